@@ -1,0 +1,54 @@
+"""The one place that knows the compiler: every compiled function takes its decorator from here.
+
+Kernels are compiled under strict floating point (no ``fastmath``: it gives other trajectories cold and cached)
+and cached on disk. Numba's own cache looks only at the file of a function and not at the files of the functions
+it calls, so the cache folder is named after a digest of all kernel sources: after an update or an edit a stale
+machine code can never be loaded.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numba
+from numba.core import config
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+_PACKAGE = Path(__file__).resolve().parent.parent
+_MARK = "rotordrop.physics._compile import kernel"
+
+
+def _kernel_sources() -> list[Path]:
+    folders = ("physics", "model", "simulation", "tracking")
+    files = (file for folder in folders for file in sorted((_PACKAGE / folder).glob("*.py")))
+    return [file for file in files if _MARK in file.read_text(encoding="utf-8")]
+
+
+@lru_cache(maxsize=1)
+def cache_folder() -> str:
+    """Folder of the compiled kernels, named after a digest of their sources and of the compiler's version."""
+    digest = hashlib.sha256(numba.__version__.encode())
+    for file in _kernel_sources():
+        digest.update(file.name.encode())
+        digest.update(file.read_bytes())
+    root = os.environ.get("NUMBA_CACHE_DIR") or os.path.join(
+        os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache"), "rotordrop"
+    )
+    return os.path.join(root, digest.hexdigest()[:16])
+
+
+def kernel(function: Function) -> Function:
+    """Compile a function with strict floating point, without the interpreter lock, cached on disk."""
+    previous = config.CACHE_DIR
+    config.CACHE_DIR = cache_folder()
+    try:
+        compiled = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=False)(function)
+    finally:
+        config.CACHE_DIR = previous
+    return cast(Function, compiled)
