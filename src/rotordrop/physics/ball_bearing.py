@@ -1,0 +1,382 @@
+"""Constants of an angular-contact ball bearing: groove geometry, Hertz stiffness, preload, rigidity, lift-off.
+
+One row under axial load carries everything a catalogue prints: the preload sets the axial offset of the
+grooves, the pair's rigidity is twice the slope of a row, the lift-off force empties the unloaded row.
+Forces of a displaced race are in `ball_bearing_response` (five degrees of freedom) and `ball_bearing_planar`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol, SupportsFloat
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.errors import UsageError
+from rotordrop.physics.hertz import compliance, contacts_in_series, race_contact
+
+Array = NDArray[np.float64]
+ArrayLike = float | Array
+Arrangement = Literal["X", "O", "tandem", "single"]
+
+_AXIAL_SIGNS: dict[str, tuple[float, ...]] = {
+    "X": (-1.0, 1.0),
+    "O": (1.0, -1.0),
+    "tandem": (1.0, 1.0),
+    "single": (1.0,),
+}
+_NEWTON_STEPS = 60
+
+
+class BallBearingDescription(Protocol):
+    """What the physics needs to know of a ball bearing: the machine's bearing and `BallBearingGeometry` fit.
+
+    Source: Neisi 2020, Fig. 1.
+    """
+
+    @property
+    def ball_diameter(self) -> SupportsFloat:
+        """Ball diameter [m]."""
+        ...
+
+    @property
+    def ball_count(self) -> int:
+        """Balls per row [1]."""
+        ...
+
+    @property
+    def pitch_diameter(self) -> SupportsFloat:
+        """Pitch diameter [m]."""
+        ...
+
+    @property
+    def contact_angle(self) -> SupportsFloat:
+        """Nominal contact angle [rad]."""
+        ...
+
+    @property
+    def conformity_inner(self) -> SupportsFloat:
+        """Groove radius of the inner race over ball diameter [1]."""
+        ...
+
+    @property
+    def conformity_outer(self) -> SupportsFloat:
+        """Groove radius of the outer race over ball diameter [1]."""
+        ...
+
+    @property
+    def ring_youngs_modulus(self) -> SupportsFloat:
+        """Young's modulus of the rings [Pa]."""
+        ...
+
+    @property
+    def ring_poisson_ratio(self) -> SupportsFloat:
+        """Poisson ratio of the rings [1]."""
+        ...
+
+    @property
+    def ball_youngs_modulus(self) -> SupportsFloat:
+        """Young's modulus of the balls [Pa]."""
+        ...
+
+    @property
+    def ball_poisson_ratio(self) -> SupportsFloat:
+        """Poisson ratio of the balls [1]."""
+        ...
+
+    @property
+    def ball_density(self) -> SupportsFloat:
+        """Density of the balls [kg/m³]."""
+        ...
+
+    @property
+    def preload(self) -> SupportsFloat:
+        """Axial preload of each row [N]."""
+        ...
+
+    @property
+    def arrangement(self) -> Arrangement:
+        """Arrangement of the rows."""
+        ...
+
+    @property
+    def first_ball_angle(self) -> SupportsFloat:
+        """Angle of the first ball from +y towards −x [rad]."""
+        ...
+
+    @property
+    def second_row_offset(self) -> SupportsFloat:
+        """Angle of the second row against the first, fraction of the ball pitch [1]."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class BallBearingGeometry:
+    """A ball bearing by plain numbers [SI]; the default materials are steel rings and silicon nitride balls.
+
+    Attributes
+    ----------
+    ball_diameter, pitch_diameter : float
+        D_w and D_pw [m].
+    ball_count : int
+        Balls per row [1].
+    contact_angle : float
+        Nominal contact angle α₀ [rad].
+    conformity_inner, conformity_outer : float
+        Groove radius over ball diameter [1].
+    ring_youngs_modulus, ball_youngs_modulus : float
+        Young's moduli [Pa].
+    ring_poisson_ratio, ball_poisson_ratio : float
+        Poisson ratios [1].
+    ball_density : float
+        Density of the balls [kg/m³].
+    preload : float
+        Axial preload of each row [N].
+    arrangement : str
+        "X" (face to face), "O" (back to back), "tandem" or "single".
+    first_ball_angle : float
+        Angle of the first ball from +y towards −x [rad].
+    second_row_offset : float
+        Angle of the second row against the first, as a fraction of the ball pitch [1].
+
+    Notes
+    -----
+    Source: Neisi 2020, Fig. 1.
+    """
+
+    ball_diameter: float
+    ball_count: int
+    pitch_diameter: float
+    contact_angle: float
+    conformity_inner: float
+    conformity_outer: float
+    ring_youngs_modulus: float = 208e9
+    ring_poisson_ratio: float = 0.3
+    ball_youngs_modulus: float = 315e9
+    ball_poisson_ratio: float = 0.26
+    ball_density: float = 3200.0
+    preload: float = 0.0
+    arrangement: Arrangement = "X"
+    first_ball_angle: float = 0.0
+    second_row_offset: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BearingConstants:
+    """Everything about a preloaded ball bearing that does not change during a drop.
+
+    Attributes
+    ----------
+    groove_distance : float
+        Distance of the groove centres A₀ of an unloaded row [m].
+    contact_angle : float
+        Nominal contact angle α₀ [rad].
+    radial_offset, axial_offset : float
+        ``A₀ cos α₀`` and ``A₀ sin α₀ + preload_approach`` [m].
+    pitch_radius : float
+        ``D_pw / 2`` [m], the arm of the tilt in kinematics and in moment.
+    inner_stiffness, outer_stiffness, ball_stiffness : float
+        Stiffness of the ball on one race and of both contacts in series, K_tot [N/m^1.5].
+    stress_coefficient_inner, stress_coefficient_outer : float
+        ``σ = coefficient · Q^(1/3)`` [Pa/N^(1/3)].
+    ball_angles : ndarray, shape (Z,)
+        Angles of the balls of the first row from +x towards +y [rad].
+    second_row_offset : float
+        Angle of the second row against the first, as a fraction of the ball pitch [1].
+    axial_signs : tuple of float
+        For each row: +1 if an axial displacement of the race along +z loads it, else −1 [1].
+    preload, preload_approach, preload_ball_load : float
+        Axial force of each row [N], its axial approach [m], the load of each ball [N].
+
+    Notes
+    -----
+    Source: Neisi 2020, eqs. (2)–(7). Differs from the paper: its equations are those of a deep-groove bearing;
+    an angular-contact row has an axial offset of the groove centres.
+    """
+
+    groove_distance: float
+    contact_angle: float
+    radial_offset: float
+    axial_offset: float
+    pitch_radius: float
+    inner_stiffness: float
+    outer_stiffness: float
+    ball_stiffness: float
+    stress_coefficient_inner: float
+    stress_coefficient_outer: float
+    ball_angles: Array
+    second_row_offset: float
+    axial_signs: tuple[float, ...]
+    preload: float
+    preload_approach: float
+    preload_ball_load: float
+
+    @property
+    def row_count(self) -> int:
+        """Number of rows [1]. Source: definition."""
+        return len(self.axial_signs)
+
+    @property
+    def ball_count(self) -> int:
+        """Balls of one row [1]. Source: definition."""
+        return len(self.ball_angles)
+
+    @property
+    def row_ball_angles(self) -> Array:
+        """Angles of all balls from +x towards +y [rad]; shape (rows, Z). Source: definition."""
+        shift = self.second_row_offset * 2.0 * math.pi / self.ball_count
+        return self.ball_angles + shift * np.arange(self.row_count)[:, None]
+
+
+def row_axial_force(s: ArrayLike, ZK: ArrayLike, A_0: ArrayLike, alpha_0: ArrayLike) -> Any:
+    """Axial force [N] of one row at an axial approach s ≥ 0 of its rings.
+
+    Parameters
+    ----------
+    s : float or ndarray
+        Axial approach from the position in which the balls just touch [m].
+    ZK : float or ndarray
+        Number of balls times K_tot [N/m^1.5].
+    A_0 : float or ndarray
+        Distance of the unloaded groove centres [m].
+    alpha_0 : float or ndarray
+        Nominal contact angle [rad].
+
+    Returns
+    -------
+    float or ndarray
+        ``Z K δ^1.5 sin φ`` [N] with the contact angle φ under load.
+
+    Notes
+    -----
+    Source: Neisi 2020, eqs. (3)–(6), for an axial displacement.
+    """
+    axial = A_0 * np.sin(alpha_0) + s
+    A = np.hypot(A_0 * np.cos(alpha_0), axial)
+    return ZK * _elongation(s, A, A_0, alpha_0) ** 1.5 * axial / A
+
+
+def row_axial_stiffness(s: ArrayLike, ZK: ArrayLike, A_0: ArrayLike, alpha_0: ArrayLike) -> Any:
+    """Slope dF/ds [N/m] of `row_axial_force`, with the same arguments.
+
+    Source: Neisi 2020, eqs. (3)–(6), differentiated; the change of the contact angle is included.
+    """
+    axial = A_0 * np.sin(alpha_0) + s
+    A = np.hypot(A_0 * np.cos(alpha_0), axial)
+    delta = _elongation(s, A, A_0, alpha_0)
+    sine = axial / A
+    return ZK * np.sqrt(delta) * (1.5 * sine**2 + delta / A * (1.0 - sine**2))
+
+
+def row_approach(F: ArrayLike, ZK: ArrayLike, A_0: ArrayLike, alpha_0: ArrayLike) -> Any:
+    """Axial approach [m] at which one row carries an axial force F ≥ 0 [N].
+
+    The other arguments are those of `row_axial_force`. Newton's method on ``F^(2/3)``, nearly a straight line, from a bound above the root.
+    Source: inverse of Neisi 2020, eqs. (3)–(6), for an axial displacement.
+    """
+    F, ZK, A_0, alpha_0 = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in (F, ZK, A_0, alpha_0)))
+    sine = np.maximum(np.sin(alpha_0), 1e-9)
+    s = np.minimum((F / (ZK * sine**2.5)) ** (2.0 / 3.0), (F / ZK * A_0 * (2.0 * A_0) ** 1.5) ** 0.25)
+    for _ in range(_NEWTON_STEPS):
+        force = row_axial_force(s, ZK, A_0, alpha_0)
+        slope = row_axial_stiffness(s, ZK, A_0, alpha_0)
+        gain = 1.5 * (force - np.cbrt(force) * np.cbrt(F) ** 2)
+        step = np.divide(gain, slope, out=np.zeros_like(s), where=slope > 0.0)
+        s = np.maximum(s - step, 0.0)
+        if np.all(np.abs(step) <= 1e-15 * s):
+            break
+    return s[()]
+
+
+def bearing_constants(bearing: BallBearingDescription) -> BearingConstants:
+    """Constants of a touchdown bearing: groove offsets, contact stiffness, stress coefficients, preload.
+
+    Returns SI values; array shapes in `BearingConstants`.
+    Source: Neisi 2020, eqs. (2)–(7), in the algebraic form ``δ = A − A₀``.
+    """
+    D_w, D_pw = float(bearing.ball_diameter), float(bearing.pitch_diameter)
+    alpha = float(bearing.contact_angle)
+    f_i, f_o = float(bearing.conformity_inner), float(bearing.conformity_outer)
+    eta = compliance(
+        float(bearing.ring_youngs_modulus),
+        float(bearing.ring_poisson_ratio),
+        float(bearing.ball_youngs_modulus),
+        float(bearing.ball_poisson_ratio),
+    )
+    inner = race_contact(D_w, D_pw, f_i, alpha, eta, inner=True)
+    outer = race_contact(D_w, D_pw, f_o, alpha, eta, inner=False)
+    K = float(contacts_in_series(inner.stiffness, outer.stiffness))
+    Z, A_0, F_V = int(bearing.ball_count), (f_i + f_o - 1.0) * D_w, float(bearing.preload)
+    s = float(row_approach(F_V, Z * K, A_0, alpha))
+    radial, axial = A_0 * math.cos(alpha), A_0 * math.sin(alpha) + s
+    return BearingConstants(
+        groove_distance=A_0,
+        contact_angle=alpha,
+        radial_offset=radial,
+        axial_offset=axial,
+        pitch_radius=0.5 * D_pw,
+        inner_stiffness=float(inner.stiffness),
+        outer_stiffness=float(outer.stiffness),
+        ball_stiffness=K,
+        stress_coefficient_inner=float(inner.stress_coefficient),
+        stress_coefficient_outer=float(outer.stress_coefficient),
+        ball_angles=0.5 * math.pi + float(bearing.first_ball_angle) + np.arange(Z) * (2.0 * math.pi / Z),
+        second_row_offset=float(bearing.second_row_offset),
+        axial_signs=_AXIAL_SIGNS[bearing.arrangement],
+        preload=F_V,
+        preload_approach=s,
+        preload_ball_load=F_V * math.hypot(radial, axial) / (Z * axial) if F_V > 0.0 else 0.0,
+    )
+
+
+def axial_rigidity(constants: BearingConstants) -> float:
+    """Axial rigidity [N/m] of a preloaded X or O pair, as catalogues print it: 2 dF/ds of a row.
+
+    Source: tangent at zero external load; reproduces the FAG and GMN spindle bearing tables.
+    """
+    _require_pair(constants, "axial rigidity")
+    return 2.0 * float(row_axial_stiffness(constants.preload_approach, *_row(constants)))
+
+
+def lift_off_force(constants: BearingConstants) -> float:
+    """Axial load [N] on an X or O pair at which the unloaded row has lost its last contact force.
+
+    The loaded row has then twice the approach of the preload.
+    Source: definition in the FAG spindle bearing catalogue.
+    """
+    _require_pair(constants, "lift-off force")
+    return float(row_axial_force(2.0 * constants.preload_approach, *_row(constants)))
+
+
+def ball_centrifugal_force(bearing: BallBearingDescription, omega_i: ArrayLike) -> Any:
+    """Centrifugal force [N] of one ball while the inner race turns at ω_i [rad/s].
+
+    ``½ m_b D_pw ω_c²`` with the cage speed ``ω_c = ½ ω_i (1 − γ)``. It loads the outer race only.
+    Source: Harris, Rolling Bearing Analysis. Differs from the paper, which neglects it; our drops neglect it
+    too, and `rotordrop check` compares it with the preload ball load.
+    """
+    D_w, D_pw = float(bearing.ball_diameter), float(bearing.pitch_diameter)
+    mass = float(bearing.ball_density) * math.pi / 6.0 * D_w**3
+    gamma = D_w * math.cos(float(bearing.contact_angle)) / D_pw
+    return 0.5 * mass * D_pw * np.square(0.5 * omega_i * (1.0 - gamma))
+
+
+def _elongation(s: ArrayLike, A: ArrayLike, A_0: ArrayLike, alpha_0: ArrayLike) -> Any:
+    """``A − A₀`` [m] without the cancellation of the difference; zero where the balls are loose."""
+    return np.maximum(s * (2.0 * A_0 * np.sin(alpha_0) + s) / (A + A_0), 0.0)
+
+
+def _row(constants: BearingConstants) -> tuple[float, float, float]:
+    stiffness = constants.ball_count * constants.ball_stiffness
+    return stiffness, constants.groove_distance, constants.contact_angle
+
+
+def _require_pair(constants: BearingConstants, quantity: str) -> None:
+    if sum(constants.axial_signs) != 0.0:
+        arrangement = "a single row" if constants.row_count == 1 else "a tandem pair"
+        raise UsageError(
+            f"the {quantity} is defined for a preloaded pair in X or O arrangement, not for {arrangement}; "
+            'set the arrangement of the bearing to "X" or "O"'
+        )

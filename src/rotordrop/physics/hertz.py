@@ -1,0 +1,221 @@
+"""Hertz contact of ball and race: from curvatures to stiffness, contact ellipse and pressure.
+
+The exact solution with complete elliptic integrals. The curvatures decide the shape of the ellipse, the two
+materials only its scale, so that ceramic balls on steel rings need nothing special.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ellipe, elliprd
+
+Array = NDArray[np.float64]
+ArrayLike = float | Array
+
+_SECANT_STEPS = 40
+_PALMGREN = 3.84e-5
+"""Palmgren's line contact ``δ = 3.84e-5 Q^0.9 / l^0.8`` in millimetre and newton."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contact:
+    """Point contact of two bodies, ready to be loaded: all its laws are powers of the load.
+
+    Attributes
+    ----------
+    curvature_sum : float or ndarray
+        Σρ [1/m].
+    curvature_difference : float or ndarray
+        F(ρ) [1], zero for a circular contact.
+    stiffness : float or ndarray
+        ``Q = stiffness · δ^1.5`` [N/m^1.5].
+    semi_major_coefficient, semi_minor_coefficient : float or ndarray
+        ``a, b = coefficient · Q^(1/3)`` [m/N^(1/3)].
+
+    Notes
+    -----
+    Source: Hertz; Harris, Rolling Bearing Analysis, chapter on contact stress and deformation.
+    """
+
+    curvature_sum: ArrayLike
+    curvature_difference: ArrayLike
+    stiffness: ArrayLike
+    semi_major_coefficient: ArrayLike
+    semi_minor_coefficient: ArrayLike
+
+    @property
+    def ellipticity(self) -> ArrayLike:
+        """Ratio of the semi-axes a/b [1]. Source: definition."""
+        return self.semi_major_coefficient / self.semi_minor_coefficient
+
+    @property
+    def stress_coefficient(self) -> ArrayLike:
+        """Largest pressure per cube root of the load [Pa/N^(1/3)]. Source: Neisi 2020, eq. (7)."""
+        return 1.5 / (math.pi * self.semi_major_coefficient * self.semi_minor_coefficient)
+
+    def semi_axes(self, Q: ArrayLike) -> tuple[ArrayLike, ArrayLike]:
+        """Half length and half width [m] of the contact ellipse under a load [N].
+
+        Source: Harris, Rolling Bearing Analysis.
+        """
+        root = np.cbrt(Q)
+        return self.semi_major_coefficient * root, self.semi_minor_coefficient * root
+
+    def approach(self, Q: ArrayLike) -> ArrayLike:
+        """Approach of the two bodies [m] under a load [N]. Source: inverse of Neisi 2020, eq. (6)."""
+        return (Q / self.stiffness) ** (2.0 / 3.0)
+
+    def maximum_pressure(self, Q: ArrayLike) -> ArrayLike:
+        """Largest Hertz pressure [Pa], at the centre of the ellipse, under a load [N].
+
+        Source: Neisi 2020, eq. (7); a* and b* there are the dimensional semi-axes.
+        """
+        return self.stress_coefficient * np.cbrt(Q)
+
+
+def curvature_difference_of_ellipticity(kappa: ArrayLike) -> Any:
+    """Curvature difference F(ρ) [1] of a contact ellipse with the axis ratio κ = a/b ≥ 1 [1].
+
+    The textbook form ``((κ²+1) E − 2 K) / ((κ²−1) E)`` written with Carlson's integrals, which stays exact
+    down to the circle. Source: Harris, Rolling Bearing Analysis, with DLMF 19.25.
+    """
+    q = 1.0 / np.square(kappa)
+    return q * (elliprd(0.0, 1.0, q) - elliprd(0.0, q, 1.0)) / (3.0 * ellipe(1.0 - q))
+
+
+def ellipticity(F_rho: ArrayLike) -> Any:
+    """Axis ratio κ = a/b ≥ 1 [1] of the contact ellipse whose curvature difference is F(ρ) [1].
+
+    Solved by secants in ``ln κ`` against ``atanh F``, nearly a straight line.
+    Source: inverse of `curvature_difference_of_ellipticity`.
+    """
+    wanted = np.arctanh(np.asarray(F_rho, dtype=float))
+    x_old, x = np.zeros_like(wanted), wanted / 0.75
+    f_old = -wanted
+    for _ in range(_SECANT_STEPS):
+        f = np.arctanh(curvature_difference_of_ellipticity(np.exp(x))) - wanted
+        slope = f - f_old
+        step = np.divide(f * (x - x_old), slope, out=np.zeros_like(x), where=slope != 0.0)
+        x_old, f_old, x = x, f, np.maximum(x - step, 0.0)
+        if np.all(np.abs(step) <= 1e-15 * (1.0 + x)):
+            break
+    return np.exp(x)[()]
+
+
+def contact_parameters(F_rho: ArrayLike) -> tuple[Any, Any, Any]:
+    """Dimensionless contact parameters a*, b*, δ* [1] of a curvature difference F(ρ) [1].
+
+    Source: Harris, Rolling Bearing Analysis, table of dimensionless contact parameters.
+    """
+    kappa = ellipticity(F_rho)
+    q = 1.0 / np.square(kappa)
+    E = ellipe(1.0 - q)
+    K = E + (1.0 - q) * elliprd(0.0, q, 1.0) / 3.0
+    a_star = np.cbrt(2.0 * kappa**2 * E / math.pi)
+    b_star = np.cbrt(2.0 * E / (math.pi * kappa))
+    delta_star = (2.0 * K / math.pi) * np.cbrt(math.pi / (2.0 * kappa**2 * E))
+    return a_star, b_star, delta_star
+
+
+def compliance(E_1: float, nu_1: float, E_2: float, nu_2: float) -> float:
+    """Contact compliance of a material pair [1/Pa], ``(1 − ν₁²)/E₁ + (1 − ν₂²)/E₂``.
+
+    Young's moduli [Pa], Poisson ratios [1]. Source: Johnson, Contact Mechanics, ch. 4.
+    """
+    return (1.0 - nu_1**2) / E_1 + (1.0 - nu_2**2) / E_2
+
+
+def point_contact(curvature_sum: ArrayLike, curvature_difference: ArrayLike, eta: float) -> Contact:
+    """Stiffness and ellipse of a contact: curvature sum [1/m] and difference [1], material compliance [1/Pa].
+
+    Source: Harris, Rolling Bearing Analysis, ch. on contact stress; Neisi 2020, eqs. (6) and (7).
+    """
+    a_star, b_star, delta_star = contact_parameters(curvature_difference)
+    scale = np.cbrt(1.5 * eta / curvature_sum)
+    return Contact(
+        curvature_sum=curvature_sum,
+        curvature_difference=curvature_difference,
+        stiffness=(0.5 * delta_star * scale**2 * curvature_sum) ** -1.5,
+        semi_major_coefficient=a_star * scale,
+        semi_minor_coefficient=b_star * scale,
+    )
+
+
+def race_curvatures(
+    D_w: ArrayLike, D_pw: ArrayLike, f: ArrayLike, alpha: ArrayLike, *, inner: bool
+) -> tuple[ArrayLike, ArrayLike]:
+    """Curvature sum Σρ [1/m] and difference F(ρ) [1] of ball and race.
+
+    Parameters
+    ----------
+    D_w, D_pw : float or ndarray
+        Ball and pitch diameter [m].
+    f : float or ndarray
+        Groove conformity, groove radius over ball diameter [1].
+    alpha : float or ndarray
+        Nominal contact angle [rad].
+    inner : bool
+        Inner race (convex along the rolling direction) or outer race (concave).
+
+    Returns
+    -------
+    tuple of float or ndarray
+        Σρ [1/m], F(ρ) [1].
+
+    Notes
+    -----
+    Source: Harris, Rolling Bearing Analysis, eqs. for ball-raceway curvature.
+    """
+    gamma = D_w * np.cos(alpha) / D_pw
+    rolling = 2.0 * gamma / (1.0 - gamma) if inner else -2.0 * gamma / (1.0 + gamma)
+    total = 4.0 - 1.0 / f + rolling
+    return total / D_w, (1.0 / f + rolling) / total
+
+
+def race_contact(
+    D_w: ArrayLike, D_pw: ArrayLike, f: ArrayLike, alpha: ArrayLike, eta: float, *, inner: bool
+) -> Contact:
+    """Contact of a ball with the inner or outer race; arguments as in `race_curvatures`, compliance [1/Pa].
+
+    Source: Harris, Rolling Bearing Analysis; Neisi 2020, eqs. (6) and (7).
+    """
+    return point_contact(*race_curvatures(D_w, D_pw, f, alpha, inner=inner), eta)
+
+
+def circular_contact(R_1: float, R_2: float, eta: float) -> Contact:
+    """Contact of two spheres of radius [m] and compliance [1/Pa]; an infinite radius is a plane.
+
+    Source: Johnson, Contact Mechanics, ch. 4.
+    """
+    return point_contact(2.0 * (1.0 / R_1 + 1.0 / R_2), 0.0, eta)
+
+
+def contacts_in_series(K_i: ArrayLike, K_o: ArrayLike) -> ArrayLike:
+    """Stiffness [N/m^1.5] of two Hertz contacts that carry the same load, inner and outer [N/m^1.5].
+
+    ``K_tot = (K_i^(−2/3) + K_o^(−2/3))^(−3/2)``.
+    Source: Harris, Rolling Bearing Analysis; Neisi 2020, eq. (6).
+    """
+    return (K_i ** (-2.0 / 3.0) + K_o ** (-2.0 / 3.0)) ** -1.5
+
+
+def line_contact_stiffness(length: float) -> float:
+    """Stiffness [N/m^(10/9)] of a line contact of a given length [m], with the exponent 10/9 of Neisi 2020.
+
+    Source: Palmgren, ``δ = 3.84e-5 Q^0.9 / l^0.8`` (mm, N). Differs from the paper: it says "Hertzian model".
+    """
+    per_load = 1e-3 * _PALMGREN / (1e3 * length) ** 0.8
+    return float(per_load ** (-10.0 / 9.0))
+
+
+def line_contact_approach(Q: float, length: float) -> float:
+    """Approach [m] of a line contact under a load [N] and of a given length [m].
+
+    Source: Palmgren, ``δ = 3.84e-5 Q^0.9 / l^0.8`` (mm, N).
+    """
+    return 1e-3 * _PALMGREN * Q**0.9 / float((1e3 * length) ** 0.8)
