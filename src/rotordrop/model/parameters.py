@@ -1,0 +1,259 @@
+"""From the description of a machine to the flat arrays the compiled drop model works on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.model import layout as L
+from rotordrop.model.assembly import RotorFE, build_rotor_fe
+from rotordrop.model.reduction import Reduction, RotorBasis, reduce_rotor
+from rotordrop.model.statics import bearing_load_shares
+from rotordrop.physics import aerodynamics
+from rotordrop.physics.ball_bearing import BearingConstants, bearing_constants
+from rotordrop.physics.ball_bearing_planar import planar_ball_gradient
+
+Array = NDArray[np.float64]
+LANES = 8
+
+
+class KernelParameters(NamedTuple):
+    """Everything the right-hand side reads, as flat arrays in SI units; m modes, B bearings, A magnets, Z balls.
+
+    Columns and entries are named in `rotordrop.model.layout`.
+    """
+
+    eigenvalue: Array
+    damping: Array
+    polar: Array
+    gravity: Array
+    unbalance_cos: Array
+    unbalance_sin: Array
+    bearing_shape: Array
+    bearing: Array
+    ball_cos: Array
+    ball_sin: Array
+    ball_weight: Array
+    magnet_shape: Array
+    magnet: Array
+    spin: Array
+    flags: NDArray[np.int64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class DropModel:
+    """A machine made ready for the time loop: finite elements, reduced basis, kernel arrays and state layout."""
+
+    machine: Machine
+    fe: RotorFE
+    basis: RotorBasis
+    parameters: KernelParameters
+    layout: L.StateLayout
+    load_shares: Array
+
+    def with_values(self, values: Mapping[str, float]) -> DropModel:
+        """The same model with other parameter values, by path such as ``"NDE.support.stiffness"`` (SI).
+
+        Only what changes is computed again; the rotor and its basis are kept.
+        """
+        machine = self.machine.with_values(values)
+        return replace(self, machine=machine, parameters=_with_machine(self, machine))
+
+    @property
+    def bearing_names(self) -> tuple[str, ...]:
+        """Names of the touchdown bearings, in the order of every bearing axis."""
+        return tuple(bearing.name for bearing in self.machine.touchdown_bearings)
+
+
+def build_drop_model(machine: Machine, reduction: str | Reduction = "accurate") -> DropModel:
+    """Assemble, reduce and flatten a machine for the time loop.
+
+    Parameters
+    ----------
+    machine : Machine
+        What the machine is.
+    reduction : str or Reduction
+        ``"accurate"`` (14 modes + attachment), ``"quick"`` (6 + attachment), ``"full"`` or an own choice.
+    """
+    fe = build_rotor_fe(machine)
+    nodes = tuple(bearing.node for bearing in machine.touchdown_bearings)
+    basis = reduce_rotor(fe, reduction, nodes)
+    shares = np.asarray(bearing_load_shares(machine), dtype=np.float64)
+    layout = L.StateLayout(n_modes=basis.shapes.shape[1], n_bearings=len(nodes))
+    return DropModel(
+        machine=machine,
+        fe=fe,
+        basis=basis,
+        parameters=_kernel_parameters(machine, fe, basis, shares),
+        layout=layout,
+        load_shares=shares,
+    )
+
+
+def _rows(basis: RotorBasis, nodes: list[int]) -> Array:
+    if not nodes:
+        return np.zeros((0, basis.shapes.shape[1]))
+    return np.ascontiguousarray([basis.node_row(node) for node in nodes], dtype=np.float64)
+
+
+def _kernel_parameters(machine: Machine, fe: RotorFE, basis: RotorBasis, shares: Array) -> KernelParameters:
+    m = basis.shapes.shape[1]
+    bearings = machine.touchdown_bearings
+    magnet = np.zeros((len(machine.ambs), L.N_MAGNET_COLUMNS))
+    for a, amb in enumerate(machine.ambs):
+        magnet[a, L.AMB_STIFFNESS] = float(amb.stiffness)
+        magnet[a, L.AMB_DAMPING] = float(amb.damping)
+    lift = np.zeros(fe.mass.shape[0])
+    lift[0::2] = 1.0
+    ball_cos, ball_sin, ball_weight = _ball_arrays([bearing_constants(b.bearing) for b in bearings])
+    unbalance_cos, unbalance_sin = _unbalance(machine, basis)
+    return KernelParameters(
+        eigenvalue=np.ascontiguousarray(basis.eigenvalues, dtype=np.float64),
+        damping=np.ascontiguousarray(np.diag(basis.damping), dtype=np.float64),
+        polar=np.ascontiguousarray(basis.polar, dtype=np.float64).reshape(m, m),
+        gravity=-float(machine.gravity) * (basis.shapes.T @ (fe.mass @ lift)),
+        unbalance_cos=unbalance_cos,
+        unbalance_sin=unbalance_sin,
+        bearing_shape=_rows(basis, [b.node for b in bearings]),
+        bearing=np.array([bearing_row(b, w) for b, w in zip(bearings, shares, strict=True)]),
+        ball_cos=ball_cos,
+        ball_sin=ball_sin,
+        ball_weight=ball_weight,
+        magnet_shape=_rows(basis, [amb.node for amb in machine.ambs]),
+        magnet=magnet,
+        spin=_spin(machine, fe),
+        flags=np.array([aerodynamics.OFF, 0], dtype=np.int64),
+    )
+
+
+def _with_machine(model: DropModel, machine: Machine) -> KernelParameters:
+    bearings = machine.touchdown_bearings
+    ball_cos, ball_sin, ball_weight = _ball_arrays([bearing_constants(b.bearing) for b in bearings])
+    unbalance_cos, unbalance_sin = _unbalance(machine, model.basis)
+    spin = _spin(machine, model.fe)
+    return model.parameters._replace(
+        bearing=np.array([bearing_row(b, w) for b, w in zip(bearings, model.load_shares, strict=True)]),
+        ball_cos=ball_cos,
+        ball_sin=ball_sin,
+        ball_weight=ball_weight,
+        unbalance_cos=unbalance_cos,
+        unbalance_sin=unbalance_sin,
+        spin=spin,
+    )
+
+
+def _spin(machine: Machine, fe: RotorFE) -> Array:
+    spin = np.zeros(L.N_SPIN_ENTRIES)
+    spin[L.POLAR_INERTIA] = fe.polar_inertia
+    speed = machine.speed
+    spin[L.AERO_TIME_CONSTANT] = np.inf if speed.aero_time_constant is None else float(speed.aero_time_constant)
+    spin[L.AERO_LINEAR] = 0.0 if speed.aero_linear is None else float(speed.aero_linear)
+    spin[L.AERO_QUADRATIC] = 0.0 if speed.aero_quadratic is None else float(speed.aero_quadratic)
+    return spin
+
+
+def _unbalance(machine: Machine, basis: RotorBasis) -> tuple[Array, Array]:
+    """Modal unbalance vectors; the phase is measured from +y, so 90° is added to get it from +x."""
+    cosine = np.zeros(basis.shapes.shape[1])
+    sine = np.zeros_like(cosine)
+    for unbalance in machine.unbalances:
+        angle = float(unbalance.phase) + 0.5 * math.pi
+        row = basis.node_row(unbalance.node)
+        cosine += float(unbalance.amount) * math.cos(angle) * row
+        sine += float(unbalance.amount) * math.sin(angle) * row
+    return cosine, sine
+
+
+def _ball_arrays(constants: list[BearingConstants]) -> tuple[Array, Array, Array]:
+    """Directions of the balls, rows that coincide merged by weight, padded to whole lanes."""
+    entries = [_merged_angles(c) for c in constants]
+    longest = max((len(angles) for angles, _ in entries), default=0)
+    width = LANES * max(1, -(-longest // LANES))
+    cosine = np.ones((len(entries), width))
+    sine = np.zeros((len(entries), width))
+    weight = np.zeros((len(entries), width))
+    for b, (angles, counts) in enumerate(entries):
+        cosine[b, : len(angles)] = np.cos(angles)
+        sine[b, : len(angles)] = np.sin(angles)
+        weight[b, : len(angles)] = counts
+    return cosine, sine, weight
+
+
+def _merged_angles(constants: BearingConstants) -> tuple[Array, Array]:
+    first = np.asarray(constants.ball_angles, dtype=np.float64)
+    if constants.row_count == 1:
+        return first, np.ones(len(first))
+    if constants.second_row_offset == 0.0:
+        return first, np.full(len(first), float(constants.row_count))
+    shift = constants.second_row_offset * 2.0 * math.pi / len(first)
+    both = np.concatenate([first, first + shift])
+    return both, np.ones(len(both))
+
+
+def bearing_row(bearing: TouchdownBearing, static_load: float) -> Array:
+    """One row of `KernelParameters.bearing` [SI], with the bearing damping from the tangent stiffness at a load [N]."""
+    constants = bearing_constants(bearing.bearing)
+    row = np.zeros(L.N_BEARING_COLUMNS)
+    gap = float(bearing.air_gap)
+    row[L.AIR_GAP] = gap
+    row[L.BORE_RADIUS] = float(bearing.bore_radius)
+    row[L.ROTOR_RADIUS] = float(bearing.bore_radius) - gap
+    row[L.CONTACT_STIFFNESS] = float(bearing.contact.stiffness)
+    row[L.CONTACT_EXPONENT] = float(bearing.contact.exponent)
+    row[L.CONTACT_DAMPING] = float(bearing.contact.damping)
+    row[L.FRICTION_STATIC] = float(bearing.friction.static)
+    row[L.FRICTION_DYNAMIC] = float(bearing.friction.dynamic)
+    row[L.STRIBECK_SPEED] = float(bearing.friction.stribeck_speed)
+    row[L.SMOOTHING_SPEED] = float(bearing.friction.smoothing_speed)
+    row[L.RACE_MASS] = float(bearing.race.mass)
+    row[L.RACE_INERTIA] = float(bearing.race.inertia)
+    row[L.DRAG_COEFFICIENT] = float(bearing.race.drag_coefficient)
+    row[L.DRAG_SPEED] = float(bearing.race.drag_speed)
+    row[L.PITCH_DIAMETER] = float(bearing.bearing.pitch_diameter)
+    row[L.BALL_STIFFNESS] = constants.ball_stiffness
+    row[L.GROOVE_DISTANCE] = constants.groove_distance
+    row[L.RADIAL_OFFSET] = constants.radial_offset
+    row[L.AXIAL_OFFSET] = constants.axial_offset
+    row[L.STRESS_COEFFICIENT] = constants.stress_coefficient_inner
+    row[L.BEARING_DAMPING] = float(bearing.damping_time) * static_bearing_stiffness(constants, static_load)
+    support = bearing.support
+    row[L.SUPPORT_MASS_X] = float(support.mass_horizontal)
+    row[L.SUPPORT_MASS_Y] = float(support.mass)
+    row[L.SUPPORT_STIFFNESS_X] = float(support.stiffness_horizontal)
+    row[L.SUPPORT_STIFFNESS_Y] = float(support.stiffness)
+    row[L.SUPPORT_DAMPING_X] = float(support.damping_horizontal)
+    row[L.SUPPORT_DAMPING_Y] = float(support.damping)
+    return row
+
+
+def static_deflection(constants: BearingConstants, load: float) -> tuple[float, float]:
+    """Downward deflection [m] of the race under a vertical load [N], and the tangent stiffness there [N/m]."""
+    cosine, sine, weight = (array[0] for array in _ball_arrays([constants]))
+    geometry = (
+        constants.radial_offset,
+        constants.axial_offset,
+        constants.groove_distance,
+        constants.ball_stiffness,
+        cosine,
+        sine,
+        weight,
+    )
+    dy = 0.0
+    for _ in range(50):
+        _, force, _, _, stiffness = planar_ball_gradient(0.0, dy, *geometry)
+        step = (-load - force) / stiffness
+        dy += step
+        if abs(step) < 1e-18:
+            break
+    return -dy, float(planar_ball_gradient(0.0, dy, *geometry)[4])
+
+
+def static_bearing_stiffness(constants: BearingConstants, load: float) -> float:
+    """Tangent radial stiffness [N/m] of the ball set at the deflection of a static load [N], straight down."""
+    return static_deflection(constants, load)[1]

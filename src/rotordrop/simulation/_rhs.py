@@ -1,0 +1,244 @@
+"""Right-hand side of a drop: rotor modes, contact, friction, races, balls, supports, spin.
+
+Numbers below, names above: everything arrives as the flat arrays of `rotordrop.model.parameters.KernelParameters`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.model import layout as L
+from rotordrop.model.parameters import KernelParameters
+from rotordrop.physics import aerodynamics
+from rotordrop.physics._compile import kernel
+from rotordrop.physics.aerodynamics import exponential_deceleration, speed_dependent_deceleration
+from rotordrop.physics.ball_bearing_planar import planar_ball_force
+from rotordrop.physics.contact import hunt_crossley_force
+from rotordrop.physics.friction import stribeck_coefficient
+from rotordrop.physics.remanence import remanent_fraction
+from rotordrop.physics.spin import race_drag_torque, surface_speed
+
+Array = NDArray[np.float64]
+PRESCRIBED = aerodynamics.PRESCRIBED_SPEED
+IN_TIME = aerodynamics.EXPONENTIAL_IN_TIME
+OF_SPEED = aerodynamics.FUNCTION_OF_SPEED
+
+
+@kernel
+def project(shape: Array, amplitudes: Array) -> float:
+    """Physical displacement or velocity of a node from modal amplitudes: one row of mode shapes times amplitudes."""
+    total = 0.0
+    for k in range(shape.shape[0]):
+        total += shape[k] * amplitudes[k]
+    return total
+
+
+@kernel
+def contact_state(
+    ux: float, uy: float, vx: float, vy: float, omega: float, omega_i: float, bearing: Array
+) -> tuple[float, float, float, float, float, float]:
+    """Contact of rotor and race from their relative displacement [m] and velocity [m/s].
+
+    Returns indentation [m], normal force [N], signed friction coefficient [1], normal (x, y) [1] from race to rotor,
+    and relative surface speed [m/s]. The tangent is the normal turned by 90° in the sense of positive spin.
+    """
+    e_r = math.sqrt(ux * ux + uy * uy)
+    delta = e_r - bearing[L.AIR_GAP]
+    if delta <= 0.0:
+        return delta, 0.0, 0.0, 0.0, 0.0, 0.0
+    nx = ux / e_r
+    ny = uy / e_r
+    delta_dot = vx * nx + vy * ny
+    F_r = hunt_crossley_force(
+        delta, delta_dot, bearing[L.CONTACT_STIFFNESS], bearing[L.CONTACT_EXPONENT], bearing[L.CONTACT_DAMPING]
+    )
+    v_t = surface_speed(
+        vy * nx - vx * ny, omega, bearing[L.ROTOR_RADIUS], omega_i, bearing[L.BORE_RADIUS]
+    )
+    mu = stribeck_coefficient(
+        v_t,
+        bearing[L.FRICTION_STATIC],
+        bearing[L.FRICTION_DYNAMIC],
+        bearing[L.STRIBECK_SPEED],
+        bearing[L.SMOOTHING_SPEED],
+    )
+    return delta, F_r, mu, nx, ny, v_t
+
+
+@kernel
+def add_rotor_accelerations(
+    y: Array, omega: float, omega_dot: float, p: KernelParameters, dy: Array
+) -> tuple[float, float]:
+    """Add modal accelerations from stiffness, damping, gyroscopics, unbalance and gravity.
+
+    Returns the power dissipated by modal damping and the power put in by unbalance and spin-up [W].
+    """
+    m = p.eigenvalue.shape[0]
+    n_q = 2 * m + 4 * p.bearing.shape[0]
+    c = math.cos(y[2 * n_q + p.bearing.shape[0] + 1])
+    s = math.sin(y[2 * n_q + p.bearing.shape[0] + 1])
+    w2 = omega * omega
+    along = w2 * c + omega_dot * s
+    across = w2 * s - omega_dot * c
+    dissipated = 0.0
+    put_in = 0.0
+    for k in range(m):
+        gx = 0.0
+        gy = 0.0
+        for j in range(m):
+            gx += p.polar[k, j] * (omega * y[n_q + m + j] + omega_dot * y[m + j])
+            gy += p.polar[k, j] * (omega * y[n_q + j] + omega_dot * y[j])
+        vx = y[n_q + k]
+        vy = y[n_q + m + k]
+        fx = p.unbalance_cos[k] * along - p.unbalance_sin[k] * across
+        fy = p.unbalance_cos[k] * across + p.unbalance_sin[k] * along
+        dy[n_q + k] += fx - p.eigenvalue[k] * y[k] - p.damping[k] * vx - gx
+        dy[n_q + m + k] += fy + p.gravity[k] - p.eigenvalue[k] * y[m + k] - p.damping[k] * vy + gy
+        dissipated += p.damping[k] * (vx * vx + vy * vy)
+        put_in += (fx - gx) * vx + (fy + gy) * vy
+    return dissipated, put_in
+
+
+@kernel
+def add_magnet_forces(t: float, y: Array, p: KernelParameters, dy: Array) -> float:
+    """Add holding, spring, damper and remanent forces of the AMBs; returns the power they put in [W]."""
+    m = p.eigenvalue.shape[0]
+    n_q = 2 * m + 4 * p.bearing.shape[0]
+    holds = t < p.spin[L.POWER_OFF_DELAY]
+    left = remanent_fraction(t, p.spin[L.POWER_OFF_DELAY], p.spin[L.REMANENCE_TIME_CONSTANT])
+    put_in = 0.0
+    for a in range(p.magnet.shape[0]):
+        shape = p.magnet_shape[a]
+        vx = project(shape, y[n_q : n_q + m])
+        vy = project(shape, y[n_q + m : n_q + 2 * m])
+        fx = left * p.magnet[a, L.REMANENT_X]
+        fy = left * p.magnet[a, L.REMANENT_Y]
+        if holds:
+            ux = project(shape, y[:m]) - p.magnet[a, L.AMB_REFERENCE_X]
+            uy = project(shape, y[m : 2 * m]) - p.magnet[a, L.AMB_REFERENCE_Y]
+            fx += p.magnet[a, L.HOLDING_X] - p.magnet[a, L.AMB_STIFFNESS] * ux - p.magnet[a, L.AMB_DAMPING] * vx
+            fy += p.magnet[a, L.HOLDING_Y] - p.magnet[a, L.AMB_STIFFNESS] * uy - p.magnet[a, L.AMB_DAMPING] * vy
+        for k in range(m):
+            dy[n_q + k] += shape[k] * fx
+            dy[n_q + m + k] += shape[k] * fy
+        put_in += fx * vx + fy * vy
+    return put_in
+
+
+@kernel
+def bearing_accelerations(
+    b: int, y: Array, omega: float, p: KernelParameters, dy: Array, work: Array
+) -> tuple[float, float]:
+    """Forces at one touchdown bearing, added to rotor, race, support and spin.
+
+    Returns the friction torque on the rotor [N m] (positive drives it) and the power dissipated [W].
+    """
+    m = p.eigenvalue.shape[0]
+    n_b = p.bearing.shape[0]
+    n_q = 2 * m + 4 * n_b
+    row = p.bearing[b]
+    shape = p.bearing_shape[b]
+    r = 2 * m + 2 * b
+    h = r + 2 * n_b
+    spin = 2 * n_q + b
+    ux = project(shape, y[:m]) - y[r]
+    uy = project(shape, y[m : 2 * m]) - y[r + 1]
+    vx = project(shape, y[n_q : n_q + m]) - y[n_q + r]
+    vy = project(shape, y[n_q + m : n_q + 2 * m]) - y[n_q + r + 1]
+    delta, F_r, mu, nx, ny, v_t = contact_state(ux, uy, vx, vy, omega, y[spin], row)
+    F_x, F_y = planar_ball_force(
+        y[r] - y[h],
+        y[r + 1] - y[h + 1],
+        row[L.RADIAL_OFFSET],
+        row[L.AXIAL_OFFSET],
+        row[L.GROOVE_DISTANCE],
+        row[L.BALL_STIFFNESS],
+        p.ball_cos[b],
+        p.ball_sin[b],
+        p.ball_weight[b],
+        work,
+    )
+    drag = race_drag_torque(
+        math.sqrt(F_x * F_x + F_y * F_y), y[spin], row[L.DRAG_COEFFICIENT], row[L.PITCH_DIAMETER], row[L.DRAG_SPEED]
+    )
+    wx = y[n_q + r] - y[n_q + h]
+    wy = y[n_q + r + 1] - y[n_q + h + 1]
+    C_b = row[L.BEARING_DAMPING]
+    F_x += C_b * wx
+    F_y += C_b * wy
+    sx = y[n_q + h]
+    sy = y[n_q + h + 1]
+    contact_x = 0.0
+    contact_y = 0.0
+    torque = 0.0
+    dissipated = C_b * (wx * wx + wy * wy) + drag * y[spin]
+    dissipated += row[L.SUPPORT_DAMPING_X] * sx * sx + row[L.SUPPORT_DAMPING_Y] * sy * sy
+    if delta > 0.0:
+        F_mu = mu * F_r
+        contact_x = F_r * nx - F_mu * ny
+        contact_y = F_r * ny + F_mu * nx
+        torque = F_mu
+        elastic = row[L.CONTACT_STIFFNESS] * delta ** row[L.CONTACT_EXPONENT]
+        dissipated += F_mu * v_t + (F_r - elastic) * (vx * nx + vy * ny)
+        for k in range(m):
+            dy[n_q + k] -= shape[k] * contact_x
+            dy[n_q + m + k] -= shape[k] * contact_y
+    dy[n_q + r] = (contact_x - F_x) / row[L.RACE_MASS]
+    dy[n_q + r + 1] = (contact_y - F_y) / row[L.RACE_MASS]
+    dy[n_q + h] = (F_x - row[L.SUPPORT_DAMPING_X] * sx - row[L.SUPPORT_STIFFNESS_X] * y[h]) / row[L.SUPPORT_MASS_X]
+    dy[n_q + h + 1] = (
+        F_y - row[L.SUPPORT_DAMPING_Y] * sy - row[L.SUPPORT_STIFFNESS_Y] * y[h + 1]
+    ) / row[L.SUPPORT_MASS_Y]
+    dy[spin] = (torque * row[L.BORE_RADIUS] - drag) / row[L.RACE_INERTIA]
+    return -torque * row[L.ROTOR_RADIUS], dissipated
+
+
+@kernel
+def aerodynamic_deceleration(t: float, omega: float, p: KernelParameters) -> float:
+    """Deceleration [rad/s²] by air alone, in the mode of the case; zero without a speed model."""
+    mode = p.flags[L.SPIN_MODE]
+    if mode == IN_TIME or mode == PRESCRIBED:
+        return exponential_deceleration(t, p.spin[L.INITIAL_SPEED], p.spin[L.AERO_TIME_CONSTANT])
+    if mode == OF_SPEED:
+        return speed_dependent_deceleration(omega, p.spin[L.AERO_LINEAR], p.spin[L.AERO_QUADRATIC])
+    return 0.0
+
+
+@kernel
+def drop_derivative(t: float, y: Array, p: KernelParameters, dy: Array, work: Array) -> None:
+    """Time derivative of the state of a drop.
+
+    Bearings come first, then the rotor's spin, then its lateral motion, because the ω̇ terms of eq. (1) need the
+    angular acceleration that friction causes.
+    """
+    m = p.eigenvalue.shape[0]
+    n_b = p.bearing.shape[0]
+    n_q = 2 * m + 4 * n_b
+    i_w = 2 * n_q + n_b
+    omega = y[i_w]
+    for i in range(n_q):
+        dy[i] = y[n_q + i]
+        dy[n_q + i] = 0.0
+    contact_torque = 0.0
+    dissipated = 0.0
+    for b in range(n_b):
+        torque, lost = bearing_accelerations(b, y, omega, p, dy, work)
+        contact_torque += torque
+        dissipated += lost
+    air = aerodynamic_deceleration(t, omega, p)
+    omega_dot = air
+    put_in = p.spin[L.POLAR_INERTIA] * air * omega
+    if p.flags[L.SPIN_MODE] != PRESCRIBED:
+        omega_dot += contact_torque / p.spin[L.POLAR_INERTIA]
+    else:
+        put_in -= contact_torque * omega
+    lost, gained = add_rotor_accelerations(y, omega, omega_dot, p, dy)
+    if p.flags[L.MAGNETS_ACT] != 0:
+        gained += add_magnet_forces(t, y, p, dy)
+    dy[i_w] = omega_dot
+    dy[i_w + 1] = omega
+    dy[i_w + 2] = dissipated + lost
+    dy[i_w + 3] = put_in + gained

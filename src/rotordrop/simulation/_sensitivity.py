@@ -1,0 +1,276 @@
+"""Derivative of the right-hand side by the state: what the filter needs beside the value.
+
+Every derivative is analytic and tested against finite differences away from switches. Left out, because they are tiny
+and would make the matrix full: the dependence of the ω̇ terms of eq. (1) on the contact torque.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.model import layout as L
+from rotordrop.model.parameters import KernelParameters
+from rotordrop.physics import aerodynamics
+from rotordrop.physics._compile import kernel
+from rotordrop.physics.ball_bearing_planar import planar_ball_gradient
+from rotordrop.physics.contact import hunt_crossley_gradient
+from rotordrop.physics.friction import stribeck_gradient
+from rotordrop.physics.spin import surface_speed
+from rotordrop.simulation._rhs import aerodynamic_deceleration, project
+
+Array = NDArray[np.float64]
+PRESCRIBED = aerodynamics.PRESCRIBED_SPEED
+OF_SPEED = aerodynamics.FUNCTION_OF_SPEED
+
+
+@kernel
+def contact_gradient(
+    ux: float, uy: float, vx: float, vy: float, omega: float, omega_i: float, bearing: Array, g: Array
+) -> bool:
+    """Derivatives of contact force and friction force at one bearing; False and untouched when there is no contact.
+
+    ``g`` (3, 6): rows force on the race in x, in y [N] and friction force [N]; columns by ``ux, uy`` [m], ``vx, vy``
+    [m/s] (rotor relative to race), rotor spin and race spin [rad/s].
+    """
+    r = math.sqrt(ux * ux + uy * uy)
+    delta = r - bearing[L.AIR_GAP]
+    if delta <= 0.0:
+        return False
+    nx = ux / r
+    ny = uy / r
+    tx = -ny
+    ty = nx
+    v_n = vx * nx + vy * ny
+    v_s = vx * tx + vy * ty
+    F, F_d, F_v = hunt_crossley_gradient(
+        delta, v_n, bearing[L.CONTACT_STIFFNESS], bearing[L.CONTACT_EXPONENT], bearing[L.CONTACT_DAMPING]
+    )
+    v_t = surface_speed(v_s, omega, bearing[L.ROTOR_RADIUS], omega_i, bearing[L.BORE_RADIUS])
+    mu, mu_v = stribeck_gradient(
+        v_t,
+        bearing[L.FRICTION_STATIC],
+        bearing[L.FRICTION_DYNAMIC],
+        bearing[L.STRIBECK_SPEED],
+        bearing[L.SMOOTHING_SPEED],
+    )
+    for c in range(6):
+        dn = 0.0
+        dt = 0.0
+        d_force = 0.0
+        d_slip = 0.0
+        if c < 2:
+            dn = nx if c == 0 else ny
+            dt = tx if c == 0 else ty
+            d_force = F_d * dn + F_v * v_s / r * dt
+            d_slip = -v_n / r * dt
+        elif c < 4:
+            d_force = F_v * (nx if c == 2 else ny)
+            d_slip = tx if c == 2 else ty
+        elif c == 4:
+            d_slip = bearing[L.ROTOR_RADIUS]
+        else:
+            d_slip = -bearing[L.BORE_RADIUS]
+        d_friction = mu * d_force + F * mu_v * d_slip
+        turn = dt / r
+        g[0, c] = nx * d_force + tx * d_friction + F * turn * (tx - mu * nx)
+        g[1, c] = ny * d_force + ty * d_friction + F * turn * (ty - mu * ny)
+        g[2, c] = d_friction
+    return True
+
+
+@kernel
+def _rotor_jacobian(t: float, y: Array, p: KernelParameters, J: Array) -> None:
+    m = p.eigenvalue.shape[0]
+    n_b = p.bearing.shape[0]
+    n_q = 2 * m + 4 * n_b
+    i_w = 2 * n_q + n_b
+    omega = y[i_w]
+    c = math.cos(y[i_w + 1])
+    s = math.sin(y[i_w + 1])
+    omega_dot = aerodynamic_deceleration(t, omega, p)
+    w2 = omega * omega
+    for k in range(m):
+        rx = n_q + k
+        ry = n_q + m + k
+        J[rx, k] -= p.eigenvalue[k]
+        J[ry, m + k] -= p.eigenvalue[k]
+        J[rx, rx] -= p.damping[k]
+        J[ry, ry] -= p.damping[k]
+        turn_x = 0.0
+        turn_y = 0.0
+        for j in range(m):
+            g = p.polar[k, j]
+            J[rx, n_q + m + j] -= omega * g
+            J[ry, n_q + j] += omega * g
+            J[rx, m + j] -= omega_dot * g
+            J[ry, j] += omega_dot * g
+            turn_x -= g * y[n_q + m + j]
+            turn_y += g * y[n_q + j]
+        uc = p.unbalance_cos[k]
+        us = p.unbalance_sin[k]
+        J[rx, i_w] += turn_x + 2.0 * omega * (uc * c - us * s)
+        J[ry, i_w] += turn_y + 2.0 * omega * (uc * s + us * c)
+        J[rx, i_w + 1] += w2 * (-uc * s - us * c)
+        J[ry, i_w + 1] += w2 * (uc * c - us * s)
+
+
+@kernel
+def _contact_jacobian(b: int, g: Array, p: KernelParameters, J: Array) -> None:
+    m = p.eigenvalue.shape[0]
+    n_b = p.bearing.shape[0]
+    n_q = 2 * m + 4 * n_b
+    i_w = 2 * n_q + n_b
+    spin = 2 * n_q + b
+    row = p.bearing[b]
+    shape = p.bearing_shape[b]
+    r = 2 * m + 2 * b
+    prescribed = p.flags[L.SPIN_MODE] == PRESCRIBED
+    for i in range(4):
+        if i < 2:
+            place = n_q + r + i
+            factor = 1.0 / row[L.RACE_MASS]
+            source = i
+        elif i == 2:
+            place = spin
+            factor = row[L.BORE_RADIUS] / row[L.RACE_INERTIA]
+            source = 2
+        else:
+            if prescribed:
+                continue
+            place = i_w
+            factor = -row[L.ROTOR_RADIUS] / p.spin[L.POLAR_INERTIA]
+            source = 2
+        _spread(place, factor, g[source], b, p, J)
+    for k in range(m):
+        _spread(n_q + k, -shape[k], g[0], b, p, J)
+        _spread(n_q + m + k, -shape[k], g[1], b, p, J)
+
+
+@kernel
+def _spread(place: int, factor: float, g: Array, b: int, p: KernelParameters, J: Array) -> None:
+    """Add one row of the contact derivatives to the columns of rotor modes, race and spins."""
+    m = p.eigenvalue.shape[0]
+    n_b = p.bearing.shape[0]
+    n_q = 2 * m + 4 * n_b
+    r = 2 * m + 2 * b
+    shape = p.bearing_shape[b]
+    fx = factor * g[0]
+    fy = factor * g[1]
+    gx = factor * g[2]
+    gy = factor * g[3]
+    for k in range(m):
+        J[place, k] += fx * shape[k]
+        J[place, m + k] += fy * shape[k]
+        J[place, n_q + k] += gx * shape[k]
+        J[place, n_q + m + k] += gy * shape[k]
+    J[place, r] -= fx
+    J[place, r + 1] -= fy
+    J[place, n_q + r] -= gx
+    J[place, n_q + r + 1] -= gy
+    J[place, 2 * n_q + n_b] += factor * g[4]
+    J[place, 2 * n_q + b] += factor * g[5]
+
+
+@kernel
+def _bearing_jacobian(b: int, y: Array, p: KernelParameters, J: Array, g: Array) -> None:
+    m = p.eigenvalue.shape[0]
+    n_b = p.bearing.shape[0]
+    n_q = 2 * m + 4 * n_b
+    row = p.bearing[b]
+    shape = p.bearing_shape[b]
+    r = 2 * m + 2 * b
+    h = r + 2 * n_b
+    spin = 2 * n_q + b
+    touches = contact_gradient(
+        project(shape, y[:m]) - y[r],
+        project(shape, y[m : 2 * m]) - y[r + 1],
+        project(shape, y[n_q : n_q + m]) - y[n_q + r],
+        project(shape, y[n_q + m : n_q + 2 * m]) - y[n_q + r + 1],
+        y[2 * n_q + n_b],
+        y[spin],
+        row,
+        g,
+    )
+    if touches:
+        _contact_jacobian(b, g, p, J)
+    F_x, F_y, k_xx, k_xy, k_yy = planar_ball_gradient(
+        y[r] - y[h],
+        y[r + 1] - y[h + 1],
+        row[L.RADIAL_OFFSET],
+        row[L.AXIAL_OFFSET],
+        row[L.GROOVE_DISTANCE],
+        row[L.BALL_STIFFNESS],
+        p.ball_cos[b],
+        p.ball_sin[b],
+        p.ball_weight[b],
+    )
+    C_b = row[L.BEARING_DAMPING]
+    for i in range(2):
+        race = n_q + r + i
+        hold = n_q + h + i
+        m_h = row[L.SUPPORT_MASS_X + i]
+        for j in range(2):
+            k = k_xy
+            if i == j:
+                k = k_xx if i == 0 else k_yy
+            J[race, r + j] -= k / row[L.RACE_MASS]
+            J[race, h + j] += k / row[L.RACE_MASS]
+            J[hold, r + j] += k / m_h
+            J[hold, h + j] -= k / m_h
+        J[race, race] -= C_b / row[L.RACE_MASS]
+        J[race, hold] += C_b / row[L.RACE_MASS]
+        J[hold, race] += C_b / m_h
+        J[hold, hold] -= (C_b + row[L.SUPPORT_DAMPING_X + i]) / m_h
+        J[hold, h + i] -= row[L.SUPPORT_STIFFNESS_X + i] / m_h
+    F = math.sqrt(F_x * F_x + F_y * F_y)
+    half = 0.5 * row[L.DRAG_COEFFICIENT] * row[L.PITCH_DIAMETER] / row[L.RACE_INERTIA]
+    level = math.tanh(y[spin] / row[L.DRAG_SPEED])
+    J[spin, spin] -= half * F * (1.0 - level * level) / row[L.DRAG_SPEED]
+    if F > 0.0:
+        by_x = half * level * (F_x * k_xx + F_y * k_xy) / F
+        by_y = half * level * (F_x * k_xy + F_y * k_yy) / F
+        J[spin, r] -= by_x
+        J[spin, r + 1] -= by_y
+        J[spin, h] += by_x
+        J[spin, h + 1] += by_y
+
+
+@kernel
+def drop_jacobian(t: float, y: Array, p: KernelParameters, J: Array) -> None:
+    """Derivative of `drop_derivative` by the state, shape (s, s) with s up to and including the rotor angle.
+
+    The energies behind the rotor angle are left out.
+    """
+    m = p.eigenvalue.shape[0]
+    n_b = p.bearing.shape[0]
+    n_q = 2 * m + 4 * n_b
+    i_w = 2 * n_q + n_b
+    J[:, :] = 0.0
+    for i in range(n_q):
+        J[i, n_q + i] = 1.0
+    g = np.zeros((3, 6))
+    for b in range(n_b):
+        _bearing_jacobian(b, y, p, J, g)
+    _rotor_jacobian(t, y, p, J)
+    J[i_w + 1, i_w] = 1.0
+    if p.flags[L.SPIN_MODE] == OF_SPEED:
+        J[i_w, i_w] -= p.spin[L.AERO_LINEAR] + 2.0 * p.spin[L.AERO_QUADRATIC] * abs(y[i_w])
+    if p.flags[L.MAGNETS_ACT] != 0 and t < p.spin[L.POWER_OFF_DELAY]:
+        _magnet_jacobian(p, J)
+
+
+@kernel
+def _magnet_jacobian(p: KernelParameters, J: Array) -> None:
+    m = p.eigenvalue.shape[0]
+    n_q = 2 * m + 4 * p.bearing.shape[0]
+    for a in range(p.magnet.shape[0]):
+        for k in range(m):
+            for j in range(m):
+                shapes = p.magnet_shape[a, k] * p.magnet_shape[a, j]
+                for axis in range(2):
+                    row = n_q + axis * m + k
+                    J[row, axis * m + j] -= p.magnet[a, L.AMB_STIFFNESS] * shapes
+                    J[row, n_q + axis * m + j] -= p.magnet[a, L.AMB_DAMPING] * shapes
