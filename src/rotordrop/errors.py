@@ -1,0 +1,77 @@
+"""The errors a user can meet, one class per exit code of the command line.
+
+A message names the thing, the value found, what was expected and the way out.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import ClassVar
+
+
+class RotordropError(Exception):
+    """Anything rotordrop refuses to do, with a message that says why and what to do about it."""
+
+    exit_code: ClassVar[int] = 1
+
+
+class MachineFileError(RotordropError):
+    """The machine description cannot be used as it stands; says where in the file.
+
+    Parameters
+    ----------
+    message : str
+        What is wrong, with the value, and the way out.
+    file, line, column : optional
+        Place of the error in the file; line and column count from 1.
+    """
+
+    exit_code: ClassVar[int] = 2
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        file: str | Path | None = None,
+        line: int | None = None,
+        column: int | None = None,
+    ) -> None:
+        self.message = message
+        self.file = None if file is None else str(file)
+        self.line = line
+        self.column = column
+        super().__init__(self._located(message))
+
+    def _located(self, message: str) -> str:
+        place = ":".join(str(part) for part in (self.file, self.line, self.column) if part is not None)
+        return f"{place}: {message}" if place else message
+
+
+class RecordError(RotordropError):
+    """A recording cannot be read or does not hold what is needed."""
+
+    exit_code: ClassVar[int] = 3
+
+
+class IdentificationError(RotordropError):
+    """An unknown parameter cannot be found from the recording."""
+
+    exit_code: ClassVar[int] = 4
+
+
+class SimulationError(RotordropError):
+    """A drop cannot be computed."""
+
+    exit_code: ClassVar[int] = 5
+
+
+class OutputError(RotordropError):
+    """A result cannot be written."""
+
+    exit_code: ClassVar[int] = 6
+
+
+class UsageError(RotordropError, ValueError):
+    """A command or function was called with a value it does not accept."""
+
+    exit_code: ClassVar[int] = 64

@@ -1,0 +1,289 @@
+"""Numbers with units: text such as ``"280 um"`` or ``"3600 rpm"`` to SI and back.
+
+What a unit means depends on what is asked for: ``60 Hz`` is a speed of 376.99 rad/s and a frequency of 60 Hz.
+The registry therefore treats the angle as a dimension of its own, knows a hertz as one turn per second, and
+drops the angle wherever a quantity (a drag torque, say) does not count it.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import lru_cache
+from typing import Any
+
+from rotordrop.errors import UsageError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Kind:
+    """What a quantity is: its SI unit, an example to show, and the scales it is displayed in."""
+
+    unit: str
+    example: str
+    scales: tuple[tuple[float, str], ...]
+    keeps_angle: bool = False
+
+
+def _metric(unit: str, *prefixes: str) -> tuple[tuple[float, str], ...]:
+    factors = {"G": 1e9, "M": 1e6, "k": 1e3, "": 1.0, "m": 1e-3, "µ": 1e-6, "n": 1e-9}
+    return tuple((factors[prefix], prefix + unit) for prefix in prefixes)
+
+
+KINDS: dict[str, Kind] = {
+    "length": Kind(unit="m", example="280 um", scales=_metric("m", "", "m", "µ")),
+    "mass": Kind(unit="kg", example="105 kg", scales=((1.0, "kg"), (1e-3, "g"))),
+    "time": Kind(unit="s", example="0.2 s", scales=_metric("s", "", "m", "µ")),
+    "angle": Kind(unit="rad", example="45 deg", scales=((math.pi / 180, "°"),), keeps_angle=True),
+    "speed": Kind(unit="rad/s", example="60 Hz", scales=((2 * math.pi, "Hz"),), keeps_angle=True),
+    "frequency": Kind(unit="turn/s", example="60 Hz", scales=_metric("Hz", "k", ""), keeps_angle=True),
+    "angular_acceleration": Kind(
+        unit="rad/s^2", example="10 rad/s^2", scales=((1.0, "rad/s²"),), keeps_angle=True
+    ),
+    "velocity": Kind(unit="m/s", example="0.05 m/s", scales=_metric("m/s", "", "m")),
+    "acceleration": Kind(unit="m/s^2", example="9.81 m/s^2", scales=((1.0, "m/s²"),)),
+    "force": Kind(unit="N", example="515 N", scales=_metric("N", "M", "k", "")),
+    "impulse": Kind(unit="N s", example="2 N s", scales=((1.0, "N s"), (1e-3, "mN s"))),
+    "torque": Kind(unit="N m", example="0.1 N m", scales=_metric("N m", "k", "", "m", "µ")),
+    "energy": Kind(unit="J", example="0.5 J", scales=_metric("J", "k", "", "m", "µ")),
+    "power": Kind(unit="W", example="20 W", scales=_metric("W", "k", "", "m")),
+    "pressure": Kind(unit="Pa", example="210 GPa", scales=((1e6, "MPa"), (1e3, "kPa"), (1.0, "Pa"))),
+    "density": Kind(unit="kg/m^3", example="7850 kg/m^3", scales=((1.0, "kg/m³"),)),
+    "stiffness": Kind(unit="N/m", example="1e8 N/m", scales=_metric("N/m", "G", "M", "k", "")),
+    "damping": Kind(unit="N s/m", example="5000 N s/m", scales=_metric("N s/m", "k", "")),
+    "inertia": Kind(unit="kg m^2", example="0.42 kg m^2", scales=((1.0, "kg m²"), (1e-6, "kg mm²"))),
+    "unbalance": Kind(unit="kg m", example="50 g mm", scales=((1e-6, "g mm"),)),
+    "rotational_stiffness": Kind(unit="N m", example="10 N m/rad", scales=((1.0, "N m/rad"),)),
+    "rotational_drag": Kind(unit="N m s", example="1e-4 N m s", scales=((1.0, "N m s"),)),
+    "quadratic_drag": Kind(unit="N m s^2", example="1e-6 N m s^2", scales=((1.0, "N m s²"),)),
+    "contact_stiffness": Kind(unit="N/m^n", example="1.05e9 N/m^1.11", scales=((1.0, "N/m^n"),)),
+    "contact_damping": Kind(unit="s/m", example="0.1 s/m", scales=((1.0, "s/m"),)),
+    "voltage": Kind(unit="V", example="5 V", scales=_metric("V", "k", "", "m", "µ")),
+    "voltage_sensitivity": Kind(unit="V/m", example="8 mV/um", scales=((1e3, "mV/µm"),)),
+    "temperature": Kind(unit="K", example="20 degC", scales=((1.0, "K"),)),
+    "dimensionless": Kind(unit="", example="0.15", scales=((1.0, ""),)),
+}
+
+_DEFINITIONS = """
+giga- = 1e9 = G-
+mega- = 1e6 = M-
+kilo- = 1e3 = k-
+centi- = 1e-2 = c-
+milli- = 1e-3 = m-
+micro- = 1e-6 = µ- = μ- = u-
+nano- = 1e-9 = n-
+metre = [length] = m = meter
+second = [time] = s = sec
+gram = [mass] = g
+kelvin = [temperature] = K
+volt = [voltage] = V
+radian = [angle] = rad
+turn = 6.283185307179586476925 * radian = _ = rev = revolution = cycle
+degree = turn / 360 = deg = °
+minute = 60 * second = min
+hour = 3600 * second = h
+hertz = turn / second = Hz
+rpm = turn / minute = _ = RPM
+micron = 1e-6 * metre
+inch = 0.0254 * metre = in
+foot = 0.3048 * metre = ft
+mil = 0.001 * inch = _ = thou
+tonne = 1e6 * gram = t
+pound = 453.59237 * gram = lb
+ounce = 28.349523125 * gram = oz
+standard_gravity = 9.80665 * metre / second ** 2 = g_n = gn = g_0
+newton = kilogram * metre / second ** 2 = N
+pound_force = pound * standard_gravity = lbf
+ounce_force = ounce * standard_gravity = ozf
+kilogram_force = kilogram * standard_gravity = kgf
+pascal = newton / metre ** 2 = Pa
+bar = 1e5 * pascal
+psi = pound_force / inch ** 2
+ksi = 1000 * psi
+joule = newton * metre = J
+watt = joule / second = W
+degree_Celsius = kelvin; offset: 273.15 = degC = °C
+degree_Fahrenheit = 5 / 9 * kelvin; offset: 233.15 + 200 / 9 = degF = °F
+percent = 0.01 = %
+"""
+
+_FAMILIAR = tuple(
+    "m,mm,um,cm,in,mil,kg,g,t,lb,s,ms,min,Hz,kHz,rpm,rad,deg,N,kN,lbf,Pa,MPa,GPa,bar,psi,N/m,N/mm,N/um,"
+    "N s/m,V,mV,mV/um,kg/m^3,kg m^2,g mm,m/s,mm/s,m/s^2,degC".split(",")
+)
+
+_NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?")
+_COMMA = re.compile(r"[+-]?\d+,\d+")
+
+
+@lru_cache(maxsize=1)
+def _registry() -> Any:
+    import pint
+
+    registry = pint.UnitRegistry(None, autoconvert_offset_to_baseunit=True)
+    registry.load_definitions(_DEFINITIONS.strip().splitlines())
+    return registry
+
+
+def parse_quantity(text: object, kind: str) -> float:
+    """Read a number with its unit, such as ``"280 um"``, and give it in SI units.
+
+    Parameters
+    ----------
+    text : str
+        A number, a blank, a unit. A plain number is accepted for the kind ``"dimensionless"`` only.
+    kind : str
+        What the quantity is, one of `KINDS`. A ``"speed"`` comes back in rad/s, a ``"frequency"`` in Hz.
+
+    Returns
+    -------
+    float
+        The value in the SI unit of the kind.
+
+    Raises
+    ------
+    UsageError
+        When the text is not a number with a fitting unit; the message says what to write instead.
+
+    Examples
+    --------
+    >>> round(parse_quantity("3600 rpm", "frequency"), 6)
+    60.0
+    >>> round(parse_quantity("60 Hz", "speed"), 2)
+    376.99
+    """
+    wanted = _kind(kind)
+    number, unit = _split(text, kind, wanted)
+    if not unit and wanted.unit:
+        raise UsageError(f"{text!r} has no unit; {_spoken(kind)} needs one, for example {wanted.example!r}")
+    if kind == "contact_stiffness":
+        return _contact_stiffness(number, unit, text)
+    return _convert(number, unit, text, kind, wanted)
+
+
+def si_unit(kind: str) -> str:
+    """Name the SI unit in which `parse_quantity` gives a kind, for display."""
+    return "Hz" if kind == "frequency" else _kind(kind).unit
+
+
+def format_quantity(value: float, kind: str, digits: int = 3) -> str:
+    """Write an SI value the way an engineer reads it, for example ``"280 µm"`` or ``"60 Hz (3600 rpm)"``.
+
+    Parameters
+    ----------
+    value : float
+        Value in the SI unit of the kind (speeds in rad/s).
+    kind : str
+        What the quantity is, one of `KINDS`.
+    digits : int
+        Significant digits.
+    """
+    if kind == "speed":
+        turns = value / (2 * math.pi)
+        return f"{_rounded(turns, digits)} Hz ({_rounded(60 * turns, max(digits, 4))} rpm)"
+    scales = _kind(kind).scales
+    size = abs(value) * (1 + 0.5 * 10.0**-digits)
+    factor, unit = next(
+        (scale for scale in scales if size >= scale[0]), scales[-1] if size > 0 else scales[0]
+    )
+    number = _rounded(value / factor, digits)
+    return f"{number}{unit}" if unit == "°" else f"{number} {unit}".rstrip()
+
+
+def _kind(kind: str) -> Kind:
+    try:
+        return KINDS[kind]
+    except KeyError:
+        raise UsageError(f"{kind!r} is not a kind of quantity; known are {', '.join(KINDS)}") from None
+
+
+def _split(text: object, kind: str, wanted: Kind) -> tuple[float, str]:
+    if isinstance(text, bool) or not isinstance(text, str | int | float):
+        raise UsageError(f"{text!r} is not {_spoken(kind)}; write a number with a unit, {wanted.example!r}")
+    written = str(text).strip().replace("−", "-").replace("·", " ")
+    comma = _COMMA.match(written)
+    if comma:
+        point = comma.group().replace(",", ".")
+        raise UsageError(f"{text!r} has a decimal comma; use {point}{written[comma.end() :]}")
+    match = _NUMBER.match(written)
+    if not match:
+        raise UsageError(f"{text!r} does not begin with a number; write for example {wanted.example!r}")
+    number = float(match.group())
+    if not math.isfinite(number):
+        raise UsageError(f"{text!r} is too large to be {_spoken(kind)}")
+    return number, _plain_unit(written[match.end() :].strip())
+
+
+def _plain_unit(unit: str) -> str:
+    """Bring the usual ways of writing a unit to the one the registry reads."""
+    unit = re.sub(r"\b([rU])/min\b", "rpm", unit)
+    unit = re.sub(r"\bN(ms|m|s)\b", lambda match: "N " + " ".join(match.group(1)), unit)
+    unit = re.sub(r"\bgmm\b", "g mm", unit)
+    return unit.replace("²", "^2").replace("³", "^3")
+
+
+def _unit(unit: str, text: object, kind: str) -> Any:
+    if not re.fullmatch(r"[\w\s°%*/^().+-]*", unit):
+        raise UsageError(
+            f"{text!r}: cannot read {unit!r} as a unit; write for example {_kind(kind).example!r}"
+        )
+    try:
+        return _registry().parse_units(unit)
+    except Exception as error:  # the parser fails in many ways on text that is no unit
+        close = [name for name in _FAMILIAR if name.lower() == unit.lower()]
+        close = close or get_close_matches(unit, _FAMILIAR, 1, 0.6)
+        hint = f"did you mean {close[0]!r}?" if close else f"write for example {_kind(kind).example!r}"
+        raise UsageError(f"{text!r}: {unit!r} is not a unit known here; {hint}") from error
+
+
+def _convert(number: float, unit: str, text: object, kind: str, wanted: Kind) -> float:
+    registry = _registry()
+    quantity = registry.Quantity(number, _unit(unit, text, kind))
+    if not wanted.keeps_angle:
+        turns = quantity.dimensionality.get("[angle]", 0)
+        quantity = quantity / registry.Quantity(1.0, "radian") ** turns if turns else quantity
+    target = registry.parse_units(wanted.unit)
+    if quantity.dimensionality != target.dimensionality:
+        raise UsageError(_wrong_dimension(unit, text, kind, wanted))
+    magnitude: float = quantity.to(target).magnitude
+    return magnitude
+
+
+def _wrong_dimension(unit: str, text: object, kind: str, wanted: Kind) -> str:
+    hint = f"write for example {wanted.example!r}"
+    if kind == "acceleration" and unit == "g":
+        hint = "g is the gram; write '3 g_n' for three times gravity, or the value in 'm/s^2'"
+    elif kind in ("speed", "frequency") and not re.search(r"Hz|rpm|RPM|rad|rev|turn|deg", unit):
+        hint = "say what is counted: 'Hz', 'rpm' or 'rad/s'"
+    elif re.search(r"\blb\b", unit):
+        hint = "lb is a mass here; write 'lbf' for the force"
+    return f"{text!r} is not {_spoken(kind)}; {hint}"
+
+
+def _contact_stiffness(number: float, unit: str, text: object) -> float:
+    """Convert N/m^n, whose exponent n is itself a parameter of the contact."""
+    quantity = _registry().Quantity(number, _unit(unit, text, "contact_stiffness"))
+    dimension = dict(quantity.dimensionality)
+    exponent = 1.0 - float(dimension.pop("[length]", 0))
+    if dimension != {"[mass]": 1, "[time]": -2} or not 1.0 <= exponent <= 2.0:
+        raise UsageError(
+            f"{text!r} is not a contact stiffness; write N/m^n with n from 1 to 2, '1e9 N/m^1.11'"
+        )
+    magnitude: float = quantity.to_base_units().magnitude
+    return magnitude * 1e-3  # base units count grams
+
+
+def _rounded(number: float, digits: int) -> str:
+    if not math.isfinite(number) or number == 0.0:
+        return f"{number:g}".replace("-0", "0")
+    if not 1e-4 <= abs(number) < 1e7:
+        return f"{number:.{digits - 1}e}".replace("e-0", "e-").replace("e+0", "e").replace("e+", "e")
+    places = max(0, digits - 1 - math.floor(math.log10(abs(number) * (1 + 0.5 * 10.0**-digits))))
+    return f"{number:.{places}f}"
+
+
+def _spoken(kind: str) -> str:
+    """Name a kind with its article."""
+    return ("an " if kind[0] in "aeiou" else "a ") + kind.replace("_", " ")
