@@ -1,4 +1,4 @@
-"""Constants of an angular-contact ball bearing: groove geometry, Hertz stiffness, preload, rigidity, lift-off.
+"""Constants of an angular-contact ball bearing: grooves, Hertz stiffness, preload, rigidity, lift-off.
 
 One row under axial load carries everything a catalogue prints: the preload sets the axial offset of the
 grooves, the pair's rigidity is twice the slope of a row, the lift-off force empties the unloaded row.
@@ -9,17 +9,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol, SupportsFloat
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import UsageError
+from rotordrop.physics.ball_bearing_geometry import BallBearingDescription
 from rotordrop.physics.hertz import compliance, contacts_in_series, race_contact
 
 Array = NDArray[np.float64]
 ArrayLike = float | Array
-Arrangement = Literal["X", "O", "tandem", "single"]
 
 _AXIAL_SIGNS: dict[str, tuple[float, ...]] = {
     "X": (-1.0, 1.0),
@@ -28,139 +28,6 @@ _AXIAL_SIGNS: dict[str, tuple[float, ...]] = {
     "single": (1.0,),
 }
 _NEWTON_STEPS = 60
-
-
-class BallBearingDescription(Protocol):
-    """What the physics needs to know of a ball bearing: the machine's bearing and `BallBearingGeometry` fit.
-
-    Source: Neisi 2020, Fig. 1.
-    """
-
-    @property
-    def ball_diameter(self) -> SupportsFloat:
-        """Ball diameter [m]."""
-        ...
-
-    @property
-    def ball_count(self) -> int:
-        """Balls per row [1]."""
-        ...
-
-    @property
-    def pitch_diameter(self) -> SupportsFloat:
-        """Pitch diameter [m]."""
-        ...
-
-    @property
-    def contact_angle(self) -> SupportsFloat:
-        """Nominal contact angle [rad]."""
-        ...
-
-    @property
-    def conformity_inner(self) -> SupportsFloat:
-        """Groove radius of the inner race over ball diameter [1]."""
-        ...
-
-    @property
-    def conformity_outer(self) -> SupportsFloat:
-        """Groove radius of the outer race over ball diameter [1]."""
-        ...
-
-    @property
-    def ring_youngs_modulus(self) -> SupportsFloat:
-        """Young's modulus of the rings [Pa]."""
-        ...
-
-    @property
-    def ring_poisson_ratio(self) -> SupportsFloat:
-        """Poisson ratio of the rings [1]."""
-        ...
-
-    @property
-    def ball_youngs_modulus(self) -> SupportsFloat:
-        """Young's modulus of the balls [Pa]."""
-        ...
-
-    @property
-    def ball_poisson_ratio(self) -> SupportsFloat:
-        """Poisson ratio of the balls [1]."""
-        ...
-
-    @property
-    def ball_density(self) -> SupportsFloat:
-        """Density of the balls [kg/m³]."""
-        ...
-
-    @property
-    def preload(self) -> SupportsFloat:
-        """Axial preload of each row [N]."""
-        ...
-
-    @property
-    def arrangement(self) -> Arrangement:
-        """Arrangement of the rows."""
-        ...
-
-    @property
-    def first_ball_angle(self) -> SupportsFloat:
-        """Angle of the first ball from +y towards −x [rad]."""
-        ...
-
-    @property
-    def second_row_offset(self) -> SupportsFloat:
-        """Angle of the second row against the first, fraction of the ball pitch [1]."""
-        ...
-
-
-@dataclass(frozen=True, kw_only=True)
-class BallBearingGeometry:
-    """A ball bearing by plain numbers [SI]; the default materials are steel rings and silicon nitride balls.
-
-    Attributes
-    ----------
-    ball_diameter, pitch_diameter : float
-        D_w and D_pw [m].
-    ball_count : int
-        Balls per row [1].
-    contact_angle : float
-        Nominal contact angle α₀ [rad].
-    conformity_inner, conformity_outer : float
-        Groove radius over ball diameter [1].
-    ring_youngs_modulus, ball_youngs_modulus : float
-        Young's moduli [Pa].
-    ring_poisson_ratio, ball_poisson_ratio : float
-        Poisson ratios [1].
-    ball_density : float
-        Density of the balls [kg/m³].
-    preload : float
-        Axial preload of each row [N].
-    arrangement : str
-        "X" (face to face), "O" (back to back), "tandem" or "single".
-    first_ball_angle : float
-        Angle of the first ball from +y towards −x [rad].
-    second_row_offset : float
-        Angle of the second row against the first, as a fraction of the ball pitch [1].
-
-    Notes
-    -----
-    Source: Neisi 2020, Fig. 1.
-    """
-
-    ball_diameter: float
-    ball_count: int
-    pitch_diameter: float
-    contact_angle: float
-    conformity_inner: float
-    conformity_outer: float
-    ring_youngs_modulus: float = 208e9
-    ring_poisson_ratio: float = 0.3
-    ball_youngs_modulus: float = 315e9
-    ball_poisson_ratio: float = 0.26
-    ball_density: float = 3200.0
-    preload: float = 0.0
-    arrangement: Arrangement = "X"
-    first_ball_angle: float = 0.0
-    second_row_offset: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -192,8 +59,8 @@ class BearingConstants:
 
     Notes
     -----
-    Source: Neisi 2020, eqs. (2)–(7). Differs from the paper: its equations are those of a deep-groove bearing;
-    an angular-contact row has an axial offset of the groove centres.
+    Source: Neisi 2020, eqs. (2)–(7). Differs from the paper: its equations are those of a deep-groove
+    bearing; an angular-contact row has an axial offset of the groove centres.
     """
 
     groove_distance: float
@@ -227,7 +94,8 @@ class BearingConstants:
     def row_ball_angles(self) -> Array:
         """Angles of all balls from +x towards +y [rad]; shape (rows, Z). Source: definition."""
         shift = self.second_row_offset * 2.0 * math.pi / self.ball_count
-        return self.ball_angles + shift * np.arange(self.row_count)[:, None]
+        shifts = shift * np.arange(self.row_count, dtype=np.float64)
+        return np.add(self.ball_angles, shifts[:, None])
 
 
 def row_axial_force(s: ArrayLike, ZK: ArrayLike, A_0: ArrayLike, alpha_0: ArrayLike) -> Any:
@@ -273,7 +141,8 @@ def row_axial_stiffness(s: ArrayLike, ZK: ArrayLike, A_0: ArrayLike, alpha_0: Ar
 def row_approach(F: ArrayLike, ZK: ArrayLike, A_0: ArrayLike, alpha_0: ArrayLike) -> Any:
     """Axial approach [m] at which one row carries an axial force F ≥ 0 [N].
 
-    The other arguments are those of `row_axial_force`. Newton's method on ``F^(2/3)``, nearly a straight line, from a bound above the root.
+    The other arguments are those of `row_axial_force`. Newton's method on
+    ``F^(2/3)``, nearly a straight line, from a bound above the root.
     Source: inverse of Neisi 2020, eqs. (3)–(6), for an axial displacement.
     """
     F, ZK, A_0, alpha_0 = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in (F, ZK, A_0, alpha_0)))
@@ -322,7 +191,7 @@ def bearing_constants(bearing: BallBearingDescription) -> BearingConstants:
         ball_stiffness=K,
         stress_coefficient_inner=float(inner.stress_coefficient),
         stress_coefficient_outer=float(outer.stress_coefficient),
-        ball_angles=0.5 * math.pi + float(bearing.first_ball_angle) + np.arange(Z) * (2.0 * math.pi / Z),
+        ball_angles=_first_row_angles(Z, float(bearing.first_ball_angle)),
         second_row_offset=float(bearing.second_row_offset),
         axial_signs=_AXIAL_SIGNS[bearing.arrangement],
         preload=F_V,
@@ -366,6 +235,11 @@ def ball_centrifugal_force(bearing: BallBearingDescription, omega_i: ArrayLike) 
 def _elongation(s: ArrayLike, A: ArrayLike, A_0: ArrayLike, alpha_0: ArrayLike) -> Any:
     """``A − A₀`` [m] without the cancellation of the difference; zero where the balls are loose."""
     return np.maximum(s * (2.0 * A_0 * np.sin(alpha_0) + s) / (A + A_0), 0.0)
+
+
+def _first_row_angles(Z: int, first_ball_angle: float) -> Array:
+    turns = np.arange(Z, dtype=np.float64) * (2.0 * math.pi / Z)
+    return np.add(turns, 0.5 * math.pi + first_ball_angle)
 
 
 def _row(constants: BearingConstants) -> tuple[float, float, float]:

@@ -218,4 +218,4 @@ def line_contact_approach(Q: float, length: float) -> float:
 
     Source: Palmgren, ``δ = 3.84e-5 Q^0.9 / l^0.8`` (mm, N).
     """
-    return 1e-3 * _PALMGREN * Q**0.9 / float((1e3 * length) ** 0.8)
+    return float(1e-3 * _PALMGREN * Q**0.9 / (1e3 * length) ** 0.8)

@@ -1,0 +1,141 @@
+"""What describes a ball bearing: the numbers its physics needs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, Protocol, SupportsFloat
+
+Arrangement = Literal["X", "O", "tandem", "single"]
+
+
+class BallBearingDescription(Protocol):
+    """What the physics needs to know of a ball bearing: the machine's bearing and `BallBearingGeometry` fit.
+
+    Source: Neisi 2020, Fig. 1.
+    """
+
+    @property
+    def ball_diameter(self) -> SupportsFloat:
+        """Ball diameter [m]."""
+        ...
+
+    @property
+    def ball_count(self) -> int:
+        """Balls per row [1]."""
+        ...
+
+    @property
+    def pitch_diameter(self) -> SupportsFloat:
+        """Pitch diameter [m]."""
+        ...
+
+    @property
+    def contact_angle(self) -> SupportsFloat:
+        """Nominal contact angle [rad]."""
+        ...
+
+    @property
+    def conformity_inner(self) -> SupportsFloat:
+        """Groove radius of the inner race over ball diameter [1]."""
+        ...
+
+    @property
+    def conformity_outer(self) -> SupportsFloat:
+        """Groove radius of the outer race over ball diameter [1]."""
+        ...
+
+    @property
+    def ring_youngs_modulus(self) -> SupportsFloat:
+        """Young's modulus of the rings [Pa]."""
+        ...
+
+    @property
+    def ring_poisson_ratio(self) -> SupportsFloat:
+        """Poisson ratio of the rings [1]."""
+        ...
+
+    @property
+    def ball_youngs_modulus(self) -> SupportsFloat:
+        """Young's modulus of the balls [Pa]."""
+        ...
+
+    @property
+    def ball_poisson_ratio(self) -> SupportsFloat:
+        """Poisson ratio of the balls [1]."""
+        ...
+
+    @property
+    def ball_density(self) -> SupportsFloat:
+        """Density of the balls [kg/m³]."""
+        ...
+
+    @property
+    def preload(self) -> SupportsFloat:
+        """Axial preload of each row [N]."""
+        ...
+
+    @property
+    def arrangement(self) -> Arrangement:
+        """Arrangement of the rows."""
+        ...
+
+    @property
+    def first_ball_angle(self) -> SupportsFloat:
+        """Angle of the first ball from +y towards −x [rad]."""
+        ...
+
+    @property
+    def second_row_offset(self) -> SupportsFloat:
+        """Angle of the second row against the first, fraction of the ball pitch [1]."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class BallBearingGeometry:
+    """A ball bearing by plain numbers [SI]; the default materials are steel rings and silicon nitride balls.
+
+    Attributes
+    ----------
+    ball_diameter, pitch_diameter : float
+        D_w and D_pw [m].
+    ball_count : int
+        Balls per row [1].
+    contact_angle : float
+        Nominal contact angle α₀ [rad].
+    conformity_inner, conformity_outer : float
+        Groove radius over ball diameter [1].
+    ring_youngs_modulus, ball_youngs_modulus : float
+        Young's moduli [Pa].
+    ring_poisson_ratio, ball_poisson_ratio : float
+        Poisson ratios [1].
+    ball_density : float
+        Density of the balls [kg/m³].
+    preload : float
+        Axial preload of each row [N].
+    arrangement : str
+        "X" (face to face), "O" (back to back), "tandem" or "single".
+    first_ball_angle : float
+        Angle of the first ball from +y towards −x [rad].
+    second_row_offset : float
+        Angle of the second row against the first, as a fraction of the ball pitch [1].
+
+    Notes
+    -----
+    Source: Neisi 2020, Fig. 1.
+    """
+
+    ball_diameter: float
+    ball_count: int
+    pitch_diameter: float
+    contact_angle: float
+    conformity_inner: float
+    conformity_outer: float
+    ring_youngs_modulus: float = 208e9
+    ring_poisson_ratio: float = 0.3
+    ball_youngs_modulus: float = 315e9
+    ball_poisson_ratio: float = 0.26
+    ball_density: float = 3200.0
+    preload: float = 0.0
+    arrangement: Arrangement = "X"
+    first_ball_angle: float = 0.0
+    second_row_offset: float = 0.0
