@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
 
 # Columns of `KernelParameters.bearing`, one row per touchdown bearing; SI units.
 AIR_GAP = 0
@@ -61,6 +65,29 @@ AMB_DAMPING = 5
 AMB_REFERENCE_X = 6
 AMB_REFERENCE_Y = 7
 N_MAGNET_COLUMNS = 8
+
+
+class KernelParameters(NamedTuple):
+    """Everything the right-hand side reads, as flat arrays in SI units; m modes, B bearings, A magnets, Z balls.
+
+    Columns and entries are named in this module.
+    """
+
+    eigenvalue: Array
+    damping: Array
+    polar: Array
+    gravity: Array
+    unbalance_cos: Array
+    unbalance_sin: Array
+    bearing_shape: Array
+    bearing: Array
+    ball_cos: Array
+    ball_sin: Array
+    ball_weight: Array
+    magnet_shape: Array
+    magnet: Array
+    spin: Array
+    flags: NDArray[np.int64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,6 +173,6 @@ class StateLayout:
         spins = [f"race {name} spin" for name in bearing_names]
         return (*coordinates, *rates, *spins, "rotor speed", "rotor angle", "dissipated energy", "work put in")
 
-    def zeros(self) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    def zeros(self) -> Array:
         """State with everything at zero."""
         return np.zeros(self.size)

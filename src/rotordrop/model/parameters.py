@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.model import layout as L
 from rotordrop.model.assembly import RotorFE, build_rotor_fe
+from rotordrop.model.layout import KernelParameters
 from rotordrop.model.reduction import Reduction, RotorBasis, reduce_rotor
 from rotordrop.model.statics import bearing_load_shares
 from rotordrop.physics import aerodynamics
@@ -21,29 +21,6 @@ from rotordrop.physics.ball_bearing_planar import planar_ball_gradient
 
 Array = NDArray[np.float64]
 LANES = 8
-
-
-class KernelParameters(NamedTuple):
-    """Everything the right-hand side reads, as flat arrays in SI units; m modes, B bearings, A magnets, Z balls.
-
-    Columns and entries are named in `rotordrop.model.layout`.
-    """
-
-    eigenvalue: Array
-    damping: Array
-    polar: Array
-    gravity: Array
-    unbalance_cos: Array
-    unbalance_sin: Array
-    bearing_shape: Array
-    bearing: Array
-    ball_cos: Array
-    ball_sin: Array
-    ball_weight: Array
-    magnet_shape: Array
-    magnet: Array
-    spin: Array
-    flags: NDArray[np.int64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -187,10 +164,10 @@ def _ball_arrays(constants: list[BearingConstants]) -> tuple[Array, Array, Array
 
 def _merged_angles(constants: BearingConstants) -> tuple[Array, Array]:
     first = np.asarray(constants.ball_angles, dtype=np.float64)
-    if constants.row_count == 1:
+    if len(constants.axial_signs) == 1:
         return first, np.ones(len(first))
     if constants.second_row_offset == 0.0:
-        return first, np.full(len(first), float(constants.row_count))
+        return first, np.full(len(first), float(len(constants.axial_signs)))
     shift = constants.second_row_offset * 2.0 * math.pi / len(first)
     both = np.concatenate([first, first + shift])
     return both, np.ones(len(both))

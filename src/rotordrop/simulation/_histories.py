@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.model import layout as L
-from rotordrop.model.parameters import KernelParameters
+from rotordrop.model.layout import KernelParameters
 from rotordrop.physics._compile import kernel
 from rotordrop.physics.ball_bearing_planar import largest_ball_load, planar_ball_energy, planar_ball_force
 from rotordrop.physics.contact import elastic_contact_energy

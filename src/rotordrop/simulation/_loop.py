@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.model import layout as L
-from rotordrop.model.parameters import KernelParameters
+from rotordrop.model.layout import KernelParameters
 from rotordrop.physics._compile import kernel
 from rotordrop.simulation._rhs import contact_state, drop_derivative, project
 from rotordrop.simulation._tableau import Tableau

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.model import layout as L
-from rotordrop.model.parameters import KernelParameters
+from rotordrop.model.layout import KernelParameters
 from rotordrop.physics import aerodynamics
 from rotordrop.physics._compile import kernel
 from rotordrop.physics.aerodynamics import exponential_deceleration, speed_dependent_deceleration

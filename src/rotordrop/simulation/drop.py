@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.machine import Machine
-from rotordrop.model.parameters import DropModel, KernelParameters, build_drop_model
+from rotordrop.model.layout import KernelParameters
+from rotordrop.model.parameters import DropModel, build_drop_model
 from rotordrop.model.reduction import Reduction
 from rotordrop.simulation import _histories as H
 from rotordrop.simulation import _loop

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import SimulationError
 from rotordrop.model import layout as L
-from rotordrop.model.parameters import DropModel, KernelParameters
+from rotordrop.model.layout import KernelParameters
+from rotordrop.model.parameters import DropModel
 from rotordrop.physics import aerodynamics
 from rotordrop.simulation.case import CentredStart, DropCase, LevitatedStart, PlacedStart, StateStart
 

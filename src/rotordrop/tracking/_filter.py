@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.model import layout as L
-from rotordrop.model.parameters import KernelParameters
+from rotordrop.model.layout import KernelParameters
 from rotordrop.physics._compile import kernel
 from rotordrop.simulation._loop import contact_at
 from rotordrop.simulation._rhs import drop_derivative
