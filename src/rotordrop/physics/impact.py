@@ -153,7 +153,8 @@ def contact_time_stiffness(m: float, T: float, v_0: float, g: float = 9.81) -> f
     """Equivalent stiffness [N/m] of a contact of duration T [s], with gravity in the account.
 
     Mass [kg], impact speed [m/s], gravity [m/s²]. Bisection in ω of `spring_contact_time`, whose value
-    lies between π/ω and 2π/ω. Source: Neisi 2020, eq. (17). Differs from the paper: the contact time of the exact solution.
+    lies between π/ω and 2π/ω.
+    Source: Neisi 2020, eq. (17). Differs from the paper: the contact time of the exact solution.
     """
     low = math.pi / T
     high = 2.0 * low

@@ -7,7 +7,8 @@ def rolling_whirl_speed(omega_r: float, R_i: float, c_r: float) -> float:
     """Backward whirl speed [rad/s] of a rotor that rolls without sliding in a fixed bore, ``ω_r R_i / c_r``.
 
     Rotor speed [rad/s], bore radius [m], air gap [m]. Never reached in a drop: a real whirl locks to a
-    coupled natural frequency of rotor and support far below. Source: Black 1968; Bartha 1998 (dry friction whirl).
+    coupled natural frequency of rotor and support far below.
+    Source: Black 1968; Bartha 1998 (dry friction whirl).
     """
     return omega_r * R_i / c_r
 
