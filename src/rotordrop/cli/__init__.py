@@ -1,0 +1,5 @@
+"""The command line: one file per verb, loaded only when the verb is called.
+
+A verb ``coast-down`` is the function ``coast_down`` in ``coast_down.py``; the first line of that file is what
+``rotordrop --help`` shows. Files whose name begins with an underscore are shared by the verbs.
+"""

@@ -1,0 +1,50 @@
+"""Arguments and options that several verbs share, and the parser of quantities with units."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rotordrop.errors import UsageError
+from rotordrop.units import parse_quantity
+
+
+def quantity(kind: str) -> Callable[[str | float], float]:
+    """Make a parser for a command-line value with a unit; the value arrives in SI units.
+
+    A default given as a number is taken as SI already.
+
+    Examples
+    --------
+    >>> quantity("speed")("3600 rpm") == quantity("speed")("60 Hz")
+    True
+    """
+
+    def parse(text: str | float) -> float:
+        if isinstance(text, float):
+            return text
+        try:
+            return parse_quantity(text, kind)
+        except UsageError as error:
+            raise typer.BadParameter(str(error)) from error
+
+    parse.__name__ = kind.replace("_", " ")
+    return parse
+
+
+MachineArgument = Annotated[
+    Path, typer.Argument(metavar="MACHINE", help="Machine description, a .toml file.", show_default=False)
+]
+
+JsonOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--json",
+        metavar="FILE",
+        help="Write the result as JSON to FILE; '-' prints it in place of the summary.",
+        show_default=False,
+    ),
+]

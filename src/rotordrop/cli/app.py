@@ -1,0 +1,145 @@
+"""The command ``rotordrop``: finds the verb, runs it, and turns errors into a sentence and an exit code.
+
+Exit codes: 0 done, 2 machine file, 3 recording, 4 identification, 5 simulation, 6 output, 64 wrong call,
+130 stopped by Ctrl-C, 1 anything else.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from difflib import get_close_matches
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+
+from rotordrop._version import __version__
+from rotordrop.errors import RotordropError, UsageError
+
+INTERRUPTED = 130
+BROKEN_PIPE = 141
+
+_ORDER = (
+    "init",
+    "schema",
+    "check",
+    "simulate",
+    "critical-speeds",
+    "coast-down",
+    "estimate",
+    "calibrate",
+    "compare",
+    "waterfall",
+    "synthesize",
+    "score",
+)
+
+# Typer carries its own copy of click in new versions and uses the installed one in old versions.
+_CallError: type[Exception] = next(c for c in typer.BadParameter.__mro__ if c.__name__ == "ClickException")
+
+
+def verbs() -> dict[str, str]:
+    """List the verbs with their one-line descriptions, in the order of the work, without importing them."""
+    files = [file for file in Path(__file__).parent.glob("[a-z]*.py") if file.stem != "app"]
+    found = {file.stem.replace("_", "-"): _first_line(file) for file in files}
+    ordered = [name for name in _ORDER if name in found]
+    return {name: found[name] for name in [*ordered, *sorted(found.keys() - set(ordered))]}
+
+
+def load_verb(name: str) -> TyperCommand:
+    """Import the file of a verb and make its function a command."""
+    module = import_module(f"rotordrop.cli.{name.replace('-', '_')}")
+    single = typer.Typer(add_completion=False, rich_markup_mode=None)
+    single.command(name)(getattr(module, name.replace("-", "_")))
+    command = typer.main.get_command(single)
+    assert isinstance(command, TyperCommand)
+    return command
+
+
+class VerbTable(TyperGroup):
+    """Group of commands that lists its verbs without importing them."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Name the verbs."""
+        return list(verbs())
+
+    def get_command(self, ctx: Any, cmd_name: str) -> TyperCommand | None:
+        """Give a light stand-in with the one-line description, enough for the help page."""
+        line = verbs().get(cmd_name)
+        return None if line is None else TyperCommand(cmd_name, short_help=line, rich_markup_mode=None)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> tuple[str | None, Any, list[str]]:
+        """Load the verb that was called."""
+        if args and args[0] in verbs():
+            return args[0], load_verb(args[0]), args[1:]
+        wrong = args[0] if args else ""
+        close = get_close_matches(wrong, verbs(), 1) or ["--help"]
+        raise UsageError(f"there is no command {wrong!r}; try 'rotordrop {close[0]}'")
+
+
+app = typer.Typer(
+    cls=VerbTable,
+    add_completion=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"rotordrop {__version__}")
+        raise typer.Exit
+
+
+@app.callback(invoke_without_command=False)
+def rotordrop(
+    version: bool = typer.Option(
+        False, "--version", is_eager=True, callback=_show_version, help="Print the version and stop."
+    ),
+) -> None:
+    """From a recorded rotor drop to touchdown-bearing force and stress."""
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run one command and give its exit code; errors become one sentence on standard error."""
+    try:
+        command = typer.main.get_command(app)
+        outcome = command.main(
+            args=list(arguments) or ["--help"], prog_name="rotordrop", standalone_mode=False
+        )
+        sys.stdout.flush()
+        return outcome if isinstance(outcome, int) else 0
+    except RotordropError as error:
+        return _fail(str(error), error.exit_code)
+    except _CallError as error:
+        return _fail(_call_message(error), UsageError.exit_code)
+    except (KeyboardInterrupt, typer.Abort):
+        return _fail("stopped; nothing was left half written", INTERRUPTED)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return BROKEN_PIPE
+
+
+def main() -> None:
+    """Entry point of the command ``rotordrop``."""
+    sys.exit(run(sys.argv[1:]))
+
+
+def _fail(message: str, code: int) -> int:
+    typer.echo(f"rotordrop: {message}", err=True)
+    return code
+
+
+def _call_message(error: Any) -> str:
+    context = getattr(error, "ctx", None)
+    path = context.command_path if context else "rotordrop"
+    return f"{error.format_message()}\nSee '{path} --help'."
+
+
+def _first_line(file: Path) -> str:
+    with file.open(encoding="utf-8") as text:
+        return text.readline().strip().strip('"').rstrip(".")
