@@ -29,6 +29,7 @@ ON_BEARING = 0
 ON_SPIN = 1
 ON_MAGNET = 2
 ON_UNBALANCE = 3
+SCALE_BEARING = 4
 
 
 class ParameterTargets(NamedTuple):
@@ -78,6 +79,8 @@ def apply_parameters(theta: Array, targets: ParameterTargets, p: KernelParameter
             p.bearing[row, column] = value
             if column == L.AIR_GAP:
                 p.bearing[row, L.ROTOR_RADIUS] = p.bearing[row, L.BORE_RADIUS] - value
+        elif kind == SCALE_BEARING:
+            p.bearing[row, column] *= value
         elif kind == ON_SPIN:
             p.spin[column] = value
         elif kind == ON_MAGNET:
