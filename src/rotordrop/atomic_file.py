@@ -35,6 +35,8 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     temporary = target.with_name(f".{target.stem}.{secrets.token_hex(4)}.part{target.suffix}")
     try:
         yield temporary
+        if not temporary.exists():
+            raise OutputError(f"nothing was written for {target}")
         _sync(temporary)
         temporary.replace(target)
     except OSError as error:
@@ -76,8 +78,6 @@ def _refuse_impossible(target: Path) -> None:
 
 
 def _sync(path: Path) -> None:
-    if not path.exists():
-        raise OutputError(f"nothing was written for {path}")
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
@@ -87,10 +87,5 @@ def _sync(path: Path) -> None:
 
 def _sync_folder(folder: Path) -> None:
     """Make the rename itself durable where the system allows to sync a folder (not on Windows)."""
-    if os.name != "posix":
-        return
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+    if os.name == "posix":
+        _sync(folder)

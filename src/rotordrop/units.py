@@ -81,7 +81,7 @@ kelvin = [temperature] = K
 volt = [voltage] = V
 radian = [angle] = rad
 turn = 6.283185307179586476925 * radian = _ = rev = revolution = cycle
-degree = turn / 360 = deg = °
+degree = turn / 360 = deg
 minute = 60 * second = min
 hour = 3600 * second = h
 hertz = turn / second = Hz
@@ -104,8 +104,8 @@ psi = pound_force / inch ** 2
 ksi = 1000 * psi
 joule = newton * metre = J
 watt = joule / second = W
-degree_Celsius = kelvin; offset: 273.15 = degC = °C
-degree_Fahrenheit = 5 / 9 * kelvin; offset: 233.15 + 200 / 9 = degF = °F
+degree_Celsius = kelvin; offset: 273.15 = degC
+degree_Fahrenheit = 5 / 9 * kelvin; offset: 233.15 + 200 / 9 = degF
 percent = 0.01 = %
 """
 
@@ -221,11 +221,12 @@ def _plain_unit(unit: str) -> str:
     unit = re.sub(r"\b([rU])/min\b", "rpm", unit)
     unit = re.sub(r"\bN(ms|m|s)\b", lambda match: "N " + " ".join(match.group(1)), unit)
     unit = re.sub(r"\bgmm\b", "g mm", unit)
+    unit = re.sub(r"°\s*([CF]?)", r" deg\1", unit).strip()
     return unit.replace("²", "^2").replace("³", "^3")
 
 
 def _unit(unit: str, text: object, kind: str) -> Any:
-    if not re.fullmatch(r"[\w\s°%*/^().+-]*", unit):
+    if not re.fullmatch(r"[\w\s%*/^().+-]*", unit):
         raise UsageError(
             f"{text!r}: cannot read {unit!r} as a unit; write for example {_kind(kind).example!r}"
         )
@@ -278,7 +279,7 @@ def _contact_stiffness(number: float, unit: str, text: object) -> float:
 def _rounded(number: float, digits: int) -> str:
     if not math.isfinite(number) or number == 0.0:
         return f"{number:g}".replace("-0", "0")
-    if not 1e-4 <= abs(number) < 1e7:
+    if not 1e-3 <= abs(number) < 1e7:
         return f"{number:.{digits - 1}e}".replace("e-0", "e-").replace("e+0", "e").replace("e+", "e")
     places = max(0, digits - 1 - math.floor(math.log10(abs(number) * (1 + 0.5 * 10.0**-digits))))
     return f"{number:.{places}f}"

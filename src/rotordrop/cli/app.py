@@ -107,12 +107,11 @@ def rotordrop(
 def run(arguments: Sequence[str]) -> int:
     """Run one command and give its exit code; errors become one sentence on standard error."""
     try:
-        command = typer.main.get_command(app)
-        outcome = command.main(
-            args=list(arguments) or ["--help"], prog_name="rotordrop", standalone_mode=False
-        )
+        _invoke(list(arguments) or ["--help"])
         sys.stdout.flush()
-        return outcome if isinstance(outcome, int) else 0
+        return 0
+    except typer.Exit as stop:
+        return stop.exit_code
     except RotordropError as error:
         return _fail(str(error), error.exit_code)
     except _CallError as error:
@@ -122,6 +121,12 @@ def run(arguments: Sequence[str]) -> int:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return BROKEN_PIPE
+
+
+def _invoke(arguments: list[str]) -> None:
+    command = typer.main.get_command(app)
+    with command.make_context("rotordrop", arguments) as context:
+        command.invoke(context)
 
 
 def main() -> None:

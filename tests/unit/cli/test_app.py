@@ -1,0 +1,187 @@
+"""The command line: help without imports, stable exit codes, sentences instead of tracebacks."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rotordrop import errors
+from rotordrop.cli import app as command_line
+from rotordrop.cli._options import quantity
+
+VERBS = command_line.verbs()
+
+
+def call(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "rotordrop", *arguments],
+        capture_output=True,
+        text=True,
+        env=os.environ | environment,
+        timeout=60,
+    )
+
+
+def test_help_lists_every_verb_with_its_line():
+    done = call("--help")
+    assert done.returncode == 0
+    for verb, line in VERBS.items():
+        assert f"  {verb}" in done.stdout
+        assert line.split()[0] in done.stdout
+
+
+def test_no_arguments_is_help():
+    assert call().stdout == call("--help").stdout
+
+
+def test_version():
+    import rotordrop
+
+    assert call("--version").stdout == f"rotordrop {rotordrop.__version__}\n"
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_each_verb_has_help_and_a_line_that_fits(verb):
+    command = command_line.load_verb(verb)
+    assert command.name == verb
+    assert command.help, "the function of the verb needs a docstring"
+    assert 10 < len(VERBS[verb]) < 62, "one line of the help page"
+    for parameter in command.params:
+        if parameter.name != "help":
+            assert getattr(parameter, "help", None), f"{verb}: {parameter.name} has no help text"
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_each_verb_that_computes_offers_json(verb):
+    if verb in {"init", "schema"}:
+        pytest.skip("writes a document, not a result")
+    options = [name for parameter in command_line.load_verb(verb).params for name in parameter.opts]
+    assert "--json" in options
+
+
+def test_an_unknown_verb_is_a_wrong_call_with_a_suggestion():
+    done = call("--no-such-option")
+    assert (done.returncode, done.stdout) == (64, "")
+    assert done.stderr == "rotordrop: No such option: --no-such-option\nSee 'rotordrop --help'.\n"
+    done = call("frobnicate")
+    assert (done.returncode, done.stdout) == (64, "")
+    assert done.stderr == "rotordrop: there is no command 'frobnicate'; try 'rotordrop --help'\n"
+
+
+@pytest.fixture
+def verb_folder(tmp_path, monkeypatch):
+    """Let the command line find its verbs in a folder of the test."""
+    import rotordrop.cli
+
+    monkeypatch.setattr(rotordrop.cli, "__path__", [str(tmp_path)])
+    monkeypatch.setattr(command_line, "__file__", str(tmp_path / "app.py"))
+    yield tmp_path
+    for name in [name for name in sys.modules if name.startswith("rotordrop.cli.try_")]:
+        del sys.modules[name]
+
+
+def write_verb(folder: Path, name: str, body: str) -> None:
+    text = '"""Try it out.\n\nMore.\n"""\n'
+    text += "from rotordrop import errors\n"
+    (folder / f"{name}.py").write_text(text + body)
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        "MachineFileError",
+        "RecordError",
+        "IdentificationError",
+        "SimulationError",
+        "OutputError",
+        "UsageError",
+    ],
+)
+def test_each_error_becomes_its_exit_code_and_one_line(verb_folder, capsys, error):
+    name = f"try_{error.lower()}"
+    write_verb(
+        verb_folder,
+        name,
+        f"def {name}() -> None:\n    'Try.'\n    raise errors.{error}('the gap is -3 µm')\n",
+    )
+    code = command_line.run([name.replace("_", "-")])
+    out, err = capsys.readouterr()
+    assert code == getattr(errors, error).exit_code
+    assert (out, err) == ("", "rotordrop: the gap is -3 µm\n")
+
+
+def test_ctrl_c_ends_with_130_and_no_traceback(verb_folder, capsys):
+    write_verb(verb_folder, "try_stop", "def try_stop() -> None:\n    'Try.'\n    raise KeyboardInterrupt\n")
+    assert command_line.run(["try-stop"]) == 130
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.strip() == "rotordrop: stopped; nothing was left half written"
+
+
+def test_an_error_of_ours_is_not_hidden(verb_folder):
+    write_verb(verb_folder, "try_bug", "def try_bug() -> None:\n    'Try.'\n    1 / 0\n")
+    with pytest.raises(ZeroDivisionError):
+        command_line.run(["try-bug"])
+
+
+def test_a_missing_argument_is_a_wrong_call(verb_folder, capsys):
+    write_verb(verb_folder, "try_gap", "def try_gap(gap: str) -> None:\n    'Try.'\n")
+    assert command_line.run(["try-gap"]) == 64
+    assert "Missing argument" in (message := capsys.readouterr().err)
+    assert "See 'rotordrop try-gap --help'." in message
+
+
+def test_the_help_page_does_not_import_the_verbs(verb_folder, capsys):
+    write_verb(verb_folder, "try_heavy", "raise RuntimeError('was imported')\n")
+    assert command_line.run(["--help"]) == 0
+    assert "try-heavy  Try it out" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "environment", [{}, {"FORCE_COLOR": "1"}, {"NO_COLOR": "1"}, {"GITHUB_ACTIONS": "true"}]
+)
+def test_no_escape_sequences_where_there_is_no_terminal(environment):
+    done = call("--help", **environment)
+    assert "\x1b" not in done.stdout + done.stderr
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes as on POSIX")
+def test_a_reader_that_goes_away_is_no_traceback():
+    line = f"{sys.executable} -m rotordrop --help | true; echo ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", line], capture_output=True, text=True)
+    assert done.stdout.strip() in {"0", "141"}
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals as on POSIX")
+def test_ctrl_c_in_the_real_command_ends_with_130():
+    program = (
+        "import os, signal, sys\n"
+        "from rotordrop.cli import app\n"
+        "app.load_verb = lambda name: os.kill(os.getpid(), signal.SIGINT)\n"
+        "app.verbs = lambda: {'wait': 'Wait'}\n"
+        "sys.exit(app.run(['wait']))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 130
+    assert "Traceback" not in done.stderr
+    assert signal.SIGINT.name not in done.stderr
+
+
+@pytest.mark.parametrize(("text", "value"), [("280 um", 280e-6), ("0.28 mm", 280e-6), (280e-6, 280e-6)])
+def test_a_quantity_on_the_command_line_arrives_in_si(text, value):
+    assert quantity("length")(text) == pytest.approx(value)
+
+
+def test_a_quantity_without_unit_is_refused_with_the_way_out():
+    import typer
+
+    with pytest.raises(
+        typer.BadParameter, match=r"'280' has no unit; a length needs one, for example '280 um'"
+    ):
+        quantity("length")("280")

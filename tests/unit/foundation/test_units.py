@@ -1,0 +1,179 @@
+"""Units: what stock parsers get wrong, and what the messages say instead."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rotordrop.errors import UsageError
+from rotordrop.units import KINDS, format_quantity, parse_quantity, si_unit
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "value"),
+    [
+        # each was seen wrong with a stock registry
+        ("60 Hz", "speed", 2 * math.pi * 60),
+        ("3600 rpm", "frequency", 60.0),
+        ("10 mil", "length", 254e-6),
+        ("3600 RPM", "speed", 2 * math.pi * 60),
+        ("60 rev/s", "speed", 2 * math.pi * 60),
+        # the same unit, chosen by the kind of the field
+        ("60 Hz", "frequency", 60.0),
+        ("376.99111843077515 rad/s", "frequency", 60.0),
+        ("1 deg/s", "speed", math.pi / 180),
+        ("1.5 kHz", "frequency", 1500.0),
+        ("3000 r/min", "speed", 100 * math.pi),
+        ("3000 U/min", "speed", 100 * math.pi),
+        ("45 deg", "angle", math.pi / 4),
+        ("-45°", "angle", -math.pi / 4),
+        # lengths
+        ("280 um", "length", 280e-6),
+        ("280 µm", "length", 280e-6),
+        ("280 μm", "length", 280e-6),
+        ("280 micron", "length", 280e-6),
+        ("0.27 mm", "length", 0.27e-3),
+        ("1 in", "length", 0.0254),
+        ("5 thou", "length", 127e-6),
+        # mechanics
+        ("1e8 N/m", "stiffness", 1e8),
+        ("100 N/um", "stiffness", 1e8),
+        ("1 lbf/in", "stiffness", 4.4482216152605 / 0.0254),
+        ("5 kN s/m", "damping", 5000.0),
+        ("5000 Ns/m", "damping", 5000.0),
+        ("5 N·s/mm", "damping", 5000.0),
+        ("50 g mm", "unbalance", 5e-5),
+        ("50 gmm", "unbalance", 5e-5),
+        ("0.42 kg m²", "inertia", 0.42),
+        ("7.85 g/cm^3", "density", 7850.0),
+        ("210 GPa", "pressure", 210e9),
+        ("1 psi", "pressure", 6894.757293168361),
+        ("3 g_n", "acceleration", 29.41995),
+        ("1 kgf", "force", 9.80665),
+        ("2 t", "mass", 2000.0),
+        ("1 lb", "mass", 0.45359237),
+        ("0.1 N m s", "rotational_drag", 0.1),
+        ("0.1 N m s/rad", "rotational_drag", 0.1),
+        ("1 N m/rpm", "rotational_drag", 60 / (2 * math.pi)),
+        ("0.1 s/m", "contact_damping", 0.1),
+        ("8 mV/um", "voltage_sensitivity", 8000.0),
+        ("20 degC", "temperature", 293.15),
+        ("68 °F", "temperature", 293.15),
+        ("15 %", "dimensionless", 0.15),
+        (0.15, "dimensionless", 0.15),
+        ("0.15", "dimensionless", 0.15),
+        # the contact's exponent is part of its unit
+        ("1.05e9 N/m^1.11", "contact_stiffness", 1.05e9),
+        ("1.05e9 N/m^(10/9)", "contact_stiffness", 1.05e9),
+        ("1 N/mm^1.5", "contact_stiffness", 1000**1.5),
+        ("2 kN/m", "contact_stiffness", 2000.0),
+    ],
+)
+def test_value_in_si(text, kind, value):
+    assert parse_quantity(text, kind) == pytest.approx(value, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "message"),
+    [
+        ("0,27 mm", "length", r"'0,27 mm' has a decimal comma; use 0\.27 mm"),
+        ("1,000 N", "force", r"'1,000 N' has a decimal comma; use 1\.000 N"),
+        ("3 g", "acceleration", r"'3 g' is not an acceleration; g is the gram; write '3 g_n'"),
+        ("280", "length", r"'280' has no unit; a length needs one, for example '280 um'"),
+        (280, "length", r"280 has no unit; a length needs one"),
+        (280e-6, "length", r"0\.00028 has no unit"),
+        ("60", "speed", r"'60' has no unit; a speed needs one, for example '60 Hz'"),
+        ("280 kg", "length", r"'280 kg' is not a length; write for example '280 um'"),
+        ("1e8 N", "stiffness", r"'1e8 N' is not a stiffness; write for example '1e8 N/m'"),
+        ("60 1/s", "speed", r"'60 1/s' is not a speed; say what is counted: 'Hz', 'rpm' or 'rad/s'"),
+        ("3000 1/min", "speed", r"say what is counted"),
+        ("60 Hz", "angle", r"'60 Hz' is not an angle; write for example '45 deg'"),
+        ("45 lb/in", "stiffness", r"lb is a mass here; write 'lbf'"),
+        ("60 hz", "speed", r"'hz' is not a unit known here; did you mean 'Hz'\?"),
+        ("210 Gpa", "pressure", r"'Gpa' is not a unit known here; did you mean 'GPa'\?"),
+        ("3 bananas", "mass", r"'bananas' is not a unit known here; write for example '105 kg'"),
+        ("um", "length", r"'um' does not begin with a number; write for example '280 um'"),
+        ("", "length", r"'' does not begin with a number"),
+        ("nan m", "length", r"'nan m' does not begin with a number"),
+        ("1e999 m", "length", r"'1e999 m' is too large to be a length"),
+        ("3 m; 4", "length", r"cannot read 'm; 4' as a unit"),
+        ("3 m + 4 mm", "length", r"'m \+ 4 mm' is not a unit known here"),
+        (
+            "1e9 N/m^3",
+            "contact_stiffness",
+            r"'1e9 N/m\^3' is not a contact stiffness; write N/m\^n with n from 1 to 2",
+        ),
+        (True, "length", r"True is not a length; write a number with a unit, '280 um'"),
+        (None, "mass", r"None is not a mass"),
+    ],
+)
+def test_refusal_names_the_value_and_the_way_out(text, kind, message):
+    with pytest.raises(UsageError, match=message):
+        parse_quantity(text, kind)
+
+
+def test_unknown_kind_is_refused():
+    with pytest.raises(UsageError, match=r"'colour' is not a kind of quantity; known are length, mass"):
+        parse_quantity("3 red", "colour")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_example_of_each_kind_is_accepted(kind):
+    assert math.isfinite(parse_quantity(KINDS[kind].example, kind))
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if KINDS[kind].unit])
+def test_one_si_unit_is_one(kind):
+    unit = KINDS[kind].unit.replace("^n", "^1.5")
+    assert parse_quantity(f"1 {unit}", kind) == pytest.approx(1.0, rel=1e-12)
+
+
+@pytest.mark.parametrize(("kind", "unit"), [("speed", "rad/s"), ("frequency", "Hz"), ("force", "N")])
+def test_si_unit_is_named(kind, unit):
+    assert si_unit(kind) == unit
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.text(max_size=20) | st.from_regex(r"\A-?[0-9]{1,3}(e[0-9])? ?[a-zA-Z/^*()0-9 .+-]{0,12}\Z"))
+def test_any_text_gives_a_finite_number_or_a_usage_error(text):
+    for kind in ("length", "speed", "contact_stiffness", "dimensionless"):
+        try:
+            value = parse_quantity(text, kind)
+        except UsageError:
+            continue
+        assert math.isfinite(value)
+
+
+@pytest.mark.parametrize(
+    ("value", "kind", "text"),
+    [
+        (280e-6, "length", "280 µm"),
+        (0.99996e-3, "length", "1.00 mm"),
+        (1.115523, "length", "1.12 m"),
+        (0.0, "length", "0 m"),
+        (2 * math.pi * 60, "speed", "60.0 Hz (3600 rpm)"),
+        (60.0, "frequency", "60.0 Hz"),
+        (7000.0, "frequency", "7.00 kHz"),
+        (1.66e9, "pressure", "1660 MPa"),
+        (1e8, "stiffness", "100 MN/m"),
+        (-513.2, "force", "-513 N"),
+        (12345.0, "force", "12.3 kN"),
+        (math.pi / 4, "angle", "45.0°"),
+        (5e-5, "unbalance", "50.0 g mm"),
+        (0.15, "dimensionless", "0.150"),
+        (3.2e-10, "length", "3.20e-4 µm"),
+        (math.nan, "length", "nan m"),
+    ],
+)
+def test_a_value_is_written_as_engineers_read_it(value, kind, text):
+    assert format_quantity(value, kind) == text
+
+
+@given(st.floats(1e-9, 1e3), st.sampled_from(["length", "mass", "velocity", "angle", "unbalance", "time"]))
+@settings(max_examples=100, deadline=None)
+def test_what_is_written_reads_back(value, kind):
+    text = format_quantity(value, kind, digits=6)
+    assert parse_quantity(text, kind) == pytest.approx(value, rel=1e-5)
