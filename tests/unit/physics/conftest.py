@@ -1,0 +1,30 @@
+"""Bearings of the physics tests."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from rotordrop.physics.ball_bearing_geometry import BallBearingGeometry
+
+
+@pytest.fixture(scope="session")
+def touchdown_bearing() -> Callable[..., BallBearingGeometry]:
+    """The reference machine's touchdown bearing (23 ceramic balls, 25°, 530 N per row), with changes."""
+    reference: dict[str, Any] = {
+        "ball_diameter": 0.009525,
+        "ball_count": 23,
+        "pitch_diameter": 0.085,
+        "contact_angle": math.radians(25.0),
+        "conformity_inner": 0.53,
+        "conformity_outer": 0.53,
+        "preload": 530.0,
+    }
+
+    def changed(**changes: Any) -> BallBearingGeometry:
+        return BallBearingGeometry(**(reference | changes))
+
+    return changed

@@ -1,0 +1,277 @@
+"""Laws of the five-degree-of-freedom ball bearing: energy, symmetry, rotation, arrangements, equilibrium."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from rotordrop.errors import SimulationError
+from rotordrop.physics.ball_bearing import bearing_constants
+from rotordrop.physics.ball_bearing_geometry import BallBearingGeometry
+from rotordrop.physics.ball_bearing_planar import planar_ball_force, planar_ball_gradient
+from rotordrop.physics.ball_bearing_response import (
+    bearing_equilibrium,
+    bearing_response,
+    simple_radial_stiffness,
+)
+from rotordrop.physics.hertz import compliance
+
+Array = NDArray[np.float64]
+Bearing = Callable[..., BallBearingGeometry]
+SPACING = 0.016
+ARRANGEMENTS = ("X", "O", "tandem", "single")
+UNITS = np.array([1e-5, 1e-5, 5e-6, 2e-4, 2e-4])
+
+
+def displacements(count: int, seed: int = 7) -> Array:
+    """Displacements at which some balls are loose and some heavily loaded."""
+    return np.random.default_rng(seed).normal(size=(count, 5)) * UNITS
+
+
+def turn(q: Array, angle: float) -> Array:
+    """A displacement or force turned about z."""
+    c, s = math.cos(angle), math.sin(angle)
+    rotation = np.eye(5)
+    rotation[:2, :2] = rotation[3:, 3:] = [[c, -s], [s, c]]
+    return rotation @ q
+
+
+@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
+def test_force_is_minus_the_gradient_of_the_elastic_energy(
+    touchdown_bearing: Bearing, arrangement: str
+) -> None:
+    constants = bearing_constants(touchdown_bearing(arrangement=arrangement, second_row_offset=0.3))
+    for q in displacements(6):
+        response = bearing_response(constants, q, row_spacing=SPACING)
+        steps = 1e-4 * np.diag(UNITS)
+        energy = [
+            [bearing_response(constants, q + sign * step, row_spacing=SPACING).energy for sign in (1, -1)]
+            for step in steps
+        ]
+        gradient = -np.diff(energy, axis=1)[:, 0] / (2 * np.diag(steps))
+        np.testing.assert_allclose(
+            response.force * UNITS, -gradient * UNITS, atol=2e-6 * np.max(np.abs(response.force * UNITS))
+        )
+
+
+@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
+def test_stiffness_is_minus_the_derivative_of_the_force_and_symmetric(
+    touchdown_bearing: Bearing, arrangement: str
+) -> None:
+    constants = bearing_constants(touchdown_bearing(arrangement=arrangement, second_row_offset=0.3))
+    scale = np.outer(UNITS, UNITS)
+    for q in displacements(6, seed=3):
+        stiffness = bearing_response(constants, q, row_spacing=SPACING).stiffness
+        columns = []
+        for step in 1e-5 * np.diag(UNITS):
+            up = bearing_response(constants, q + step, row_spacing=SPACING).force
+            down = bearing_response(constants, q - step, row_spacing=SPACING).force
+            columns.append((down - up) / (2 * step.sum()))
+        size = np.max(np.abs(stiffness * scale))
+        np.testing.assert_allclose(stiffness * scale, np.array(columns).T * scale, atol=2e-5 * size)
+        np.testing.assert_allclose(stiffness * scale, stiffness.T * scale, atol=1e-14 * size)
+        assert np.all(np.linalg.eigvalsh(stiffness * scale) > -1e-12 * size)
+
+
+@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
+def test_turning_the_displacement_by_one_pitch_turns_the_force(
+    touchdown_bearing: Bearing, arrangement: str
+) -> None:
+    constants = bearing_constants(touchdown_bearing(arrangement=arrangement, ball_count=5))
+    pitch = 2 * math.pi / 5
+    for q in displacements(3):
+        force = bearing_response(constants, q, row_spacing=SPACING).force
+        turned = bearing_response(constants, turn(q, pitch), row_spacing=SPACING).force
+        np.testing.assert_allclose(turned, turn(force, pitch), rtol=1e-9, atol=1e-9)
+        half = bearing_response(constants, turn(q, pitch / 2), row_spacing=SPACING).force
+        assert np.linalg.norm(half - turn(force, pitch / 2)) > 1e-6 * np.linalg.norm(force)
+
+
+def test_turning_the_balls_with_the_displacement_turns_the_force(touchdown_bearing: Bearing) -> None:
+    q = displacements(1)[0]
+    force = bearing_response(bearing_constants(touchdown_bearing()), q, row_spacing=SPACING).force
+    for angle in (0.3, 2.0, 4.5):
+        constants = bearing_constants(touchdown_bearing(first_ball_angle=angle))
+        turned = bearing_response(constants, turn(q, angle), row_spacing=SPACING).force
+        np.testing.assert_allclose(turned, turn(force, angle), rtol=1e-9, atol=1e-9)
+
+
+def test_mirror_at_the_yz_plane_mirrors_the_force(touchdown_bearing: Bearing) -> None:
+    """The balls are their own mirror image (first on +y): x and the rotation about y change sign."""
+    constants = bearing_constants(touchdown_bearing())
+    mirror = np.array([-1.0, 1.0, 1.0, 1.0, -1.0])
+    for q in displacements(3):
+        force = bearing_response(constants, q, row_spacing=SPACING).force
+        mirrored = bearing_response(constants, mirror * q, row_spacing=SPACING).force
+        np.testing.assert_allclose(mirrored, mirror * force, rtol=1e-9, atol=1e-9)
+
+
+def test_x_and_o_pairs_are_equal_under_radial_displacement(touchdown_bearing: Bearing) -> None:
+    pair = [bearing_constants(touchdown_bearing(arrangement=a)) for a in ("X", "O")]
+    x, o = (bearing_response(c, [3e-6, -2e-5, 0, 0, 0], row_spacing=SPACING) for c in pair)
+    np.testing.assert_allclose(x.force[:3], o.force[:3], rtol=1e-12, atol=1e-9)
+    np.testing.assert_allclose(x.stiffness[:3, :3], o.stiffness[:3, :3], rtol=1e-9, atol=1.0)
+    np.testing.assert_allclose(x.ball_loads, o.ball_loads, rtol=1e-12)
+
+
+def test_o_pair_is_the_mirror_image_of_the_x_pair_with_the_rows_exchanged(touchdown_bearing: Bearing) -> None:
+    x, o = (bearing_constants(touchdown_bearing(arrangement=a)) for a in ("X", "O"))
+    for q in displacements(3):
+        force_x = bearing_response(x, q, row_spacing=SPACING).force
+        force_o = bearing_response(o, q, row_spacing=-SPACING).force
+        np.testing.assert_allclose(force_x, force_o, rtol=1e-10, atol=1e-9)
+
+
+def test_o_arrangement_resists_tilt_with_the_longer_base(touchdown_bearing: Bearing) -> None:
+    """Moment stiffness of a pair: its load lines meet the axis at the distance D_pw tan α ± l."""
+    tilt = {}
+    for arrangement in ("X", "O"):
+        constants = bearing_constants(touchdown_bearing(arrangement=arrangement))
+        response = bearing_response(constants, np.zeros(5), row_spacing=SPACING)
+        tilt[arrangement] = response.stiffness[3, 3]
+        slope = 1.5 * constants.ball_stiffness ** (2 / 3) * constants.preload_ball_load ** (1 / 3)
+        phi = math.atan2(constants.axial_offset, constants.radial_offset)
+        sign = 1.0 if arrangement == "O" else -1.0
+        base = 0.5 * SPACING * math.cos(phi) + sign * constants.pitch_radius * math.sin(phi)
+        along = slope * 23 * base**2
+        assert tilt[arrangement] == pytest.approx(
+            along, rel=0.08
+        )  # the rest is the force turning with the tilt
+        assert tilt[arrangement] > along
+    assert tilt["O"] > 2.0 * tilt["X"]
+
+
+def test_rigid_tilt_is_the_same_as_axial_motion_of_each_ball(touchdown_bearing: Bearing) -> None:
+    """Right-handed axes: a turn about +x lifts the race at +y in +z, a turn about +y sinks it at +x."""
+    constants = bearing_constants(touchdown_bearing(ball_count=4, arrangement="single"))
+    for tilt, loaded in (
+        ((1e-4, 0.0), "+y"),
+        ((-1e-4, 0.0), "-y"),
+        ((0.0, 1e-4), "-x"),
+        ((0.0, -1e-4), "+x"),
+    ):
+        loads = bearing_response(constants, [0, 0, 0, *tilt]).ball_loads[0]
+        assert ("+y", "-x", "-y", "+x")[int(np.argmax(loads))] == loaded
+        moved = bearing_response(constants, [0, 0, 1e-4 * 0.0425, 0, 0]).ball_loads[0]
+        assert loads.max() == pytest.approx(moved.max(), rel=1e-12)
+
+
+def test_planar_kernel_agrees_with_the_full_function(touchdown_bearing: Bearing) -> None:
+    constants = bearing_constants(touchdown_bearing(first_ball_angle=0.05))
+    beta = np.append(constants.ball_angles, 0.0)
+    weights = np.append(np.full(23, 2.0), 0.0)
+    arguments = (
+        constants.radial_offset,
+        constants.axial_offset,
+        constants.groove_distance,
+        constants.ball_stiffness,
+        np.cos(beta),
+        np.sin(beta),
+        weights,
+    )
+    for dx, dy, *_ in displacements(5):
+        full = bearing_response(constants, [dx, dy, 0, 0, 0])
+        force = planar_ball_force(dx, dy, *arguments, np.empty((2, 24)))
+        assert force == pytest.approx(tuple(-full.force[:2]), rel=1e-9, abs=1e-9)
+        gradient = planar_ball_gradient(dx, dy, *arguments)
+        k = full.stiffness
+        assert gradient[2:] == pytest.approx((k[0, 0], k[0, 1], k[1, 1]), rel=1e-9, abs=1.0)
+
+
+def test_stress_is_the_coefficient_times_the_cube_root_of_the_load(touchdown_bearing: Bearing) -> None:
+    constants = bearing_constants(touchdown_bearing())
+    response = bearing_response(constants, [0, -2e-5, 0, 0, 0])
+    ratio = response.stress_inner[response.ball_loads > 0] / response.stress_outer[response.ball_loads > 0]
+    np.testing.assert_allclose(
+        ratio, constants.stress_coefficient_inner / constants.stress_coefficient_outer, rtol=1e-13
+    )
+    loads = (response.stress_inner / constants.stress_coefficient_inner) ** 3
+    np.testing.assert_allclose(loads, response.ball_loads, rtol=1e-12, atol=1e-12)
+    bottom = int(np.argmax(response.ball_loads[0]))
+    assert math.sin(constants.ball_angles[bottom]) < -0.98  # the loaded part of the race is at the bottom
+
+
+@pytest.mark.acceptance
+@pytest.mark.parametrize(("load", "N_per_um"), [(174.618, 509.925), (409.077, 507.524)])
+@pytest.mark.parametrize(("preload", "agrees"), [(530.0, True), (531.0, False)])
+def test_tangent_stiffness_at_the_static_loads(
+    touchdown_bearing: Bearing, load: float, N_per_um: float, preload: float, agrees: bool
+) -> None:
+    """Own reference: K_b of the reference machine at its two weight shares."""
+    constants = bearing_constants(touchdown_bearing(preload=preload))
+    q = bearing_equilibrium(constants, [0, -load, 0, 0, 0])
+    k_yy = bearing_response(constants, q).stiffness[1, 1]
+    assert (k_yy == pytest.approx(1e6 * N_per_um, rel=2e-6)) == agrees
+
+
+@pytest.mark.parametrize("arrangement", ["X", "O"])
+def test_equilibrium_carries_the_load(touchdown_bearing: Bearing, arrangement: str) -> None:
+    constants = bearing_constants(touchdown_bearing(arrangement=arrangement))
+    load = np.array([300.0, -900.0, 200.0, 3.0, -4.0])
+    q = bearing_equilibrium(constants, load, row_spacing=SPACING)
+    force = bearing_response(constants, q, row_spacing=SPACING).force
+    np.testing.assert_allclose(force, -load, atol=1e-6)
+
+
+def test_equilibrium_leaves_held_directions_at_their_start(touchdown_bearing: Bearing) -> None:
+    constants = bearing_constants(touchdown_bearing())
+    start = np.array([1e-6, 0.0, 2e-6, 1e-5, -1e-5])
+    q = bearing_equilibrium(
+        constants, [0, -500.0, 0, 0, 0], free=(False, True, False, False, False), start=start
+    )
+    np.testing.assert_array_equal(q[[0, 2, 3, 4]], start[[0, 2, 3, 4]])
+    assert -bearing_response(constants, q).force[1] == pytest.approx(-500.0, rel=1e-9)
+
+
+def test_load_that_nothing_carries_is_reported(touchdown_bearing: Bearing) -> None:
+    constants = bearing_constants(touchdown_bearing(arrangement="single"))
+    with pytest.raises(
+        SimulationError, match=r"no equilibrium under the load .*-800.* N are left over .*hold the"
+    ):
+        bearing_equilibrium(constants, [0, 0, -800.0, 0, 0], free=(False, False, True, False, False))
+
+
+def test_simple_formula_is_the_one_of_gargiulo() -> None:
+    """Palmgren with Stribeck's 5 and the pound-inch coefficient 0.0325e6 are one formula within 0.2 %."""
+    D, Z, alpha, F = 0.009525, 46, math.radians(25), 409.1
+    inch, pound = 0.0254, 4.4482216
+    gargiulo = 0.0325e6 * (D / inch * F / pound * Z**2 * math.cos(alpha) ** 5) ** (1 / 3) * pound / inch
+    assert simple_radial_stiffness(D, Z, alpha, F) == pytest.approx(gargiulo, rel=2e-3)
+
+
+def test_simple_formula_is_the_slope_of_its_deflection_and_follows_the_material() -> None:
+    D, Z, alpha = 0.009525, 46, math.radians(25)
+    stiffness = simple_radial_stiffness(D, Z, alpha, 400.0)
+    assert simple_radial_stiffness(D, Z, alpha, 3200.0) == pytest.approx(2.0 * stiffness, rel=1e-12)
+    ratio = compliance(208e9, 0.3, 315e9, 0.26) / compliance(208e9, 0.3, 208e9, 0.3)
+    hybrid = simple_radial_stiffness(D, Z, alpha, 400.0, ratio)
+    assert hybrid / stiffness == pytest.approx(ratio ** (-2 / 3), rel=1e-12)
+
+
+def test_simple_formula_meets_the_tangent_of_a_bearing_without_preload(touchdown_bearing: Bearing) -> None:
+    """Deep-groove steel bearing without clearance, the case of the formula: they agree within 15 %."""
+    bearing = touchdown_bearing(
+        arrangement="single",
+        contact_angle=0.0,
+        conformity_inner=0.52,
+        conformity_outer=0.53,
+        ball_youngs_modulus=208e9,
+        ball_poisson_ratio=0.3,
+        preload=0.0,
+    )
+    constants = bearing_constants(bearing)
+    held = (True, True, False, False, False)
+    q = bearing_equilibrium(constants, [0, -1000.0, 0, 0, 0], free=held, start=[0, -1e-6, 0, 0, 0])
+    tangent = bearing_response(constants, q).stiffness[1, 1]
+    assert simple_radial_stiffness(0.009525, 23, 0.0, 1000.0) == pytest.approx(tangent, rel=0.15)
+
+
+def test_simple_formula_knows_no_preload(touchdown_bearing: Bearing) -> None:
+    constants = bearing_constants(touchdown_bearing())
+    q = bearing_equilibrium(constants, [0, -409.1, 0, 0, 0])
+    tangent = bearing_response(constants, q).stiffness[1, 1]
+    assert simple_radial_stiffness(0.009525, 46, constants.contact_angle, 409.1) < 0.5 * tangent

@@ -1,0 +1,136 @@
+"""Laws of the Hertz contact: limits, scaling, energy, and equivalence of the two ways to a number."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.special import ellipe, ellipk
+
+from rotordrop.physics import hertz
+
+STEEL = (208e9, 0.3)
+SILICON_NITRIDE = (315e9, 0.26)
+ETA = hertz.compliance(*STEEL, *SILICON_NITRIDE)
+KAPPAS = np.array([1.0 + 1e-9, 1.001, 1.5, 4.0, 12.0, 80.0])
+
+
+def test_carlson_form_equals_the_textbook_form_away_from_the_circle() -> None:
+    kappa = np.array([1.2, 3.0, 12.0, 50.0])
+    m = 1.0 - kappa**-2.0
+    textbook = ((kappa**2 + 1) * ellipe(m) - 2 * ellipk(m)) / ((kappa**2 - 1) * ellipe(m))
+    np.testing.assert_allclose(hertz.curvature_difference_of_ellipticity(kappa), textbook, rtol=1e-12)
+
+
+def test_nearly_circular_ellipse_follows_its_expansion() -> None:
+    """F = 3/4 (κ − 1) to first order: the textbook form has lost all its digits here."""
+    kappa = 1.0 + 1e-9
+    assert hertz.curvature_difference_of_ellipticity(kappa) == pytest.approx(0.75e-9, rel=1e-6)
+
+
+def test_ellipticity_inverts_the_curvature_difference() -> None:
+    F_rho = hertz.curvature_difference_of_ellipticity(KAPPAS)
+    np.testing.assert_allclose(hertz.ellipticity(F_rho), KAPPAS, rtol=1e-11)
+
+
+def test_circle_has_unit_parameters() -> None:
+    np.testing.assert_allclose(hertz.contact_parameters(0.0), (1.0, 1.0, 1.0), rtol=1e-15)
+
+
+def potential(b_over_a: float, weight: float | None) -> float:
+    """Integral of the ellipsoid's potential over w = tan²t, in units of a; weighted with 1/(weight + w)."""
+
+    def integrand(t: float) -> float:
+        w = math.tan(t) ** 2
+        value = 2.0 / math.cos(t) ** 2 / math.sqrt((1.0 + w) * (b_over_a**2 + w))
+        return value if weight is None else value / (weight + w)
+
+    return quad(integrand, 0.0, math.pi / 2 - 1e-9, epsabs=0, epsrel=1e-11, limit=200)[0]
+
+
+@pytest.mark.parametrize("F_rho", [0.0, 0.3, 0.9, 0.99])
+def test_pressure_ellipsoid_carries_the_load_and_flattens_the_gap(F_rho: float) -> None:
+    """Load, both gap curvatures and the approach from Hertz's integrals, done numerically."""
+    total, Q = 150.0, 700.0
+    contact = hertz.point_contact(total, F_rho, ETA)
+    a, b = contact.semi_axes(Q)
+    assert 2.0 / 3.0 * math.pi * a * b * contact.maximum_pressure(Q) == pytest.approx(Q, rel=1e-13)
+    factor = 3.0 * ETA * Q / (4.0 * math.pi * a)
+    along = 2.0 * factor * potential(b / a, 1.0) / a**2
+    across = 2.0 * factor * potential(b / a, (b / a) ** 2) / a**2
+    assert along + across == pytest.approx(total, rel=1e-7)
+    assert across - along == pytest.approx(F_rho * total, rel=1e-7, abs=1e-5)
+    assert contact.approach(Q) == pytest.approx(factor * potential(b / a, None), rel=1e-7)
+
+
+@pytest.mark.parametrize("factor", [0.1, 8.0, 1000.0])
+def test_powers_of_the_load(factor: float) -> None:
+    contact = hertz.race_contact(0.009525, 0.085, 0.53, 0.4, ETA, inner=True)
+    a, b = contact.semi_axes(50.0)
+    a_2, b_2 = contact.semi_axes(50.0 * factor)
+    assert (a_2 / a, b_2 / b) == pytest.approx((factor ** (1 / 3),) * 2, rel=1e-13)
+    assert contact.approach(50.0 * factor) == pytest.approx(
+        contact.approach(50.0) * factor ** (2 / 3), rel=1e-13
+    )
+    assert contact.maximum_pressure(50.0 * factor) == pytest.approx(
+        contact.maximum_pressure(50.0) * factor ** (1 / 3), rel=1e-13
+    )
+    assert contact.stiffness * contact.approach(50.0) ** 1.5 == pytest.approx(50.0, rel=1e-13)
+
+
+def test_larger_contact_of_the_same_shape_follows_similarity() -> None:
+    """Twice all lengths at four times the load: the same pressure, twice the ellipse and approach."""
+    small = hertz.race_contact(0.01, 0.08, 0.52, 0.3, ETA, inner=False)
+    large = hertz.race_contact(0.02, 0.16, 0.52, 0.3, ETA, inner=False)
+    assert large.maximum_pressure(400.0) == pytest.approx(small.maximum_pressure(100.0), rel=1e-13)
+    assert large.approach(400.0) == pytest.approx(2.0 * small.approach(100.0), rel=1e-13)
+    assert large.semi_axes(400.0) == pytest.approx(tuple(2.0 * np.array(small.semi_axes(100.0))), rel=1e-13)
+
+
+def test_materials_scale_the_stiffness_and_leave_the_shape() -> None:
+    curvatures = hertz.race_curvatures(0.009525, 0.085, 0.53, 0.4, inner=True)
+    hybrid = hertz.point_contact(*curvatures, ETA)
+    steel = hertz.point_contact(*curvatures, hertz.compliance(*STEEL, *STEEL))
+    ratio = hertz.compliance(*STEEL, *STEEL) / ETA
+    assert hybrid.ellipticity == pytest.approx(steel.ellipticity, rel=1e-14)
+    assert hybrid.stiffness / steel.stiffness == pytest.approx(ratio, rel=1e-13)
+    assert hybrid.stress_coefficient / steel.stress_coefficient == pytest.approx(ratio ** (2 / 3), rel=1e-13)
+    assert ratio > 1.1
+
+
+def test_inner_race_is_the_more_stressed_one() -> None:
+    inner = hertz.race_contact(0.009525, 0.085, 0.53, 0.4, ETA, inner=True)
+    outer = hertz.race_contact(0.009525, 0.085, 0.53, 0.4, ETA, inner=False)
+    assert inner.stress_coefficient > 1.05 * outer.stress_coefficient
+
+
+def test_groove_closer_to_the_ball_is_stiffer_and_longer() -> None:
+    f = np.array([0.51, 0.52, 0.54, 0.58])
+    contact = hertz.race_contact(0.01, 0.08, f, 0.3, ETA, inner=True)
+    assert np.all(np.diff(contact.stiffness) < 0.0)
+    assert np.all(np.diff(contact.ellipticity) < 0.0)
+
+
+def test_race_on_infinite_pitch_circle_is_a_straight_groove() -> None:
+    inner = hertz.race_curvatures(0.01, 1e9, 0.53, 0.0, inner=True)
+    outer = hertz.race_curvatures(0.01, 1e9, 0.53, 0.0, inner=False)
+    straight = ((4.0 - 1.0 / 0.53) / 0.01, (1.0 / 0.53) / (4.0 - 1.0 / 0.53))
+    assert inner == pytest.approx(straight, rel=1e-9)
+    assert outer == pytest.approx(straight, rel=1e-9)
+
+
+def test_contacts_in_series_add_their_approaches() -> None:
+    K = hertz.contacts_in_series(2e10, 5e10)
+    Q = 123.0
+    approach = (Q / 2e10) ** (2 / 3) + (Q / 5e10) ** (2 / 3)
+    assert K * approach**1.5 == pytest.approx(Q, rel=1e-13)
+
+
+def test_line_contact_stiffness_inverts_its_approach() -> None:
+    delta = hertz.line_contact_approach(777.0, 0.032)
+    assert hertz.line_contact_stiffness(0.032) * delta ** (10 / 9) == pytest.approx(777.0, rel=1e-12)
+    assert hertz.line_contact_stiffness(0.032) == pytest.approx(
+        3.78e9, rel=1e-3
+    )  # physics of the paper's contact
