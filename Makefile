@@ -1,0 +1,60 @@
+# The two commands of the README are "make demo" and "make test"; "make help" lists the rest.
+# Each makes the virtual environment .venv where there is none and installs into it what requirements.lock names.
+
+PYTHON ?= $(shell for name in python3 python3.13 python3.12 python3.11; do \
+	"$$name" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo "$$name" && break; done)
+BIN := .venv/bin
+READY := .venv/.rotordrop-ready
+OUTPUT := output/demo
+MACHINE := src/rotordrop/machine/examples/lp400.toml
+RECORDS := src/rotordrop/examples/lp400
+
+.PHONY: help demo test lint docs lock clean
+.DEFAULT_GOAL := help
+
+help: ## list the commands
+	@sed -n 's/^\([a-z]*\):.*## /make \1 - /p' $(firstword $(MAKEFILE_LIST))
+
+demo: $(READY) ## estimate force and stress from a bundled (simulated) recording and write the report
+	@mkdir -p $(OUTPUT)
+	@$(BIN)/rotordrop estimate $(MACHINE) $(RECORDS)/drop_060.h5 --tail $(RECORDS)/drop_060_tail.csv \
+		--json $(OUTPUT)/estimate.json --report $(OUTPUT)/report.html
+	@echo "The recording is simulated. The report is $(CURDIR)/$(OUTPUT)/report.html"
+
+test: $(READY) ## run the tests
+	@$(BIN)/python -m pytest
+
+lint: $(READY) ## check style, types and layers
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check .
+	@$(BIN)/mypy
+	@$(BIN)/lint-imports --no-cache
+
+docs: $(READY) ## build the documentation and run its examples
+	@$(BIN)/python -m sphinx -q -W --keep-going -b doctest docs docs/_build/doctest
+	@$(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build/html
+	@echo "The documentation is $(CURDIR)/docs/_build/html/index.html"
+
+lock: $(READY) ## renew requirements.lock from pyproject.toml
+	@$(BIN)/python -m pip install --quiet uv
+	@echo '# Versions and hashes of everything that "make demo" and "make test" install. Written by "make lock".' \
+		> requirements.lock
+	@$(BIN)/uv pip compile pyproject.toml --extra dev --universal --python-version 3.11 --upgrade --quiet \
+		--generate-hashes --no-emit-index-url --no-annotate --no-header >> requirements.lock
+
+clean: ## remove what was built, the virtual environment included
+	rm -rf .venv output build dist docs/_build docs/generated
+
+$(READY): requirements.lock pyproject.toml
+	@if [ -z "$(PYTHON)" ]; then \
+		echo "rotordrop needs Python 3.11 or newer, and the python3 found here is" \
+			"$$(python3 -V 2>&1 || true). Install a newer one and call: make PYTHON=/path/to/python3" >&2; exit 1; fi
+	@"$(PYTHON)" -c 'import sys; v = sys.version.split()[0]; sys.exit(sys.version_info < (3, 11) and \
+		f"rotordrop needs Python 3.11 or newer, and $(PYTHON) is {v}. Call: make PYTHON=/path/to/python3")'
+	@test -x $(BIN)/python || "$(PYTHON)" -m venv .venv || \
+		{ rm -rf .venv; echo "$(PYTHON) cannot make a virtual environment;" \
+			"on Debian and Ubuntu install the package python3-venv" >&2; exit 1; }
+	@echo "Installing into .venv what requirements.lock names (once, some minutes) ..."
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@touch $(READY)
