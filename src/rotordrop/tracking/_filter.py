@@ -322,8 +322,8 @@ def forward_pass(
         Displacement along each sensor's direction from the dynamic state.
     variances, speed_variance : ndarray (C,), float
         Noise variance of the readings [m²] and of the speed [rad²/s²].
-    reference : ndarray, shape (N, n) or (0, n)
-        Trajectory to linearise at; empty for the filter's own mean.
+    reference : ndarray, shape (M, n)
+        Trajectory to linearise at for the first M samples; the filter's own mean afterwards.
     means, covariances : ndarray, shapes (N, n), (N, n, n) or (N, 0, 0)
         Filled with the filtered estimate; covariances only when there is room.
     transitions : ndarray, shape (N, s, s + P) or (0, ...)
@@ -352,10 +352,10 @@ def forward_pass(
     gain = np.empty(n)
     theta = mean[s : s + n_p].copy()
     keep = transitions.shape[0] > 0
-    with_reference = reference.shape[0] > 0
     for i in range(times.shape[0]):
         if i > 0:
             at = mean
+            with_reference = i - 1 < reference.shape[0]
             if with_reference:
                 at = reference[i - 1]
             theta[:] = at[s : s + n_p]
@@ -386,7 +386,7 @@ def forward_pass(
                 continue
             if c < n_c:
                 variance = variances[c]
-                if with_reference:
+                if i < reference.shape[0]:
                     predicted = measurement_row(c, reference[i], sensor_rows[c], s, n_p, n_c, row)
                     for j in range(n):
                         predicted += row[j] * (mean[j] - reference[i, j])
@@ -473,7 +473,7 @@ def backward_pass(
             body = np.dot(np.ascontiguousarray(tail[:, :s]), F)
             old = lam.copy()
             lam[:columns] = np.dot(F.T, old[:s])
-            lam[s:] += old[s:]
+            lam[s:columns] += old[s:columns]
             lower = Lam[s:, s:].copy()
             cross = tail[:, s:].copy()
             Lam[:, :] = 0.0

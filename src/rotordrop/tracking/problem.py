@@ -1,0 +1,313 @@
+"""A recorded drop put as an estimation problem: readings, sensor rows, unknowns, prior."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.errors import IdentificationError
+from rotordrop.machine import Machine
+from rotordrop.model import layout as L
+from rotordrop.model.parameters import DropModel, static_deflection
+from rotordrop.model.statics import levitated_sag, settled_sag
+from rotordrop.physics import aerodynamics
+from rotordrop.physics.ball_bearing import bearing_constants
+from rotordrop.simulation.levitation import rigid_amplitudes
+from rotordrop.tracking import _filter as F
+from rotordrop.tracking.sensors import LevitatedPhase, levitated_phase, without_hum_and_runout
+from rotordrop.tracking.unknowns import Unknown, all_unknowns, parameter_targets
+
+Array = NDArray[np.float64]
+
+GAIN_SIGMA = 0.01
+OFFSET_SIGMA = 10e-6
+START_POSITION_SIGMA = 30e-6
+START_VELOCITY_SIGMA = 20e-3
+BENDING_POSITION_SIGMA = 1.5e-6
+BENDING_VELOCITY_SIGMA = 1.5e-3
+SPEED_SIGMA = 0.5
+NOISE_FLOOR = 0.1e-6
+TAIL_VERTICAL_SIGMA = 0.7e-6
+TAIL_HORIZONTAL_SIGMA = 25e-6
+READING_SCALE = 1e-6
+
+
+@dataclass(frozen=True, kw_only=True)
+class DropProblem:
+    """One recorded drop with everything the filter needs; N samples, C channels, n estimated, s dynamic states.
+
+    Attributes
+    ----------
+    time : ndarray, shape (N,)
+        Time from power-off [s].
+    readings : ndarray, shape (N, C)
+        Readings in the positive direction of each sensor [m], hum and 2X runout removed.
+    speed : ndarray, shape (N,)
+        Rotor speed [rad/s], NaN where it is not used.
+    sensor_rows : ndarray, shape (C, s)
+        Displacement along each sensor's direction from the dynamic state.
+    variances : ndarray, shape (C,)
+        Noise variance of each channel [m²].
+    mean, covariance : ndarray, shapes (n,), (n, n)
+        Prior at the first sample.
+    """
+
+    model: DropModel
+    unknowns: tuple[Unknown, ...]
+    targets: F.ParameterTargets
+    time: Array
+    readings: Array
+    speed: Array
+    sensor_rows: Array
+    variances: Array
+    speed_variance: float
+    mean: Array
+    covariance: Array
+    levitated: LevitatedPhase
+
+    @property
+    def n_dynamic(self) -> int:
+        """Number of dynamic states s."""
+        return self.model.layout.size - 2
+
+    @property
+    def n_channels(self) -> int:
+        """Number of sensor channels C."""
+        return len(self.variances)
+
+    @property
+    def parameter_slice(self) -> slice:
+        """Where the unknown parameters are in the estimate."""
+        return slice(self.n_dynamic, self.n_dynamic + len(self.unknowns))
+
+    @property
+    def machine_indices(self) -> NDArray[np.int64]:
+        """Entries of the estimate that all drops of the machine share: parameters of the machine, gains, offsets."""
+        start = self.n_dynamic
+        shared = [start + i for i, unknown in enumerate(self.unknowns) if unknown.scope == "machine"]
+        sensors = range(start + len(self.unknowns), len(self.mean))
+        return np.array([*shared, *sensors], dtype=np.int64)
+
+
+def build_problem(
+    model: DropModel,
+    time: Array,
+    readings: Array,
+    speed: Array,
+    *,
+    tail_level: Array | None,
+    until: float = 0.2,
+    unknowns: tuple[Unknown, ...] | None = None,
+) -> DropProblem:
+    """Put a recorded drop as an estimation problem.
+
+    Parameters
+    ----------
+    model : DropModel
+        Drop model of the machine; its sensors define the channels.
+    time : ndarray, shape (N,)
+        Time from power-off [s], evenly spaced, with the levitated phase at negative times.
+    readings : ndarray, shape (N, C)
+        Readings [m], one column for each sensor of the machine, polarity removed.
+    speed : ndarray, shape (N,)
+        Rotor speed [rad/s]; NaN where unknown.
+    tail_level : ndarray, shape (C,), or None
+        Mean readings of the settled tail [m].
+    until : float
+        End of the window [s].
+    unknowns : tuple of Unknown, optional
+        The parameters to estimate; all by default.
+    """
+    unknowns = all_unknowns(model) if unknowns is None else unknowns
+    known = np.isfinite(speed)
+    if not np.any(known):
+        raise IdentificationError("the record has no rotor speed; expected a speed channel or a given speed in Hz.")
+    omega = float(np.median(speed[known & (time < 0.005)])) if np.any(known & (time < 0.005)) else float(
+        speed[known][0]
+    )
+    phase = levitated_phase(time, readings, omega)
+    clean = without_hum_and_runout(time, readings, omega * time, phase)
+    inside = (time >= 0.0) & (time <= until)
+    rows = sensor_rows(model)
+    variances = _variances(phase, rows.shape[0])
+    mean, covariance = _prior(model, unknowns, rows, clean[inside], omega)
+    problem = DropProblem(
+        model=_prepared(model, omega),
+        unknowns=unknowns,
+        targets=parameter_targets(model, unknowns),
+        time=time[inside],
+        readings=clean[inside],
+        speed=_thinned(speed[inside]),
+        sensor_rows=rows,
+        variances=variances,
+        speed_variance=0.1**2,
+        mean=mean,
+        covariance=covariance,
+        levitated=phase,
+    )
+    if tail_level is not None:
+        apply_tail(problem, tail_level, problem.mean, problem.covariance)
+    return problem
+
+
+def _prepared(model: DropModel, omega: float) -> DropModel:
+    from dataclasses import replace
+
+    p = model.parameters
+    spin, flags = p.spin.copy(), p.flags.copy()
+    spin[L.INITIAL_SPEED] = omega
+    spin[L.POWER_OFF_DELAY] = 0.0
+    flags[L.SPIN_MODE] = aerodynamics.EXPONENTIAL_IN_TIME
+    flags[L.MAGNETS_ACT] = 1
+    return replace(model, parameters=p._replace(spin=spin, flags=flags))
+
+
+def _thinned(speed: Array, every: int = 50) -> Array:
+    """Speed as a measurement now and then: its error is not white, so not every sample counts."""
+    thin = np.full_like(speed, np.nan)
+    thin[::every] = speed[::every]
+    return thin
+
+
+def _variances(phase: LevitatedPhase, channels: int) -> Array:
+    noise = phase.noise if phase.samples else np.full(channels, 1e-6)
+    return noise**2 + NOISE_FLOOR**2
+
+
+def sensor_rows(model: DropModel) -> Array:
+    """Displacement along each sensor's positive direction from the dynamic state, shape (C, s) [m per state]."""
+    layout = model.layout
+    rows = np.zeros((len(model.machine.sensors), layout.size - 2))
+    for c, sensor in enumerate(model.machine.sensors):
+        shape = model.basis.node_row(sensor.node)
+        angle = float(sensor.angle)
+        rows[c, layout.modal_x] = np.cos(angle) * shape
+        rows[c, layout.modal_y] = np.sin(angle) * shape
+    return rows
+
+
+def _prior(
+    model: DropModel, unknowns: tuple[Unknown, ...], rows: Array, readings: Array, omega: float
+) -> tuple[Array, Array]:
+    """Prior mean and covariance of the whole estimate at power-off."""
+    layout = model.layout
+    s, n_p, n_c = layout.size - 2, len(unknowns), rows.shape[0]
+    mean = np.zeros(s + n_p + 2 * n_c)
+    sigma = np.zeros_like(mean)
+    _rotor_prior(model, rows, readings, mean, sigma)
+    for part in (layout.race, layout.support):
+        sigma[part] = 0.1e-6
+        sigma[layout.velocity_of(part)] = 1e-4
+    sigma[layout.race_spin] = 0.3
+    mean[layout.rotor_speed] = omega
+    sigma[layout.rotor_speed] = SPEED_SIGMA
+    for i, unknown in enumerate(unknowns):
+        mean[s + i], sigma[s + i] = unknown.mean, unknown.sigma
+    sigma[s + n_p : s + n_p + n_c] = GAIN_SIGMA
+    sigma[s + n_p + n_c :] = OFFSET_SIGMA
+    return mean, np.diag(sigma**2)
+
+
+def _rotor_prior(model: DropModel, rows: Array, readings: Array, mean: Array, sigma: Array) -> None:
+    layout, basis = model.layout, model.basis
+    weight = np.sqrt(model.fe.total_mass)
+    frequency = np.sqrt(np.maximum(basis.eigenvalues, 0.0))
+    softer = np.where(frequency > 0.0, frequency[2] / np.maximum(frequency, 1.0), 1.0)
+    sag = np.zeros(basis.shapes.shape[0])
+    if len(model.machine.ambs) >= 2:
+        sag = np.asarray(levitated_sag(model.fe, model.machine), dtype=np.float64)
+    amplitude = basis.shapes.T @ (model.fe.mass @ sag)
+    amplitude[: basis.n_rigid] = 0.0
+    mean[layout.modal_y] = amplitude
+    rigid = slice(0, basis.n_rigid)
+    observed = readings[: min(10, len(readings))].mean(axis=0) - rows[:, : mean.size][:, layout.modal_y] @ amplitude
+    design = np.hstack([rows[:, layout.modal_x][:, rigid], rows[:, layout.modal_y][:, rigid]])
+    fitted, *_ = np.linalg.lstsq(design, observed, rcond=None)
+    mean[layout.modal_x][rigid] = fitted[: basis.n_rigid]
+    mean[layout.modal_y][rigid] += fitted[basis.n_rigid :]
+    for part in (layout.modal_x, layout.modal_y):
+        position = BENDING_POSITION_SIGMA * weight * softer**2 + 0.2 * np.abs(amplitude)
+        velocity = BENDING_VELOCITY_SIGMA * weight * softer
+        position[rigid] = START_POSITION_SIGMA * weight
+        velocity[rigid] = START_VELOCITY_SIGMA * weight
+        sigma[part] = position
+        sigma[layout.velocity_of(part)] = velocity
+
+
+def settled_displacement(problem: DropProblem, theta: Array) -> Array:
+    """Vertical displacement [m] of the resting rotor at each sensor, shape (C,), for parameter values.
+
+    Gap, indentation, race and support sag under the static load shares, the line between the bearings, and the bending
+    of the rotor on its touchdown bearings.
+    """
+    model = problem.model
+    p = _with_theta(problem, theta)
+    level = np.empty(len(model.load_shares))
+    for b, load in enumerate(model.load_shares):
+        row = p.bearing[b]
+        indentation = (load / row[L.CONTACT_STIFFNESS]) ** (1.0 / row[L.CONTACT_EXPONENT])
+        stiffness = model.machine.touchdown_bearings[b]
+        race = static_deflection(bearing_constants(stiffness.bearing), float(load))[0]
+        race *= 1.0
+        level[b] = -(row[L.AIR_GAP] + indentation + race + load / row[L.SUPPORT_STIFFNESS_Y])
+    nodes = np.array([bearing.node for bearing in model.machine.touchdown_bearings]) - 1
+    z = np.asarray(model.fe.node_positions)
+    line = np.polynomial.Polynomial.fit(z[nodes], level, min(1, len(nodes) - 1)).convert()
+    bend = np.asarray(settled_sag(model.fe, model.machine))[0::2]
+    sensors = np.array([sensor.node for sensor in model.machine.sensors]) - 1
+    return np.asarray(line(z[sensors]) + bend[sensors])
+
+
+def _with_theta(problem: DropProblem, theta: Array) -> L.KernelParameters:
+    p = private_copy(problem.model.parameters)
+    F.apply_parameters(np.asarray(theta, dtype=np.float64).copy(), problem.targets, p)
+    return p
+
+
+def private_copy(p: L.KernelParameters) -> L.KernelParameters:
+    """Kernel arrays that may be written to."""
+    return L.KernelParameters(*(array.copy() for array in p))
+
+
+def apply_tail(problem: DropProblem, tail_level: Array, mean: Array, covariance: Array) -> None:
+    """Tie gap, gains and offsets to the settled tail: update mean (n,) and covariance (n, n) in place.
+
+    Vertically the rotor rests where gap and sag put it; horizontally it may be held aside by friction.
+    """
+    start, n_p, n_c = problem.n_dynamic, len(problem.unknowns), problem.n_channels
+    theta = mean[problem.parameter_slice].copy()
+    height = settled_displacement(problem, theta)
+    slopes = np.zeros((n_c, n_p))
+    for k in range(n_p):
+        if not np.any((problem.targets.target[:, 0] == k) & (problem.targets.target[:, 1] == F.ON_BEARING)):
+            continue
+        trial = theta.copy()
+        trial[k] += problem.targets.step[k]
+        slopes[:, k] = (settled_displacement(problem, trial) - height) / problem.targets.step[k]
+    angles = np.array([float(sensor.angle) for sensor in problem.model.machine.sensors])
+    nodes = np.array([sensor.node for sensor in problem.model.machine.sensors])
+    gain_scratch = np.empty(len(mean))
+    for node in np.unique(nodes):
+        chosen = np.flatnonzero(nodes == node)
+        directions = np.column_stack([np.cos(angles[chosen]), np.sin(angles[chosen])])
+        weights = np.linalg.pinv(directions)
+        for axis, sigma in ((1, TAIL_VERTICAL_SIGMA), (0, TAIL_HORIZONTAL_SIGMA)):
+            row = np.zeros(len(mean))
+            predicted, observed = 0.0, 0.0
+            for weight, c in zip(weights[axis], chosen, strict=True):
+                along = np.sin(angles[c]) * height[c]
+                growth = 1.0 + mean[start + n_p + c]
+                predicted += weight * (growth * along + mean[start + n_p + n_c + c])
+                observed += weight * tail_level[c]
+                row[start + n_p + c] += weight * along
+                row[start + n_p + n_c + c] += weight
+                row[problem.parameter_slice] += weight * growth * np.sin(angles[c]) * slopes[c]
+            F.scalar_update(mean, covariance, row, observed - predicted, sigma**2, gain_scratch)
+
+
+def start_line(machine: Machine, model: DropModel, positions: Array) -> Array:
+    """Amplitudes (m, 2) of a straight rotor through positions (B, 2) [m] at its touchdown bearings."""
+    nodes = np.array([bearing.node for bearing in machine.touchdown_bearings]) - 1
+    return rigid_amplitudes(model, np.asarray(model.fe.node_positions)[nodes], positions)

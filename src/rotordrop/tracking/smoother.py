@@ -1,0 +1,202 @@
+"""Filter and smoother over one recorded drop, and over several drops of one machine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.tracking import _filter as F
+from rotordrop.tracking.problem import DropProblem, private_copy
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PassSettings:
+    """Numbers of one pass.
+
+    Attributes
+    ----------
+    substeps : int
+        Integration steps per sample.
+    impulse : float
+        Standard deviation of an unknown impulse per 50 µs at each bearing and axis [N s].
+    share : float
+        The same as a fraction of the contact impulse [1].
+    spin_noise : float
+        Standard deviation of the race spin per 50 µs [rad/s].
+    speed_noise : float
+        Standard deviation of the rotor speed per 50 µs [rad/s].
+    """
+
+    substeps: int = 4
+    impulse: float = 2e-4
+    share: float = 0.01
+    spin_noise: float = 0.02
+    speed_noise: float = 1e-3
+
+    def for_sampling(self, dt: float) -> F.FilterSettings:
+        """Settings of the kernel for a sample distance [s]; noise grows with the square root of time."""
+        growth = np.sqrt(dt / 50e-6)
+        return F.FilterSettings(
+            dt=dt,
+            substeps=max(1, round(self.substeps * dt / 50e-6)),
+            impulse=self.impulse * growth,
+            share=self.share,
+            spin_noise=self.spin_noise * growth,
+            speed_noise=self.speed_noise * growth,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Forward:
+    """What a forward pass leaves: filtered estimates and what the smoother needs; N samples, n estimated.
+
+    ``done`` is the number of samples reached; ``innovations`` and ``innovation_variances`` have one column per channel
+    and one for the speed, NaN where nothing was measured.
+    """
+
+    done: int
+    means: Array
+    covariances: Array
+    transitions: Array
+    rows: Array
+    gains: Array
+    innovations: Array
+    innovation_variances: Array
+
+    @property
+    def nis(self) -> float:
+        """Mean normalised innovation squared [1]; about one when model and noise are right."""
+        values = self.innovations[: self.done] ** 2 / self.innovation_variances[: self.done]
+        return float(np.nanmean(values))
+
+    @property
+    def negative_log_likelihood(self) -> float:
+        """Negative logarithm of the likelihood of the readings, up to a constant [1]."""
+        S = self.innovation_variances[: self.done]
+        values = self.innovations[: self.done] ** 2 / S + np.log(S)
+        return 0.5 * float(np.nansum(values))
+
+
+def forward(
+    problem: DropProblem,
+    settings: PassSettings,
+    *,
+    mean: Array | None = None,
+    covariance: Array | None = None,
+    reference: Array | None = None,
+    samples: int | None = None,
+    smoothing: bool = True,
+) -> Forward:
+    """Run the filter over the first samples of a problem.
+
+    Parameters
+    ----------
+    mean, covariance : ndarray, optional
+        Start estimate, shapes (n,), (n, n); the problem's prior by default.
+    reference : ndarray, shape (M, n), optional
+        Trajectory to linearise at for the first M samples; the filter's own mean afterwards.
+    samples : int, optional
+        Number of samples; all by default.
+    smoothing : bool
+        Keep what the smoother needs.
+    """
+    count = len(problem.time) if samples is None else min(samples, len(problem.time))
+    mean = problem.mean if mean is None else mean
+    covariance = problem.covariance if covariance is None else covariance
+    n, s, n_c = len(mean), problem.n_dynamic, problem.n_channels
+    kept = count if smoothing else 0
+    columns = s + len(problem.unknowns)
+    dt = float(problem.time[1] - problem.time[0])
+    result = Forward(
+        done=0,
+        means=np.empty((count, n)),
+        covariances=np.empty((count, n, n) if smoothing else (count, 0, 0)),
+        transitions=np.zeros((kept, s, columns)),
+        rows=np.empty((kept, n_c + 1, n)),
+        gains=np.empty((kept, n_c + 1, n)),
+        innovations=np.empty((count, n_c + 1)),
+        innovation_variances=np.empty((count, n_c + 1)),
+    )
+    done = F.forward_pass(
+        np.ascontiguousarray(mean),
+        np.ascontiguousarray(covariance),
+        problem.time[:count],
+        np.ascontiguousarray(problem.readings[:count]),
+        problem.speed[:count],
+        problem.sensor_rows,
+        problem.variances,
+        problem.speed_variance,
+        problem.targets,
+        private_copy(problem.model.parameters),
+        settings.for_sampling(dt),
+        np.zeros((0, n)) if reference is None else np.ascontiguousarray(reference[:count]),
+        result.means,
+        result.covariances,
+        result.transitions,
+        result.rows,
+        result.gains,
+        result.innovations,
+        result.innovation_variances,
+    )
+    from dataclasses import replace
+
+    return replace(result, done=int(done))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Smoothed:
+    """Smoothed estimate of one drop.
+
+    Attributes
+    ----------
+    means : ndarray, shape (N, n)
+        Smoothed estimate at each sample.
+    information : ndarray, shape (N, n, n)
+        Λ of each sample: the smoothed covariance is ``P − P Λ P`` with the filtered P.
+    score_0, information_0 : ndarray, shapes (n,), (n, n)
+        λ and Λ before the first measurement.
+    """
+
+    filtered: Forward
+    means: Array
+    information: Array
+    score_0: Array
+    information_0: Array
+
+    def covariance(self, sample: int) -> Array:
+        """Smoothed covariance at a sample, shape (n, n)."""
+        P = self.filtered.covariances[sample]
+        return np.asarray(P - P @ self.information[sample] @ P)
+
+    def variance_of(self, sample: int, gradients: Array) -> Array:
+        """Covariance (G, G) of linear functions of the estimate at a sample, gradients (G, n)."""
+        P = self.filtered.covariances[sample]
+        spread = gradients @ P
+        return np.asarray(spread @ gradients.T - spread @ self.information[sample] @ spread.T)
+
+
+def smooth(filtered: Forward, score: Array | None = None, information: Array | None = None) -> Smoothed:
+    """Run the backward pass; ``score`` and ``information`` are what later drops say about the last sample."""
+    done, n = filtered.done, filtered.means.shape[1]
+    means = np.empty((done, n))
+    kept = np.empty((done, n, n))
+    lam = np.zeros(n) if score is None else score.copy()
+    Lam = np.zeros((n, n)) if information is None else information.copy()
+    F.backward_pass(
+        filtered.means[:done],
+        filtered.covariances[:done],
+        filtered.transitions[:done],
+        filtered.rows[:done],
+        filtered.gains[:done],
+        filtered.innovations[:done],
+        filtered.innovation_variances[:done],
+        means,
+        kept,
+        lam,
+        Lam,
+    )
+    return Smoothed(filtered=filtered, means=means, information=kept, score_0=lam, information_0=Lam)

@@ -1,0 +1,287 @@
+"""What the tracked twin does not know: the parameters it estimates with the state, and what is believed beforehand."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.estimated import Estimated
+from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.model import layout as L
+from rotordrop.model.parameters import DropModel
+from rotordrop.physics.ball_bearing import BearingConstants, bearing_constants
+from rotordrop.tracking import _filter as F
+
+Array = NDArray[np.float64]
+Scope = Literal["machine", "drop"]
+NINETY = 1.6448536269514722
+"""Half width of a 90 % interval in standard deviations of a normal distribution [1]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unknown:
+    """One unknown parameter with its prior.
+
+    Attributes
+    ----------
+    path : str
+        Path in the machine, such as ``"NDE.support.stiffness"``, or a name of its own for what belongs to a drop.
+    mean, sigma : float
+        Prior mean and standard deviation, of the logarithm when ``logarithmic``; SI unit.
+    logarithmic : bool
+        Whether the parameter is estimated by its logarithm (positive quantities).
+    scope : {"machine", "drop"}
+        Whether all drops of a machine share it.
+    targets : tuple
+        Kernel entries it sets: (kind, row, column, factor).
+    """
+
+    path: str
+    mean: float
+    sigma: float
+    logarithmic: bool
+    scope: Scope
+    targets: tuple[tuple[int, int, int, float], ...]
+    unit: str = ""
+
+    def value_of(self, theta: float) -> float:
+        """SI value of an estimated number."""
+        return math.exp(theta) if self.logarithmic else theta
+
+
+RELATIVE_PRIOR: dict[str, tuple[float, float]] = {
+    "support.stiffness": (0.5, 0.05),
+    "support.mass": (0.4, 0.05),
+    "support.damping": (0.7, 0.3),
+    "contact.stiffness": (0.3, 0.3),
+    "contact.damping": (0.6, 0.6),
+    "friction.dynamic": (0.4, 0.4),
+    "friction.stribeck_speed": (0.4, 0.4),
+    "race.inertia": (0.12, 0.12),
+    "race.drag_coefficient": (0.8, 0.8),
+    "damping_time": (0.5, 0.5),
+    "preload": (0.15, 0.15),
+}
+"""Prior standard deviation of the logarithm: of a guess without a range or a default, and of a plain given value [1]."""
+
+GAP_SIGMA = 20e-6
+EXPONENT_SIGMA = 0.03
+ANISOTROPY_SIGMA = 0.03
+REMANENT_SIGMA = 60.0
+
+
+def relative_sigma(quantity: Estimated, path: str) -> float:
+    """Prior standard deviation [1] of the logarithm of a positive quantity, from what the machine file says of it."""
+    value = float(quantity)
+    for interval in (quantity.interval_90, quantity.range):
+        if interval is not None and interval[0] > 0.0:
+            return max(math.log(interval[1] / interval[0]) / (2.0 * NINETY), 1e-4)
+    if quantity.standard_error is not None and value > 0.0:
+        return quantity.standard_error / value
+    loose, given = RELATIVE_PRIOR[path]
+    return given if quantity.status == "given" else loose
+
+
+def _absolute_sigma(quantity: Estimated, default: float) -> float:
+    for interval in (quantity.interval_90, quantity.range):
+        if interval is not None:
+            return max((interval[1] - interval[0]) / (2.0 * NINETY), 1e-12)
+    return quantity.standard_error if quantity.standard_error is not None else default
+
+
+def bearing_unknowns(bearing: TouchdownBearing, row: int) -> Iterator[Unknown]:
+    """Unknown parameters of one touchdown bearing."""
+
+    def relative(path: str, quantity: Estimated, *columns: tuple[int, float], unit: str) -> Unknown:
+        return Unknown(
+            path=f"{bearing.name}.{path}",
+            mean=math.log(float(quantity)),
+            sigma=relative_sigma(quantity, path),
+            logarithmic=True,
+            scope="machine",
+            targets=tuple((F.ON_BEARING, row, column, factor) for column, factor in columns),
+            unit=unit,
+        )
+
+    support, contact, friction, race = bearing.support, bearing.contact, bearing.friction, bearing.race
+    yield Unknown(
+        path=f"{bearing.name}.air_gap",
+        mean=float(bearing.air_gap),
+        sigma=_absolute_sigma(bearing.air_gap, GAP_SIGMA),
+        logarithmic=False,
+        scope="machine",
+        targets=((F.ON_BEARING, row, L.AIR_GAP, 1.0),),
+        unit="m",
+    )
+    sideways = float(support.stiffness_horizontal) / float(support.stiffness)
+    yield relative(
+        "support.stiffness",
+        support.stiffness,
+        (L.SUPPORT_STIFFNESS_Y, 1.0),
+        (L.SUPPORT_STIFFNESS_X, sideways),
+        unit="N/m",
+    )
+    yield Unknown(
+        path=f"{bearing.name}.support.anisotropy",
+        mean=0.0,
+        sigma=ANISOTROPY_SIGMA,
+        logarithmic=True,
+        scope="machine",
+        targets=((F.SCALE_BEARING, row, L.SUPPORT_STIFFNESS_X, 1.0),),
+        unit="1",
+    )
+    yield relative(
+        "support.mass",
+        support.mass,
+        (L.SUPPORT_MASS_Y, 1.0),
+        (L.SUPPORT_MASS_X, float(support.mass_horizontal) / float(support.mass)),
+        unit="kg",
+    )
+    yield relative(
+        "support.damping",
+        support.damping,
+        (L.SUPPORT_DAMPING_Y, 1.0),
+        (L.SUPPORT_DAMPING_X, float(support.damping_horizontal) / float(support.damping)),
+        unit="N s/m",
+    )
+    yield relative("contact.stiffness", contact.stiffness, (L.CONTACT_STIFFNESS, 1.0), unit="N/m^n")
+    yield relative("contact.damping", contact.damping, (L.CONTACT_DAMPING, 1.0), unit="s/m")
+    yield relative(
+        "friction.dynamic",
+        friction.dynamic,
+        (L.FRICTION_DYNAMIC, 1.0),
+        (L.FRICTION_STATIC, float(friction.static) / float(friction.dynamic)),
+        unit="1",
+    )
+    yield relative("friction.stribeck_speed", friction.stribeck_speed, (L.STRIBECK_SPEED, 1.0), unit="m/s")
+    yield relative("race.inertia", race.inertia, (L.RACE_INERTIA, 1.0), unit="kg m^2")
+    yield relative("race.drag_coefficient", race.drag_coefficient, (L.DRAG_COEFFICIENT, 1.0), unit="1")
+    yield _bearing_damping(bearing, row)
+    yield _axial_offset(bearing, row)
+
+
+def _bearing_damping(bearing: TouchdownBearing, row: int) -> Unknown:
+    """Bearing damping by its time constant C_b/K_b; the stiffness it multiplies is fixed at the static load."""
+    return Unknown(
+        path=f"{bearing.name}.damping_time",
+        mean=math.log(float(bearing.damping_time)),
+        sigma=relative_sigma(bearing.damping_time, "damping_time"),
+        logarithmic=True,
+        scope="machine",
+        targets=((F.ON_BEARING, row, L.BEARING_DAMPING, math.nan),),
+        unit="s",
+    )
+
+
+def _axial_offset(bearing: TouchdownBearing, row: int) -> Unknown:
+    """Preload, estimated by the axial offset of the rows, which is what the ball forces depend on."""
+    constants = bearing_constants(bearing.bearing)
+    preload = float(bearing.bearing.preload)
+    spread = relative_sigma(bearing.bearing.preload, "preload")
+    step = 1e-4
+    slope = (
+        preload_of_offset(constants, constants.axial_offset * (1 + step))
+        - preload_of_offset(constants, constants.axial_offset * (1 - step))
+    ) / (2 * step * constants.axial_offset)
+    return Unknown(
+        path=f"{bearing.name}.axial_offset",
+        mean=constants.axial_offset,
+        sigma=preload * spread / slope,
+        logarithmic=False,
+        scope="machine",
+        targets=((F.ON_BEARING, row, L.AXIAL_OFFSET, 1.0),),
+        unit="m",
+    )
+
+
+def preload_of_offset(constants: BearingConstants, axial_offset: float) -> float:
+    """Axial force of one row [N] whose grooves are offset by a distance [m] with the race centred."""
+    distance = math.hypot(constants.radial_offset, axial_offset)
+    approach = max(distance - constants.groove_distance, 0.0)
+    load = constants.ball_stiffness * approach**1.5
+    return len(constants.ball_angles) * load * axial_offset / distance
+
+
+def drop_unknowns(model: DropModel) -> Iterator[Unknown]:
+    """Unknowns that belong to one drop: unbalance against an unknown mark, remanent forces, aerodynamic constant."""
+    machine = model.machine
+    for plane, unbalance in enumerate(machine.unbalances):
+        for column, part in enumerate(("cosine", "sine")):
+            yield Unknown(
+                path=f"unbalance.{plane}.{part}",
+                mean=0.0,
+                sigma=max(float(unbalance.amount), 1e-9),
+                logarithmic=False,
+                scope="drop",
+                targets=((F.ON_UNBALANCE, plane, column, 1.0),),
+                unit="kg m",
+            )
+    for a, amb in enumerate(machine.ambs):
+        for column, axis in ((L.REMANENT_X, "x"), (L.REMANENT_Y, "y")):
+            yield Unknown(
+                path=f"{amb.name}.remanent_force.{axis}",
+                mean=0.0,
+                sigma=REMANENT_SIGMA,
+                logarithmic=False,
+                scope="drop",
+                targets=((F.ON_MAGNET, a, column, 1.0),),
+                unit="N",
+            )
+    if machine.ambs:
+        yield _positive("remanence.time_constant", 2e-3, 0.4, L.REMANENCE_TIME_CONSTANT, "s")
+    yield _positive("speed.aero_time_constant", aero_time_constant(machine), 0.7, L.AERO_TIME_CONSTANT, "s")
+
+
+def _positive(path: str, value: float, sigma: float, entry: int, unit: str) -> Unknown:
+    return Unknown(
+        path=path,
+        mean=math.log(value),
+        sigma=sigma,
+        logarithmic=True,
+        scope="drop",
+        targets=((F.ON_SPIN, 0, entry, 1.0),),
+        unit=unit,
+    )
+
+
+def aero_time_constant(machine: Machine) -> float:
+    """Time constant [s] of the aerodynamic deceleration to start from; 10 s when the machine does not say."""
+    constant = machine.speed.aero_time_constant
+    return 10.0 if constant is None else float(constant)
+
+
+def all_unknowns(model: DropModel) -> tuple[Unknown, ...]:
+    """Every unknown, machine first, then those of the drop."""
+    found: list[Unknown] = []
+    for row, bearing in enumerate(model.machine.touchdown_bearings):
+        found.extend(bearing_unknowns(bearing, row))
+    found.extend(drop_unknowns(model))
+    return tuple(found)
+
+
+def parameter_targets(model: DropModel, unknowns: tuple[Unknown, ...]) -> F.ParameterTargets:
+    """Flat table of what the unknowns set in the kernel, in the order given."""
+    rows, factors = [], []
+    for index, unknown in enumerate(unknowns):
+        for kind, row, column, factor in unknown.targets:
+            rows.append((index, kind, row, column))
+            factors.append(_stiffness_of_damping(model, unknown, row) if math.isnan(factor) else factor)
+    order = sorted(range(len(rows)), key=lambda i: rows[i][1] == F.SCALE_BEARING)
+    planes = [model.basis.node_row(unbalance.node) for unbalance in model.machine.unbalances]
+    shape = np.array(planes) if planes else np.zeros((0, model.layout.n_modes))
+    return F.ParameterTargets(
+        target=np.array([rows[i] for i in order], dtype=np.int64).reshape(-1, 4),
+        factor=np.array([factors[i] for i in order]),
+        logarithmic=np.array([int(u.logarithmic) for u in unknowns], dtype=np.int64),
+        step=np.array([1e-5 if u.logarithmic else max(1e-3 * u.sigma, 1e-12) for u in unknowns]),
+        plane_shape=np.ascontiguousarray(shape),
+    )
+
+
+def _stiffness_of_damping(model: DropModel, unknown: Unknown, row: int) -> float:
+    return float(model.parameters.bearing[row, L.BEARING_DAMPING] / math.exp(unknown.mean))
