@@ -1,0 +1,50 @@
+"""What is installed: floors in pyproject.toml, a lock file with hashes, without addresses, free licences."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+SETTINGS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+LOCK = (ROOT / "requirements.lock").read_text(encoding="utf-8")
+LOCKED = {
+    name.lower().replace("_", "-") for name in re.findall(r"^([\w.-]+)(?:\[\w+\])?==", LOCK, re.MULTILINE)
+}
+COPYLEFT = {"mat73", "rota-order", "nevergrad", "sdypy"}
+LESSER_COPYLEFT = {"nptdms", "asammdf", "psycopg"}
+
+
+def _names(requirements: list[str]) -> set[str]:
+    return {re.split(r"[\[<>=~! ;]", requirement)[0].lower() for requirement in requirements}
+
+
+@pytest.mark.parametrize("requirement", SETTINGS["project"]["dependencies"])
+def test_a_dependency_has_a_floor_and_no_pin(requirement):
+    assert re.fullmatch(r"[A-Za-z0-9-]+>=[0-9.]+", requirement)
+
+
+def test_the_lock_file_names_every_dependency():
+    extras = SETTINGS["project"]["optional-dependencies"]
+    wanted = _names(SETTINGS["project"]["dependencies"]) | _names(extras["dev"]) - {"rotordrop"}
+    assert wanted <= LOCKED
+
+
+def test_each_locked_package_has_a_hash():
+    blocks = re.split(r"\n(?=\S)", LOCK.split("\n", 1)[1].strip())
+    assert len(blocks) >= len(LOCKED) > 30
+    assert [block for block in blocks if "--hash=sha256:" not in block] == []
+
+
+def test_the_lock_file_names_no_address():
+    assert re.search(r"://|--index|--extra-index|--find-links|--trusted-host", LOCK) is None
+
+
+def test_no_copyleft_package_is_needed():
+    extras = SETTINGS["project"]["optional-dependencies"]
+    everything = LOCKED | {name for requirements in extras.values() for name in _names(requirements)}
+    assert everything & COPYLEFT == set()
+    assert _names(SETTINGS["project"]["dependencies"]) & LESSER_COPYLEFT == set()
