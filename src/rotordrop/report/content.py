@@ -1,0 +1,126 @@
+"""What a report says, before it becomes a page or a terminal summary: plain frozen data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+from rotordrop.report.quantity import Quantity
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+
+Level: TypeAlias = Literal["good", "notice", "warning", "bad"]
+Cell: TypeAlias = str | Quantity
+
+SIMULATED_RECORD = (
+    "This record is simulated: it comes from another program with a realistic measuring chain, "
+    "not from a machine."
+)
+"""What every report on a bundled record says."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Statement:
+    """One sentence the reader can act on, and how serious it is."""
+
+    text: str
+    level: Level = "notice"
+
+
+@dataclass(frozen=True, kw_only=True)
+class KeyFigure:
+    """One headline number of a card, with a few words on when or how."""
+
+    label: str
+    value: Quantity
+    note: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Card:
+    """The headline numbers of one bearing."""
+
+    title: str
+    figures: tuple[KeyFigure, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """A table; cells are text or quantities.
+
+    Attributes
+    ----------
+    columns : tuple of str
+        Headings.
+    rows : tuple of tuple
+        Cells, as many per row as columns.
+    caption : str
+        What the table shows.
+    note : str
+        Small print below, for example the rule behind a statistic.
+    """
+
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    caption: str = ""
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        for row in self.rows:
+            if len(row) != len(self.columns):
+                raise ValueError(
+                    f"table {self.caption!r}: a row has {len(row)} cells for {len(self.columns)} columns: "
+                    f"{row!r}; give as many cells as columns"
+                )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Figure:
+    """A plotly figure with the sentence that tells what is to be seen in it."""
+
+    chart: go.Figure
+    caption: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section:
+    """One part of the report: heading, text, figures, tables, in this order."""
+
+    heading: str
+    text: tuple[str, ...] = ()
+    statements: tuple[Statement, ...] = ()
+    figures: tuple[Figure, ...] = ()
+    tables: tuple[Table, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReportContent:
+    """Everything a report says; pages and terminal summaries are made from it alone.
+
+    Attributes
+    ----------
+    title, subtitle : str
+        What was done, to which machine, at which speed.
+    facts : tuple of (str, str)
+        Provenance: machine file, record, method, version.
+    simulated : str
+        Sentence that says the record is simulated; empty for a measured one.
+    verdict : tuple of Statement
+        The result in sentences, warnings included, most important first.
+    cards : tuple of Card
+        Headline numbers per bearing.
+    summary : tuple of Table
+        Tables that belong beside the verdict and into the terminal.
+    sections : tuple of Section
+        Figures and tables.
+    """
+
+    title: str
+    subtitle: str = ""
+    facts: tuple[tuple[str, str], ...] = ()
+    simulated: str = ""
+    verdict: tuple[Statement, ...] = ()
+    cards: tuple[Card, ...] = ()
+    summary: tuple[Table, ...] = ()
+    sections: tuple[Section, ...] = field(default=())

@@ -1,0 +1,72 @@
+"""Fewer points for a figure without losing a peak."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+DRAWN_BLOCKS = 900
+"""Blocks a history is cut into; each keeps its extremes, so a figure 900 pixels wide loses nothing."""
+
+
+def peak_indices(*signals: Array, blocks: int = DRAWN_BLOCKS) -> NDArray[np.int64]:
+    """Choose samples to draw: the first, the last, and in every block the extremes of every signal.
+
+    Parameters
+    ----------
+    *signals : ndarray, shape (T,)
+        Signals drawn over the same samples; the peaks of all of them stay.
+    blocks : int
+        Number of blocks.
+
+    Returns
+    -------
+    ndarray of int
+        Indices in ascending order; all of them when decimation would not save anything.
+    """
+    count = len(signals[0])
+    if count <= 2 * blocks * len(signals):
+        return np.arange(count, dtype=np.int64)
+    edges = np.linspace(0, count, blocks + 1).astype(np.int64)
+    chosen: list[NDArray[np.int64]] = [np.array([0, count - 1], dtype=np.int64)]
+    for signal in signals:
+        chosen.append(_block_extremes(np.where(np.isnan(signal), np.inf, signal), edges))
+        chosen.append(_block_extremes(np.where(np.isnan(signal), np.inf, -signal), edges))
+    return np.unique(np.concatenate(chosen))
+
+
+def _block_extremes(values: Array, edges: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Index of the first smallest value of every block."""
+    width = int(np.max(np.diff(edges)))
+    index = edges[:-1, None] + np.arange(width)
+    inside = index < edges[1:, None]
+    block = np.where(inside, values[np.minimum(index, len(values) - 1)], np.inf)
+    return np.asarray(edges[:-1] + np.argmin(block, axis=1), dtype=np.int64)
+
+
+def block_envelope(
+    lower: Array, upper: Array, blocks: int = DRAWN_BLOCKS
+) -> tuple[NDArray[np.int64], Array, Array]:
+    """Reduce a band so that the drawn band contains the whole one.
+
+    Parameters
+    ----------
+    lower, upper : ndarray, shape (T,)
+        Limits of the band.
+    blocks : int
+        Number of blocks.
+
+    Returns
+    -------
+    tuple
+        Indices at which the limits are drawn, and the lowest and highest limit of each block there.
+    """
+    count = len(lower)
+    if count <= 2 * blocks:
+        return np.arange(count, dtype=np.int64), lower, upper
+    edges = np.linspace(0, count, blocks + 1).astype(np.int64)
+    lowest = np.minimum.reduceat(lower, edges[:-1])
+    highest = np.maximum.reduceat(upper, edges[:-1])
+    return (edges[:-1] + edges[1:] - 1) // 2, np.asarray(lowest), np.asarray(highest)

@@ -1,0 +1,125 @@
+"""One offline HTML file from a report's content: plotly inside, no network, names escaped."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import os
+from functools import lru_cache
+from importlib import resources
+from typing import TYPE_CHECKING, Any
+
+from rotordrop.atomic_file import write_text
+from rotordrop.report.content import ReportContent
+from rotordrop.report.quantity import Quantity
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+_PACKAGE = "rotordrop.report"
+_JSON_ESCAPES = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026", "\u2028": "\\u2028", "\u2029": "\\u2029"}
+LEVEL_WORDS = {"good": "good", "notice": "note", "warning": "warning", "bad": "problem"}
+
+
+def write_page(content: ReportContent, path: str | os.PathLike[str]) -> None:
+    """Write a report as one HTML file that needs no network; complete or not at all.
+
+    Parameters
+    ----------
+    content : ReportContent
+        What the report says.
+    path : path-like
+        File to write.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    write_text(path, render_page(content))
+
+
+def render_page(content: ReportContent) -> str:
+    """Give the HTML of a report.
+
+    The page carries its own content security policy: only the two scripts that belong to it run,
+    and nothing is loaded from anywhere. Figures travel as JSON, which no browser executes.
+    """
+    scripts = (_text("assets", "plotly-cartesian.min.js"), _text("templates", "page.js"))
+    numbered = _numbered_sections(content)
+    html: str = (
+        _environment()
+        .get_template("page.html")
+        .render(
+            content=content,
+            sections=numbered,
+            style=_text("templates", "page.css"),
+            plotly=scripts[0],
+            starter=scripts[1],
+            policy=content_security_policy(scripts),
+            level_words=LEVEL_WORDS,
+        )
+    )
+    return html
+
+
+def content_security_policy(scripts: tuple[str, ...]) -> str:
+    """Policy that lets exactly these inline scripts run and forbids every request."""
+    allowed = " ".join(f"'sha256-{_digest(script)}'" for script in scripts)
+    return (
+        f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data: blob:; "
+        "base-uri 'none'; form-action 'none'"
+    )
+
+
+def _digest(script: str) -> str:
+    return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+
+
+def _numbered_sections(content: ReportContent) -> list[dict[str, Any]]:
+    """Sections with an anchor each and their figures as JSON with a number through the whole page."""
+    numbered, count = [], 0
+    for index, section in enumerate(content.sections, start=1):
+        figures = []
+        for figure in section.figures:
+            count += 1
+            figures.append(
+                {
+                    "number": count,
+                    "caption": figure.caption,
+                    "json": chart_json(figure.chart),
+                    "height": int(figure.chart.layout.height or 400),
+                }
+            )
+        numbered.append({"anchor": f"section-{index}", "section": section, "figures": figures})
+    return numbered
+
+
+def chart_json(chart: Any) -> str:
+    """A plotly figure as JSON that is safe inside a page: no character in it can end a script element."""
+    description = json.loads(chart.to_json())
+    text = json.dumps(description, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    for character, escape in _JSON_ESCAPES.items():
+        text = text.replace(character, escape)
+    return text
+
+
+@lru_cache(maxsize=4)
+def _text(folder: str, name: str) -> str:
+    return resources.files(_PACKAGE).joinpath(folder, name).read_text(encoding="utf-8")
+
+
+@lru_cache(maxsize=1)
+def _environment() -> Environment:
+    from jinja2 import Environment, FunctionLoader, StrictUndefined
+
+    environment = Environment(
+        loader=FunctionLoader(lambda name: _text("templates", name)),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.tests["quantity"] = lambda cell: isinstance(cell, Quantity)
+    return environment

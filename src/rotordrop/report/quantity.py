@@ -1,0 +1,171 @@
+"""A number as a report shows it: fixed unit per kind, and never without its interval where there is one."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rotordrop.estimated import Estimated, IdentifiedValue
+from rotordrop.units import KINDS
+
+DISPLAY: dict[str, tuple[float, str]] = {
+    "length": (1e-6, "µm"),
+    "dimension": (1e-3, "mm"),
+    "time": (1e-3, "ms"),
+    "duration": (1.0, "s"),
+    "force": (1.0, "N"),
+    "pressure": (1e6, "MPa"),
+    "stiffness": (1e6, "N/µm"),
+    "damping": (1.0, "N s/m"),
+    "impulse": (1.0, "N s"),
+    "energy": (1e-3, "mJ"),
+    "inertia": (1e-6, "kg mm²"),
+    "voltage_sensitivity": (1e3, "mV/µm"),
+    "share": (1e-2, "%"),
+}
+"""Unit in which a report shows a kind, so that the numbers of a column can be compared."""
+
+PLACES_OF_SCIENCE = 7
+THIN_SPACE = "\u202f"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quantity:
+    """A number for a table or a headline, in SI units, with what is known about its error.
+
+    Attributes
+    ----------
+    value : float
+        Value in the SI unit of the kind; NaN shows as a dash.
+    kind : str
+        Kind of quantity, a key of `DISPLAY` or of `rotordrop.units.KINDS`.
+    interval_90 : tuple of float, optional
+        Interval that holds the true value with 90 % probability.
+    standard_error : float, optional
+        Standard error.
+    lower, upper : float, optional
+        Limits set by the record itself, for example of the air gap.
+    status : str
+        Verdict or reason, for example why there is no interval.
+    digits : int
+        Significant digits when no interval says how many are meant.
+    """
+
+    value: float
+    kind: str
+    interval_90: tuple[float, float] | None = None
+    standard_error: float | None = None
+    lower: float | None = None
+    upper: float | None = None
+    status: str = ""
+    digits: int = 4
+
+    @classmethod
+    def of(cls, known: Estimated | IdentifiedValue | float | None, kind: str, digits: int = 4) -> Quantity:
+        """Take over a value of a machine or an identification with all that is known about it."""
+        if known is None or isinstance(known, int | float):
+            return cls(value=math.nan if known is None else float(known), kind=kind, digits=digits)
+        return cls(
+            value=known.value,
+            kind=kind,
+            interval_90=known.interval_90,
+            standard_error=known.standard_error,
+            lower=known.lower,
+            upper=known.upper,
+            status=known.status,
+            digits=digits,
+        )
+
+    @property
+    def unit(self) -> str:
+        """Unit shown with the number, empty for a pure number."""
+        return display_unit(self.kind)[1]
+
+    @property
+    def number(self) -> str:
+        """The number alone, in the shown unit."""
+        return written(self._shown(self.value), self._places())
+
+    @property
+    def text(self) -> str:
+        """Number and unit; a speed in Hz and rpm."""
+        if self.kind == "speed" and math.isfinite(self.value):
+            turns = self.value / (2 * math.pi)
+            rpm = written(60 * turns, max(0, 3 - _magnitude(60 * turns)))
+            return f"{self.number} Hz ({rpm} rpm)"
+        return self._with_unit(self.number)
+
+    @property
+    def interval_text(self) -> str:
+        """The 90 % interval or else the limits in words; empty when neither is known."""
+        if self.interval_90 is not None:
+            return self._with_unit(" to ".join(self._at(limit) for limit in self.interval_90))
+        if self.lower is not None and self.upper is not None:
+            return "limits " + self._with_unit(f"{self._at(self.lower)} to {self._at(self.upper)}")
+        if self.standard_error is not None:
+            return (
+                "± "
+                + self._with_unit(written(self._shown(self.standard_error), self._places()))
+                + " (1 s.e.)"
+            )
+        return ""
+
+    def _at(self, value: float) -> str:
+        return written(self._shown(value), self._places())
+
+    def _with_unit(self, number: str) -> str:
+        return number if number == "–" or not self.unit else f"{number} {self.unit}"
+
+    def _shown(self, value: float) -> float:
+        return value / display_unit(self.kind)[0]
+
+    def _places(self) -> int | None:
+        """Decimal places: two digits of the error if there is one, else the significant digits asked for."""
+        value = self._shown(self.value)
+        if not math.isfinite(value):
+            return 0
+        if abs(_magnitude(value)) >= PLACES_OF_SCIENCE:
+            return None
+        error = self._error()
+        if error > 0.0 and math.isfinite(error):
+            return min(12, max(0, 1 - _magnitude(error)))
+        return max(0, self.digits - 1 - _magnitude(value))
+
+    def _error(self) -> float:
+        if self.interval_90 is not None:
+            return 0.5 * abs(self._shown(self.interval_90[1] - self.interval_90[0]))
+        if self.standard_error is not None:
+            return abs(self._shown(self.standard_error))
+        return 0.0
+
+
+def display_unit(kind: str) -> tuple[float, str]:
+    """Factor and unit in which a kind is shown; kinds without an entry in `DISPLAY` in their first scale."""
+    if kind in DISPLAY:
+        return DISPLAY[kind]
+    scales = KINDS[kind].scales
+    return next((scale for scale in scales if scale[0] == 1.0), scales[0])
+
+
+def written(value: float, places: int | None) -> str:
+    """Write a number with thin spaces between thousands, or with a power of ten when `places` is None."""
+    if not math.isfinite(value):
+        return "–"
+    if places is None:
+        mantissa, exponent = f"{value:.3e}".split("e")
+        return f"{mantissa} × 10{_superscript(int(exponent))}"
+    text = f"{value:,.{places}f}".replace(",", THIN_SPACE)
+    return (
+        "0" + text[2:]
+        if text.startswith("-0") and not text.strip(f"-0.{THIN_SPACE}")
+        else text.replace("-", "−")
+    )
+
+
+def _superscript(number: int) -> str:
+    return str(number).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+def _magnitude(value: float) -> int:
+    """Power of ten of the first significant digit; 0 for zero."""
+    return 0 if value == 0.0 or not math.isfinite(value) else math.floor(math.log10(abs(value)))

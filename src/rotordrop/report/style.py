@@ -1,0 +1,246 @@
+"""One look for all figures: colours by origin of a history, axes with units, bearings side by side."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from numpy.typing import NDArray
+from plotly.subplots import make_subplots
+
+from rotordrop.report.decimation import block_envelope, peak_indices
+from rotordrop.report.history import AirGap, Band, History, Role
+
+Array = NDArray[np.float64]
+
+INK = "#1c2733"
+MUTED = "#5b6875"
+GRID = "#e6eaee"
+LIMIT = "#b3261e"
+GAP_FILL = "rgba(179, 38, 30, 0.28)"
+COLOURS: dict[Role, str] = {
+    "measured": "#20262d",
+    "simulated": "#1c7ed6",
+    "simulated, lower gap": "#e8890c",
+    "estimated": "#1c7ed6",
+    "cross-check": "#1a8f6f",
+}
+BAND_FILL = "rgba(28, 126, 214, 0.25)"
+SERIES = ("#0b62b8", "#d9780a", "#1a8f6f", "#8e44ad", "#b3261e", "#5d6d1e", "#00838f", "#7a4a2b")
+"""Colours of drops that are laid over each other."""
+
+FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', 'Liberation Sans', Arial, sans-serif"
+MILLI = 1e3
+MICRO = 1e6
+TIME_TITLE = "time from power-off [ms]"
+PANEL_HEIGHT = 300
+TOP_MARGIN = 62
+LEGEND_ROW = 22
+LEGEND_WIDTH = 720
+
+
+def plain(text: str) -> str:
+    """A name from a file, made harmless for plotly, which reads tags in its texts."""
+    return html.escape(str(text), quote=False)
+
+
+def axis_title(text: str, unit: str) -> str:
+    """Title of an axis, always with its unit; a pure number has the unit 1."""
+    return f"{text} [{unit or '1'}]"
+
+
+def panels(
+    titles: Sequence[str],
+    *,
+    rows: int = 1,
+    columns: int | None = None,
+    height: int = PANEL_HEIGHT,
+    share_time: bool = True,
+) -> go.Figure:
+    """An empty figure with one titled panel per bearing (or per axis and bearing).
+
+    Parameters
+    ----------
+    titles : sequence of str
+        Titles of the panels, row by row; names from files are made harmless here.
+    rows, columns : int
+        Grid; as many columns as titles by default.
+    height : int
+        Height of one panel [pixels].
+    share_time : bool
+        Panels of one column zoom together in time.
+    """
+    columns = columns or len(titles)
+    plot_height = rows * height
+    figure = make_subplots(
+        rows=rows,
+        cols=columns,
+        subplot_titles=[plain(title) for title in titles],
+        shared_xaxes="columns" if share_time and rows > 1 else False,
+        horizontal_spacing=0.085 if columns > 1 else 0.0,
+        vertical_spacing=58 / plot_height if rows > 1 else 0.0,
+    )
+    figure.update_layout(
+        template="none",
+        height=plot_height + 110,
+        font={"family": FONT, "size": 12.5, "color": INK},
+        margin={"l": 64, "r": 16, "t": TOP_MARGIN, "b": 50},
+        legend={
+            "orientation": "h",
+            "x": 0.0,
+            "y": 1.0,
+            "xanchor": "left",
+            "yanchor": "top",
+            "yref": "container",
+        },
+        paper_bgcolor="#ffffff",
+        plot_bgcolor="#ffffff",
+        separators=".\u202f",
+        hoverlabel={"font": {"family": FONT, "size": 12}},
+        hovermode="closest",
+        dragmode="zoom",
+    )
+    figure.update_annotations(font={"size": 13.5, "color": INK}, yshift=2)
+    frame = {"showline": True, "linecolor": "#9aa6b2", "mirror": True, "ticks": "outside", "ticklen": 4}
+    for update in (figure.update_xaxes, figure.update_yaxes):
+        update(
+            **frame, gridcolor=GRID, zeroline=False, tickcolor="#9aa6b2", title_standoff=8, automargin=True
+        )
+        update(title_font_size=13, tickfont_size=12)
+    return figure
+
+
+def line_style(role: Role, index: int | None = None) -> dict[str, Any]:
+    """Colour and width of a history; an index takes the colour of a series instead of the role's."""
+    colour = COLOURS[role] if index is None else SERIES[index % len(SERIES)]
+    return {"color": colour, "width": 1.1 if role == "measured" and index is None else 1.5}
+
+
+def add_history(
+    figure: go.Figure,
+    history: History,
+    scale: float,
+    unit: str,
+    *,
+    row: int = 1,
+    column: int = 1,
+    legend: bool = True,
+    line: dict[str, Any] | None = None,
+    group: str | None = None,
+) -> None:
+    """Draw a history over time in milliseconds, with as few points as show all its peaks.
+
+    Parameters
+    ----------
+    figure : Figure
+        Figure to draw into.
+    history : History
+        Time [s] and values in SI units.
+    scale : float
+        Factor from SI units to the shown unit.
+    unit : str
+        Shown unit, for the hover text.
+    row, column : int
+        Panel.
+    legend : bool
+        Whether the history gets an entry in the legend.
+    line : dict, optional
+        Line in place of the one of its role.
+    group : str, optional
+        Histories of one group are switched together by the legend; the label by default.
+    """
+    chosen = peak_indices(history.values)
+    figure.add_trace(
+        go.Scatter(
+            x=single(MILLI * history.time[chosen]),
+            y=single(scale * history.values[chosen]),
+            mode="lines",
+            name=plain(history.label),
+            legendgroup=group or plain(history.label),
+            showlegend=legend,
+            line=line or line_style(history.role),
+            hovertemplate=f"%{{x:.2f}} ms: %{{y:.4~g}} {unit}<extra>{plain(history.label)}</extra>",
+        ),
+        row=row,
+        col=column,
+    )
+
+
+def add_band(
+    figure: go.Figure,
+    band: Band,
+    scale: float,
+    unit: str,
+    *,
+    row: int = 1,
+    column: int = 1,
+    legend: bool = True,
+) -> None:
+    """Draw a band between two limits; thinned out, the drawn band still contains the whole one."""
+    index, lower, upper = block_envelope(band.lower, band.upper)
+    time = single(MILLI * band.time[index])
+    shared = {"mode": "lines", "line": {"width": 0}, "legendgroup": plain(band.label), "x": time}
+    label = plain(band.label)
+    figure.add_trace(
+        go.Scatter(y=single(scale * lower), showlegend=False, hoverinfo="skip", **shared), row=row, col=column
+    )
+    figure.add_trace(
+        go.Scatter(
+            y=single(scale * upper),
+            fill="tonexty",
+            fillcolor=BAND_FILL,
+            name=label,
+            showlegend=legend,
+            hovertemplate=f"%{{x:.2f}} ms: up to %{{y:.4~g}} {unit}<extra>{label}</extra>",
+            **shared,
+        ),
+        row=row,
+        col=column,
+    )
+
+
+def add_gap_limits(
+    figure: go.Figure, gap: AirGap, *, sign: float = 1.0, row: int = 1, column: int = 1, legend: bool = False
+) -> None:
+    """Draw the air gap as a horizontal limit, or as a strip between its lower and upper value."""
+    lower, upper = sorted((sign * MICRO * gap.lower, sign * MICRO * gap.upper))
+    place = {"row": row, "col": column}
+    if upper > lower:
+        figure.add_hrect(
+            y0=lower,
+            y1=upper,
+            fillcolor=GAP_FILL,
+            line_width=0,
+            name="air gap, lower to upper limit",
+            showlegend=legend,
+            **place,
+        )
+    else:
+        add_level(figure, lower, "air gap", legend=legend, **place)
+
+
+def add_level(figure: go.Figure, value: float, name: str, *, row: int, col: int, legend: bool) -> None:
+    """Draw a horizontal limit with an entry in the legend."""
+    line = {"color": LIMIT, "width": 1, "dash": "dash"}
+    figure.add_hline(y=value, line=line, name=plain(name), showlegend=legend, row=row, col=col)
+
+
+def fit_legend(figure: go.Figure) -> go.Figure:
+    """Make room above the panels for as many rows as the legend needs."""
+    shown = [trace.name for trace in figure.data if trace.showlegend is not False and trace.name]
+    shown += [shape.name for shape in figure.layout.shapes if shape.showlegend and shape.name]
+    row, used = 1, 0.0
+    for name in shown:
+        width = 48 + 7.0 * len(name)
+        row, used = (row + 1, width) if used and used + width > LEGEND_WIDTH else (row, used + width)
+    extra = (row - 1) * LEGEND_ROW
+    figure.update_layout(height=figure.layout.height + extra, margin_t=TOP_MARGIN + extra)
+    return figure
+
+
+def single(values: Array) -> NDArray[np.float32]:
+    """Values in single precision: seven digits are plenty for a figure and halve the page."""
+    return np.asarray(values, dtype=np.float32)

@@ -1,0 +1,35 @@
+"use strict";
+(function () {
+  var settings = {
+    displaylogo: false,
+    responsive: true,
+    plotlyServerURL: "",
+    showSendToCloud: false,
+    modeBarButtonsToRemove: ["lasso2d", "select2d"],
+    toImageButtonOptions: { format: "svg", filename: "rotordrop" }
+  };
+  var waiting = Array.prototype.slice.call(document.querySelectorAll(".chart"));
+  var drawn = [];
+
+  function draw(element) {
+    var description = JSON.parse(document.getElementById(element.id + "-data").textContent);
+    drawn.push(element);
+    return Plotly.newPlot(element, description.data, description.layout, settings);
+  }
+
+  function drawNext() {
+    var element = waiting.shift();
+    if (!element) { document.documentElement.setAttribute("data-drawn", String(drawn.length)); return; }
+    draw(element);
+    window.setTimeout(drawNext, 0);
+  }
+
+  window.addEventListener("beforeprint", function () {
+    while (waiting.length) { draw(waiting.shift()); }
+    drawn.forEach(function (element) { Plotly.relayout(element, { width: 695, autosize: false }); });
+  });
+  window.addEventListener("afterprint", function () {
+    drawn.forEach(function (element) { Plotly.relayout(element, { width: null, autosize: true }); });
+  });
+  drawNext();
+})();
