@@ -101,7 +101,7 @@ def index_page(folder: Path = PHYSICS) -> str:
             "# Equation index",
             "",
             "Every function of `rotordrop.physics`, in the order of the paper's equations; generated from",
-            "the docstrings. Neisi 2020 is the paper named on the [first page](index.md).",
+            "the docstrings. Neisi 2020 is the paper named on the [first page](../index.md).",
             "",
             "| source | function | what it gives |",
             "|---|---|---|",

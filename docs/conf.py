@@ -1,0 +1,43 @@
+"""Settings of the documentation; the pages under ``generated/`` are written from the sources before each build."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE))
+
+import generated_pages  # noqa: E402
+
+from rotordrop import __version__  # noqa: E402
+
+project = "rotordrop"
+author = "rotordrop contributors"
+copyright = author  # noqa: A001
+release = version = __version__
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.doctest",
+    "sphinx.ext.mathjax",
+    "sphinx.ext.viewcode",
+    "numpydoc",
+]
+exclude_patterns = ["_build"]
+html_theme = "furo"
+html_title = "rotordrop"
+html_show_copyright = False
+
+myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 3
+
+autodoc_typehints = "none"
+autodoc_member_order = "bysource"
+numpydoc_show_class_members = False
+numpydoc_class_members_toctree = False
+
+doctest_global_setup = "import numpy as np\nnp.set_printoptions(precision=4, suppress=True)"
+
+generated_pages.write(HERE / "generated")
