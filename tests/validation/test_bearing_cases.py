@@ -1,0 +1,274 @@
+"""Hertz contact and ball bearing cases: tables, textbook examples, standards and two catalogues."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+from cases import Compute, check, load_case, load_table
+
+from rotordrop.physics import hertz
+from rotordrop.physics.ball_bearing import axial_rigidity, bearing_constants, lift_off_force
+from rotordrop.physics.ball_bearing_catalogue import (
+    conformity_of_rigidity,
+    pair_lift_off_force,
+    pair_rigidity,
+    row_of_catalogue,
+    row_of_conformity,
+)
+from rotordrop.physics.ball_bearing_geometry import BallBearingGeometry
+from rotordrop.physics.ball_bearing_response import bearing_equilibrium
+
+pytestmark = pytest.mark.acceptance
+Inputs = Mapping[str, Any]
+Table = Mapping[str, list[Any]]
+
+
+def contact_parameters(inputs: Inputs) -> dict[str, float]:
+    numbers = {}
+    for F_rho in inputs["F_rho"]:
+        a_star, b_star, delta_star = hertz.contact_parameters(F_rho)
+        numbers |= {
+            f"a* at F(rho)={F_rho}": a_star,
+            f"b* at F(rho)={F_rho}": b_star,
+            f"delta* at F(rho)={F_rho}": delta_star,
+        }
+    return numbers
+
+
+def curvatures(inputs: Inputs) -> dict[str, float]:
+    numbers = {}
+    for name, bearing in (("209", inputs["b209"]), ("218", inputs["b218"])):
+        f = bearing["f"] if "f" in bearing else bearing["groove_radius"] / bearing["Dw"]
+        alpha = math.radians(bearing["alpha_deg"])
+        for race in ("inner", "outer"):
+            total, difference = hertz.race_curvatures(
+                bearing["Dw"], bearing["dm"], f, alpha, inner=race == "inner"
+            )
+            numbers[f"{name} {race} curvature sum"] = total
+            numbers[f"{name} {race} curvature difference F"] = difference
+    return numbers
+
+
+def iso_16281_equilibrium(inputs: Inputs) -> dict[str, float]:
+    """A deep-groove row: contact angle and axial offset come from the clearance; the race starts centred."""
+    names = (
+        "load case 1: radial displacement",
+        "load case 2: axial displacement (from centred, incl. half axial clearance)",
+        "load case 3: radial displacement",
+    )
+    grooves = (inputs["ri"] / inputs["Dw"], inputs["re"] / inputs["Dw"])
+    A_0 = inputs["ri"] + inputs["re"] - inputs["Dw"]
+    numbers = {}
+    for name, load in zip(names, inputs["load_cases"], strict=True):
+        constants = bearing_constants(
+            BallBearingGeometry(
+                ball_diameter=inputs["Dw"],
+                ball_count=inputs["Z"],
+                pitch_diameter=inputs["Dpw"],
+                contact_angle=math.acos(1.0 - load["clearance_s"] / (2.0 * A_0)),
+                conformity_inner=grooves[0],
+                conformity_outer=grooves[1],
+                ring_youngs_modulus=inputs["E"],
+                ring_poisson_ratio=inputs["nu"],
+                ball_youngs_modulus=inputs["E"],
+                ball_poisson_ratio=inputs["nu"],
+                arrangement="single",
+                first_ball_angle=math.pi,
+            )
+        )
+        centred = np.array([0.0, -1e-6, -constants.axial_offset, 0.0, 0.0])
+        force = [0.0, -load["Fr"], load["Fa"], 0.0, load["M"]]
+        q = bearing_equilibrium(constants, force, start=centred)
+        numbers[name] = -q[1] if load["Fr"] else q[2] + constants.axial_offset
+    return numbers
+
+
+def stribeck_loaded_inner_race(inputs: Inputs) -> dict[str, float]:
+    eta = hertz.compliance(inputs["E"], inputs["nu"], inputs["E"], inputs["nu"])
+    f = inputs["groove_radius"] / inputs["Dw"]
+    contact = hertz.race_contact(inputs["Dw"], inputs["dm"], f, 0.0, eta, inner=True)
+    a, b = contact.semi_axes(inputs["Q"])
+    pressure = float(contact.maximum_pressure(inputs["Q"]))
+    return {
+        "ellipticity (exact)": float(contact.ellipticity),
+        "semi-major axis (exact)": float(a),
+        "semi-minor axis (exact)": float(b),
+        "max Hertz stress (exact)": pressure,
+        "max Hertz stress (Hamrock-Brewe page)": pressure,
+    }
+
+
+def palmgren_line_contact(inputs: Inputs) -> dict[str, float]:
+    first = inputs["l_mm"][0]
+    stiffness = {f"K(l={mm} mm)": hertz.line_contact_stiffness(1e-3 * mm) for mm in inputs["l_mm"]}
+    return stiffness | {
+        f"delta(Q=1000 N,l={first} mm)": hertz.line_contact_approach(inputs["Q"], 1e-3 * first)
+    }
+
+
+def circular_contacts(inputs: Inputs) -> dict[str, float]:
+    steel, ceramic = (tuple(inputs[name][key] for key in ("E", "nu")) for name in ("steel", "Si3N4"))
+    all_steel, hybrid = hertz.compliance(*steel, *steel), hertz.compliance(*ceramic, *steel)
+    numbers = {}
+    for name, contact, Q in (
+        (
+            "sphere R=10 mm on plane, steel/steel, 100 N",
+            hertz.circular_contact(0.01, math.inf, all_steel),
+            100,
+        ),
+        ("spheres 10 and 20 mm, steel/steel, 500 N", hertz.circular_contact(0.01, 0.02, all_steel), 500),
+        ("Si3N4 ball R=5 mm on steel plane, 200 N", hertz.circular_contact(0.005, math.inf, hybrid), 200),
+    ):
+        numbers[f"{name}: contact radius"] = float(contact.semi_axes(Q)[0])
+        numbers[f"{name}: approach"] = float(contact.approach(Q))
+        numbers[f"{name}: p0"] = float(contact.maximum_pressure(Q))
+    return numbers
+
+
+def gmn_errors(table: Table, eta: float, *, angle_changes: bool = True) -> np.ndarray:
+    """Relative errors of the rigidity at light and strong preload; the medium one gives the conformity."""
+    D_w, D_pw = 1e-3 * np.array(table["D_w_mm"]), 1e-3 * np.array(table["D_pw_mm"])
+    alpha, Z = np.radians(table["contact_angle_deg"]), np.array(table["Z"])
+    F_V = {c: np.array(table[f"F_V_{c}"]) for c in "LMS"}
+    C_ax = {c: 1e6 * np.array(table[f"C_ax_{c}"]) for c in "LMS"}
+    f = conformity_of_rigidity(C_ax["M"], F_V["M"], D_w, D_pw, Z, alpha, eta)
+    ZK, A_0 = row_of_conformity(f, D_w, D_pw, Z, alpha, eta)
+    if not angle_changes:  # a groove distance beyond measure holds the contact angle; K then fits the medium
+        A_0 = 1e6 * A_0
+        ZK = ZK * (C_ax["M"] / pair_rigidity(F_V["M"], ZK, A_0, alpha)) ** 1.5
+    return np.concatenate([pair_rigidity(F_V[c], ZK, A_0, alpha) / C_ax[c] - 1.0 for c in "LS"])
+
+
+def gmn_catalogue(inputs: Inputs) -> dict[str, float]:
+    steel = (inputs["steel"]["E"], inputs["steel"]["nu"])
+    errors = np.abs(gmn_errors(load_table(inputs["table"]), hertz.compliance(*steel, *steel)))
+    return {
+        "median |error| of predicted L and S rigidity": float(np.median(errors)),
+        "90th percentile |error|": float(np.percentile(errors, 90)),
+    }
+
+
+def fag_errors(table: Table) -> np.ndarray:
+    """Relative errors of rigidity and lift-off force at three preloads, two free numbers per bearing."""
+    F_V, lift_off, C_a = (
+        np.stack([table[f"{k}_{c}"] for c in "LMH"], axis=1) for k in ("F_V", "K_aE", "C_a")
+    )
+    alpha = np.radians(table["contact_angle_deg"])
+    ZK, A_0 = row_of_catalogue(F_V, 1e6 * C_a, lift_off, alpha)
+    row = (ZK[:, None], A_0[:, None], alpha[:, None])
+    errors = [pair_rigidity(F_V, *row) / (1e6 * C_a) - 1.0, pair_lift_off_force(F_V, *row) / lift_off - 1.0]
+    return np.hstack(errors)
+
+
+def fag_catalogue(inputs: Inputs) -> dict[str, float]:
+    errors = np.abs(fag_errors(load_table(inputs["table"])))
+    return {
+        "median |error| over all numbers": float(np.median(errors)),
+        "95th percentile |error|": float(np.percentile(errors, 95)),
+        "worst |error|": float(errors.max()),
+    }
+
+
+def papers_touchdown_bearing(inputs: Inputs) -> dict[str, float]:
+    numbers = {}
+    for F_V in (96, 452, 1026):
+        constants = bearing_constants(
+            BallBearingGeometry(
+                ball_diameter=inputs["Dw"],
+                ball_count=inputs["Z"],
+                pitch_diameter=inputs["dm"],
+                contact_angle=math.radians(inputs["alpha0_deg"]),
+                conformity_inner=inputs["fi"],
+                conformity_outer=inputs["fo"],
+                ring_youngs_modulus=inputs["ring_steel"]["E"],
+                ring_poisson_ratio=inputs["ring_steel"]["nu"],
+                ball_youngs_modulus=inputs["ball_Si3N4"]["E"],
+                ball_poisson_ratio=inputs["ball_Si3N4"]["nu"],
+                preload=F_V,
+                arrangement="X",
+            )
+        )
+        numbers[f"axial rigidity of pair at Fv={F_V} N"] = axial_rigidity(constants)
+        numbers[f"lift-off force at Fv={F_V} N"] = lift_off_force(constants)
+    return numbers
+
+
+CASES: dict[str, Compute] = {
+    "H01a": contact_parameters,
+    "H02": curvatures,
+    "H03a": iso_16281_equilibrium,
+    "H05": stribeck_loaded_inner_race,
+    "H06a": gmn_catalogue,
+    "H07a": fag_catalogue,
+    "H08": palmgren_line_contact,
+    "H09": circular_contacts,
+    "H11": papers_touchdown_bearing,
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_case(name: str) -> None:
+    case = load_case(name)
+    check(case, CASES[name](case.inputs))
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("H02", {"b209__f": 0.5201}),
+        ("H02", {"b218__alpha_deg": 40.1}),
+        ("H03a", {"ri": 0.0060}),
+        ("H03a", {"E": 210.5e9}),
+        ("H03a", {"re": 0.0062}),
+        ("H05", {"groove_radius": 0.004891}),
+        ("H05", {"Q": 556.0}),
+        ("H08", {"Q": 1001.0}),
+        ("H09", {"steel__E": 2.101e11}),
+        ("H09", {"Si3N4__nu": 0.261}),
+        ("H11", {"fi": 0.52}),
+        ("H11", {"alpha0_deg": 24.0}),
+        ("H11", {"Dw": 0.0105}),
+    ],
+)
+def test_perturbed_input_fails_the_case(name: str, change: dict[str, float]) -> None:
+    case = load_case(name).with_inputs(**change)
+    with pytest.raises(AssertionError, match=f"{name} .*\n.*deviation .* tolerance"):
+        check(case, CASES[name](case.inputs))
+
+
+def test_perturbed_curvature_difference_fails_the_table() -> None:
+    case = load_case("H01a")
+    shifted = contact_parameters({"F_rho": [F + 1e-4 for F in case.inputs["F_rho"]]})
+    with pytest.raises(AssertionError, match=r"(?s)H01a .*deviation"):
+        check(case, dict(zip((e.name for e in case.expected), shifted.values(), strict=True)))
+
+
+def test_palmgren_length_matters() -> None:
+    case = load_case("H08")
+    numbers = palmgren_line_contact({**case.inputs, "l_mm": [10.01, 25.01]})
+    with pytest.raises(AssertionError, match=r"(?s)H08 .*deviation"):
+        check(case, dict(zip((e.name for e in case.expected), numbers.values(), strict=True)))
+
+
+def test_fixed_contact_angle_fails_the_gmn_catalogue() -> None:
+    case = load_case("H06a")
+    steel = (case.inputs["steel"]["E"], case.inputs["steel"]["nu"])
+    table = load_table(case.inputs["table"])
+    errors = np.abs(gmn_errors(table, hertz.compliance(*steel, *steel), angle_changes=False))
+    assert np.median(errors) > 2.0 * case.expected[0].tolerance
+    assert len(table["name"]) == 107
+
+
+@pytest.mark.parametrize(("column", "factor"), [("F_V_M", 1.05), ("K_aE_H", 0.95), ("C_a_L", 1.1)])
+def test_perturbed_column_fails_the_fag_catalogue(column: str, factor: float) -> None:
+    case = load_case("H07a")
+    table = load_table(case.inputs["table"])
+    table[column] = [factor * value for value in table[column]]
+    errors = np.abs(fag_errors(table))
+    statistics = (np.median(errors), np.percentile(errors, 95), errors.max())
+    assert any(not e.holds(value) for e, value in zip(case.expected, statistics, strict=True))
+    assert len(table["name"]) == 433

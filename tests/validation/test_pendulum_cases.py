@@ -1,0 +1,48 @@
+"""Pendulum cases: small swings in the clearance circle, exact period of large ones."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import pytest
+from cases import Compute, check, load_case
+
+from rotordrop.physics.pendulum import period, period_ratio, small_frequency
+
+pytestmark = pytest.mark.acceptance
+Inputs = Mapping[str, Any]
+
+
+def small_swing(inputs: Inputs) -> dict[str, float]:
+    return {f"f0 at c={c * 1e6:.0f} um": float(small_frequency(c, inputs["g"])) for c in inputs["c"]}
+
+
+def large_swing(inputs: Inputs) -> dict[str, float]:
+    quarter_turn = float(period(0.5, math.radians(90.0), inputs["g"]))
+    ratios = {f"T/T0 at {deg} deg": float(period_ratio(math.radians(deg))) for deg in (10, 30, 45, 90)}
+    return ratios | {"period l=0.5 m, 90 deg": quarter_turn, "Code_Aster V5.02.100 value": quarter_turn}
+
+
+CASES: dict[str, Compute] = {"P01": small_swing, "P02a": large_swing}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_case(name: str) -> None:
+    case = load_case(name)
+    check(case, CASES[name](case.inputs))
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_perturbed_gravity_fails_the_case(name: str) -> None:
+    case = load_case(name).with_inputs(g=9.8101)
+    with pytest.raises(AssertionError, match=f"{name} .*\n.*deviation .* tolerance"):
+        check(case, CASES[name](case.inputs))
+
+
+def test_small_swing_formula_fails_the_large_swing() -> None:
+    case = load_case("P02a")
+    numbers = large_swing(case.inputs) | {"T/T0 at 10 deg": 1.0}
+    with pytest.raises(AssertionError, match=r"T/T0 at 10 deg: 1 -, expected 1\.0019"):
+        check(case, numbers)
