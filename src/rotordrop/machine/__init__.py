@@ -1,0 +1,40 @@
+"""What a machine is: frozen descriptions, read from and written to a TOML file with units."""
+
+from rotordrop.machine.amb import ActiveMagneticBearing
+from rotordrop.machine.ball_bearing import BallBearing
+from rotordrop.machine.examples import example_machine, example_names, example_path
+from rotordrop.machine.loading import load_machine, loads_machine
+from rotordrop.machine.machine import Machine
+from rotordrop.machine.material import Material
+from rotordrop.machine.rotor import Disc, Element, Rotor, Section, SectionByLength, SectionByNodes
+from rotordrop.machine.sensor import Sensor
+from rotordrop.machine.speed import SpeedDescription
+from rotordrop.machine.touchdown_bearing import Contact, Friction, Race, Support, TouchdownBearing
+from rotordrop.machine.unbalance import BalanceGrade, Unbalance
+
+__all__ = [
+    "ActiveMagneticBearing",
+    "BalanceGrade",
+    "BallBearing",
+    "Contact",
+    "Disc",
+    "Element",
+    "Friction",
+    "Machine",
+    "Material",
+    "Race",
+    "Rotor",
+    "Section",
+    "SectionByLength",
+    "SectionByNodes",
+    "Sensor",
+    "SpeedDescription",
+    "Support",
+    "TouchdownBearing",
+    "Unbalance",
+    "example_machine",
+    "example_names",
+    "example_path",
+    "load_machine",
+    "loads_machine",
+]

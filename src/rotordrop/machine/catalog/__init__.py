@@ -1,0 +1,11 @@
+"""Bearings by designation: catalogue values, and ball complements where the maker does not publish them."""
+
+from rotordrop.machine.catalog.lookup import (
+    BallComplement,
+    CatalogueBearing,
+    PreloadClass,
+    designations,
+    find_bearing,
+)
+
+__all__ = ["BallComplement", "CatalogueBearing", "PreloadClass", "designations", "find_bearing"]

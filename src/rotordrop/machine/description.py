@@ -1,0 +1,150 @@
+"""What every part of a machine description has in common: frozen, strict about keys, aware of what was given."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from difflib import get_close_matches
+from typing import Annotated, Any, ClassVar, Self, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, Strict, model_validator
+
+from rotordrop.estimated import Estimated
+from rotordrop.machine.values import LEFT_OUT, Length, Physical
+
+Text = Annotated[str, Strict()]
+Node = Annotated[int, Strict(), Field(ge=1)]
+Name = Annotated[str, Strict(), Field(min_length=1, pattern=r"^[^.\s]+$")]
+
+NODE_TOLERANCE = 1e-4
+"""A position this close to a node [m] means the node."""
+
+
+class Misfit(ValueError):
+    """Something does not fit, at a place below the table that found it."""
+
+    def __init__(self, message: str, place: tuple[str | int, ...] = ()) -> None:
+        self.message = message
+        self.place = place
+        super().__init__(message)
+
+
+class Description(BaseModel):
+    """A part of a machine: frozen, with no key that is not known."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
+
+    displaces: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    """Fields that give way when another one is set, because both say the same thing."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _refuse_unknown_keys(cls, raw: Any) -> Any:
+        if isinstance(raw, Mapping):
+            raw = cls.rewritten(dict(raw))
+            for key in raw:
+                if key not in cls.model_fields:
+                    raise Misfit(unknown_key(str(key), cls.known_keys()), (str(key),))
+        return raw
+
+    @model_validator(mode="after")
+    def _fill_left_out(self) -> Self:
+        self.check()
+        self.__dict__.update(self.left_out())
+        return self
+
+    @classmethod
+    def rewritten(cls, raw: dict[str, Any]) -> dict[str, Any]:
+        """Bring shorthand of the file to the fields of the description."""
+        return raw
+
+    @classmethod
+    def known_keys(cls) -> tuple[str, ...]:
+        """Keys to suggest for a mistyped one."""
+        return tuple(cls.model_fields)
+
+    def check(self) -> None:
+        """Refuse values that do not fit together, with a `Misfit`."""
+
+    def left_out(self) -> dict[str, Any]:
+        """Values for fields that were left out and follow from others."""
+        return {}
+
+    def changed(self, **values: Any) -> Self:
+        """Give a copy with other values; what follows from them follows again."""
+        displaced = {other for name in values for other in self.displaces.get(name, ())}
+        given = {name: getattr(self, name) for name in self.model_fields_set if name not in displaced}
+        return type(self).model_validate(given | values)
+
+    def completed_with(self, values: Mapping[str, Any]) -> Self:
+        """Give a copy in which values that were left out follow from outside; they still count as left out."""
+        copy = self.model_copy()
+        copy.__dict__.update(values)
+        return copy
+
+    def reason(self, name: str) -> str:
+        """Say why a value that was left out is what it is."""
+        value = getattr(self, name)
+        stated = value.source if isinstance(value, Estimated) else None
+        return stated or type(self).model_fields[name].description or "the usual case"
+
+
+class Placed(Description):
+    """Something that sits at a node of the rotor, given by number or by position."""
+
+    node: Node = Field(default=0, validate_default=False, description="Node number, counted from 1")
+    position: Length | None = Field(default=None, description="In place of the node: distance from node 1")
+
+    def check(self) -> None:
+        """Refuse both or neither of node and position."""
+        if ("node" in self.model_fields_set) == (self.position is not None):
+            raise Misfit(
+                "needs either 'node' (counted from 1) or 'position' (distance from node 1), and only one of them"
+            )
+
+
+P = TypeVar("P", bound=Placed)
+
+
+def place_on_nodes(items: tuple[P, ...], nodes: tuple[float, ...], key: str) -> tuple[P, ...]:
+    """Find the node of everything that sits on the rotor; refuse what lies outside."""
+    for index, item in enumerate(items):
+        if item.position is None:
+            _refuse_outside(item.node, nodes, (key, index, "node"))
+        else:
+            item.__dict__["node"] = _node_at(item.position, nodes, (key, index, "position"))
+    return items
+
+
+def _refuse_outside(node: int, nodes: tuple[float, ...], place: tuple[str | int, ...]) -> None:
+    if not 1 <= node <= len(nodes):
+        raise Misfit(f"node {node} is outside the rotor, whose nodes are 1 to {len(nodes)}", place)
+
+
+def _node_at(position: Estimated, nodes: tuple[float, ...], place: tuple[str | int, ...]) -> int:
+    text = Physical("length").text
+    if not nodes[0] - NODE_TOLERANCE <= position.value <= nodes[-1] + NODE_TOLERANCE:
+        raise Misfit(
+            f"{text(position.value)} is outside the rotor, which reaches from {text(nodes[0])} to {text(nodes[-1])}",
+            place,
+        )
+    nearest = min(range(len(nodes)), key=lambda i: abs(nodes[i] - position.value))
+    if abs(nodes[nearest] - position.value) > NODE_TOLERANCE:
+        raise Misfit(
+            f"there is no node at {position.value * 1e3:.7g} mm; the nearest is node {nearest + 1} at "
+            f"{nodes[nearest] * 1e3:.7g} mm: end a shaft section at this position or give the node",
+            place,
+        )
+    return nearest + 1
+
+
+def unknown_key(key: str, known: tuple[str, ...]) -> str:
+    """Say that a key is not known, with the nearest one."""
+    close = get_close_matches(key, known, 1, 0.6)
+    way_out = f"did you mean {close[0]!r}?" if close else f"known here are {', '.join(known)}"
+    return f"unknown key {key!r}; {way_out}"
+
+
+def is_left_out(value: Estimated | None) -> bool:
+    """Tell whether a value is still to follow from others."""
+    return value is LEFT_OUT or (value is not None and math.isnan(value.value))

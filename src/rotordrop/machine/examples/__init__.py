@@ -1,0 +1,32 @@
+"""Machines that ship with rotordrop."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+
+from rotordrop.errors import UsageError
+from rotordrop.machine.loading import load_machine
+from rotordrop.machine.machine import Machine
+
+_EXAMPLES = {
+    "paper": "the reference machine, reconstructed from Neisi et al. 2020",
+    "lp400": "the machine of the supplied records, as its owner knows it",
+}
+
+
+def example_names() -> tuple[str, ...]:
+    """Names of the machines that ship with rotordrop."""
+    return tuple(_EXAMPLES)
+
+
+def example_path(name: str) -> Path:
+    """Path of the machine file of an example."""
+    if name not in _EXAMPLES:
+        raise UsageError(f"there is no example machine {name!r}; there are {', '.join(_EXAMPLES)}")
+    return Path(str(files("rotordrop.machine.examples") / f"{name}.toml"))
+
+
+def example_machine(name: str) -> Machine:
+    """Load a machine that ships with rotordrop: "paper" or "lp400"."""
+    return load_machine(example_path(name))

@@ -1,0 +1,167 @@
+"""Read a machine from its TOML file; every refusal says where and what to do."""
+
+from __future__ import annotations
+
+import os
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from rotordrop.errors import MachineFileError, UsageError
+from rotordrop.machine.description import Misfit
+from rotordrop.machine.machine import Machine
+from rotordrop.machine.shaft_table import SECTION_LINE, read_shaft_table
+from rotordrop.machine.toml_positions import TomlPositions
+
+_UNION_TAGS = {"by_length", "by_nodes"}
+_DECIMAL_COMMA = re.compile(r"=\s*([+-]?\d+),(\d+)(?!\s*\])")
+_SYNTAX_PLACE = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)")
+
+
+def load_machine(path: str | os.PathLike[str]) -> Machine:
+    """Read a machine from a TOML file.
+
+    Parameters
+    ----------
+    path : path-like
+        The machine file; a shaft table named in it counts from its folder.
+
+    Raises
+    ------
+    MachineFileError
+        When the file cannot be used; the message holds file, line, column, the value and the way out.
+    """
+    file = Path(path)
+    try:
+        text = file.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise MachineFileError(f"cannot read the machine file: {error.strerror}", file=file) from error
+    except UnicodeDecodeError as error:
+        raise MachineFileError(
+            f"byte {error.start} is not UTF-8 text; save the machine file as UTF-8", file=file
+        ) from error
+    return _loaded(text, file)
+
+
+def loads_machine(text: str, folder: str | os.PathLike[str] = ".") -> Machine:
+    """Read a machine from TOML text; a shaft table named in it counts from `folder`."""
+    return _loaded(text, None, Path(folder))
+
+
+def _loaded(text: str, file: Path | None, folder: Path | None = None) -> Machine:
+    raw = _parsed(text, file)
+    positions = TomlPositions(text)
+    table = _with_shaft_table(raw, file, folder or (file.parent if file else Path()), positions)
+    try:
+        machine = Machine.model_validate(raw)
+    except ValidationError as error:
+        raise _located(error, positions, file, table) from None
+    if file is not None:
+        machine._source_path = file  # the one moment before the machine leaves the house
+    return machine
+
+
+def _parsed(text: str, file: Path | None) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise _syntax_error(text, str(error), file) from None
+
+
+def _syntax_error(text: str, message: str, file: Path | None) -> MachineFileError:
+    lines = text.splitlines() or [""]
+    place = _SYNTAX_PLACE.search(message)
+    line = int(place.group(1)) if place and place.group(1) else len(lines)
+    column = int(place.group(2)) if place and place.group(2) else len(lines[-1]) + 1
+    comma = _DECIMAL_COMMA.search(lines[min(line, len(lines)) - 1])
+    if comma:
+        value = f"{comma.group(1)},{comma.group(2)}"
+        return MachineFileError(
+            f"{value} has a decimal comma; write {value.replace(',', '.')}, in quotes with its unit, "
+            f"as in \"{value.replace(',', '.')} mm\"",
+            file=file,
+            line=line,
+            column=comma.start(1) + 1,
+        )
+    reason = _SYNTAX_PLACE.sub("", message)
+    unquoted = re.search(r"=\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*([A-Za-zµ°%][^#\"']*?)\s*(#.*)?$", lines[line - 1])
+    if unquoted:
+        reason = f"a value with a unit is a text: write \"{unquoted.group(1)} {unquoted.group(2)}\" in quotes"
+    return MachineFileError(f"not valid TOML: {reason}", file=file, line=line, column=column)
+
+
+def _with_shaft_table(
+    raw: dict[str, Any], file: Path | None, folder: Path, positions: TomlPositions
+) -> tuple[Path, list[int]] | None:
+    """Put the sections of the shaft table in place of its name; give its path and the line of each section."""
+    rotor = raw.get("rotor")
+    if not isinstance(rotor, dict) or "shaft_table" not in rotor:
+        return None
+    place = positions.value(("rotor", "shaft_table")) or (None, None)
+    named = rotor.pop("shaft_table")
+    if not isinstance(named, str):
+        raise MachineFileError(
+            f"shaft_table = {named!r} is not the name of a CSV file", file=file, line=place[0], column=place[1]
+        )
+    both = [key for key in ("sections", "node_positions") if key in rotor]
+    if both:
+        raise MachineFileError(
+            f"the shaft is given by 'shaft_table' and by {both[0]!r}; keep one of them",
+            file=file,
+            line=place[0],
+            column=place[1],
+        )
+    path = folder / named
+    rotor.update(read_shaft_table(path))
+    return path, [section.pop(SECTION_LINE) for section in rotor["sections"]]
+
+
+def _located(
+    error: ValidationError, positions: TomlPositions, file: Path | None, table: tuple[Path, list[int]] | None
+) -> MachineFileError:
+    found = [_one_error(entry, positions, file, table) for entry in error.errors()]
+    found.sort(key=lambda refusal: (refusal.line or 0, refusal.column or 0))
+    first = found[0]
+    others = "".join(f"\n{other}" for other in found[1:])
+    return MachineFileError(first.message + others, file=first.file, line=first.line, column=first.column)
+
+
+def _one_error(
+    entry: Any, positions: TomlPositions, file: Path | None, table: tuple[Path, list[int]] | None
+) -> MachineFileError:
+    place = tuple(part for part in entry["loc"] if part not in _UNION_TAGS)
+    message, at_key = _message(entry, place)
+    cause = entry.get("ctx", {}).get("error")
+    if isinstance(cause, Misfit):
+        place = (*place, *cause.place)
+    if table is not None and place[:2] == ("rotor", "sections") and len(place) > 2:
+        return MachineFileError(f"{_dotted(place[2:])}: {message}", file=table[0], line=table[1][int(place[2])])
+    line, column = (positions.key(place) if at_key else positions.value(place)) or (1, 1)
+    return MachineFileError(f"{_dotted(place)}: {message}" if place else message, file=file, line=line, column=column)
+
+
+def _message(entry: Any, place: tuple[str | int, ...]) -> tuple[str, bool]:
+    """Say what is wrong, and whether the key rather than the value is to blame."""
+    cause = entry.get("ctx", {}).get("error")
+    if isinstance(cause, Misfit):
+        return cause.message, cause.message.startswith("unknown")
+    if isinstance(cause, UsageError):
+        return str(cause), False
+    if entry["type"] == "missing":
+        return f"{place[-1]!r} is missing; add it (machine_schema() and 'rotordrop init' show how)", True
+    found = entry["input"]
+    shown = f"{found!r}" if not isinstance(found, dict | list) else "this"
+    return f"{shown} does not fit: {entry['msg'][0].lower()}{entry['msg'][1:]}", False
+
+
+def _dotted(place: tuple[str | int, ...]) -> str:
+    """Write a place as the file shows it; list entries count from 1."""
+    text = ""
+    for part in place:
+        text += f"[{part + 1}]" if isinstance(part, int) else f".{part}" if text else part
+    return text
+
+

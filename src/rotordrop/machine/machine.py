@@ -1,0 +1,184 @@
+"""A machine: rotor, bearings, magnets, sensors, and what was given, defaulted or inferred."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from pydantic import Field, PrivateAttr
+
+from rotordrop.errors import UsageError
+from rotordrop.estimated import Estimated
+from rotordrop.machine.amb import ActiveMagneticBearing
+from rotordrop.machine.description import Description, Misfit, Text, place_on_nodes
+from rotordrop.machine.parameter_paths import changed_machine_parts
+from rotordrop.machine.provenance import Mention, mentions
+from rotordrop.machine.rotor import Rotor
+from rotordrop.machine.sensor import Sensor, check_sensors_resolve_motion
+from rotordrop.machine.speed import SpeedDescription
+from rotordrop.machine.touchdown_bearing import TouchdownBearing
+from rotordrop.machine.unbalance import BalanceGrade, Unbalance, from_grade
+from rotordrop.machine.values import Acceleration, default
+
+RESERVED_NAMES = ("speed", "unbalance", "rotor", "gravity", "sensors", "ambs", "machine")
+
+
+class Machine(Description):
+    """A machine whose rotor can drop onto its touchdown bearings; immutable.
+
+    Attributes
+    ----------
+    name : str
+        Name of the machine.
+    gravity : Estimated
+        Acceleration of gravity, acting towards -y [m/s²].
+    rotor : Rotor
+        Shaft, discs, materials.
+    unbalances : tuple of Unbalance
+        Unbalances; from the balance grade where none is given.
+    balance_grade : BalanceGrade, optional
+        Balance quality after ISO 21940-11.
+    touchdown_bearings : tuple of TouchdownBearing
+        Touchdown bearings, any number, NDE first.
+    ambs : tuple of ActiveMagneticBearing
+        Radial active magnetic bearings.
+    sensors : tuple of Sensor
+        Displacement sensors.
+    speed : SpeedDescription
+        Nominal speed and aerodynamic drag.
+    notes : tuple of str
+        Remarks of the file's author.
+    """
+
+    name: Text
+    notes: tuple[Text, ...] = ()
+    gravity: Acceleration = default(9.81, "usual value")
+    speed: SpeedDescription
+    rotor: Rotor
+    balance_grade: BalanceGrade | None = None
+    unbalances: tuple[Unbalance, ...] = ()
+    touchdown_bearings: tuple[TouchdownBearing, ...] = Field(min_length=1)
+    ambs: tuple[ActiveMagneticBearing, ...] = ()
+    sensors: tuple[Sensor, ...] = ()
+
+    _source_path: Path | None = PrivateAttr(default=None)
+
+    def check(self) -> None:
+        """Refuse parts that do not fit together."""
+        nodes = self.rotor.node_positions
+        for key in ("unbalances", "touchdown_bearings", "ambs", "sensors"):
+            place_on_nodes(getattr(self, key), nodes, key)
+        self._check_names()
+        if self.sensors:
+            check_sensors_resolve_motion(self.sensors, nodes)
+
+    def _check_names(self) -> None:
+        for key in ("touchdown_bearings", "ambs", "sensors"):
+            seen: set[str] = set()
+            for index, part in enumerate(getattr(self, key)):
+                if part.name in seen:
+                    raise Misfit(f"the name {part.name!r} is used twice; names must differ", (key, index, "name"))
+                if key == "touchdown_bearings" and part.name in RESERVED_NAMES:
+                    raise Misfit(
+                        f"a touchdown bearing cannot be called {part.name!r}; choose another name, such as \"NDE\"",
+                        (key, index, "name"),
+                    )
+                seen.add(part.name)
+        names = {bearing.name for bearing in self.touchdown_bearings}
+        for index, sensor in enumerate(self.sensors):
+            if "bearing" in sensor.model_fields_set and sensor.bearing not in names:
+                raise Misfit(
+                    f"sensor {sensor.name} belongs to touchdown bearing {sensor.bearing!r}, which does not exist; "
+                    f"there are {', '.join(sorted(names))}",
+                    ("sensors", index, "bearing"),
+                )
+
+    def left_out(self) -> dict[str, Any]:
+        """Share out the balance grade, complete the AMBs, assign the sensors to bearings."""
+        values: dict[str, Any] = {"ambs": self._completed_ambs(), "sensors": self._assigned_sensors()}
+        if self.balance_grade is not None and "unbalances" not in self.model_fields_set:
+            rotor = self.rotor
+            values["unbalances"] = from_grade(
+                self.balance_grade, rotor.mass, rotor.centre_of_gravity, self._balance_planes()
+            )
+        return values
+
+    def _balance_planes(self) -> tuple[tuple[int, float], ...]:
+        carriers = self.ambs if len(self.ambs) >= 2 else self.touchdown_bearings
+        nodes = sorted({carrier.node for carrier in carriers})
+        return tuple((node, self.rotor.node_positions[node - 1]) for node in nodes)
+
+    def _completed_ambs(self) -> tuple[ActiveMagneticBearing, ...]:
+        carried = self.rotor.mass / max(1, len(self.ambs))
+        return tuple(amb.completed_with(amb.completed(carried)) for amb in self.ambs)
+
+    def _assigned_sensors(self) -> tuple[Sensor, ...]:
+        return tuple(
+            sensor
+            if "bearing" in sensor.model_fields_set
+            else sensor.completed_with({"bearing": self._nearest_bearing(sensor.node)})
+            for sensor in self.sensors
+        )
+
+    def _nearest_bearing(self, node: int) -> str:
+        nodes = self.rotor.node_positions
+        return min(
+            self.touchdown_bearings, key=lambda b: abs(nodes[b.node - 1] - nodes[node - 1])
+        ).name
+
+    @property
+    def source_path(self) -> Path | None:
+        """File the machine was read from."""
+        return self._source_path
+
+    def bearing(self, name: str) -> TouchdownBearing:
+        """Find a touchdown bearing by name."""
+        for bearing in self.touchdown_bearings:
+            if bearing.name == name:
+                return bearing
+        names = ", ".join(bearing.name for bearing in self.touchdown_bearings)
+        raise UsageError(f"the machine has no touchdown bearing {name!r}; there are {names}")
+
+    def with_values(self, values: Mapping[str, float | Estimated]) -> Machine:
+        """Give the same machine with other values, by path such as ``"NDE.support.stiffness"`` [SI].
+
+        What follows from a changed value (the horizontal support, say) follows again. Unbalances are counted from
+        0, as in `unbalances`: ``"unbalance.0.amount"``.
+        """
+        parts = changed_machine_parts(self, values)
+        copy = self.completed_with(parts)
+        copy.__pydantic_fields_set__.update(parts)
+        return copy
+
+    @cached_property
+    def _mentions(self) -> tuple[Mention, ...]:
+        return tuple(self._all_mentions())
+
+    def _all_mentions(self) -> Iterator[Mention]:
+        if self.rotor.uses_builtin_steel:
+            steel = self.rotor.material_named("steel")
+            text = f"{steel.youngs_modulus.value / 1e9:g} GPa, {steel.density.value:g} kg/m³"
+            yield Mention("rotor.materials.steel", text, "no material 'steel' is described", "default")
+        yield from mentions(self)
+
+    @property
+    def defaults_in_use(self) -> tuple[tuple[str, str, str], ...]:
+        """Path, value and reason of everything that was left out of the file and has a default."""
+        return tuple((m.path, m.text, m.why) for m in self._mentions if m.status == "default")
+
+    @property
+    def inferred(self) -> tuple[tuple[str, str, str], ...]:
+        """Path, value and reason of everything that was inferred from other facts."""
+        return tuple((m.path, m.text, m.why) for m in self._mentions if m.status == "inferred")
+
+    def __eq__(self, other: object) -> bool:
+        """Compare what the machines are, not where they were read from."""
+        if not isinstance(other, Machine):
+            return NotImplemented
+        return all(getattr(self, name) == getattr(other, name) for name in type(self).model_fields)
+
+    def __hash__(self) -> int:
+        """Hash by the parts that tell machines apart in practice."""
+        return hash((self.name, self.rotor.node_positions, self.touchdown_bearings))

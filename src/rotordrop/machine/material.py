@@ -1,0 +1,28 @@
+"""Materials of the shaft."""
+
+from __future__ import annotations
+
+from rotordrop.machine.description import Description
+from rotordrop.machine.values import Density, PoissonRatio, Pressure
+
+
+class Material(Description):
+    """Elastic constants and density of a material.
+
+    Attributes
+    ----------
+    youngs_modulus : Estimated
+        Young's modulus [Pa].
+    poisson_ratio : Estimated
+        Poisson ratio [1].
+    density : Estimated
+        Density [kg/m³].
+    """
+
+    youngs_modulus: Pressure
+    poisson_ratio: PoissonRatio
+    density: Density
+
+
+STEEL = {"youngs_modulus": "210 GPa", "poisson_ratio": 0.3, "density": "7850 kg/m^3"}
+"""What a shaft is made of when the file names no material."""

@@ -1,0 +1,104 @@
+"""Values by path, such as ``"NDE.support.stiffness"``: what may be set, and setting it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from difflib import get_close_matches
+from typing import TYPE_CHECKING, Any
+
+from rotordrop.errors import UsageError
+from rotordrop.estimated import Estimated
+from rotordrop.machine.description import Description
+
+if TYPE_CHECKING:
+    from rotordrop.machine.machine import Machine
+
+_Changes = dict[str, Any]
+
+
+def changed_machine_parts(machine: Machine, values: Mapping[str, float | Estimated]) -> dict[str, Any]:
+    """Give the top-level parts of a machine that change with the given values."""
+    tree: _Changes = {}
+    for path, value in values.items():
+        _graft(tree, _resolved(machine, path), value if isinstance(value, Estimated) else Estimated(value=float(value)))
+    parts: dict[str, Any] = {}
+    for key, branch in tree.items():
+        try:
+            parts[key] = _changed(getattr(machine, key), branch)
+        except ValueError as error:
+            raise UsageError(_refusal(error, values)) from error
+    return parts
+
+
+def _refusal(error: ValueError, values: Mapping[str, float | Estimated]) -> str:
+    from pydantic import ValidationError
+
+    stated = ", ".join(f"{path} = {float(value):g}" for path, value in values.items())
+    if isinstance(error, ValidationError):
+        reasons = "; ".join(str(e["msg"]).removeprefix("Value error, ") for e in error.errors())
+        return f"cannot set {stated} (SI units): {reasons}"
+    return f"cannot set {stated} (SI units): {error}"
+
+
+def _graft(tree: _Changes, keys: tuple[Any, ...], value: Estimated) -> None:
+    for key in keys[:-1]:
+        tree = tree.setdefault(key, {})
+    tree[keys[-1]] = value
+
+
+def _changed(part: Any, branch: Any) -> Any:
+    if isinstance(branch, Estimated):
+        return branch
+    if isinstance(part, tuple):
+        return tuple(_changed(item, branch[i]) if i in branch else item for i, item in enumerate(part))
+    assert isinstance(part, Description)
+    return part.changed(**{key: _changed(getattr(part, key), sub) for key, sub in branch.items()})
+
+
+def _resolved(machine: Machine, path: str) -> tuple[Any, ...]:
+    """Turn a path into keys and indices from the machine down to one physical value."""
+    head, *rest = path.split(".")
+    keys = _start(machine, head, rest, path)
+    part: Any = machine
+    for key in keys:
+        part = _step(part, key, path)
+    if not (isinstance(part, Estimated) or part is None):
+        raise UsageError(f"{path!r} is not a single physical value; {_suggestion(machine, path)}")
+    return keys
+
+
+def _start(machine: Machine, head: str, rest: list[str], path: str) -> tuple[Any, ...]:
+    for index, bearing in enumerate(machine.touchdown_bearings):
+        if bearing.name == head:
+            return ("touchdown_bearings", index, *(["bearing", *rest] if rest == ["preload"] else rest))
+    if head == "unbalance":
+        return ("unbalances", *(_index(rest[:1], path)), *rest[1:])
+    for key in ("sensors", "ambs"):
+        if head == key and rest:
+            names = [part.name for part in getattr(machine, key)]
+            if rest[0] in names:
+                return (key, names.index(rest[0]), *rest[1:])
+    return (head, *rest)
+
+
+def _index(texts: list[str], path: str) -> list[int]:
+    try:
+        return [int(text) for text in texts]
+    except ValueError:
+        raise UsageError(f"{path!r}: unbalances are counted from 0, as in 'unbalance.0.amount'") from None
+
+
+def _step(part: Any, key: Any, path: str) -> Any:
+    if isinstance(part, tuple) and isinstance(key, int) and 0 <= key < len(part):
+        return part[key]
+    if isinstance(part, Description) and key in type(part).model_fields:
+        return getattr(part, key)
+    known = ", ".join(type(part).model_fields) if isinstance(part, Description) else ""
+    close = get_close_matches(str(key), list(type(part).model_fields), 1, 0.5) if known else []
+    way_out = f"did you mean {close[0]!r}?" if close else f"known there are {known or 'no further names'}"
+    raise UsageError(f"the machine has no value {path!r}: {key!r} is not known; {way_out}")
+
+
+def _suggestion(machine: Machine, path: str) -> str:
+    names = ", ".join(bearing.name for bearing in machine.touchdown_bearings)
+    return f"write for example '<bearing>.support.stiffness' with one of the bearings {names} (given: {path})"

@@ -1,0 +1,83 @@
+"""Which values of a machine were defaulted or inferred, by path."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from rotordrop.estimated import Estimated, Status
+from rotordrop.machine.description import Description
+from rotordrop.machine.values import Physical
+from rotordrop.units import format_quantity
+
+
+@dataclass(frozen=True)
+class Mention:
+    """A value worth mentioning: where it is, what it is and why."""
+
+    path: str
+    text: str
+    why: str
+    status: Status
+
+
+_BEARINGS = "touchdown_bearings"
+_SILENT = {"position", "notes", "unbalances", "node_positions", "sections", "elements", "part", "materials"}
+_PLAIN_INFERRED = {"ball_count", "ball_material"}
+
+
+def mentions(part: Description, path: str = "") -> Iterator[Mention]:
+    """Walk through a description and mention every default and inference in it."""
+    for name, field in type(part).model_fields.items():
+        value = getattr(part, name)
+        here = f"{path}.{name}" if path else name
+        if isinstance(value, Estimated):
+            if value.status in ("default", "inferred"):
+                physical = next(m for m in _physicals(field))
+                yield Mention(here, format_quantity(value.value, physical.kind), part.reason(name), value.status)
+        elif isinstance(value, Description):
+            yield from mentions(value, here)
+        elif isinstance(value, tuple) and value and isinstance(value[0], Description):
+            for index, item in enumerate(value):
+                yield from mentions(item, _item_path(name, index, item, path))
+        elif isinstance(value, dict):
+            for key, item in value.items():
+                yield from mentions(item, f"{here}.{key}")
+        else:
+            yield from _plain(part, name, value, here)
+
+
+def _item_path(name: str, index: int, item: Description, path: str) -> str:
+    label = getattr(item, "name", "")
+    if name == _BEARINGS:
+        return str(label)
+    if name == "unbalances":
+        return f"unbalance.{index}"
+    prefix = f"{path}.{name}" if path else name
+    return f"{prefix}.{label if label else index + 1}"
+
+
+def _plain(part: Description, name: str, value: Any, here: str) -> Iterator[Mention]:
+    if name in part.model_fields_set or name in _SILENT or value in (None, "", ()) or name == "node":
+        return
+    inferred = name in _PLAIN_INFERRED and getattr(part, "designation", None) is not None
+    inferred = inferred or name == "bearing"
+    text = {True: "yes", False: "no"}.get(value, str(value)) if isinstance(value, bool) else str(value)
+    yield Mention(here, text, part.reason(name), "inferred" if inferred else "default")
+
+
+def _physicals(field: Any) -> Iterator[Physical]:
+    """Find how a field is read, directly or as one member of an optional field."""
+    for metadata in field.metadata:
+        if isinstance(metadata, Physical):
+            yield metadata
+    for argument in getattr(field.annotation, "__args__", ()):
+        for metadata in getattr(argument, "__metadata__", ()):
+            if isinstance(metadata, Physical):
+                yield metadata
+
+
+def kind_of(description: type[Description], name: str) -> str:
+    """Name the kind of quantity of a field."""
+    return next(_physicals(description.model_fields[name])).kind

@@ -1,0 +1,352 @@
+"""The rotor: shaft sections, layers, discs, materials, and the elements they make."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag
+
+from rotordrop.errors import UsageError
+from rotordrop.machine.description import Description, Misfit, Name, Placed, Text, place_on_nodes, unknown_key
+from rotordrop.machine.material import STEEL, Material
+from rotordrop.machine.values import (
+    Density,
+    Inertia,
+    NonNegative,
+    NonNegativeLength,
+    Physical,
+    PositiveLength,
+    PositiveMass,
+    default,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Element:
+    """One beam element between two neighbouring nodes; plain numbers in SI units.
+
+    Attributes
+    ----------
+    length : float
+        Length [m].
+    outer_diameter, inner_diameter : float
+        Diameters of what carries load [m].
+    layer_diameter : float or None
+        Outer diameter [m] of a layer that adds mass and inertia but no stiffness.
+    layer_density : float
+        Density of the layer [kg/m³].
+    material : str
+        Name of the material.
+    youngs_modulus, poisson_ratio, density : float
+        Material constants [Pa], [1], [kg/m³].
+    part : str
+        What this piece of the shaft is.
+    """
+
+    length: float
+    outer_diameter: float
+    inner_diameter: float
+    layer_diameter: float | None
+    layer_density: float
+    material: str
+    youngs_modulus: float
+    poisson_ratio: float
+    density: float
+    part: str
+
+
+class Section(Description):
+    """What every shaft section has: diameters, a layer, a material."""
+
+    part: Text = Field(default="", description="What this piece of the shaft is")
+    outer_diameter: PositiveLength
+    inner_diameter: NonNegativeLength = default(0.0, "a solid shaft")
+    layer_diameter: PositiveLength | None = Field(
+        default=None, description="Outer diameter of a layer that adds mass and inertia but no stiffness"
+    )
+    layer_density: Density | None = Field(default=None, description="Density of the layer")
+    material: Name | None = Field(default=None, description="Material; that of the rotor when left out")
+
+    def check(self) -> None:
+        """Refuse diameters that do not nest."""
+        outer, inner = self.outer_diameter.value, self.inner_diameter.value
+        text = Physical("length").text
+        if inner >= outer:
+            raise Misfit(
+                f"the inner diameter {text(inner)} must be smaller than the outer one, {text(outer)}",
+                ("inner_diameter",),
+            )
+        if (self.layer_diameter is None) != (self.layer_density is None):
+            raise Misfit("a layer needs both 'layer_diameter' and 'layer_density'")
+        if self.layer_diameter is not None and self.layer_diameter.value <= outer:
+            raise Misfit(
+                f"the layer reaches to {text(self.layer_diameter.value)} and must reach beyond the "
+                f"outer diameter {text(outer)}",
+                ("layer_diameter",),
+            )
+
+
+class SectionByLength(Section):
+    """A shaft section given by its length, cut into equal elements."""
+
+    length: PositiveLength
+    elements: Annotated[int, Strict(), Field(ge=1, description="Number of equal elements")] = 1
+
+
+class SectionByNodes(Section):
+    """A shaft section from one node to another."""
+
+    nodes: tuple[Annotated[int, Strict()], Annotated[int, Strict()]] = Field(
+        description="First and last node of the section, counted from 1"
+    )
+
+    def check(self) -> None:
+        """Refuse a section that runs backwards."""
+        super().check()
+        if not 1 <= self.nodes[0] < self.nodes[1]:
+            raise Misfit(
+                f"nodes = {list(self.nodes)} is no section; write the first and the last node, counted from 1",
+                ("nodes",),
+            )
+
+
+def _section_tag(raw: Any) -> str:
+    if isinstance(raw, Mapping):
+        return "by_nodes" if "nodes" in raw else "by_length"
+    return "by_nodes" if isinstance(raw, SectionByNodes) else "by_length"
+
+
+AnySection = Annotated[
+    Annotated[SectionByLength, Tag("by_length")] | Annotated[SectionByNodes, Tag("by_nodes")],
+    Discriminator(_section_tag),
+]
+
+
+class Disc(Placed):
+    """A disc or point mass at a node: impeller, thrust disc, coupling.
+
+    Attributes
+    ----------
+    node : int
+        Node number, counted from 1.
+    mass : Estimated
+        Mass [kg].
+    polar_inertia, diametral_inertia : Estimated
+        Moments of inertia [kg m²] about the shaft axis and about a diameter.
+    """
+
+    name: Text = ""
+    mass: PositiveMass
+    polar_inertia: Inertia = default(0.0, "a point mass")
+    diametral_inertia: Inertia = default(0.0, "a point mass")
+
+    def check(self) -> None:
+        """Refuse inertias no body can have."""
+        super().check()
+        polar, diametral = self.polar_inertia.value, self.diametral_inertia.value
+        if polar > 2.0 * diametral * (1.0 + 1e-9) and diametral > 0.0:
+            raise Misfit(
+                f"polar_inertia {polar:.4g} kg m² is more than twice diametral_inertia {diametral:.4g} kg m², "
+                "which no body can have; check both (perhaps they are interchanged)",
+                ("polar_inertia",),
+            )
+
+
+def _node_positions(raw: Any) -> Any:
+    """Read node positions: a list of lengths, or ``{unit = "mm", values = [0, 23.3, …]}``."""
+    if isinstance(raw, Mapping):
+        raw = _with_unit(raw)
+    if not isinstance(raw, list | tuple):
+        raise UsageError(f"{raw!r} is not a list; write {{unit = \"mm\", values = [0, 25, 50]}}")
+    if all(isinstance(entry, float) for entry in raw) and isinstance(raw, tuple):
+        return raw
+    return tuple(Physical("length").number(entry) for entry in raw)
+
+
+def _with_unit(table: Mapping[str, Any]) -> list[str]:
+    unit, values = table.get("unit"), table.get("values")
+    if set(table) != {"unit", "values"} or not isinstance(unit, str) or not isinstance(values, list | tuple):
+        raise UsageError("node positions as a table need exactly 'unit' and 'values'")
+    return [f"{value!r} {unit}" for value in values]
+
+
+NodePositions = Annotated[tuple[float, ...], BeforeValidator(_node_positions)]
+
+
+class Rotor(Description):
+    """The rotor as built: shaft, discs, materials.
+
+    Attributes
+    ----------
+    node_positions : tuple of float
+        Distance of every node from node 1 [m], NDE to DE.
+    sections : tuple of Section
+        Shaft sections, as lengths one after the other or from node to node.
+    discs : tuple of Disc
+        Discs and point masses.
+    modal_damping : Estimated
+        Damping ratio of the free-free flexible modes [1].
+    """
+
+    material: Name = Field(default="steel", description="Material of all sections that name no other")
+    materials: dict[Name, Material] = Field(default_factory=dict, description="Materials by name")
+    modal_damping: NonNegative = default(0.005, "0.5 % of critical on every free-free flexible mode")
+    node_positions: NodePositions = Field(
+        default=(), validate_default=False, description="Position of every node, for sections given by nodes"
+    )
+    sections: tuple[AnySection, ...] = Field(min_length=1, description="Shaft sections from NDE to DE")
+    discs: tuple[Disc, ...] = ()
+
+    @classmethod
+    def known_keys(cls) -> tuple[str, ...]:
+        """Keys to suggest for a mistyped one, with the shaft table of the file."""
+        return (*cls.model_fields, "shaft_table")
+
+    def check(self) -> None:
+        """Lay out the nodes and refuse sections, materials and discs that do not fit them."""
+        by_nodes = [isinstance(section, SectionByNodes) for section in self.sections]
+        if any(by_nodes) != all(by_nodes):
+            raise Misfit("some sections have 'length' and others 'nodes'; use one of the two", ("sections",))
+        if all(by_nodes):
+            self._check_nodes()
+        elif "node_positions" in self.model_fields_set:
+            raise Misfit(
+                "sections given by 'length' make their own nodes; leave out 'node_positions' or give "
+                "every section its 'nodes'",
+                ("node_positions",),
+            )
+        else:
+            self.__dict__["node_positions"] = _laid_out(self.sections)
+        self._check_materials()
+        place_on_nodes(self.discs, self.node_positions, "discs")
+
+    def _check_nodes(self) -> None:
+        if len(self.node_positions) < 2:
+            raise Misfit(
+                "sections given by 'nodes' need 'node_positions = {unit = \"mm\", values = [0, …]}'", ("sections",)
+            )
+        for number, (left, right) in enumerate(pairwise(self.node_positions), start=1):
+            if not right > left:
+                raise Misfit(
+                    f"node {number + 1} at {right * 1e3:.7g} mm does not lie beyond node {number} at "
+                    f"{left * 1e3:.7g} mm; node positions must increase",
+                    ("node_positions",),
+                )
+        self._check_cover()
+
+    def _check_cover(self) -> None:
+        expected = 1
+        for index, section in enumerate(self.sections):
+            assert isinstance(section, SectionByNodes)
+            if section.nodes[0] != expected:
+                raise Misfit(
+                    f"the section begins at node {section.nodes[0]}, but the one before ends at node {expected}; "
+                    "sections must follow each other without gap",
+                    ("sections", index, "nodes"),
+                )
+            expected = section.nodes[1]
+        if expected != len(self.node_positions):
+            raise Misfit(
+                f"the last section ends at node {expected}, but there are {len(self.node_positions)} nodes",
+                ("sections", len(self.sections) - 1, "nodes"),
+            )
+
+    def _check_materials(self) -> None:
+        known = tuple({*self.materials, "steel"})
+        for index, section in enumerate(self.sections):
+            if section.material is not None and section.material not in known:
+                raise Misfit(_unknown_material(section.material, known), ("sections", index, "material"))
+        if self.material not in known:
+            raise Misfit(_unknown_material(self.material, known), ("material",))
+
+    def material_named(self, name: str | None) -> Material:
+        """Find a material; ``"steel"`` is known without being described."""
+        wanted = self.material if name is None else name
+        return self.materials[wanted] if wanted in self.materials else _builtin_steel()
+
+    @property
+    def uses_builtin_steel(self) -> bool:
+        """Tell whether some section is made of the steel that the file does not describe."""
+        names = {section.material or self.material for section in self.sections}
+        return "steel" in names and "steel" not in self.materials
+
+    @cached_property
+    def elements(self) -> tuple[Element, ...]:
+        """Beam elements; element i joins nodes i+1 and i+2 (counted from 1)."""
+        lengths = [right - left for left, right in pairwise(self.node_positions)]
+        owners = [section for section in self.sections for _ in range(element_count(section))]
+        return tuple(self._element(*pair) for pair in zip(lengths, owners, strict=True))
+
+    def _element(self, length: float, section: Section) -> Element:
+        material = self.material_named(section.material)
+        layer = section.layer_diameter
+        return Element(
+            length=length,
+            outer_diameter=section.outer_diameter.value,
+            inner_diameter=section.inner_diameter.value,
+            layer_diameter=None if layer is None else layer.value,
+            layer_density=0.0 if section.layer_density is None else section.layer_density.value,
+            material=section.material or self.material,
+            youngs_modulus=material.youngs_modulus.value,
+            poisson_ratio=material.poisson_ratio.value,
+            density=material.density.value,
+            part=section.part,
+        )
+
+    @cached_property
+    def mass(self) -> float:
+        """Mass of shaft, layers and discs [kg]."""
+        return math.fsum(mass for mass, _ in self._masses())
+
+    @cached_property
+    def centre_of_gravity(self) -> float:
+        """Distance of the centre of gravity from node 1 [m]."""
+        return math.fsum(mass * position for mass, position in self._masses()) / self.mass
+
+    def _masses(self) -> list[tuple[float, float]]:
+        shaft = [
+            (element_mass(element), 0.5 * (left + right))
+            for element, (left, right) in zip(self.elements, pairwise(self.node_positions), strict=True)
+        ]
+        return shaft + [(disc.mass.value, self.node_positions[disc.node - 1]) for disc in self.discs]
+
+
+def element_count(section: Section) -> int:
+    """Count the elements a section is cut into."""
+    if isinstance(section, SectionByNodes):
+        return section.nodes[1] - section.nodes[0]
+    assert isinstance(section, SectionByLength)
+    return section.elements
+
+
+def element_mass(element: Element) -> float:
+    """Mass of an element with its layer [kg]."""
+    area = element.outer_diameter**2 - element.inner_diameter**2
+    layer = 0.0
+    if element.layer_diameter is not None:
+        layer = element.layer_density * (element.layer_diameter**2 - element.outer_diameter**2)
+    return 0.25 * math.pi * element.length * (element.density * area + layer)
+
+
+def _laid_out(sections: tuple[Any, ...]) -> tuple[float, ...]:
+    positions = [0.0]
+    for section in sections:
+        start = positions[-1]
+        step = section.length.value / section.elements
+        positions.extend(start + step * k for k in range(1, section.elements + 1))
+    return tuple(positions)
+
+
+def _builtin_steel() -> Material:
+    return Material.model_validate(STEEL)
+
+
+def _unknown_material(name: str, known: tuple[str, ...]) -> str:
+    return unknown_key(name, known).replace("key", "material", 1) + "; describe it under [rotor.materials]"
+
+

@@ -1,0 +1,98 @@
+"""Displacement sensors and what they can resolve."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+from pydantic import Field
+
+from rotordrop.machine.description import Misfit, Name, Placed
+from rotordrop.machine.values import Angle, Length, NonNegativeLength, Positive, Sensitivity, default
+
+LEAST_PLANE_DISTANCE = 1e-3
+"""Sensor planes closer than this [m] count as one."""
+
+
+class Sensor(Placed):
+    """A displacement sensor looking at the shaft.
+
+    Attributes
+    ----------
+    name : str
+        Name of its channel in the recording.
+    node : int
+        Node number, counted from 1.
+    angle : Estimated
+        Direction of positive reading [rad], counter-clockwise from +x (horizontal), y up, seen from the DE.
+    polarity : {1, -1}
+        -1 when a motion in the direction of the angle makes the reading fall.
+    gain : Estimated
+        True displacement over reading [1].
+    offset : Estimated
+        Reading [m] when the rotor is centred.
+    sensitivity : Estimated, optional
+        Volts per metre [V/m], for recordings in volts.
+    bearing : str
+        Name of the touchdown bearing at this end; the nearest when left out.
+    position_error : Estimated
+        Standard uncertainty of the axial position [m].
+    """
+
+    name: Name = Field(description="Name of the channel in the recording")
+    angle: Angle
+    polarity: Literal[1, -1] = 1
+    gain: Positive = default(1.0, "true displacement over reading of a calibrated sensor", (0.97, 1.03))
+    offset: Length = default(0.0, "reads zero when the rotor is centred", (-50e-6, 50e-6))
+    sensitivity: Sensitivity | None = Field(default=None, description="Volts per metre, for recordings in volts")
+    bearing: Name = Field(
+        default="-", validate_default=False, description="Touchdown bearing at this end; the nearest when left out"
+    )
+    position_error: NonNegativeLength = default(1e-3, "standard uncertainty of the axial position")
+
+
+def check_sensors_resolve_motion(sensors: tuple[Sensor, ...], nodes: tuple[float, ...]) -> None:
+    """Refuse sensors from which the rigid motion of the rotor (x, y and both tilts) cannot be found."""
+    planes: dict[float, list[Sensor]] = {}
+    for sensor in sensors:
+        position = nodes[sensor.node - 1]
+        key = next((z for z in planes if abs(z - position) < LEAST_PLANE_DISTANCE), position)
+        planes.setdefault(key, []).append(sensor)
+    if len(planes) < 2:
+        raise Misfit(
+            f"the {len(sensors)} sensors sit in {len(planes)} plane ({_plane_text(planes)}) and cannot tell a tilt "
+            "of the rotor from its displacement; add sensors in a second plane",
+            ("sensors",),
+        )
+    if len([plane for plane in planes.values() if _resolves_both(plane)]) < 2 and _rank(sensors, nodes) < 4:
+        weak = next(z for z, plane in planes.items() if not _resolves_both(plane))
+        raise Misfit(
+            f"the sensors resolve only {_rank(sensors, nodes)} of the 4 rigid motions: in the plane at "
+            f"{weak * 1e3:.4g} mm all look in the same direction "
+            f"({', '.join(_sensor_text(sensor) for sensor in planes[weak])}); turn one or add one",
+            ("sensors", sensors.index(planes[weak][0]), "angle"),
+        )
+
+
+def _resolves_both(plane: list[Sensor]) -> bool:
+    first = plane[0].angle.value
+    return any(abs(math.sin(sensor.angle.value - first)) > 0.05 for sensor in plane)
+
+
+def _rank(sensors: tuple[Sensor, ...], nodes: tuple[float, ...]) -> int:
+    import numpy as np
+
+    span = max(nodes) - min(nodes)
+    rows = [
+        (math.cos(a), math.sin(a), math.cos(a) * z, math.sin(a) * z)
+        for a, z in ((s.angle.value, nodes[s.node - 1] / span - 0.5) for s in sensors)
+    ]
+    return int(np.linalg.matrix_rank(np.array(rows), tol=1e-3))
+
+
+def _sensor_text(sensor: Sensor) -> str:
+    return f"{sensor.name} at {math.degrees(sensor.angle.value):.4g}°"
+
+
+def _plane_text(planes: dict[float, list[Sensor]]) -> str:
+    return ", ".join(f"{z * 1e3:.4g} mm" for z in planes)

@@ -1,0 +1,29 @@
+"""Nominal speed of the machine and what slows it down."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from rotordrop.machine.description import Description
+from rotordrop.machine.values import Drag, PositiveSpeed, PositiveTime, QuadraticDrag
+
+
+class SpeedDescription(Description):
+    """Nominal speed and aerodynamic drag.
+
+    Attributes
+    ----------
+    nominal : Estimated
+        Nominal speed [rad/s].
+    aero_time_constant : Estimated, optional
+        Time constant [s] of the exponential fall of speed by aerodynamic drag alone.
+    aero_linear, aero_quadratic : Estimated, optional
+        Aerodynamic torque as a function of speed: linear [N m s] and quadratic [N m s²] coefficients.
+    """
+
+    nominal: PositiveSpeed
+    aero_time_constant: PositiveTime | None = Field(
+        default=None, description="Time constant of the fall of speed by aerodynamic drag alone"
+    )
+    aero_linear: Drag | None = Field(default=None, description="Aerodynamic torque per speed")
+    aero_quadratic: QuadraticDrag | None = Field(default=None, description="Aerodynamic torque per speed squared")

@@ -1,0 +1,122 @@
+"""Unbalance: by amount and phase, or by balance grade."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from pydantic import Field
+
+from rotordrop.errors import UsageError
+from rotordrop.estimated import Estimated
+from rotordrop.machine.description import Description, Placed
+from rotordrop.machine.values import Angle, PositiveSpeed
+from rotordrop.machine.values import Unbalance as UnbalanceAmount
+from rotordrop.units import parse_quantity
+
+
+class Unbalance(Placed):
+    """An unbalance at a node.
+
+    Attributes
+    ----------
+    node : int
+        Node number, counted from 1.
+    amount : Estimated
+        Mass times radius [kg m].
+    phase : Estimated
+        Angle from +y, positive with the spin [rad], when the rotor angle is zero.
+    """
+
+    amount: UnbalanceAmount
+    phase: Angle
+
+
+class BalanceGrade(Description):
+    """Balance quality after ISO 21940-11 (formerly ISO 1940): the permissible unbalance, of unknown phase.
+
+    Attributes
+    ----------
+    grade_mm_s : float
+        The grade G: permissible speed of the centre of gravity [mm/s].
+    at_speed : Estimated
+        Speed for which the grade holds [rad/s].
+    permissible : Estimated, optional
+        Permissible unbalance of the whole rotor [kg m], where it is given beside the grade.
+    """
+
+    grade_mm_s: float = Field(gt=0.0, description="The grade, such as \"G 2.5\", \"2.5 mm/s\" or 2.5")
+    at_speed: PositiveSpeed
+    permissible: UnbalanceAmount | None = None
+
+    @classmethod
+    def rewritten(cls, raw: dict[str, Any]) -> dict[str, Any]:
+        """Read ``grade = "G 2.5"``."""
+        if "grade" in raw:
+            raw = {**raw, "grade_mm_s": _grade(raw["grade"])}
+            del raw["grade"]
+        return raw
+
+    @classmethod
+    def known_keys(cls) -> tuple[str, ...]:
+        """Keys to suggest for a mistyped one."""
+        return ("grade", "at_speed", "permissible")
+
+    def permissible_unbalance(self, mass: float) -> float:
+        """Permissible unbalance of a rotor of this mass [kg m]."""
+        if self.permissible is not None:
+            return self.permissible.value
+        return 1e-3 * self.grade_mm_s * mass / self.at_speed.value
+
+
+def _grade(raw: Any) -> float:
+    if isinstance(raw, int | float) and not isinstance(raw, bool):
+        return float(raw)
+    if not isinstance(raw, str):
+        raise UsageError(f"grade = {raw!r} is not a balance grade; write grade = \"G 2.5\"")
+    text = raw.strip().removeprefix("G").strip()
+    return 1e3 * parse_quantity(text if text.endswith("/s") else f"{text} mm/s", "velocity")
+
+
+def from_grade(
+    grade: BalanceGrade, mass: float, centre_of_gravity: float, planes: tuple[tuple[int, float], ...]
+) -> tuple[Unbalance, ...]:
+    """Share the permissible unbalance among the planes of the bearings, all at the same unknown phase.
+
+    ISO 21940-11 gives each of two bearing planes the share of the weight it carries. The phase is not known to
+    a balance grade: zero stands for it, with the whole turn as its range.
+
+    Parameters
+    ----------
+    mass : float
+        Mass of the rotor [kg].
+    centre_of_gravity : float
+        Distance of the centre of gravity from node 1 [m].
+    planes : tuple of (int, float)
+        Node and position [m] of the planes, NDE first.
+    """
+    total = grade.permissible_unbalance(mass)
+    shares = _shares(centre_of_gravity, [position for _, position in planes])
+    why = f"grade G {grade.grade_mm_s:g} allows {total * 1e6:.4g} g mm in all; shared by weight"
+    return tuple(
+        Unbalance(
+            node=node,
+            amount=Estimated(value=share * total, status="inferred", range=(0.0, total), source=why),
+            phase=Estimated(
+                value=0.0,
+                status="inferred",
+                range=(-math.pi, math.pi),
+                source="unknown: a balance grade says nothing of the phase",
+            ),
+        )
+        for (node, _), share in zip(planes, shares, strict=True)
+    )
+
+
+def _shares(centre: float, positions: list[float]) -> list[float]:
+    """Weight shares of the outermost two planes; a centre of gravity outside them loads the nearest only."""
+    if len(positions) == 1:
+        return [1.0]
+    first, last = positions[0], positions[-1]
+    far = min(1.0, max(0.0, (centre - first) / (last - first)))
+    return [1.0 - far, *[0.0] * (len(positions) - 2), far]

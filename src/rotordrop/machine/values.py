@@ -1,0 +1,234 @@
+"""How a physical value is written in a machine file: with unit, as a guess, or as an estimate."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, Literal, cast
+
+from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic_core import CoreSchema, core_schema
+
+from rotordrop.errors import UsageError
+from rotordrop.estimated import Estimated
+from rotordrop.units import KINDS, format_quantity, parse_quantity, si_unit
+
+LEFT_OUT = Estimated(value=math.nan, status="default", source="follows from other values")
+"""Stands for a value that was left out and follows from its neighbours."""
+
+_TABLE_KEYS = ("value", "guess", "range", "interval", "standard_error", "lower", "upper", "source", "status")
+
+
+@dataclass(frozen=True)
+class Physical:
+    """Kind and admissible range of a physical value; reads every way of writing it.
+
+    Attributes
+    ----------
+    kind : str
+        Kind of quantity, one of `rotordrop.units.KINDS`.
+    above : float, optional
+        The value must be greater than this [SI unit of the kind].
+    least, most : float, optional
+        The value must lie between these [SI unit of the kind].
+    """
+
+    kind: str
+    above: float | None = None
+    least: float | None = None
+    most: float | None = None
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Read with `read`."""
+        return core_schema.no_info_plain_validator_function(self.read)
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """Describe the ways of writing the value."""
+        number = self._number_schema()
+        pair = {"type": "array", "items": number, "minItems": 2, "maxItems": 2}
+        shared: dict[str, Any] = {"source": {"type": "string"}}
+        guess = {"guess": number, "range": pair, **shared}
+        known = {"value": number, "interval": pair, "standard_error": number, "lower": number, "upper": number}
+        known |= {"range": pair, "status": {"enum": ["inferred"]}, **shared}
+        return {
+            "anyOf": [
+                number,
+                {"type": "object", "properties": guess, "required": ["guess"], "additionalProperties": False},
+                {"type": "object", "properties": known, "required": ["value"], "additionalProperties": False},
+            ]
+        }
+
+    def _number_schema(self) -> dict[str, Any]:
+        if KINDS[self.kind].unit:
+            return {"type": "string", "examples": [KINDS[self.kind].example], "pattern": r"^\s*[+-]?[\d.]"}
+        return {"type": ["number", "string"]}
+
+    def read(self, raw: Any) -> Estimated:
+        """Read a number with unit, a guess with range, or an estimate with interval and source."""
+        if raw is LEFT_OUT:
+            return LEFT_OUT
+        if isinstance(raw, Estimated):
+            return self._admissible(raw if raw.unit else replace(raw, unit=si_unit(self.kind)), raw)
+        if isinstance(raw, Mapping):
+            return self._admissible(self._from_table(raw), raw)
+        return self._admissible(Estimated(value=self.number(raw), unit=si_unit(self.kind)), raw)
+
+    def number(self, raw: Any) -> float:
+        """Read one number [SI unit of the kind]."""
+        if isinstance(raw, int | float) and not isinstance(raw, bool) and KINDS[self.kind].unit:
+            raise UsageError(
+                f"{raw!r} has no unit; {spoken(self.kind)} needs one, for example {KINDS[self.kind].example!r}"
+            )
+        if isinstance(raw, str) and (exact := _exact_si(raw, self.kind)) is not None:
+            return exact
+        return parse_quantity(raw, self.kind)
+
+    def _from_table(self, table: Mapping[str, Any]) -> Estimated:
+        unknown = [key for key in table if key not in _TABLE_KEYS]
+        if unknown:
+            raise UsageError(
+                f"{unknown[0]!r} does not belong to a value; write {{guess = …, range = […]}} or "
+                f"{{value = …, interval = […], source = …}}"
+            )
+        if ("guess" in table) == ("value" in table):
+            raise UsageError("a value given as a table needs either 'guess' or 'value', and only one of them")
+        guessed = "guess" in table
+        if guessed and (misplaced := sorted({"interval", "standard_error"} & set(table))):
+            raise UsageError(
+                f"a guess has a range, not {misplaced[0]!r}; write {{guess = …, range = […]}} or "
+                f"{{value = …, {misplaced[0]} = …}}"
+            )
+        return Estimated(
+            value=self.number(table["guess" if guessed else "value"]),
+            status="guess" if guessed else _status(table),
+            range=self._pair(table, "range"),
+            interval_90=self._pair(table, "interval"),
+            standard_error=self._optional(table, "standard_error"),
+            lower=self._optional(table, "lower"),
+            upper=self._optional(table, "upper"),
+            source=_source(table),
+            unit=si_unit(self.kind),
+        )
+
+    def _optional(self, table: Mapping[str, Any], key: str) -> float | None:
+        return self.number(table[key]) if key in table else None
+
+    def _pair(self, table: Mapping[str, Any], key: str) -> tuple[float, float] | None:
+        if key not in table:
+            return None
+        written = table[key]
+        if not isinstance(written, list | tuple) or len(written) != 2:
+            raise UsageError(
+                f"{key} = {written!r} is not a pair; write {key} = [lowest, highest], with decimal points"
+            )
+        low, high = self.number(written[0]), self.number(written[1])
+        if low > high:
+            raise UsageError(f"{key} = {written!r} runs backwards; write the lower value first")
+        return low, high
+
+    def _admissible(self, value: Estimated, raw: Any) -> Estimated:
+        self._check(value.value, raw)
+        if value.range is not None and not value.range[0] <= value.value <= value.range[1]:
+            raise UsageError(
+                f"{self.text(value.value)} lies outside its own range, {self.text(value.range[0])} to "
+                f"{self.text(value.range[1])}; change one of them"
+            )
+        return value
+
+    def _check(self, number: float, raw: Any) -> None:
+        if not math.isfinite(number):
+            raise UsageError(f"{raw!r} is not a finite number; write for example {KINDS[self.kind].example!r}")
+        if self.above is not None and not number > self.above:
+            limit = "positive" if self.above == 0 else f"greater than {self.text(self.above)}"
+            raise UsageError(f"{self.text(number)} is not allowed here; {spoken(self.kind)} must be {limit}")
+        if self.least is not None and number < self.least:
+            limit = "negative" if self.least == 0 else f"below {self.text(self.least)}"
+            raise UsageError(f"{self.text(number)} is not allowed here; it must not be {limit}")
+        if self.most is not None and number > self.most:
+            raise UsageError(f"{self.text(number)} is not allowed here; at most {self.text(self.most)}")
+
+    def text(self, number: float) -> str:
+        """Write a number the way an engineer reads it."""
+        return format_quantity(number, self.kind)
+
+
+def spoken(kind: str) -> str:
+    """Name a kind with its article."""
+    return ("an " if kind[0] in "aeiou" else "a ") + kind.replace("_", " ")
+
+
+def default(value: float, why: str, bounds: tuple[float, float] | None = None) -> Any:
+    """Give a field a documented default [SI], with the range thought possible."""
+    return Field(default=Estimated(value=value, status="default", range=bounds, source=why), description=why)
+
+
+def follows(why: str) -> Any:
+    """Mark a field that, when left out, follows from its neighbours."""
+    return Field(default=LEFT_OUT, description=f"When left out: {why}")
+
+
+def _status(table: Mapping[str, Any]) -> Literal["given", "estimated", "inferred"]:
+    stated = table.get("status")
+    if stated is not None:
+        if stated != "inferred":
+            raise UsageError(f"status = {stated!r} is not known; only 'inferred' may be stated")
+        return "inferred"
+    estimated = {"interval", "standard_error", "lower", "upper"} & set(table)
+    return cast(Literal["given", "estimated"], "estimated" if estimated else "given")
+
+
+def _source(table: Mapping[str, Any]) -> str | None:
+    source = table.get("source")
+    if source is not None and not isinstance(source, str):
+        raise UsageError(f"source = {source!r} is not a text; write source = \"where the value comes from\"")
+    return source
+
+
+def _exact_si(text: str, kind: str) -> float | None:
+    """Read a text in the SI unit of the kind without converting, so that what was saved comes back exactly."""
+    head, _, unit = text.strip().partition(" ")
+    if unit != si_unit(kind) or not unit:
+        return None
+    try:
+        number = float(head)
+    except ValueError:
+        return None
+    return number if math.isfinite(number) and "_" not in head else None
+
+
+Length = Annotated[Estimated, Physical("length")]
+PositiveLength = Annotated[Estimated, Physical("length", above=0.0)]
+NonNegativeLength = Annotated[Estimated, Physical("length", least=0.0)]
+Mass = Annotated[Estimated, Physical("mass", least=0.0)]
+PositiveMass = Annotated[Estimated, Physical("mass", above=0.0)]
+Inertia = Annotated[Estimated, Physical("inertia", least=0.0)]
+PositiveInertia = Annotated[Estimated, Physical("inertia", above=0.0)]
+Angle = Annotated[Estimated, Physical("angle")]
+ContactAngle = Annotated[Estimated, Physical("angle", least=0.0, most=math.radians(60.0))]
+Time = Annotated[Estimated, Physical("time", least=0.0)]
+PositiveTime = Annotated[Estimated, Physical("time", above=0.0)]
+Speed = Annotated[Estimated, Physical("speed", least=0.0)]
+PositiveSpeed = Annotated[Estimated, Physical("speed", above=0.0)]
+Velocity = Annotated[Estimated, Physical("velocity", above=0.0)]
+Force = Annotated[Estimated, Physical("force", least=0.0)]
+PositiveForce = Annotated[Estimated, Physical("force", above=0.0)]
+Stiffness = Annotated[Estimated, Physical("stiffness", above=0.0)]
+Damping = Annotated[Estimated, Physical("damping", least=0.0)]
+Pressure = Annotated[Estimated, Physical("pressure", above=0.0)]
+Density = Annotated[Estimated, Physical("density", above=0.0)]
+Acceleration = Annotated[Estimated, Physical("acceleration", least=0.0)]
+Unbalance = Annotated[Estimated, Physical("unbalance", least=0.0)]
+ContactStiffness = Annotated[Estimated, Physical("contact_stiffness", above=0.0)]
+ContactDamping = Annotated[Estimated, Physical("contact_damping", least=0.0)]
+Drag = Annotated[Estimated, Physical("rotational_drag", least=0.0)]
+QuadraticDrag = Annotated[Estimated, Physical("quadratic_drag", least=0.0)]
+Sensitivity = Annotated[Estimated, Physical("voltage_sensitivity", above=0.0)]
+Number = Annotated[Estimated, Physical("dimensionless")]
+NonNegative = Annotated[Estimated, Physical("dimensionless", least=0.0)]
+Positive = Annotated[Estimated, Physical("dimensionless", above=0.0)]
+PoissonRatio = Annotated[Estimated, Physical("dimensionless", above=-1.0, most=0.5)]
+Conformity = Annotated[Estimated, Physical("dimensionless", above=0.5, most=1.0)]
+ContactExponent = Annotated[Estimated, Physical("dimensionless", least=1.0, most=2.0)]
