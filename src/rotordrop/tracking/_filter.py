@@ -1,6 +1,7 @@
 """Forward filter and backward smoother of a drop: states, unknown parameters and sensor errors in one estimate.
 
-The vector estimated is ``[dynamic state (s), parameters (P), sensor gains (C), sensor offsets (C)]``. The forward pass
+The vector estimated is ``[dynamic state (s), parameters (P), sensor gains (C), offsets (C), 1X runout cosine and
+sine (C, C)]``. The forward pass
 is an extended Kalman filter with analytic sensitivities of the drop model; given a reference trajectory (the smoothed
 one of an earlier pass) it linearises there, so that repeated passes are a Gauss–Newton solution of the whole problem.
 The backward pass is the modified Bryson–Frazier smoother: it needs no inverse of a covariance.
@@ -36,13 +37,15 @@ class ParameterTargets(NamedTuple):
     """Which kernel entries the unknown parameters set; R targets, P parameters, U unbalance planes.
 
     ``target`` (R, 4): parameter, kind, row, column; ``factor`` (R,) [1]; ``logarithmic`` (P,) flags; ``step`` (P,) of the
-    finite difference by which the right-hand side is differentiated; ``plane_shape`` (U, m) mode shapes of the planes.
+    finite difference by which the right-hand side is differentiated; ``drift`` (P,) standard deviation of the random walk
+    of each parameter per square root of a second; ``plane_shape`` (U, m) mode shapes of the planes.
     """
 
     target: IntArray
     factor: Array
     logarithmic: IntArray
     step: Array
+    drift: Array
     plane_shape: Array
 
 
@@ -208,8 +211,10 @@ def propagate(
 
 
 @kernel
-def add_process_noise(P: Array, p: KernelParameters, settings: FilterSettings, impulses: Array) -> None:
-    """Add unknown impulses between rotor and race, and noise of the spins, to a covariance in place."""
+def add_process_noise(
+    P: Array, p: KernelParameters, settings: FilterSettings, impulses: Array, drift: Array
+) -> None:
+    """Add unknown impulses between rotor and race, noise of the spins and drift of the parameters to a covariance."""
     m = p.eigenvalue.shape[0]
     n_b = p.bearing.shape[0]
     n_q = 2 * m + 4 * n_b
@@ -229,6 +234,9 @@ def add_process_noise(P: Array, p: KernelParameters, settings: FilterSettings, i
         spin = settings.spin_noise + sigma * p.bearing[b, L.BORE_RADIUS] / p.bearing[b, L.RACE_INERTIA] * 0.1
         P[2 * n_q + b, 2 * n_q + b] += spin * spin
     P[2 * n_q + n_b, 2 * n_q + n_b] += settings.speed_noise * settings.speed_noise
+    s = 2 * n_q + n_b + 2
+    for k in range(drift.shape[0]):
+        P[s + k, s + k] += drift[k] * drift[k] * settings.dt
 
 
 @kernel
@@ -264,18 +272,23 @@ def measurement_row(
 ) -> float:
     """Reading of sensor ``c`` predicted at an estimate [m] and its derivative ``row`` (n,).
 
-    The reading is ``(1 + gain error) · (sensor row · state) + offset``.
+    The reading is ``(1 + gain error) · (sensor row · state) + offset + runout at the rotor angle``.
     """
     row[:] = 0.0
+    k = s + n_p + c
+    cosine = math.cos(at[s - 1])
+    sine = math.sin(at[s - 1])
     seen = 0.0
     for j in range(sensor_row.shape[0]):
         seen += sensor_row[j] * at[j]
-    growth = 1.0 + at[s + n_p + c]
+    growth = 1.0 + at[k]
     for j in range(sensor_row.shape[0]):
         row[j] = growth * sensor_row[j]
-    row[s + n_p + c] = seen
-    row[s + n_p + n_c + c] = 1.0
-    return growth * seen + at[s + n_p + n_c + c]
+    row[k] = seen
+    row[k + n_c] = 1.0
+    row[k + 2 * n_c] = cosine
+    row[k + 3 * n_c] = sine
+    return growth * seen + at[k + n_c] + at[k + 2 * n_c] * cosine + at[k + 3 * n_c] * sine
 
 
 @kernel
@@ -340,7 +353,7 @@ def forward_pass(
     """
     n = mean_0.shape[0]
     n_c, s = sensor_rows.shape
-    n_p = n - s - 2 * n_c
+    n_p = n - s - 4 * n_c
     full = s + 4 - 2
     i_w = s - 2
     mean = mean_0.copy()
@@ -372,7 +385,7 @@ def forward_pass(
             P[:s] = head
             P[:s, :s] = np.dot(np.ascontiguousarray(head[:, : s + n_p]), F.T)
             P[s:, :s] = head[:, s:].T
-            add_process_noise(P, p, settings, impulses)
+            add_process_noise(P, p, settings, impulses, targets.drift)
             if keep:
                 transitions[i] = F
         for c in range(n_c + 1):

@@ -23,11 +23,13 @@ Array = NDArray[np.float64]
 
 GAIN_SIGMA = 0.01
 OFFSET_SIGMA = 10e-6
+RUNOUT_SIGMA = 0.5e-6
 START_POSITION_SIGMA = 30e-6
 START_VELOCITY_SIGMA = 20e-3
 BENDING_POSITION_SIGMA = 1.5e-6
 BENDING_VELOCITY_SIGMA = 1.5e-3
 SPEED_SIGMA = 0.5
+SPEED_READING_SIGMA = 1.0
 NOISE_FLOOR = 0.1e-6
 TAIL_VERTICAL_SIGMA = 0.7e-6
 TAIL_HORIZONTAL_SIGMA = 25e-6
@@ -87,7 +89,8 @@ class DropProblem:
         """Entries of the estimate that all drops of the machine share: parameters of the machine, gains, offsets."""
         start = self.n_dynamic
         shared = [start + i for i, unknown in enumerate(self.unknowns) if unknown.scope == "machine"]
-        sensors = range(start + len(self.unknowns), len(self.mean))
+        first = start + len(self.unknowns)
+        sensors = range(first, first + 2 * self.n_channels)
         return np.array([*shared, *sensors], dtype=np.int64)
 
 
@@ -142,7 +145,7 @@ def build_problem(
         speed=_thinned(speed[inside]),
         sensor_rows=rows,
         variances=variances,
-        speed_variance=0.1**2,
+        speed_variance=SPEED_READING_SIGMA**2,
         mean=mean,
         covariance=covariance,
         levitated=phase,
@@ -194,7 +197,7 @@ def _prior(
     """Prior mean and covariance of the whole estimate at power-off."""
     layout = model.layout
     s, n_p, n_c = layout.size - 2, len(unknowns), rows.shape[0]
-    mean = np.zeros(s + n_p + 2 * n_c)
+    mean = np.zeros(s + n_p + 4 * n_c)
     sigma = np.zeros_like(mean)
     _rotor_prior(model, rows, readings, mean, sigma)
     for part in (layout.race, layout.support):
@@ -206,7 +209,8 @@ def _prior(
     for i, unknown in enumerate(unknowns):
         mean[s + i], sigma[s + i] = unknown.mean, unknown.sigma
     sigma[s + n_p : s + n_p + n_c] = GAIN_SIGMA
-    sigma[s + n_p + n_c :] = OFFSET_SIGMA
+    sigma[s + n_p + n_c : s + n_p + 2 * n_c] = OFFSET_SIGMA
+    sigma[s + n_p + 2 * n_c :] = RUNOUT_SIGMA
     return mean, np.diag(sigma**2)
 
 

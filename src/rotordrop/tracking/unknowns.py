@@ -69,6 +69,22 @@ RELATIVE_PRIOR: dict[str, tuple[float, float]] = {
 }
 """Prior standard deviation of the logarithm: of a guess without a range or a default, and of a plain given value [1]."""
 
+DRIFT: dict[str, float] = {
+    "friction.dynamic": 1.0,
+    "friction.stribeck_speed": 1.0,
+    "race.drag_coefficient": 1.0,
+    "contact.stiffness": 0.2,
+    "support.stiffness": 0.02,
+    "support.mass": 0.02,
+    "support.damping": 0.1,
+    "damping_time": 0.2,
+    "race.inertia": 0.1,
+    "air_gap": 8e-6,
+}
+"""Random walk of a parameter per square root of a second, in the unit it is estimated in (most by their logarithm).
+
+It keeps what the simplified model gets wrong late in a drop from spoiling what the first impacts determine."""
+
 GAP_SIGMA = 20e-6
 EXPONENT_SIGMA = 0.03
 ANISOTROPY_SIGMA = 0.03
@@ -207,6 +223,14 @@ def preload_of_offset(constants: BearingConstants, axial_offset: float) -> float
     return len(constants.ball_angles) * load * axial_offset / distance
 
 
+def drift_of(unknown: Unknown) -> float:
+    """Random walk of an unknown per square root of a second, in the unit it is estimated in."""
+    for ending, drift in DRIFT.items():
+        if unknown.path.endswith(ending):
+            return drift
+    return 0.0
+
+
 def drop_unknowns(model: DropModel) -> Iterator[Unknown]:
     """Unknowns that belong to one drop: unbalance against an unknown mark, remanent forces, aerodynamic constant."""
     machine = model.machine
@@ -278,6 +302,7 @@ def parameter_targets(model: DropModel, unknowns: tuple[Unknown, ...]) -> F.Para
         target=np.array([rows[i] for i in order], dtype=np.int64).reshape(-1, 4),
         factor=np.array([factors[i] for i in order]),
         logarithmic=np.array([int(u.logarithmic) for u in unknowns], dtype=np.int64),
+        drift=np.array([drift_of(u) for u in unknowns]),
         step=np.array([1e-5 if u.logarithmic else max(1e-3 * u.sigma, 1e-12) for u in unknowns]),
         plane_shape=np.ascontiguousarray(shape),
     )
