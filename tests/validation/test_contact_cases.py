@@ -1,0 +1,347 @@
+"""Contact, friction, whirl and small drop cases: the kernels with scipy's integrators, and closed forms.
+
+The integrators restart nothing: their steps are short enough for make and break of a contact whose force
+starts at zero, and the times of make and break are the roots of the gap.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+from cases import Compute, check, load_case
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from rotordrop.physics import impact, whirl
+from rotordrop.physics.contact import hunt_crossley_force
+from rotordrop.physics.friction import stribeck_coefficient
+from rotordrop.physics.spin import surface_speed
+from rotordrop.physics.support import support_force
+
+pytestmark = pytest.mark.acceptance
+Inputs = Mapping[str, Any]
+Array = NDArray[np.float64]
+
+
+def integrate(
+    motion: Callable[[float, Array], Sequence[float]],
+    start: Sequence[float],
+    end: float,
+    events: Callable[[float, Array], float],
+    max_step: float,
+    method: str = "DOP853",
+) -> Any:
+    return solve_ivp(
+        motion,
+        (0.0, end),
+        np.array(start),
+        method=method,
+        events=events,
+        max_step=max_step,
+        rtol=1e-10,
+        atol=1e-15,
+        dense_output=True,
+    )
+
+
+def sphere_contact_points(inputs: Inputs) -> dict[str, float]:
+    """Simbody's own combination of two bodies and friction law around the library's normal force."""
+    s_1, s_2 = (k ** (2 / 3) for k in inputs["stiffness_k"])
+    d_1, d_2 = inputs["dissipation"]
+    K = 4 / 3 * (s_1 * s_2 / (s_1 + s_2)) ** 1.5 * math.sqrt(inputs["radius"])
+    lam = (d_1 * s_2 + d_2 * s_1) / (s_1 + s_2)
+    mu_s, mu_d, mu_v = (
+        2 * a * b / (a + b) for a, b in (inputs[f"mu_{kind}"] for kind in ("static", "dynamic", "viscous"))
+    )
+
+    def normal(rate: float) -> float:
+        return hunt_crossley_force(0.5, rate, K, 1.5, lam)
+
+    def friction(slip: float) -> float:
+        vr = slip / inputs["transition_velocity"]
+        return normal(0.0) * (min(vr, 1) * (mu_d + 2 * (mu_s - mu_d) / (1 + vr**2)) + mu_v * abs(slip))
+
+    return {
+        "elastic force at depth 0.5": normal(0.0),
+        "force at depth 0.5, approach 0.4 m/s": normal(0.4),
+        "force at depth 0.5, separation 1.0 m/s (clamped >=0)": normal(-1.0),
+        "friction force at slip 0.0005 m/s, depth 0.5": friction(0.0005),
+        "friction force at slip 0.002 m/s, depth 0.5": friction(0.002),
+        "friction force at slip 0.5 m/s, depth 0.5": friction(0.5),
+    }
+
+
+def rebound_speed(m: float, K: float, n: float, lam: float, v_0: float) -> float:
+    """Speed after one integrated impact of the contact kernel."""
+
+    def motion(_: float, state: Array) -> Sequence[float]:
+        return state[1], -hunt_crossley_force(state[0], state[1], K, n, lam) / m
+
+    def gap(_: float, state: Array) -> float:
+        return float(state[0])
+
+    gap.terminal, gap.direction = True, -1  # type: ignore[attr-defined]
+    duration = impact.elastic_contact_time(m, K, n, v_0)
+    solution = integrate(motion, [0.0, v_0], 6 * duration, gap, duration / 100)
+    return -float(solution.y_events[0][0][1])
+
+
+def restitution(inputs: Inputs) -> dict[str, float]:
+    """The integrated kernel; the closed form must agree with it too."""
+    numbers = {}
+    for a_v0 in inputs["a_v0"]:
+        lam = a_v0 / inputs["v0"] / 1.5
+        e = rebound_speed(inputs["m"], inputs["K"], inputs["n"], lam, inputs["v0"]) / inputs["v0"]
+        assert e == pytest.approx(impact.restitution(lam, inputs["v0"]), abs=1e-7)
+        numbers[f"restitution at a*v0={a_v0}"] = e
+    return numbers
+
+
+def elastic_impact(inputs: Inputs) -> dict[str, float]:
+    m, K, v_0 = inputs["m"], inputs["K"], inputs["v0"]
+    numbers = {}
+    for n in inputs["n"]:
+        duration = impact.elastic_contact_time(m, K, n, v_0)
+        numbers[f"contact time n={n:.4f}"] = duration
+        numbers[f"peak force n={n:.4f}"] = impact.elastic_peak_force(m, K, n, v_0)
+        numbers[f"T*v0/dmax n={n:.4f}"] = duration * v_0 / impact.elastic_indentation(m, K, n, v_0)
+    return numbers
+
+
+def bouncing_ball(inputs: Inputs) -> dict[str, float]:
+    """Each impact integrated with the λ that asks for e at its speed: the delivered restitution counts."""
+    h, g = inputs["h"], inputs["g"]
+    time, speed = impact.fall_time(h, g), math.sqrt(2 * g * h)
+    times, heights = [time], []
+    for _ in range(3):
+        lam = impact.damping_for_restitution(inputs["e"], speed)
+        speed = rebound_speed(1.0, 1e14, 1.0, lam, speed)
+        heights.append(speed**2 / (2 * g))
+        time += 2 * speed / g
+        times.append(time)
+    ratio = math.sqrt(heights[2] / heights[1])
+    numbers = {
+        "first impact time": times[0],
+        "time to rest": times[3] + (times[3] - times[2]) * ratio / (1 - ratio),
+    }
+    numbers |= {f"impact time {k}": times[k - 1] for k in (2, 3, 4)}
+    return numbers | {f"bounce height {k}": heights[k - 1] for k in (1, 2, 3)}
+
+
+def mass_caught_by_a_spring(inputs: Inputs) -> dict[str, float]:
+    m, k, g, floor = inputs["m"], inputs["k"], inputs["g"], -inputs["gap"]
+
+    def force(state: Array) -> float:
+        return hunt_crossley_force(floor - state[0], -state[1], k, 1.0, 0.0)
+
+    def motion(_: float, state: Array) -> Sequence[float]:
+        return state[1], -g + force(state) / m
+
+    def gap(_: float, state: Array) -> float:
+        return float(state[0] - floor)
+
+    solution = integrate(motion, [0.0, inputs["v0"]], 1.2, gap, 1e-3)
+    dense = solution.sol(np.linspace(0, 1.2, 120_001)).T
+    return {
+        "time of first contact": solution.t_events[0][0],
+        "time of lift-off": solution.t_events[0][1],
+        "z at 1.0 s": solution.sol(1.0)[0],
+        "z at 1.1 s": solution.sol(1.1)[0],
+        "peak force": k * (floor - dense[:, 0].min()),
+    }
+
+
+def friction_oscillator(inputs: Inputs) -> dict[str, float]:
+    m, k, mu, N = inputs["m"], inputs["k"], inputs["mu"], inputs["N"]
+
+    def motion(_: float, state: Array) -> Sequence[float]:
+        friction = N * stribeck_coefficient(state[1], mu, mu, 0.5, inputs["smoothing_speed"])
+        return state[1], (-k * state[0] - friction) / m
+
+    def standstill(t: float, state: Array) -> float:
+        return float(state[1]) if t > 0 else -1.0
+
+    half_period = math.pi * math.sqrt(m / k)
+    solution = integrate(
+        motion, [inputs["u0"], 0.0], 4.5 * half_period, standstill, half_period / 50, "LSODA"
+    )
+    times = solution.t_events[0][:4]
+    numbers = {
+        f"turning point {i + 1} (x cos45)": solution.sol(t)[0] * math.cos(math.pi / 4)
+        for i, t in enumerate(times)
+    }
+    return numbers | {"time between turning points (half period)": float(np.mean(np.diff(times[:3])))}
+
+
+def ring_spin_up(inputs: Inputs) -> dict[str, float]:
+    """The race integrated under the friction kernel until it runs with the rotor's surface."""
+    r, torque_arm = inputs["r"], inputs["N"] * inputs["r"]
+
+    def slip(omega_i: float) -> float:
+        return surface_speed(0.0, inputs["Omega"], r, omega_i, r)
+
+    def motion(_: float, state: Array) -> Sequence[float]:
+        mu = stribeck_coefficient(slip(state[0]), inputs["mu"], inputs["mu"], 0.5, 5e-3)
+        return (mu * torque_arm / inputs["I"],)
+
+    def synchronous(_: float, state: Array) -> float:
+        return slip(state[0]) - 5e-3
+
+    closed = whirl.race_spin_up_time(inputs["I"], inputs["mu"], inputs["N"], r, inputs["Omega"])
+    solution = integrate(motion, [0.0], 1.1 * closed, synchronous, closed / 50)
+    time = float(solution.t_events[0][0])
+    assert time == pytest.approx(closed, rel=1e-3)
+    return {"time to synchronism": time}
+
+
+def rolling_whirl(inputs: Inputs) -> dict[str, float]:
+    two_pi = 2 * math.pi
+    whirl_speed = whirl.rolling_whirl_speed(two_pi * inputs["Omega_Hz"], inputs["R"], inputs["c"])
+    force = whirl.whirl_force(inputs["m"], inputs["c2"], two_pi * inputs["whirl_Hz"])
+    return {
+        "rolling whirl frequency": whirl_speed / two_pi,
+        "contact force at 150 Hz whirl, c=250 um, m=10 kg": force,
+    }
+
+
+def vertical_drop(inputs: Inputs) -> dict[str, float]:
+    """State: rotor and support travel, downwards, and their velocities."""
+    m, c, ms, g = inputs["m"], inputs["c"], inputs["ms"], inputs["g"]
+
+    def force(state: Array) -> float:
+        y, y_s, v, v_s = state
+        return hunt_crossley_force(y - y_s - c, v - v_s, inputs["K"], inputs["n"], inputs["lam"])
+
+    def motion(_: float, state: Array) -> Sequence[float]:
+        F = force(state)
+        on_support = F + support_force(state[1], state[3], inputs["Ks"], inputs["Cs"])
+        return state[2], state[3], g - F / m, on_support / ms
+
+    def gap(_: float, state: Array) -> float:
+        return float(state[0] - state[1] - c)
+
+    solution = integrate(motion, [0.0] * 4, 0.03, gap, 2e-5)
+    times = np.linspace(0, 0.03, 300_001)
+    states = solution.sol(times).T
+    touch, release, again = solution.t_events[0][:3]
+    flight = (times > release) & (times < again)
+    return {
+        "first contact": touch,
+        "end of first contact": release,
+        "start of second contact": again,
+        "peak contact force": max(force(state) for state in states[(times > touch) & (times < release)]),
+        "max rotor travel": states[:, 0].max(),
+        "max support travel": states[:, 1].max(),
+        "top of first rebound (min y)": states[flight, 0].min(),
+        "y at 30 ms": states[-1, 0],
+        "K from omega=pi/T (paper sect 5.1) on this record": impact.half_period_stiffness(m, release - touch),
+    }
+
+
+def planar_drop(inputs: Inputs) -> dict[str, float]:
+    """State: x, z of rotor and support, their velocities, ring spin; friction is the tanh law of the case."""
+    m, ms, r = inputs["m"], inputs["ms"], inputs["r"]
+
+    def contact(state: Array) -> tuple[Array, Array, float, float]:
+        way, velocity = state[0:2] - state[2:4], state[4:6] - state[6:8]
+        e_r = math.hypot(*way)
+        normal = way / e_r if e_r > 0 else np.array([0.0, -1.0])
+        tangent = np.array([-normal[1], normal[0]])
+        N = hunt_crossley_force(
+            e_r - inputs["c"], float(velocity @ normal), inputs["K"], inputs["n"], inputs["lam"]
+        )
+        slip = surface_speed(float(velocity @ tangent), inputs["Om"], r, state[8], r)
+        return normal, tangent, N, inputs["mu"] * N * math.tanh(slip / inputs["vs"])
+
+    def motion(t: float, state: Array) -> Sequence[float]:
+        normal, tangent, N, friction = contact(state)
+        on_rotor = -N * normal - friction * tangent
+        angle = inputs["Om"] * t + inputs["phase"]
+        unbalance = inputs["e"] * inputs["Om"] ** 2 * np.array([math.cos(angle), math.sin(angle)])
+        holding = [support_force(state[2 + i], state[6 + i], inputs["Ks"], inputs["Cs"]) for i in (0, 1)]
+        rotor = on_rotor / m + unbalance - np.array([0.0, inputs["g"]])
+        support = (-on_rotor + holding) / ms
+        return [*state[4:8], *rotor, *support, friction * r / inputs["I"]]
+
+    def gap(_: float, state: Array) -> float:
+        return math.hypot(*(state[0:2] - state[2:4])) - inputs["c"]
+
+    solution = integrate(motion, [0.0] * 9, 0.015, gap, 1e-5)
+    times = np.linspace(*solution.t_events[0][:2], 4001)
+    return {
+        "contact event 1": solution.t_events[0][0],
+        "contact event 2": solution.t_events[0][1],
+        "peak normal force": max(contact(state)[2] for state in solution.sol(times).T),
+        "ring speed at 15 ms": solution.y[8, -1],
+        "x at 15 ms": solution.y[0, -1],
+        "z at 15 ms": solution.y[1, -1],
+    }
+
+
+CASES: dict[str, Compute] = {
+    "C01": sphere_contact_points,
+    "C02a": restitution,
+    "C04a": elastic_impact,
+    "C05": bouncing_ball,
+    "C06": mass_caught_by_a_spring,
+    "C08": friction_oscillator,
+    "C11": ring_spin_up,
+    "C13": rolling_whirl,
+    "D01": vertical_drop,
+    "D03": planar_drop,
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_case(name: str) -> None:
+    case = load_case(name)
+    check(case, CASES[name](case.inputs))
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("C01", {"radius": 0.8000001}),
+        ("C01", {"dissipation": [0.5001, 1.0]}),
+        ("C01", {"mu_dynamic": [0.5, 0.2001]}),
+        ("C04a", {"K": 1.0001e8}),
+        ("C04a", {"v0": 0.1001}),
+        ("C05", {"e": 0.7005}),
+        ("C05", {"g": 9.82}),
+        ("C06", {"k": 101.0}),
+        ("C06", {"gap": 2.01}),
+        ("C08", {"mu": 0.101}),
+        ("C08", {"k": 1.01e4}),
+        ("C08", {"smoothing_speed": 0.02}),
+        ("C11", {"I": 3.02e-4}),
+        ("C13", {"c": 2.751e-4}),
+        ("C13", {"m": 10.01}),
+        ("D01", {"lam": 0.09}),
+        ("D01", {"n": 1.11}),
+        ("D01", {"Ks": 1.001e8}),
+        ("D01", {"Cs": 3010.0}),
+        ("D03", {"lam": 0.1}),
+        ("D03", {"mu": 0.131}),
+        ("D03", {"I": 3.01e-4}),
+        ("D03", {"phase": 2.01}),
+        ("D03", {"Om": -1319.4689145077132}),
+    ],
+)
+def test_perturbed_input_fails_the_case(name: str, change: dict[str, Any]) -> None:
+    case = load_case(name).with_inputs(**change)
+    with pytest.raises(AssertionError, match=f"{name} .*\n.*deviation .* tolerance"):
+        check(case, CASES[name](case.inputs))
+
+
+@pytest.mark.parametrize("factor", [0.99, 1.01])
+def test_perturbed_damping_fails_the_restitution(factor: float) -> None:
+    case = load_case("C02a")
+    numbers = {
+        f"restitution at a*v0={a}": impact.restitution(factor * a / 1.5, 1.0) for a in case.inputs["a_v0"]
+    }
+    with pytest.raises(AssertionError, match=r"C02a .*\n.*deviation .* tolerance"):
+        check(case, numbers)
