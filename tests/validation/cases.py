@@ -8,7 +8,6 @@ validation page of the docs is made from the same files and functions.
 from __future__ import annotations
 
 import copy
-import csv
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -93,15 +92,6 @@ def load_case(name: str) -> Case:
     return Case(**{**raw, "expected": expected})
 
 
-def load_table(name: str) -> dict[str, list[Any]]:
-    """Columns of a table of a case: numbers where every entry is one, else text."""
-    with (FOLDER / name).open(encoding="utf-8", newline="") as file:
-        header, *rows = csv.reader(line for line in file if not line.startswith("#"))
-    return {
-        column: _numbers(entries) for column, entries in zip(header, zip(*rows, strict=True), strict=True)
-    }
-
-
 def check(case: Case, computed: Mapping[str, float]) -> None:
     """Compare every expected number of a case; one that was not computed, or not asked for, is an error."""
     names = {e.name for e in case.expected}
@@ -118,10 +108,3 @@ def _disagreement(expected: Expected, value: float) -> str:
         f"{expected.name}: {value:.9g} {expected.unit}, expected {expected.value:.9g}, "
         f"deviation {expected.deviation(value):.3g} {unit}, tolerance {expected.tolerance:.3g}"
     )
-
-
-def _numbers(entries: tuple[str, ...]) -> list[Any]:
-    try:
-        return [float(entry) for entry in entries]
-    except ValueError:
-        return list(entries)
