@@ -7,6 +7,7 @@ from rotordrop.machine.loading import load_machine, loads_machine
 from rotordrop.machine.machine import Machine
 from rotordrop.machine.material import Material
 from rotordrop.machine.rotor import Disc, Element, Rotor, Section, SectionByLength, SectionByNodes
+from rotordrop.machine.saving import machine_text, save_machine
 from rotordrop.machine.sensor import Sensor
 from rotordrop.machine.speed import SpeedDescription
 from rotordrop.machine.touchdown_bearing import Contact, Friction, Race, Support, TouchdownBearing
@@ -37,4 +38,6 @@ __all__ = [
     "example_path",
     "load_machine",
     "loads_machine",
+    "machine_text",
+    "save_machine",
 ]

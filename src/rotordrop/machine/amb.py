@@ -46,7 +46,9 @@ class ActiveMagneticBearing(Placed):
         stiffness = self.stiffness
         if "stiffness" not in self.model_fields_set:
             value = carried_mass * (2.0 * math.pi * RIGID_FREQUENCY) ** 2
-            why = f"gives the {carried_mass:.3g} kg it carries a rigid-body frequency of {RIGID_FREQUENCY:g} Hz"
+            why = (
+                f"gives the {carried_mass:.3g} kg it carries a rigid-body frequency of {RIGID_FREQUENCY:g} Hz"
+            )
             stiffness = Estimated(value=value, status="default", source=why, unit="N/m")
             values["stiffness"] = stiffness
         if "damping" not in self.model_fields_set:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, Strict
 
@@ -82,7 +83,9 @@ class BallBearing(Description):
         Static load rating C_0 of one row [N].
     """
 
-    designation: Text | None = Field(default=None, description="Designation in the catalogue, such as XCB71914-E")
+    designation: Text | None = Field(
+        default=None, description="Designation in the catalogue, such as XCB71914-E"
+    )
     ball_diameter: PositiveLength = follows("reconstructed from the catalogue")
     ball_count: Annotated[int, Strict(), Field(ge=3)] = Field(
         default=0, validate_default=False, description="Balls per row; reconstructed from the catalogue"
@@ -100,7 +103,7 @@ class BallBearing(Description):
     ball_poisson_ratio: PoissonRatio = follows("from the ball material")
     ball_density: Density = follows("from the ball material")
     preload: Force = follows("that of the preload class")
-    preload_class: PreloadClass | None = Field(default=None, description="Written as preload = \"light\"")
+    preload_class: PreloadClass | None = Field(default=None, description='Written as preload = "light"')
     arrangement: Literal["X", "O", "tandem", "single"] = Field(
         default="X", description="Two rows face to face, as in Neisi 2020"
     )
@@ -108,9 +111,11 @@ class BallBearing(Description):
     second_row_offset: Number = default(0.0, "the balls of both rows stand at the same angles")
     width: PositiveLength | None = Field(default=None, description="Width of one row")
     limiting_speed: PositiveSpeed | None = Field(default=None, description="Highest speed the maker allows")
-    static_load_rating: PositiveForce | None = Field(default=None, description="Static load rating of one row")
+    static_load_rating: PositiveForce | None = Field(
+        default=None, description="Static load rating of one row"
+    )
 
-    displaces = {"preload": ("preload_class",)}
+    displaces: ClassVar[Mapping[str, tuple[str, ...]]] = {"preload": ("preload_class",)}
 
     @classmethod
     def rewritten(cls, raw: dict[str, Any]) -> dict[str, Any]:
@@ -143,11 +148,13 @@ class BallBearing(Description):
 
     def _check_preload_class(self, catalogued: CatalogueBearing | None) -> None:
         if "preload" in self.model_fields_set:
-            raise Misfit("the preload is given both as a force and as a class; keep one of them", ("preload",))
+            raise Misfit(
+                "the preload is given both as a force and as a class; keep one of them", ("preload",)
+            )
         if catalogued is None:
             raise Misfit(
                 f"preload = {self.preload_class!r} needs a 'designation' that is in the catalogue; "
-                "give the force, for example preload = \"100 N\"",
+                'give the force, for example preload = "100 N"',
                 ("preload",),
             )
 
@@ -205,7 +212,8 @@ class BallBearing(Description):
         count = values["ball_count"]
         if ball * count > 3.14159266 * pitch:
             raise Misfit(
-                f"{count} balls of {ball * 1e3:.4g} mm do not fit on a pitch diameter of {pitch * 1e3:.4g} mm; "
+                f"{count} balls of {ball * 1e3:.4g} mm do not fit on a pitch diameter of "
+                f"{pitch * 1e3:.4g} mm; "
                 f"at most {int(3.14159266 * pitch / ball)} do",
                 ("ball_count",),
             )

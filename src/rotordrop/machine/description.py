@@ -1,20 +1,42 @@
-"""What every part of a machine description has in common: frozen, strict about keys, aware of what was given."""
+"""What every part of a machine description has in common: frozen, strict, aware of what was given."""
 
 from __future__ import annotations
 
-import math
+import re
 from collections.abc import Mapping
 from difflib import get_close_matches
 from typing import Annotated, Any, ClassVar, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, Strict, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, Strict, model_validator
 
 from rotordrop.estimated import Estimated
-from rotordrop.machine.values import LEFT_OUT, Length, Physical
+from rotordrop.machine.values import Length, Physical
+
+
+def _node(raw: Any) -> Any:
+    if isinstance(raw, bool) or not isinstance(raw, int):
+        raise ValueError(f"{raw!r} is not a node; write its number, counted from 1, without quotes")
+    if raw < 1:
+        raise ValueError(f"node {raw} is outside the rotor; nodes count from 1")
+    return raw
+
+
+def _name(raw: Any) -> Any:
+    if not isinstance(raw, str) or not re.fullmatch(r"[^.\s]+", raw):
+        raise ValueError(f'{raw!r} is not a name; write one word without dots, such as "NDE"')
+    return raw
+
+
+def _channel(raw: Any) -> Any:
+    if not isinstance(raw, str) or not raw.strip():
+        raise ValueError(f"{raw!r} is not the name of a channel; write it as the recording does")
+    return raw
+
 
 Text = Annotated[str, Strict()]
-Node = Annotated[int, Strict(), Field(ge=1)]
-Name = Annotated[str, Strict(), Field(min_length=1, pattern=r"^[^.\s]+$")]
+Node = Annotated[int, BeforeValidator(_node)]
+Name = Annotated[str, BeforeValidator(_name)]
+Channel = Annotated[str, BeforeValidator(_channel)]
 
 NODE_TOLERANCE = 1e-4
 """A position this close to a node [m] means the node."""
@@ -77,7 +99,7 @@ class Description(BaseModel):
         return type(self).model_validate(given | values)
 
     def completed_with(self, values: Mapping[str, Any]) -> Self:
-        """Give a copy in which values that were left out follow from outside; they still count as left out."""
+        """Give a copy with values that follow from outside; they still count as left out."""
         copy = self.model_copy()
         copy.__dict__.update(values)
         return copy
@@ -99,8 +121,15 @@ class Placed(Description):
         """Refuse both or neither of node and position."""
         if ("node" in self.model_fields_set) == (self.position is not None):
             raise Misfit(
-                "needs either 'node' (counted from 1) or 'position' (distance from node 1), and only one of them"
+                "needs either 'node' (counted from 1) or 'position' (distance from node 1), and only one "
+                "of them"
             )
+
+    def changed(self, **values: Any) -> Self:
+        """Give a copy with other values, at the same node."""
+        copy = super().changed(**values)
+        copy.__dict__["node"] = self.node
+        return copy
 
 
 P = TypeVar("P", bound=Placed)
@@ -125,7 +154,8 @@ def _node_at(position: Estimated, nodes: tuple[float, ...], place: tuple[str | i
     text = Physical("length").text
     if not nodes[0] - NODE_TOLERANCE <= position.value <= nodes[-1] + NODE_TOLERANCE:
         raise Misfit(
-            f"{text(position.value)} is outside the rotor, which reaches from {text(nodes[0])} to {text(nodes[-1])}",
+            f"{text(position.value)} is outside the rotor, which reaches from {text(nodes[0])} to "
+            f"{text(nodes[-1])}",
             place,
         )
     nearest = min(range(len(nodes)), key=lambda i: abs(nodes[i] - position.value))
@@ -143,8 +173,3 @@ def unknown_key(key: str, known: tuple[str, ...]) -> str:
     close = get_close_matches(key, known, 1, 0.6)
     way_out = f"did you mean {close[0]!r}?" if close else f"known here are {', '.join(known)}"
     return f"unknown key {key!r}; {way_out}"
-
-
-def is_left_out(value: Estimated | None) -> bool:
-    """Tell whether a value is still to follow from others."""
-    return value is LEFT_OUT or (value is not None and math.isnan(value.value))

@@ -18,6 +18,13 @@ from rotordrop.machine.toml_positions import TomlPositions
 
 _UNION_TAGS = {"by_length", "by_nodes"}
 _DECIMAL_COMMA = re.compile(r"=\s*([+-]?\d+),(\d+)(?!\s*\])")
+_EXPECTED = {
+    "tuple_type": "expected a list, [[…]] for a list of tables",
+    "model_type": "expected a table, {…} or [header]",
+    "dict_type": "expected a table of tables",
+    "too_short": "at least one entry is needed",
+    "missing_argument": "expected two entries",
+}
 _SYNTAX_PLACE = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)")
 
 
@@ -81,22 +88,24 @@ def _syntax_error(text: str, message: str, file: Path | None) -> MachineFileErro
         value = f"{comma.group(1)},{comma.group(2)}"
         return MachineFileError(
             f"{value} has a decimal comma; write {value.replace(',', '.')}, in quotes with its unit, "
-            f"as in \"{value.replace(',', '.')} mm\"",
+            f'as in "{value.replace(",", ".")} mm"',
             file=file,
             line=line,
             column=comma.start(1) + 1,
         )
     reason = _SYNTAX_PLACE.sub("", message)
-    unquoted = re.search(r"=\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*([A-Za-zµ°%][^#\"']*?)\s*(#.*)?$", lines[line - 1])
+    unquoted = re.search(
+        r"=\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*([A-Za-zµ°%][^#\"']*?)\s*(#.*)?$", lines[line - 1]
+    )
     if unquoted:
-        reason = f"a value with a unit is a text: write \"{unquoted.group(1)} {unquoted.group(2)}\" in quotes"
+        reason = f'a value with a unit is a text: write "{unquoted.group(1)} {unquoted.group(2)}" in quotes'
     return MachineFileError(f"not valid TOML: {reason}", file=file, line=line, column=column)
 
 
 def _with_shaft_table(
     raw: dict[str, Any], file: Path | None, folder: Path, positions: TomlPositions
 ) -> tuple[Path, list[int]] | None:
-    """Put the sections of the shaft table in place of its name; give its path and the line of each section."""
+    """Put the sections of the shaft table in place of its name; give its path and their lines."""
     rotor = raw.get("rotor")
     if not isinstance(rotor, dict) or "shaft_table" not in rotor:
         return None
@@ -104,7 +113,10 @@ def _with_shaft_table(
     named = rotor.pop("shaft_table")
     if not isinstance(named, str):
         raise MachineFileError(
-            f"shaft_table = {named!r} is not the name of a CSV file", file=file, line=place[0], column=place[1]
+            f"shaft_table = {named!r} is not the name of a CSV file",
+            file=file,
+            line=place[0],
+            column=place[1],
         )
     both = [key for key in ("sections", "node_positions") if key in rotor]
     if both:
@@ -138,9 +150,13 @@ def _one_error(
     if isinstance(cause, Misfit):
         place = (*place, *cause.place)
     if table is not None and place[:2] == ("rotor", "sections") and len(place) > 2:
-        return MachineFileError(f"{_dotted(place[2:])}: {message}", file=table[0], line=table[1][int(place[2])])
+        return MachineFileError(
+            f"{_dotted(place[2:])}: {message}", file=table[0], line=table[1][int(place[2])]
+        )
     line, column = (positions.key(place) if at_key else positions.value(place)) or (1, 1)
-    return MachineFileError(f"{_dotted(place)}: {message}" if place else message, file=file, line=line, column=column)
+    return MachineFileError(
+        f"{_dotted(place)}: {message}" if place else message, file=file, line=line, column=column
+    )
 
 
 def _message(entry: Any, place: tuple[str | int, ...]) -> tuple[str, bool]:
@@ -152,9 +168,21 @@ def _message(entry: Any, place: tuple[str | int, ...]) -> tuple[str, bool]:
         return str(cause), False
     if entry["type"] == "missing":
         return f"{place[-1]!r} is missing; add it (machine_schema() and 'rotordrop init' show how)", True
+    if cause is not None:
+        return str(cause), False
     found = entry["input"]
-    shown = f"{found!r}" if not isinstance(found, dict | list) else "this"
-    return f"{shown} does not fit: {entry['msg'][0].lower()}{entry['msg'][1:]}", False
+    shown = (
+        "a table"
+        if isinstance(found, dict)
+        else "a list"
+        if isinstance(found, list | tuple)
+        else f"{found!r}"
+    )
+    return f"{shown} does not fit; {_EXPECTED.get(entry['type']) or _spoken(entry['msg'])}", False
+
+
+def _spoken(message: str) -> str:
+    return message.replace("Input should be", "expected")
 
 
 def _dotted(place: tuple[str | int, ...]) -> str:
@@ -163,5 +191,3 @@ def _dotted(place: tuple[str | int, ...]) -> str:
     for part in place:
         text += f"[{part + 1}]" if isinstance(part, int) else f".{part}" if text else part
     return text
-
-

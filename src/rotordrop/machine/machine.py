@@ -79,10 +79,13 @@ class Machine(Description):
             seen: set[str] = set()
             for index, part in enumerate(getattr(self, key)):
                 if part.name in seen:
-                    raise Misfit(f"the name {part.name!r} is used twice; names must differ", (key, index, "name"))
+                    raise Misfit(
+                        f"the name {part.name!r} is used twice; names must differ", (key, index, "name")
+                    )
                 if key == "touchdown_bearings" and part.name in RESERVED_NAMES:
                     raise Misfit(
-                        f"a touchdown bearing cannot be called {part.name!r}; choose another name, such as \"NDE\"",
+                        f"a touchdown bearing cannot be called {part.name!r}; choose another "
+                        'name, such as "NDE"',
                         (key, index, "name"),
                     )
                 seen.add(part.name)
@@ -90,7 +93,8 @@ class Machine(Description):
         for index, sensor in enumerate(self.sensors):
             if "bearing" in sensor.model_fields_set and sensor.bearing not in names:
                 raise Misfit(
-                    f"sensor {sensor.name} belongs to touchdown bearing {sensor.bearing!r}, which does not exist; "
+                    f"sensor {sensor.name} belongs to touchdown bearing {sensor.bearing!r}, which does "
+                    f"not exist; "
                     f"there are {', '.join(sorted(names))}",
                     ("sensors", index, "bearing"),
                 )
@@ -124,9 +128,7 @@ class Machine(Description):
 
     def _nearest_bearing(self, node: int) -> str:
         nodes = self.rotor.node_positions
-        return min(
-            self.touchdown_bearings, key=lambda b: abs(nodes[b.node - 1] - nodes[node - 1])
-        ).name
+        return min(self.touchdown_bearings, key=lambda b: abs(nodes[b.node - 1] - nodes[node - 1])).name
 
     @property
     def source_path(self) -> Path | None:
@@ -144,8 +146,8 @@ class Machine(Description):
     def with_values(self, values: Mapping[str, float | Estimated]) -> Machine:
         """Give the same machine with other values, by path such as ``"NDE.support.stiffness"`` [SI].
 
-        What follows from a changed value (the horizontal support, say) follows again. Unbalances are counted from
-        0, as in `unbalances`: ``"unbalance.0.amount"``.
+        What follows from a changed value (the horizontal support, say) follows again. Unbalances are counted
+        from 0, as in `unbalances`: ``"unbalance.0.amount"``.
         """
         parts = changed_machine_parts(self, values)
         copy = self.completed_with(parts)

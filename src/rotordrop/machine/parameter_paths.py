@@ -20,7 +20,11 @@ def changed_machine_parts(machine: Machine, values: Mapping[str, float | Estimat
     """Give the top-level parts of a machine that change with the given values."""
     tree: _Changes = {}
     for path, value in values.items():
-        _graft(tree, _resolved(machine, path), value if isinstance(value, Estimated) else Estimated(value=float(value)))
+        _graft(
+            tree,
+            _resolved(machine, path),
+            value if isinstance(value, Estimated) else Estimated(value=float(value)),
+        )
     parts: dict[str, Any] = {}
     for key, branch in tree.items():
         try:

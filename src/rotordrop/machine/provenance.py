@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -22,28 +23,43 @@ class Mention:
     status: Status
 
 
+_ENTRY = re.compile(r"(rotor\.sections|rotor\.discs|sensors|ambs)\..+\.(\w+)$")
 _BEARINGS = "touchdown_bearings"
 _SILENT = {"position", "notes", "unbalances", "node_positions", "sections", "elements", "part", "materials"}
 _PLAIN_INFERRED = {"ball_count", "ball_material"}
 
 
-def mentions(part: Description, path: str = "") -> Iterator[Mention]:
-    """Walk through a description and mention every default and inference in it."""
+def mentions(part: Description) -> tuple[Mention, ...]:
+    """Mention every default and inference in a description, once where list entries share it."""
+    merged: dict[tuple[str, str, str, Status], list[Mention]] = {}
+    for mention in _walk(part):
+        match = _ENTRY.match(mention.path)
+        common = match.expand(r"\1.*.\2") if match else mention.path
+        merged.setdefault((common, mention.text, mention.why, mention.status), []).append(mention)
+    return tuple(
+        found[0] if len(found) == 1 else Mention(common, text, why, status)
+        for (common, text, why, status), found in merged.items()
+    )
+
+
+def _walk(part: Description, path: str = "") -> Iterator[Mention]:
     for name, field in type(part).model_fields.items():
         value = getattr(part, name)
         here = f"{path}.{name}" if path else name
         if isinstance(value, Estimated):
             if value.status in ("default", "inferred"):
                 physical = next(m for m in _physicals(field))
-                yield Mention(here, format_quantity(value.value, physical.kind), part.reason(name), value.status)
+                yield Mention(
+                    here, format_quantity(value.value, physical.kind), part.reason(name), value.status
+                )
         elif isinstance(value, Description):
-            yield from mentions(value, here)
+            yield from _walk(value, here)
         elif isinstance(value, tuple) and value and isinstance(value[0], Description):
             for index, item in enumerate(value):
-                yield from mentions(item, _item_path(name, index, item, path))
+                yield from _walk(item, _item_path(name, index, item, path))
         elif isinstance(value, dict):
             for key, item in value.items():
-                yield from mentions(item, f"{here}.{key}")
+                yield from _walk(item, f"{here}.{key}")
         else:
             yield from _plain(part, name, value, here)
 

@@ -110,7 +110,8 @@ class SectionByNodes(Section):
         super().check()
         if not 1 <= self.nodes[0] < self.nodes[1]:
             raise Misfit(
-                f"nodes = {list(self.nodes)} is no section; write the first and the last node, counted from 1",
+                f"nodes = {list(self.nodes)} is no section; write the first and the last node, "
+                "counted from 1",
                 ("nodes",),
             )
 
@@ -151,7 +152,8 @@ class Disc(Placed):
         polar, diametral = self.polar_inertia.value, self.diametral_inertia.value
         if polar > 2.0 * diametral * (1.0 + 1e-9) and diametral > 0.0:
             raise Misfit(
-                f"polar_inertia {polar:.4g} kg m² is more than twice diametral_inertia {diametral:.4g} kg m², "
+                f"polar_inertia {polar:.4g} kg m² is more than twice diametral_inertia {diametral:.4g} "
+                "kg m², "
                 "which no body can have; check both (perhaps they are interchanged)",
                 ("polar_inertia",),
             )
@@ -162,7 +164,7 @@ def _node_positions(raw: Any) -> Any:
     if isinstance(raw, Mapping):
         raw = _with_unit(raw)
     if not isinstance(raw, list | tuple):
-        raise UsageError(f"{raw!r} is not a list; write {{unit = \"mm\", values = [0, 25, 50]}}")
+        raise UsageError(f'{raw!r} is not a list; write {{unit = "mm", values = [0, 25, 50]}}')
     if all(isinstance(entry, float) for entry in raw) and isinstance(raw, tuple):
         return raw
     return tuple(Physical("length").number(entry) for entry in raw)
@@ -228,7 +230,8 @@ class Rotor(Description):
     def _check_nodes(self) -> None:
         if len(self.node_positions) < 2:
             raise Misfit(
-                "sections given by 'nodes' need 'node_positions = {unit = \"mm\", values = [0, …]}'", ("sections",)
+                "sections given by 'nodes' need 'node_positions = {unit = \"mm\", values = [0, …]}'",
+                ("sections",),
             )
         for number, (left, right) in enumerate(pairwise(self.node_positions), start=1):
             if not right > left:
@@ -245,7 +248,8 @@ class Rotor(Description):
             assert isinstance(section, SectionByNodes)
             if section.nodes[0] != expected:
                 raise Misfit(
-                    f"the section begins at node {section.nodes[0]}, but the one before ends at node {expected}; "
+                    f"the section begins at node {section.nodes[0]}, but the one before ends at "
+                    f"node {expected}; "
                     "sections must follow each other without gap",
                     ("sections", index, "nodes"),
                 )
@@ -348,5 +352,3 @@ def _builtin_steel() -> Material:
 
 def _unknown_material(name: str, known: tuple[str, ...]) -> str:
     return unknown_key(name, known).replace("key", "material", 1) + "; describe it under [rotor.materials]"
-
-

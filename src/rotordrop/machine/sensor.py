@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from rotordrop.machine.description import Misfit, Name, Placed
+from rotordrop.machine.description import Channel, Misfit, Name, Placed
 from rotordrop.machine.values import Angle, Length, NonNegativeLength, Positive, Sensitivity, default
 
 LEAST_PLANE_DISTANCE = 1e-3
@@ -39,14 +39,18 @@ class Sensor(Placed):
         Standard uncertainty of the axial position [m].
     """
 
-    name: Name = Field(description="Name of the channel in the recording")
+    name: Channel = Field(description="Name of the channel in the recording")
     angle: Angle
     polarity: Literal[1, -1] = 1
     gain: Positive = default(1.0, "true displacement over reading of a calibrated sensor", (0.97, 1.03))
     offset: Length = default(0.0, "reads zero when the rotor is centred", (-50e-6, 50e-6))
-    sensitivity: Sensitivity | None = Field(default=None, description="Volts per metre, for recordings in volts")
+    sensitivity: Sensitivity | None = Field(
+        default=None, description="Volts per metre, for recordings in volts"
+    )
     bearing: Name = Field(
-        default="-", validate_default=False, description="Touchdown bearing at this end; the nearest when left out"
+        default="-",
+        validate_default=False,
+        description="Touchdown bearing at this end; the nearest when left out",
     )
     position_error: NonNegativeLength = default(1e-3, "standard uncertainty of the axial position")
 
@@ -60,8 +64,9 @@ def check_sensors_resolve_motion(sensors: tuple[Sensor, ...], nodes: tuple[float
         planes.setdefault(key, []).append(sensor)
     if len(planes) < 2:
         raise Misfit(
-            f"the {len(sensors)} sensors sit in {len(planes)} plane ({_plane_text(planes)}) and cannot tell a tilt "
-            "of the rotor from its displacement; add sensors in a second plane",
+            f"the {len(sensors)} sensors sit in {len(planes)} plane "
+            f"({_plane_text(planes)}) and cannot tell a "
+            "tilt of the rotor from its displacement; add sensors in a second plane",
             ("sensors",),
         )
     if len([plane for plane in planes.values() if _resolves_both(plane)]) < 2 and _rank(sensors, nodes) < 4:

@@ -33,14 +33,16 @@ SECTION_LINE = "_line"
 def read_shaft_table(path: Path) -> dict[str, Any]:
     """Read shaft sections from a CSV file, as the tables of a machine file would give them.
 
-    The first line names the columns with their units, such as ``position [mm]``. Either ``position`` says where
-    each node lies, the row describing the shaft from there to the next one (the last row holds the end only), or
-    ``length`` gives every section its length.
+    The first line names the columns with their units, such as ``position [mm]``. Either ``position`` says
+    where each node lies, the row describing the shaft from there to the next one (the last row holds the end
+    only), or ``length`` gives every section its length.
     """
     lines = _text(path).splitlines()
     rows = [(number, line) for number, line in enumerate(lines, start=1) if line.strip() and line[0] != "#"]
     if len(rows) < 2:
-        raise MachineFileError("the shaft table holds no sections; give a heading and at least one row", file=path)
+        raise MachineFileError(
+            "the shaft table holds no sections; give a heading and at least one row", file=path
+        )
     separator = _separator(rows[0][1])
     cells = [(number, next(csv.reader([line], delimiter=separator))) for number, line in rows]
     table = _Table(path, [text.strip() for text in cells[0][1]], rows[0][0])
@@ -63,11 +65,14 @@ class _Table:
             match = _HEADING.match(heading)
             name = (match.group(1) if match else heading).strip().lower().replace(" ", "_")
             if name not in _COLUMNS:
-                raise self.error(unknown_key(name, tuple(_COLUMNS)).replace("key", "column", 1), line, column + 1)
+                raise self.error(
+                    unknown_key(name, tuple(_COLUMNS)).replace("key", "column", 1), line, column + 1
+                )
             unit = (match.group(2) if match else None) or ""
             if _COLUMNS[name] is not None and not unit:
                 raise self.error(
-                    f"the column {heading!r} has no unit; write for example '{name.replace('_', ' ')} [mm]'", line
+                    f"the column {heading!r} has no unit; write for example '{name.replace('_', ' ')} [mm]'",
+                    line,
                 )
             self.names.append(name)
             self.units.append(unit)
@@ -76,9 +81,10 @@ class _Table:
         return MachineFileError(message, file=self.path, line=line, column=column)
 
     def row(self, number: int, cells: list[str]) -> dict[str, Any]:
-        if len(cells) > len(self.names) or len(cells) < 2 and len(self.names) > 1:
+        if len(cells) > len(self.names) or (len(cells) < 2 and len(self.names) > 1):
             raise self.error(
-                f"the row has {len(cells)} columns, the heading {len(self.names)}; is a decimal comma in it?", number
+                f"the row has {len(cells)} columns, the heading {len(self.names)}; is a decimal comma in it?",
+                number,
             )
         values: dict[str, Any] = {SECTION_LINE: number}
         for index, (name, unit, cell) in enumerate(zip(self.names, self.units, cells, strict=False)):
@@ -101,11 +107,14 @@ def _text(path: Path) -> str:
         return path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise MachineFileError(
-            f"cannot read the shaft table: {error.strerror}; the path counts from the folder of the machine file",
+            f"cannot read the shaft table: {error.strerror}; the path counts from the folder of "
+            "the machine file",
             file=path,
         ) from error
     except UnicodeDecodeError as error:
-        raise MachineFileError("the shaft table is not UTF-8 text; save it as CSV UTF-8", file=path) from error
+        raise MachineFileError(
+            "the shaft table is not UTF-8 text; save it as CSV UTF-8", file=path
+        ) from error
 
 
 def _separator(heading: str) -> str:
@@ -119,9 +128,23 @@ def _by_position(rows: list[dict[str, Any]], table: _Table) -> dict[str, Any]:
         _need(row, "outer_diameter", table)
     positions = [row.pop("position").value for row in rows]
     if set(rows[-1]) != {SECTION_LINE}:
-        raise table.error("the last row must hold the end of the shaft only, its position", rows[-1][SECTION_LINE])
-    sections = [row | {"nodes": [index, index + 1]} for index, row in enumerate(rows[:-1], start=1)]
+        raise table.error(
+            "the last row must hold the end of the shaft only, its position", rows[-1][SECTION_LINE]
+        )
+    sections: list[dict[str, Any]] = []
+    for node, row in enumerate(rows[:-1], start=1):
+        if sections and _same_shaft(sections[-1], row):
+            sections[-1]["nodes"][1] = node + 1
+        else:
+            sections.append(row | {"nodes": [node, node + 1]})
     return {"node_positions": tuple(positions), "sections": sections}
+
+
+def _same_shaft(section: dict[str, Any], row: dict[str, Any]) -> bool:
+    ignored = {SECTION_LINE, "nodes"}
+    return {k: v for k, v in section.items() if k not in ignored} == {
+        k: v for k, v in row.items() if k not in ignored
+    }
 
 
 def _need(row: dict[str, Any], name: str, table: _Table) -> None:

@@ -26,4 +26,6 @@ class SpeedDescription(Description):
         default=None, description="Time constant of the fall of speed by aerodynamic drag alone"
     )
     aero_linear: Drag | None = Field(default=None, description="Aerodynamic torque per speed")
-    aero_quadratic: QuadraticDrag | None = Field(default=None, description="Aerodynamic torque per speed squared")
+    aero_quadratic: QuadraticDrag | None = Field(
+        default=None, description="Aerodynamic torque per speed squared"
+    )

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 from pydantic import Field
 
@@ -31,6 +33,7 @@ from rotordrop.machine.values import (
 LINE_CONTACT = 10.0 / 9.0
 """Exponent of a line contact (Palmgren)."""
 
+_UNIT_EXPONENT = re.compile(r"m\s*(?:\^|\*\*)\s*([\d.]+)\s*$")
 _STATIC_OVER_DYNAMIC = 1.3
 _DAMPING_RATIO = 0.025
 _STEEL_DENSITY = 7800.0
@@ -56,7 +59,23 @@ class Contact(Description):
     damping: ContactDamping = default(0.08, "contact damping of steel at low speed", (0.0, 0.5))
     length: PositiveLength | None = Field(default=None, description="Length of the line contact")
 
-    displaces = {"stiffness": ("length",)}
+    displaces: ClassVar[Mapping[str, tuple[str, ...]]] = {"stiffness": ("length",)}
+
+    @classmethod
+    def rewritten(cls, raw: dict[str, Any]) -> dict[str, Any]:
+        """Refuse a stiffness whose unit holds another exponent than the contact."""
+        exponent = raw.get("exponent", LINE_CONTACT)
+        written = raw.get("stiffness")
+        if isinstance(written, Mapping):
+            written = written.get("value", written.get("guess"))
+        found = _UNIT_EXPONENT.search(written) if isinstance(written, str) else None
+        if found and isinstance(exponent, int | float) and abs(float(found.group(1)) - exponent) > 0.01:
+            raise Misfit(
+                f"{written!r} belongs to the exponent {found.group(1)}, but the contact has the exponent "
+                f"{exponent:.4g}; change the unit or give 'exponent'",
+                ("stiffness",),
+            )
+        return raw
 
     def check(self) -> None:
         """Refuse a stiffness given twice."""
@@ -85,9 +104,9 @@ class Contact(Description):
 
 
 def palmgren_stiffness(length: float) -> float:
-    """Contact stiffness [N/m^(10/9)] of a line contact of a length [m], δ = 3.84e-5 Q^0.9 / l^0.8 (mm, N)."""
-    per_mm: float = 3.84e-5 ** (-LINE_CONTACT) * (1e3 * length) ** (0.8 * LINE_CONTACT)
-    return per_mm * 1e3**LINE_CONTACT
+    """Contact stiffness [N/m^(10/9)] of a line contact [m]: δ = 3.84e-5 Q^0.9 / l^0.8 in mm and N."""
+    per_mm = math.pow(3.84e-5, -LINE_CONTACT) * math.pow(1e3 * length, 0.8 * LINE_CONTACT)
+    return per_mm * math.pow(1e3, LINE_CONTACT)
 
 
 class Friction(Description):
@@ -133,7 +152,9 @@ class Race(Description):
 
     mass: PositiveMass = follows("from the size of the bearing")
     inertia: PositiveInertia = follows("from the size of the bearing")
-    drag_coefficient: NonNegative = default(0.002, "rolling friction of angular-contact bearings", (0.001, 0.005))
+    drag_coefficient: NonNegative = default(
+        0.002, "rolling friction of angular-contact bearings", (0.001, 0.005)
+    )
     drag_speed: PositiveSpeed = default(1.0, "small against any race speed that matters in a drop")
 
 
@@ -152,7 +173,9 @@ class Support(Description):
         In place of the horizontal damping.
     """
 
-    mass: PositiveMass = default(40.0, "the housing parts around the bearing of the reference machine", (4.0, 400.0))
+    mass: PositiveMass = default(
+        40.0, "the housing parts around the bearing of the reference machine", (4.0, 400.0)
+    )
     stiffness: Stiffness = default(1e8, "a first guess for a bearing housing", (1e7, 2e9))
     damping: Damping = follows("2.5 % of critical, or from the damping ratio")
     damping_ratio: NonNegative | None = Field(default=None, description="In place of the damping")
@@ -163,7 +186,7 @@ class Support(Description):
         default=None, description="In place of the horizontal damping"
     )
 
-    displaces = {
+    displaces: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "damping": ("damping_ratio",),
         "damping_ratio": ("damping",),
         "damping_horizontal": ("damping_ratio_horizontal",),
@@ -186,7 +209,9 @@ class Support(Description):
         for name in ("mass", "stiffness"):
             if f"{name}_horizontal" not in given:
                 vertical = getattr(self, name)
-                values[f"{name}_horizontal"] = _scaled(vertical, 1.0, "equal to the vertical one", vertical.unit)
+                values[f"{name}_horizontal"] = _scaled(
+                    vertical, 1.0, "equal to the vertical one", vertical.unit
+                )
         if "damping" not in given:
             values["damping"] = _from_ratio(self.damping_ratio, self.mass, self.stiffness)
         if "damping_horizontal" not in given:

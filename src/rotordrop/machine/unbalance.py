@@ -45,7 +45,7 @@ class BalanceGrade(Description):
         Permissible unbalance of the whole rotor [kg m], where it is given beside the grade.
     """
 
-    grade_mm_s: float = Field(gt=0.0, description="The grade, such as \"G 2.5\", \"2.5 mm/s\" or 2.5")
+    grade_mm_s: float = Field(gt=0.0, description='The grade, such as "G 2.5", "2.5 mm/s" or 2.5')
     at_speed: PositiveSpeed
     permissible: UnbalanceAmount | None = None
 
@@ -73,7 +73,7 @@ def _grade(raw: Any) -> float:
     if isinstance(raw, int | float) and not isinstance(raw, bool):
         return float(raw)
     if not isinstance(raw, str):
-        raise UsageError(f"grade = {raw!r} is not a balance grade; write grade = \"G 2.5\"")
+        raise UsageError(f'grade = {raw!r} is not a balance grade; write grade = "G 2.5"')
     text = raw.strip().removeprefix("G").strip()
     return 1e3 * parse_quantity(text if text.endswith("/s") else f"{text} mm/s", "velocity")
 
@@ -83,8 +83,8 @@ def from_grade(
 ) -> tuple[Unbalance, ...]:
     """Share the permissible unbalance among the planes of the bearings, all at the same unknown phase.
 
-    ISO 21940-11 gives each of two bearing planes the share of the weight it carries. The phase is not known to
-    a balance grade: zero stands for it, with the whole turn as its range.
+    ISO 21940-11 gives each of two bearing planes the share of the weight it carries. The phase is not known
+    to a balance grade: zero stands for it, with the whole turn as its range.
 
     Parameters
     ----------

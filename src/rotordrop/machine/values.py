@@ -5,18 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, cast, get_args
 
 from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
 from rotordrop.errors import UsageError
-from rotordrop.estimated import Estimated
+from rotordrop.estimated import Estimated, Status
 from rotordrop.units import KINDS, format_quantity, parse_quantity, si_unit
 
 LEFT_OUT = Estimated(value=math.nan, status="default", source="follows from other values")
 """Stands for a value that was left out and follows from its neighbours."""
 
+_STATUSES: tuple[Status, ...] = get_args(Status)
 _TABLE_KEYS = ("value", "guess", "range", "interval", "standard_error", "lower", "upper", "source", "status")
 
 
@@ -51,8 +52,14 @@ class Physical:
         pair = {"type": "array", "items": number, "minItems": 2, "maxItems": 2}
         shared: dict[str, Any] = {"source": {"type": "string"}}
         guess = {"guess": number, "range": pair, **shared}
-        known = {"value": number, "interval": pair, "standard_error": number, "lower": number, "upper": number}
-        known |= {"range": pair, "status": {"enum": ["inferred"]}, **shared}
+        known = {
+            "value": number,
+            "interval": pair,
+            "standard_error": number,
+            "lower": number,
+            "upper": number,
+        }
+        known |= {"range": pair, "status": {"enum": list(_STATUSES)}, **shared}
         return {
             "anyOf": [
                 number,
@@ -68,10 +75,11 @@ class Physical:
 
     def read(self, raw: Any) -> Estimated:
         """Read a number with unit, a guess with range, or an estimate with interval and source."""
-        if raw is LEFT_OUT:
-            return LEFT_OUT
         if isinstance(raw, Estimated):
-            return self._admissible(raw if raw.unit else replace(raw, unit=si_unit(self.kind)), raw)
+            if raw is LEFT_OUT:
+                return raw
+            unit = si_unit(self.kind)
+            return self._admissible(raw if raw.unit == unit else replace(raw, unit=unit), raw)
         if isinstance(raw, Mapping):
             return self._admissible(self._from_table(raw), raw)
         return self._admissible(Estimated(value=self.number(raw), unit=si_unit(self.kind)), raw)
@@ -80,7 +88,8 @@ class Physical:
         """Read one number [SI unit of the kind]."""
         if isinstance(raw, int | float) and not isinstance(raw, bool) and KINDS[self.kind].unit:
             raise UsageError(
-                f"{raw!r} has no unit; {spoken(self.kind)} needs one, for example {KINDS[self.kind].example!r}"
+                f"{raw!r} has no unit; {spoken(self.kind)} needs one, for example "
+                f"{KINDS[self.kind].example!r}"
             )
         if isinstance(raw, str) and (exact := _exact_si(raw, self.kind)) is not None:
             return exact
@@ -140,7 +149,9 @@ class Physical:
 
     def _check(self, number: float, raw: Any) -> None:
         if not math.isfinite(number):
-            raise UsageError(f"{raw!r} is not a finite number; write for example {KINDS[self.kind].example!r}")
+            raise UsageError(
+                f"{raw!r} is not a finite number; write for example {KINDS[self.kind].example!r}"
+            )
         if self.above is not None and not number > self.above:
             limit = "positive" if self.above == 0 else f"greater than {self.text(self.above)}"
             raise UsageError(f"{self.text(number)} is not allowed here; {spoken(self.kind)} must be {limit}")
@@ -170,27 +181,26 @@ def follows(why: str) -> Any:
     return Field(default=LEFT_OUT, description=f"When left out: {why}")
 
 
-def _status(table: Mapping[str, Any]) -> Literal["given", "estimated", "inferred"]:
+def _status(table: Mapping[str, Any]) -> Status:
     stated = table.get("status")
-    if stated is not None:
-        if stated != "inferred":
-            raise UsageError(f"status = {stated!r} is not known; only 'inferred' may be stated")
-        return "inferred"
-    estimated = {"interval", "standard_error", "lower", "upper"} & set(table)
-    return cast(Literal["given", "estimated"], "estimated" if estimated else "given")
+    if stated is None:
+        return "estimated" if {"interval", "standard_error", "lower", "upper"} & set(table) else "given"
+    if stated not in _STATUSES:
+        raise UsageError(f"status = {stated!r} is not known; it is one of {', '.join(_STATUSES)}")
+    return cast(Status, stated)
 
 
 def _source(table: Mapping[str, Any]) -> str | None:
     source = table.get("source")
     if source is not None and not isinstance(source, str):
-        raise UsageError(f"source = {source!r} is not a text; write source = \"where the value comes from\"")
+        raise UsageError(f'source = {source!r} is not a text; write source = "where the value comes from"')
     return source
 
 
 def _exact_si(text: str, kind: str) -> float | None:
-    """Read a text in the SI unit of the kind without converting, so that what was saved comes back exactly."""
+    """Read a text in the SI unit of the kind without converting: what was saved comes back exactly."""
     head, _, unit = text.strip().partition(" ")
-    if unit != si_unit(kind) or not unit:
+    if unit != si_unit(kind) or not unit or not head.isascii():
         return None
     try:
         number = float(head)

@@ -87,8 +87,8 @@ def find_bearing(designation: str) -> CatalogueBearing:
         nearest = ", ".join(_index()[key].designation for key in close)
         hint = f"did you mean one of {nearest}?" if close else "no designation is similar."
         raise LookupError(
-            f"the catalogue holds no bearing {designation!r}; {hint} Else give the geometry: 'ball_diameter', "
-            "'ball_count', 'pitch_diameter', 'contact_angle' and a 'preload' in N"
+            f"the catalogue holds no bearing {designation!r}; {hint} Else give the geometry: "
+            "'ball_diameter', 'ball_count', 'pitch_diameter', 'contact_angle' and a 'preload' in N"
         )
     return found
 

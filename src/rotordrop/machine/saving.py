@@ -1,0 +1,178 @@
+"""Write a machine to a TOML file that reads back as the same machine."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+from rotordrop.atomic_file import write_text
+from rotordrop.estimated import Estimated
+from rotordrop.machine.ball_bearing import BallBearing
+from rotordrop.machine.description import Description
+from rotordrop.machine.machine import Machine
+from rotordrop.machine.provenance import kind_of
+from rotordrop.machine.rotor import Rotor
+from rotordrop.machine.unbalance import BalanceGrade
+from rotordrop.units import KINDS, parse_quantity, si_unit
+
+_FILE_UNITS = {
+    "length": (("mm", 1e-3), ("um", 1e-6), ("m", 1.0)),
+    "mass": (("kg", 1.0),),
+    "speed": (("Hz", 6.283185307179586),),
+    "angle": (("deg", 0.017453292519943295),),
+    "pressure": (("GPa", 1e9),),
+    "unbalance": (("g mm", 1e-6),),
+    "voltage_sensitivity": (("mV/um", 1e3),),
+}
+"""Units to write a kind in when the number comes back exactly; else its SI unit."""
+
+
+def save_machine(machine: Machine, path: str | os.PathLike[str]) -> None:
+    """Write a machine to a TOML file, with guesses, intervals and sources.
+
+    What was left out of the description stays left out, so that defaults remain defaults. A shaft that came
+    from a table is written into the file, which therefore stands alone. Reading the file gives an equal
+    machine.
+    """
+    write_text(path, machine_text(machine))
+
+
+def machine_text(machine: Machine) -> str:
+    """Give the TOML text of a machine."""
+    return "\n".join(_table(_content(machine), "")).strip("\n") + "\n"
+
+
+@dataclass(frozen=True)
+class _Written:
+    """A value as it stands in the file."""
+
+    text: str
+
+
+def _content(part: Description) -> dict[str, Any]:
+    """What a description writes: texts, tables and lists of tables, by key."""
+    content: dict[str, Any] = {}
+    for name in sorted(type(part).model_fields, key=lambda name: name != "name"):
+        if name in part.model_fields_set and (value := getattr(part, name)) is not None:
+            content[name] = _item(type(part), name, value)
+    return _shorthand(part, content)
+
+
+def _item(owner: type[Description], name: str, value: Any) -> Any:
+    if isinstance(value, Estimated):
+        return _Written(_value_text(value, kind_of(owner, name)))
+    if isinstance(value, Description):
+        return _content(value)
+    if isinstance(value, dict):
+        return {key: _content(item) for key, item in value.items()}
+    if isinstance(value, tuple) and value and isinstance(value[0], Description):
+        return [_content(item) for item in value]
+    return _Written(_plain_text(value))
+
+
+def _shorthand(part: Description, content: dict[str, Any]) -> dict[str, Any]:
+    """Write what the file says in another way than the description."""
+    if isinstance(part, Rotor) and "node_positions" in content:
+        content["node_positions"] = _positions(part.node_positions)
+    if isinstance(part, BalanceGrade):
+        grade = _Written(_plain_text(f"G {repr(part.grade_mm_s).removesuffix('.0')}"))
+        content = {"grade": grade} | {key: value for key, value in content.items() if key != "grade_mm_s"}
+    if isinstance(part, BallBearing) and "preload_class" in content:
+        content["preload"] = content.pop("preload_class")
+    return content
+
+
+def _positions(positions: tuple[float, ...]) -> dict[str, Any]:
+    texts = [_number_text(position, "length").split(" ", 1) for position in positions]
+    unit = "mm" if all(unit == "mm" for _, unit in texts) else "m"
+    numbers = [number for number, _ in texts] if unit == "mm" else [repr(position) for position in positions]
+    return {"unit": _Written(_plain_text(unit)), "values": _Written(f"[{', '.join(numbers)}]")}
+
+
+def _table(content: dict[str, Any], header: str) -> Iterator[str]:
+    """Write the lines of a table: values first, then the tables below it."""
+    for key, item in content.items():
+        if isinstance(item, _Written):
+            yield f"{_key(key)} = {item.text}"
+    for key, item in content.items():
+        path = f"{header}.{_key(key)}" if header else _key(key)
+        if isinstance(item, dict):
+            holds_values = any(isinstance(entry, _Written) for entry in item.values())
+            yield from ("", f"[{path}]") if holds_values else ()
+            yield from _table(item, path)
+        elif isinstance(item, list):
+            for entry in item:
+                yield from ("", f"[[{path}]]", *_table(entry, path))
+
+
+def _key(key: str) -> str:
+    bare = key.isascii() and key.replace("_", "").replace("-", "").isalnum()
+    return key if bare else _plain_text(key)
+
+
+def _plain_text(value: Any) -> str:
+    import tomlkit
+
+    if isinstance(value, tuple) and any(isinstance(entry, str) for entry in value):
+        return "[\n" + "".join(f"  {_plain_text(entry)},\n" for entry in value) + "]"
+    text: str = tomlkit.item(list(value) if isinstance(value, tuple) else value).as_string()
+    return text
+
+
+def _value_text(value: Estimated, kind: str) -> str:
+    entries = {"guess" if _is_plain_guess(value) else "value": _quoted(value.value, kind)}
+    for key, pair in (("range", value.range), ("interval", value.interval_90)):
+        if pair is not None:
+            entries[key] = f"[{_quoted(pair[0], kind)}, {_quoted(pair[1], kind)}]"
+    for key in ("standard_error", "lower", "upper"):
+        if (number := getattr(value, key)) is not None:
+            entries[key] = _quoted(number, kind)
+    if value.source is not None:
+        entries["source"] = _plain_text(value.source)
+    if "guess" not in entries and value.status != _status_read_back(value):
+        entries["status"] = _plain_text(value.status)
+    if set(entries) == {"value"}:
+        return entries["value"]
+    return "{ " + ", ".join(f"{key} = {text}" for key, text in entries.items()) + " }"
+
+
+def _is_plain_guess(value: Estimated) -> bool:
+    return value.status == "guess" and value.interval_90 is None and value.standard_error is None
+
+
+def _status_read_back(value: Estimated) -> str:
+    known = (value.interval_90, value.standard_error, value.lower, value.upper)
+    return "given" if all(number is None for number in known) else "estimated"
+
+
+def _quoted(number: float, kind: str) -> str:
+    text = _number_text(number, kind)
+    return f'"{text}"' if KINDS[kind].unit else text
+
+
+@lru_cache(maxsize=4096)
+def _number_text(number: float, kind: str) -> str:
+    """Write a number so that it comes back exactly, in a unit an engineer likes where that is possible."""
+    if not KINDS[kind].unit:
+        return repr(float(number))
+    for unit, factor in _FILE_UNITS.get(kind, ()):
+        text = f"{number / factor:.12g} {unit}"
+        if parse_quantity(text, kind) == number and (number == 0.0 or 1e-3 <= abs(number / factor) < 1e6):
+            return text
+    return f"{_shortest(number)} {si_unit(kind)}"
+
+
+def _shortest(number: float) -> str:
+    """Write a number so that it reads back exactly, with or without exponent, whichever is shorter."""
+    plain = repr(number)
+    mantissa, exponent = f"{number:.16e}".split("e")
+    for digits in range(17):
+        candidate, exponent = f"{number:.{digits}e}".split("e")
+        if float(f"{candidate}e{exponent}") == number:
+            mantissa = candidate
+            break
+    scientific = f"{mantissa}e{int(exponent)}"
+    return scientific if len(scientific) < len(plain.removesuffix(".0")) else plain.removesuffix(".0")
