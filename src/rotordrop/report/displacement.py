@@ -5,7 +5,15 @@ from __future__ import annotations
 import plotly.graph_objects as go
 
 from rotordrop.report.history import BearingMotions
-from rotordrop.report.style import MICRO, TIME_TITLE, add_gap_limits, add_history, axis_title, panels
+from rotordrop.report.style import (
+    MICRO,
+    TIME_TITLE,
+    add_gap_limits,
+    add_history,
+    axis_title,
+    fit_legend,
+    panels,
+)
 
 
 def displacement_figure(bearing: BearingMotions) -> go.Figure:
@@ -38,4 +46,4 @@ def displacement_figure(bearing: BearingMotions) -> go.Figure:
     figure.update_xaxes(title_text=TIME_TITLE, row=2)
     figure.update_yaxes(title_text=axis_title("displacement y", "µm"), row=1)
     figure.update_yaxes(title_text=axis_title("displacement x", "µm"), row=2)
-    return figure
+    return fit_legend(figure)

@@ -7,7 +7,15 @@ from collections.abc import Sequence
 import plotly.graph_objects as go
 
 from rotordrop.report.history import BearingMotions
-from rotordrop.report.style import MICRO, TIME_TITLE, add_gap_limits, add_history, axis_title, panels
+from rotordrop.report.style import (
+    MICRO,
+    TIME_TITLE,
+    add_gap_limits,
+    add_history,
+    axis_title,
+    fit_legend,
+    panels,
+)
 
 
 def displacement_pair_figure(bearings: Sequence[BearingMotions]) -> go.Figure:
@@ -34,4 +42,4 @@ def displacement_pair_figure(bearings: Sequence[BearingMotions]) -> go.Figure:
         figure.update_yaxes(title_text=axis_title("displacement", "µm"), row=row, col=1)
     figure.update_xaxes(title_text=TIME_TITLE, row=len(bearings))
     figure.update_xaxes(matches="x")
-    return figure
+    return fit_legend(figure)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
 import plotly.graph_objects as go
 
 from rotordrop.report.history import AirGap, BearingMotions, History, between
@@ -85,7 +86,7 @@ def first_contact_figure(
             _mark(figure, contact, bearing, column)
     figure.update_xaxes(title_text=TIME_TITLE, range=[0.0, MILLI * until])
     figure.update_yaxes(title_text=axis_title("vertical displacement y", "µm"), col=1)
-    return figure
+    return fit_legend(figure)
 
 
 def _mark(figure: go.Figure, contact: FirstContact, bearing: BearingMotions, column: int) -> None:
@@ -106,16 +107,17 @@ def _mark(figure: go.Figure, contact: FirstContact, bearing: BearingMotions, col
         row=1,
         col=column,
     )
-    gap = 0.0 if bearing.air_gap is None else bearing.air_gap.upper
+    drawn = bearing.motions[0].vertical
+    depth = float(np.interp(contact.deepest_time, drawn.time, drawn.values))
     figure.add_annotation(
         x=MILLI * contact.deepest_time,
-        y=-MICRO * (gap + contact.indentation),
+        y=MICRO * depth,
         text=f"indentation {MICRO * contact.indentation:.1f} µm",
         showarrow=True,
         arrowhead=2,
         arrowcolor=LIMIT,
         ax=70,
-        ay=-6,
+        ay=-4,
         xanchor="left",
         font={"size": 11.5, "color": INK},
         row=1,

@@ -19,6 +19,7 @@ from rotordrop.report.style import (
     add_history,
     add_level,
     axis_title,
+    fit_legend,
     panels,
 )
 
@@ -66,7 +67,7 @@ def force_figure(
         if load is not None:
             add_level(figure, load, "share of the weight", row=row, col=1, legend=row == 1)
     figure.update_yaxes(title_text=axis_title("bearing force", "N"), rangemode="tozero")
-    return figure
+    return fit_legend(figure)
 
 
 def history_panels(

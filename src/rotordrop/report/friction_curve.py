@@ -9,7 +9,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from rotordrop.physics.friction import stribeck_coefficient
-from rotordrop.report.style import SERIES, axis_title, panels, plain, single
+from rotordrop.report.style import SERIES, axis_title, fit_legend, panels, plain, single
 
 POINTS = 801
 
@@ -62,7 +62,7 @@ def friction_curve_figure(laws: Sequence[FrictionLaw], *, highest_speed: float |
             )
     figure.update_xaxes(title_text=axis_title("relative surface speed", "m/s"))
     figure.update_yaxes(title_text=axis_title("friction coefficient", "1"), col=1)
-    return figure
+    return fit_legend(figure)
 
 
 def _coefficient(law: FrictionLaw, speed: float) -> float:

@@ -9,7 +9,17 @@ import plotly.graph_objects as go
 
 from rotordrop.report.decimation import peak_indices
 from rotordrop.report.history import BearingMotions, Motion
-from rotordrop.report.style import LIMIT, MICRO, MILLI, axis_title, line_style, panels, plain, single
+from rotordrop.report.style import (
+    LIMIT,
+    MICRO,
+    MILLI,
+    axis_title,
+    fit_legend,
+    line_style,
+    panels,
+    plain,
+    single,
+)
 
 CIRCLE = np.linspace(0.0, 2.0 * np.pi, 181)
 ORBIT_BLOCKS = 450
@@ -38,7 +48,7 @@ def orbit_figure(bearings: Sequence[BearingMotions]) -> go.Figure:
         figure.update_xaxes(constrain="domain", range=[-reach, reach], row=1, col=column)
     figure.update_xaxes(title_text=axis_title("horizontal displacement x", "µm"))
     figure.update_yaxes(title_text=axis_title("vertical displacement y", "µm"))
-    return figure
+    return fit_legend(figure)
 
 
 def _add_orbit(figure: go.Figure, motion: Motion, column: int) -> None:

@@ -18,10 +18,11 @@ DISPLAY: dict[str, tuple[float, str]] = {
     "stiffness": (1e6, "N/µm"),
     "damping": (1.0, "N s/m"),
     "impulse": (1.0, "N s"),
-    "energy": (1e-3, "mJ"),
+    "energy": (1.0, "J"),
     "inertia": (1e-6, "kg mm²"),
     "voltage_sensitivity": (1e3, "mV/µm"),
     "share": (1e-2, "%"),
+    "count": (1.0, ""),
 }
 """Unit in which a report shows a kind, so that the numbers of a column can be compared."""
 
@@ -123,6 +124,8 @@ class Quantity:
         """Decimal places: two digits of the error if there is one, else the significant digits asked for."""
         value = self._shown(self.value)
         if not math.isfinite(value):
+            return 0
+        if self.kind == "count":
             return 0
         if abs(_magnitude(value)) >= PLACES_OF_SCIENCE:
             return None

@@ -7,7 +7,15 @@ from collections.abc import Sequence
 import plotly.graph_objects as go
 
 from rotordrop.report.history import BearingMotions
-from rotordrop.report.style import MICRO, TIME_TITLE, add_gap_limits, add_history, axis_title, panels
+from rotordrop.report.style import (
+    MICRO,
+    TIME_TITLE,
+    add_gap_limits,
+    add_history,
+    axis_title,
+    fit_legend,
+    panels,
+)
 
 
 def radial_figure(bearings: Sequence[BearingMotions]) -> go.Figure:
@@ -31,4 +39,4 @@ def radial_figure(bearings: Sequence[BearingMotions]) -> go.Figure:
             add_gap_limits(figure, bearing.air_gap, row=row, legend=row == 1)
     figure.update_yaxes(title_text=axis_title("radial displacement", "µm"), rangemode="tozero")
     figure.update_xaxes(title_text=TIME_TITLE, row=len(bearings))
-    return figure
+    return fit_legend(figure)

@@ -8,7 +8,7 @@ import plotly.graph_objects as go
 
 from rotordrop.report.force import Peak, history_panels, mark_peak
 from rotordrop.report.history import BearingHistories
-from rotordrop.report.style import add_level, axis_title
+from rotordrop.report.style import add_level, axis_title, fit_legend
 
 MEGA = 1e-6
 
@@ -39,4 +39,4 @@ def stress_figure(
         if preload is not None:
             add_level(figure, MEGA * preload, "preload alone", row=row, col=1, legend=row == 1)
     figure.update_yaxes(title_text=axis_title("max. Hertz stress", "MPa"))
-    return figure
+    return fit_legend(figure)

@@ -1,0 +1,113 @@
+"""A report's verdict and numbers for the terminal."""
+
+from __future__ import annotations
+
+from typing import IO, TYPE_CHECKING
+from unicodedata import category
+
+from rotordrop.report.content import Cell, Level, ReportContent, Statement, Table
+from rotordrop.report.quantity import Quantity
+
+if TYPE_CHECKING:
+    from rich.console import Console, RenderableType
+
+MARKS: dict[Level, tuple[str, str]] = {
+    "good": ("good", "green"),
+    "notice": ("note", "cyan"),
+    "warning": ("warning", "yellow"),
+    "bad": ("problem", "bold red"),
+}
+
+
+def print_summary(content: ReportContent, console: Console | None = None) -> None:
+    """Print title, verdict, headline numbers and summary tables of a report.
+
+    Colours follow the terminal: none with ``NO_COLOR`` set or when the output is not a terminal. Names from
+    files cannot switch colours on.
+
+    Parameters
+    ----------
+    content : ReportContent
+        What the report says.
+    console : rich.console.Console, optional
+        Where to print; standard output by default.
+    """
+    console = console or summary_console()
+    for part in _parts(content):
+        console.print(part)
+
+
+def summary_console(file: IO[str] | None = None) -> Console:
+    """A console that obeys ``NO_COLOR`` and writes plain text when its output is not a terminal."""
+    from rich.console import Console
+
+    return Console(file=file, highlight=False, markup=False, emoji=False)
+
+
+def _parts(content: ReportContent) -> list[RenderableType]:
+    from rich.text import Text
+
+    parts: list[RenderableType] = [Text(_safe(content.title), style="bold")]
+    if content.subtitle:
+        parts.append(Text(_safe(content.subtitle), style="dim"))
+    if content.simulated:
+        parts.append(Text(_safe(content.simulated), style="yellow"))
+    if content.cards:
+        parts.append(_cards(content))
+    parts.extend(_statement(statement) for statement in content.verdict)
+    parts.extend(_table(table) for table in content.summary)
+    return parts
+
+
+def _cards(content: ReportContent) -> RenderableType:
+    """Headline numbers, one column per bearing."""
+    labels = list(dict.fromkeys(figure.label for card in content.cards for figure in card.figures))
+    rows = []
+    for label in labels:
+        cells: list[Cell] = [label]
+        for card in content.cards:
+            found = next((figure.value for figure in card.figures if figure.label == label), "")
+            cells.append(found)
+        rows.append(tuple(cells))
+    columns = ("", *(card.title for card in content.cards))
+    return _table(Table(columns=columns, rows=tuple(rows)))
+
+
+def _statement(statement: Statement) -> RenderableType:
+    from rich.text import Text
+
+    word, style = MARKS[statement.level]
+    return Text.assemble((f"{word}: ", style), _safe(statement.text))
+
+
+def _table(table: Table) -> RenderableType:
+    from rich import box
+    from rich.table import Table as RichTable
+    from rich.text import Text
+
+    drawn = RichTable(
+        title=Text(_safe(table.caption)) if table.caption else None,
+        title_justify="left",
+        box=box.SIMPLE_HEAD,
+        pad_edge=False,
+    )
+    for index, column in enumerate(table.columns):
+        numeric = bool(table.rows) and isinstance(table.rows[0][index], Quantity)
+        drawn.add_column(Text(_safe(column)), justify="right" if numeric else "left")
+    for row in table.rows:
+        drawn.add_row(*(Text(_cell(cell)) for cell in row))
+    return drawn
+
+
+def _cell(cell: Cell) -> str:
+    if not isinstance(cell, Quantity):
+        return _safe(cell)
+    interval = cell.interval_text
+    if not interval:
+        return cell.text
+    return f"{cell.text}\n{'90 %: ' if cell.interval_90 else ''}{interval}"
+
+
+def _safe(text: str) -> str:
+    """Text without control characters, which a name from a file could use to repaint the terminal."""
+    return "".join("\N{REPLACEMENT CHARACTER}" if category(mark).startswith("C") else mark for mark in text)
