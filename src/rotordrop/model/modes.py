@@ -111,9 +111,10 @@ def _eigenpairs(stiffness: Array, mass: Array, count: int) -> tuple[Array, Array
     try:
         values, vectors = eigh(stiffness, mass, subset_by_index=(0, count - 1))
     except LinAlgError:
-        bare = [1 + i // 2 for i in range(0, len(mass), 2) if mass[i, i] <= 0.0 or mass[i + 1, i + 1] <= 0.0]
+        bare = [1 + i // 2 for i in range(0, len(mass), 2) if min(mass[i, i], mass[i + 1, i + 1]) <= 0.0]
+        where = f"at node {bare[0]}" if bare else "somewhere"
         raise SimulationError(
-            f"the rotor has nodes without mass or inertia ({', '.join(map(str, bare)) or 'not found'}), so not "
-            "all of its modes are finite. Give the shaft a density, or ask for the 2 rigid modes only."
+            f"the rotor has neither mass nor inertia {where}, so not all of its modes are finite. "
+            "Give the shaft a density, or ask for the 2 rigid modes only."
         ) from None
     return np.asarray(values), np.asarray(vectors)

@@ -1,0 +1,164 @@
+"""What holds a machine's rotor, made linear: its AMBs, or the touchdown bearings it has settled in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.errors import UsageError
+from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.model.parameters import static_bearing_stiffness
+from rotordrop.model.statics import bearing_load_shares
+from rotordrop.model.supports import Support, in_series, link, spring
+from rotordrop.physics.ball_bearing import bearing_constants
+from rotordrop.physics.ball_bearing_response import simple_radial_stiffness
+from rotordrop.physics.hertz import compliance
+
+Array = NDArray[np.float64]
+
+SUSPENSIONS = ("free-free", "AMBs", "touchdown bearings")
+FORMULAS = ("tangent", "simple")
+_STEEL_YOUNGS_MODULUS = 208e9
+_STEEL_POISSON_RATIO = 0.3
+
+
+@dataclass(frozen=True, kw_only=True)
+class EquivalentStiffness:
+    """How stiff one touchdown bearing holds the settled rotor, vertically, part by part.
+
+    Attributes
+    ----------
+    bearing : str
+        Name of the touchdown bearing.
+    node : int
+        Its node, counted from 1.
+    load : float
+        Static load [N].
+    tangent, simple : float
+        Radial stiffness of the ball bearing at that load [N/m]: slope of the ball forces with preload, and
+        the simple engineering formula, which knows no preload.
+    support : float
+        Stiffness of the support [N/m].
+    contact : float
+        Slope of the contact law between rotor and race at that load [N/m].
+    """
+
+    bearing: str
+    node: int
+    load: float
+    tangent: float
+    simple: float
+    support: float
+    contact: float
+
+    def equivalent(self, formula: str = "tangent", *, contact: bool = False) -> float:
+        """Bearing and support in series [N/m], with the contact if asked (Neisi 2020, section 5.4)."""
+        if formula not in FORMULAS:
+            raise UsageError(f"unknown bearing stiffness {formula!r}; choose one of {', '.join(FORMULAS)}")
+        parts = [self.tangent if formula == "tangent" else self.simple, self.support]
+        return in_series(*parts, *([self.contact] if contact else []))
+
+
+def equivalent_stiffness(
+    machine: Machine, loads: Sequence[float] | None = None
+) -> tuple[EquivalentStiffness, ...]:
+    """Stiffness of each touchdown bearing under the settled rotor, in the machine's order.
+
+    Parameters
+    ----------
+    machine : Machine
+        The machine.
+    loads : sequence of float, length B, optional
+        Static load of each bearing [N]; the load shares of the weight by default.
+    """
+    shares = bearing_load_shares(machine) if loads is None else loads
+    pairs = zip(machine.touchdown_bearings, shares, strict=True)
+    return tuple(_of_bearing(bearing, float(load)) for bearing, load in pairs)
+
+
+def _of_bearing(bearing: TouchdownBearing, load: float) -> EquivalentStiffness:
+    if load <= 0.0:
+        raise UsageError(
+            f"touchdown bearing {bearing.name!r} carries {load:.3g} N of the rotor's weight and is not "
+            "loaded; its stiffness is not defined"
+        )
+    constants = bearing_constants(bearing.bearing)
+    ball = bearing.bearing
+    materials = compliance(
+        float(ball.ring_youngs_modulus),
+        float(ball.ring_poisson_ratio),
+        float(ball.ball_youngs_modulus),
+        float(ball.ball_poisson_ratio),
+    ) / compliance(_STEEL_YOUNGS_MODULUS, _STEEL_POISSON_RATIO, _STEEL_YOUNGS_MODULUS, _STEEL_POISSON_RATIO)
+    return EquivalentStiffness(
+        bearing=bearing.name,
+        node=bearing.node,
+        load=load,
+        tangent=static_bearing_stiffness(constants, load),
+        simple=simple_radial_stiffness(
+            float(ball.ball_diameter),
+            constants.row_count * constants.ball_count,
+            constants.contact_angle,
+            load,
+            materials,
+        ),
+        support=float(bearing.support.stiffness),
+        contact=contact_stiffness(float(bearing.contact.stiffness), float(bearing.contact.exponent), load),
+    )
+
+
+def contact_stiffness(K: float, n: float, load: float) -> float:
+    """Slope [N/m] of the contact law ``F = K δⁿ`` at a load [N]; K in N/mⁿ."""
+    return float(n * K ** (1.0 / n) * load ** (1.0 - 1.0 / n))
+
+
+def suspension_of(machine: Machine, name: str) -> tuple[Support, ...]:
+    """Supports of a machine's rotor by the name of what holds it, one of `SUSPENSIONS`."""
+    if name == "free-free":
+        return ()
+    if name == "AMBs":
+        return amb_supports(machine)
+    if name == "touchdown bearings":
+        return touchdown_supports(machine)
+    raise UsageError(f"unknown suspension {name!r}; choose one of {', '.join(map(repr, SUSPENSIONS))}")
+
+
+def amb_supports(machine: Machine) -> tuple[Support, ...]:
+    """Springs and dampers of the AMBs.
+
+    Not validated: a controller's stiffness depends on frequency; the machine file knows one number.
+    """
+    if not machine.ambs:
+        raise UsageError(f"machine {machine.name!r} has no AMBs; add their nodes to the machine file")
+    return tuple(spring(amb.node, float(amb.stiffness), float(amb.damping)) for amb in machine.ambs)
+
+
+def touchdown_supports(
+    machine: Machine, formula: str = "tangent", loads: Sequence[float] | None = None
+) -> tuple[Support, ...]:
+    """Contact, race, ball bearing and support under the settled rotor, with their masses and damping.
+
+    The bearing damping of a formula is the machine's damping time times the tangent stiffness.
+    Differs from the paper: its critical speed map has neither the contact nor the masses. The contact holds
+    the rotor in both directions here; the slow swing along the race is the pendulum's, not a mode.
+    """
+    if formula not in FORMULAS:
+        raise UsageError(f"unknown bearing stiffness {formula!r}; choose one of {', '.join(FORMULAS)}")
+    supports = []
+    for bearing, parts in zip(machine.touchdown_bearings, equivalent_stiffness(machine, loads), strict=True):
+        ground = bearing.support
+        balls = parts.tangent if formula == "tangent" else parts.simple
+        links = (
+            link(parts.contact),
+            link(balls, float(bearing.damping_time) * parts.tangent),
+            link(
+                (float(ground.stiffness_horizontal), float(ground.stiffness)),
+                (float(ground.damping_horizontal), float(ground.damping)),
+            ),
+        )
+        masses = (float(bearing.race.mass), float(ground.mass))
+        supports.append(Support(node=bearing.node, links=links, masses=masses))
+    return tuple(supports)
