@@ -1,0 +1,57 @@
+"""Check a machine file and show what it amounts to.
+
+Prints mass, inertias, load shares, frequencies and sag, what was assumed, and where the drop model ends.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rotordrop.cli._options import JsonOption, MachineArgument, quantity
+from rotordrop.cli._output import deliver
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+def check(
+    machine: MachineArgument,
+    speed: Annotated[
+        float | None,
+        typer.Option(
+            parser=quantity("speed"),
+            metavar="SPEED",
+            help='Speed at the drop, such as "60 Hz", for the warnings; the nominal speed when left out.',
+        ),
+    ] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write the same with a drawing of the rotor as an HTML page."),
+    ] = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Check a machine file and show what it amounts to: mass, load shares, frequencies, sag, assumptions."""
+    from rotordrop.cli._rotor_text import rotor_lines
+    from rotordrop.machine import load_machine
+    from rotordrop.model.machine_summary import summarise_machine
+    from rotordrop.model.machine_warnings import machine_warnings
+    from rotordrop.report.machine_content import machine_content, machine_json
+    from rotordrop.report.terminal import print_summary
+
+    described = load_machine(machine)
+    summary = summarise_machine(described)
+    warnings = machine_warnings(described, summary, speed)
+
+    def summarise(out: Console) -> None:
+        print_summary(machine_content(described, summary, warnings), out)
+        for line in rotor_lines(described):
+            out.print(line, no_wrap=True, crop=True)
+
+    if report is not None:
+        from rotordrop.report.page import write_page
+
+        write_page(machine_content(described, summary, warnings, drawn=True), report)
+    deliver(machine_json(described, summary, warnings), json_file, summarise)

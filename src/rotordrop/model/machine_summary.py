@@ -1,0 +1,120 @@
+"""What a machine description amounts to: mass, inertias, load shares, frequencies, sag, bearings at rest."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.model.assembly import RotorFE, build_rotor_fe
+from rotordrop.model.modes import N_RIGID, free_free_modes, modes_on_springs
+from rotordrop.model.parameters import static_deflection
+from rotordrop.model.statics import bearing_load_shares, levitated_sag
+from rotordrop.physics.ball_bearing import BearingConstants, bearing_constants
+
+if TYPE_CHECKING:
+    from rotordrop.machine import Machine, TouchdownBearing
+
+Array = NDArray[np.float64]
+
+SHOWN_MODES = 4
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BearingSummary:
+    """One touchdown bearing with the rotor at rest in it.
+
+    Attributes
+    ----------
+    name : str
+        Name of the bearing.
+    load : float
+        Share of the rotor's weight [N].
+    constants : BearingConstants
+        Stiffness, preload and geometry of the ball bearing.
+    preload_stress : float
+        Hertz stress of a ball on the inner race from the preload alone [Pa].
+    deflection : float
+        Deflection of the race against the outer ring under the load [m].
+    tangent_stiffness : float
+        Radial stiffness of the ball bearing at that deflection [N/m].
+    support_frequency : float
+        Natural frequency of the support by itself, vertical [Hz].
+    equivalent_stiffness : float
+        Ball bearing and support in series [N/m].
+    """
+
+    name: str
+    load: float
+    constants: BearingConstants
+    preload_stress: float
+    deflection: float
+    tangent_stiffness: float
+    support_frequency: float
+    equivalent_stiffness: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MachineSummary:
+    """What a machine description amounts to.
+
+    Attributes
+    ----------
+    fe : RotorFE
+        Finite elements of the rotor, which know mass, centre of gravity and inertias.
+    bearings : tuple of BearingSummary
+        The touchdown bearings.
+    free_free : ndarray, shape (up to 4,)
+        Lowest bending frequencies of the free rotor [Hz].
+    settled : ndarray, shape (up to 4,)
+        Lowest frequencies of the rotor resting in its bearings, supports without mass [Hz].
+    levitated_sag : ndarray, shape (N,), or None
+        Vertical displacement of the levitated rotor at the nodes [m]; None with fewer than two AMB planes.
+    """
+
+    fe: RotorFE
+    bearings: tuple[BearingSummary, ...]
+    free_free: Array
+    settled: Array
+    levitated_sag: Array | None
+
+
+def summarise_machine(machine: Machine) -> MachineSummary:
+    """Compute what a machine description amounts to, to be read before any drop is trusted to it."""
+    fe = build_rotor_fe(machine)
+    loads = bearing_load_shares(machine, fe)
+    bearings = tuple(
+        _bearing(bearing, float(load))
+        for bearing, load in zip(machine.touchdown_bearings, loads, strict=True)
+    )
+    springs = {
+        bearing.node: summary.equivalent_stiffness
+        for bearing, summary in zip(machine.touchdown_bearings, bearings, strict=True)
+    }
+    levitated = len({amb.node for amb in machine.ambs}) >= 2
+    return MachineSummary(
+        fe=fe,
+        bearings=bearings,
+        free_free=free_free_modes(fe, min(fe.size, N_RIGID + SHOWN_MODES)).frequency[N_RIGID:],
+        settled=modes_on_springs(fe, springs, min(fe.size, SHOWN_MODES)).frequency,
+        levitated_sag=levitated_sag(fe, machine)[0::2] if levitated else None,
+    )
+
+
+def _bearing(bearing: TouchdownBearing, load: float) -> BearingSummary:
+    constants = bearing_constants(bearing.bearing)
+    deflection, tangent = static_deflection(constants, abs(load))
+    support = bearing.support
+    return BearingSummary(
+        name=bearing.name,
+        load=load,
+        constants=constants,
+        preload_stress=constants.stress_coefficient_inner * math.cbrt(constants.preload_ball_load),
+        deflection=deflection,
+        tangent_stiffness=tangent,
+        support_frequency=math.sqrt(float(support.stiffness) / float(support.mass)) / (2.0 * math.pi),
+        equivalent_stiffness=1.0 / (1.0 / tangent + 1.0 / float(support.stiffness)),
+    )

@@ -1,0 +1,149 @@
+"""Where a machine leaves what the drop model was made for: each warning with the two numbers it compares."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rotordrop.model.machine_summary import BearingSummary, MachineSummary
+from rotordrop.physics.ball_bearing import ball_centrifugal_force
+from rotordrop.physics.thermal import friction_heat, growth_of_race
+from rotordrop.units import format_quantity
+
+if TYPE_CHECKING:
+    from rotordrop.machine import Machine, TouchdownBearing
+
+CENTRIFUGAL_SHARE = 0.25
+"""Ball centrifugal force over preload ball load from which it counts."""
+
+FREQUENCY_DISTANCE = 0.15
+"""Relative distance of a support frequency and a rotor mode below which they shift each other."""
+
+HEAT_WINDOW = 0.2
+"""Time [s] over which frictional heat is added up: the part of a drop the force is estimated for."""
+
+GROWTH_SHARE = 0.1
+"""Thermal growth of the race over the elastic approach of a preloaded ball from which heat counts."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MachineWarning:
+    """One thing to know before trusting a result of this machine.
+
+    Attributes
+    ----------
+    kind : str
+        "limiting speed", "ball centrifugal force", "support resonance", "frictional heat", "load direction".
+    bearing : str
+        Name of the touchdown bearing.
+    value, limit : float
+        The two numbers compared, SI units.
+    message : str
+        What it means.
+    """
+
+    kind: str
+    bearing: str
+    value: float
+    limit: float
+    message: str
+
+
+def machine_warnings(
+    machine: Machine, summary: MachineSummary, speed: float | None = None
+) -> tuple[MachineWarning, ...]:
+    """List where a machine leaves the range of the drop model.
+
+    Parameters
+    ----------
+    machine : Machine
+        The machine.
+    summary : MachineSummary
+        What `summarise_machine` gave for it.
+    speed : float, optional
+        Speed at the drop [rad/s]; the nominal speed by default.
+    """
+    omega = float(machine.speed.nominal) if speed is None else speed
+    found: list[MachineWarning] = []
+    for bearing, rest in zip(machine.touchdown_bearings, summary.bearings, strict=True):
+        found += [*_limiting_speed(bearing, omega), *_centrifugal(bearing, rest, omega)]
+        found += [*_resonance(rest, summary), *_heat(bearing, rest, omega), *_lifted(rest)]
+    return tuple(found)
+
+
+def _limiting_speed(bearing: TouchdownBearing, omega: float) -> Iterator[MachineWarning]:
+    limit = bearing.bearing.limiting_speed
+    if limit is None or omega <= float(limit):
+        return
+    reached, allowed = format_quantity(omega, "speed"), format_quantity(float(limit), "speed")
+    text = f"a race that reaches the rotor's {reached} turns faster than the {allowed} its maker allows"
+    yield _warning("limiting speed", bearing.name, omega, float(limit), text)
+
+
+def _centrifugal(bearing: TouchdownBearing, rest: BearingSummary, omega: float) -> Iterator[MachineWarning]:
+    force, preload = float(ball_centrifugal_force(bearing.bearing, omega)), rest.constants.preload_ball_load
+    if force <= CENTRIFUGAL_SHARE * preload:
+        return
+    speed, thrown = format_quantity(omega, "speed"), format_quantity(force, "force")
+    text = (
+        f"at {speed} of the race each ball is thrown outwards with {thrown}, not small against its "
+        f"preload of {format_quantity(preload, 'force')}; the drop model leaves this out"
+    )
+    yield _warning("ball centrifugal force", bearing.name, force, preload, text)
+
+
+def _resonance(rest: BearingSummary, summary: MachineSummary) -> Iterator[MachineWarning]:
+    own = rest.support_frequency
+    for frequency in (float(value) for value in summary.settled):
+        if abs(own - frequency) > FREQUENCY_DISTANCE * frequency:
+            continue
+        support, rotor = format_quantity(own, "frequency"), format_quantity(frequency, "frequency")
+        text = (
+            f"the support by itself resonates at {support}, near the rotor's mode at {rotor} on massless "
+            "supports; the mass of the support splits that mode, and maps with massless supports mislead"
+        )
+        yield _warning("support resonance", rest.name, own, frequency, text)
+
+
+def _heat(bearing: TouchdownBearing, rest: BearingSummary, omega: float) -> Iterator[MachineWarning]:
+    race, radius = bearing.race, float(bearing.bore_radius)
+    sliding, rolling = friction_heat(
+        F_r=max(rest.load, 0.0),
+        mu=float(bearing.friction.dynamic),
+        omega_r=omega,
+        R_i=radius,
+        race_inertia=float(race.inertia),
+        drag_coefficient=float(race.drag_coefficient),
+        D_pw=float(bearing.bearing.pitch_diameter),
+        duration=HEAT_WINDOW,
+    )
+    warming, growth = growth_of_race(0.5 * sliding + rolling, float(race.mass), radius)
+    approach = (rest.constants.preload_ball_load / rest.constants.ball_stiffness) ** (2.0 / 3.0)
+    if growth <= GROWTH_SHARE * approach:
+        return
+    speed, grown, pressed = (
+        format_quantity(omega, "speed"),
+        format_quantity(growth, "length", 2),
+        format_quantity(approach, "length", 2),
+    )
+    text = (
+        f"after a drop at {speed} friction heats the race by about {warming:.2g} K in {HEAT_WINDOW:g} s; "
+        f"it grows by {grown}, not small against the {pressed} a preloaded ball is pressed in, so that the "
+        "preload rises; the drop model has no heat in it"
+    )
+    yield _warning("frictional heat", bearing.name, growth, approach, text)
+
+
+def _lifted(rest: BearingSummary) -> Iterator[MachineWarning]:
+    if rest.load >= 0.0:
+        return
+    text = (
+        f"the rotor at rest would lift out of this bearing ({format_quantity(rest.load, 'force')}), because "
+        "its centre of gravity does not lie between the bearings; check their nodes"
+    )
+    yield _warning("load direction", rest.name, rest.load, 0.0, text)
+
+
+def _warning(kind: str, bearing: str, value: float, limit: float, text: str) -> MachineWarning:
+    return MachineWarning(kind=kind, bearing=bearing, value=value, limit=limit, message=f"{bearing}: {text}")

@@ -1,0 +1,146 @@
+"""What ``rotordrop check`` says about a machine, for the terminal and for a page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from rotordrop._version import __version__
+from rotordrop.report.content import Card, Cell, Figure, KeyFigure, ReportContent, Section, Statement, Table
+from rotordrop.report.quantity import Quantity
+
+if TYPE_CHECKING:
+    from rotordrop.machine import Machine
+    from rotordrop.model.machine_summary import BearingSummary, MachineSummary
+    from rotordrop.model.machine_warnings import MachineWarning
+
+
+def machine_content(
+    machine: Machine,
+    summary: MachineSummary,
+    warnings: tuple[MachineWarning, ...],
+    *,
+    drawn: bool = False,
+) -> ReportContent:
+    """Put what is known about a machine into a report; `drawn` adds the rotor's drawing for a page."""
+    sections = (_drawing(machine), _assumptions(machine)) if drawn else ()
+    return ReportContent(
+        title=f"Machine: {machine.name}",
+        subtitle="; ".join(machine.notes),
+        facts=(("machine file", str(machine.source_path or "-")), ("rotordrop", __version__)),
+        verdict=tuple(Statement(text=warning.message, level="warning") for warning in warnings)
+        or (Statement(text="Nothing found that the drop model leaves out.", level="good"),),
+        cards=tuple(_card(machine, rest) for rest in summary.bearings),
+        summary=(
+            _rotor_table(summary),
+            _mode_table(summary),
+            *(() if drawn else _assumption_tables(machine)),
+        ),
+        sections=sections,
+    )
+
+
+def _card(machine: Machine, rest: BearingSummary) -> Card:
+    bearing = machine.bearing(rest.name)
+    return Card(
+        title=rest.name,
+        figures=(
+            KeyFigure(label="share of the weight", value=Quantity(value=rest.load, kind="force")),
+            KeyFigure(label="air gap", value=Quantity.of(bearing.air_gap, "length")),
+            KeyFigure(label="preload of a row", value=Quantity.of(bearing.bearing.preload, "force")),
+            KeyFigure(label="stress by preload", value=Quantity(value=rest.preload_stress, kind="pressure")),
+            KeyFigure(
+                label="tangent stiffness at rest",
+                value=Quantity(value=rest.tangent_stiffness, kind="stiffness"),
+            ),
+            KeyFigure(
+                label="in series with the support",
+                value=Quantity(value=rest.equivalent_stiffness, kind="stiffness"),
+            ),
+            KeyFigure(
+                label="support by itself", value=Quantity(value=rest.support_frequency, kind="frequency")
+            ),
+        ),
+    )
+
+
+def _rotor_table(summary: MachineSummary) -> Table:
+    fe = summary.fe
+    rows: list[tuple[Cell, ...]] = [
+        ("mass", Quantity(value=fe.total_mass, kind="mass")),
+        ("centre of gravity from node 1", Quantity(value=fe.centre_of_gravity, kind="dimension")),
+        ("polar inertia", f"{fe.polar_inertia:.4g} kg m²"),
+        ("diametral inertia about the centre of gravity", f"{fe.diametral_inertia:.4g} kg m²"),
+    ]
+    if summary.levitated_sag is not None:
+        span = float(max(summary.levitated_sag) - min(summary.levitated_sag))
+        rows.append(("levitated sag, lowest to highest node", Quantity(value=span, kind="length")))
+    return Table(columns=("rotor", ""), rows=tuple(rows))
+
+
+def _mode_table(summary: MachineSummary) -> Table:
+    count = max(len(summary.free_free), len(summary.settled))
+    columns = ("bending or support mode", *(str(number) for number in range(1, count + 1)))
+    rows: tuple[tuple[Cell, ...], ...] = (
+        ("free-free", *_frequencies(summary.free_free, count)),
+        ("resting in its bearings, supports without mass", *_frequencies(summary.settled, count)),
+    )
+    return Table(columns=columns, rows=rows)
+
+
+def _frequencies(values: Iterable[float], count: int) -> list[Quantity]:
+    listed = [float(value) for value in values]
+    return [Quantity(value=value, kind="frequency") for value in listed + [math.nan] * (count - len(listed))]
+
+
+def _drawing(machine: Machine) -> Section:
+    from rotordrop.report.rotor_drawing import rotor_figure
+
+    caption = "The rotor to scale. Bearings, AMBs and sensors stand at their nodes."
+    return Section(heading="Rotor", figures=(Figure(chart=rotor_figure(machine), caption=caption),))
+
+
+def _assumptions(machine: Machine) -> Section:
+    return Section(heading="What the file leaves open", tables=_assumption_tables(machine))
+
+
+def _assumption_tables(machine: Machine) -> tuple[Table, ...]:
+    columns = ("value", "taken as", "because")
+    tables = (
+        Table(columns=columns, rows=machine.defaults_in_use, caption="Defaults in use"),
+        Table(columns=columns, rows=machine.inferred, caption="Inferred"),
+    )
+    return tuple(table for table in tables if table.rows)
+
+
+def machine_json(
+    machine: Machine, summary: MachineSummary, warnings: tuple[MachineWarning, ...]
+) -> dict[str, object]:
+    """Give what ``rotordrop check`` found, ready for JSON, in SI units."""
+    fe = summary.fe
+    sag = summary.levitated_sag
+    return {
+        "machine": machine.name,
+        "mass_kg": fe.total_mass,
+        "centre_of_gravity_m": fe.centre_of_gravity,
+        "polar_inertia_kg_m2": fe.polar_inertia,
+        "diametral_inertia_kg_m2": fe.diametral_inertia,
+        "free_free_Hz": [float(value) for value in summary.free_free],
+        "settled_Hz": [float(value) for value in summary.settled],
+        "levitated_sag_m": None if sag is None else [float(value) for value in sag],
+        "bearings": {rest.name: _bearing_json(rest) for rest in summary.bearings},
+        "warnings": [warning.message for warning in warnings],
+        "defaults": [list(entry) for entry in machine.defaults_in_use],
+        "inferred": [list(entry) for entry in machine.inferred],
+    }
+
+
+def _bearing_json(rest: BearingSummary) -> dict[str, float]:
+    return {
+        "load_N": rest.load,
+        "preload_stress_Pa": rest.preload_stress,
+        "tangent_stiffness_N_per_m": rest.tangent_stiffness,
+        "equivalent_stiffness_N_per_m": rest.equivalent_stiffness,
+        "support_frequency_Hz": rest.support_frequency,
+    }
