@@ -61,7 +61,7 @@ class Case:
             *folders, last = path.split("__")
             place = inputs
             for folder in folders:
-                place = place[folder]
+                place = place[int(folder) if isinstance(place, list) else folder]
             if last not in place:
                 raise KeyError(f"case {self.id} has no input {path}: {sorted(place)}")
             place[last] = value

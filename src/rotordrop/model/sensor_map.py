@@ -91,16 +91,16 @@ class SensorMap:
         if len(chosen) < 2 or strength[-1] < SMALLEST_SINGULAR_VALUE:
             listed = ", ".join(f"{self.names[c]} at {_angle(self.directions[c])}" for c in chosen)
             raise MachineFileError(
-                f"the sensors at node {node} ({listed}) see one direction only; displacement in x and y needs "
-                "two sensors there whose angles differ by clearly more than 0° and less than 180°"
+                f"the sensors at node {node} ({listed}) see one direction only; displacement in x and y "
+                "needs two sensors there whose angles differ by clearly more than 0° and less than 180°"
             )
 
     def _why_not(self, modes: int, strength: float) -> str:
         planes = ", ".join(f"node {node}" for node in self.plane_nodes)
         return (
             f"the {len(self.names)} sensors at {planes} cannot tell {modes} modes per plane apart (smallest "
-            f"singular value {strength:.2g}, at least {SMALLEST_SINGULAR_VALUE} wanted): {modes} modes need sensors "
-            f"in {modes} planes that are apart along the rotor, two directions in each"
+            f"singular value {strength:.2g}, at least {SMALLEST_SINGULAR_VALUE} wanted): {modes} modes need "
+            f"sensors in {modes} planes that are apart along the rotor, two directions in each"
         )
 
 
