@@ -48,3 +48,5 @@ JsonOption = Annotated[
         show_default=False,
     ),
 ]
+
+ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite what stands there already.")]

@@ -1,0 +1,88 @@
+"""The verbs init and schema: files that are right, and none that overwrite another."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from rotordrop.cli.app import run
+from rotordrop.machine import example_machine, load_machine
+
+
+@pytest.fixture(autouse=True)
+def in_empty_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def test_the_template_is_a_machine_that_passes_the_check(capsys):
+    assert run(["init"]) == 0
+    assert capsys.readouterr().err == "written: machine.toml\n"
+    assert load_machine("machine.toml").touchdown_bearings
+    assert run(["check", "machine.toml"]) == 0
+
+
+def test_the_template_is_commented():
+    run(["init", "my.toml"])
+    lines = Path("my.toml").read_text(encoding="utf-8").splitlines()
+    assert sum("#" in line for line in lines) > 30
+
+
+def test_nothing_is_overwritten_unasked(capsys):
+    Path("machine.toml").write_text("mine")
+    assert run(["init"]) == 6
+    assert "machine.toml exists already; name another file or add --force" in capsys.readouterr().err
+    assert Path("machine.toml").read_text() == "mine"
+    assert run(["init", "--force"]) == 0
+    assert load_machine("machine.toml")
+
+
+@pytest.mark.parametrize("name", ["paper", "lp400"])
+def test_an_example_is_copied_whole(name):
+    assert run(["init", "--example", name, "there"]) == 0
+    assert load_machine("there/machine.toml") == example_machine(name)
+
+
+def test_the_example_with_a_recording_says_that_it_is_simulated():
+    assert run(["init", "--example", "lp400"]) == 0
+    assert {"drop_060.h5", "drop_060_tail.csv", "README.md"} <= {
+        file.name for file in Path("lp400").iterdir()
+    }
+    assert "made by simulation" in Path("lp400/README.md").read_text(encoding="utf-8")
+
+
+def test_an_example_is_copied_wholly_or_not_at_all(capsys):
+    Path("lp400").mkdir()
+    Path("lp400/drop_060.h5").write_text("mine")
+    assert run(["init", "--example", "lp400"]) == 6
+    assert "drop_060.h5 exists already; name another folder or add --force" in capsys.readouterr().err
+    assert [file.name for file in Path("lp400").iterdir()] == ["drop_060.h5"]
+
+
+def test_an_unknown_example_is_named_with_those_there_are(capsys):
+    assert run(["init", "--example", "lp500"]) == 64
+    assert "there is no example machine 'lp500'; there are paper, lp400" in capsys.readouterr().err
+
+
+def test_the_schema_accepts_the_template_and_refuses_a_wrong_key(capsys):
+    assert run(["schema"]) == 0
+    schema = json.loads(capsys.readouterr().out)
+    jsonschema.Draft202012Validator.check_schema(schema)
+    run(["init"])
+    machine = tomllib.loads(Path("machine.toml").read_text(encoding="utf-8"))
+    jsonschema.validate(machine, schema)
+    with pytest.raises(jsonschema.ValidationError, match="nmae"):
+        jsonschema.validate(machine | {"nmae": "x"}, schema)
+
+
+def test_the_schema_goes_to_a_file(capsys):
+    assert run(["schema", "-o", "machine.schema.json"]) == 0
+    assert (
+        json.loads(Path("machine.schema.json").read_text(encoding="utf-8"))["title"]
+        == "rotordrop machine file"
+    )
+    assert run(["schema", "-o", "nowhere/machine.schema.json"]) == 6
+    assert "the folder nowhere does not exist; create it first" in capsys.readouterr().err
