@@ -14,15 +14,41 @@ if TYPE_CHECKING:
     from rotordrop.errors import RotordropError as RotordropError
     from rotordrop.estimated import Estimated as Estimated
     from rotordrop.estimated import IdentifiedValue as IdentifiedValue
+    from rotordrop.machine import Machine as Machine
+    from rotordrop.machine import example_machine as example_machine
+    from rotordrop.machine import load_machine as load_machine
+    from rotordrop.machine import machine_schema as machine_schema
+    from rotordrop.machine import save_machine as save_machine
+    from rotordrop.model.parameters import DropModel as DropModel
+    from rotordrop.model.parameters import build_drop_model as build_drop_model
+    from rotordrop.simulation.case import DropCase as DropCase
+    from rotordrop.simulation.case import LevitatedStart as LevitatedStart
+    from rotordrop.simulation.case import PlacedStart as PlacedStart
+    from rotordrop.simulation.drop import simulate_drop as simulate_drop
+    from rotordrop.simulation.result import DropResult as DropResult
+    from rotordrop.simulation.result import load_result as load_result
     from rotordrop.units import format_quantity as format_quantity
     from rotordrop.units import parse_quantity as parse_quantity
 
 _PUBLIC = {
+    "DropCase": "rotordrop.simulation.case",
+    "DropModel": "rotordrop.model.parameters",
+    "DropResult": "rotordrop.simulation.result",
     "Estimated": "rotordrop.estimated",
     "IdentifiedValue": "rotordrop.estimated",
+    "LevitatedStart": "rotordrop.simulation.case",
+    "Machine": "rotordrop.machine",
+    "PlacedStart": "rotordrop.simulation.case",
     "RotordropError": "rotordrop.errors",
+    "build_drop_model": "rotordrop.model.parameters",
+    "example_machine": "rotordrop.machine",
     "format_quantity": "rotordrop.units",
+    "load_machine": "rotordrop.machine",
+    "load_result": "rotordrop.simulation.result",
+    "machine_schema": "rotordrop.machine",
     "parse_quantity": "rotordrop.units",
+    "save_machine": "rotordrop.machine",
+    "simulate_drop": "rotordrop.simulation.drop",
 }
 
 __all__ = ["__version__", *_PUBLIC]
