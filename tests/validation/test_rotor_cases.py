@@ -1,4 +1,4 @@
-"""Rotor cases: published codes, a book's examples, closed forms; every number by the library's elements and modes."""
+"""Rotor cases: published codes, a book and closed forms; every number by our elements and modes."""
 
 from __future__ import annotations
 

@@ -1,0 +1,69 @@
+"""The validation page names every case with the numbers of now; what it calls a disagreement is one."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from cases import Case, Expected, case_names, load_case
+from disagreements import DISAGREEMENTS, Disagreement
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "docs" / "validation.md"
+QUICK = ("H08", "P01", "R01", "R07", "R18", "X01")
+
+
+def _script() -> ModuleType:
+    spec = importlib.util.spec_from_file_location(
+        "generate_validation", ROOT / "docs" / "generate_validation.py"
+    )
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+script = _script()
+
+
+def test_every_case_file_is_computed_by_one_function() -> None:
+    assert set(script.computations()) == set(case_names())
+
+
+@pytest.mark.parametrize("name", case_names())
+def test_the_page_has_every_case_with_its_kind(name: str) -> None:
+    case = load_case(name)
+    heading = f"### {case.id} {case.title}\n\nReference: {case.kind}. "
+    assert heading in PAGE.read_text(encoding="utf-8"), "run docs/generate_validation.py"
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_the_numbers_of_the_page_are_those_of_now(name: str) -> None:
+    case = load_case(name)
+    section = "\n".join(script.case_section(case, script.computations()[name](case.inputs)))
+    assert section in PAGE.read_text(encoding="utf-8"), "run docs/generate_validation.py"
+
+
+def test_a_number_outside_its_tolerance_is_marked() -> None:
+    entry = Expected(name="force", value=100.0, unit="N", tolerance=0.01, relative=True, source=None)
+    assert script.row(entry, 102.0) == "| force | 100 | 102 | N | 2 % **outside** | 1 % |"
+    assert script.row(entry, 100.5) == "| force | 100 | 100.5 | N | 0.5 % | 1 % |"
+
+
+def test_the_summary_counts_cases_and_numbers() -> None:
+    case: Case = load_case("R18")
+    (line,) = script.summary([case], {"R18": {e.name: e.value * (1 + 5e-5) for e in case.expected}})[2:-1]
+    assert line.startswith("| analytical |")
+    assert line.endswith("| 1 | 7 | 50% |")
+
+
+@pytest.mark.parametrize("one", DISAGREEMENTS, ids=lambda one: one.what)
+def test_a_disagreement_is_more_than_rounding(one: Disagreement) -> None:
+    _, _, decimals = f"{one.printed:.10g}".partition(".")
+    rounding = 0.5 * 10.0 ** -len(decimals) / one.printed
+    assert rounding < abs(one.deviation()) < 0.2
