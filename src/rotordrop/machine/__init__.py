@@ -8,8 +8,10 @@ from rotordrop.machine.machine import Machine
 from rotordrop.machine.material import Material
 from rotordrop.machine.rotor import Disc, Element, Rotor, Section, SectionByLength, SectionByNodes
 from rotordrop.machine.saving import machine_text, save_machine
+from rotordrop.machine.schema import machine_schema
 from rotordrop.machine.sensor import Sensor
 from rotordrop.machine.speed import SpeedDescription
+from rotordrop.machine.template import template_text
 from rotordrop.machine.touchdown_bearing import Contact, Friction, Race, Support, TouchdownBearing
 from rotordrop.machine.unbalance import BalanceGrade, Unbalance
 
@@ -38,6 +40,8 @@ __all__ = [
     "example_path",
     "load_machine",
     "loads_machine",
+    "machine_schema",
     "machine_text",
     "save_machine",
+    "template_text",
 ]

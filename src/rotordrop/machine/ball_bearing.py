@@ -228,14 +228,15 @@ class BallBearing(Description):
 
 def _inferred(entry: CatalogueBearing, complement: BallComplement) -> dict[str, Any]:
     """What the catalogue gives or lets infer of the geometry."""
-    lengths = {
-        "ball_diameter": complement.ball_diameter,
-        "pitch_diameter": complement.pitch_diameter,
-        "width": entry.width,
-    }
+    listed = f"{entry.maker} catalogue, {entry.designation}"
+    lengths = (
+        ("ball_diameter", complement.ball_diameter, complement.basis),
+        ("pitch_diameter", complement.pitch_diameter, complement.basis),
+        ("width", entry.width, listed),
+    )
     values: dict[str, Any] = {
-        name: Estimated(value=value, status="inferred", source=complement.basis, unit="m")
-        for name, value in lengths.items()
+        name: Estimated(value=value, status="inferred", source=why, unit="m")
+        for name, value, why in lengths
         if value is not None
     }
     for race in ("inner", "outer"):
@@ -243,6 +244,6 @@ def _inferred(entry: CatalogueBearing, complement: BallComplement) -> dict[str, 
             value=complement.conformity, status="inferred", source=complement.basis
         )
     values["contact_angle"] = Estimated(
-        value=entry.contact_angle, status="inferred", source=f"{entry.maker} catalogue", unit="rad"
+        value=entry.contact_angle, status="inferred", source=listed, unit="rad"
     )
     return values | {"ball_count": complement.ball_count, "ball_material": entry.ball_material}

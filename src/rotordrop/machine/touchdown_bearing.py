@@ -178,13 +178,11 @@ class Support(Description):
     )
     stiffness: Stiffness = default(1e8, "a first guess for a bearing housing", (1e7, 2e9))
     damping: Damping = follows("2.5 % of critical, or from the damping ratio")
-    damping_ratio: NonNegative | None = Field(default=None, description="In place of the damping")
+    damping_ratio: NonNegative | None = Field(default=None, description="")
     mass_horizontal: PositiveMass = follows("equal to the vertical one")
     stiffness_horizontal: Stiffness = follows("equal to the vertical one")
     damping_horizontal: Damping = follows("from the damping ratio, or equal to the vertical one")
-    damping_ratio_horizontal: NonNegative | None = Field(
-        default=None, description="In place of the horizontal damping"
-    )
+    damping_ratio_horizontal: NonNegative | None = Field(default=None, description="")
 
     displaces: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "damping": ("damping_ratio",),
@@ -281,6 +279,13 @@ class TouchdownBearing(Placed):
             raise Misfit(
                 f"the air gap {gap * 1e3:.4g} mm must be smaller than the bore radius {bore * 1e3:.4g} mm",
                 ("air_gap",),
+            )
+        entry = self.bearing.catalogue_entry()
+        if entry is not None and bore > 0.5 * entry.bore * (1.0 + 1e-9):
+            raise Misfit(
+                f"the bore radius {bore * 1e3:.4g} mm is larger than that of {entry.designation}, "
+                f"{0.5e3 * entry.bore:.4g} mm; a diameter perhaps, or another bearing",
+                ("bore_radius",),
             )
         inner = 0.5 * (self.bearing.pitch_diameter.value - self.bearing.ball_diameter.value)
         if bore >= inner:

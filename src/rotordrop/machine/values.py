@@ -17,7 +17,10 @@ from rotordrop.units import KINDS, format_quantity, parse_quantity, si_unit
 LEFT_OUT = Estimated(value=math.nan, status="default", source="follows from other values")
 """Stands for a value that was left out and follows from its neighbours."""
 
-_STATUSES: tuple[Status, ...] = get_args(Status)
+KIND_MARK = "x-quantity"
+"""Marks a physical value in the schema of a description, with its kind."""
+
+STATUSES: tuple[Status, ...] = get_args(Status)
 _TABLE_KEYS = ("value", "guess", "range", "interval", "standard_error", "lower", "upper", "source", "status")
 
 
@@ -47,31 +50,8 @@ class Physical:
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        """Describe the ways of writing the value."""
-        number = self._number_schema()
-        pair = {"type": "array", "items": number, "minItems": 2, "maxItems": 2}
-        shared: dict[str, Any] = {"source": {"type": "string"}}
-        guess = {"guess": number, "range": pair, **shared}
-        known = {
-            "value": number,
-            "interval": pair,
-            "standard_error": number,
-            "lower": number,
-            "upper": number,
-        }
-        known |= {"range": pair, "status": {"enum": list(_STATUSES)}, **shared}
-        return {
-            "anyOf": [
-                number,
-                {"type": "object", "properties": guess, "required": ["guess"], "additionalProperties": False},
-                {"type": "object", "properties": known, "required": ["value"], "additionalProperties": False},
-            ]
-        }
-
-    def _number_schema(self) -> dict[str, Any]:
-        if KINDS[self.kind].unit:
-            return {"type": "string", "examples": [KINDS[self.kind].example], "pattern": r"^\s*[+-]?[\d.]"}
-        return {"type": ["number", "string"]}
+        """Name the kind; `rotordrop.machine.schema` describes the ways of writing it once for all values."""
+        return {KIND_MARK: self.kind}
 
     def read(self, raw: Any) -> Estimated:
         """Read a number with unit, a guess with range, or an estimate with interval and source."""
@@ -185,8 +165,8 @@ def _status(table: Mapping[str, Any]) -> Status:
     stated = table.get("status")
     if stated is None:
         return "estimated" if {"interval", "standard_error", "lower", "upper"} & set(table) else "given"
-    if stated not in _STATUSES:
-        raise UsageError(f"status = {stated!r} is not known; it is one of {', '.join(_STATUSES)}")
+    if stated not in STATUSES:
+        raise UsageError(f"status = {stated!r} is not known; it is one of {', '.join(STATUSES)}")
     return cast(Status, stated)
 
 

@@ -4,8 +4,9 @@ from rotordrop.machine.catalog.lookup import (
     BallComplement,
     CatalogueBearing,
     PreloadClass,
+    ball_size,
     designations,
     find_bearing,
 )
 
-__all__ = ["BallComplement", "CatalogueBearing", "PreloadClass", "designations", "find_bearing"]
+__all__ = ["BallComplement", "CatalogueBearing", "PreloadClass", "ball_size", "designations", "find_bearing"]

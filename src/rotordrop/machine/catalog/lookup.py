@@ -115,17 +115,22 @@ def _read(name: str) -> Any:
 
 
 @lru_cache(maxsize=1)
-def _complements() -> dict[tuple[float, float], BallComplement]:
+def _complements() -> dict[tuple[float, float, str], BallComplement]:
     return {
-        (row["bore_mm"], row["outside_mm"]): BallComplement(
+        (row["bore_mm"], row["outside_mm"], row["balls"]): BallComplement(
             ball_count=row["ball_count"],
             ball_diameter=row["ball_diameter_mm"] * 1e-3,
             pitch_diameter=row["pitch_diameter_mm"] * 1e-3,
             conformity=row["conformity"],
             basis=row["basis"],
         )
-        for row in _read("complements.json")["series"]
+        for row in _read("complements.json")["families"]
     }
+
+
+@lru_cache(maxsize=1)
+def _conformities() -> dict[str, float]:
+    return {row["name"]: row["conformity"] for row in _read("complements.json").get("conformities", [])}
 
 
 def _by_class(values: list[float], factor: float = 1.0) -> dict[PreloadClass, float]:
@@ -145,7 +150,7 @@ def _fag(row: dict[str, Any]) -> CatalogueBearing:
         axial_rigidity=_by_class(row["Ca"], 1e6),
         lift_off=_by_class(row["KaE"]),
         ball_material="silicon nitride" if ceramic else "steel",
-        complement=_complements().get((row["d"], row["D"])) or _usual_complement(row["d"], row["D"]),
+        complement=_complements()[row["d"], row["D"], ball_size(row["name"])],
     )
 
 
@@ -166,20 +171,12 @@ def _gmn(row: dict[str, Any]) -> CatalogueBearing:
             ball_count=row["Z"],
             ball_diameter=row["Dw"] * 1e-3,
             pitch_diameter=row["dm"] * 1e-3,
-            conformity=0.53,
-            basis="GMN catalogue; the conformity is not published",
+            conformity=_conformities().get(row["name"], 0.53),
+            basis="GMN catalogue; the conformity, not published, reproduces its axial rigidity best",
         ),
     )
 
 
-def _usual_complement(bore: float, outside: float) -> BallComplement:
-    """Balls that fill a bearing the usual way: 0.6 of the section height, 80 % of the pitch circle."""
-    pitch = 0.5 * (bore + outside)
-    ball = round(0.3 * (outside - bore) / 0.79375) * 0.79375
-    return BallComplement(
-        ball_count=int(0.8 * math.pi * pitch / ball),
-        ball_diameter=ball * 1e-3,
-        pitch_diameter=pitch * 1e-3,
-        conformity=0.53,
-        basis="estimated from bore and outside diameter by the usual proportions of spindle bearings",
-    )
+def ball_size(designation: str) -> Literal["small", "standard"]:
+    """Size of the balls of a FAG series: HS, HC and XC have small ones, B, HCB and XCB standard ones."""
+    return "small" if re.match(r"HS|[HX]C\d", designation) else "standard"

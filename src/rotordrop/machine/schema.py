@@ -1,0 +1,164 @@
+"""JSON Schema of a machine file, for editors that check and complete while one types."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from rotordrop.estimated import Estimated
+from rotordrop.machine.description import Description
+from rotordrop.machine.machine import Machine
+from rotordrop.machine.provenance import kind_of
+from rotordrop.machine.values import KIND_MARK, STATUSES
+from rotordrop.units import KINDS, format_quantity
+
+_DIALECT = "https://json-schema.org/draft/2020-12/schema"
+_TEXT = {"type": "string"}
+_ATTRIBUTE = re.compile(r"^(\w[\w, ]*) : .*\n((?:    .*\n?)+)", re.MULTILINE)
+
+
+def machine_schema() -> dict[str, Any]:
+    """Give the JSON Schema (draft 2020-12) of a machine file."""
+    schema = Machine.model_json_schema()
+    parts = schema["$defs"]
+    described: list[type[Description]] = [Machine, *_parts(Description)]
+    for description in described:
+        name = description.__name__
+        if description is Machine or name in parts:
+            _describe(schema if description is Machine else parts[name], description)
+    _add_shaft_table(parts["Rotor"])
+    _add_shorthand(parts)
+    kinds: set[str] = set()
+    _refer(schema, kinds)
+    for kind in sorted(kinds):
+        parts[f"{kind}_number"] = _number(kind)
+        parts[kind] = _value(kind)
+    return {"$schema": _DIALECT, "title": "rotordrop machine file"} | {
+        key: value for key, value in schema.items() if key != "title"
+    }
+
+
+def _parts(base: type[Description]) -> list[type[Description]]:
+    found: list[type[Description]] = []
+    for child in base.__subclasses__():
+        found += [child, *_parts(child)]
+    return found
+
+
+def _describe(schema: dict[str, Any], description: type[Description]) -> None:
+    """Put the words of the class into its schema: what each key means and what holds when it is left out."""
+    text = description.__doc__ or ""
+    schema["description"] = text.split("\n")[0]
+    schema.pop("title", None)
+    meanings = _meanings(text)
+    for name, entry in schema["properties"].items():
+        entry.pop("title", None)
+        standing = entry.pop("default", None)
+        field = description.model_fields[name]
+        words = list(dict.fromkeys([meanings.get(name, ""), field.description or ""]))
+        if isinstance(field.default, Estimated) and field.default.value == field.default.value:
+            value = format_quantity(field.default.value, kind_of(description, name))
+            words = [meanings.get(name, ""), f"Default {value}: {field.default.source}"]
+        elif isinstance(standing, str | int | float | bool) and standing not in ("", "-", 0):
+            entry["default"] = standing
+        entry["description"] = ". ".join(word.rstrip(".") for word in words if word)
+
+
+def _meanings(text: str) -> dict[str, str]:
+    """Read the attributes of a numpydoc docstring."""
+    found: dict[str, str] = {}
+    plain = "\n".join(line.removeprefix("    ") for line in text.split("\n"))
+    for match in _ATTRIBUTE.finditer(plain):
+        words = " ".join(match.group(2).split())
+        found |= {name.strip(): words for name in match.group(1).split(",")}
+    return found
+
+
+def _refer(node: Any, kinds: set[str]) -> None:
+    """Let every physical value refer to the one description of its kind."""
+    if isinstance(node, list):
+        for entry in node:
+            _refer(entry, kinds)
+    elif isinstance(node, dict):
+        _drop_null(node)
+        kind = node.pop(KIND_MARK, None)
+        if kind is not None:
+            kinds.add(kind)
+            node["$ref"] = f"#/$defs/{kind}"
+        for entry in node.values():
+            _refer(entry, kinds)
+
+
+def _drop_null(node: dict[str, Any]) -> None:
+    """A TOML file leaves out what it does not give; it has no null."""
+    choices = node.get("anyOf")
+    if isinstance(choices, list) and {"type": "null"} in choices:
+        choices.remove({"type": "null"})
+        if len(choices) == 1:
+            node.update(node.pop("anyOf")[0])
+
+
+def _number(kind: str) -> dict[str, Any]:
+    if not KINDS[kind].unit:
+        return {"type": ["number", "string"], "examples": [float(KINDS[kind].example)]}
+    return {"type": "string", "examples": [KINDS[kind].example], "pattern": r"^\s*[+-]?[\d.]"}
+
+
+def _value(kind: str) -> dict[str, Any]:
+    """Describe a number with unit, a guess with range, or an estimate with interval and source."""
+    number = {"$ref": f"#/$defs/{kind}_number"}
+    pair = {"type": "array", "items": number, "minItems": 2, "maxItems": 2}
+    guess: dict[str, Any] = {
+        "guess": number,
+        "range": pair,
+        "lower": number,
+        "upper": number,
+        "source": _TEXT,
+    }
+    known: dict[str, Any] = {"value": number, "interval": pair, "standard_error": number, "range": pair}
+    known |= {"lower": number, "upper": number, "source": _TEXT, "status": {"enum": list(STATUSES)}}
+    return {
+        "description": f"{kind.replace('_', ' ')}, for example {KINDS[kind].example}",
+        "anyOf": [
+            number,
+            {"type": "object", "properties": guess, "required": ["guess"], "additionalProperties": False},
+            {"type": "object", "properties": known, "required": ["value"], "additionalProperties": False},
+        ],
+    }
+
+
+def _add_shaft_table(rotor: dict[str, Any]) -> None:
+    words = "CSV file with the shaft, in place of 'sections'"
+    rotor["properties"]["shaft_table"] = _TEXT | {"description": words}
+    rotor["required"] = [key for key in rotor.get("required", []) if key != "sections"]
+    rotor["oneOf"] = [{"required": ["sections"]}, {"required": ["shaft_table"]}]
+    table = {
+        "type": "object",
+        "properties": {"unit": _TEXT, "values": {"type": "array", "items": {"type": "number"}}},
+        "required": ["unit", "values"],
+        "additionalProperties": False,
+    }
+    rotor["properties"]["node_positions"] = {
+        "description": "Position of every node, for sections given by nodes",
+        "anyOf": [{"type": "array", "items": {KIND_MARK: "length"}}, table],
+    }
+
+
+def _add_shorthand(parts: dict[str, Any]) -> None:
+    """Describe what the file writes in another way than the description holds it."""
+    grade = parts["BalanceGrade"]
+    described = grade["properties"].pop("grade_mm_s")["description"]
+    grade["properties"]["grade"] = {"type": ["string", "number"], "description": described}
+    grade["required"] = ["grade", "at_speed"]
+    bearing = parts["BallBearing"]["properties"]
+    del bearing["preload_class"]
+    bearing["preload"] = {
+        "description": bearing["preload"]["description"],
+        "anyOf": [{"enum": ["light", "medium", "heavy"]}, {KIND_MARK: "force"}],
+    }
+    bearing["conformity"] = {"description": "Conformity of both races", KIND_MARK: "dimensionless"}
+    for name in ("Disc", "Unbalance", "TouchdownBearing", "ActiveMagneticBearing", "Sensor"):
+        part = parts[name]
+        part["oneOf"] = [{"required": ["node"]}, {"required": ["position"]}]
+        part["properties"]["node"]["minimum"] = 1
+        part["required"] = [key for key in part.get("required", []) if key != "node"]
