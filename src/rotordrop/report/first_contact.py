@@ -98,7 +98,7 @@ def _mark(figure: go.Figure, contact: FirstContact, bearing: BearingMotions, col
         x=end,
         y=1.0,
         yref="y domain" if column == 1 else f"y{column} domain",
-        text=f"t₁ = {start:.2f} ms, t₂ = {end:.2f} ms, T = {end - start:.2f} ms",
+        text=f"t₁ {start:.2f}, t₂ {end:.2f}, T {end - start:.2f} ms",
         showarrow=False,
         xanchor="left",
         yanchor="top",

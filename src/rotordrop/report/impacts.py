@@ -113,13 +113,14 @@ def impact_figure(impacts: Sequence[Impact]) -> go.Figure:
     for column, bearing in enumerate(bearings, start=1):
         _add_impacts(figure, [impact for impact in impacts if impact.bearing == bearing], column, latest)
     figure.update_xaxes(title_text=axis_title("azimuth from +x, −90° at the bottom", "°"), dtick=30)
-    figure.update_yaxes(title_text=axis_title("peak contact force", "N"), rangemode="tozero", col=1)
+    figure.update_yaxes(title_text=axis_title("peak contact force", "N"), col=1)
+    figure.update_yaxes(rangemode="tozero")
     figure.update_layout(
         coloraxis={
             "colorscale": [[0.0, EARLY], [1.0, LATE]],
             "cmin": 0.0,
             "cmax": 1e3 * latest,
-            "colorbar": {"title": {"text": "time [ms]"}, "thickness": 12, "outlinewidth": 0},
+            "colorbar": {"title": {"text": "time [ms]", "font": {"size": 13}}, "thickness": 12, "outlinewidth": 0},
         }
     )
     return figure

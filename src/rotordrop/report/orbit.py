@@ -38,7 +38,7 @@ def orbit_figure(bearings: Sequence[BearingMotions]) -> go.Figure:
     Figure
         One panel per bearing in µm, x to the right and y up as seen from the last bearing, same scale.
     """
-    figure = panels([b.bearing for b in bearings], height=470)
+    figure = panels([b.bearing for b in bearings], height=470, spacing=0.12)
     for column, bearing in enumerate(bearings, start=1):
         for motion in bearing.motions:
             _add_orbit(figure, motion, column)

@@ -107,7 +107,7 @@ class Quantity:
             return (
                 "± "
                 + self._with_unit(written(self._shown(self.standard_error), self._places()))
-                + " (1 s.e.)"
+                + " (standard error)"
             )
         return ""
 
@@ -115,7 +115,9 @@ class Quantity:
         return written(self._shown(value), self._places())
 
     def _with_unit(self, number: str) -> str:
-        return number if number == "–" or not self.unit else f"{number} {self.unit}"
+        if number == "–" or not self.unit:
+            return number
+        return f"{number}{self.unit}" if self.unit == "°" else f"{number} {self.unit}"
 
     def _shown(self, value: float) -> float:
         return value / display_unit(self.kind)[0]

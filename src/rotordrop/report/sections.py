@@ -48,7 +48,7 @@ def first_contact_section(
     figure = Figure(
         chart=first_contact_figure(bearings, contacts),
         caption="Vertical displacement around the first contact: t₁ first touch, t₂ lift-off, T the time "
-        "between; indentation counts from the air gap (Neisi 2020, Fig. 10).",
+        "between; indentation counts from the air gap, support included (Neisi 2020, Fig. 10).",
     )
     return Section(heading="First contact", figures=(figure,), tables=tables)
 

@@ -28,7 +28,7 @@ def speed_figure(rotor: Sequence[History], races: Sequence[History] = ()) -> go.
     Figure
         Speeds in Hz; the axis says how to read them in rpm.
     """
-    figure = panels(("rotor", "inner races") if races else ("rotor",), height=250)
+    figure = panels(("rotor", "inner races") if races else ("rotor",), height=250, spacing=0.12)
     for history in rotor:
         add_history(figure, history, PER_TURN, "Hz")
     for index, history in enumerate(races):

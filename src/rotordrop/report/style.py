@@ -59,6 +59,7 @@ def panels(
     columns: int | None = None,
     height: int = PANEL_HEIGHT,
     share_time: bool = True,
+    spacing: float = 0.085,
 ) -> go.Figure:
     """An empty figure with one titled panel per bearing (or per axis and bearing).
 
@@ -72,6 +73,8 @@ def panels(
         Height of one panel [pixels].
     share_time : bool
         Panels of one column zoom together in time.
+    spacing : float
+        Horizontal space between panels as a share of the width [1]; more where both have an axis title.
     """
     columns = columns or len(titles)
     plot_height = rows * height
@@ -80,7 +83,7 @@ def panels(
         cols=columns,
         subplot_titles=[plain(title) for title in titles],
         shared_xaxes="columns" if share_time and rows > 1 else False,
-        horizontal_spacing=0.085 if columns > 1 else 0.0,
+        horizontal_spacing=spacing if columns > 1 else 0.0,
         vertical_spacing=58 / plot_height if rows > 1 else 0.0,
     )
     figure.update_layout(

@@ -24,12 +24,18 @@
     window.setTimeout(drawNext, 0);
   }
 
+  function resize(width, share) {
+    drawn.forEach(function (element) {
+      var height = Math.round(share * Number(element.getAttribute("data-height")));
+      element.style.height = height + "px";
+      Plotly.relayout(element, { width: width, height: height, autosize: width === null });
+    });
+  }
+
   window.addEventListener("beforeprint", function () {
     while (waiting.length) { draw(waiting.shift()); }
-    drawn.forEach(function (element) { Plotly.relayout(element, { width: 695, autosize: false }); });
+    resize(695, 0.74);
   });
-  window.addEventListener("afterprint", function () {
-    drawn.forEach(function (element) { Plotly.relayout(element, { width: null, autosize: true }); });
-  });
+  window.addEventListener("afterprint", function () { resize(null, 1.0); });
   drawNext();
 })();

@@ -1,0 +1,69 @@
+"""Numbers in a report: one unit per kind, as many digits as the interval justifies, never a bare number."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from rotordrop.estimated import IdentifiedValue
+from rotordrop.report.quantity import Quantity, written
+
+THIN = "\u202f"
+
+
+@pytest.mark.parametrize(
+    ("value", "kind", "text"),
+    [
+        (275.04e-6, "length", "275.0 µm"),
+        (2840.4, "force", f"2{THIN}840 N"),
+        (1.7408e9, "pressure", f"1{THIN}741 MPa"),
+        (1.02e8, "stiffness", "102.0 N/µm"),
+        (2 * math.pi * 60, "speed", f"60.00 Hz (3{THIN}600 rpm)"),
+        (-math.pi / 2, "angle", "−90.00°"),
+        (8.18e-3, "time", "8.180 ms"),
+        (3.78e9, "contact_stiffness", "3.780 × 10⁹ N/m^n"),
+        (0.1, "dimensionless", "0.1000"),
+        (1316, "count", f"1{THIN}316"),
+        (0.948, "share", "94.80 %"),
+        (math.nan, "force", "–"),
+    ],
+)
+def test_a_kind_has_one_unit(value: float, kind: str, text: str) -> None:
+    assert Quantity(value=value, kind=kind).text == text
+
+
+def test_the_interval_says_how_many_digits_are_meant() -> None:
+    quantity = Quantity(value=3333.086, kind="force", interval_90=(3180.4, 3490.2))
+    assert quantity.text == f"3{THIN}333 N"
+    assert quantity.interval_text == f"3{THIN}180 to 3{THIN}490 N"
+    fine = Quantity(value=275.0432e-6, kind="length", interval_90=(274.61e-6, 275.49e-6))
+    assert fine.text == "275.04 µm"
+    assert fine.interval_text == "274.61 to 275.49 µm"
+
+
+def test_limits_of_the_record_are_shown_as_limits() -> None:
+    gap = Quantity(value=275e-6, kind="length", lower=270e-6, upper=275e-6)
+    assert gap.interval_text == "limits 270.0 to 275.0 µm"
+
+
+def test_an_identified_value_brings_its_interval_along() -> None:
+    known = IdentifiedValue(
+        value=1e8, interval_90=(0.9e8, 1.1e8), standard_error=0.06e8, status="at its bound"
+    )
+    quantity = Quantity.of(known, "stiffness")
+    assert quantity.interval_text == "90 to 110 N/µm"
+    assert quantity.status == "at its bound"
+    assert Quantity.of(None, "stiffness").text == "–"
+
+
+def test_a_standard_error_alone_is_named_as_one() -> None:
+    assert Quantity(value=40.0, kind="mass", standard_error=0.5).interval_text == "± 0.50 kg (standard error)"
+
+
+@pytest.mark.parametrize(
+    ("value", "places", "text"),
+    [(-0.0004, 2, "0.00"), (-12.34, 1, "−12.3"), (1234567.0, 0, f"1{THIN}234{THIN}567"), (0.0, 0, "0")],
+)
+def test_written_numbers(value: float, places: int, text: str) -> None:
+    assert written(value, places) == text

@@ -1,0 +1,199 @@
+"""Tables and sentences of the report: impacts, parameters, cross-check, data quality, stress distribution."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from rotordrop.report.content import Table
+from rotordrop.report.cross_check import CrossCheck, cross_check_statements, cross_check_table
+from rotordrop.report.data_quality import data_quality_section
+from rotordrop.report.impacts import impact_figure, impact_table, impacts_of
+from rotordrop.report.parameters import ParameterRow, parameter_figure, parameter_table
+from rotordrop.report.quantity import Quantity
+from rotordrop.report.stress_box import StressBox, stress_box_figure, stress_table, thinned
+from rotordrop.simulation.result import DropResult
+
+
+def texts(row: tuple[object, ...]) -> list[str]:
+    return [cell.text if isinstance(cell, Quantity) else str(cell) for cell in row]
+
+
+def test_a_row_of_the_wrong_length_is_refused() -> None:
+    with pytest.raises(
+        ValueError, match=r"table 'gaps': a row has 1 cells for 2 columns.*give as many cells"
+    ):
+        Table(columns=("a", "b"), rows=(("x",),), caption="gaps")
+
+
+def test_impacts_are_listed_in_the_order_of_time(drop_result: DropResult) -> None:
+    impacts = impacts_of(drop_result.contacts, drop_result.bearing_names)
+    table = impact_table(impacts)
+    assert [texts(row)[:3] for row in table.rows] == [
+        ["NDE", "7.900 ms", "−90.0°"],
+        ["DE", "9.200 ms", "−95.0°"],
+        ["DE", "31.00 ms", "−110°"],
+    ]
+    assert texts(table.rows[1])[3:] == ["4\u202f660 N", "6.40 N s", "7.60 J", "2.40 ms"]
+    assert texts(table.rows[2])[6] == "–"
+
+
+def test_the_weakest_impacts_are_left_out_and_counted(drop_result: DropResult) -> None:
+    table = impact_table(impacts_of(drop_result.contacts, drop_result.bearing_names), listed=2)
+    assert [texts(row)[1] for row in table.rows] == ["7.900 ms", "9.200 ms"]
+    assert table.caption == "Impacts (2 of 3)"
+    assert "1 weaker ones are left out" in table.note
+
+
+def test_impacts_are_drawn_at_their_azimuth_with_their_interval(drop_result: DropResult) -> None:
+    impacts = impacts_of(drop_result.contacts, drop_result.bearing_names)
+    first = impacts[0]
+    force = Quantity(value=2644.0, kind="force", interval_90=(2600.0, 2750.0))
+    known = type(first)(**{**first.__dict__, "peak_force": force})
+    drawn = impact_figure([known, *impacts[1:]])
+    assert_allclose(drawn.data[0].x, [-90.0])
+    assert_allclose(drawn.data[0].y, [2644.0])
+    assert_allclose(drawn.data[0].error_y.array, [106.0])
+    assert_allclose(drawn.data[0].error_y.arrayminus, [44.0])
+    assert not drawn.data[1].error_y.visible
+    assert_allclose(drawn.data[1].x, [-95.0, -110.0])
+
+
+def row(name: str, prior: float, estimate: float, interval: tuple[float, float] | None) -> ParameterRow:
+    return ParameterRow(
+        name=name,
+        prior=Quantity(value=prior, kind="stiffness"),
+        estimate=Quantity(value=estimate, kind="stiffness", interval_90=interval),
+        verdict="determined" if interval else "the record does not determine it",
+    )
+
+
+def test_parameters_show_prior_estimate_interval_and_verdict() -> None:
+    table = parameter_table([row("NDE.support.stiffness", 1e8, 1.4e8, (1.38e8, 1.42e8))])
+    assert texts(table.rows[0]) == ["NDE.support.stiffness", "100.0 N/µm", "140.0 N/µm", "determined"]
+    cell = table.rows[0][2]
+    assert isinstance(cell, Quantity)
+    assert cell.interval_text == "138.0 to 142.0 N/µm"
+
+
+def test_parameters_are_drawn_relative_to_their_prior() -> None:
+    rows = [row("K", 1e8, 1.4e8, (1.38e8, 1.42e8)), row("M", 4e7, 4e7, None), row("zero", 0.0, 1.0, None)]
+    drawn = parameter_figure(rows)
+    estimate = next(item for item in drawn.data if item.name.startswith("estimate"))
+    assert list(estimate.y) == ["K", "M"]
+    assert_allclose(estimate.x, [1.4, 1.0])
+    assert_allclose(estimate.error_x.array, [0.02, 0.0], atol=1e-12)
+    assert_allclose(estimate.error_x.arrayminus, [0.02, 0.0], atol=1e-12)
+
+
+def check(estimate: float, other: float) -> CrossCheck:
+    return CrossCheck(
+        name="NDE peak force",
+        estimate=Quantity(value=estimate, kind="force"),
+        check=Quantity(value=other, kind="force"),
+        accuracy=0.15,
+    )
+
+
+def test_a_disagreeing_cross_check_is_a_warning_with_both_numbers() -> None:
+    (statement,) = cross_check_statements([check(3000.0, 3100.0), check(3000.0, 2400.0)])
+    assert statement.level == "warning"
+    assert "2\u202f400 N against 3\u202f000 N" in statement.text
+    assert "-20 %" in statement.text
+    assert "± 15 %" in statement.text
+
+
+def test_an_agreeing_cross_check_says_so_once() -> None:
+    (statement,) = cross_check_statements([check(3000.0, 3100.0), check(3000.0, 2900.0)])
+    assert statement.level == "good"
+    table = cross_check_table([check(3000.0, 3100.0), check(3000.0, 2400.0)])
+    assert [texts(cells)[3:] for cells in table.rows] == [
+        ["3.3 %", "± 15 %", "agrees"],
+        ["−20 %", "± 15 %", "disagrees"],
+    ]
+
+
+@dataclass(frozen=True)
+class Finding:
+    kind: str
+    channel: str | None
+    time: float | None
+    message: str
+    remedy: str
+    severity: str
+
+
+def test_findings_tell_channel_time_and_remedy_the_serious_ones_first() -> None:
+    section = data_quality_section(
+        [
+            Finding("hum", "S_DE_B", None, "50 Hz hum of 1.2 µm peak", "ground the cable", "warning"),
+            Finding("clipping", "S_NDE_A", 0.0082, "clipped at 500 µm", "use a larger range", "fault"),
+        ]
+    )
+    assert [(s.level, s.text) for s in section.statements] == [
+        ("bad", "Channel S_NDE_A: clipped at 500 µm"),
+        ("warning", "Channel S_DE_B: 50 Hz hum of 1.2 µm peak"),
+    ]
+    assert section.tables[0].rows[1] == (
+        "clipping",
+        "S_NDE_A",
+        "8.200 ms",
+        "clipped at 500 µm",
+        "use a larger range",
+    )
+
+
+def test_a_sound_record_is_called_sound() -> None:
+    (statement,) = data_quality_section([]).statements
+    assert statement.level == "good"
+
+
+def box(label: str, bearing: str, outliers: np.ndarray) -> StressBox:
+    return StressBox(
+        label=label,
+        bearing=bearing,
+        mean=1045e6,
+        median=1022e6,
+        lower_quartile=994e6,
+        upper_quartile=1060e6,
+        lower_whisker=993e6,
+        upper_whisker=1158e6,
+        standard_deviation=81.9e6,
+        maximum=1694e6,
+        outliers=outliers,
+        preload=993e6,
+    )
+
+
+def test_the_box_plot_draws_the_numbers_of_the_table() -> None:
+    drawn = stress_box_figure(
+        [box("60 Hz", "NDE", np.array([1.2e9, 1.694e9])), box("150 Hz", "NDE", np.array([]))]
+    )
+    first = drawn.data[0]
+    numbers = (first.lowerfence, first.q1, first.median, first.mean, first.q3, first.upperfence)
+    assert_allclose(np.ravel(numbers), (993.0, 994.0, 1022.0, 1045.0, 1060.0, 1158.0))
+    assert_allclose(drawn.data[1].y, (1200.0, 1694.0))
+    assert list(first.x) == ["60 Hz"]
+    assert "[MPa]" in drawn.layout.yaxis.title.text
+
+
+def test_the_stress_table_names_its_rule_and_the_preload() -> None:
+    table = stress_table([box("60 Hz", "NDE", np.zeros(7)), box("60 Hz", "DE", np.zeros(3))])
+    rows = {cells[0]: texts(cells)[1:] for cells in table.rows}
+    assert rows["mean"] == ["1\u202f045 MPa"] * 2
+    assert rows["outliers"] == ["7", "3"]
+    assert rows["preload's share of the mean"] == ["95.0 %"] * 2
+    assert "Hazen" in table.note
+    assert "1.5 times the interquartile range" in table.note
+
+
+def test_thinned_outliers_keep_both_ends_and_leave_no_gap() -> None:
+    values = np.random.default_rng(5).exponential(size=50_000)
+    kept = thinned(values)
+    assert len(kept) <= 302
+    assert (kept[0], kept[-1]) == (values.min(), values.max())
+    distance = np.min(np.abs(values[:2000, None] - kept[None, :]), axis=1)
+    assert distance.max() <= (values.max() - values.min()) / 300

@@ -1,0 +1,74 @@
+"""The terminal summary: plain text where colours are not wanted, and no control characters from names."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+from rich.console import Console
+
+from rotordrop.report.content import Card, KeyFigure, ReportContent, Statement, Table
+from rotordrop.report.quantity import Quantity
+from rotordrop.report.terminal import print_summary, summary_console
+
+ESCAPE = "\x1b"
+
+
+def content(name: str = "LP-400") -> ReportContent:
+    peak = Quantity(value=3333.0, kind="force", interval_90=(3180.0, 3490.0))
+    stress = Quantity(value=1.805e9, kind="pressure")
+    return ReportContent(
+        title=f"Drop of {name}",
+        simulated="This record is simulated.",
+        verdict=(Statement(text="Clipping on channel A.", level="warning"),),
+        cards=(
+            Card(title="NDE", figures=(KeyFigure(label="Peak bearing force", value=peak),)),
+            Card(title="DE", figures=(KeyFigure(label="Peak Hertz stress", value=stress),)),
+        ),
+        summary=(Table(columns=("air gap", "NDE"), rows=(("lower", Quantity(value=27e-5, kind="length")),)),),
+    )
+
+
+def printed(report: ReportContent) -> str:
+    stream = io.StringIO()
+    print_summary(report, summary_console(stream))
+    return stream.getvalue()
+
+
+def test_all_numbers_with_unit_and_interval_are_printed() -> None:
+    text = printed(content())
+    for part in (
+        "Drop of LP-400",
+        "This record is simulated.",
+        "warning: Clipping on channel A.",
+        "3\u202f333 N",
+        "90 %: 3\u202f180 to 3\u202f490 N",
+        "1\u202f805 MPa",
+        "270.0 µm",
+    ):
+        assert part in text
+
+
+def test_there_is_no_ansi_when_the_output_is_not_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("FORCE_COLOR", "TTY_COMPATIBLE", "NO_COLOR"):
+        monkeypatch.delenv(name, raising=False)
+    assert ESCAPE not in printed(content())
+
+
+def test_no_color_is_obeyed_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    def colours(stream: io.StringIO) -> list[str]:
+        console = Console(file=stream, force_terminal=True, color_system="standard", highlight=False)
+        print_summary(content(), console)
+        return [code for code in ("[33m", "[1;33m") if code in stream.getvalue()]
+
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    assert colours(io.StringIO())
+    monkeypatch.setenv("NO_COLOR", "1")
+    assert not colours(io.StringIO())
+
+
+def test_a_name_cannot_repaint_the_terminal_or_bring_markup() -> None:
+    text = printed(content(f"{ESCAPE}[2Jgone{ESCAPE}]0;title\x07 [bold]x[/bold]"))
+    assert ESCAPE not in text
+    assert "\x07" not in text
+    assert "[bold]x[/bold]" in text
