@@ -1,0 +1,422 @@
+"""What slows the rotor down: exponential fit, drag law and standstill, fitted to the recorded speed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import least_squares
+from scipy.special import ndtr
+
+from rotordrop.errors import RecordError
+from rotordrop.estimated import IdentifiedValue, Verdict
+
+Array = NDArray[np.float64]
+Model = Callable[[Array], Array]
+
+QUANTILE_90 = 1.6448536269514722
+MOST_VALUES = 2000
+LONGEST_STEP = 0.02
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExponentialFit:
+    """Exponential coast-down ``ω = ω_0 e^(−(t − t_0)/τ)`` fitted to a recorded speed.
+
+    Attributes
+    ----------
+    initial_speed : IdentifiedValue
+        ω_0 [rad/s] at ``start``.
+    time_constant : IdentifiedValue
+        τ [s].
+    start, end : float
+        Window of the fit [s].
+    time, residual : shape (K,)
+        Recorded minus fitted speed [rad/s] over time [s].
+    residual_rms, residual_largest : float
+        Size of the residual [rad/s].
+    noise : float
+        What of the residual is noise of the recording [rad/s]; the rest says the law is not exponential.
+    statement : str
+    """
+
+    initial_speed: IdentifiedValue
+    time_constant: IdentifiedValue
+    start: float
+    end: float
+    time: Array
+    residual: Array
+    residual_rms: float
+    residual_largest: float
+    noise: float
+    statement: str
+
+    def speed_at(self, time: ArrayLike) -> Array:
+        """Fitted speed [rad/s] at times [s]."""
+        elapsed = np.asarray(time, dtype=np.float64) - self.start
+        return self.initial_speed.value * np.exp(-elapsed / self.time_constant.value)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DragFit:
+    """Deceleration ``−(constant + linear ω + quadratic ω²)`` fitted to a recorded speed.
+
+    Attributes
+    ----------
+    constant : IdentifiedValue
+        Dry part [rad/s²]: friction of balls and races, which a recorded speed always contains.
+    linear : IdentifiedValue
+        Laminar drag per polar inertia [1/s]; the machine file's ``aero_linear``.
+    quadratic : IdentifiedValue
+        Turbulent drag per polar inertia [1/rad]; the machine file's ``aero_quadratic``.
+    initial_speed : IdentifiedValue
+        [rad/s] at ``start``.
+    correlation : shape (4, 4)
+        Of initial speed, constant, linear, quadratic, in this order [1].
+    start, end : float
+        Window of the fit [s].
+    residual_rms, noise : float
+        Of the recorded speed about the fit, and of the recording itself [rad/s].
+    statement : str
+    """
+
+    constant: IdentifiedValue
+    linear: IdentifiedValue
+    quadratic: IdentifiedValue
+    initial_speed: IdentifiedValue
+    correlation: Array
+    start: float
+    end: float
+    residual_rms: float
+    noise: float
+    statement: str
+
+    def speed_at(self, time: ArrayLike) -> Array:
+        """Fitted speed [rad/s] at times [s] from ``start`` on; standstill is kept."""
+        values = (self.initial_speed, self.constant, self.linear, self.quadratic)
+        parameters = np.array([value.value for value in values])
+        wanted = np.asarray(time, dtype=np.float64)
+        steps = max(math.ceil((float(wanted.max()) - self.start) / LONGEST_STEP), 1)
+        knots = np.linspace(self.start, self.start + steps * LONGEST_STEP, steps + 1)
+        return np.interp(wanted, knots, _drag_solution(parameters, knots))
+
+
+def exponential_time_constant(first_speed: float, later_speed: float, elapsed: float) -> float:
+    """Time constant [s] of an exponential coast-down from two speeds (any one unit) and the time between [s].
+
+    Source: Neisi 2020, eq. (13) and section 5.1 (60 Hz to 58 Hz in 0.2 s).
+    """
+    if not first_speed > later_speed > 0.0 or elapsed <= 0.0:
+        raise RecordError(
+            f"time constant: speed goes from {first_speed:g} to {later_speed:g} in {elapsed:g} s; "
+            f"expected a falling positive speed and a positive time"
+        )
+    return elapsed / math.log(first_speed / later_speed)
+
+
+def fit_exponential(
+    time: ArrayLike, speed: ArrayLike, *, start: float, end: float | None = None
+) -> ExponentialFit:
+    """Fit one time constant to a recorded coast-down and say how far from exponential it is.
+
+    Parameters
+    ----------
+    time : shape (K,)
+        [s], rising.
+    speed : shape (K,)
+        Recorded rotor speed [rad/s].
+    start, end : float
+        Window of the fit [s]; to the end of the record if not given.
+
+    Returns
+    -------
+    ExponentialFit
+
+    Notes
+    -----
+    Source: Neisi 2020, eq. (13). The intervals are widened where neighbouring residuals are alike, because a
+    wrong law does not scatter like noise.
+    """
+    t, omega = _window(time, speed, start, end)
+    expected = _reading(t, omega)
+    guess = max(_half_time(t, omega, start) / math.log(2.0), 1e-6)
+    scale = np.array([max(float(omega[0]), 1e-9), guess])
+
+    def model(p: Array) -> Array:
+        return expected(p[0] * np.exp(-(t - start) / p[1]))
+
+    fit = _fit(model, omega, scale, lower=np.array([0.0, 1e-6]))
+    residual = omega - model(fit.parameters)
+    noise = neighbour_noise(omega)
+    values = _values(fit, scale, ("rad/s", "s"), np.array([0.0, 0.0]))
+    rms = float(np.sqrt(np.mean(residual**2)))
+    return ExponentialFit(
+        initial_speed=values[0],
+        time_constant=values[1],
+        start=start,
+        end=float(t[-1]),
+        time=t,
+        residual=residual,
+        residual_rms=rms,
+        residual_largest=float(np.abs(residual).max()),
+        noise=noise,
+        statement=_law_statement("one time constant", rms, noise),
+    )
+
+
+def fit_drag(time: ArrayLike, speed: ArrayLike, *, start: float, end: float | None = None) -> DragFit:
+    """Fit dry, linear and quadratic drag to a recorded coast-down, each with its interval.
+
+    Let the window start after the races have spun up (about a second after the drop): until then the rotor
+    hands spin to the races, which is no drag.
+
+    Parameters
+    ----------
+    time : shape (K,)
+        [s], rising.
+    speed : shape (K,)
+        Recorded rotor speed [rad/s].
+    start, end : float
+        Window of the fit [s]; to the end of the record if not given.
+
+    Returns
+    -------
+    DragFit
+
+    Notes
+    -----
+    Source: drag laws behind Neisi 2020, eq. (13). Differs from the paper: the deceleration is a function of
+    speed, with a dry part that the recorded speed contains besides the aerodynamic ones.
+    """
+    t, omega = _window(time, speed, start, end)
+    expected = _reading(t, omega)
+    knots = np.concatenate([[start], t])
+    scale = _drag_scale(t, omega)
+
+    def model(p: Array) -> Array:
+        return expected(_drag_solution(p, knots)[1:])
+
+    fit = _fit(model, omega, scale, lower=np.zeros(4))
+    noise = neighbour_noise(omega)
+    rms = float(np.sqrt(np.mean((omega - model(fit.parameters)) ** 2)))
+    values = _values(fit, scale, ("rad/s", "rad/s²", "1/s", "1/rad"), np.zeros(4))
+    return DragFit(
+        initial_speed=values[0],
+        constant=values[1],
+        linear=values[2],
+        quadratic=values[3],
+        correlation=fit.correlation,
+        start=start,
+        end=float(t[-1]),
+        residual_rms=rms,
+        noise=noise,
+        statement=_law_statement("dry, linear and quadratic drag", rms, noise),
+    )
+
+
+def find_standstill(time: ArrayLike, speed: ArrayLike, *, share: float = 0.05) -> IdentifiedValue:
+    """Find when the rotor stops [s], by carrying its last slow turning to zero speed.
+
+    Dry and linear drag bring the rotor to rest at a definite time, which is fitted to the recorded speed from
+    ``share`` of its highest value on, with allowance for a tacho that cannot read below zero. What stops is
+    the mean turning: a rotor that still swings in the race rocks a little about its axis. A record that ends
+    before, or a rotor that only creeps ever slower, is said to determine nothing; ``lower`` is then the time
+    up to which it surely turned.
+
+    Parameters
+    ----------
+    time : shape (K,)
+        [s], rising.
+    speed : shape (K,)
+        Recorded rotor speed [rad/s].
+    share : float
+        Share of the highest speed [1] at which the fit begins.
+
+    Returns
+    -------
+    IdentifiedValue
+        Time of standstill [s] on the clock of ``time``.
+    """
+    t, omega = _window(time, speed, -math.inf, None)
+    turning = np.flatnonzero(omega > share * float(omega.max()))
+    t, omega = t[turning[-1] :], omega[turning[-1] :]
+    noise = max(neighbour_noise(omega), 1e-9 * float(omega.max()))
+    last_seen = float(t[np.flatnonzero(omega > 5.0 * noise)[-1]])
+    if t.size < 8:
+        return IdentifiedValue(
+            value=float(t[-1]), status="the record does not determine it", lower=last_seen, unit="s"
+        )
+    expected = _reading(t, omega)
+    span = float(t[-1] - t[0])
+    scale = np.array([max(last_seen - float(t[0]), 1e-3 * span), 3.0 / span, float(omega[0])])
+
+    def model(p: Array) -> Array:
+        left = np.maximum(p[0] - (t - t[0]), 0.0)
+        return expected(p[2] * np.expm1(p[1] * left) / np.expm1(p[1] * p[0]))
+
+    upper = np.array([4.0 * span, 300.0 / span, np.inf])
+    fit = _fit(model, omega, scale, lower=np.array([1e-3 * span, 1e-3 / span, 0.0]), upper=upper)
+    error = float(fit.error[0])
+    value = float(t[0]) + float(fit.parameters[0])
+    determined = value + QUANTILE_90 * error < t[-1] and error < 0.2 * fit.parameters[0]
+    status: Verdict = "determined" if determined else "the record does not determine it"
+    return IdentifiedValue(
+        value=value if determined else float(t[-1]),
+        status=status,
+        standard_error=error if determined else None,
+        interval_90=(value - QUANTILE_90 * error, value + QUANTILE_90 * error) if determined else None,
+        lower=last_seen,
+        unit="s",
+    )
+
+
+def neighbour_noise(speed: ArrayLike) -> float:
+    """Noise of a smooth recorded speed [rad/s], from second differences of neighbouring values."""
+    values = np.asarray(speed, dtype=np.float64)
+    turning = values[values > 0.02 * float(values.max())] if values.size else values
+    if turning.size < 4:
+        return 0.0
+    return 1.4826 * float(np.median(np.abs(np.diff(turning, 2)))) / math.sqrt(6.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Fit:
+    parameters: Array
+    error: Array
+    correlation: Array
+    lower: Array
+
+
+def _fit(model: Model, measured: Array, scale: Array, *, lower: Array, upper: Array | None = None) -> _Fit:
+    """Least squares in scaled parameters, with errors from the residual and its run of equal signs."""
+    highest = np.full(scale.size, np.inf) if upper is None else upper / scale
+    start = np.clip(np.ones(scale.size), lower / scale, highest)
+    solution = least_squares(
+        lambda q: model(q * scale) - measured,
+        start,
+        bounds=(lower / scale, highest),
+        x_scale="jac",
+        xtol=1e-12,
+        ftol=1e-12,
+    )
+    residual = solution.fun
+    freedom = max(residual.size - scale.size, 1)
+    variance = float(residual @ residual) / freedom * _inflation(residual)
+    covariance = variance * np.linalg.pinv(solution.jac.T @ solution.jac)
+    deviation = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    return _Fit(
+        parameters=solution.x * scale,
+        error=deviation * scale,
+        correlation=covariance / np.outer(deviation, deviation),
+        lower=lower,
+    )
+
+
+def _inflation(residual: Array) -> float:
+    """How much fewer independent residuals there are than residuals [1]."""
+    power = float(residual @ residual)
+    if power == 0.0:
+        return 1.0
+    likeness = min(max(float(residual[1:] @ residual[:-1]) / power, 0.0), 0.98)
+    return (1.0 + likeness) / (1.0 - likeness)
+
+
+def _values(fit: _Fit, start: Array, units: tuple[str, ...], bound: Array) -> list[IdentifiedValue]:
+    found = []
+    for k, unit in enumerate(units):
+        value, error = float(fit.parameters[k]), float(fit.error[k])
+        status: Verdict = "determined"
+        if value <= bound[k] + 0.01 * error:
+            status = "at its bound"
+        elif error > 0.5 * abs(value):
+            status = "the record does not determine it"
+        found.append(
+            IdentifiedValue(
+                value=value,
+                status=status,
+                standard_error=error,
+                interval_90=(max(value - QUANTILE_90 * error, float(bound[k])), value + QUANTILE_90 * error),
+                start=float(start[k]),
+                bounds=(float(bound[k]), math.inf),
+                unit=unit,
+            )
+        )
+    return found
+
+
+def _window(time: ArrayLike, speed: ArrayLike, start: float, end: float | None) -> tuple[Array, Array]:
+    t = np.asarray(time, dtype=np.float64)
+    omega = np.asarray(speed, dtype=np.float64)
+    inside = (t >= start) & (t <= (math.inf if end is None else end)) & np.isfinite(omega)
+    t, omega = t[inside], omega[inside]
+    if t.size < 8 or float(omega.max()) <= 0.0:
+        raise RecordError(
+            f"speed fit: {t.size} recorded speeds between {start:.3f} s and "
+            f"{'the end' if end is None else f'{end:.3f} s'}, at least 8 and a turning rotor are needed"
+        )
+    block = -(-t.size // MOST_VALUES)
+    whole = t.size // block * block
+    return t[:whole].reshape(-1, block).mean(1), omega[:whole].reshape(-1, block).mean(1)
+
+
+def _reading(time: Array, speed: Array) -> Model:
+    """What a tacho shows on average at a true speed: noise that cannot fall below zero lifts slow
+    readings.
+    """
+    noise = neighbour_noise(speed)
+    zeros = int(np.sum(speed == 0.0))
+    cut_off = float(speed.min()) >= 0.0 and 2 < zeros < 0.9 * time.size and noise > 0.0
+    if not cut_off:
+        return lambda omega: omega
+
+    def mean_reading(omega: Array) -> Array:
+        z = omega / noise
+        density = np.exp(-0.5 * z**2) / math.sqrt(2.0 * math.pi)
+        return cast(Array, omega * ndtr(z) + noise * density)
+
+    return mean_reading
+
+
+def _half_time(time: Array, speed: Array, start: float) -> float:
+    below = np.flatnonzero(speed <= 0.5 * speed[0])
+    return float((time[below[0]] if below.size else time[-1]) - start)
+
+
+def _drag_scale(time: Array, speed: Array) -> Array:
+    """Start values: each of the three drags alone would stop about half of the rotor's speed in the half
+    time.
+    """
+    half = max(_half_time(time, speed, float(time[0])), 1e-6)
+    first = float(speed[0])
+    return np.array([first, 0.05 * first / half, 0.5 / half, 0.1 / (half * first)])
+
+
+def _drag_solution(parameters: Array, time: Array) -> Array:
+    """Speed [rad/s] at rising times [s] under dry, linear and quadratic drag; fourth-order steps."""
+    omega, dry, linear, quadratic = (float(p) for p in parameters)
+
+    def slope(w: float) -> float:
+        return -(dry + (linear + quadratic * w) * w) if w > 0.0 else 0.0
+
+    result = np.empty(time.size)
+    result[0] = omega
+    for k, h in enumerate(np.diff(time).tolist(), start=1):
+        a = slope(omega)
+        b = slope(omega + 0.5 * h * a)
+        c = slope(omega + 0.5 * h * b)
+        d = slope(omega + h * c)
+        omega = max(omega + h / 6.0 * (a + 2.0 * b + 2.0 * c + d), 0.0)
+        result[k] = omega
+    return result
+
+
+def _law_statement(law: str, rms: float, noise: float) -> str:
+    hertz = 2.0 * math.pi
+    text = f"{law}: residual {rms / hertz:.3g} Hz rms, noise of the recording {noise / hertz:.3g} Hz"
+    if rms > 1.5 * noise:
+        return f"{text}; the recorded speed does not follow this law"
+    return f"{text}; the recorded speed follows this law"

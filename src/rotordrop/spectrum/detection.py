@@ -1,0 +1,243 @@
+"""Finding the clearest line in a set of frames, against the noise floor around it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.spectrum.line_spectra import FramePower
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+MEDIAN_OF_NOISE = math.log(2.0)
+"""Median over mean of the power of noise in one frame [1]."""
+
+HANN_OVERLAP_SHARE = 1.0 / 18.0
+"""How much half-overlapping Hann frames repeat each other: averages counted as n / (1 + share)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DetectionSettings:
+    """When a peak counts as a line.
+
+    Attributes
+    ----------
+    least_ratio : float
+        Amplitude over the local floor [1].
+    false_alarm : float
+        Accepted probability that noise alone shows any line in the whole search [1].
+    floor_lines : int
+        Neighbouring lines whose median is the local floor [1].
+    """
+
+    least_ratio: float = 2.0
+    false_alarm: float = 1e-3
+    floor_lines: int = 81
+
+
+@dataclass(frozen=True, kw_only=True)
+class Peak:
+    """The clearest peak of a view.
+
+    Attributes
+    ----------
+    coordinate : float
+        Frequency [Hz] or order [1], interpolated between lines.
+    channel : int
+        Channel in which it is clearest.
+    first, last : int
+        Frames it was found in, last one excluded.
+    amplitude, floor : float
+        Zero-to-peak amplitude and local floor [m].
+    score : float
+        Minus the logarithm of the probability that noise alone shows it [1].
+    width : float
+        Full width at half power of the peak [unit of the coordinate].
+    """
+
+    coordinate: float
+    channel: int
+    first: int
+    last: int
+    amplitude: float
+    floor: float
+    score: float
+    width: float
+
+    @property
+    def ratio(self) -> float:
+        """Amplitude over the local floor [1]."""
+        return self.amplitude / self.floor
+
+
+def clearest_peak(
+    frames: FramePower,
+    allowed: Mask,
+    settings: DetectionSettings,
+    stretches: Sequence[tuple[int, int]],
+) -> Peak | None:
+    """Find the peak that noise explains worst, over all channels and all given stretches of frames.
+
+    Parameters
+    ----------
+    frames : FramePower
+    allowed : shape (F, K)
+        Where a line may be looked for.
+    settings : DetectionSettings
+    stretches : sequence of (int, int)
+        First frame and last one, excluded, of every stretch in which a line must be seen half the time.
+
+    Returns
+    -------
+    Peak or None
+        None when noise explains everything.
+    """
+    trials = max(int(np.sum(allowed.any(axis=0))), 1) * frames.power.shape[2] * max(len(stretches), 1)
+    threshold = math.log(trials / settings.false_alarm)
+    floor = _floor(frames.power, settings.floor_lines)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ratio = np.where(allowed[:, :, None] & (floor > 0.0), frames.power / floor, np.nan)
+    best: tuple[float, int, int, int, int] = (threshold, -1, -1, -1, -1)
+    for first, last in stretches:
+        best = max(best, _best_in(ratio[first:last], settings, first, last))
+    if best[1] < 0:
+        return None
+    return _peak(frames, floor, ratio, *best)
+
+
+def stretches_of(count: int, shortest: int) -> Iterator[tuple[int, int]]:
+    """All frames, then half of them in overlapping steps, and so on down to the shortest stretch."""
+    length = count
+    while length >= max(shortest, 1):
+        for first in range(0, count - length + 1, max(length // 2, 1)):
+            yield first, first + length
+        length = length // 2
+
+
+def _best_in(
+    ratio: Array, settings: DetectionSettings, first: int, last: int
+) -> tuple[float, int, int, int, int]:
+    """Score, line, channel and stretch of the clearest peak in one stretch."""
+    seen = np.isfinite(ratio).sum(axis=0)
+    typical = _median_of_frames(ratio, seen >= max(1, (last - first + 1) // 2))
+    independent = np.maximum(seen / (1.0 + HANN_OVERLAP_SHARE), 1.0)
+    clear = (typical * MEDIAN_OF_NOISE >= settings.least_ratio**2) & _local_maximum(typical)
+    score = np.where(clear, _improbability(np.nan_to_num(typical), independent), 0.0)
+    line, channel = np.unravel_index(int(np.argmax(score)), score.shape)
+    return float(score[line, channel]), int(line), int(channel), first, last
+
+
+def _peak(
+    frames: FramePower,
+    floor: Array,
+    ratio: Array,
+    score: float,
+    line: int,
+    channel: int,
+    first: int,
+    last: int,
+) -> Peak:
+    used = np.isfinite(ratio[first:last, line, channel])
+    shape = _typical_shape(frames.power[first:last, :, channel][used])
+    shift, height = _between_lines(shape, line)
+    around = float(np.median(floor[first:last, line, channel][used])) / MEDIAN_OF_NOISE
+    return Peak(
+        coordinate=float(frames.coordinate[line]) + shift * frames.spacing,
+        channel=channel,
+        first=first,
+        last=last,
+        amplitude=math.sqrt(height),
+        floor=math.sqrt(around),
+        score=score,
+        width=_half_power_width(shape, line) * frames.spacing,
+    )
+
+
+def _floor(power: Array, lines: int) -> Array:
+    """Median power of the lines around each line, frame by frame: half-overlapping blocks, joined by
+    straight lines.
+    """
+    count = power.shape[1]
+    half = max(min(lines, count) // 2, 1)
+    centres = np.arange(half, max(count - half, half + 1), half)
+    blocks = np.empty((power.shape[0], centres.size, power.shape[2]))
+    for k, centre in enumerate(centres):
+        block = power[:, centre - half : centre + half + 1]
+        reached = np.isfinite(block).sum(axis=1) > half
+        blocks[:, k] = np.where(reached, np.nanmedian(np.where(reached[:, None], block, 0.0), axis=1), np.nan)
+    place = np.clip((np.arange(count) - centres[0]) / half, 0.0, centres.size - 1.0)
+    low = np.minimum(place.astype(int), max(centres.size - 2, 0))
+    share = (place - low)[:, None]
+    high = np.minimum(low + 1, centres.size - 1)
+    left, right = blocks[:, low], blocks[:, high]
+    joined = np.where(np.isnan(right), left, np.where(np.isnan(left), right, left + share * (right - left)))
+    return cast(Array, np.where(np.isfinite(power), joined, np.nan))
+
+
+def _median_of_frames(ratio: Array, enough: Mask) -> Array:
+    """Ratio exceeded in half of the frames: a line that only passes through, or a bang, leaves it alone."""
+    median = np.full(ratio.shape[1:], np.nan)
+    columns = ratio[:, enough]
+    if columns.size:
+        median[enough] = np.nanmedian(columns, axis=0)
+    return median
+
+
+def _typical_shape(power: Array) -> Array:
+    """Median over the frames of one channel, zero where no frame reaches, to measure a peak's form."""
+    reached = np.isfinite(power).any(axis=0)
+    shape = np.zeros(power.shape[1])
+    shape[reached] = np.nanmedian(power[:, reached], axis=0)
+    return shape
+
+
+def _improbability(ratio: Array, frames: Array) -> Array:
+    """Minus the logarithm of (Chernoff's bound of) the chance that noise exceeds its median so far in half
+    the frames.
+
+    Power of noise in one frame is exponentially distributed: it exceeds ``ratio`` medians with probability
+    2^(−ratio), independently in each frame.
+    """
+    above = np.clip(ratio, 1.0, None)
+    share = np.exp2(-np.minimum(above, 60.0))
+    return 0.5 * frames * ((above - 2.0) * math.log(2.0) - np.log1p(-share))
+
+
+def _local_maximum(values: Array) -> Mask:
+    """Higher than both neighbours, which must be looked at too: the edge of what is left out is no line."""
+    result = np.zeros(values.shape, dtype=np.bool_)
+    with np.errstate(invalid="ignore"):
+        result[1:-1] = (values[1:-1] >= values[:-2]) & (values[1:-1] >= values[2:])
+    return result
+
+
+def _between_lines(power: Array, line: int) -> tuple[float, float]:
+    """Place of a peak between lines and its power there, by a parabola through the logarithms."""
+    if not 0 < line < len(power) - 1:
+        return 0.0, float(power[line])
+    left, here, right = np.log(np.maximum(power[line - 1 : line + 2], 1e-300))
+    if not np.isfinite(left + right):
+        return 0.0, float(power[line])
+    bend = left - 2.0 * here + right
+    shift = 0.0 if bend >= 0.0 else float(np.clip(0.5 * (left - right) / bend, -0.5, 0.5))
+    return shift, float(np.exp(here - 0.25 * (left - right) * shift))
+
+
+def _half_power_width(power: Array, line: int) -> float:
+    half = 0.5 * power[line]
+    left, right = line, line
+    while left > 0 and power[left - 1] > half:
+        left -= 1
+    while right < len(power) - 1 and power[right + 1] > half:
+        right += 1
+    below = 0.0 if left == 0 else float((power[left] - half) / (power[left] - power[left - 1]))
+    above = (
+        0.0 if right == len(power) - 1 else float((power[right] - half) / (power[right] - power[right + 1]))
+    )
+    return right - left + below + above

@@ -1,0 +1,146 @@
+"""Taking one line out of a signal: its slowly changing amplitude, its frequency, and the rest."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+TURN = 2.0 * math.pi
+SHARPENING = 3
+"""Passes over what the smoothing missed: each widens the band in which an amplitude is kept exactly."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Envelope:
+    """Complex amplitude of a line over time, in every channel.
+
+    Attributes
+    ----------
+    value : shape (N, C)
+        The line is the real part of value times e^(j phase) [m], zero-to-peak.
+    phase : shape (N,)
+        Phase [rad] the line was assumed to follow.
+    """
+
+    value: ComplexArray
+    phase: Array
+
+    def line(self) -> Array:
+        """The line itself [m], shape (N, C)."""
+        return cast(Array, (self.value * np.exp(1j * self.phase)[:, None]).real)
+
+
+def smooth(values: Array, samples: int) -> Array:
+    """Smooth over so many samples on each side (three moving averages), fair to the ends, shape kept."""
+    size = max(samples, 1)
+    weight = np.ones(len(values))
+    out = values
+    for _ in range(3):
+        weight = uniform_filter1d(weight, size, mode="constant")
+        out = uniform_filter1d(out, size, axis=0, mode="constant")
+    return out / weight.reshape(-1, *([1] * (values.ndim - 1)))
+
+
+def smooth_complex(values: ComplexArray, samples: int) -> ComplexArray:
+    """Smooth real and imaginary part alike."""
+    return cast(ComplexArray, smooth(values.real, samples) + 1j * smooth(values.imag, samples))
+
+
+def extract(signal: Array, sampling_rate: float, phase: Array, *, bandwidth: float) -> Envelope:
+    """Take the part of a signal out that follows a phase, with an amplitude that changes slowly.
+
+    Parameters
+    ----------
+    signal : shape (N, C)
+        [m], without its mean.
+    sampling_rate : float
+        [Hz].
+    phase : shape (N,)
+        [rad].
+    bandwidth : float
+        Distance from the line up to which amplitude changes are followed [Hz].
+    """
+    samples = round(0.5 * sampling_rate / bandwidth)
+    turned = 2.0 * signal * np.exp(-1j * phase)[:, None]
+    value = np.zeros_like(turned)
+    for _ in range(SHARPENING):
+        value = value + smooth_complex(turned - value, samples)
+    return Envelope(value=value, phase=phase)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Offset:
+    """How far a line's true frequency (or order) lies from the assumed one.
+
+    Attributes
+    ----------
+    value, error : float
+        Offset and its standard error [unit of advance per radian].
+    """
+
+    value: float
+    error: float
+
+
+def mean_offset(envelope: ComplexArray, advance: Array, *, lag: int, present: NDArray[np.bool_]) -> Offset:
+    """Mean offset of a line from the turning of its envelope, weighted by power.
+
+    Parameters
+    ----------
+    envelope : shape (N, C)
+        Complex amplitude [m].
+    advance : shape (N,)
+        What the offset is counted in: time times 2π [s rad] gives Hz, rotor angle [rad] gives orders.
+    lag : int
+        Samples between compared values [1].
+    present : shape (N,)
+        Where the line is there.
+    """
+    pairs = present[:-lag] & present[lag:]
+    product = np.where(pairs[:, None], envelope[lag:] * envelope[:-lag].conj(), 0.0).sum(axis=1)
+    step = advance[lag:] - advance[:-lag]
+    groups = np.arange(0, product.size, lag)
+    turning = np.add.reduceat(product, groups)
+    weight = np.abs(turning)
+    # A bang is no line: no moment counts much more than the usual one.
+    weight = np.minimum(weight, 4.0 * float(np.median(weight[weight > 0.0]))) if weight.any() else weight
+    mean_step = np.add.reduceat(step, groups) / np.diff(np.append(groups, product.size))
+    if weight.sum() == 0.0:
+        return Offset(value=0.0, error=math.inf)
+    power = float(np.sum(weight * mean_step**2))
+    value = float(np.sum(weight * np.angle(turning) * mean_step)) / power
+    left = np.angle(turning * np.exp(-1j * value * mean_step))
+    effective = max(float(weight.sum() ** 2 / np.sum(weight**2)), 1.0)
+    scatter = math.sqrt(float(np.sum(weight * left**2) / np.sum(weight * mean_step**2)) / effective)
+    return Offset(value=value, error=scatter)
+
+
+def drift_phase(
+    envelope: ComplexArray, sampling_rate: float, present: NDArray[np.bool_], *, span: float
+) -> Array:
+    """Slow phase [rad], shape (N,), by which a line wanders from its assumed frequency, smoothed over a span
+    [s].
+
+    Where the line is absent its frequency is taken as that of the nearest moments where it is there.
+    """
+    lag = max(round(0.05 * sampling_rate), 1)
+    product = (envelope[lag:] * envelope[:-lag].conj()).sum(axis=1)
+    product = np.where(present[:-lag] & present[lag:], product, 0.0)
+    for _ in range(2):
+        product = smooth_complex(product, round(0.5 * span * sampling_rate))
+    size = np.abs(product)
+    if not size.any():
+        return np.zeros(len(envelope))
+    known = size > 1e-6 * float(np.median(size[present[:-lag]])) if present[:-lag].any() else size > 0.0
+    index = np.arange(product.size)
+    rate = np.interp(index, index[known], np.angle(product[known])) / lag
+    rate = np.concatenate([rate[:1].repeat(lag // 2), rate, rate[-1:].repeat(lag - lag // 2)])
+    return cast(Array, np.cumsum(rate))

@@ -1,0 +1,299 @@
+"""Lines of a coast-down: which frequencies are there, do they follow the speed, what are they called."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from rotordrop.errors import RecordError
+from rotordrop.spectrum._search import FoundLine, LineSearch
+from rotordrop.spectrum.candidates import Candidate, harmonic_candidates
+from rotordrop.spectrum.frequency_path import FrequencyPath
+from rotordrop.spectrum.line_settings import STANDARD_SETTINGS, LineSettings
+from rotordrop.spectrum.naming import LineEvidence, LineKind, Name, name_line
+from rotordrop.spectrum.rate import reduce_rate
+from rotordrop.spectrum.speed_profile import SpeedProfile
+from rotordrop.spectrum.waterfall import PlanarSignal
+
+
+@dataclass(frozen=True, kw_only=True)
+class Line:
+    """One line of a coast-down, with its name and the reason for it.
+
+    Attributes
+    ----------
+    kind : {"order", "steady", "combination", "undecided"}
+        Follows the speed, stands still, both (sum or difference of an order and a steady line), or the speed
+        changes too little to say.
+    label : str
+        Its name, or "unnamed".
+    named : bool
+    confidence : float
+        Probability that line and name are right [1].
+    reason : str
+    frequency, frequency_error : float
+        Mean frequency over the time it was seen [Hz], weighted by power.
+    order, order_error : float or None
+        Multiple of the rotor speed [1]; None for a steady line.
+    drift : tuple of float
+        Lowest and highest frequency of a steady line over its time [Hz].
+    width : float
+        Full width at half power [Hz], without that of the frame; 0 when it is below the resolution.
+    amplitude : float
+        Zero-to-peak [m], in the plane and direction where it is largest, root mean square over its time.
+    amplitude_xy : dict of str to tuple
+        Zero-to-peak amplitude [m] of (x, y) in each plane, root mean square over its time.
+    forward, backward : dict of str to float
+        Radii of the forward and backward turning parts [m] in each plane, root mean square over its time.
+    floor : float
+        Local noise floor [m] where it was found.
+    ratio : float
+        Amplitude over the local floor where it was found [1].
+    first_seen, last_seen : float
+        [s].
+    path : FrequencyPath
+        Its frequency over time [Hz].
+    name : Name
+        With all candidates worth considering.
+    """
+
+    kind: LineKind
+    label: str
+    named: bool
+    confidence: float
+    reason: str
+    frequency: float
+    frequency_error: float
+    order: float | None
+    order_error: float | None
+    drift: tuple[float, float]
+    width: float
+    amplitude: float
+    amplitude_xy: dict[str, tuple[float, float]]
+    forward: dict[str, float]
+    backward: dict[str, float]
+    floor: float
+    ratio: float
+    first_seen: float
+    last_seen: float
+    path: FrequencyPath
+    name: Name
+
+    def as_json(self) -> dict[str, Any]:
+        """Everything known about the line, ready for JSON; amplitudes are zero-to-peak in m."""
+        return {
+            "kind": self.kind,
+            "label": self.label,
+            "named": self.named,
+            "confidence": round(self.confidence, 4),
+            "reason": self.reason,
+            "frequency_hz": self.frequency,
+            "frequency_error_hz": self.frequency_error,
+            "order": self.order,
+            "order_error": self.order_error,
+            "drift_hz": list(self.drift),
+            "width_hz": self.width,
+            "amplitude_zero_to_peak_m": self.amplitude,
+            "amplitude_xy_zero_to_peak_m": {plane: list(xy) for plane, xy in self.amplitude_xy.items()},
+            "forward_m": self.forward,
+            "backward_m": self.backward,
+            "floor_zero_to_peak_m": self.floor,
+            "ratio_to_floor": self.ratio,
+            "first_seen_s": self.first_seen,
+            "last_seen_s": self.last_seen,
+            "candidates": [
+                {"name": m.candidate.name, "probability": m.probability, "deviation": m.deviation}
+                for m in self.name.matches
+            ],
+        }
+
+
+def find_lines(
+    planes: Mapping[str, PlanarSignal],
+    sampling_rate: float,
+    profile: SpeedProfile | None,
+    *,
+    start_time: float = 0.0,
+    candidates: Sequence[Candidate] = (),
+    air_gap: float | None = None,
+    settings: LineSettings = STANDARD_SETTINGS,
+) -> tuple[Line, ...]:
+    """Find the lines of a coast-down one after the other, the clearest first, and name those that can be
+    named.
+
+    The signal is looked at over frequency and, in frames of equal rotor angle, over order. The peak that
+    noise explains worst is taken, followed through the whole record, taken out of the signal, and the search
+    goes on with the rest: so a strong order does not appear as a steady line where it is smeared, nor a
+    strong steady line as an order. Afterwards sums and differences of orders and steady lines are looked for.
+
+    Parameters
+    ----------
+    planes : mapping of str to shape (N, 2)
+        Displacement (x, y) [m] in each plane, after power-off.
+    sampling_rate : float
+        [Hz].
+    profile : SpeedProfile, optional
+        Rotor speed; without it every line stays undecided.
+    start_time : float
+        Time of the first sample [s].
+    candidates : sequence of Candidate
+        What lines could be.
+    air_gap : float, optional
+        [m]; needed to recognise whirl.
+    settings : LineSettings
+
+    Returns
+    -------
+    tuple of Line
+        Strongest first.
+
+    Notes
+    -----
+    Source: own method; names after Neisi 2020, section 5.4.
+    """
+    if not planes:
+        raise RecordError("lines: no plane given, at least one displacement (N, 2) is needed")
+    highest = min(settings.highest_frequency, 0.4 * sampling_rate)
+    found: list[tuple[str, FoundLine]] = []
+    for plane, displacement in planes.items():
+        thin, rate = reduce_rate(displacement, sampling_rate, highest, samples_per_turn=2.7)
+        search = LineSearch(
+            thin, rate, profile, start_time=start_time, settings=settings, highest_frequency=highest
+        )
+        found += [(plane, line) for line in search.run()]
+    bands = (highest, settings.highest_order)
+    lines = _joined(_named(found, candidates, air_gap, bands))
+    return tuple(sorted(lines, key=lambda line: -line.amplitude))
+
+
+def _named(
+    found: Sequence[tuple[str, FoundLine]],
+    candidates: Sequence[Candidate],
+    air_gap: float | None,
+    bands: tuple[float, float],
+) -> list[Line]:
+    """Name fundamental lines first; those named give the candidates for their harmonics and combinations."""
+
+    def named(plane: str, line: FoundLine, choice: Sequence[Candidate]) -> Line:
+        return _line(line, plane, name_line(_evidence(line, plane, bands), choice, air_gap=air_gap))
+
+    single = [(plane, line) for plane, line in found if line.parent is None]
+    first = [named(plane, line, candidates) for plane, line in single]
+    more = [
+        candidate
+        for line in first
+        if line.named and line.kind == "steady" and _swings(line)
+        for candidate in harmonic_candidates(line.label, line.frequency, _spread(line))
+    ]
+    lines = [named(plane, line, (*candidates, *more)) for plane, line in single] if more else first
+    label = {
+        id(line): (result.label if result.named else f"{line.frequency:.1f} Hz")
+        for (_, line), result in zip(single, lines, strict=True)
+    }
+    return lines + [
+        _line(line, plane, _combination_name(line, label[id(line.parent)]))
+        for plane, line in found
+        if line.parent
+    ]
+
+
+def _combination_name(line: FoundLine, parent: str) -> Name:
+    order = abs(line.multiple)
+    sign = "+" if line.multiple > 0 else "−"
+    label = f"{parent} {sign} {order:g}X"
+    reason = (
+        f"moves with {line.multiple:+g} times the rotor speed from the {parent} line: both modulate each "
+        f"other, as in a contact that is not linear"
+    )
+    return Name(label=label, named=True, confidence=0.95, reason=reason, matches=())
+
+
+def _joined(lines: Sequence[Line]) -> list[Line]:
+    """One entry for a line seen in several planes at the same place."""
+    result: list[Line] = []
+    for line in lines:
+        twin = next((k for k, other in enumerate(result) if _same(line, other)), None)
+        if twin is None:
+            result.append(line)
+        else:
+            result[twin] = _merged(result[twin], line)
+    return result
+
+
+def _same(line: Line, other: Line) -> bool:
+    if line.kind != other.kind or line.label != other.label or set(line.forward) & set(other.forward):
+        return False
+    if line.kind == "combination":
+        return True
+    if line.order is not None and other.order is not None:
+        return abs(line.order - other.order) <= 0.01
+    return abs(line.frequency - other.frequency) <= 0.15 + 3.0 * (
+        line.frequency_error + other.frequency_error
+    )
+
+
+def _merged(line: Line, other: Line) -> Line:
+    strong, weak = (line, other) if line.amplitude >= other.amplitude else (other, line)
+    return replace(
+        strong,
+        amplitude_xy={**strong.amplitude_xy, **weak.amplitude_xy},
+        forward={**strong.forward, **weak.forward},
+        backward={**strong.backward, **weak.backward},
+        first_seen=min(line.first_seen, other.first_seen),
+        last_seen=max(line.last_seen, other.last_seen),
+        confidence=max(line.confidence, other.confidence),
+    )
+
+
+def _swings(line: Line) -> bool:
+    """Whether the line is a swing or whirl, whose path along the race has multiples of its frequency."""
+    family = line.name.matches[0].candidate.family if line.name.matches else "whirl"
+    return family in ("pendulum", "whirl")
+
+
+def _spread(line: Line) -> float:
+    return 0.5 * (line.drift[1] - line.drift[0]) + line.frequency_error + 0.05
+
+
+def _evidence(found: FoundLine, plane: str, bands: tuple[float, float]) -> LineEvidence:
+    forward, backward = float(found.forward[0]), float(found.backward[0])
+    return LineEvidence(
+        kind=found.kind,
+        frequency=found.frequency,
+        frequency_error=found.frequency_error,
+        order=found.order if found.order is not None else 0.0,
+        order_error=found.order_error if found.order_error is not None else math.inf,
+        roundness=(forward - backward) / max(forward + backward, 1e-300),
+        radius=forward + backward,
+        plane=plane,
+        band=bands[0],
+        order_band=bands[1],
+    )
+
+
+def _line(found: FoundLine, plane: str, name: Name) -> Line:
+    return Line(
+        kind=found.kind,
+        label=name.label,
+        named=name.named,
+        confidence=name.confidence * found.existence,
+        reason=name.reason,
+        frequency=found.frequency,
+        frequency_error=found.frequency_error,
+        order=found.order,
+        order_error=found.order_error,
+        drift=found.drift,
+        width=found.width,
+        amplitude=float(found.amplitude.max()),
+        amplitude_xy={plane: (float(found.amplitude[0]), float(found.amplitude[1]))},
+        forward={plane: float(found.forward[0])},
+        backward={plane: float(found.backward[0])},
+        floor=found.floor,
+        ratio=found.ratio,
+        first_seen=found.first_seen,
+        last_seen=found.last_seen,
+        path=found.path_of_frequency(),
+        name=name,
+    )
