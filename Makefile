@@ -32,7 +32,7 @@ lint: $(READY) ## check style, types and layers
 
 docs: $(READY) ## build the documentation and run its examples
 	@$(BIN)/python -m sphinx -q -W --keep-going -b doctest docs docs/_build/doctest
-	@$(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build/html
+	@NUMBA_DISABLE_JIT=1 $(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build/html
 	@echo "The documentation is $(CURDIR)/docs/_build/html/index.html"
 
 lock: $(READY) ## renew requirements.lock from pyproject.toml

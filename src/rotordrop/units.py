@@ -149,6 +149,7 @@ def parse_quantity(text: object, kind: str) -> float:
 
     Examples
     --------
+    >>> from rotordrop.units import parse_quantity
     >>> round(parse_quantity("3600 rpm", "frequency"), 6)
     60.0
     >>> round(parse_quantity("60 Hz", "speed"), 2)

@@ -53,12 +53,12 @@ class WhirlModes:
 
     @property
     def natural_frequency(self) -> Array:
-        """Magnitudes |λ| / 2π [Hz], shape (K,)."""
+        """Magnitudes ``|λ| / 2π`` [Hz], shape (K,)."""
         return np.asarray(np.abs(self.eigenvalue) / (2.0 * np.pi))
 
     @property
     def damping_ratio(self) -> Array:
-        """Damping ratios −Re λ / |λ| [1], shape (K,)."""
+        """Damping ratios ``−Re λ / |λ|`` [1], shape (K,)."""
         return np.asarray(-self.eigenvalue.real / np.abs(self.eigenvalue))
 
     @property
