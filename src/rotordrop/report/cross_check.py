@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rotordrop.report.content import Statement, Table
-from rotordrop.report.quantity import Quantity
+from rotordrop.report.quantity import Quantity, written
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +67,8 @@ def cross_check_statements(checks: Sequence[CrossCheck]) -> tuple[Statement, ...
     warnings = tuple(
         Statement(
             text=f"{check.name}: the cross-check finds {check.check.text} against {check.estimate.text}, "
-            f"a difference of {100 * check.difference:+.0f} % where ± {100 * check.accuracy:.3g} % is known.",
+            f"a difference of {written(100 * check.difference, 0)} % where "
+            f"± {100 * check.accuracy:.3g} % is known.",
             level="warning",
         )
         for check in checks

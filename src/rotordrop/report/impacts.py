@@ -120,7 +120,11 @@ def impact_figure(impacts: Sequence[Impact]) -> go.Figure:
             "colorscale": [[0.0, EARLY], [1.0, LATE]],
             "cmin": 0.0,
             "cmax": 1e3 * latest,
-            "colorbar": {"title": {"text": "time [ms]", "font": {"size": 13}}, "thickness": 12, "outlinewidth": 0},
+            "colorbar": {
+                "title": {"text": "time [ms]", "font": {"size": 13}},
+                "thickness": 12,
+                "outlinewidth": 0,
+            },
         }
     )
     return figure

@@ -8,15 +8,13 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from rotordrop.report.history import Band, History
+from rotordrop.report.history import History
 from rotordrop.report.style import (
-    COLOURS,
     LIMIT,
     MICRO,
     MILLI,
     SERIES,
     TIME_TITLE,
-    add_band,
     add_history,
     axis_title,
     fit_legend,
@@ -27,6 +25,8 @@ from rotordrop.report.style import (
 
 Array = NDArray[np.float64]
 
+EXPECTED = "90 % expected by the filter"
+LIMIT_LINE = {"color": LIMIT, "width": 1.2, "dash": "dash"}
 NORMAL_90 = 1.6448536269514722
 """Half width of the 90 % interval of a normal distribution in standard deviations."""
 
@@ -51,13 +51,15 @@ def innovations_figure(
     figure = panels(channels, rows=rows, columns=min(2, len(channels)), height=190)
     for index in range(len(channels)):
         row, column, legend = index // 2 + 1, index % 2 + 1, index == 0
+        history = History(label="innovation", time=time, values=innovations[:, index], role="measured")
+        line = {"color": "#6b7785", "width": 0.8}
+        add_history(figure, history, MICRO, "µm", row=row, column=column, legend=legend, line=line)
         if standard_deviation is not None:
             half = NORMAL_90 * standard_deviation[:, index]
-            band = Band(time=time, lower=-half, upper=half, label="90 % expected by the filter")
-            add_band(figure, band, MICRO, "µm", row=row, column=column, legend=legend)
-        history = History(label="innovation", time=time, values=innovations[:, index], role="measured")
-        line = {"color": COLOURS["measured"], "width": 0.8}
-        add_history(figure, history, MICRO, "µm", row=row, column=column, legend=legend, line=line)
+            for sign in (1.0, -1.0):
+                limit = History(label=EXPECTED, time=time, values=sign * half)
+                shown = legend and sign > 0.0
+                add_history(figure, limit, MICRO, "µm", row=row, column=column, legend=shown, line=LIMIT_LINE)
     figure.update_xaxes(title_text=TIME_TITLE, row=rows)
     figure.update_yaxes(title_text=axis_title("innovation", "µm"), col=1)
     return fit_legend(figure)
@@ -80,7 +82,9 @@ def nis_figure(
         Length of the running mean [s].
     """
     count = max(1, round(window / float(np.median(np.diff(time)))))
-    mean = np.convolve(normalised_square, np.full(count, 1.0 / count), mode="same")
+    window_of_ones = np.ones(min(count, len(time)))
+    summed = np.convolve(normalised_square, window_of_ones, mode="same")
+    mean = summed / np.convolve(np.ones(len(time)), window_of_ones, mode="same")
     figure = panels(("normalised innovation squared",), height=230)
     history = History(label=f"mean over {MILLI * window:.3g} ms", time=time, values=mean, role="estimated")
     add_history(figure, history, 1.0, "")

@@ -13,6 +13,7 @@ from rotordrop.report.quantity import Quantity
 from rotordrop.report.style import COLOURS, axis_title, fit_legend, panels, plain
 
 ROW_HEIGHT = 24
+TICKS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.85, 1, 1.2, 1.5, 2, 3, 5, 10, 20, 50, 100)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,7 +72,7 @@ def parameter_figure(rows: Sequence[ParameterRow]) -> go.Figure:
             )
         )
     figure.add_vline(x=1.0, line={"color": "#5b6875", "width": 1, "dash": "dot"})
-    figure.update_xaxes(title_text=axis_title("value divided by prior", "1"), type="log", dtick="D2")
+    figure.update_xaxes(title_text=axis_title("value divided by prior", "1"), type="log", tickvals=TICKS)
     figure.update_yaxes(autorange="reversed", type="category", showgrid=False)
     return fit_legend(figure)
 

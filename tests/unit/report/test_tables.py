@@ -102,7 +102,7 @@ def test_a_disagreeing_cross_check_is_a_warning_with_both_numbers() -> None:
     (statement,) = cross_check_statements([check(3000.0, 3100.0), check(3000.0, 2400.0)])
     assert statement.level == "warning"
     assert "2\u202f400 N against 3\u202f000 N" in statement.text
-    assert "-20 %" in statement.text
+    assert "−20 %" in statement.text
     assert "± 15 %" in statement.text
 
 
