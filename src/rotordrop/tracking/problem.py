@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError
-from rotordrop.machine import Machine
+from rotordrop.estimated import Estimated
 from rotordrop.model import layout as L
 from rotordrop.model.parameters import DropModel, static_deflection
 from rotordrop.model.statics import levitated_sag, settled_sag
 from rotordrop.physics import aerodynamics
 from rotordrop.physics.ball_bearing import bearing_constants
-from rotordrop.simulation.levitation import rigid_amplitudes
 from rotordrop.tracking import _filter as F
 from rotordrop.tracking.sensors import LevitatedPhase, levitated_phase, without_hum_and_runout
-from rotordrop.tracking.unknowns import Unknown, all_unknowns, parameter_targets
+from rotordrop.tracking.unknowns import NINETY, Unknown, all_unknowns, parameter_targets
 
 Array = NDArray[np.float64]
 
@@ -156,8 +155,6 @@ def build_problem(
 
 
 def _prepared(model: DropModel, omega: float) -> DropModel:
-    from dataclasses import replace
-
     p = model.parameters
     spin, flags = p.spin.copy(), p.flags.copy()
     spin[L.INITIAL_SPEED] = omega
@@ -208,10 +205,19 @@ def _prior(
     sigma[layout.rotor_speed] = SPEED_SIGMA
     for i, unknown in enumerate(unknowns):
         mean[s + i], sigma[s + i] = unknown.mean, unknown.sigma
-    sigma[s + n_p : s + n_p + n_c] = GAIN_SIGMA
-    sigma[s + n_p + n_c : s + n_p + 2 * n_c] = OFFSET_SIGMA
+    for c, sensor in enumerate(model.machine.sensors):
+        gain, offset = s + n_p + c, s + n_p + n_c + c
+        mean[gain], sigma[gain] = 1.0 / float(sensor.gain) - 1.0, _sensor_sigma(sensor.gain, GAIN_SIGMA)
+        mean[offset], sigma[offset] = float(sensor.offset), _sensor_sigma(sensor.offset, OFFSET_SIGMA)
     sigma[s + n_p + 2 * n_c :] = RUNOUT_SIGMA
     return mean, np.diag(sigma**2)
+
+
+def _sensor_sigma(quantity: Estimated, default: float) -> float:
+    """Standard deviation of a gain [1] or an offset [m]: of its estimate where there is one."""
+    if quantity.interval_90 is not None:
+        return max((quantity.interval_90[1] - quantity.interval_90[0]) / (2.0 * NINETY), 1e-12)
+    return default if quantity.standard_error is None else quantity.standard_error
 
 
 def _rotor_prior(model: DropModel, rows: Array, readings: Array, mean: Array, sigma: Array) -> None:
@@ -252,9 +258,8 @@ def settled_displacement(problem: DropProblem, theta: Array) -> Array:
     for b, load in enumerate(model.load_shares):
         row = p.bearing[b]
         indentation = (load / row[L.CONTACT_STIFFNESS]) ** (1.0 / row[L.CONTACT_EXPONENT])
-        stiffness = model.machine.touchdown_bearings[b]
-        race = static_deflection(bearing_constants(stiffness.bearing), float(load))[0]
-        race *= 1.0
+        bearing = model.machine.touchdown_bearings[b].bearing
+        race = static_deflection(bearing_constants(bearing), float(load))[0]
         level[b] = -(row[L.AIR_GAP] + indentation + race + load / row[L.SUPPORT_STIFFNESS_Y])
     nodes = np.array([bearing.node for bearing in model.machine.touchdown_bearings]) - 1
     z = np.asarray(model.fe.node_positions)
@@ -309,9 +314,3 @@ def apply_tail(problem: DropProblem, tail_level: Array, mean: Array, covariance:
                 row[start + n_p + n_c + c] += weight
                 row[problem.parameter_slice] += weight * growth * np.sin(angles[c]) * slopes[c]
             F.scalar_update(mean, covariance, row, observed - predicted, sigma**2, gain_scratch)
-
-
-def start_line(machine: Machine, model: DropModel, positions: Array) -> Array:
-    """Amplitudes (m, 2) of a straight rotor through positions (B, 2) [m] at its touchdown bearings."""
-    nodes = np.array([bearing.node for bearing in machine.touchdown_bearings]) - 1
-    return rigid_amplitudes(model, np.asarray(model.fe.node_positions)[nodes], positions)

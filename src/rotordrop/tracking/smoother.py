@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -142,8 +142,6 @@ def forward(
         result.innovations,
         result.innovation_variances,
     )
-    from dataclasses import replace
-
     return replace(result, done=int(done))
 
 

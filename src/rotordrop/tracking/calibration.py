@@ -1,0 +1,176 @@
+"""One fit of a drop model to several recorded drops of a machine, by repeated filter and smoother passes.
+
+Each pass linearises at the smoothed trajectory of the pass before: a Gauss–Newton step of the whole problem. The window
+grows, because a long chaotic window has no use for a start that is wrong. The drops are chained: what belongs to the
+machine is carried from the end of one drop to the beginning of the next, what belongs to a drop is not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.errors import IdentificationError
+from rotordrop.tracking.problem import DropProblem
+from rotordrop.tracking.smoother import Forward, PassSettings, Smoothed, forward, smooth
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stage:
+    """One stage of the schedule: window after power-off [s], unknown impulses [N s], their share, passes."""
+
+    until: float
+    impulse: float
+    share: float
+    passes: int
+
+
+BLIND_SCHEDULE: tuple[Stage, ...] = (
+    Stage(until=0.012, impulse=1e-2, share=0.05, passes=1),
+    Stage(until=0.012, impulse=5e-3, share=0.03, passes=2),
+    Stage(until=0.016, impulse=3e-3, share=0.03, passes=2),
+    Stage(until=0.020, impulse=3e-3, share=0.02, passes=2),
+    Stage(until=0.030, impulse=2e-3, share=0.02, passes=2),
+    Stage(until=0.045, impulse=2e-3, share=0.02, passes=2),
+    Stage(until=0.060, impulse=2e-3, share=0.02, passes=2),
+)
+"""From nominal guesses: windows for a first contact at about 7 ms; they are shifted when it comes later."""
+
+CALIBRATED_SCHEDULE: tuple[Stage, ...] = (
+    Stage(until=0.02, impulse=2e-3, share=0.02, passes=1),
+    Stage(until=0.2, impulse=2e-3, share=0.02, passes=2),
+)
+"""With a calibrated machine: what is left is the state, the sensors and the drop's own unknowns."""
+
+FULL_SCHEDULE: tuple[Stage, ...] = (
+    *BLIND_SCHEDULE,
+    Stage(until=0.1, impulse=2e-3, share=0.02, passes=1),
+    Stage(until=0.15, impulse=2e-3, share=0.02, passes=1),
+    Stage(until=0.2, impulse=2e-3, share=0.02, passes=2),
+)
+"""From nominal guesses to the whole 0.2 s of one drop."""
+
+REFERENCE_CONTACT = 0.0075
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrackedDrops:
+    """Smoothed estimates of all drops of a fit.
+
+    Attributes
+    ----------
+    problems : tuple of DropProblem
+        The drops, in the order of the chain.
+    smoothed : tuple of Smoothed
+        Their smoothed estimates.
+    nis : tuple of float
+        Mean normalised innovation squared of each drop [1].
+    diverged : tuple of bool
+        Drops in which the filter had to give up.
+    """
+
+    problems: tuple[DropProblem, ...]
+    smoothed: tuple[Smoothed, ...]
+    nis: tuple[float, ...]
+    diverged: tuple[bool, ...] = field(default=())
+
+
+def shifted(schedule: Sequence[Stage], first_contact: float) -> tuple[Stage, ...]:
+    """The schedule with its short windows moved to a first contact at another time [s]."""
+    late = max(first_contact - REFERENCE_CONTACT, -0.004)
+    return tuple(
+        Stage(until=stage.until + late, impulse=stage.impulse, share=stage.share, passes=stage.passes)
+        if stage.until < 0.1
+        else stage
+        for stage in schedule
+    )
+
+
+def track(
+    problems: Sequence[DropProblem],
+    schedule: Sequence[Stage],
+    *,
+    noise_factor: float = 1.0,
+    progress: Progress | None = None,
+) -> TrackedDrops:
+    """Fit the drop model to recorded drops of one machine.
+
+    Parameters
+    ----------
+    problems : sequence of DropProblem
+        The drops; the prior of the first one holds for the machine.
+    schedule : sequence of Stage
+        Windows and noise, in order.
+    noise_factor : float
+        Factor on the unknown impulses of every stage [1].
+    progress : callable, optional
+        Called with a sentence and the fraction done.
+    """
+    references: list[Array | None] = [None] * len(problems)
+    total = sum(stage.until * stage.passes for stage in schedule)
+    done = 0.0
+    smoothed: list[Smoothed] = []
+    for stage in schedule:
+        settings = PassSettings(impulse=stage.impulse * noise_factor, share=stage.share * noise_factor)
+        for _ in range(stage.passes):
+            if progress is not None:
+                progress(f"fitting the first {1e3 * stage.until:.0f} ms", done / total)
+            smoothed = one_pass(problems, settings, references, stage.until)
+            references = [s.means for s in smoothed]
+            done += stage.until
+    return TrackedDrops(
+        problems=tuple(problems),
+        smoothed=tuple(smoothed),
+        nis=tuple(s.filtered.nis for s in smoothed),
+        diverged=tuple(s.filtered.done < len(s.filtered.means) for s in smoothed),
+    )
+
+
+def one_pass(
+    problems: Sequence[DropProblem], settings: PassSettings, references: Sequence[Array | None], until: float
+) -> list[Smoothed]:
+    """One forward pass through the chain of drops and one backward pass through it."""
+    shared = problems[0].machine_indices
+    filtered: list[Forward] = []
+    mean, covariance = problems[0].mean, problems[0].covariance
+    for d, problem in enumerate(problems):
+        if d > 0:
+            mean, covariance = _handed_on(filtered[-1], problem, shared)
+        samples = int(np.searchsorted(problem.time, until, side="right"))
+        result = forward(
+            problem, settings, mean=mean, covariance=covariance, reference=references[d], samples=samples
+        )
+        if result.done < min(samples, 10):
+            raise IdentificationError(
+                f"the filter lost the drop after {result.done} samples of {samples}; the first guesses of the machine "
+                "are too far from it. Check air gap, bearing nodes, sensor angles and support guesses."
+            )
+        filtered.append(result)
+    smoothed: list[Smoothed] = []
+    score, information = None, None
+    for d in range(len(problems) - 1, -1, -1):
+        back = smooth(filtered[d], score, information)
+        smoothed.append(back)
+        if d > 0:
+            n = len(problems[d].mean)
+            score, information = np.zeros(n), np.zeros((n, n))
+            score[shared] = back.score_0[shared]
+            information[np.ix_(shared, shared)] = back.information_0[np.ix_(shared, shared)]
+    return smoothed[::-1]
+
+
+def _handed_on(before: Forward, problem: DropProblem, shared: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Prior of the next drop: its own state, and the machine as known after the drop before."""
+    last = before.done - 1
+    mean, covariance = problem.mean.copy(), problem.covariance.copy()
+    mean[shared] = before.means[last][shared]
+    covariance[shared, :] = 0.0
+    covariance[:, shared] = 0.0
+    covariance[np.ix_(shared, shared)] = before.covariances[last][np.ix_(shared, shared)]
+    return mean, covariance

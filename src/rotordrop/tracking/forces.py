@@ -1,0 +1,211 @@
+"""Touchdown-bearing force and stress from a smoothed drop, with their standard deviations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.model import layout as L
+from rotordrop.model.layout import KernelParameters
+from rotordrop.physics._compile import kernel
+from rotordrop.physics.ball_bearing_planar import largest_ball_load, planar_ball_force
+from rotordrop.simulation._loop import contact_at
+from rotordrop.tracking import _filter as F
+from rotordrop.tracking.problem import DropProblem, private_copy
+from rotordrop.tracking.smoother import Smoothed
+
+Array = NDArray[np.float64]
+
+FORCE_X, FORCE_Y, FORCE, STRESS = range(4)
+N_VALUES = 4
+
+
+@kernel
+def _bearing_values(
+    dx: float, dy: float, axial: float, b: int, p: KernelParameters, work: Array, out: Array
+) -> None:
+    row = p.bearing[b]
+    F_x, F_y = planar_ball_force(
+        dx,
+        dy,
+        row[L.RADIAL_OFFSET],
+        axial,
+        row[L.GROOVE_DISTANCE],
+        row[L.BALL_STIFFNESS],
+        p.ball_cos[b],
+        p.ball_sin[b],
+        p.ball_weight[b],
+        work,
+    )
+    load = largest_ball_load(
+        dx,
+        dy,
+        row[L.RADIAL_OFFSET],
+        axial,
+        row[L.GROOVE_DISTANCE],
+        row[L.BALL_STIFFNESS],
+        p.ball_cos[b],
+        p.ball_sin[b],
+        p.ball_weight[b],
+    )
+    out[0] = -F_x
+    out[1] = -F_y
+    out[2] = np.hypot(F_x, F_y)
+    out[3] = row[L.STRESS_COEFFICIENT] * load ** (1.0 / 3.0)
+
+
+@kernel
+def force_values(
+    means: Array,
+    s: int,
+    targets: F.ParameterTargets,
+    p: KernelParameters,
+    n_parameters: int,
+    values: Array,
+    gradients: Array,
+    contacts: Array,
+) -> None:
+    """Fill values (N, B, 4), gradients (N, B, 4, 3) by race deflection x, y and axial offset, contacts (N, B, 6).
+
+    Values are ball force on the race x, y, its magnitude [N] and inner-race stress [Pa]; contacts as in `contact_at`.
+    """
+    m = p.eigenvalue.shape[0]
+    n_b = p.bearing.shape[0]
+    work = np.empty((2, p.ball_cos.shape[1]))
+    above = np.empty(4)
+    below = np.empty(4)
+    y = np.zeros(s + 2)
+    step_d = 1e-9
+    for i in range(means.shape[0]):
+        F.apply_parameters(means[i, s : s + n_parameters].copy(), targets, p)
+        y[:s] = means[i, :s]
+        for b in range(n_b):
+            r = 2 * m + 2 * b
+            h = r + 2 * n_b
+            dx = y[r] - y[h]
+            dy = y[r + 1] - y[h + 1]
+            axial = p.bearing[b, L.AXIAL_OFFSET]
+            contact_at(b, y, p, contacts[i, b])
+            _bearing_values(dx, dy, axial, b, p, work, values[i, b])
+            for c in range(3):
+                ex = step_d if c == 0 else 0.0
+                ey = step_d if c == 1 else 0.0
+                es = step_d if c == 2 else 0.0
+                _bearing_values(dx + ex, dy + ey, axial + es, b, p, work, above)
+                _bearing_values(dx - ex, dy - ey, axial - es, b, p, work, below)
+                for v in range(4):
+                    gradients[i, b, v, c] = (above[v] - below[v]) / (2.0 * step_d)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForceHistory:
+    """Forces of a smoothed drop; N samples, B bearings.
+
+    Attributes
+    ----------
+    time : ndarray, shape (N,)
+        Time from power-off [s].
+    force : ndarray, shape (N, B, 2)
+        Elastic ball force on the race [N].
+    magnitude, magnitude_sigma : ndarray, shape (N, B)
+        Its magnitude and standard deviation [N].
+    stress, stress_sigma : ndarray, shape (N, B)
+        Largest Hertz stress at the inner race and standard deviation [Pa].
+    indentation, contact_force, friction_force, contact_power : ndarray, shape (N, B)
+        Indentation [m], normal and friction force [N], power lost in the contact [W].
+    azimuth : ndarray, shape (N, B)
+        Direction of the contact normal from race to rotor [rad ccw from +x]; NaN in flight.
+    displacement, displacement_sigma : ndarray, shape (N, B, 2)
+        Rotor at the bearing nodes and standard deviation [m].
+    """
+
+    time: Array
+    force: Array
+    magnitude: Array
+    magnitude_sigma: Array
+    stress: Array
+    stress_sigma: Array
+    indentation: Array
+    contact_force: Array
+    friction_force: Array
+    contact_power: Array
+    azimuth: Array
+    displacement: Array
+    displacement_sigma: Array
+
+
+def force_history(problem: DropProblem, smoothed: Smoothed) -> ForceHistory:
+    """Force and stress histories of a smoothed drop with standard deviations from the smoothed covariance."""
+    means, s = smoothed.means, problem.n_dynamic
+    n_b = problem.model.layout.n_bearings
+    count = len(means)
+    values = np.empty((count, n_b, N_VALUES))
+    gradients = np.empty((count, n_b, N_VALUES, 3))
+    contacts = np.empty((count, n_b, 6))
+    force_values(
+        means,
+        s,
+        problem.targets,
+        private_copy(problem.model.parameters),
+        len(problem.unknowns),
+        values,
+        gradients,
+        contacts,
+    )
+    sigma = _standard_deviations(problem, smoothed, gradients)
+    displacement, displacement_sigma = _displacements(problem, smoothed)
+    touching = contacts[..., 0] > 0.0
+    return ForceHistory(
+        time=problem.time[:count],
+        force=values[..., FORCE_X : FORCE_Y + 1],
+        magnitude=values[..., FORCE],
+        magnitude_sigma=sigma[..., FORCE],
+        stress=values[..., STRESS],
+        stress_sigma=sigma[..., STRESS],
+        indentation=contacts[..., 0],
+        contact_force=contacts[..., 1],
+        friction_force=contacts[..., 2],
+        contact_power=contacts[..., 5],
+        azimuth=np.where(touching, np.arctan2(contacts[..., 4], contacts[..., 3]), np.nan),
+        displacement=displacement,
+        displacement_sigma=displacement_sigma,
+    )
+
+
+def smoothed_blocks(smoothed: Smoothed, rows: Array) -> Array:
+    """Covariance (N, g, g) at every sample of fixed linear functions, rows (g, n), of the estimate."""
+    P = smoothed.filtered.covariances[: len(smoothed.means)]
+    spread = rows @ P
+    return np.asarray(spread @ rows.T - spread @ smoothed.information @ spread.transpose(0, 2, 1))
+
+
+def _standard_deviations(problem: DropProblem, smoothed: Smoothed, gradients: Array) -> Array:
+    layout = problem.model.layout
+    n = smoothed.means.shape[1]
+    sigma = np.empty(gradients.shape[:3])
+    for b, name in enumerate(problem.model.bearing_names):
+        rows = np.zeros((3, n))
+        for axis in range(2):
+            rows[axis, layout.race.start + 2 * b + axis] = 1.0
+            rows[axis, layout.support.start + 2 * b + axis] = -1.0
+        for k, unknown in enumerate(problem.unknowns):
+            if unknown.path == f"{name}.axial_offset":
+                rows[2, problem.n_dynamic + k] = 1.0
+        blocks = smoothed_blocks(smoothed, rows)
+        g = gradients[:, b]
+        sigma[:, b] = np.sqrt(np.maximum(np.einsum("nvi,nij,nvj->nv", g, blocks, g), 0.0))
+    return sigma
+
+
+def _displacements(problem: DropProblem, smoothed: Smoothed) -> tuple[Array, Array]:
+    layout, shapes = problem.model.layout, problem.model.parameters.bearing_shape
+    n_b, n = len(shapes), smoothed.means.shape[1]
+    rows = np.zeros((2 * n_b, n))
+    for b in range(n_b):
+        rows[2 * b, layout.modal_x] = shapes[b]
+        rows[2 * b + 1, layout.modal_y] = shapes[b]
+    variance = np.diagonal(smoothed_blocks(smoothed, rows), axis1=1, axis2=2)
+    shape = (len(smoothed.means), n_b, 2)
+    return (smoothed.means @ rows.T).reshape(shape), np.sqrt(np.maximum(variance, 0.0)).reshape(shape)
