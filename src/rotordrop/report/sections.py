@@ -16,9 +16,7 @@ from rotordrop.report.quantity import Quantity
 from rotordrop.report.radial import radial_figure
 from rotordrop.report.stress import stress_figure
 from rotordrop.report.stress_box import StressBox, stress_box_figure, stress_table
-
-STATIC_LIMIT = 4.2e9
-"""Hertz stress [Pa] at which ISO 76 puts the static load rating of ball bearings; shown as information."""
+from rotordrop.severity.damage import STATIC_LIMIT
 
 EARLY = 0.04
 """Window [s] around the first contacts that gets figures of its own."""
@@ -93,7 +91,8 @@ def stress_section(
     text: tuple[str, ...] = (),
 ) -> Section:
     """Maximum Hertz stress against time, its distribution and its numbers."""
-    preload = {box.bearing: box.preload for box in boxes if box.preload is not None}
+    known = ((box.bearing, box.statistics.preload_stress) for box in boxes)
+    preload = {bearing: stress for bearing, stress in known if stress is not None}
     history = Figure(
         chart=stress_figure(bearings, peaks=peaks, preload_stress=preload),
         caption="Largest Hertz stress of all balls at the inner race, instantaneous.",

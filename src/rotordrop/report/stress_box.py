@@ -12,23 +12,17 @@ from numpy.typing import NDArray
 from rotordrop.report.content import Table
 from rotordrop.report.quantity import Quantity
 from rotordrop.report.style import SERIES, axis_title, panels, plain, single
+from rotordrop.severity.statistics import StressStatistics, stress_statistics
 
 Array = NDArray[np.float64]
 
 MEGA = 1e-6
 DRAWN_OUTLIERS = 300
-RULE = (
-    "Quartiles by Hazen's rule (as in Matlab); whiskers reach the last value within 1.5 times the "
-    "interquartile range; outliers lie beyond them."
-)
-PAPER_RULE = (
-    "The paper's text calls values beyond three standard deviations outliers; its figures use the rule above."
-)
 
 
 @dataclass(frozen=True, kw_only=True)
 class StressBox:
-    """Distribution of the stress at one bearing in one drop, all in Pa.
+    """Distribution of the stress at one bearing in one drop.
 
     Attributes
     ----------
@@ -36,28 +30,35 @@ class StressBox:
         Drop, for example its speed.
     bearing : str
         Name of the bearing.
-    mean, median, lower_quartile, upper_quartile, lower_whisker, upper_whisker : float
-        Numbers of the box.
-    standard_deviation, maximum : float
-        Spread and largest value.
+    statistics : StressStatistics
+        Numbers of the box and of the table [Pa].
     outliers : ndarray
-        Values beyond the whiskers.
-    preload : float, optional
-        Stress of the preload alone.
+        Values beyond the whiskers [Pa].
     """
 
     label: str
     bearing: str
-    mean: float
-    median: float
-    lower_quartile: float
-    upper_quartile: float
-    lower_whisker: float
-    upper_whisker: float
-    standard_deviation: float
-    maximum: float
+    statistics: StressStatistics
     outliers: Array
-    preload: float | None = None
+
+
+def stress_box(label: str, bearing: str, stress: Array, preload_stress: float | None = None) -> StressBox:
+    """Take the statistics of a stress history, with its outliers to draw.
+
+    Parameters
+    ----------
+    label : str
+        Drop, for example its speed.
+    bearing : str
+        Name of the bearing.
+    stress : ndarray, shape (T,)
+        Stress at equidistant times [Pa].
+    preload_stress : float, optional
+        Stress of the preload alone [Pa].
+    """
+    statistics = stress_statistics(stress, preload_stress=preload_stress)
+    beyond = (stress < statistics.lower_whisker) | (stress > statistics.upper_whisker)
+    return StressBox(label=label, bearing=bearing, statistics=statistics, outliers=np.asarray(stress)[beyond])
 
 
 def stress_box_figure(boxes: Sequence[StressBox]) -> go.Figure:
@@ -89,16 +90,16 @@ def stress_box_figure(boxes: Sequence[StressBox]) -> go.Figure:
 
 
 def _add_box(figure: go.Figure, box: StressBox, column: int, colour: str) -> None:
-    label = plain(box.label)
+    label, numbers = plain(box.label), box.statistics
     figure.add_trace(
         go.Box(
             x=[label],
-            q1=[MEGA * box.lower_quartile],
-            median=[MEGA * box.median],
-            q3=[MEGA * box.upper_quartile],
-            lowerfence=[MEGA * box.lower_whisker],
-            upperfence=[MEGA * box.upper_whisker],
-            mean=[MEGA * box.mean],
+            q1=[MEGA * numbers.lower_quartile],
+            median=[MEGA * numbers.median],
+            q3=[MEGA * numbers.upper_quartile],
+            lowerfence=[MEGA * numbers.lower_whisker],
+            upperfence=[MEGA * numbers.upper_whisker],
+            mean=[MEGA * numbers.mean],
             boxpoints=False,
             width=0.45,
             line={"color": colour, "width": 1.6},
@@ -138,29 +139,40 @@ def thinned(values: Array) -> Array:
 
 def stress_table(boxes: Sequence[StressBox]) -> Table:
     """State the numbers of the box plots (Neisi 2020, Table 5), with the share of the preload in the mean."""
-    columns = tuple(f"{box.bearing}, {box.label}" for box in boxes)
     rows: list[tuple[str | Quantity, ...]] = [
-        ("mean", *(_stress(box.mean) for box in boxes)),
-        ("median", *(_stress(box.median) for box in boxes)),
-        ("lower quartile", *(_stress(box.lower_quartile) for box in boxes)),
-        ("upper quartile", *(_stress(box.upper_quartile) for box in boxes)),
-        ("lower whisker", *(_stress(box.lower_whisker) for box in boxes)),
-        ("upper whisker", *(_stress(box.upper_whisker) for box in boxes)),
-        ("standard deviation", *(_stress(box.standard_deviation) for box in boxes)),
-        ("maximum", *(_stress(box.maximum) for box in boxes)),
-        ("outliers", *(Quantity(value=len(box.outliers), kind="count") for box in boxes)),
+        (name, *(_stress(getattr(box.statistics, field)) for box in boxes)) for name, field in STRESSES
     ]
-    if any(box.preload is not None for box in boxes):
-        shares = (np.nan if box.preload is None else box.preload / box.mean for box in boxes)
-        rows.append(
-            ("preload's share of the mean", *(Quantity(value=s, kind="share", digits=3) for s in shares))
-        )
+    rows += [
+        (name, *(Quantity(value=getattr(box.statistics, field), kind="count") for box in boxes))
+        for name, field in COUNTS
+    ]
+    shares = [box.statistics.preload_share for box in boxes]
+    if any(share is not None for share in shares):
+        cells = [Quantity.of(share, "share", digits=3) for share in shares]
+        rows.append(("preload's share of the mean", *cells))
+    rules = dict.fromkeys(box.statistics.rules() for box in boxes)
     return Table(
-        columns=("stress, peak of the contact ellipse", *columns),
+        columns=("stress, peak of the contact ellipse", *(f"{box.bearing}, {box.label}" for box in boxes)),
         rows=tuple(rows),
         caption="Distribution of the maximum Hertz stress",
-        note=f"{RULE} {PAPER_RULE}",
+        note=f"Rules in use: {'; '.join(rules)}.",
     )
+
+
+STRESSES = (
+    ("mean", "mean"),
+    ("median", "median"),
+    ("lower quartile", "lower_quartile"),
+    ("upper quartile", "upper_quartile"),
+    ("lower whisker", "lower_whisker"),
+    ("upper whisker", "upper_whisker"),
+    ("standard deviation", "standard_deviation"),
+    ("maximum", "maximum"),
+)
+COUNTS = (
+    ("samples beyond the whiskers", "beyond_whiskers"),
+    ("samples above mean + 3 σ", "above_three_sigma"),
+)
 
 
 def _stress(value: float) -> Quantity:

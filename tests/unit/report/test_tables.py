@@ -14,7 +14,8 @@ from rotordrop.report.data_quality import data_quality_section
 from rotordrop.report.impacts import impact_figure, impact_table, impacts_of
 from rotordrop.report.parameters import ParameterRow, parameter_figure, parameter_table
 from rotordrop.report.quantity import Quantity
-from rotordrop.report.stress_box import StressBox, stress_box_figure, stress_table, thinned
+from rotordrop.report.stress_box import stress_box, stress_box_figure, stress_table, thinned
+from rotordrop.severity.statistics import stress_statistics
 from rotordrop.simulation.result import DropResult
 
 
@@ -151,43 +152,52 @@ def test_a_sound_record_is_called_sound() -> None:
     assert statement.level == "good"
 
 
-def box(label: str, bearing: str, outliers: np.ndarray) -> StressBox:
-    return StressBox(
-        label=label,
-        bearing=bearing,
-        mean=1045e6,
-        median=1022e6,
-        lower_quartile=994e6,
-        upper_quartile=1060e6,
-        lower_whisker=993e6,
-        upper_whisker=1158e6,
-        standard_deviation=81.9e6,
-        maximum=1694e6,
-        outliers=outliers,
-        preload=993e6,
-    )
+STRESS = 993e6 + 2e8 * np.random.default_rng(6).exponential(size=4001)
 
 
-def test_the_box_plot_draws_the_numbers_of_the_table() -> None:
-    drawn = stress_box_figure(
-        [box("60 Hz", "NDE", np.array([1.2e9, 1.694e9])), box("150 Hz", "NDE", np.array([]))]
+def test_the_box_plot_draws_the_numbers_of_the_statistics() -> None:
+    statistics = stress_statistics(STRESS)
+    drawn = stress_box_figure([stress_box("60 Hz", "NDE", STRESS), stress_box("150 Hz", "NDE", 2 * STRESS)])
+    first, outliers = drawn.data[0], drawn.data[1]
+    shown = (first.lowerfence, first.q1, first.median, first.mean, first.q3, first.upperfence)
+    expected = (
+        statistics.lower_whisker,
+        statistics.lower_quartile,
+        statistics.median,
+        statistics.mean,
+        statistics.upper_quartile,
+        statistics.upper_whisker,
     )
-    first = drawn.data[0]
-    numbers = (first.lowerfence, first.q1, first.median, first.mean, first.q3, first.upperfence)
-    assert_allclose(np.ravel(numbers), (993.0, 994.0, 1022.0, 1045.0, 1060.0, 1158.0))
-    assert_allclose(drawn.data[1].y, (1200.0, 1694.0))
-    assert list(first.x) == ["60 Hz"]
+    assert_allclose(np.ravel(shown), 1e-6 * np.array(expected))
+    assert len(outliers.y) == statistics.beyond_whiskers
+    assert max(outliers.y) == pytest.approx(1e-6 * statistics.maximum, rel=1e-6)
+    assert min(outliers.y) > 1e-6 * statistics.upper_whisker
+    assert (list(first.x), list(drawn.data[2].x)) == (["60 Hz"], ["150 Hz"])
     assert "[MPa]" in drawn.layout.yaxis.title.text
 
 
-def test_the_stress_table_names_its_rule_and_the_preload() -> None:
-    table = stress_table([box("60 Hz", "NDE", np.zeros(7)), box("60 Hz", "DE", np.zeros(3))])
-    rows = {cells[0]: texts(cells)[1:] for cells in table.rows}
-    assert rows["mean"] == ["1\u202f045 MPa"] * 2
-    assert rows["outliers"] == ["7", "3"]
-    assert rows["preload's share of the mean"] == ["95.0 %"] * 2
+def test_the_stress_table_states_the_statistics_names_the_rules_and_the_preload() -> None:
+    statistics = stress_statistics(STRESS, preload_stress=993e6)
+    boxes = [stress_box("60 Hz", name, STRESS, 993e6) for name in ("NDE", "DE")]
+    table = stress_table(boxes)
+    rows = {str(cells[0]): cells[1:] for cells in table.rows}
+    for name, value in (
+        ("mean", statistics.mean),
+        ("median", statistics.median),
+        ("lower quartile", statistics.lower_quartile),
+        ("upper quartile", statistics.upper_quartile),
+        ("lower whisker", statistics.lower_whisker),
+        ("upper whisker", statistics.upper_whisker),
+        ("standard deviation", statistics.standard_deviation),
+        ("maximum", statistics.maximum),
+        ("samples beyond the whiskers", statistics.beyond_whiskers),
+        ("samples above mean + 3 σ", statistics.above_three_sigma),
+        ("preload's share of the mean", 993e6 / statistics.mean),
+    ):
+        assert [cell.value for cell in rows[name] if isinstance(cell, Quantity)] == [value, value]
     assert "Hazen" in table.note
-    assert "1.5 times the interquartile range" in table.note
+    assert "1.5 interquartile ranges" in table.note
+    assert table.columns[1:] == ("NDE, 60 Hz", "DE, 60 Hz")
 
 
 def test_thinned_outliers_keep_both_ends_and_leave_no_gap() -> None:
