@@ -167,7 +167,7 @@ def weighted_quantiles(
 
 
 def _durations(time: ArrayLike, count: int) -> Array:
-    """Share of the whole time around each value [1]: half of the steps beside it, as in the trapezoidal rule."""
+    """Share of the whole time around each value [1]: half of the steps beside it (trapezoidal rule)."""
     t = np.asarray(time, dtype=np.float64)
     if t.shape != (count,):
         raise UsageError(f"stress statistics: {count} stresses but time of shape {t.shape}")
