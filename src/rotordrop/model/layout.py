@@ -55,7 +55,8 @@ SPIN_MODE = 0
 MAGNETS_ACT = 1
 N_FLAGS = 2
 
-# Columns of `KernelParameters.magnet`, one row per AMB: remanent force, holding force [N], spring, damper, reference.
+# Columns of `KernelParameters.magnet`, one row per AMB: remanent force, holding force [N], spring, damper,
+# reference.
 REMANENT_X = 0
 REMANENT_Y = 1
 HOLDING_X = 2
@@ -68,7 +69,8 @@ N_MAGNET_COLUMNS = 8
 
 
 class KernelParameters(NamedTuple):
-    """Everything the right-hand side reads, as flat arrays in SI units; m modes, B bearings, A magnets, Z balls.
+    """Everything the right-hand side reads, as flat arrays in SI units; m modes, B bearings, A magnets, Z
+    balls.
 
     Columns and entries are named in this module.
     """
@@ -94,9 +96,10 @@ class KernelParameters(NamedTuple):
 class StateLayout:
     """Slices of the state vector: coordinates, their velocities in the same order, then spins and work.
 
-    The coordinates are modal amplitudes in x, modal amplitudes in y [sqrt(kg) m], then per bearing the race (x, y)
-    and after all races the supports (x, y) [m]. After the velocities come the race spins [rad/s], the rotor speed
-    [rad/s], the rotor angle [rad], the energy dissipated [J] and the work put in from outside [J].
+    The coordinates are modal amplitudes in x, modal amplitudes in y [sqrt(kg) m], then per bearing the race
+    (x, y) and after all races the supports (x, y) [m]. After the velocities come the race spins [rad/s], the
+    rotor speed [rad/s], the rotor angle [rad], the energy dissipated [J] and the work put in from outside
+    [J].
     """
 
     n_modes: int
@@ -167,11 +170,21 @@ class StateLayout:
         """Name of every state, in order."""
         m, axes = self.n_modes, ("x", "y")
         modal = [f"mode {k + 1} {axis}" for axis in axes for k in range(m)]
-        ends = [f"{part} {name} {axis}" for part in ("race", "support") for name in bearing_names for axis in axes]
+        ends = [
+            f"{part} {name} {axis}" for part in ("race", "support") for name in bearing_names for axis in axes
+        ]
         coordinates = modal + ends
         rates = [f"{name} velocity" for name in coordinates]
         spins = [f"race {name} spin" for name in bearing_names]
-        return (*coordinates, *rates, *spins, "rotor speed", "rotor angle", "dissipated energy", "work put in")
+        return (
+            *coordinates,
+            *rates,
+            *spins,
+            "rotor speed",
+            "rotor angle",
+            "dissipated energy",
+            "work put in",
+        )
 
     def zeros(self) -> Array:
         """State with everything at zero."""

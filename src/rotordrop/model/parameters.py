@@ -129,7 +129,9 @@ def _spin(machine: Machine, fe: RotorFE) -> Array:
     spin = np.zeros(L.N_SPIN_ENTRIES)
     spin[L.POLAR_INERTIA] = fe.polar_inertia
     speed = machine.speed
-    spin[L.AERO_TIME_CONSTANT] = np.inf if speed.aero_time_constant is None else float(speed.aero_time_constant)
+    spin[L.AERO_TIME_CONSTANT] = (
+        np.inf if speed.aero_time_constant is None else float(speed.aero_time_constant)
+    )
     spin[L.AERO_LINEAR] = 0.0 if speed.aero_linear is None else float(speed.aero_linear)
     spin[L.AERO_QUADRATIC] = 0.0 if speed.aero_quadratic is None else float(speed.aero_quadratic)
     return spin
@@ -174,7 +176,9 @@ def _merged_angles(constants: BearingConstants) -> tuple[Array, Array]:
 
 
 def bearing_row(bearing: TouchdownBearing, static_load: float) -> Array:
-    """One row of `KernelParameters.bearing` [SI], with the bearing damping from the tangent stiffness at a load [N]."""
+    """One row of `KernelParameters.bearing` [SI], with the bearing damping from the tangent stiffness at a
+    load [N].
+    """
     constants = bearing_constants(bearing.bearing)
     row = np.zeros(L.N_BEARING_COLUMNS)
     gap = float(bearing.air_gap)

@@ -192,10 +192,11 @@ def _basis(
     reduction: Reduction,
     nodes: tuple[int, ...],
 ) -> RotorBasis:
+    polar = shapes.T @ fe.polar @ shapes
     return RotorBasis(
         shapes=shapes,
         eigenvalues=eigenvalues,
-        polar=np.asarray(shapes.T @ fe.polar @ shapes),
+        polar=np.asarray(0.5 * (polar + polar.T)),
         damping=damping,
         reduction=reduction,
         attachment_nodes=nodes,

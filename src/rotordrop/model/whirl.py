@@ -194,6 +194,6 @@ def _at_nodes(rotor: RotorFE | RotorBasis, system: PlanarMatrices, vectors: Comp
 
 def _node_shapes(rotor: RotorFE | RotorBasis, system: PlanarMatrices, vectors: ComplexArray) -> ComplexArray:
     shapes = _at_nodes(rotor, system, vectors)
-    flat = shapes.reshape(len(shapes), -1)
-    largest = flat[np.arange(len(flat)), np.argmax(np.abs(flat), axis=1)] if len(flat) else np.ones(0)
+    flat = shapes.reshape(len(shapes), 2 * shapes.shape[1])
+    largest = flat[np.arange(len(flat)), np.argmax(np.abs(flat), axis=1)]
     return np.asarray(shapes / largest[:, None, None])

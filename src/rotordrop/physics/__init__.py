@@ -1,0 +1,1 @@
+"""The equations, each in a function that names its source; symbols as in Neisi 2020, SI units."""

@@ -1,9 +1,9 @@
 """The one place that knows the compiler: every compiled function takes its decorator from here.
 
-Kernels are compiled under strict floating point (no ``fastmath``: it gives other trajectories cold and cached)
-and cached on disk. Numba's own cache looks only at the file of a function and not at the files of the functions
-it calls, so the cache folder is named after a digest of all kernel sources: after an update or an edit a stale
-machine code can never be loaded.
+Kernels are compiled under strict floating point (no ``fastmath``: it gives other trajectories cold and
+cached) and cached on disk. Numba's own cache looks only at the file of a function and not at the files of the
+functions it calls, so the cache folder is named after a digest of all kernel sources: after an update or an
+edit a stale machine code can never be loaded.
 """
 
 from __future__ import annotations
@@ -37,10 +37,9 @@ def cache_folder() -> str:
     for file in _kernel_sources():
         digest.update(file.name.encode())
         digest.update(file.read_bytes())
-    root = os.environ.get("NUMBA_CACHE_DIR") or os.path.join(
-        os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache"), "rotordrop"
-    )
-    return os.path.join(root, digest.hexdigest()[:16])
+    caches = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    root = Path(os.environ.get("NUMBA_CACHE_DIR") or caches / "rotordrop")
+    return str(root / digest.hexdigest()[:16])
 
 
 def kernel(function: Function) -> Function:

@@ -1,7 +1,8 @@
 """Ball forces of a touchdown bearing whose race moves in x and y only: the inner loop of a drop.
 
-The algebraic form of Neisi 2020, eqs. (2)–(6): distance of the groove centres instead of contact angles, so that
-no ``atan`` and no ``cos`` is left. Balls of all rows that sit at the same angle are one entry with a weight.
+The algebraic form of Neisi 2020, eqs. (2)–(6): distance of the groove centres instead of contact angles, so
+that no ``atan`` and no ``cos`` is left. Balls of all rows that sit at the same angle are one entry with a
+weight.
 """
 
 from __future__ import annotations
@@ -68,11 +69,13 @@ def planar_ball_force(
     Returns
     -------
     tuple of float
-        Restoring force of the race against its displacement, x and y [N]; the force *on* the race is its negative.
+        Restoring force of the race against its displacement, x and y [N]; the force *on* the race is its
+        negative.
 
     Notes
     -----
-    Source: Neisi 2020, eqs. (2)–(6). Differs from the paper: axial offset of an angular-contact row, algebraic form.
+    Source: Neisi 2020, eqs. (2)–(6). Differs from the paper: axial offset of an angular-contact row,
+    algebraic form.
     """
     axial2 = axial_offset * axial_offset
     for j in range(cosines.shape[0]):
@@ -159,7 +162,8 @@ def planar_ball_energy(
     sines: Array,
     weights: Array,
 ) -> float:
-    """Elastic energy [J] in all balls at fixed axial offset, ``Σ 2/5 K δ^(5/2)``; arguments as in `planar_ball_force`.
+    """Elastic energy [J] in all balls at fixed axial offset, ``Σ 2/5 K δ^(5/2)``; arguments as in
+    `planar_ball_force`.
 
     Source: integral of Neisi 2020, eq. (6).
     """

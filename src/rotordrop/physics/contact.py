@@ -29,8 +29,8 @@ def hunt_crossley_force(delta: float, delta_dot: float, K: float, n: float, lam:
 
     Notes
     -----
-    Source: Neisi 2020, eq. (8) with b = 3/2 λ K. Differs from the paper: the printed "and" of the zero branch is
-    read as "or", so the force never pulls.
+    Source: Neisi 2020, eq. (8) with b = 3/2 λ K. Differs from the paper: the printed "and" of the zero branch
+    is read as "or", so the force never pulls.
     """
     if delta <= 0.0:
         return 0.0

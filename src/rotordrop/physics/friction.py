@@ -29,7 +29,8 @@ def stribeck_coefficient(v: float, mu_s: float, mu_d: float, v_stribeck: float, 
 
     Notes
     -----
-    Source: Neisi 2020, eq. (11) and Fig. 2; the law is ``μ_d + (μ_s − μ_d) exp(−(|v| − v_smooth)/v_stribeck)``.
+    Source: Neisi 2020, eq. (11) and Fig. 2; the law is
+    ``μ_d + (μ_s − μ_d) exp(−(|v| − v_smooth)/v_stribeck)``.
     Not validated: below ``v_smooth`` the regularised law creeps where true stiction would hold.
     """
     speed = abs(v)

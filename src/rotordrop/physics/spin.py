@@ -38,9 +38,10 @@ def race_drag_torque(
 ) -> float:
     """Torque [N m] with which bearing friction and the ball set brake the inner race.
 
-    ``drag_coefficient · |F_b| · D_pw/2 · tanh(ω_i / drag_speed)``: coefficient [1], ball force on the race [N],
-    race spin [rad/s], pitch diameter [m], regularisation speed [rad/s].
+    ``drag_coefficient · |F_b| · D_pw/2 · tanh(ω_i / drag_speed)``: coefficient [1], ball force on the race
+    [N], race spin [rad/s], pitch diameter [m], regularisation speed [rad/s].
 
-    Source: load-proportional bearing friction torque (Harris, Rolling Bearing Analysis), regularised at zero spin.
+    Source: load-proportional bearing friction torque (Harris, Rolling Bearing Analysis), regularised at zero
+    spin.
     """
     return drag_coefficient * F_b * 0.5 * D_pw * math.tanh(omega_i / drag_speed)

@@ -17,7 +17,8 @@ def support_force(x: float, v: float, K_sup: float, C_sup: float) -> float:
 
 
 def damping_from_ratio(zeta: float, K_sup: float, m_sup: float) -> float:
-    """Support damping [N s/m] ``C = 2 ζ sqrt(K m)`` of a damping ratio [1], stiffness [N/m] and support mass [kg].
+    """Support damping [N s/m] ``C = 2 ζ sqrt(K m)`` of a damping ratio [1], stiffness [N/m] and support mass
+    [kg].
 
     Source: Neisi 2020, section 3.2 (ratio 0.025 for steel structures).
     """

@@ -184,8 +184,7 @@ def element_mass(section: Section, length: float) -> Array:
     Units [kg, kg m, kg m²]. ``∫ (ρA N_uᵀ N_u + ρI N_ψᵀ N_ψ) dz``. Source: Nelson 1980; Neisi 2020, eq. (1).
     """
     N_u, N_psi, weight = _at_gauss_points(section, length)
-    translation = np.einsum("p,pi,pj->ij", weight, N_u, N_u)
-    rotation = np.einsum("p,pi,pj->ij", weight, N_psi, N_psi)
+    translation, rotation = _products(weight, N_u), _products(weight, N_psi)
     return np.asarray(section.mass * translation + section.diametral_inertia * rotation)
 
 
@@ -196,10 +195,16 @@ def element_polar(section: Section, length: float) -> Array:
     ``−ω P q̇_x`` in that of y. Source: Nelson 1980; Neisi 2020, eq. (1), gyroscopic matrix.
     """
     _, N_psi, weight = _at_gauss_points(section, length)
-    return np.asarray(section.polar_inertia * np.einsum("p,pi,pj->ij", weight, N_psi, N_psi))
+    return np.asarray(section.polar_inertia * _products(weight, N_psi))
 
 
 def _at_gauss_points(section: Section, length: float) -> tuple[Array, Array, Array]:
     xi = 0.5 * (1.0 + _GAUSS_POINTS)
     N_u, N_psi = shape_functions(xi, length, shear_parameter(section, length))
     return N_u, N_psi, 0.5 * length * _GAUSS_WEIGHTS
+
+
+def _products(weight: Array, N: Array) -> Array:
+    """``∫ Nᵀ N dz``, symmetric to the last bit."""
+    product = (N * weight[:, None]).T @ N
+    return np.asarray(0.5 * (product + product.T))

@@ -1,0 +1,1 @@
+"""One drop, computed: case in, named histories with a certificate out."""

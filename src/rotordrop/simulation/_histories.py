@@ -30,7 +30,9 @@ N_HISTORIES = 10
 
 @kernel
 def bearing_histories(states: Array, p: KernelParameters, out: Array) -> None:
-    """Fill ``out`` (T, B, 10) from ``states`` (T, n); SI units, columns ``H_*``; the ball force is that on the race."""
+    """Fill ``out`` (T, B, 10) from ``states`` (T, n); SI units, columns ``H_*``; the ball force is that on
+    the race.
+    """
     m = p.eigenvalue.shape[0]
     n_b = p.bearing.shape[0]
     work = np.empty((2, p.ball_cos.shape[1]))
@@ -101,8 +103,12 @@ def stored_energy(y: Array, p: KernelParameters, with_rotor_spin: bool) -> float
             p.ball_weight[b],
         )
         energy += 0.5 * row[L.RACE_MASS] * (y[n_q + r] ** 2 + y[n_q + r + 1] ** 2)
-        energy += 0.5 * row[L.SUPPORT_MASS_X] * y[n_q + h] ** 2 + 0.5 * row[L.SUPPORT_MASS_Y] * y[n_q + h + 1] ** 2
-        energy += 0.5 * row[L.SUPPORT_STIFFNESS_X] * y[h] ** 2 + 0.5 * row[L.SUPPORT_STIFFNESS_Y] * y[h + 1] ** 2
+        energy += (
+            0.5 * row[L.SUPPORT_MASS_X] * y[n_q + h] ** 2 + 0.5 * row[L.SUPPORT_MASS_Y] * y[n_q + h + 1] ** 2
+        )
+        energy += (
+            0.5 * row[L.SUPPORT_STIFFNESS_X] * y[h] ** 2 + 0.5 * row[L.SUPPORT_STIFFNESS_Y] * y[h + 1] ** 2
+        )
         energy += 0.5 * row[L.RACE_INERTIA] * y[2 * n_q + b] ** 2
     if with_rotor_spin:
         energy += 0.5 * p.spin[L.POLAR_INERTIA] * y[2 * n_q + n_b] ** 2

@@ -62,9 +62,7 @@ def runge_kutta_stages(
         y_new[i] = y[i] + h * (a[3, 0] * k[0, i] + a[3, 1] * k[1, i] + a[3, 2] * k[2, i])
     drop_derivative(t + tab.c[3] * h, y_new, p, k[3], work)
     for i in range(n):
-        y_new[i] = y[i] + h * (
-            a[4, 0] * k[0, i] + a[4, 1] * k[1, i] + a[4, 2] * k[2, i] + a[4, 3] * k[3, i]
-        )
+        y_new[i] = y[i] + h * (a[4, 0] * k[0, i] + a[4, 1] * k[1, i] + a[4, 2] * k[2, i] + a[4, 3] * k[3, i])
     drop_derivative(t + tab.c[4] * h, y_new, p, k[4], work)
     for i in range(n):
         y_new[i] = y[i] + h * (
@@ -84,7 +82,9 @@ def runge_kutta_stages(
 
 
 @kernel
-def scaled_error(h: float, y: Array, y_new: Array, k: Array, e: Array, scale: Array, tolerance: float) -> float:
+def scaled_error(
+    h: float, y: Array, y_new: Array, k: Array, e: Array, scale: Array, tolerance: float
+) -> float:
     """Root mean square over the states of the embedded error over ``tolerance · (scale + |y|)``."""
     total = 0.0
     n = scale.shape[0]
@@ -124,7 +124,8 @@ def dense_output(theta: float, h: float, y: Array, k: Array, tab: Tableau, out: 
 
 @kernel
 def contact_at(b: int, y: Array, p: KernelParameters, out: Array) -> None:
-    """Contact of one bearing in a state: indentation [m], normal force [N], friction force [N], normal, power [W].
+    """Contact of one bearing in a state: indentation [m], normal force [N], friction force [N], normal, power
+    [W].
 
     Filled as ``delta, F_r, F_mu, n_x, n_y, power dissipated in the contact``.
     """
@@ -152,7 +153,15 @@ def contact_at(b: int, y: Array, p: KernelParameters, out: Array) -> None:
 
 @kernel
 def crossing_fraction(
-    b: int, h: float, y: Array, k: Array, tab: Tableau, p: KernelParameters, delta_0: float, scratch: Array, out: Array
+    b: int,
+    h: float,
+    y: Array,
+    k: Array,
+    tab: Tableau,
+    p: KernelParameters,
+    delta_0: float,
+    scratch: Array,
+    out: Array,
 ) -> float:
     """Fraction of a step at which the indentation changes sign, by bisection on the dense output."""
     low = 0.0
@@ -192,7 +201,9 @@ def log_contacts(
         begin = t
         end = t + h
         if was != touches:
-            moment = t + h * crossing_fraction(b, h, y, k, tab, p, running[b, RUN_DELTA], scratch, at_crossing)
+            moment = t + h * crossing_fraction(
+                b, h, y, k, tab, p, running[b, RUN_DELTA], scratch, at_crossing
+            )
             if touches:
                 begin = moment
             else:
@@ -247,7 +258,7 @@ def start_running(y: Array, t: float, p: KernelParameters, running: Array, log: 
 
 
 @kernel
-def integrate_drop(
+def integrate_drop(  # noqa: C901, PLR0915  one compiled loop
     y0: Array,
     times: Array,
     p: KernelParameters,

@@ -1,6 +1,7 @@
 """Right-hand side of a drop: rotor modes, contact, friction, races, balls, supports, spin.
 
-Numbers below, names above: everything arrives as the flat arrays of `rotordrop.model.parameters.KernelParameters`.
+Numbers below, names above: everything arrives as the flat arrays of
+`rotordrop.model.parameters.KernelParameters`.
 """
 
 from __future__ import annotations
@@ -29,7 +30,9 @@ OF_SPEED = aerodynamics.FUNCTION_OF_SPEED
 
 @kernel
 def project(shape: Array, amplitudes: Array) -> float:
-    """Physical displacement or velocity of a node from modal amplitudes: one row of mode shapes times amplitudes."""
+    """Physical displacement or velocity of a node from modal amplitudes: one row of mode shapes times
+    amplitudes.
+    """
     total = 0.0
     for k in range(shape.shape[0]):
         total += shape[k] * amplitudes[k]
@@ -42,8 +45,9 @@ def contact_state(
 ) -> tuple[float, float, float, float, float, float]:
     """Contact of rotor and race from their relative displacement [m] and velocity [m/s].
 
-    Returns indentation [m], normal force [N], signed friction coefficient [1], normal (x, y) [1] from race to rotor,
-    and relative surface speed [m/s]. The tangent is the normal turned by 90° in the sense of positive spin.
+    Returns indentation [m], normal force [N], signed friction coefficient [1], normal (x, y) [1] from race to
+    rotor, and relative surface speed [m/s]. The tangent is the normal turned by 90° in the sense of positive
+    spin.
     """
     e_r = math.sqrt(ux * ux + uy * uy)
     delta = e_r - bearing[L.AIR_GAP]
@@ -53,11 +57,13 @@ def contact_state(
     ny = uy / e_r
     delta_dot = vx * nx + vy * ny
     F_r = hunt_crossley_force(
-        delta, delta_dot, bearing[L.CONTACT_STIFFNESS], bearing[L.CONTACT_EXPONENT], bearing[L.CONTACT_DAMPING]
+        delta,
+        delta_dot,
+        bearing[L.CONTACT_STIFFNESS],
+        bearing[L.CONTACT_EXPONENT],
+        bearing[L.CONTACT_DAMPING],
     )
-    v_t = surface_speed(
-        vy * nx - vx * ny, omega, bearing[L.ROTOR_RADIUS], omega_i, bearing[L.BORE_RADIUS]
-    )
+    v_t = surface_speed(vy * nx - vx * ny, omega, bearing[L.ROTOR_RADIUS], omega_i, bearing[L.BORE_RADIUS])
     mu = stribeck_coefficient(
         v_t,
         bearing[L.FRICTION_STATIC],
@@ -119,8 +125,12 @@ def add_magnet_forces(t: float, y: Array, p: KernelParameters, dy: Array) -> flo
         if holds:
             ux = project(shape, y[:m]) - p.magnet[a, L.AMB_REFERENCE_X]
             uy = project(shape, y[m : 2 * m]) - p.magnet[a, L.AMB_REFERENCE_Y]
-            fx += p.magnet[a, L.HOLDING_X] - p.magnet[a, L.AMB_STIFFNESS] * ux - p.magnet[a, L.AMB_DAMPING] * vx
-            fy += p.magnet[a, L.HOLDING_Y] - p.magnet[a, L.AMB_STIFFNESS] * uy - p.magnet[a, L.AMB_DAMPING] * vy
+            fx += (
+                p.magnet[a, L.HOLDING_X] - p.magnet[a, L.AMB_STIFFNESS] * ux - p.magnet[a, L.AMB_DAMPING] * vx
+            )
+            fy += (
+                p.magnet[a, L.HOLDING_Y] - p.magnet[a, L.AMB_STIFFNESS] * uy - p.magnet[a, L.AMB_DAMPING] * vy
+            )
         for k in range(m):
             dy[n_q + k] += shape[k] * fx
             dy[n_q + m + k] += shape[k] * fy
@@ -162,7 +172,11 @@ def bearing_accelerations(
         work,
     )
     drag = race_drag_torque(
-        math.sqrt(F_x * F_x + F_y * F_y), y[spin], row[L.DRAG_COEFFICIENT], row[L.PITCH_DIAMETER], row[L.DRAG_SPEED]
+        math.sqrt(F_x * F_x + F_y * F_y),
+        y[spin],
+        row[L.DRAG_COEFFICIENT],
+        row[L.PITCH_DIAMETER],
+        row[L.DRAG_SPEED],
     )
     wx = y[n_q + r] - y[n_q + h]
     wy = y[n_q + r + 1] - y[n_q + h + 1]
@@ -188,10 +202,12 @@ def bearing_accelerations(
             dy[n_q + m + k] -= shape[k] * contact_y
     dy[n_q + r] = (contact_x - F_x) / row[L.RACE_MASS]
     dy[n_q + r + 1] = (contact_y - F_y) / row[L.RACE_MASS]
-    dy[n_q + h] = (F_x - row[L.SUPPORT_DAMPING_X] * sx - row[L.SUPPORT_STIFFNESS_X] * y[h]) / row[L.SUPPORT_MASS_X]
-    dy[n_q + h + 1] = (
-        F_y - row[L.SUPPORT_DAMPING_Y] * sy - row[L.SUPPORT_STIFFNESS_Y] * y[h + 1]
-    ) / row[L.SUPPORT_MASS_Y]
+    dy[n_q + h] = (F_x - row[L.SUPPORT_DAMPING_X] * sx - row[L.SUPPORT_STIFFNESS_X] * y[h]) / row[
+        L.SUPPORT_MASS_X
+    ]
+    dy[n_q + h + 1] = (F_y - row[L.SUPPORT_DAMPING_Y] * sy - row[L.SUPPORT_STIFFNESS_Y] * y[h + 1]) / row[
+        L.SUPPORT_MASS_Y
+    ]
     dy[spin] = (torque * row[L.BORE_RADIUS] - drag) / row[L.RACE_INERTIA]
     return -torque * row[L.ROTOR_RADIUS], dissipated
 
@@ -200,7 +216,7 @@ def bearing_accelerations(
 def aerodynamic_deceleration(t: float, omega: float, p: KernelParameters) -> float:
     """Deceleration [rad/s²] by air alone, in the mode of the case; zero without a speed model."""
     mode = p.flags[L.SPIN_MODE]
-    if mode == IN_TIME or mode == PRESCRIBED:
+    if mode == IN_TIME or mode == PRESCRIBED:  # noqa: SIM109  compiled
         return exponential_deceleration(t, p.spin[L.INITIAL_SPEED], p.spin[L.AERO_TIME_CONSTANT])
     if mode == OF_SPEED:
         return speed_dependent_deceleration(omega, p.spin[L.AERO_LINEAR], p.spin[L.AERO_QUADRATIC])
@@ -211,8 +227,8 @@ def aerodynamic_deceleration(t: float, omega: float, p: KernelParameters) -> flo
 def drop_derivative(t: float, y: Array, p: KernelParameters, dy: Array, work: Array) -> None:
     """Time derivative of the state of a drop.
 
-    Bearings come first, then the rotor's spin, then its lateral motion, because the ω̇ terms of eq. (1) need the
-    angular acceleration that friction causes.
+    Bearings come first, then the rotor's spin, then its lateral motion, because the ω̇ terms of eq. (1) need
+    the angular acceleration that friction causes.
     """
     m = p.eigenvalue.shape[0]
     n_b = p.bearing.shape[0]

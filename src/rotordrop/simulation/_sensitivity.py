@@ -1,7 +1,7 @@
 """Derivative of the right-hand side by the state: what the filter needs beside the value.
 
-Every derivative is analytic and tested against finite differences away from switches. Left out, because they are tiny
-and would make the matrix full: the dependence of the ω̇ terms of eq. (1) on the contact torque.
+Every derivative is analytic and tested against finite differences away from switches. Left out, because they
+are tiny and would make the matrix full: the dependence of the ω̇ terms of eq. (1) on the contact torque.
 """
 
 from __future__ import annotations
@@ -30,10 +30,11 @@ OF_SPEED = aerodynamics.FUNCTION_OF_SPEED
 def contact_gradient(
     ux: float, uy: float, vx: float, vy: float, omega: float, omega_i: float, bearing: Array, g: Array
 ) -> bool:
-    """Derivatives of contact force and friction force at one bearing; False and untouched when there is no contact.
+    """Derivatives of contact force and friction force at one bearing; False and untouched when there is no
+    contact.
 
-    ``g`` (3, 6): rows force on the race in x, in y [N] and friction force [N]; columns by ``ux, uy`` [m], ``vx, vy``
-    [m/s] (rotor relative to race), rotor spin and race spin [rad/s].
+    ``g`` (3, 6): rows force on the race in x, in y [N] and friction force [N]; columns by ``ux, uy`` [m],
+    ``vx, vy`` [m/s] (rotor relative to race), rotor spin and race spin [rad/s].
     """
     r = math.sqrt(ux * ux + uy * uy)
     delta = r - bearing[L.AIR_GAP]

@@ -70,7 +70,9 @@ def tsit5() -> Tableau:
 
 
 def dp5() -> Tableau:
-    """Coefficients of Dormand and Prince 1980, the pair of MATLAB's ode45, for comparison with the paper's settings."""
+    """Coefficients of Dormand and Prince 1980, the pair of MATLAB's ode45, for comparison with the paper's
+    settings.
+    """
     a = np.zeros((7, 7))
     a[1, :1] = [1 / 5]
     a[2, :2] = [3 / 40, 9 / 40]

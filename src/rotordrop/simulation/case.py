@@ -91,8 +91,8 @@ class DropCase:
     start : Start
         How the drop starts.
     spin : {"dynamic", "prescribed", "function of speed", "constant"}
-        Aerodynamic deceleration in time plus friction; the measured profile as it is; drag as a function of speed plus
-        friction; neither.
+        Aerodynamic deceleration in time plus friction; the measured profile as it is; drag as a function of
+        speed plus friction; neither.
     integrator : {"tsit5", "dp5"}
         Runge–Kutta pair.
     largest_step : float
@@ -116,9 +116,13 @@ class DropCase:
         for name in ("duration", "output_step", "tolerance", "largest_step"):
             value = getattr(self, name)
             if not value > 0.0 or not np.isfinite(value):
-                raise SimulationError(f"{name} is {value!r}; expected a positive, finite number. Give another value.")
+                raise SimulationError(
+                    f"{name} is {value!r}; expected a positive, finite number. Give another value."
+                )
         if not np.isfinite(self.speed):
-            raise SimulationError(f"speed is {self.speed!r} rad/s; expected a finite number. Give another value.")
+            raise SimulationError(
+                f"speed is {self.speed!r} rad/s; expected a finite number. Give another value."
+            )
 
     @property
     def output_times(self) -> Array:

@@ -50,12 +50,15 @@ class Certificate:
                 "at a ten times tighter tolerance"
             )
         if self.peak_change_truncation is not None:
-            parts.append(f"and {100 * np.max(self.peak_change_truncation):.2g} % with eight more modes per plane")
+            parts.append(
+                f"and {100 * np.max(self.peak_change_truncation):.2g} % with eight more modes per plane"
+            )
         return ", ".join(parts)
 
 
 def refined_peak(time: Array, values: Array) -> tuple[float, float]:
-    """Peak of a sampled history and its time [s], by a parabola through the largest sample and its neighbours.
+    """Peak of a sampled history and its time [s], by a parabola through the largest sample and its
+    neighbours.
 
     Parameters
     ----------

@@ -38,8 +38,8 @@ def simulate_drop(machine: Machine | DropModel, case: DropCase, *, certify: bool
     case : DropCase
         Speed [rad/s], start, duration [s], accuracy.
     certify : bool
-        Also repeat the drop with a ten times tighter tolerance and with eight more modes per plane, and put the
-        changes of the peak force into the certificate (three times the cost).
+        Also repeat the drop with a ten times tighter tolerance and with eight more modes per plane, and put
+        the changes of the peak force into the certificate (three times the cost).
 
     Returns
     -------
@@ -181,7 +181,10 @@ def _sentence(outcome: int, case: DropCase, counters: Array, contacts: int, n_be
             f"The simulation stopped at {reached}: {case.most_steps} steps were not enough. "
             "Raise most_steps, loosen the tolerance or use a smaller reduction."
         )
-    return f"The simulation stopped at {reached}: a value became infinite. Check the start and the machine's parameters."
+    return (
+        f"The simulation stopped at {reached}: a value became infinite. "
+        "Check the start and the machine's parameters."
+    )
 
 
 def _energy_certificate(
@@ -227,12 +230,12 @@ def _richer(model: DropModel) -> DropModel | None:
     reduction = model.basis.reduction
     if reduction.modes is None:
         return None
-    return build_drop_model(model.machine, Reduction(modes=reduction.modes + 8, attachment=reduction.attachment))
+    return build_drop_model(
+        model.machine, Reduction(modes=reduction.modes + 8, attachment=reduction.attachment)
+    )
 
 
 def _peak_change(one: DropResult, other: DropResult, until: float) -> Array:
     first = peaks_of(one.time, one.bearing_force_magnitude, until)
     second = peaks_of(other.time, other.bearing_force_magnitude, until)
     return np.abs(first - second) / np.maximum(second, 1e-9)
-
-

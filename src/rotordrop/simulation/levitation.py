@@ -25,7 +25,9 @@ _SPIN_MODES = {
 
 
 def start_of_drop(model: DropModel, case: DropCase) -> tuple[Array, KernelParameters]:
-    """State at power-off, shape (n,), and the kernel parameters with what the case adds (speed mode, magnets)."""
+    """State at power-off, shape (n,), and the kernel parameters with what the case adds (speed mode,
+    magnets).
+    """
     parameters = _with_spin(model.parameters, case)
     start = case.start
     if isinstance(start, StateStart):
@@ -58,7 +60,9 @@ def _given_state(model: DropModel, start: StateStart) -> Array:
 
 
 def rigid_amplitudes(model: DropModel, positions: Array, values: Array) -> Array:
-    """Amplitudes (m, 2) of the two rigid modes of a straight rotor through values (P, 2) at positions z (P,) [m]."""
+    """Amplitudes (m, 2) of the two rigid modes of a straight rotor through values (P, 2) at positions z (P,)
+    [m].
+    """
     line = np.column_stack([np.ones_like(positions), positions])
     coefficients, *_ = np.linalg.lstsq(line, values, rcond=None)
     z = np.asarray(model.fe.node_positions)
@@ -74,7 +78,8 @@ def _placed(model: DropModel, start: PlacedStart, state: Array) -> Array:
     for name, value in (("displacement", start.displacement), ("velocity", start.velocity)):
         if np.shape(value) != expected:
             raise SimulationError(
-                f"the start {name} has shape {np.shape(value)}; expected {expected}: x and y for each touchdown bearing."
+                f"the start {name} has shape {np.shape(value)}; expected {expected}: "
+                "x and y for each touchdown bearing."
             )
     positions = np.asarray(model.fe.node_positions)[np.array(nodes) - 1]
     layout = model.layout
@@ -126,7 +131,8 @@ def _levitated(
     n_a = parameters.magnet.shape[0]
     if n_a < 2:
         raise SimulationError(
-            f"a levitated start needs at least two radial AMBs; the machine {model.machine.name!r} has {n_a}. "
+            "a levitated start needs at least two radial AMBs; "
+            f"the machine {model.machine.name!r} has {n_a}. "
             "Add [[amb]] entries with node, stiffness and damping, or use another start."
         )
     static, holding = levitated_static(model, start.offset)
@@ -152,7 +158,8 @@ def _with_magnets(parameters: KernelParameters, start: LevitatedStart, holding: 
         force = np.asarray(start.remanent_force, dtype=np.float64)
         if force.shape != (n_a, 2):
             raise SimulationError(
-                f"the remanent force has shape {force.shape}; expected ({n_a}, 2): x and y for each AMB, in newtons."
+                f"the remanent force has shape {force.shape}; expected ({n_a}, 2): "
+                "x and y for each AMB, in newtons."
             )
         magnet[:, L.REMANENT_X : L.REMANENT_Y + 1] = force
     spin[L.POWER_OFF_DELAY] = start.delay

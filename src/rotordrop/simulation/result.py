@@ -198,7 +198,9 @@ def _write(result: DropResult, path: Path) -> None:
             _dataset(file, name, getattr(result, name), axes, unit, words)
         _dataset(file, "shapes", result.shapes, ("coordinate", "mode"), "1", "mode shapes of a plane")
         for item in fields(ContactLog):
-            _dataset(file, f"contact_{item.name}", getattr(result.contacts, item.name), ("contact",), "", item.name)
+            _dataset(
+                file, f"contact_{item.name}", getattr(result.contacts, item.name), ("contact",), "", item.name
+            )
         for item in fields(Certificate):
             value = getattr(result.certificate, item.name)
             if value is not None:

@@ -1,0 +1,1 @@
+"""State estimation: a drop model that follows a recording sample by sample."""
