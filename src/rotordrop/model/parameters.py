@@ -25,7 +25,7 @@ LANES = 8
 
 @dataclass(frozen=True, kw_only=True)
 class DropModel:
-    """A machine made ready for the time loop: finite elements, reduced basis, kernel arrays and state layout."""
+    """A machine made ready for the time loop: finite elements, reduced basis, kernel arrays, state layout."""
 
     machine: Machine
     fe: RotorFE
@@ -214,7 +214,7 @@ def bearing_row(bearing: TouchdownBearing, static_load: float) -> Array:
 
 
 def static_deflection(constants: BearingConstants, load: float) -> tuple[float, float]:
-    """Downward deflection [m] of the race under a vertical load [N], and the tangent stiffness there [N/m]."""
+    """Downward deflection [m] of the race under a vertical load [N], and tangent stiffness there [N/m]."""
     cosine, sine, weight = (array[0] for array in _ball_arrays([constants]))
     geometry = (
         constants.radial_offset,
@@ -236,5 +236,5 @@ def static_deflection(constants: BearingConstants, load: float) -> tuple[float, 
 
 
 def static_bearing_stiffness(constants: BearingConstants, load: float) -> float:
-    """Tangent radial stiffness [N/m] of the ball set at the deflection of a static load [N], straight down."""
+    """Tangent radial stiffness [N/m] of the ball set at the deflection of a static load [N] downwards."""
     return static_deflection(constants, load)[1]

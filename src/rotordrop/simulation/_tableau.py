@@ -23,7 +23,7 @@ class Tableau(NamedTuple):
 
 
 def tsit5() -> Tableau:
-    """Coefficients of Tsitouras 2011, the default pair (Computers & Mathematics with Applications 62, 770)."""
+    """Coefficients of Tsitouras 2011, the default pair (Computers Math. Applic. 62, 770)."""
     a = np.zeros((7, 7))
     a[1, :1] = [0.161]
     a[2, :2] = [-0.008480655492356989, 0.335480655492357]
