@@ -44,10 +44,11 @@ def cache_folder() -> str:
 
 def kernel(function: Function) -> Function:
     """Compile a function with strict floating point, without the interpreter lock, cached on disk."""
-    previous = config.CACHE_DIR
-    config.CACHE_DIR = cache_folder()
+    settings: Any = config
+    previous = settings.CACHE_DIR
+    settings.CACHE_DIR = cache_folder()
     try:
         compiled = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=False)(function)
     finally:
-        config.CACHE_DIR = previous
+        settings.CACHE_DIR = previous
     return cast(Function, compiled)

@@ -34,7 +34,8 @@ def hunt_crossley_force(delta: float, delta_dot: float, K: float, n: float, lam:
     """
     if delta <= 0.0:
         return 0.0
-    return max(0.0, K * delta**n * (1.0 + 1.5 * lam * delta_dot))
+    force: float = K * delta**n * (1.0 + 1.5 * lam * delta_dot)
+    return max(0.0, force)
 
 
 @kernel
@@ -62,4 +63,5 @@ def elastic_contact_energy(delta: float, K: float, n: float) -> float:
     """
     if delta <= 0.0:
         return 0.0
-    return K * delta ** (n + 1.0) / (n + 1.0)
+    energy: float = K * delta ** (n + 1.0) / (n + 1.0)
+    return energy
