@@ -119,6 +119,7 @@ def test_touchdown_supports_hold_with_contact_bearing_and_support(paper):
     assert support.links[1].damping[0, 0] == pytest.approx(1e-5 * parts.tangent)
     simple = touchdown_supports(paper, "simple")[0]
     assert simple.links[1].stiffness[0, 0] == pytest.approx(parts.simple)
+    assert simple.links[1].damping[0, 0] == support.links[1].damping[0, 0]
 
 
 SPEEDS = np.linspace(0.0, 2 * np.pi * 700.0, 29)
