@@ -22,11 +22,13 @@ DISPLAY: dict[str, tuple[float, str]] = {
     "inertia": (1e-6, "kg mm²"),
     "voltage_sensitivity": (1e3, "mV/µm"),
     "share": (1e-2, "%"),
+    "probability": (1e-2, "%"),
     "count": (1.0, ""),
 }
 """Unit in which a report shows a kind, so that the numbers of a column can be compared."""
 
 PLACES_OF_SCIENCE = 7
+FIXED_PLACES = {"count": 0, "probability": 1}
 THIN_SPACE = "\u202f"
 
 
@@ -127,8 +129,8 @@ class Quantity:
         value = self._shown(self.value)
         if not math.isfinite(value):
             return 0
-        if self.kind == "count":
-            return 0
+        if self.kind in FIXED_PLACES:
+            return FIXED_PLACES[self.kind]
         if abs(_magnitude(value)) >= PLACES_OF_SCIENCE:
             return None
         error = self._error()

@@ -6,7 +6,7 @@ from typing import IO, TYPE_CHECKING
 from unicodedata import category
 
 from rotordrop.report.content import Cell, Level, ReportContent, Statement, Table
-from rotordrop.report.quantity import Quantity
+from rotordrop.report.quantity import THIN_SPACE, Quantity
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -102,12 +102,16 @@ def _table(table: Table) -> RenderableType:
 def _cell(cell: Cell) -> str:
     if not isinstance(cell, Quantity):
         return _safe(cell)
-    interval = cell.interval_text
+    value, interval = _safe(cell.text), _safe(cell.interval_text)
     if not interval:
-        return cell.text
-    return f"{cell.text}\n{'90 %: ' if cell.interval_90 else ''}{interval}"
+        return value
+    return f"{value}\n{'90 %: ' if cell.interval_90 else ''}{interval}"
 
 
 def _safe(text: str) -> str:
-    """Text without control characters, which a name from a file could use to repaint the terminal."""
-    return "".join("\N{REPLACEMENT CHARACTER}" if category(mark).startswith("C") else mark for mark in text)
+    """Text without control characters, which a name from a file could use to repaint the terminal.
+
+    Thin spaces between thousands go too: a terminal would break the line there.
+    """
+    shown = text.replace(THIN_SPACE, "")
+    return "".join("\N{REPLACEMENT CHARACTER}" if category(mark).startswith("C") else mark for mark in shown)

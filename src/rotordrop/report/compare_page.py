@@ -1,0 +1,194 @@
+"""The report on several drops: how hard each was, and how sure the ranking is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from rotordrop._version import __version__
+from rotordrop.errors import UsageError
+from rotordrop.report.compared_drop import NUMBERS, ComparedDrop
+from rotordrop.report.comparison import comparison_figure
+from rotordrop.report.content import Cell, Figure, ReportContent, Section, Statement, Table
+from rotordrop.report.first_contact import first_contacts_figure
+from rotordrop.report.quantity import Quantity
+from rotordrop.report.stress_box import stress_box_figure, stress_table
+from rotordrop.severity.ranking import DropSeverity, Ranking, rank_drops
+
+RANKED = ("peak_force_N", "peak_stress_Pa")
+
+
+def compare_page(
+    drops: Sequence[ComparedDrop],
+    *,
+    machine_name: str = "",
+    drop_scatter: Mapping[str, float] | None = None,
+) -> ReportContent:
+    """Build the report that compares several drops of one machine.
+
+    Parameters
+    ----------
+    drops : sequence of ComparedDrop
+        At least two drops with the same bearings.
+    machine_name : str
+        Name of the machine.
+    drop_scatter : mapping, optional
+        Standard deviation between equal drops by name of the number (``"peak_force_N"`` [N], …).
+    """
+    bearings = _bearings(drops)
+    sections = [_number_section(drops, bearings, drop_scatter or {})]
+    boxes = [box for drop in drops for box in drop.boxes]
+    if boxes:
+        figure = Figure(
+            chart=stress_box_figure(boxes),
+            caption="Distribution of the stress; dashed in the box: mean (Neisi 2020, Fig. 16).",
+        )
+        sections.append(Section(heading="Hertz stress", figures=(figure,), tables=(stress_table(boxes),)))
+    overlaid = [drop.first_contact for drop in drops if drop.first_contact is not None]
+    if overlaid:
+        figure = Figure(
+            chart=first_contacts_figure(overlaid, bearings),
+            caption="First contacts of all drops; solid simulated, dashed measured (Neisi 2020, Fig. 11).",
+        )
+        sections.append(Section(heading="First contact", figures=(figure,)))
+    return ReportContent(
+        title=f"Comparison of {len(drops)} drops" + (f" of {machine_name}" if machine_name else ""),
+        subtitle=", ".join(drop.name for drop in drops),
+        simulated=_simulated(drops),
+        verdict=_verdict(drops, bearings, drop_scatter or {}),
+        summary=tuple(_number_table(drops, bearing) for bearing in bearings),
+        facts=(("rotordrop", __version__),),
+        sections=tuple(sections),
+    )
+
+
+def _bearings(drops: Sequence[ComparedDrop]) -> tuple[str, ...]:
+    if len(drops) < 2:
+        raise UsageError(f"comparison: {len(drops)} drop given, at least two are needed")
+    bearings = tuple(drops[0].numbers)
+    for drop in drops[1:]:
+        if set(drop.numbers) != set(bearings):
+            raise UsageError(
+                f"comparison: {drop.name} has the bearings {', '.join(drop.numbers)}, {drops[0].name} has "
+                f"{', '.join(bearings)}; only drops of one machine can be compared"
+            )
+    return bearings
+
+
+def _simulated(drops: Sequence[ComparedDrop]) -> str:
+    names = [drop.name for drop in drops if drop.simulated]
+    if not names:
+        return ""
+    return f"The records of these drops are simulated, not measured: {', '.join(names)}."
+
+
+def rankings(
+    drops: Sequence[ComparedDrop], bearings: Sequence[str], drop_scatter: Mapping[str, float]
+) -> dict[tuple[str, str], Ranking]:
+    """Rank the drops by peak force and peak stress at every bearing, where every drop states its error."""
+    found = {}
+    for bearing in bearings:
+        for key in RANKED:
+            severities = [_severity(drop, bearing, key) for drop in drops]
+            known = [severity for severity in severities if severity is not None]
+            if len(known) == len(drops):
+                found[bearing, key] = rank_drops(known, drop_scatter=drop_scatter.get(key))
+    return found
+
+
+def _severity(drop: ComparedDrop, bearing: str, key: str) -> DropSeverity | None:
+    quantity = drop.numbers[bearing].get(key)
+    if quantity is None or not math.isfinite(quantity.value):
+        return None
+    if quantity.interval_90 is not None:
+        return DropSeverity.from_interval(drop.name, quantity.value, quantity.interval_90)
+    if quantity.standard_error is None:
+        return None
+    return DropSeverity(name=drop.name, value=quantity.value, standard_error=quantity.standard_error)
+
+
+def _verdict(
+    drops: Sequence[ComparedDrop], bearings: Sequence[str], drop_scatter: Mapping[str, float]
+) -> tuple[Statement, ...]:
+    names = {key: name for key, name, _ in NUMBERS}
+    ranked = rankings(drops, bearings, drop_scatter)
+    statements = []
+    for bearing in bearings:
+        for key in RANKED:
+            if (bearing, key) in ranked:
+                text = f"{bearing}, {names[key]}: {ranked[bearing, key].statement}."
+            else:
+                text = (
+                    f"{bearing}, {names[key]}: not every drop states an interval, so the order of the "
+                    "numbers says nothing about which drop was the worst."
+                )
+            statements.append(Statement(text=text))
+    statements += [
+        Statement(text=f"{drop.name}: {warning}", level="warning")
+        for drop in drops
+        for warning in drop.warnings
+    ]
+    return tuple(statements)
+
+
+def _number_table(drops: Sequence[ComparedDrop], bearing: str) -> Table:
+    rows: list[tuple[Cell, ...]] = []
+    for drop in drops:
+        speed = Quantity(value=drop.speed, kind="speed", digits=3)
+        rows.append((drop.name, speed, *(_number(drop, bearing, key, kind) for key, _, kind in NUMBERS)))
+    return Table(
+        columns=("drop", "speed", *(name for _, name, _ in NUMBERS)),
+        rows=tuple(rows),
+        caption=f"{bearing} touchdown bearing",
+        note="Below a number: its 90 % interval. Peaks are the largest value within the drop.",
+    )
+
+
+def _number(drop: ComparedDrop, bearing: str, key: str, kind: str) -> Quantity:
+    return drop.numbers[bearing].get(key, Quantity(value=math.nan, kind=kind))
+
+
+def _number_section(
+    drops: Sequence[ComparedDrop], bearings: Sequence[str], drop_scatter: Mapping[str, float]
+) -> Section:
+    figures, tables = [], []
+    ranked = rankings(drops, bearings, drop_scatter)
+    for key, name, kind in NUMBERS:
+        values = {bearing: [_number(drop, bearing, key, kind) for drop in drops] for bearing in bearings}
+        caption = f"{name[0].upper()}{name[1:]} of every drop with its 90 % interval."
+        figures.append(
+            Figure(chart=comparison_figure([drop.name for drop in drops], values, name), caption=caption)
+        )
+        tables += [
+            _ranking_table(f"{bearing}: ranking by {name}", ranked[bearing, key], kind)
+            for bearing in bearings
+            if (bearing, key) in ranked
+        ]
+    return Section(heading="Severity", figures=tuple(figures), tables=tuple(tables))
+
+
+def _ranking_table(caption: str, ranking: Ranking, kind: str) -> Table:
+    conditions = ranking.worst_condition or (math.nan,) * len(ranking.names)
+    rows = tuple(
+        (
+            name,
+            Quantity(value=value, kind=kind),
+            Quantity(value=drop, kind="probability"),
+            Quantity(value=condition, kind="probability"),
+        )
+        for name, value, drop, condition in zip(
+            ranking.names, ranking.values, ranking.worst_drop, conditions, strict=True
+        )
+    )
+    scatter = (
+        "The scatter between equal drops is unknown, so nothing is said about conditions."
+        if ranking.drop_scatter is None
+        else f"Scatter between equal drops: {Quantity(value=ranking.drop_scatter, kind=kind).text} "
+        "(standard deviation)."
+    )
+    return Table(
+        columns=("drop, worst first", "value", "was the worst drop", "has the worst conditions"),
+        rows=rows,
+        caption=caption,
+        note=f"Probabilities follow from the intervals of the drops. {scatter}",
+    )

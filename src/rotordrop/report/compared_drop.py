@@ -1,0 +1,91 @@
+"""One drop of a comparison, from an estimate document."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from rotordrop.errors import UsageError
+from rotordrop.report.first_contact import OverlaidDrop
+from rotordrop.report.quantity import Quantity
+from rotordrop.report.stress_box import StressBox
+
+NUMBERS = (
+    ("peak_force_N", "peak bearing force", "force"),
+    ("mean_force_0p15_0p2_N", "mean force, 150 to 200 ms", "force"),
+    ("peak_stress_Pa", "peak Hertz stress", "pressure"),
+    ("mean_stress_Pa", "mean Hertz stress", "pressure"),
+)
+"""Numbers of an estimate document that are compared: key, name, kind."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ComparedDrop:
+    """One drop of a comparison.
+
+    Attributes
+    ----------
+    name : str
+        Name of the drop.
+    speed : float
+        Speed at power-off [rad/s].
+    numbers : mapping
+        By bearing and name of the number in an estimate file (``"peak_force_N"``, …), with intervals.
+    warnings : tuple of str
+        What the estimate warns of.
+    simulated : bool
+        Whether the record is known to be simulated.
+    boxes : tuple of StressBox
+        Distribution of the stress by bearing, where the histories are at hand.
+    first_contact : OverlaidDrop, optional
+        Vertical displacement, where the histories are at hand.
+    """
+
+    name: str
+    speed: float
+    numbers: Mapping[str, Mapping[str, Quantity]]
+    warnings: tuple[str, ...] = ()
+    simulated: bool = False
+    boxes: tuple[StressBox, ...] = field(default=())
+    first_contact: OverlaidDrop | None = None
+
+    @classmethod
+    def of_document(cls, name: str, document: Mapping[str, Any], *, simulated: bool = False) -> ComparedDrop:
+        """Take one drop from an estimate document as the command line writes it.
+
+        Raises
+        ------
+        UsageError
+            If the document has no bearings or no speed.
+        """
+        if "bearings" not in document or "speed_Hz" not in document:
+            raise UsageError(
+                f"{name}: the document has the entries {', '.join(document) or 'none'}; expected 'speed_Hz' "
+                "and 'bearings'. Give a file written by 'rotordrop estimate --json'."
+            )
+        turns = document["speed_Hz"]
+        return cls(
+            name=name,
+            speed=2 * math.pi * float(turns["value"] if isinstance(turns, Mapping) else turns),
+            numbers={bearing: _numbers(values) for bearing, values in document["bearings"].items()},
+            warnings=tuple(str(warning) for warning in document.get("warnings", ())),
+            simulated=simulated,
+        )
+
+
+def _numbers(values: Mapping[str, Any]) -> dict[str, Quantity]:
+    found = {}
+    for key, _, kind in NUMBERS:
+        if key in values:
+            entry = values[key]
+            interval = entry.get("interval_90")
+            found[key] = Quantity(
+                value=float(entry["value"]),
+                kind=kind,
+                interval_90=None if interval is None else (float(interval[0]), float(interval[1])),
+                standard_error=entry.get("standard_error"),
+                status=str(entry.get("status", "")),
+            )
+    return found

@@ -1,0 +1,112 @@
+"""The comparison of several drops: all numbers, the ranking of the severity package, and its limits."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from rotordrop.errors import UsageError
+from rotordrop.report.compare_page import compare_page, rankings
+from rotordrop.report.compared_drop import ComparedDrop
+from rotordrop.report.comparison import comparison_figure
+from rotordrop.report.quantity import Quantity
+from rotordrop.severity.ranking import DropSeverity, rank_drops
+
+
+def number(value: float, half: float | None) -> dict[str, Any]:
+    return {"value": value} if half is None else {"value": value, "interval_90": [value - half, value + half]}
+
+
+def drop(name: str, speed: float, nde: float, de: float, half: float | None = 150.0) -> ComparedDrop:
+    document = {
+        "speed_Hz": speed,
+        "warnings": ["the tail does not reach standstill"] if name == "c" else [],
+        "bearings": {
+            bearing: {"peak_force_N": number(force, half), "peak_stress_Pa": number(1.5e9, 2e7)}
+            for bearing, force in (("NDE", nde), ("DE", de))
+        },
+    }
+    return ComparedDrop.of_document(name, document, simulated=name == "a")
+
+
+DROPS = (drop("a", 60, 3300, 3600), drop("b", 100, 3100, 3300), drop("c", 210, 2500, 4200))
+
+
+def test_every_number_of_every_drop_is_in_the_table_of_its_bearing() -> None:
+    nde, de = compare_page(DROPS, machine_name="LP-400").summary
+    assert nde.caption == "NDE touchdown bearing"
+    forces = {row[0]: row[2] for row in de.rows}
+    assert isinstance(forces["c"], Quantity)
+    assert forces["c"].text == "4\u202f200 N"
+    assert forces["c"].interval_text == "4\u202f050 to 4\u202f350 N"
+    speed = nde.rows[2][1]
+    assert isinstance(speed, Quantity)
+    assert speed.text == "210 Hz (12\u202f600 rpm)"
+
+
+def test_the_ranking_is_the_one_of_the_severity_package() -> None:
+    ranked = rankings(DROPS, ("NDE", "DE"), {"peak_force_N": 600.0})["DE", "peak_force_N"]
+    expected = rank_drops(
+        [
+            DropSeverity.from_interval(n, v, (v - 150.0, v + 150.0))
+            for n, v in (("a", 3600), ("b", 3300), ("c", 4200))
+        ],
+        drop_scatter=600.0,
+    )
+    assert ranked.names == expected.names == ("c", "a", "b")
+    assert_allclose(ranked.worst_drop, expected.worst_drop)
+    content = compare_page(DROPS, drop_scatter={"peak_force_N": 600.0})
+    assert any(expected.statement in statement.text for statement in content.verdict)
+    table = next(t for t in content.sections[0].tables if t.caption == "DE: ranking by peak bearing force")
+    assert [row[0] for row in table.rows] == ["c", "a", "b"]
+    assert "600.0 N" in table.note
+
+
+def test_without_an_interval_there_is_no_ranking_and_the_page_says_why() -> None:
+    drops = (DROPS[0], drop("d", 150, 3500, 3900, half=None))
+    content = compare_page(drops)
+    texts = [statement.text for statement in content.verdict]
+    assert any(
+        text.startswith("NDE, peak bearing force: not every drop states an interval") for text in texts
+    )
+    assert not [t for t in content.sections[0].tables if "bearing force" in t.caption]
+
+
+def test_warnings_and_simulated_records_are_named() -> None:
+    content = compare_page(DROPS)
+    assert "simulated, not measured: a." in content.simulated
+    warnings = [statement.text for statement in content.verdict if statement.level == "warning"]
+    assert warnings == ["c: the tail does not reach standstill"]
+
+
+def test_points_and_intervals_of_the_figure_are_the_numbers() -> None:
+    values = {"NDE": [DROPS[0].numbers["NDE"]["peak_stress_Pa"], Quantity(value=1.7e9, kind="pressure")]}
+    chart = comparison_figure(("a", "b"), values, "peak Hertz stress")
+    assert_allclose(chart.data[0].y, (1500.0, 1700.0))
+    assert_allclose(chart.data[0].error_y.array, (20.0, 0.0))
+    assert_allclose(chart.data[0].error_y.arrayminus, (20.0, 0.0))
+    assert chart.layout.yaxis.title.text == "peak Hertz stress [MPa]"
+    assert np.ravel(chart.data[0].x).tolist() == ["a", "b"]
+
+
+def test_a_single_drop_cannot_be_compared() -> None:
+    with pytest.raises(UsageError, match="1 drop given, at least two are needed"):
+        compare_page(DROPS[:1])
+
+
+def test_drops_of_different_machines_are_refused() -> None:
+    other = ComparedDrop(name="x", speed=1.0, numbers={"front": {}, "rear": {}})
+    with pytest.raises(
+        UsageError, match="x has the bearings front, rear, a has NDE, DE; only drops of one machine"
+    ):
+        compare_page((DROPS[0], other))
+
+
+def test_a_document_of_another_kind_is_refused_with_its_entries() -> None:
+    with pytest.raises(
+        UsageError, match=r"truth: the document has the entries name, fs; expected 'speed_Hz'"
+    ):
+        ComparedDrop.of_document("truth", {"name": "drop_060", "fs": 20000})
