@@ -12,6 +12,7 @@ from rotordrop.machine.machine import Machine
 _EXAMPLES = {
     "paper": "the reference machine, reconstructed from Neisi et al. 2020",
     "lp400": "the machine of the supplied records, as its owner knows it",
+    "small": "an invented high-speed compressor rotor of 13 kg at 500 Hz, for studies",
 }
 
 
@@ -28,5 +29,5 @@ def example_path(name: str) -> Path:
 
 
 def example_machine(name: str) -> Machine:
-    """Load a machine that ships with rotordrop: "paper" or "lp400"."""
+    """Load a machine that ships with rotordrop: "paper", "lp400" or "small"."""
     return load_machine(example_path(name))
