@@ -180,6 +180,7 @@ def propagate(
     B = np.empty((s, columns - s))
     first = np.empty((s, columns))
     second = np.empty((s, columns))
+    third = np.empty((s, columns))
     k = np.empty((5, n))
     trial = np.empty(n)
     work = np.empty((2, p.ball_cos.shape[1]))
@@ -199,15 +200,16 @@ def propagate(
         for b in range(p.bearing.shape[0]):
             contact_at(b, middle, p, contact)
             impulses[b] += h * contact[1]
-        # F <- (I + hJ + (hJ)²/2) F + h (I + hJ/2) [0 | B], second order like the midpoint it is taken at
+        # F <- exp(hJ) F + what the parameters add, to third order: the second order would let light modes grow
         sparse_product(J, F, first)
         for i in range(s):
             for j in range(columns - s):
                 first[i, s + j] += B[i, j]
         sparse_product(J, first, second)
+        sparse_product(J, second, third)
         for i in range(s):
             for j in range(columns):
-                F[i, j] += h * first[i, j] + 0.5 * h * h * second[i, j]
+                F[i, j] += h * (first[i, j] + h * (0.5 * second[i, j] + h / 6.0 * third[i, j]))
 
 
 @kernel

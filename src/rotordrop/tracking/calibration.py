@@ -96,6 +96,7 @@ def track(
     problems: Sequence[DropProblem],
     schedule: Sequence[Stage],
     *,
+    references: Sequence[Array] | None = None,
     noise_factor: float = 1.0,
     progress: Progress | None = None,
 ) -> TrackedDrops:
@@ -107,12 +108,14 @@ def track(
         The drops; the prior of the first one holds for the machine.
     schedule : sequence of Stage
         Windows and noise, in order.
+    references : sequence of ndarray, optional
+        Trajectory of each drop to linearise at first, shape (M, n).
     noise_factor : float
         Factor on the unknown impulses of every stage [1].
     progress : callable, optional
         Called with a sentence and the fraction done.
     """
-    references: list[Array | None] = [None] * len(problems)
+    trajectories: list[Array | None] = list(references) if references is not None else [None] * len(problems)
     total = sum(stage.until * stage.passes for stage in schedule)
     done = 0.0
     smoothed: list[Smoothed] = []
@@ -121,8 +124,8 @@ def track(
         for _ in range(stage.passes):
             if progress is not None:
                 progress(f"fitting the first {1e3 * stage.until:.0f} ms", done / total)
-            smoothed = one_pass(problems, settings, references, stage.until)
-            references = [s.means for s in smoothed]
+            smoothed = one_pass(problems, settings, trajectories, stage.until)
+            trajectories = [s.means for s in smoothed]
             done += stage.until
     return TrackedDrops(
         problems=tuple(problems),

@@ -32,7 +32,9 @@ SPEED_READING_SIGMA = 1.0
 NOISE_FLOOR = 0.1e-6
 TAIL_VERTICAL_SIGMA = 0.7e-6
 TAIL_HORIZONTAL_SIGMA = 25e-6
-READING_SCALE = 1e-6
+SMOOTHED_FRICTION_SPEED = 0.15
+"""Sliding speed [m/s] below which friction is smoothed in the filter: the spin of a race is not known better, so the
+mean of the friction law over what is possible is what a linearisation may use."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,7 +163,9 @@ def _prepared(model: DropModel, omega: float) -> DropModel:
     spin[L.POWER_OFF_DELAY] = 0.0
     flags[L.SPIN_MODE] = aerodynamics.EXPONENTIAL_IN_TIME
     flags[L.MAGNETS_ACT] = 1
-    return replace(model, parameters=p._replace(spin=spin, flags=flags))
+    bearing = p.bearing.copy()
+    bearing[:, L.SMOOTHING_SPEED] = np.maximum(bearing[:, L.SMOOTHING_SPEED], SMOOTHED_FRICTION_SPEED)
+    return replace(model, parameters=p._replace(spin=spin, flags=flags, bearing=bearing))
 
 
 def _thinned(speed: Array, every: int = 50) -> Array:

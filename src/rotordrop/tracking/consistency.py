@@ -1,0 +1,122 @@
+"""Does the model fit the record? Checks that decide whether intervals hold, each with the numbers compared."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.tracking.problem import DropProblem
+from rotordrop.tracking.smoother import Smoothed
+
+Array = NDArray[np.float64]
+
+NIS_RANGE = (0.6, 1.25)
+CORRELATION_LIMIT = 0.25
+SENSOR_LIMIT = 3.5
+PARAMETER_LIMIT = 3.5
+NOISE_FACTOR_LIMIT = 4.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check:
+    """One consistency check: what was compared, whether it passed, and what to look at when it did not."""
+
+    name: str
+    passed: bool
+    message: str
+
+
+def consistency_checks(problem: DropProblem, smoothed: Smoothed, noise_factor: float) -> tuple[Check, ...]:
+    """Check innovations, sensor errors, parameters and process noise of a smoothed drop."""
+    return (
+        *_innovation_checks(problem, smoothed),
+        _sensor_check(problem, smoothed),
+        _parameter_check(problem, smoothed),
+        Check(
+            name="process noise",
+            passed=noise_factor < NOISE_FACTOR_LIMIT,
+            message=f"unknown impulses {noise_factor:g} × their usual size (limit {NOISE_FACTOR_LIMIT:g} ×)",
+        ),
+        Check(
+            name="filter",
+            passed=smoothed.filtered.done == len(smoothed.filtered.means),
+            message=f"the filter followed {smoothed.filtered.done} of {len(smoothed.filtered.means)} samples",
+        ),
+    )
+
+
+def normalised_innovations(smoothed: Smoothed) -> Array:
+    """Innovations of the displacement channels over their standard deviation [1], shape (N, C)."""
+    done = smoothed.filtered.done
+    return np.asarray(
+        smoothed.filtered.innovations[:done, :-1] / np.sqrt(smoothed.filtered.innovation_variances[:done, :-1])
+    )
+
+
+def _innovation_checks(problem: DropProblem, smoothed: Smoothed) -> tuple[Check, ...]:
+    e = normalised_innovations(smoothed)
+    names = [sensor.name for sensor in problem.model.machine.sensors]
+    nis = np.nanmean(e**2, axis=0)
+    worst = int(np.argmax(np.abs(np.log(nis))))
+    lag = np.array([_lag_one(e[:, c]) for c in range(e.shape[1])])
+    reddest = int(np.argmax(np.abs(lag)))
+    return (
+        Check(
+            name="innovation size",
+            passed=bool(NIS_RANGE[0] <= nis[worst] <= NIS_RANGE[1]),
+            message=(
+                f"mean squared innovation {np.nanmean(nis):.2f} × expected, channel {names[worst]} {nis[worst]:.2f} × "
+                f"(usual {NIS_RANGE[0]:g} to {NIS_RANGE[1]:g})"
+            ),
+        ),
+        Check(
+            name="innovation whiteness",
+            passed=bool(abs(lag[reddest]) < CORRELATION_LIMIT),
+            message=(
+                f"neighbouring innovations of channel {names[reddest]} correlate by {lag[reddest]:.2f} "
+                f"(limit {CORRELATION_LIMIT:g})"
+            ),
+        ),
+    )
+
+
+def _lag_one(e: Array) -> float:
+    pairs = np.isfinite(e[1:]) & np.isfinite(e[:-1])
+    if np.count_nonzero(pairs) < 10:
+        return 0.0
+    return float(np.sum(e[1:][pairs] * e[:-1][pairs]) / np.sum(e[1:][pairs] ** 2))
+
+
+def _sensor_check(problem: DropProblem, smoothed: Smoothed) -> Check:
+    start, n_c = problem.n_dynamic + len(problem.unknowns), problem.n_channels
+    chosen = slice(start, start + 2 * n_c)
+    sigma = np.sqrt(np.diag(problem.covariance)[chosen])
+    departure = (smoothed.means[-1][chosen] - problem.mean[chosen]) / sigma
+    worst = int(np.argmax(np.abs(departure)))
+    channel = problem.model.machine.sensors[worst % n_c].name
+    kind = "gain" if worst < n_c else "offset"
+    return Check(
+        name="sensor errors",
+        passed=bool(abs(departure[worst]) < SENSOR_LIMIT),
+        message=(
+            f"{kind} of channel {channel} departs by {abs(departure[worst]):.1f} of its prior standard deviations "
+            f"(limit {SENSOR_LIMIT:g})"
+        ),
+    )
+
+
+def _parameter_check(problem: DropProblem, smoothed: Smoothed) -> Check:
+    index = min(200, len(smoothed.means) - 1)
+    theta = smoothed.means[index][problem.parameter_slice]
+    departure = np.array([(t - u.mean) / u.sigma for t, u in zip(theta, problem.unknowns, strict=True)])
+    worst = int(np.argmax(np.abs(departure)))
+    return Check(
+        name="parameters",
+        passed=bool(abs(departure[worst]) < PARAMETER_LIMIT),
+        message=(
+            f"{problem.unknowns[worst].path} departs by {abs(departure[worst]):.1f} of its prior standard deviations "
+            f"(limit {PARAMETER_LIMIT:g})"
+        ),
+    )

@@ -1,0 +1,27 @@
+"""Carry a smoothed trajectory from one basis of the rotor to another, to linearise the finer model there."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.tracking.problem import DropProblem
+
+Array = NDArray[np.float64]
+
+
+def transferred(coarse: DropProblem, fine: DropProblem, means: Array) -> Array:
+    """Trajectory (N, n) of a coarse problem in the coordinates of a fine one, by projecting the modes."""
+    one, two = coarse.model.layout, fine.model.layout
+    result = np.zeros((len(means), len(fine.mean)))
+    project = (fine.model.basis.shapes.T @ (fine.model.fe.mass @ coarse.model.basis.shapes)).T
+    for part in ("modal_x", "modal_y"):
+        source, target = getattr(one, part), getattr(two, part)
+        result[:, target] = means[:, source] @ project
+        result[:, two.velocity_of(target)] = means[:, one.velocity_of(source)] @ project
+    for part in ("race", "support"):
+        source, target = getattr(one, part), getattr(two, part)
+        result[:, target] = means[:, source]
+        result[:, two.velocity_of(target)] = means[:, one.velocity_of(source)]
+    result[:, two.race_spin.start :] = means[:, one.race_spin.start :]
+    return result
