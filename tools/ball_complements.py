@@ -7,8 +7,8 @@ ball diameter nor ball count. Bearings of the same bore and outside diameter sha
 - one ball diameter (a standard size), one ball count and one groove conformity,
 
 with the pitch circle half way between bore and outside diameter. Balls are looked for around the proportions
-of a catalogue that does publish them (GMN): 0.53 to 0.64 of the section height, 70 to 89 % of the pitch circle
-filled; 0.40 to 0.52 of the section height and 62 to 84 % for the high-speed series with small balls.
+of a catalogue that does publish them (GMN): 0.53 to 0.64 of the section height, 70 to 89 % of the pitch
+circle filled; 0.40 to 0.52 of the section height and 62 to 84 % for the high-speed series with small balls.
 
     python tools/ball_complements.py src/rotordrop/machine/catalog/complements.json
 """
@@ -42,8 +42,9 @@ FROM_RATINGS = {
         "ball_count": 23,
         "ball_diameter_mm": 9.525,
         "conformity": 0.53,
-        "basis": "reconstructed: 23 balls of 9.525 mm reproduce the ISO 281/76 load ratings of the 71914 "
-        "series to 0.3 % (23 balls of 8.731 mm with conformity 0.53 would reproduce its axial rigidity to 2.6 %)",
+        "basis": "reconstructed: 23 balls of 9.525 mm reproduce the ISO 281/76 load ratings of the "
+        "71914 series to 0.3 % (23 balls of 8.731 mm with conformity 0.53 would reproduce its axial rigidity "
+        "to 2.6 %)",
     }
 }
 

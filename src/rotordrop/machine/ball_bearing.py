@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from difflib import get_close_matches
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, Strict
@@ -120,8 +121,14 @@ class BallBearing(Description):
     @classmethod
     def rewritten(cls, raw: dict[str, Any]) -> dict[str, Any]:
         """Read ``preload = "light"`` and a conformity common to both races."""
-        if raw.get("preload") in _PRELOAD_CLASSES:
+        preload = raw.get("preload")
+        if preload in _PRELOAD_CLASSES:
             raw["preload_class"] = raw.pop("preload")
+        elif isinstance(preload, str) and preload.isalpha():
+            close = get_close_matches(preload, _PRELOAD_CLASSES, 1, 0.5)
+            hint = f"did you mean {close[0]!r}?" if close else f"classes are {', '.join(_PRELOAD_CLASSES)}"
+            told = f'{preload!r} is no preload class; {hint} Else give a force, "100 N"'
+            raise Misfit(told, ("preload",))
         if "conformity" in raw:
             both = raw.pop("conformity")
             raw = {"conformity_inner": both, "conformity_outer": both} | raw

@@ -11,13 +11,16 @@ from typing import Any
 from pydantic import ValidationError
 
 from rotordrop.errors import MachineFileError, UsageError
-from rotordrop.machine.description import Misfit
+from rotordrop.machine.description import Description, Misfit
 from rotordrop.machine.machine import Machine
+from rotordrop.machine.provenance import kind_of
 from rotordrop.machine.shaft_table import SECTION_LINE, read_shaft_table
 from rotordrop.machine.toml_positions import TomlPositions
+from rotordrop.units import KINDS
 
 _UNION_TAGS = {"by_length", "by_nodes"}
 _DECIMAL_COMMA = re.compile(r"=\s*([+-]?\d+),(\d+)(?!\s*\])")
+_ALIASES = {"preload_class": "preload", "grade_mm_s": "grade"}
 _EXPECTED = {
     "tuple_type": "expected a list, [[…]] for a list of tables",
     "model_type": "expected a table, {…} or [header]",
@@ -137,14 +140,14 @@ def _located(
     found = [_one_error(entry, positions, file, table) for entry in error.errors()]
     found.sort(key=lambda refusal: (refusal.line or 0, refusal.column or 0))
     first = found[0]
-    others = "".join(f"\n{other}" for other in found[1:])
+    others = "".join(f"\n{text}" for text in dict.fromkeys(map(str, found[1:])) if text != str(first))
     return MachineFileError(first.message + others, file=first.file, line=first.line, column=first.column)
 
 
 def _one_error(
     entry: Any, positions: TomlPositions, file: Path | None, table: tuple[Path, list[int]] | None
 ) -> MachineFileError:
-    place = tuple(part for part in entry["loc"] if part not in _UNION_TAGS)
+    place = tuple(_ALIASES.get(part, part) for part in entry["loc"] if part not in _UNION_TAGS)
     message, at_key = _message(entry, place)
     cause = entry.get("ctx", {}).get("error")
     if isinstance(cause, Misfit):
@@ -153,6 +156,8 @@ def _one_error(
         return MachineFileError(
             f"{_dotted(place[2:])}: {message}", file=table[0], line=table[1][int(place[2])]
         )
+    if place and place[-1] in ("conformity_inner", "conformity_outer") and not positions.has(place):
+        place = (*place[:-1], "conformity")
     line, column = (positions.key(place) if at_key else positions.value(place)) or (1, 1)
     return MachineFileError(
         f"{_dotted(place)}: {message}" if place else message, file=file, line=line, column=column
@@ -167,7 +172,7 @@ def _message(entry: Any, place: tuple[str | int, ...]) -> tuple[str, bool]:
     if isinstance(cause, UsageError):
         return str(cause), False
     if entry["type"] == "missing":
-        return f"{place[-1]!r} is missing; add it (machine_schema() and 'rotordrop init' show how)", True
+        return _missing(place), True
     if cause is not None:
         return str(cause), False
     found = entry["input"]
@@ -179,6 +184,32 @@ def _message(entry: Any, place: tuple[str | int, ...]) -> tuple[str, bool]:
         else f"{found!r}"
     )
     return f"{shown} does not fit; {_EXPECTED.get(entry['type']) or _spoken(entry['msg'])}", False
+
+
+def _missing(place: tuple[str | int, ...]) -> str:
+    if isinstance(place[-1], int):
+        return f"one entry is missing; {place[-2]} needs {place[-1] + 1} at least"
+    kind = _kind_at(place)
+    example = f'for example {place[-1]} = "{KINDS[kind].example}"' if kind else "'rotordrop init' shows how"
+    return f"{place[-1]!r} is missing; add it, {example}"
+
+
+def _kind_at(place: tuple[str | int, ...]) -> str | None:
+    """Find the kind of quantity a file holds at a place."""
+    part: type[Description] = Machine
+    for key in (key for key in place[:-1] if isinstance(key, str)):
+        inner = _description_in(part.model_fields[key].annotation) if key in part.model_fields else None
+        part = inner or part
+    name = str(place[-1])
+    return kind_of(part, name) if name in part.model_fields else None
+
+
+def _description_in(annotation: Any) -> type[Description] | None:
+    """Find the description a field holds, one or many of them."""
+    if isinstance(annotation, type) and issubclass(annotation, Description):
+        return annotation
+    inner = (_description_in(argument) for argument in getattr(annotation, "__args__", ()))
+    return next((description for description in inner if description is not None), None)
 
 
 def _spoken(message: str) -> str:

@@ -152,6 +152,8 @@ class Machine(Description):
         parts = changed_machine_parts(self, values)
         copy = self.completed_with(parts)
         copy.__pydantic_fields_set__.update(parts)
+        if parts.keys() - {"touchdown_bearings", "speed"}:
+            copy.__dict__.update(copy.left_out())
         return copy
 
     @cached_property

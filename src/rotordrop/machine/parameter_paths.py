@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rotordrop.errors import UsageError
 from rotordrop.estimated import Estimated
 from rotordrop.machine.description import Description
+from rotordrop.machine.provenance import physical_of
 
 if TYPE_CHECKING:
     from rotordrop.machine.machine import Machine
@@ -28,7 +29,9 @@ def changed_machine_parts(machine: Machine, values: Mapping[str, float | Estimat
     parts: dict[str, Any] = {}
     for key, branch in tree.items():
         try:
-            parts[key] = _changed(getattr(machine, key), branch)
+            physical = physical_of(type(machine), key)
+            part = getattr(machine, key)
+            parts[key] = _changed(part, branch) if physical is None else physical.read(branch)
         except ValueError as error:
             raise UsageError(_refusal(error, values)) from error
     return parts
@@ -97,6 +100,8 @@ def _step(part: Any, key: Any, path: str) -> Any:
         return part[key]
     if isinstance(part, Description) and key in type(part).model_fields:
         return getattr(part, key)
+    if isinstance(part, tuple):
+        raise UsageError(f"the machine has no value {path!r}: there are {len(part)} of them, counted from 0")
     known = ", ".join(type(part).model_fields) if isinstance(part, Description) else ""
     close = get_close_matches(str(key), list(type(part).model_fields), 1, 0.5) if known else []
     way_out = f"did you mean {close[0]!r}?" if close else f"known there are {known or 'no further names'}"

@@ -94,6 +94,12 @@ def _physicals(field: Any) -> Iterator[Physical]:
                 yield metadata
 
 
-def kind_of(description: type[Description], name: str) -> str:
-    """Name the kind of quantity of a field."""
-    return next(_physicals(description.model_fields[name])).kind
+def kind_of(description: type[Description], name: str) -> str | None:
+    """Name the kind of quantity of a field; None where it holds none."""
+    physical = physical_of(description, name)
+    return None if physical is None else physical.kind
+
+
+def physical_of(description: type[Description], name: str) -> Physical | None:
+    """How a field is read; None where it holds no physical value."""
+    return next(_physicals(description.model_fields[name]), None)

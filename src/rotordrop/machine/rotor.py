@@ -105,6 +105,13 @@ class SectionByNodes(Section):
         description="First and last node of the section, counted from 1"
     )
 
+    @classmethod
+    def rewritten(cls, raw: dict[str, Any]) -> dict[str, Any]:
+        """Refuse a section given in both ways."""
+        if "length" in raw:
+            raise Misfit("a section has either 'length' or 'nodes', not both", ("length",))
+        return raw
+
     def check(self) -> None:
         """Refuse a section that runs backwards."""
         super().check()
@@ -238,7 +245,7 @@ class Rotor(Description):
                 raise Misfit(
                     f"node {number + 1} at {right * 1e3:.7g} mm does not lie beyond node {number} at "
                     f"{left * 1e3:.7g} mm; node positions must increase",
-                    ("node_positions",),
+                    ("node_positions", "values", number),
                 )
         self._check_cover()
 
@@ -351,4 +358,5 @@ def _builtin_steel() -> Material:
 
 
 def _unknown_material(name: str, known: tuple[str, ...]) -> str:
-    return unknown_key(name, known).replace("key", "material", 1) + "; describe it under [rotor.materials]"
+    told = unknown_key(name, known).replace("key", "material", 1).removesuffix("?")
+    return f"{told}{'?' if 'did you mean' in told else ''} Else describe it under [rotor.materials.{name}]"

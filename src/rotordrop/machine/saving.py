@@ -63,7 +63,7 @@ def _content(part: Description) -> dict[str, Any]:
 
 def _item(owner: type[Description], name: str, value: Any) -> Any:
     if isinstance(value, Estimated):
-        return _Written(_value_text(value, kind_of(owner, name)))
+        return _Written(_value_text(value, kind_of(owner, name) or "dimensionless"))
     if isinstance(value, Description):
         return _content(value)
     if isinstance(value, dict):

@@ -57,7 +57,7 @@ def _describe(schema: dict[str, Any], description: type[Description]) -> None:
         field = description.model_fields[name]
         words = list(dict.fromkeys([meanings.get(name, ""), field.description or ""]))
         if isinstance(field.default, Estimated) and field.default.value == field.default.value:
-            value = format_quantity(field.default.value, kind_of(description, name))
+            value = format_quantity(field.default.value, kind_of(description, name) or "dimensionless")
             words = [meanings.get(name, ""), f"Default {value}: {field.default.source}"]
         elif isinstance(standing, str | int | float | bool) and standing not in ("", "-", 0):
             entry["default"] = standing

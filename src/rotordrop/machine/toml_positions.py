@@ -28,9 +28,14 @@ class TomlPositions:
         """Place of a key, or of the nearest table around it that stands in the file."""
         return self._nearest(path, self._keys)
 
+    def has(self, path: Path) -> bool:
+        """Tell whether a key stands in the file."""
+        return path in self._keys
+
     def _nearest(self, path: Path, places: dict[Path, Place]) -> Place | None:
         for length in range(len(path), 0, -1):
-            place = places.get(path[:length]) or self._keys.get(path[:length])
+            part = path[:length]
+            place = places.get(part) or self._keys.get(part) or self._keys.get((*part, 0))
             if place is not None:
                 return place
         return None
@@ -62,7 +67,7 @@ class TomlPositions:
         return path
 
     def _pair(self, node: Any, table: Path) -> None:
-        key, value = node.children[0], node.children[-1]
+        key, value = (child for child in node.children if child.is_named and child.type != "comment")
         path: Path = (*table, *_key_parts(key))
         self._keys[path] = self._place(key)
         self._value(value, path)

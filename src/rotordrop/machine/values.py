@@ -143,11 +143,13 @@ class Physical:
 
     def text(self, number: float) -> str:
         """Write a number the way an engineer reads it."""
-        return format_quantity(number, self.kind)
+        return format_quantity(number, self.kind) if number else f"0 {si_unit(self.kind)}".strip()
 
 
 def spoken(kind: str) -> str:
     """Name a kind with its article."""
+    if kind == "dimensionless":
+        return "the number"
     return ("an " if kind[0] in "aeiou" else "a ") + kind.replace("_", " ")
 
 

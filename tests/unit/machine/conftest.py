@@ -1,0 +1,93 @@
+"""A small machine, as text of a file, for tests that change it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+SMALL = """
+name = "small"
+
+[speed]
+nominal = "300 Hz"
+
+[rotor]
+
+[[rotor.sections]]
+length = "0.2 m"
+elements = 2
+outer_diameter = "60 mm"
+
+[[rotor.sections]]
+length = "0.4 m"
+elements = 4
+outer_diameter = "80 mm"
+inner_diameter = "20 mm"
+
+[[rotor.sections]]
+length = "0.2 m"
+elements = 2
+outer_diameter = "60 mm"
+
+[[rotor.discs]]
+name = "wheel"
+node = 5
+mass = "5 kg"
+polar_inertia = "0.02 kg m^2"
+diametral_inertia = "0.0125 kg m^2"
+
+[[touchdown_bearings]]
+name = "NDE"
+node = 2
+air_gap = "250 um"
+bore_radius = "30.25 mm"
+bearing = { designation = "XCB71914-E" }
+
+[[touchdown_bearings]]
+name = "DE"
+position = "0.7 m"
+air_gap = "250 um"
+bore_radius = "30.25 mm"
+bearing = { designation = "XCB71914-E", preload = "heavy" }
+
+[[sensors]]
+name = "A"
+node = 2
+angle = "135 deg"
+
+[[sensors]]
+name = "B"
+node = 2
+angle = "45 deg"
+
+[[sensors]]
+name = "C"
+node = 8
+angle = "135 deg"
+
+[[sensors]]
+name = "D"
+node = 8
+angle = "45 deg"
+"""
+
+
+@pytest.fixture(scope="session")
+def small_text() -> str:
+    """Text of the small machine."""
+    return SMALL
+
+
+@pytest.fixture(scope="session")
+def changed() -> Callable[..., str]:
+    """Text of the small machine with replacements, each where its text stands first."""
+
+    def replaced(*changes: tuple[str, str]) -> str:
+        text = SMALL
+        for old, new in changes:
+            assert old in text, f"{old!r} is not in the text"
+            text = text.replace(old, new, 1)
+        return text
+
+    return replaced

@@ -1,0 +1,204 @@
+"""Every refusal of a machine file says where, what was found and what to do."""
+
+import re
+
+import pytest
+
+from rotordrop.errors import MachineFileError
+from rotordrop.machine import load_machine, loads_machine
+
+GAP = 'air_gap = "250 um"'
+
+BAD = [
+    # syntax and decimal commas
+    (GAP, "air_gap = 0,25", r"0,25 has a decimal comma; write 0\.25, in quotes with its unit", "0,25"),
+    (GAP, 'air_gap = "0,25 mm"', r"'0,25 mm' has a decimal comma; use 0\.25 mm", '"0,25'),
+    (GAP, "air_gap = { guess = 0,25 }", r"0,25 has a decimal comma; write 0\.25", "0,25"),
+    (GAP, "air_gap = 250 um", r'a value with a unit is a text: write "250 um" in quotes', "um"),
+    (GAP, 'air_gap = "250 um', "not valid TOML", "air_gap"),
+    # keys
+    (GAP, 'airgap = "250 um"', "unknown key 'airgap'; did you mean 'air_gap'", "airgap"),
+    ("[[rotor.discs]]", "[[rotor.disks]]", "unknown key 'disks'; did you mean 'discs'", "rotor.disks"),
+    ("[speed]", "[sped]", "unknown key 'sped'; did you mean 'speed'", "sped"),
+    (
+        "elements = 2",
+        "elements = 2\nshaft_tabel = 1",
+        "unknown key 'shaft_tabel'; known here are",
+        "shaft_tabel",
+    ),
+    (
+        "[rotor]",
+        '[rotor]\nshaft_tabel = "x"',
+        "unknown key 'shaft_tabel'; did you mean 'shaft_table'",
+        "shaft_t",
+    ),
+    (GAP, "", "'air_gap' is missing; add it, for example air_gap = \"280 um\"", "touchdown_bearings]]"),
+    ('name = "small"', "", "'name' is missing; add it", None),
+    # units and dimensions
+    (GAP, "air_gap = 250", "250 has no unit; a length needs one, for example '280 um'", "250"),
+    (GAP, 'air_gap = "250"', "'250' has no unit", '"250"'),
+    (GAP, 'air_gap = "250 g"', "'250 g' is not a length", '"250 g"'),
+    ("300 Hz", "300 s", "'300 s' is not a speed", '"300 s"'),
+    ('"5 kg"', "5", "5 has no unit; a mass needs one", "5"),
+    # nodes and positions
+    ("node = 2", "node = 10", "node 10 is outside the rotor, whose nodes are 1 to 9", "10"),
+    ("node = 2", "node = 0", "node 0 is outside the rotor; nodes count from 1", "0"),
+    ("node = 2", "node = -1", "node -1 is outside the rotor", "-1"),
+    ("node = 2", 'node = "2"', "'2' is not a node; write its number", '"2"'),
+    ("node = 5", "node = 50", "node 50 is outside the rotor, whose nodes are 1 to 9", "50"),
+    ('"0.7 m"', '"0.9 m"', r"900 mm is outside the rotor, which reaches from 0 m to 800 mm", '"0.9 m"'),
+    ('"0.7 m"', '"0.72 m"', "there is no node at 720 mm; the nearest is node 8 at 700 mm", '"0.72 m"'),
+    ('position = "0.7 m"', "", "needs either 'node' .* or 'position'", "touchdown_bearings]]"),
+    # diameters, layers, materials
+    ('"60 mm"', '"0 mm"', "0 m is not allowed here; a length must be positive", '"0 mm"'),
+    ('"60 mm"', '"-60 mm"', r"-60\.0 mm is not allowed here; a length must be positive", '"-60 mm"'),
+    (
+        '"20 mm"',
+        '"90 mm"',
+        r"the inner diameter 90\.0 mm must be smaller than the outer one, 80\.0 mm",
+        '"90 mm"',
+    ),
+    ('"20 mm"', '"-1 mm"', r"-1\.00 mm is not allowed here; it must not be negative", '"-1 mm"'),
+    ("elements = 4", 'elements = 4\nlayer_diameter = "90 mm"', "a layer needs both", "rotor.sections]]"),
+    (
+        "elements = 4",
+        'elements = 4\nlayer_diameter = "70 mm"\nlayer_density = "7650 kg/m^3"',
+        r"the layer reaches to 70\.0 mm and must reach beyond the outer diameter 80\.0 mm",
+        '"70 mm"',
+    ),
+    (
+        "[rotor]",
+        '[rotor]\nmaterial = "titan"',
+        r"unknown material 'titan'; .*\[rotor\.materials\.titan\]",
+        "mat",
+    ),
+    ("elements = 2", "elements = 0", "0 does not fit; expected greater than or equal to 1", "0"),
+    ("elements = 2", "elements = 2.5", r"2\.5 does not fit; expected a valid integer", "2.5"),
+    ("elements = 2", "nodes = [1, 3]", "a section has either 'length' or 'nodes', not both", "length"),
+    (
+        'length = "0.4 m"\nelements = 4',
+        "nodes = [3, 7]",
+        "some sections have 'length' and others 'nodes'",
+        "rotor",
+    ),
+    ("0.02 kg", "0.2 kg", r"polar_inertia 0\.2 kg m² is more than twice diametral_inertia", '"0.2 kg'),
+    # touchdown bearings
+    ('"30.25 mm"', '"60.5 mm"', r"bore radius 60\.5 mm is larger than that of XCB71914E.*, 35 mm", '"60.5'),
+    (GAP, 'air_gap = "31 mm"', "the air gap 31 mm must be smaller than the bore radius", '"31 mm"'),
+    ("XCB71914-E", "XCB71915-X", "no bearing 'XCB71915-X'; did you mean one of", '"XCB71915-X"'),
+    ("XCB71914-E", "6206", "no bearing '6206'", '"6206"'),
+    ('"heavy"', '"hevy"', "'hevy' is no preload class; did you mean 'heavy'", '"hevy"'),
+    (
+        'preload = "heavy"',
+        "ball_count = 40",
+        r"40 balls of 9\.525 mm do not fit on .* 85 mm; at most 28",
+        "40",
+    ),
+    ('preload = "heavy"', "ball_count = 2", "2 does not fit; expected greater than or equal to 3", "2"),
+    (
+        'preload = "heavy"',
+        'arrangement = "Y"',
+        "'Y' does not fit; expected 'X', 'O', 'tandem' or 'single'",
+        '"Y"',
+    ),
+    (
+        'preload = "heavy"',
+        "conformity = 0.5",
+        r"0\.500 is not allowed here; the number must be greater",
+        "0.5",
+    ),
+    (
+        'designation = "XCB71914-E"',
+        'preload = "1 N"',
+        "has no 'ball_diameter', 'ball_count', 'pitch_diam",
+        None,
+    ),
+    ('name = "DE"', 'name = "NDE"', "the name 'NDE' is used twice", '"NDE"'),
+    ('name = "DE"', 'name = "D E"', "'D E' is not a name; write one word without dots", '"D E"'),
+    ('name = "DE"', 'name = "speed"', "a touchdown bearing cannot be called 'speed'", '"speed"'),
+    # sensors
+    ('"135 deg"', '"45 deg"', "resolve only 3 of the 4 rigid motions: in the plane at 100 mm", '"45 deg"'),
+    ('"135 deg"', '"225 deg"', "resolve only 3 of the 4 rigid motions", '"225 deg"'),
+    ('angle = "135 deg"', 'angle = "135 deg"\npolarity = 0', "0 does not fit; expected 1 or -1", "0"),
+    ('name = "B"', 'name = "A"', "the name 'A' is used twice", '"A"'),
+    ('name = "B"', 'name = "B"\nbearing = "XE"', "belongs to touchdown bearing 'XE', .* DE, NDE", '"XE"'),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "told", "at"), BAD, ids=[new[:40] for _, new, _, _ in BAD])
+def test_refusals_say_where_what_and_the_way_out(tmp_path, changed, old, new, told, at):
+    text = changed((old, new))
+    file = tmp_path / "machine.toml"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(MachineFileError, match=told) as caught:
+        load_machine(file)
+    error = caught.value
+    assert error.file == str(file)
+    assert str(error).startswith(f"{file}:{error.line}:{error.column}: ")
+    if at is not None:
+        line = text.split("\n")[error.line - 1]
+        assert line[error.column - 1 :].startswith(at) or at in line, (line, error.column)
+
+
+def test_the_column_points_at_the_value_itself(changed):
+    text = changed((GAP, '  air_gap   =   "250 g"   # a remark'))
+    with pytest.raises(MachineFileError, match="'250 g' is not a length") as caught:
+        loads_machine(text)
+    line = text.split("\n")[caught.value.line - 1]
+    assert line[caught.value.column - 1 :].startswith('"250 g"')
+
+
+def test_columns_count_characters_not_bytes(changed):
+    text = changed(
+        ('bearing = { designation = "XCB71914-E" }', 'bearing = { "designation" = "µµµ", ball_cout = 3 }')
+    )
+    with pytest.raises(
+        MachineFileError, match="unknown key 'ball_cout'; did you mean 'ball_count'"
+    ) as caught:
+        loads_machine(text)
+    line = text.split("\n")[caught.value.line - 1]
+    assert line[caught.value.column - 1 :].startswith("ball_cout")
+
+
+def test_all_that_is_wrong_is_told_at_once(changed):
+    text = changed((GAP, 'air_gap = "250 g"'), ("300 Hz", "300 s"), ("elements = 4", "elements = 0"))
+    with pytest.raises(MachineFileError) as caught:
+        loads_machine(text)
+    told = str(caught.value).split("\n")
+    assert len(told) == 3
+    assert [re.match(r"\d+:\d+: ", line) is not None for line in told] == [True] * 3
+    assert "'300 s' is not a speed" in told[0]
+
+
+def test_sensors_in_one_plane_cannot_see_a_tilt(small_text):
+    text = small_text.replace("node = 8", "node = 2")
+    with pytest.raises(MachineFileError, match=r"4 sensors sit in 1 plane \(100 mm\) and cannot tell a tilt"):
+        loads_machine(text)
+
+
+def test_three_planes_with_one_direction_each_can_do(changed):
+    """Three planes turned against each other, four sensors in all, determine four rigid motions."""
+    text = changed(('name = "B"\nnode = 2', 'name = "B"\nnode = 5'))
+    assert len(loads_machine(text).sensors) == 4
+
+
+def test_a_machine_without_sensors_can_be_simulated(small_text):
+    assert loads_machine(small_text[: small_text.index("[[sensors]]")]).sensors == ()
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(MachineFileError, match="cannot read the machine file: No such file"):
+        load_machine(tmp_path / "nowhere.toml")
+
+
+def test_a_file_in_another_encoding_is_refused(tmp_path, small_text):
+    file = tmp_path / "machine.toml"
+    file.write_bytes(small_text.replace("small", "größe").encode("latin-1"))
+    with pytest.raises(MachineFileError, match="byte 11 is not UTF-8 text; save the machine file as UTF-8"):
+        load_machine(file)
+
+
+def test_a_byte_order_mark_does_no_harm(tmp_path, small_text):
+    file = tmp_path / "machine.toml"
+    file.write_bytes(b"\xef\xbb\xbf" + small_text.encode())
+    assert load_machine(file) == loads_machine(small_text)
