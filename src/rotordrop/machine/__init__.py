@@ -6,6 +6,7 @@ from rotordrop.machine.examples import example_machine, example_names, example_p
 from rotordrop.machine.loading import load_machine, loads_machine
 from rotordrop.machine.machine import Machine
 from rotordrop.machine.material import Material
+from rotordrop.machine.plausibility import Doubt, doubts
 from rotordrop.machine.rotor import Disc, Element, Rotor, Section, SectionByLength, SectionByNodes
 from rotordrop.machine.saving import machine_text, save_machine
 from rotordrop.machine.schema import machine_schema
@@ -21,6 +22,7 @@ __all__ = [
     "BallBearing",
     "Contact",
     "Disc",
+    "Doubt",
     "Element",
     "Friction",
     "Machine",
@@ -35,6 +37,7 @@ __all__ = [
     "Support",
     "TouchdownBearing",
     "Unbalance",
+    "doubts",
     "example_machine",
     "example_names",
     "example_path",

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from rotordrop.machine.plausibility import doubts
 from rotordrop.model.machine_summary import BearingSummary, MachineSummary
 from rotordrop.physics.ball_bearing import ball_centrifugal_force
 from rotordrop.physics.thermal import friction_heat, growth_of_race
@@ -34,7 +35,8 @@ class MachineWarning:
     Attributes
     ----------
     kind : str
-        "limiting speed", "ball centrifugal force", "support resonance", "frictional heat", "load direction".
+        "limiting speed", "ball centrifugal force", "support resonance", "frictional heat", "load direction",
+        or one of the doubts about the description itself.
     bearing : str
         Name of the touchdown bearing.
     value, limit : float
@@ -65,7 +67,7 @@ def machine_warnings(
         Speed at the drop [rad/s]; the nominal speed by default.
     """
     omega = float(machine.speed.nominal) if speed is None else speed
-    found: list[MachineWarning] = []
+    found = [MachineWarning(**vars(doubt)) for doubt in doubts(machine)]
     for bearing, rest in zip(machine.touchdown_bearings, summary.bearings, strict=True):
         found += [*_limiting_speed(bearing, omega), *_centrifugal(bearing, rest, omega)]
         found += [*_resonance(rest, summary), *_heat(bearing, rest, omega), *_lifted(rest)]
