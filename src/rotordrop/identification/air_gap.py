@@ -1,0 +1,248 @@
+"""Air gap of each touchdown bearing from the settled tail of a record (Neisi 2020, section 5).
+
+At the end of a drop the rotor rests on its bearings, so the distance of its centre from the sensors' origin
+is the air gap plus what race, support and contact give way under the weight. A vertical zero error of the
+sensors reads exactly like a larger or smaller gap: the tail alone cannot separate them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.errors import IdentificationError
+from rotordrop.identification.sensing import Sensing, displacements_along
+from rotordrop.measurement.record import Record
+from rotordrop.model import layout as L
+from rotordrop.model.layout import KernelParameters
+from rotordrop.model.parameters import DropModel, static_deflection
+from rotordrop.physics.ball_bearing import bearing_constants
+
+Array = NDArray[np.float64]
+
+STANDSTILL = 2.0 * np.pi * 0.5
+"""Shaft speed below which the rotor counts as standing still [rad/s]."""
+
+SHORTEST_TAIL = 0.5
+"""Length of settled record needed at least [s]."""
+
+BLOCK = 0.5
+"""Length of the blocks whose means give the lower and upper limit [s]: some fifteen swings."""
+
+LARGEST_SWAY = 0.25
+"""Largest swing of a rotor that counts as settled, as a share of its radius [1]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SettledRest:
+    """Where the rotor rests at the end of a drop; B bearings, S sensors.
+
+    Attributes
+    ----------
+    radius : ndarray, shape (B,)
+        Mean distance of the rotor centre at the bearing nodes from the centre of the sway arc [m].
+    radius_lower, radius_upper : ndarray, shape (B,)
+        Smallest and largest mean over a block of the tail [m].
+    standard_error : ndarray, shape (B,)
+        Standard error of the mean radius from the scatter of the blocks [m].
+    sideways : ndarray, shape (B,)
+        Mean horizontal reading at the bearings [m]; taken as horizontal sensor zero.
+    sway : ndarray, shape (B,)
+        Half the swing around the lowest point [m].
+    along : ndarray, shape (S,)
+        Displacements along the sensors [m] with the rotor at the lowest point of its sway.
+    start, end : float
+        Part of the record that was used [s].
+    """
+
+    radius: Array
+    radius_lower: Array
+    radius_upper: Array
+    standard_error: Array
+    sideways: Array
+    sway: Array
+    along: Array
+    start: float
+    end: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class StaticSag:
+    """What gives way under the static load shares, shape (B,) each [m].
+
+    Attributes
+    ----------
+    indentation, race, support : ndarray, shape (B,)
+        Rotor into race, race into balls, support on its spring [m].
+    """
+
+    indentation: Array
+    race: Array
+    support: Array
+
+    @property
+    def total(self) -> Array:
+        """All three together [m], shape (B,)."""
+        return self.indentation + self.race + self.support
+
+
+@dataclass(frozen=True, kw_only=True)
+class AirGap:
+    """Air gaps from the settled tail, shape (B,) each [m].
+
+    Attributes
+    ----------
+    value : ndarray, shape (B,)
+        Air gap [m].
+    lower, upper : ndarray, shape (B,)
+        Limits from the smallest and largest block of the tail [m] (the paper's two windows).
+    sag : StaticSag
+        What was taken off the settled radius.
+    zero_sigma, gain_sigma : ndarray, shape (B,)
+        Standard deviation of the gap [m] by the vertical zero and by the gain of the sensors, which the tail
+        cannot separate from the gap.
+    rest : SettledRest
+        The rest position behind it.
+    """
+
+    value: Array
+    lower: Array
+    upper: Array
+    sag: StaticSag
+    zero_sigma: Array
+    gain_sigma: Array
+    rest: SettledRest
+
+    @property
+    def standard_error(self) -> Array:
+        """Standard error with everything the tail cannot separate [m], shape (B,)."""
+        return np.asarray(np.sqrt(self.zero_sigma**2 + self.gain_sigma**2 + self.rest.standard_error**2))
+
+
+def find_rest(record: Record, tail: Record | None, sensing: Sensing) -> SettledRest:
+    """Where the rotor rests: from a record of the tail, or from the standstill at the end of the record.
+
+    Raises
+    ------
+    IdentificationError
+        If neither holds a rotor at rest.
+    """
+    source = record if tail is None else tail
+    keep = _settled_samples(record) if tail is None else np.ones(len(tail.time), dtype=np.bool_)
+    time, along = source.time[keep], displacements_along(source)[keep]
+    if time[-1] - time[0] < 0.9 * SHORTEST_TAIL:
+        raise IdentificationError(
+            f"{source.name}: {time[-1] - time[0]:.3g} s of settled rotor; at least {SHORTEST_TAIL:g} s are "
+            "needed for the air gap. Record longer after standstill."
+        )
+    return _rest(source.name, time, along, sensing)
+
+
+def _settled_samples(record: Record) -> NDArray[np.bool_]:
+    """Samples after the shaft came to rest, for good."""
+    if record.speed is None:
+        raise IdentificationError(
+            f"{record.name} has no shaft speed, so it cannot be seen where the rotor stands still. "
+            "Give the settled tail as a record of its own (--tail)."
+        )
+    turning = np.flatnonzero(np.abs(record.speed) > STANDSTILL)
+    first = int(turning[-1]) + 1 if len(turning) else 0
+    rest = record.time[-1] - record.time[first] if first < len(record.time) else 0.0
+    if rest < SHORTEST_TAIL:
+        last_speed = float(record.speed[-1]) / (2.0 * np.pi)
+        raise IdentificationError(
+            f"{record.name} ends at {record.time[-1]:.4g} s with the shaft turning at {last_speed:.4g} Hz, "
+            "before the "
+            f"rotor has settled; the air gap needs {SHORTEST_TAIL:g} s of standstill. Record until "
+            "standstill, or give the settled tail as a record of its own (--tail)."
+        )
+    keep = np.zeros(len(record.time), dtype=np.bool_)
+    keep[first:] = True
+    return keep
+
+
+def _rest(name: str, time: Array, along: Array, sensing: Sensing) -> SettledRest:
+    place = sensing.at_bearings(along - sensing.settled_bend)
+    sideways = place[..., 0].mean(axis=0)
+    swing = place[..., 0] - sideways
+    radius = np.hypot(swing, place[..., 1])
+    sway = 0.5 * np.ptp(swing, axis=0)
+    if np.any(place[..., 1].mean(axis=0) > 0.0) or np.any(sway > LARGEST_SWAY * radius.mean(axis=0)):
+        raise IdentificationError(
+            f"{name}: the rotor is not at rest on its bearings: mean height "
+            f"{_microns(place[..., 1].mean(axis=0))} µm, swing {_microns(sway)} µm; expected a height near "
+            "minus the air "
+            f"gap and a swing below {LARGEST_SWAY:.0%} of it. Check polarity and angles of the sensors, or "
+            "give a later tail (--tail)."
+        )
+    blocks = max(1, int((time[-1] - time[0]) / BLOCK + 0.1))
+    means = np.array([part.mean(axis=0) for part in np.array_split(radius, blocks)])
+    mean = radius.mean(axis=0)
+    lift = mean + place[..., 1].mean(axis=0)
+    raised = np.einsum("sb,b->s", sensing.from_bearings[..., 1], lift)
+    return SettledRest(
+        radius=mean,
+        radius_lower=means.min(axis=0),
+        radius_upper=means.max(axis=0),
+        standard_error=means.std(axis=0, ddof=1) / np.sqrt(blocks) if blocks > 1 else np.zeros(len(mean)),
+        sideways=sideways,
+        sway=sway,
+        along=along.mean(axis=0) - raised,
+        start=float(time[0]),
+        end=float(time[-1]),
+    )
+
+
+def static_sag(model: DropModel, parameters: KernelParameters | None = None) -> StaticSag:
+    """What race, support and contact give way under the static load shares."""
+    p = model.parameters if parameters is None else parameters
+    loads = np.asarray(model.load_shares)
+    row = p.bearing
+    indentation = (loads / row[:, L.CONTACT_STIFFNESS]) ** (1.0 / row[:, L.CONTACT_EXPONENT])
+    bearings = model.machine.touchdown_bearings
+    race = [
+        static_deflection(bearing_constants(b.bearing), float(w))[0]
+        for b, w in zip(bearings, loads, strict=True)
+    ]
+    return StaticSag(
+        indentation=indentation, race=np.array(race), support=loads / row[:, L.SUPPORT_STIFFNESS_Y]
+    )
+
+
+def identify_air_gap(rest: SettledRest, model: DropModel, sensing: Sensing) -> AirGap:
+    """Air gap of each bearing: settled radius less what gives way under the weight.
+
+    Parameters
+    ----------
+    rest : SettledRest
+        From `find_rest`.
+    model : DropModel
+        Gives load shares, contact, balls and support; call again with a better support until the gap rests.
+    sensing : Sensing
+        Gives the uncertainty of gain and zero.
+
+    Notes
+    -----
+    Source: Neisi 2020, section 5. Differs from the paper: the settled position is corrected for indentation,
+    race and support deflection, for the bend of the resting rotor between sensor and bearing, and for the arc
+    of the sway.
+    """
+    sag = static_sag(model)
+    vertical = np.abs(sensing.to_bearings[:, 1, :])
+    zero = np.sqrt(np.sum((vertical * sensing.offset_sigma) ** 2, axis=1))
+    gain = np.sqrt(np.sum((sensing.to_bearings[:, 1, :] * rest.along * sensing.gain_sigma) ** 2, axis=1))
+    return AirGap(
+        value=rest.radius - sag.total,
+        lower=rest.radius_lower - sag.total,
+        upper=rest.radius_upper - sag.total,
+        sag=sag,
+        zero_sigma=zero,
+        gain_sigma=gain,
+        rest=rest,
+    )
+
+
+def _microns(values: Array) -> str:
+    return "/".join(f"{1e6 * v:.4g}" for v in values)

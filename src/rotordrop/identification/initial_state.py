@@ -1,0 +1,249 @@
+"""Initial state of the drop from a fit over the whole fall: the better of the two starts.
+
+From power-off to the first contact the rotor is a linear system. Its rigid and bending modes, the remanent
+lift of the magnets and the unbalance are found together, by maximum posterior probability, from the samples
+of the fall and from the orbit before it. The computed gravity sag of the levitated rotor, whose release rings
+at the first bending mode, comes in as prior; the bending part of the orbit follows from the forces that hold
+it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.errors import IdentificationError
+from rotordrop.identification.air_gap import SettledRest
+from rotordrop.identification.fall_fit import Evidence, FallFit, Unknowns, unbalance_nodes
+from rotordrop.identification.free_fall import FreeFall, build_free_fall
+from rotordrop.identification.sensing import Sensing, displacements_along
+from rotordrop.measurement.axes import along_sensors
+from rotordrop.measurement.events import DropInstant
+from rotordrop.measurement.record import Record
+from rotordrop.model.parameters import DropModel
+
+Array = NDArray[np.float64]
+
+CLEARANCE_KEPT = 8e-6
+"""The fall ends when the rotor has come this close to the air gap [m]."""
+
+FEWEST_SAMPLES = 12
+
+
+@dataclass(frozen=True, kw_only=True)
+class InitialState:
+    """Initial state with its uncertainty; m modes per plane, B bearings, A magnetic bearings, n unknowns.
+
+    Attributes
+    ----------
+    fall : FreeFall
+        Linear model of the falling rotor.
+    sensing : Sensing
+        What the sensors see of it.
+    unknowns : Unknowns
+        Where each unknown is in `mean`.
+    mean, covariance : ndarray, shapes (n,), (n, n)
+        Estimate and covariance of all unknowns at power-off.
+    settled : ndarray, shape (S,)
+        Displacement along the sensors at rest, from the settled radius [m].
+    drop_instant, drop_instant_error : float
+        Power-off in record time [s] and its standard error.
+    end : float
+        End of the free fall, from power-off [s].
+    noise : ndarray, shape (S,)
+        Noise of the displacements along the sensors [m].
+    misfit : float
+        Mean square of the residual over the noise [1]; 1 is a perfect model.
+    samples : int
+        Samples of the fall that were used.
+    notes : tuple of str
+        What to know about this state.
+    """
+
+    fall: FreeFall
+    sensing: Sensing
+    unknowns: Unknowns
+    mean: Array
+    covariance: Array
+    settled: Array
+    drop_instant: float
+    drop_instant_error: float
+    end: float
+    noise: Array
+    misfit: float
+    samples: int
+    notes: tuple[str, ...] = ()
+
+    @property
+    def decay(self) -> float:
+        """Time constant of the remanent force [s]."""
+        return float(np.exp(self.mean[self.unknowns.decay]))
+
+    @property
+    def remanent_force(self) -> Array:
+        """Remanent force at power-off [N], shape (A, 2)."""
+        return self.mean[self.fall.remanent].reshape(-1, 2).copy()
+
+    @property
+    def displacement(self) -> Array:
+        """Displacement at the bearing nodes at power-off [m], shape (B, 2)."""
+        return self._at_bearings(self.fall.displacement)
+
+    @property
+    def velocity(self) -> Array:
+        """Velocity at the bearing nodes at power-off [m/s], shape (B, 2)."""
+        return self._at_bearings(self.fall.velocity)
+
+    def _at_bearings(self, part: slice) -> Array:
+        amplitudes = self.mean[part].reshape(2, -1)
+        return np.asarray(self.fall.model.parameters.bearing_shape @ amplitudes.T)
+
+    def state_at(self, time: float, unknowns: Array | None = None) -> Array:
+        """State of the fall at a time from power-off [s], shape (n_states,)."""
+        values = self.mean if unknowns is None else unknowns
+        decay = float(np.exp(values[self.unknowns.decay]))
+        return self.fall.transition(decay, time) @ values[self.unknowns.states]
+
+    def square_root(self) -> Array:
+        """Matrix L with L Lᵀ the covariance, shape (n, n); a draw is ``mean + L @ standard_normal``."""
+        scale = np.sqrt(np.maximum(np.diag(self.covariance), 1e-300))
+        values, vectors = np.linalg.eigh(self.covariance / np.outer(scale, scale))
+        return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
+
+
+def settled_along(rest: SettledRest, sensing: Sensing) -> Array:
+    """Displacement along the sensors [m], shape (S,), of the rotor at the lowest point of its bearings."""
+    return np.asarray(-sensing.from_bearings[..., 1] @ rest.radius + sensing.settled_bend)
+
+
+def end_of_fall(time: Array, place: Array, gaps: Array) -> float:
+    """Last time of the free fall [s from the first sample's clock].
+
+    Parameters
+    ----------
+    time : ndarray, shape (N,)
+        Time from power-off [s].
+    place : ndarray, shape (N, B, 2)
+        Displacement at the bearings [m].
+    gaps : ndarray, shape (B,)
+        Air gaps [m].
+    """
+    radius = np.hypot(place[..., 0], place[..., 1])
+    near = np.any(radius > gaps - CLEARANCE_KEPT, axis=1) & (time > 0.0)
+    if not near.any():
+        raise IdentificationError(
+            f"the rotor comes within {1e6 * float(np.min(gaps - radius.max(axis=0))):.0f} µm of the air gap "
+            f"{', '.join(f'{1e6 * g:.0f}' for g in gaps)} µm at most in the record; expected a contact. "
+            "Check the settled tail, the unit and the gain of the sensors."
+        )
+    return float(time[int(np.argmax(near)) - 1])
+
+
+def fit_initial_state(
+    record: Record,
+    rest: SettledRest,
+    drop: DropInstant,
+    gaps: Array,
+    model: DropModel,
+    sensing: Sensing,
+    *,
+    speed: float,
+) -> InitialState:
+    """Initial state by a fit over the fall, with covariance.
+
+    Parameters
+    ----------
+    record : Record
+        Readings from before power-off to the first contact at least.
+    rest : SettledRest
+        Rest position; displacements count from it, so that zero errors of the sensors drop out.
+    drop : DropInstant
+        Power-off, and the levitated motion before it.
+    gaps : ndarray, shape (B,)
+        Air gaps [m], to see where the fall ends.
+    model, sensing
+        The rotor and what the sensors see of it.
+    speed : float
+        Rotor speed [rad/s].
+
+    Raises
+    ------
+    IdentificationError
+        If the rotor never comes near the air gap, or the fall has too few samples.
+
+    Notes
+    -----
+    Source: own method after Neisi 2020, section 3.1. Differs from the paper: the paper expands the state at
+    one instant in the rigid modes.
+    """
+    time = record.time - drop.value
+    along = displacements_along(record)
+    shifted = along - rest.along + settled_along(rest, sensing)
+    end = end_of_fall(time, sensing.at_bearings(shifted), gaps)
+    inside = (time > 0.0) & (time <= end)
+    if int(inside.sum()) < FEWEST_SAMPLES:
+        raise IdentificationError(
+            f"{record.name}: {int(inside.sum())} samples between power-off and the first contact at "
+            f"{1e3 * end:.3g} ms; at "
+            f"least {FEWEST_SAMPLES} are needed for the initial state. Sample faster, or check the air gap."
+        )
+    fall = build_free_fall(model, speed, unbalance_nodes(model.machine))
+    evidence = _evidence(record, rest, drop, time[inside], along[inside])
+    problem = FallFit(fall, sensing, evidence, settled_along(rest, sensing), model, drop.standard_error)
+    mean, covariance, misfit = problem.solve()
+    shift = 1e-3 * mean[problem.unknowns.shift]
+    return InitialState(
+        fall=fall,
+        sensing=sensing,
+        unknowns=problem.unknowns,
+        mean=mean,
+        covariance=covariance * max(misfit, 1.0),
+        settled=problem.settled,
+        drop_instant=drop.value + float(shift),
+        drop_instant_error=float(1e-3 * np.sqrt(covariance[problem.unknowns.shift, problem.unknowns.shift])),
+        end=end - float(shift),
+        noise=evidence.noise,
+        misfit=misfit,
+        samples=int(inside.sum()),
+        notes=_notes(model, misfit),
+    )
+
+
+def _notes(model: DropModel, misfit: float) -> tuple[str, ...]:
+    notes = []
+    if len({amb.node for amb in model.machine.ambs}) < 2:
+        notes.append(
+            "the AMB planes are not given: the gravity sag of the levitated rotor, which moves first peaks "
+            "by several percent, could not be computed"
+        )
+    if misfit > 2.0:
+        notes.append(
+            f"the fall deviates from a free rotor by {misfit**0.5:.1f} times the sensor noise; expected "
+            "about 1. Check nodes and angles of the sensors"
+        )
+    return tuple(notes)
+
+
+def _evidence(record: Record, rest: SettledRest, drop: DropInstant, time: Array, along: Array) -> Evidence:
+    levitated = drop.levitated
+    waves = 2.0 * np.pi * np.asarray(levitated.tones)
+    turned = np.exp(1j * waves * drop.value)[:, None] * levitated.amplitudes
+    own = turned[1:]
+    since = np.exp(1j * np.outer(time, waves[1:]))
+    gain = np.array([float(sensor.gain) for sensor in record.sensors])
+    orbit = along_sensors((levitated.mean + turned[0].real)[None, :], record.sensors)[0]
+    return Evidence(
+        time=time,
+        deviation=along - (since @ own).real * gain - rest.along,
+        noise=np.maximum(levitated.noise * gain, 1e-9),
+        orbit=orbit - rest.along,
+        orbit_velocity=(1j * waves[0] * turned[0]).real * gain,
+        orbit_acceleration=(-(waves[0] ** 2) * turned[0]).real * gain,
+    )
+
+
+def with_unknowns(state: InitialState, unknowns: Array) -> InitialState:
+    """The same initial state with other values of the unknowns, for draws."""
+    return replace(state, mean=unknowns)

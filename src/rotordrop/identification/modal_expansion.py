@@ -1,0 +1,112 @@
+"""Initial state the paper's way: displacements and smoothed velocities, expanded to all freedoms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.errors import IdentificationError
+from rotordrop.identification.sensing import Sensing
+from rotordrop.measurement.preprocess import local_polynomial
+from rotordrop.model.parameters import DropModel
+
+Array = NDArray[np.float64]
+
+SMOOTHING = 2e-3
+"""Width of the window from which displacement and velocity at power-off are taken [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExpandedState:
+    """Initial state by modal expansion; m modes per plane, B bearings.
+
+    Attributes
+    ----------
+    displacement, velocity : ndarray, shape (m, 2)
+        Amplitudes (x, y) and their velocities; zero beyond the modes used.
+    at_bearings, velocity_at_bearings : ndarray, shape (B, 2)
+        Displacement [m] and velocity [m/s] at the bearing nodes.
+    modes : int
+        Modes per plane used in the expansion.
+    """
+
+    displacement: Array
+    velocity: Array
+    at_bearings: Array
+    velocity_at_bearings: Array
+    modes: int
+
+
+def expansion_matrix(rows: Array, modes: int) -> Array:
+    """Amplitudes of the lowest modes per measured displacement, ``(QΦ)^+``, shape (2·modes, S).
+
+    Parameters
+    ----------
+    rows : ndarray, shape (S, 2m)
+        Displacement along each sensor per amplitude, QΦ of all modes, x amplitudes before y.
+    modes : int
+        Modes per plane used; at most half the number of sensors.
+
+    Raises
+    ------
+    IdentificationError
+        If the sensors cannot tell these modes apart.
+
+    Notes
+    -----
+    Source: Neisi 2020, eqs. (14)–(16). Differs from the paper: pseudo-inverse with a rank check instead of
+    the normal equations.
+    """
+    m = rows.shape[1] // 2
+    chosen = rows[:, [*range(modes), *range(m, m + modes)]]
+    strength = np.linalg.svd(chosen / np.maximum(np.linalg.norm(chosen, axis=0), 1e-300), compute_uv=False)
+    if len(chosen) < 2 * modes or strength[-1] < 0.02:
+        weakest = strength[-1] if len(chosen) >= 2 * modes else 0.0
+        raise IdentificationError(
+            f"{len(chosen)} sensors cannot tell {modes} modes per plane apart: smallest singular value "
+            f"{weakest:.2g}, "
+            "at least 0.02 is needed. The sensor planes coincide or lie in a node of a mode: give the "
+            "sensors' true nodes, or use fewer modes."
+        )
+    return np.asarray(np.linalg.pinv(chosen), dtype=np.float64)
+
+
+def expand_initial_state(
+    time: Array, along: Array, power_off: float, model: DropModel, sensing: Sensing, *, modes: int = 2
+) -> ExpandedState:
+    """Initial displacement and velocity at all degrees of freedom by modal expansion.
+
+    Parameters
+    ----------
+    time : ndarray, shape (N,)
+        Record time [s].
+    along : ndarray, shape (N, S)
+        Displacements along the sensors, zeros taken off [m].
+    power_off : float
+        Power-off in record time [s].
+    model, sensing
+        The rotor and what the sensors see of it.
+    modes : int
+        Modes per plane: 2 are the rigid ones of the paper.
+
+    Notes
+    -----
+    Source: Neisi 2020, section 3.1. The velocity comes from a local polynomial through samples on both sides
+    of power-off. Sensors need not sit at the bearing nodes.
+    """
+    at_off, slope, _ = local_polynomial(time, along, power_off, width=SMOOTHING, order=2)
+    inverse = expansion_matrix(sensing.rows, modes)
+    m = sensing.rows.shape[1] // 2
+    displacement, velocity = np.zeros((m, 2)), np.zeros((m, 2))
+    displacement[:modes] = (inverse @ at_off).reshape(2, modes).T
+    velocity[:modes] = (inverse @ slope).reshape(2, modes).T
+    shapes = model.parameters.bearing_shape
+    return ExpandedState(
+        displacement=displacement,
+        velocity=velocity,
+        at_bearings=shapes @ displacement,
+        velocity_at_bearings=shapes @ velocity,
+        modes=modes,
+    )
