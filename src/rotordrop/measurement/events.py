@@ -1,0 +1,214 @@
+"""When things happen in a record: the drop, the first contacts, the rest at the end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotordrop.errors import RecordError
+from rotordrop.measurement.axes import Plane, along_sensors, planar_of, sensor_planes
+from rotordrop.measurement.fall import Fall, fit_fall
+from rotordrop.measurement.preprocess import LevitatedModel, acceleration, fit_levitated
+from rotordrop.measurement.recording import Array
+from rotordrop.measurement.release import free_rotor
+from rotordrop.measurement.speed import require_speed
+from rotordrop.units import format_quantity
+
+if TYPE_CHECKING:
+    from rotordrop.machine import Machine
+    from rotordrop.measurement.record import Record
+
+FALLEN_SHARE = 0.35
+"""A rotor that sank by this share of the air gap has been dropped."""
+
+MODEL_ERROR = 1.5e-5
+"""Standard uncertainty of the drop instant by what the release model leaves out [s]."""
+
+_CONTACT_FILTER = 1e-3
+_UNSURE = 3e-3
+"""How far the first guess of the drop may be off [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DropInstant:
+    """When the magnetic bearings let the rotor go.
+
+    Attributes
+    ----------
+    value : float
+        Power-off, in record time [s].
+    standard_error : float
+        Its standard uncertainty, noise and model together [s].
+    interval_90 : tuple of float
+        Interval that holds it with 90 % probability [s].
+    method : str
+        How it was found.
+    fall : Fall
+        The fit behind it, with remanent lift and misfit.
+    levitated : LevitatedModel
+        Readings before the drop.
+    notes : tuple of str
+        What to know about this value.
+    """
+
+    value: float
+    standard_error: float
+    interval_90: tuple[float, float]
+    method: str
+    fall: Fall
+    levitated: LevitatedModel
+    notes: tuple[str, ...] = ()
+
+    def __float__(self) -> float:
+        return self.value
+
+
+@dataclass(frozen=True, kw_only=True)
+class CoarseDrop:
+    """Where the rotor sinks, found without any model.
+
+    Attributes
+    ----------
+    instant : float
+        Drop to within some milliseconds [s].
+    sunk : float
+        When the fastest plane had sunk by `FALLEN_SHARE` of its gap [s].
+    contact : float
+        First sudden acceleration after that, or the end of the record [s].
+    speed : float
+        Shaft speed before the drop [rad/s].
+    """
+
+    instant: float
+    sunk: float
+    contact: float
+    speed: float
+
+
+def find_drop_instant(record: Record, machine: Machine) -> DropInstant:
+    """Find power-off from the readings: levitated motion before, released rotor after.
+
+    Parameters
+    ----------
+    record : Record
+        Readings that begin while the rotor is levitated.
+    machine : Machine
+        The machine, for its gaps, AMB planes and rotor.
+
+    Raises
+    ------
+    RecordError
+        When the rotor does not fall in the record, or the record does not begin before the fall.
+    """
+    planes = sensor_planes(record.sensors)
+    coarse = coarse_drop(record, machine, planes)
+    levitated = fit_levitated(record, coarse.instant - _UNSURE, speed=coarse.speed)
+    fall = find_fall(record, machine, planes, levitated, coarse)
+    return _instant(fall, levitated, record)
+
+
+def find_fall(
+    record: Record, machine: Machine, planes: tuple[Plane, ...], levitated: LevitatedModel, coarse: CoarseDrop
+) -> Fall:
+    """Fit the fall by the released rotor of the machine, from a first guess of the drop."""
+    window = (coarse.instant, coarse.sunk, coarse.contact)
+    return fit_fall(record, planes, free_rotor(machine, planes), levitated, window)
+
+
+def _instant(fall: Fall, levitated: LevitatedModel, record: Record) -> DropInstant:
+    error = float(np.hypot(fall.standard_error, MODEL_ERROR))
+    notes = []
+    if fall.misfit > 2.0:
+        notes.append(
+            f"the fall deviates from the released rotor by {fall.misfit**0.5:.1f} × the noise: the drop "
+            "instant is less "
+            "certain than stated"
+        )
+    step = 1.0 / record.sampling_rate
+    return DropInstant(
+        value=fall.instant,
+        standard_error=error,
+        interval_90=(fall.instant - 1.645 * error, fall.instant + 1.645 * error),
+        method=f"{fall.method}; {error / step:.2g} of a sample",
+        fall=fall,
+        levitated=levitated,
+        notes=tuple(notes),
+    )
+
+
+def coarse_drop(record: Record, machine: Machine, planes: tuple[Plane, ...]) -> CoarseDrop:
+    """Find where the rotor sinks by a share of the air gap, and the first sudden acceleration after it.
+
+    Raises
+    ------
+    RecordError
+        When it never does, or has done so from the beginning.
+    """
+    speed_time, readings = require_speed(record)
+    gaps = np.array([gap_of(machine, plane) for plane in planes])
+    shape = planar_of(along_sensors(record.signals, record.sensors), planes)
+    height = shape[:, :, 1]
+    turn = 2 * np.pi / max(abs(float(readings[0])), 1.0)
+    first = max(int(min(turn, 0.02) * record.sampling_rate), 8)
+    start = np.mean(height[:first], axis=0)
+    deepest = float(np.max((start - np.min(height, axis=0)) / gaps))
+    low = start - height > FALLEN_SHARE * gaps
+    if not low.all(axis=1).any():
+        _refuse_without_drop(record, height, start, gaps, deepest)
+    sunk = int(np.min(np.argmax(low, axis=0)))
+    fastest = float(np.max(start - height[sunk]))
+    instant = record.time[sunk] - float(np.sqrt(2 * fastest / float(machine.gravity)))
+    if instant < record.time[0] or record.time[sunk] - record.time[0] < first / record.sampling_rate:
+        raise RecordError(
+            f"{record.name}: the rotor has sunk by {format_quantity(fastest, 'length')} at "
+            f"{record.time[sunk]:.6g} s, {(record.time[sunk] - record.time[0]) * 1e3:.3g} ms after the "
+            "record begins: "
+            "the levitated part before the drop is missing; record with pre-trigger"
+        )
+    before = speed_time < instant
+    speed = float(np.median(readings[before])) if before.any() else float(readings[0])
+    contact = _sudden(record, shape, float(machine.gravity), instant, sunk)
+    return CoarseDrop(instant=float(instant), sunk=float(record.time[sunk]), contact=contact, speed=speed)
+
+
+def gap_of(machine: Machine, plane: Plane) -> float:
+    """Nominal air gap [m] of the touchdown bearing nearest to a sensor plane."""
+    named = [b for b in machine.touchdown_bearings if b.name == plane.bearing]
+    position = machine.rotor.node_positions
+    nearest = min(
+        named or machine.touchdown_bearings,
+        key=lambda b: abs(position[b.node - 1] - position[plane.node - 1]),
+    )
+    return float(nearest.air_gap)
+
+
+def _refuse_without_drop(record: Record, height: Array, start: Array, gaps: Array, deepest: float) -> None:
+    ranges = ", ".join(format_quantity(float(r), "length") for r in np.ptp(height, axis=0))
+    sunk_now = start < -FALLEN_SHARE * gaps
+    if sunk_now.any() and deepest < FALLEN_SHARE:
+        raise RecordError(
+            f"{record.name}: no drop in the record, and it begins with the rotor at "
+            f"{format_quantity(float(np.min(start)), 'length')}: the levitated part before the drop is "
+            "missing; record "
+            "with pre-trigger"
+        )
+    raise RecordError(
+        f"{record.name}: no drop in the record: the vertical displacement spans {ranges} in its planes and "
+        "sinks by "
+        f"{deepest:.0%} of the nominal air gap at most, a dropped rotor by more than {FALLEN_SHARE:.0%} in "
+        "all planes; "
+        "check that this is the recording of a drop and that its polarity and unit are right"
+    )
+
+
+def _sudden(record: Record, shape: Array, gravity: float, instant: float, sunk: int) -> float:
+    """First time after sinking at which the acceleration cannot be that of a free rotor [s]."""
+    curvature = acceleration(shape, record.sampling_rate, width=_CONTACT_FILTER)
+    size = np.max(np.hypot(curvature[:, :, 0], curvature[:, :, 1] + gravity), axis=1)
+    levitated = record.time < instant - _UNSURE
+    usual = float(np.max(size[levitated])) if levitated.any() else 0.0
+    limit = gravity + max(1.5 * gravity, 2.0 * usual)
+    after = np.flatnonzero(size[sunk:] > limit)
+    return float(record.time[sunk + after[0]]) if len(after) else float(record.time[-1])

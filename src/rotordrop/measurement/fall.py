@@ -1,0 +1,275 @@
+"""Fit of the fall: when the magnetic bearings let go, and what lift remained."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.measurement.axes import Plane, sensor_directions
+from rotordrop.measurement.preprocess import LevitatedModel
+from rotordrop.measurement.recording import Array
+from rotordrop.measurement.release import (
+    ComplexArray,
+    FreeRotor,
+    response_at,
+    tabulate_response,
+)
+
+if TYPE_CHECKING:
+    from rotordrop.machine.sensor import Sensor
+    from rotordrop.measurement.record import Record
+
+REMANENT_SHARE = (0.2, 0.2)
+"""Expected share of the static lift that remains at power-off, and its standard deviation."""
+
+REMANENT_TIME = (2e-3, 0.7)
+"""Expected time constant of the remanent lift [s], and the standard deviation of its logarithm."""
+
+_SIDEWAYS_SHARE = 0.1
+_BACKWARD_SHARE = 0.3
+_GROWTH = 4e-4
+"""Step by which the window of the fit grows [s]."""
+
+_STILL_FREE = 4.0
+"""Mean square over the noise up to which the newest samples count as free fall."""
+
+_LEAD = 5e-3
+"""Levitated samples kept before the earliest release [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fall:
+    """The fall fitted by a released rotor.
+
+    Attributes
+    ----------
+    instant : float
+        Release, in record time [s].
+    standard_error : float
+        Standard error of `instant` from the noise and the fit [s].
+    remanent_force : array, shape (A, 2)
+        Lift left at the release, x and y per magnetic bearing [N].
+    remanent_time : float
+        Time constant of its decay [s].
+    misfit : float
+        Mean square of the residual over the noise (1 is a perfect model).
+    start, end : float
+        Window of the fit [s].
+    method : str
+        The model in words.
+    rotor : FreeRotor
+        The model.
+    predicted : function of time, array (T,) -> array (T, S)
+        Readings [m] of a fall that goes on without contact.
+    """
+
+    instant: float
+    standard_error: float
+    remanent_force: Array
+    remanent_time: float
+    misfit: float
+    start: float
+    end: float
+    method: str
+    rotor: FreeRotor
+    predicted: Callable[[Array], Array]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Problem:
+    """What stays the same while release and time constant are searched."""
+
+    time: Array
+    deviation: Array
+    noise: Array
+    directions: ComplexArray
+    plane_of: NDArray[np.int64]
+    rotor: FreeRotor
+    speed: float
+    origin: float
+    span: float
+    fixed: tuple[ComplexArray, ...]
+    prior_mean: Array
+    prior_error: Array
+
+    def columns(self, time: Array, release: float, decay: float) -> tuple[Array, Array]:
+        """Fall of the sensors by the lost lift, shape (T, S), and what every unknown adds, (T, S, U)."""
+        since = time - release
+        remanent = tabulate_response(self.rotor, self.speed, 1.0 / decay, self.span)
+        step, forward, backward = (self._seen(response_at(table, since)) for table in self.fixed)
+        left = self._seen(response_at(remanent, since)) * self.rotor.lift
+        fall = (-1j * step * self.rotor.lift).sum(axis=-1).real
+        parts = [column for unit in (left, forward, backward) for column in (unit.real, -unit.imag)]
+        expected = fall + parts[1].sum(axis=-1) * REMANENT_SHARE[0]
+        own = expected[:, :, None] * np.eye(fall.shape[1])
+        return fall, np.concatenate([*parts, own], axis=-1)
+
+    def _seen(self, response: ComplexArray) -> ComplexArray:
+        """Complex displacement of the planes as the sensors see it; the real part is the reading."""
+        return response[:, self.plane_of, :] * self.directions.conj()[None, :, None]
+
+    def solve(self, release: float, decay: float) -> tuple[Array, Array]:
+        """Best unknown forces and gains, and the weighted residual with the priors."""
+        fall, columns = self.columns(self.time, release, decay)
+        weight = 1.0 / self.noise
+        left = (columns * weight[None, :, None]).reshape(-1, columns.shape[-1])
+        right = ((self.deviation - fall) * weight).reshape(-1)
+        left = np.vstack([left, np.diag(1.0 / self.prior_error)])
+        right = np.concatenate([right, self.prior_mean / self.prior_error])
+        normal = left.T @ left
+        unknown: Array = np.linalg.solve(normal, left.T @ right).astype(np.float64)
+        return unknown, right - left @ unknown
+
+    def named(self, search: Array) -> tuple[float, float]:
+        """Release [s] and time constant [s] of the searched numbers."""
+        return self.origin + 1e-3 * float(search[0]), float(np.exp(np.clip(search[1], -9.5, -3.5)))
+
+    def newest_misfit(self, search: Array) -> float:
+        """Mean square of the residual over the noise in the newest samples, in the worst sensor."""
+        residual = self.solve(*self.named(search))[1][: self.deviation.size].reshape(self.deviation.shape)
+        newest = self.time > self.time[-1] - _GROWTH
+        return float(np.max(np.mean(residual[newest] ** 2, axis=0)))
+
+    def residual(self, search: Array) -> Array:
+        """Residual to be made small over release [ms from the origin] and logarithm of the time constant."""
+        release, decay = self.named(search)
+        prior = (search[1] - np.log(REMANENT_TIME[0])) / REMANENT_TIME[1]
+        return np.append(self.solve(release, decay)[1], prior)
+
+
+def fit_fall(
+    record: Record,
+    planes: tuple[Plane, ...],
+    rotor: FreeRotor,
+    levitated: LevitatedModel,
+    window: tuple[float, float, float],
+) -> Fall:
+    """Find the release from the readings between the levitated part and the first contact.
+
+    Release and time constant of the remanent lift are searched; remanent and synchronous forces and gain
+    errors follow by linear least squares with priors (variable projection). The window grows until the newest
+    samples no longer fall freely.
+
+    Parameters
+    ----------
+    record : Record
+        The record.
+    planes : tuple of Plane
+        Sensor planes, in the order of ``rotor.plane_rows``.
+    rotor : FreeRotor
+        The released rotor.
+    levitated : LevitatedModel
+        Readings before the drop.
+    window : tuple of float
+        First guess of the release, a time that is surely in free fall, and the latest end of it [s].
+    """
+    origin, surely, latest = window
+    problem = _problem(record, rotor, levitated, planes, (origin, min(surely, latest)))
+    starts = [np.array([offset, np.log(REMANENT_TIME[0])]) for offset in (0.0, -0.7, 0.6)]
+    best = min((_search(problem, start) for start in starts), key=lambda found: found[1])
+    while problem.time[-1] + _GROWTH <= latest:
+        longer = _problem(record, rotor, levitated, planes, (origin, float(problem.time[-1]) + _GROWTH))
+        found = _search(longer, best[0])
+        if longer.newest_misfit(found[0]) > _STILL_FREE:
+            break
+        problem, best = longer, found
+    return _fall(problem, best, levitated, np.array([float(sensor.gain) for sensor in record.sensors]))
+
+
+def _search(problem: _Problem, start: Array) -> tuple[Array, float, Array]:
+    """Search release and time constant from a start; gives them, the cost and the Jacobian."""
+    from scipy.optimize import least_squares
+
+    found = least_squares(problem.residual, start, x_scale=(0.1, 0.3), max_nfev=30, xtol=1e-6, ftol=1e-6)
+    return found.x, float(found.cost), found.jac
+
+
+def _fall(
+    problem: _Problem, best: tuple[Array, float, Array], levitated: LevitatedModel, gain: Array
+) -> Fall:
+    search, _, jacobian = best
+    release, decay = problem.named(search)
+    unknown, residual = problem.solve(release, decay)
+    misfit = float(np.mean(residual[: problem.deviation.size] ** 2))
+    covariance = np.linalg.pinv(jacobian.T @ jacobian) * max(misfit, 1.0)
+    rotor, ambs = problem.rotor, len(problem.rotor.lift)
+
+    def predicted(time: Array) -> Array:
+        fall, columns = problem.columns(time, release, decay)
+        return levitated.readings(time) + (fall + columns @ unknown) / gain
+
+    return Fall(
+        instant=release,
+        standard_error=float(1e-3 * np.sqrt(covariance[0, 0])),
+        remanent_force=np.column_stack([unknown[:ambs] * rotor.lift, unknown[ambs : 2 * ambs] * rotor.lift]),
+        remanent_time=decay,
+        misfit=misfit,
+        start=float(problem.time[0]),
+        end=float(problem.time[-1]),
+        method=rotor.description,
+        rotor=rotor,
+        predicted=predicted,
+    )
+
+
+def _problem(
+    record: Record,
+    rotor: FreeRotor,
+    levitated: LevitatedModel,
+    planes: tuple[Plane, ...],
+    window: tuple[float, float],
+) -> _Problem:
+    origin, end = window
+    keep = (record.time >= origin - _LEAD) & (record.time <= end)
+    time = record.time[keep]
+    deviation = record.signals[keep] - levitated.readings(time)
+    gain = np.array([float(sensor.gain) for sensor in record.sensors])
+    unit = sensor_directions(record.sensors)
+    speed = 2 * np.pi * levitated.frequency
+    span = end - origin + 2 * _LEAD
+    amplitude = float(np.mean(np.abs(levitated.amplitudes[0])))
+    mean, error = _priors(rotor, record.sensors, rotor.mass * amplitude * speed**2)
+    return _Problem(
+        time=time,
+        deviation=deviation * gain,
+        noise=np.maximum(levitated.noise * gain, 1e-12),
+        directions=unit[:, 0] + 1j * unit[:, 1],
+        plane_of=_plane_of_sensor(planes, len(record.sensors)),
+        rotor=rotor,
+        speed=speed,
+        origin=origin,
+        span=span,
+        fixed=tuple(tabulate_response(rotor, speed, s, span) for s in (0.0, -1j * speed, 1j * speed)),
+        prior_mean=mean,
+        prior_error=error,
+    )
+
+
+def _plane_of_sensor(planes: tuple[Plane, ...], count: int) -> NDArray[np.int64]:
+    index = np.zeros(count, dtype=np.int64)
+    for number, plane in enumerate(planes):
+        index[list(plane.columns)] = number
+    return index
+
+
+def _priors(rotor: FreeRotor, sensors: tuple[Sensor, ...], turning: float) -> tuple[Array, Array]:
+    """Expected values and standard deviations of the unknowns, in the order of the columns."""
+    ambs, count = len(rotor.lift), len(sensors)
+    share, spread = REMANENT_SHARE
+    turning = max(turning, 1e-3 * float(np.sum(np.abs(rotor.lift))))
+    mean = np.concatenate([np.zeros(ambs), np.full(ambs, share), np.zeros(4 * ambs + count)])
+    forces = [_SIDEWAYS_SHARE, spread, turning, turning, _BACKWARD_SHARE * turning, _BACKWARD_SHARE * turning]
+    return mean, np.concatenate([np.repeat(forces, ambs), [_gain_error(sensor) for sensor in sensors]])
+
+
+def _gain_error(sensor: Sensor) -> float:
+    """Standard deviation of the gain, from its range or interval."""
+    gain = sensor.gain
+    if gain.standard_error is not None:
+        return max(gain.standard_error, 1e-4)
+    limits = gain.interval_90 or gain.range
+    return 0.01 if limits is None else max((limits[1] - limits[0]) / 3.29, 1e-4)

@@ -1,0 +1,126 @@
+"""The gate every record passes before anything is computed from it.
+
+It looks at the clock, at every channel, and at what a drop must show. What it cannot decide it says (severity
+"note"). Stages build on one another: a later one runs only when the earlier ones found nothing that
+forbids it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotordrop.errors import RecordError
+from rotordrop.measurement.axes import sensor_planes
+from rotordrop.measurement.events import coarse_drop
+from rotordrop.measurement.preprocess import LevitatedModel, fit_levitated
+from rotordrop.measurement.quality.arrangement import check_ends, check_planes, fall_of
+from rotordrop.measurement.quality.channels import check_channels
+from rotordrop.measurement.quality.clock import check_blocks, check_clock
+from rotordrop.measurement.quality.finding import Finding, Severity, ranked, refuse_unusable, stops
+from rotordrop.measurement.quality.motion import (
+    check_length,
+    check_levitated,
+    check_rotation_line,
+    check_speed,
+    check_units,
+    first_motion,
+    no_drop,
+)
+from rotordrop.measurement.quality.tail import check_tail
+
+if TYPE_CHECKING:
+    from rotordrop.machine import Machine
+    from rotordrop.measurement.record import Record
+
+_MARGIN = 3e-3
+"""Time kept clear before the first guess of the drop [s]."""
+
+_FALL_TIME = 8e-3
+"""Longest plausible time from power-off to visible sinking [s]."""
+
+
+def check_record(record: Record, machine: Machine, tail: Record | None = None) -> tuple[Finding, ...]:
+    """Pass a record through the gate.
+
+    Parameters
+    ----------
+    record : Record
+        The recording of a drop.
+    machine : Machine
+        The machine it was made on.
+    tail : Record, optional
+        The readings at standstill, when they are a recording of their own.
+
+    Returns
+    -------
+    tuple of Finding
+        The worst first; empty when there is nothing to say.
+    """
+    findings = [_damage(words) for words in record.warnings]
+    findings += check_clock(record) + check_channels(record)
+    if tail is not None:
+        findings += [_of_tail(found) for found in check_clock(tail, drop=False) + check_channels(tail)]
+    if stops(findings):
+        return ranked(findings)
+    findings += check_blocks(record) + check_units(record, machine, sensor_planes(record.sensors))
+    findings += check_speed(record, machine)
+    if stops(findings):
+        return ranked(findings)
+    return ranked(findings + _check_motion(record, machine, tail))
+
+
+def _damage(words: str) -> Finding:
+    return Finding(
+        kind="damage on reading",
+        message=words,
+        remedy="copy or export the file again to be sure",
+        severity="warning",
+    )
+
+
+def _of_tail(finding: Finding) -> Finding:
+    return replace(finding, message=f"tail: {finding.message}")
+
+
+def _check_motion(record: Record, machine: Machine, tail: Record | None) -> list[Finding]:
+    """Stages that need the fall: speed line, arrangement of the sensors, drop, length, tail."""
+    planes = sensor_planes(record.sensors)
+    sunk_at, level = first_motion(record)
+    before = float(record.time[sunk_at]) - _FALL_TIME
+    levitated = _levitated(record, before)
+    findings: list[Finding] = []
+    if levitated is not None:
+        assert record.speed_readings is not None
+        findings += check_rotation_line(record, before, float(record.speed_readings[0]))
+        level = levitated.mean
+    tone = None if levitated is None or findings else levitated.amplitudes[0]
+    if levitated is not None:
+        findings += check_planes(planes, fall_of(record, level, sunk_at), tone)
+    if stops(findings):
+        return findings
+    try:
+        coarse = coarse_drop(record, machine, planes)
+        levitated = fit_levitated(record, coarse.instant - _MARGIN, speed=coarse.speed)
+    except RecordError as error:
+        return [no_drop(error)]
+    findings += check_levitated(levitated, record)
+    findings += check_length(record, coarse.instant, tail is not None)
+    findings += check_ends(record, machine, planes, levitated, coarse)
+    if tail is not None and not stops(findings):
+        findings += check_tail(tail, machine, planes, levitated.mean)
+    return findings
+
+
+def _levitated(record: Record, end: float) -> LevitatedModel | None:
+    assert record.speed_readings is not None
+    before = record.speed_readings[:3]
+    try:
+        return fit_levitated(record, end, speed=float(np.median(before)))
+    except RecordError:
+        return None
+
+
+__all__ = ["Finding", "Severity", "check_record", "ranked", "refuse_unusable", "stops"]

@@ -1,0 +1,265 @@
+"""What a record shows if units, clock and speed are right: a levitated rotor, and a fall one gap deep."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotordrop.errors import RecordError
+from rotordrop.measurement.axes import Plane
+from rotordrop.measurement.events import FALLEN_SHARE, gap_of
+from rotordrop.measurement.preprocess import LevitatedModel
+from rotordrop.measurement.quality.finding import Finding
+from rotordrop.measurement.recording import Array
+from rotordrop.units import format_quantity
+
+if TYPE_CHECKING:
+    from rotordrop.machine import Machine
+    from rotordrop.measurement.record import Record
+
+PLAUSIBLE_MOTION = (0.4, 4.0)
+"""Range of a channel over a drop, in air gaps; outside it a unit or gain must be wrong."""
+
+_FACTORS = {
+    1e6: "µm taken for m, or the like",
+    1e3: "µm taken for mm, or nm for µm",
+    1 / 0.0254: "mil taken for mm, or the like",
+    25.4: "mil and µm mixed up",
+    1 / 25.4: "mil and µm mixed up",
+    1e-3: "mm taken for µm, or µm for nm",
+    1e-6: "m taken for µm, or the like",
+}
+_LONG_ENOUGH = 0.2
+_LOUD = 3e-6
+
+
+def check_units(record: Record, machine: Machine, planes: tuple[Plane, ...]) -> list[Finding]:
+    """Compare how far every channel moves with the air gap."""
+    suspects: dict[int, list[tuple[str, float]]] = {}
+    for plane in planes:
+        gap = gap_of(machine, plane)
+        for name in plane.names:
+            ratio = float(np.ptp(record.reading(name))) / gap
+            if ratio > 0 and not PLAUSIBLE_MOTION[0] <= ratio <= PLAUSIBLE_MOTION[1]:
+                suspects.setdefault(round(math.log10(ratio / 1.5)), []).append((name, ratio))
+    if (
+        sum(len(found) for found in suspects.values()) == len(record.sensors)
+        and all(ratio < PLAUSIBLE_MOTION[0] for found in suspects.values() for _, ratio in found)
+        and not _in_discrete_factor(suspects)
+    ):
+        return []  # nothing moves by a gap, and by no unit factor less: there is no drop in it
+    return [_unit_finding(found) for found in suspects.values()]
+
+
+def _in_discrete_factor(suspects: dict[int, list[tuple[str, float]]]) -> bool:
+    return any(_nearest(ratio) is not None for found in suspects.values() for _, ratio in found)
+
+
+def _nearest(ratio: float) -> float | None:
+    """Unit factor that would explain a motion of `ratio` air gaps instead of one to two and a half."""
+    fitting = [factor for factor in _FACTORS if 0.7 <= ratio / factor <= 2.7]
+    return min(fitting, key=lambda factor: abs(math.log(ratio / factor / 1.5))) if fitting else None
+
+
+def _unit_finding(found: list[tuple[str, float]]) -> Finding:
+    names = ", ".join(name for name, _ in found)
+    ratio = float(np.median([value for _, value in found]))
+    factor = _nearest(ratio)
+    guess = (
+        f"a unit factor of {factor:.4g} ({_FACTORS[factor]}) would explain it"
+        if factor
+        else "no unit factor fits"
+    )
+    return Finding(
+        kind="wrong unit factor",
+        message=f"the readings span {ratio:.3g} × the nominal air gap, a drop 1 to 2.5 ×; {guess}",
+        remedy="correct unit or sensitivity in the profile or the machine file",
+        severity="stop",
+        channel=names,
+    )
+
+
+def check_speed(record: Record, machine: Machine) -> list[Finding]:
+    """Look for missing, impossible or jumping speed readings."""
+    if record.speed_readings is None or record.speed_time is None:
+        return [
+            Finding(
+                kind="speed missing",
+                message=f"the record has no shaft speed beside {', '.join(record.channel_names)}",
+                remedy='name its channel in a profile ([speed] channel = "..."), or give it by hand '
+                '([speed] constant = "60 Hz")',
+                severity="stop",
+            )
+        ]
+    readings = record.speed_readings
+    bad = np.flatnonzero(~np.isfinite(readings))
+    if len(bad):
+        return [_speed_finding(record, f"{len(bad)} speed readings are not finite", int(bad[0]), "stop")]
+    if len(readings) >= 5:
+        from scipy.ndimage import median_filter
+
+        middle = median_filter(readings, size=5, mode="nearest")
+        usual = np.maximum(np.abs(middle), 0.1 * float(np.max(np.abs(middle))))
+        off = np.flatnonzero(np.abs(readings - middle) > 0.2 * usual)
+        if len(off):
+            seen = format_quantity(float(readings[off[0]]), "speed")
+            near = format_quantity(float(middle[off[0]]), "speed")
+            words = (
+                f"{len(off)} readings jump, the first to {seen} among {near}: tacho pulses missing or double"
+            )
+            return [_speed_finding(record, words, int(off[0]), "warning")]
+    return []
+
+
+def _speed_finding(record: Record, words: str, at: int, severity: str) -> Finding:
+    assert record.speed_time is not None
+    return Finding(
+        kind="speed readings",
+        message=words,
+        remedy="check the tacho; the speed at the drop is taken from a robust fit",
+        severity="stop" if severity == "stop" else "warning",
+        channel="speed",
+        time=float(record.speed_time[at]),
+    )
+
+
+def check_rotation_line(record: Record, end: float, speed: float) -> list[Finding]:
+    """Compare the strongest line of the levitated readings with the shaft speed."""
+    line = _strongest_line(record, end)
+    if line is None:
+        return []
+    frequency, resolution = line
+    expected = abs(speed) / (2 * np.pi)
+    if any(abs(frequency - k * expected) <= max(1.5 * resolution, 0.01 * expected) for k in (1, 2)):
+        return []
+    ratio = frequency / expected
+    named = {
+        60.0: "rpm taken for Hz",
+        1 / 60.0: "Hz taken for rpm",
+        2 * np.pi: "rad/s and Hz",
+        1 / (2 * np.pi): "rad/s and Hz",
+    }
+    why = next((text for factor, text in named.items() if abs(ratio * factor - 1) < 0.05), "")
+    guess = f" ({why}: wrong speed unit)" if why else ""
+    return [
+        Finding(
+            kind="wrong sampling rate",
+            message=f"the levitated rotor turns at {frequency:.4g} Hz in the displacements and at "
+            f"{expected:.4g} Hz by the "
+            f"speed channel, a factor {ratio:.4g}{guess}",
+            remedy="correct the sampling interval (time.step) or the speed unit (speed.unit) in the profile",
+            severity="stop",
+            time=float(record.time[0]),
+        )
+    ]
+
+
+def _strongest_line(record: Record, end: float) -> tuple[float, float] | None:
+    """Frequency of the strongest line before `end` and the resolution [Hz], if one stands out."""
+    keep = record.time < end
+    count = int(keep.sum())
+    if count < 64:
+        return None
+    window = np.hanning(count)[:, None]
+    part = record.signals[keep] - np.mean(record.signals[keep], axis=0)
+    scale = np.maximum(np.std(part, axis=0), 1e-12)
+    power = np.sum(np.abs(np.fft.rfft(window * part / scale, 8 * count, axis=0)) ** 2, axis=1)
+    frequencies = np.fft.rfftfreq(8 * count, 1.0 / record.sampling_rate)
+    resolution = record.sampling_rate / count
+    power[frequencies < 2 * resolution] = 0.0
+    best = int(np.argmax(power))
+    if power[best] < 50.0 * float(np.median(power[power > 0])):
+        return None
+    return float(frequencies[best]), resolution
+
+
+def check_levitated(levitated: LevitatedModel, record: Record) -> list[Finding]:
+    """Look for loud hum and noise in the levitated readings."""
+    findings = []
+    for index, name in enumerate(record.channel_names):
+        if levitated.hum is not None:
+            size = float(np.abs(levitated.amplitudes[levitated.tones.index(levitated.hum), index]))
+            if size > _LOUD:
+                findings.append(
+                    Finding(
+                        kind="hum",
+                        message=f"mains hum of {levitated.hum:g} Hz with {format_quantity(size, 'length')} "
+                        "zero to peak",
+                        remedy="ground the sensor driver; the hum found before the drop can be taken off",
+                        severity="warning",
+                        channel=name,
+                    )
+                )
+        noise = float(levitated.noise[index])
+        if noise > _LOUD:
+            findings.append(
+                Finding(
+                    kind="noise",
+                    message=f"{format_quantity(noise, 'length')} rms remain beside 1X, 2X and hum before the "
+                    "drop",
+                    remedy="look for other lines in the spectrum, or filter the sensor",
+                    severity="warning",
+                    channel=name,
+                )
+            )
+    return findings
+
+
+def check_length(record: Record, drop: float, has_tail: bool) -> list[Finding]:
+    """See whether the record reaches far enough behind the drop."""
+    findings = []
+    after = float(record.time[-1]) - drop
+    if after < _LONG_ENOUGH:
+        findings.append(
+            Finding(
+                kind="short record",
+                message=f"it ends {after * 1e3:.4g} ms after the drop; the analysis covers "
+                f"{_LONG_ENOUGH * 1e3:.0f} ms",
+                remedy="record longer, or analyse a shorter time",
+                severity="warning",
+                time=float(record.time[-1]),
+            )
+        )
+    turning = record.speed is not None and abs(float(record.speed[-1])) > 2 * np.pi
+    if turning and not has_tail:
+        assert record.speed is not None
+        findings.append(
+            Finding(
+                kind="record ends before standstill",
+                message=f"the shaft still turns at {format_quantity(abs(float(record.speed[-1])), 'speed')} "
+                "at "
+                f"{record.time[-1]:.6g} s",
+                remedy="give the readings at standstill with --tail: the air gap is found from them",
+                severity="warning",
+                time=float(record.time[-1]),
+            )
+        )
+    return findings
+
+
+def no_drop(error: RecordError) -> Finding:
+    """Turn the message of the drop search into a finding."""
+    text = str(error)
+    begins = "pre-trigger" in text
+    message, _, remedy = text.rpartition("; ")
+    return Finding(
+        kind="missing pre-trigger" if begins else "no drop in the record",
+        message=message,
+        remedy=remedy or f"a drop sinks by more than {FALLEN_SHARE:.0%} of the air gap",
+        severity="stop",
+    )
+
+
+def first_motion(record: Record) -> tuple[int, Array]:
+    """Sample by which the rotor has begun to fall, whatever units and polarities, and the level before (S,).
+
+    Every channel is scaled by its own largest motion; half of the channels must have moved by a quarter of
+    it.
+    """
+    first = max(int(0.01 * record.sampling_rate), 8)
+    level = np.mean(record.signals[:first], axis=0)
+    away = np.abs(record.signals - level)
+    moved = np.median(away / np.maximum(np.max(away, axis=0), 1e-15), axis=1) > 0.25
+    return int(np.argmax(moved)), level

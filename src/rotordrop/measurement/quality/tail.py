@@ -1,0 +1,118 @@
+"""What readings at standstill show: a rotor at the bottom of its bearings, swinging along the race."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotordrop.errors import RecordError
+from rotordrop.measurement.axes import Plane, along_sensors, planar_of
+from rotordrop.measurement.events import gap_of
+from rotordrop.measurement.quality.finding import Finding
+from rotordrop.measurement.recording import Array
+from rotordrop.measurement.settled import settled_tail
+from rotordrop.units import format_quantity
+
+if TYPE_CHECKING:
+    from rotordrop.machine import Machine
+    from rotordrop.measurement.record import Record
+
+MOST_LEAN = 25.0
+"""A rotor at rest may lie this far from straight below its levitated position [deg]."""
+
+DEPTH = (0.6, 1.7)
+"""How far it may lie below it, in nominal air gaps."""
+
+_VISIBLE_SWING = 4e-6
+
+
+def check_tail(tail: Record, machine: Machine, planes: tuple[Plane, ...], level: Array) -> list[Finding]:
+    """Check where the rotor came to rest and in which direction it swings.
+
+    Parameters
+    ----------
+    tail : Record
+        Readings at standstill.
+    machine : Machine
+        The machine.
+    planes : tuple of Plane
+        Sensor planes.
+    level : array, shape (S,)
+        Mean levitated readings [m].
+    """
+    try:
+        settled = settled_tail(tail, machine)
+    except RecordError as error:
+        message, _, remedy = str(error).rpartition("; ")
+        return [
+            Finding(
+                kind="not settled",
+                message=f"tail: {message}",
+                remedy=remedy,
+                severity="stop",
+                time=float(tail.time[-1]),
+            )
+        ]
+    rest = tail.window(settled.start, settled.end)
+    path = planar_of(along_sensors(rest.signals, rest.sensors) - along_sensors(level, rest.sensors), planes)
+    findings = []
+    for number, plane in enumerate(planes):
+        findings += _place(path[:, number], plane, gap_of(machine, plane))
+        findings += _swing(path[:, number], plane)
+    return findings
+
+
+def _place(path: Array, plane: Plane, gap: float) -> list[Finding]:
+    x, y = np.mean(path, axis=0)
+    depth, lean = float(np.hypot(x, y)), float(np.degrees(np.arctan2(abs(x), -y)))
+    names = ", ".join(plane.names)
+    if not DEPTH[0] <= depth / gap <= DEPTH[1]:
+        return [
+            Finding(
+                kind="wrong unit factor",
+                message=f"tail: the rotor rests {format_quantity(depth, 'length')} from its levitated "
+                "position, "
+                f"{depth / gap:.3g} × the nominal air gap of {format_quantity(gap, 'length')}",
+                remedy="correct unit, sensitivity or offset of the tail, or the nominal air gap",
+                severity="stop",
+                channel=names,
+            )
+        ]
+    if lean > MOST_LEAN:
+        return [
+            Finding(
+                kind="swapped axes",
+                message=f"tail: the rotor rests at x = {x * 1e6:+.4g} µm, y = {y * 1e6:+.4g} µm from its "
+                "levitated "
+                f"position, {lean:.0f}° from straight below",
+                remedy="correct the polarity or the angles in the machine file, or the channel map of the "
+                "tail",
+                severity="stop",
+                channel=names,
+            )
+        ]
+    return []
+
+
+def _swing(path: Array, plane: Plane) -> list[Finding]:
+    """A rotor that rests on the race can only swing along it: level at the bottom."""
+    deviation = path - np.mean(path, axis=0)
+    values, vectors = np.linalg.eigh(deviation.T @ deviation / len(deviation))
+    size = float(np.sqrt(2 * values[1]))
+    if size < _VISIBLE_SWING or values[1] < 9.0 * values[0]:
+        return []
+    slope = float(np.degrees(np.arctan2(abs(vectors[1, 1]), abs(vectors[0, 1]))))
+    if slope <= MOST_LEAN:
+        return []
+    return [
+        Finding(
+            kind="swapped channels",
+            message=f"tail: at node {plane.node} the rotor swings by {format_quantity(size, 'length')} at "
+            f"{slope:.0f}° to the "
+            "level, but it can only swing along the race",
+            remedy="a channel of this plane is inverted or belongs to the other end; correct the channel map",
+            severity="stop",
+            channel=", ".join(plane.names),
+        )
+    ]

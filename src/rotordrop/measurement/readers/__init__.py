@@ -1,0 +1,83 @@
+"""Readers of recordings: one file per format, one function each, found by the suffix of the recording.
+
+A reader is a function ``(path, profile) -> Recording``. A package adds one by an entry point of the group
+``rotordrop.readers`` whose name is the suffix (or the ``format`` of a profile), without the point; it takes
+precedence over the one supplied here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import cast
+
+from rotordrop.errors import RecordError
+from rotordrop.measurement.profile import Profile
+from rotordrop.measurement.recording import Recording
+
+Reader = Callable[[Path, Profile], Recording]
+
+GROUP = "rotordrop.readers"
+
+_DELIMITED = "rotordrop.measurement.readers.delimited:read_delimited"
+_HDF5 = "rotordrop.measurement.readers.hdf5:read_hdf5"
+_UFF = "rotordrop.measurement.readers.uff:read_uff"
+_SUPPLIED = {
+    "csv": _DELIMITED,
+    "txt": _DELIMITED,
+    "tsv": _DELIMITED,
+    "asc": _DELIMITED,
+    "dat": _DELIMITED,
+    "h5": _HDF5,
+    "hdf5": _HDF5,
+    "mat": "rotordrop.measurement.readers.matlab:read_matlab",
+    "tdms": "rotordrop.measurement.readers.tdms:read_tdms",
+    "uff": _UFF,
+    "unv": _UFF,
+}
+
+
+def read_recording(path: Path, profile: Profile) -> Recording:
+    """Read a file with the reader its suffix or the profile names.
+
+    Raises
+    ------
+    RecordError
+        When there is no such file or no reader for it.
+    """
+    if not path.is_file():
+        what = "is a folder" if path.is_dir() else "does not exist"
+        raise RecordError(f"the recording {path} {what}; check the path")
+    return find_reader(profile.format or path.suffix.lstrip(".").lower(), path)(path, profile)
+
+
+def find_reader(name: str, path: Path) -> Reader:
+    """Find the reader of a format by its name, those of other packages first."""
+    added = {entry.name: entry for entry in entry_points(group=GROUP)}
+    if name in added:
+        return cast(Reader, added[name].load())
+    if name in _SUPPLIED:
+        module, function = _SUPPLIED[name].split(":")
+        return cast(Reader, getattr(import_module(module), function))
+    raise RecordError(
+        f"{path}: no reader for {name or 'a file without suffix'!r}; known are {', '.join(known_formats())}; "
+        "name one as 'format' in the profile"
+    )
+
+
+def known_formats() -> tuple[str, ...]:
+    """Name every format that can be read, those of other packages included."""
+    return tuple(sorted({*_SUPPLIED, *(entry.name for entry in entry_points(group=GROUP))}))
+
+
+def needs_extra(package: str, path: Path, error: ImportError) -> RecordError:
+    """Say which package a format needs and how to get it."""
+    return RecordError(
+        f"{path}: reading {path.suffix} files needs the package {package}; install it with "
+        f"pip install 'rotordrop[io]' ({error})"
+    )
+
+
+__all__ = ["GROUP", "Reader", "find_reader", "known_formats", "needs_extra", "read_recording"]

@@ -1,0 +1,256 @@
+"""One recorded drop: what the sensors of the machine read, and when."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+
+from rotordrop.errors import RecordError
+from rotordrop.machine import Machine
+from rotordrop.machine.sensor import Sensor
+from rotordrop.measurement.matching import displacement, find_speed, match_sensors, speed_factor
+from rotordrop.measurement.profile import Profile, load_profile
+from rotordrop.measurement.readers import read_recording
+from rotordrop.measurement.recording import Array, Channel, Recording
+from rotordrop.measurement.speed import readings_of_held_signal
+from rotordrop.measurement.writers import recording_of, write_hdf5
+from rotordrop.units import format_quantity, parse_quantity
+
+
+@dataclass(frozen=True, kw_only=True)
+class Record:
+    """Readings of the displacement sensors over a drop, with the shaft speed.
+
+    Attributes
+    ----------
+    time : array, shape (N,)
+        Record time [s].
+    signals : array, shape (N, S)
+        Readings [m], positive in the reading direction, offsets included.
+    sensors : tuple of Sensor
+        The sensor of the machine behind every column of `signals`.
+    sampling_rate : float
+        Samples per second [Hz].
+    speed : array, shape (N,), optional
+        Shaft speed [rad/s], between the readings by straight lines.
+    speed_time, speed_readings : array, shape (K,), optional
+        When the speed was read [s] and what was read [rad/s].
+    path : Path, optional
+        Where the record comes from.
+    sha256 : str
+        Hash of that file.
+    metadata : mapping of str to str
+        Header entries of the file.
+    notes : tuple of str
+        Choices made on reading.
+    warnings : tuple of str
+        Damage worked around on reading.
+    """
+
+    time: Array
+    signals: Array
+    sensors: tuple[Sensor, ...]
+    sampling_rate: float
+    speed: Array | None = None
+    speed_time: Array | None = None
+    speed_readings: Array | None = None
+    path: Path | None = None
+    sha256: str = ""
+    metadata: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        shape = (len(self.time), len(self.sensors))
+        if self.signals.shape != shape:
+            raise RecordError(
+                f"signals have the shape {self.signals.shape}; {shape[0]} times and {shape[1]} sensors need "
+                f"{shape}"
+            )
+        for array in (self.time, self.signals, self.speed, self.speed_time, self.speed_readings):
+            if array is not None:
+                array.setflags(write=False)
+
+    @property
+    def channel_names(self) -> tuple[str, ...]:
+        """Names of the columns of `signals`, as the machine names its sensors."""
+        return tuple(sensor.name for sensor in self.sensors)
+
+    @property
+    def name(self) -> str:
+        """Short name of the record."""
+        return self.path.stem if self.path else "record"
+
+    @property
+    def duration(self) -> float:
+        """Time from the first to the last sample [s]."""
+        return float(self.time[-1] - self.time[0])
+
+    def reading(self, channel: str) -> Array:
+        """Give the readings of one sensor [m], shape (N,)."""
+        try:
+            return self.signals[:, self.channel_names.index(channel)]
+        except ValueError:
+            raise RecordError(
+                f"the record has no channel {channel!r}; it has {', '.join(self.channel_names)}"
+            ) from None
+
+    def window(self, start: float, end: float) -> Self:
+        """Cut out the samples from `start` to `end` [s]; the speed readings stay whole."""
+        keep = (self.time >= start) & (self.time <= end)
+        if not keep.any():
+            raise RecordError(
+                f"the record reaches from {self.time[0]:.6g} s to {self.time[-1]:.6g} s; nothing lies "
+                "between "
+                f"{start:.6g} s and {end:.6g} s"
+            )
+        return replace(
+            self,
+            time=self.time[keep],
+            signals=self.signals[keep],
+            speed=None if self.speed is None else self.speed[keep],
+        )
+
+
+def read_record(
+    path: str | Path,
+    machine: Machine,
+    *,
+    profile: Profile | str | Path | None = None,
+) -> Record:
+    """Read the recording of a drop and match its channels to the sensors of the machine.
+
+    Parameters
+    ----------
+    path : path-like
+        The recording, in any format of `rotordrop.measurement.readers`.
+    machine : Machine
+        Names the sensors to look for.
+    profile : Profile or path-like, optional
+        Channel map and reading rules where the file does not speak for itself.
+
+    Raises
+    ------
+    RecordError
+        When the file cannot be read, or a sensor has no channel, or a channel no unit.
+    """
+    path = Path(path)
+    rules = profile if isinstance(profile, Profile) else load_profile(profile) if profile else Profile()
+    recording = read_recording(path, rules)
+    with path.open("rb") as stream:
+        digest = hashlib.file_digest(stream, "sha256").hexdigest()
+    return record_of(recording, machine.sensors, profile=rules, path=path, sha256=digest)
+
+
+def record_of(
+    recording: Recording,
+    sensors: tuple[Sensor, ...],
+    *,
+    profile: Profile | None = None,
+    path: Path | None = None,
+    sha256: str = "",
+) -> Record:
+    """Match the channels of a recording to sensors and bring them to SI units on one clock."""
+    profile = profile or Profile()
+    place = str(path or "the recording")
+    if not sensors:
+        raise RecordError("the machine has no sensors; describe them in [[sensors]] of the machine file")
+    matched = match_sensors(recording, sensors, profile, place)
+    time, rate = _shared_clock(matched, place)
+    columns = [displacement(c, s, recording, profile, place) for c, s in zip(matched, sensors, strict=True)]
+    speed_time, speed_readings, notes = _speed(recording, matched, profile, time, place)
+    speed = None
+    if speed_time is not None and speed_readings is not None:
+        speed = np.interp(time, speed_time, speed_readings)
+    spoken = tuple(dict.fromkeys(word for _, words in columns for word in words))
+    return Record(
+        time=time,
+        signals=np.column_stack([values for values, _ in columns]),
+        sensors=sensors,
+        sampling_rate=rate,
+        speed=speed,
+        speed_time=speed_time,
+        speed_readings=speed_readings,
+        path=path,
+        sha256=sha256,
+        metadata=recording.metadata,
+        notes=(*recording.notes, *notes),
+        warnings=(*recording.warnings, *spoken),
+    )
+
+
+def _shared_clock(channels: tuple[Channel, ...], place: str) -> tuple[Array, float]:
+    """One clock for all sensors, evenly spaced where the file means it to be."""
+    first = channels[0]
+    for other in channels[1:]:
+        if len(other.time) != len(first.time):
+            raise RecordError(
+                f"{place}: {first.label!r} has {len(first.time)} samples and {other.label!r} "
+                f"{len(other.time)}; the "
+                "channels must be sampled together, export them at one rate and length"
+            )
+        shift = float(np.max(np.abs(other.time - first.time), initial=0.0))
+        if shift > 1e-3 * _step(first.time):
+            raise RecordError(
+                f"{place}: the clocks of {first.label!r} and {other.label!r} differ by "
+                f"{format_quantity(shift, 'time')}; the channels must be sampled together"
+            )
+    if len(first.time) < 2:
+        raise RecordError(f"{place}: {len(first.time)} samples are no recording")
+    return _even(first.time)
+
+
+def _step(time: Array) -> float:
+    return float(np.median(np.diff(time))) if len(time) > 1 else 1.0
+
+
+def _even(time: Array) -> tuple[Array, float]:
+    """Replace times that are even but for rounding in the file by exactly even ones."""
+    count = len(time) - 1
+    step = (time[-1] - time[0]) / count
+    even = time[0] + step * np.arange(count + 1)
+    if step > 0 and float(np.max(np.abs(time - even))) <= 0.02 * step:
+        rate = float(f"{1.0 / step:.9g}")
+        return time[0] + np.arange(count + 1) / rate, rate
+    usual = _step(time)
+    return time.copy(), 1.0 / usual if usual > 0 else float("nan")
+
+
+def _speed(
+    recording: Recording, taken: tuple[Channel, ...], profile: Profile, time: Array, place: str
+) -> tuple[Array | None, Array | None, list[str]]:
+    if profile.speed.constant is not None:
+        value = parse_quantity(profile.speed.constant, "speed")
+        note = f"speed given by hand: {profile.speed.constant}"
+        return time[[0, -1]], np.array([value, value]), [note]
+    channel = find_speed(recording, taken, profile, place)
+    if channel is None:
+        return None, None, []
+    when, readings = readings_of_held_signal(channel.time, channel.values)
+    return when, readings * speed_factor(channel, profile, place), [f"shaft speed from {channel.label!r}"]
+
+
+def save_record(record: Record, path: str | Path) -> None:
+    """Write a record as HDF5, nothing rounded; `read_record` reads it back.
+
+    Where it came from and the hash of that file are kept in the header entries.
+    """
+    metadata = dict(record.metadata)
+    if record.path is not None:
+        metadata |= {"source": record.path.name, "source_sha256": record.sha256}
+    recording = recording_of(
+        record.time,
+        record.signals,
+        record.channel_names,
+        speed_time=record.speed_time,
+        speed=record.speed_readings,
+        metadata=metadata,
+        notes=record.notes,
+        warnings=record.warnings,
+    )
+    write_hdf5(recording, path)

@@ -1,0 +1,104 @@
+"""What a file holds, before anybody has said which column is which sensor of the machine."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_UNITS = {
+    "m": "m", "mm": "mm", "um": "um", "µm": "um", "μm": "um", "micron": "um", "nm": "nm",
+    "mil": "mil", "mils": "mil", "in": "in", "inch": "in",
+    "v": "V", "volt": "V", "mv": "mV",
+    "hz": "Hz", "rpm": "rpm", "1/min": "rpm", "u/min": "rpm", "r/min": "rpm", "min-1": "rpm",
+    "rad/s": "rad/s", "s": "s", "sec": "s", "ms": "ms", "us": "us", "µs": "us", "μs": "us", "min": "min",
+}  # fmt: skip
+_BRACKETS = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\])]*)[\])]\s*$")
+_SUFFIX = re.compile(r"^(?P<name>.+)_(?P<unit>[A-Za-zµμ]+)$")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Channel:
+    """One column, dataset or variable of a file, with its own clock.
+
+    Attributes
+    ----------
+    name : str
+        Name without the unit.
+    label : str
+        Name as written in the file, unit in brackets removed.
+    unit : str
+        Unit as this package spells it, empty where the file names none.
+    values : array, shape (N,)
+        Samples, in `unit`.
+    time : array, shape (N,)
+        Time of each sample [s].
+    """
+
+    name: str
+    label: str
+    unit: str
+    values: Array
+    time: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recording:
+    """All channels of a file and what the file says about them.
+
+    Attributes
+    ----------
+    channels : tuple of Channel
+        In the order of the file.
+    metadata : mapping of str to str
+        Header entries as written.
+    notes : tuple of str
+        Choices the reader made, for the report.
+    warnings : tuple of str
+        Damage the reader worked around; each says what is missing.
+    sensitivity : float, optional
+        Volts per metre [V/m] stated in the file for all channels.
+    voltage_offset : float
+        Voltage at zero displacement stated in the file [V].
+    """
+
+    channels: tuple[Channel, ...]
+    metadata: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    sensitivity: float | None = None
+    voltage_offset: float = 0.0
+
+
+def known_unit(text: str) -> str | None:
+    """Give a unit in this package's spelling, or None when the text is not one found in recordings."""
+    return _UNITS.get(text.strip().strip("[]()").lower())
+
+
+def split_unit(written: str) -> tuple[str, str, str]:
+    """Take a column name apart: ``"S_A [um]"`` and ``"S_A_um"`` give ``("S_A", label, "um")``.
+
+    Returns
+    -------
+    name : str
+        The name without its unit.
+    label : str
+        The name without brackets, a unit-like ending kept: ``Probe_V`` may be a vertical probe.
+    unit : str
+        The unit, empty when there is none.
+    """
+    written = written.strip()
+    bracketed = _BRACKETS.match(written)
+    if bracketed:
+        unit = bracketed["unit"].strip()
+        return bracketed["name"], bracketed["name"], known_unit(unit) or unit
+    suffixed = _SUFFIX.match(written)
+    unit_of_suffix = known_unit(suffixed["unit"]) if suffixed else None
+    if suffixed and unit_of_suffix:
+        return suffixed["name"], written, unit_of_suffix
+    return written, written, ""

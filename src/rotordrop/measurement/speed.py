@@ -1,0 +1,164 @@
+"""Shaft speed from the readings of a tacho: where it stands at the drop, and how it falls."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotordrop.errors import RecordError
+from rotordrop.measurement.recording import Array
+
+if TYPE_CHECKING:
+    from rotordrop.measurement.record import Record
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpeedAtDrop:
+    """Speed when the rotor was let go.
+
+    Attributes
+    ----------
+    value : float
+        Speed at the drop [rad/s].
+    standard_error : float
+        Standard error of `value` [rad/s].
+    slope : float
+        Rate of change after the drop [rad/s²].
+    scatter : float
+        Standard deviation of one reading [rad/s].
+    readings : int
+        Readings used.
+    """
+
+    value: float
+    standard_error: float
+    slope: float
+    scatter: float
+    readings: int
+
+
+def readings_of_held_signal(time: Array, values: Array) -> tuple[Array, Array]:
+    """Find the readings in a signal that holds each until the next; other signals come back as they are.
+
+    Parameters
+    ----------
+    time : array, shape (N,)
+        Time of the samples [s].
+    values : array, shape (N,)
+        Samples, in any unit.
+
+    Returns
+    -------
+    time, values : array, shape (K,)
+        When a new value appeared and which.
+    """
+    changes = np.flatnonzero(np.diff(values)) + 1
+    if len(changes) < 3 or len(changes) > 0.5 * len(values):
+        return time, values
+    interval = int(np.median(np.diff(changes)))
+    first = changes[0] - interval * (1 + (changes[0] - 1) // interval)
+    at = [max(int(first), 0)]
+    for change in changes:
+        # a reading equal to the one before leaves no step: fill in where it must have been
+        missed = round((change - at[-1]) / interval) - 1
+        at += [int(change) - interval * k for k in range(missed, 0, -1)] if len(at) > 1 else []
+        at.append(int(change))
+    at += list(range(at[-1] + interval, len(values), interval))
+    index = np.array(sorted(set(at)))
+    return time[index], values[index]
+
+
+def speed_at_drop(record: Record, drop: float, *, span: float = 0.5) -> SpeedAtDrop:
+    """Speed at the drop from a robust fit of a straight line before and one after, meeting at the drop.
+
+    Parameters
+    ----------
+    record : Record
+        The record, with speed.
+    drop : float
+        Drop instant, in record time [s].
+    span : float
+        Readings up to this long before and after are used [s].
+
+    Raises
+    ------
+    RecordError
+        When the record has no speed near the drop.
+    """
+    time, readings = require_speed(record)
+    near = (np.abs(time - drop) <= span) & np.isfinite(readings)
+    if int(near.sum()) < 2:
+        raise RecordError(
+            f"{record.name}: {int(near.sum())} speed readings within {span:g} s of the drop at {drop:.6g} s; "
+            "the "
+            f"speed was read from {time[0]:.6g} s to {time[-1]:.6g} s"
+        )
+    when, values = time[near] - drop, readings[near]
+    columns = [np.ones_like(when)]
+    columns += [part for part in (np.minimum(when, 0.0), np.maximum(when, 0.0)) if np.count_nonzero(part) > 2]
+    design = np.column_stack(columns)
+    solution, scatter, covariance = _robust(design, values)
+    return SpeedAtDrop(
+        value=float(solution[0]),
+        standard_error=float(scatter * np.sqrt(covariance[0, 0])),
+        slope=float(solution[-1]) if len(columns) > 1 and np.any(when > 0) else 0.0,
+        scatter=scatter,
+        readings=len(values),
+    )
+
+
+def smooth_speed(record: Record, *, span: float = 0.1) -> Array:
+    """Speed over the record [rad/s], shape (N,), outliers replaced and smoothed by local straight lines."""
+    from scipy.signal import savgol_filter
+
+    time, readings = require_speed(record)
+    if len(readings) < 5:
+        return np.interp(record.time, time, readings)
+    clean = _without_outliers(readings)
+    width = int(span / float(np.median(np.diff(time)))) // 2 * 2 + 1
+    width = min(max(width, 5), len(clean) - 1 + len(clean) % 2)
+    return np.asarray(np.interp(record.time, time, savgol_filter(clean, width, 1)))
+
+
+def require_speed(record: Record) -> tuple[Array, Array]:
+    """Give the speed readings, time [s] and value [rad/s], or say that they are missing and what to do.
+
+    Raises
+    ------
+    RecordError
+        When the record has no speed.
+    """
+    if record.speed_time is None or record.speed_readings is None:
+        raise RecordError(
+            f"{record.name} has no shaft speed beside {', '.join(record.channel_names)}; name its channel in "
+            "a "
+            'profile ([speed] channel = "..."), or give it by hand ([speed] constant = "60 Hz")'
+        )
+    return record.speed_time, record.speed_readings
+
+
+def _robust(design: Array, values: Array, rounds: int = 12) -> tuple[Array, float, Array]:
+    """Least squares with Huber weights; gives solution, scatter and the unscaled covariance."""
+    weights = np.ones(len(values))
+    scatter = 0.0
+    solution: Array = np.zeros(design.shape[1])
+    for _ in range(rounds):
+        found = np.linalg.lstsq(design * weights[:, None], values * weights, rcond=None)[0]
+        solution = np.asarray(found, dtype=np.float64)
+        rest = values - design @ solution
+        scatter = float(1.4826 * np.median(np.abs(rest)))
+        limit = 1.5 * max(scatter, 1e-9)
+        weights = np.sqrt(np.minimum(1.0, limit / np.maximum(np.abs(rest), limit)))
+    weighted = design * weights[:, None]
+    return solution, scatter, np.asarray(np.linalg.pinv(weighted.T @ weighted), dtype=np.float64)
+
+
+def _without_outliers(readings: Array) -> Array:
+    from scipy.ndimage import median_filter
+
+    middle = median_filter(readings, size=5, mode="nearest")
+    rest = readings - middle
+    limit = 6.0 * 1.4826 * float(np.median(np.abs(rest))) + 1e-6 * float(np.max(np.abs(readings)))
+    return np.where(np.abs(rest) > limit, middle, readings)
