@@ -31,7 +31,7 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
         Temporary path in the same folder, with the same suffix.
     """
     target = Path(path)
-    _refuse_impossible(target)
+    require_place(target)
     temporary = target.with_name(f".{target.stem}.{secrets.token_hex(4)}.part{target.suffix}")
     try:
         yield temporary
@@ -68,7 +68,9 @@ def write_json(path: str | os.PathLike[str], content: Any) -> None:
     write_text(path, text + "\n")
 
 
-def _refuse_impossible(target: Path) -> None:
+def require_place(path: str | os.PathLike[str]) -> None:
+    """Refuse a place where no file can be written, before a long computation rather than after it."""
+    target = Path(path)
     if target.is_dir():
         raise OutputError(f"cannot write {target}: it is a folder; name a file in it")
     if not target.parent.is_dir():

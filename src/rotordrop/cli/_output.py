@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
-from rotordrop.atomic_file import write_json, write_text
+from rotordrop.atomic_file import require_place, write_json, write_text
 from rotordrop.errors import OutputError
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 STANDARD_OUTPUT = Path("-")
 _PLAIN_WIDTH = 110
 
-Report = Callable[[float, str], None]
+Progress = Callable[[str, float], None]
 
 
 def console(stream: TextIO | None = None) -> Console:
@@ -61,6 +61,13 @@ def deliver(content: Any, json_file: Path | None, summarise: Callable[[Console],
         out.print(f"JSON: {json_file}")
 
 
+def require_places(*files: Path | None) -> None:
+    """Refuse output files that cannot be written before anything is computed for them."""
+    for file in files:
+        if file is not None and file != STANDARD_OUTPUT:
+            require_place(file)
+
+
 def deliver_text(text: str, file: Path | None, *, overwrite: bool) -> None:
     """Print a text, or write it to a file that must not exist yet unless `overwrite` says so."""
     if file is None or file == STANDARD_OUTPUT:
@@ -73,22 +80,23 @@ def deliver_text(text: str, file: Path | None, *, overwrite: bool) -> None:
 
 
 @contextmanager
-def progress_bar(title: str) -> Iterator[Report]:
+def progress_bar(title: str) -> Iterator[Progress]:
     """Show a bar with the time left on standard error while a long computation runs.
 
-    Yields a function to call with the fraction done (0 to 1) and the name of the present stage. Where
+    Yields a function to call with the name of the present stage and the fraction done (0 to 1). Where
     standard error is not a terminal nothing is shown.
     """
     if not sys.stderr.isatty():
-        yield lambda fraction, stage: None
+        yield lambda stage, fraction: None
         return
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import Progress as Bars
 
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"))
-    with Progress(*columns, TimeRemainingColumn(), console=console(sys.stderr), transient=True) as progress:
-        task = progress.add_task(title, total=1.0)
+    with Bars(*columns, TimeRemainingColumn(), console=console(sys.stderr), transient=True) as bars:
+        task = bars.add_task(title, total=1.0)
 
-        def report(fraction: float, stage: str) -> None:
-            progress.update(task, completed=fraction, description=stage or title)
+        def report(stage: str, fraction: float) -> None:
+            bars.update(task, completed=fraction, description=stage or title)
 
         yield report

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rotordrop.cli._options import JsonOption, MachineArgument, quantity
-from rotordrop.cli._output import deliver
+from rotordrop.cli._output import deliver, require_places
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -41,6 +41,7 @@ def check(
     from rotordrop.report.machine_content import machine_content, machine_json
     from rotordrop.report.terminal import print_summary
 
+    require_places(report, json_file)
     described = load_machine(machine)
     summary = summarise_machine(described)
     warnings = machine_warnings(described, summary, speed)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from rotordrop._version import __version__
 from rotordrop.report.content import Card, Cell, Figure, KeyFigure, ReportContent, Section, Statement, Table
+from rotordrop.report.machine_sections import defaults_section
 from rotordrop.report.quantity import Quantity
 
 if TYPE_CHECKING:
@@ -24,7 +25,8 @@ def machine_content(
     drawn: bool = False,
 ) -> ReportContent:
     """Put what is known about a machine into a report; `drawn` adds the rotor's drawing for a page."""
-    sections = (_drawing(machine), _assumptions(machine)) if drawn else ()
+    open_values = defaults_section(machine)
+    tables = tuple(table for section in open_values for table in section.tables)
     return ReportContent(
         title=f"Machine: {machine.name}",
         subtitle="; ".join(machine.notes),
@@ -35,9 +37,9 @@ def machine_content(
         summary=(
             _rotor_table(summary),
             _mode_table(summary),
-            *(() if drawn else _assumption_tables(machine)),
+            *(() if drawn else tables),
         ),
-        sections=sections,
+        sections=(_drawing(machine), *open_values) if drawn else (),
     )
 
 
@@ -99,19 +101,6 @@ def _drawing(machine: Machine) -> Section:
 
     caption = "The rotor to scale. Bearings, AMBs and sensors stand at their nodes."
     return Section(heading="Rotor", figures=(Figure(chart=rotor_figure(machine), caption=caption),))
-
-
-def _assumptions(machine: Machine) -> Section:
-    return Section(heading="What the file leaves open", tables=_assumption_tables(machine))
-
-
-def _assumption_tables(machine: Machine) -> tuple[Table, ...]:
-    columns = ("value", "taken as", "because")
-    tables = (
-        Table(columns=columns, rows=machine.defaults_in_use, caption="Defaults in use"),
-        Table(columns=columns, rows=machine.inferred, caption="Inferred"),
-    )
-    return tuple(table for table in tables if table.rows)
 
 
 def machine_json(

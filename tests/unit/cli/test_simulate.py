@@ -1,0 +1,105 @@
+"""The verb simulate: every start, every output, and messages that name what was written."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from rotordrop.cli._start import named_pairs
+from rotordrop.cli.app import run
+from rotordrop.errors import UsageError
+from rotordrop.machine import example_path
+from rotordrop.simulation.result import load_result
+
+PAPER = str(example_path("paper"))
+SHORT = ["simulate", PAPER, "--speed", "60 Hz", "--duration", "12 ms", "--reduction", "quick"]
+
+
+def test_a_drop_from_the_centre_reaches_every_output(tmp_path, capsys):
+    files = {name: tmp_path / name for name in ("drop.h5", "drop.html", "drop.json")}
+    arguments = [
+        "-o",
+        str(files["drop.h5"]),
+        "--report",
+        str(files["drop.html"]),
+        "--json",
+        str(files["drop.json"]),
+    ]
+    assert run([*SHORT, *arguments]) == 0
+    text = capsys.readouterr().out
+    assert "The drop was simulated to 0.012 s" in text
+    assert "Peak bearing force" in text
+    numbers = json.loads(files["drop.json"].read_text())
+    result = load_result(files["drop.h5"])
+    assert numbers["speed_Hz"] == pytest.approx(60.0)
+    assert list(numbers["bearings"]) == ["NDE", "DE"]
+    for index, name in enumerate(result.bearing_names):
+        found = numbers["bearings"][name]
+        largest = result.bearing_force_magnitude[:, index].max()
+        assert found["peak_force_N"]["value"] == pytest.approx(largest, rel=1e-3)
+        assert found["peak_force_N"]["value"] >= largest
+        assert found["stress_statistics"]["maximum"] == pytest.approx(
+            found["peak_stress_Pa"]["value"], rel=1e-3
+        )
+        assert "mean_force_0p15_0p2_N" not in found
+    assert "everything on this page is computed" in files["drop.html"].read_text().lower()
+
+
+def test_the_first_contact_of_a_centred_drop_is_that_of_free_fall(capsys):
+    """275 µm of free fall take 7.49 ms and 285 µm take 7.62 ms."""
+    assert run([*SHORT, "--json", "-"]) == 0
+    bearings = json.loads(capsys.readouterr().out)["bearings"]
+    for name, gap in (("NDE", 275e-6), ("DE", 285e-6)):
+        assert bearings[name]["contacts"][0]["start_s"] == pytest.approx(np.sqrt(2 * gap / 9.81), rel=0.01)
+
+
+def test_a_start_lower_and_already_falling_is_in_contact_earlier(capsys):
+    place = ["--displacement", "NDE: 0 um, -100 um", "--displacement", "DE: 0 um, -100 um"]
+    move = ["--velocity", "NDE: 0 mm/s, -10 mm/s", "--velocity", "DE: 0 mm/s, -10 mm/s"]
+    assert run([*SHORT, *place, *move, "--json", "-"]) == 0
+    first = json.loads(capsys.readouterr().out)["bearings"]["NDE"]["contacts"][0]["start_s"]
+    expected = (-0.01 + np.sqrt(0.01**2 + 2 * 9.81 * 175e-6)) / 9.81
+    assert first == pytest.approx(expected, rel=0.01)
+
+
+def test_a_lift_left_in_the_magnets_delays_the_contact(capsys):
+    times = []
+    for lift in ([], ["--remanent-force", "NDE: 0 N, 80 N", "--remanent-force", "DE: 0 N, 80 N"]):
+        assert run([*SHORT, "--levitated", *lift, "--json", "-"]) == 0
+        times.append(json.loads(capsys.readouterr().out)["bearings"]["NDE"]["contacts"][0]["start_s"])
+    assert times[1] > times[0] + 1e-4
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        (["--speed", "60"], 64, r"'60' has no unit; a speed needs one, for example '60 Hz'"),
+        (["--displacement", "XX: 1 um, 2 um"], 64, r"'XX: 1 um, 2 um' is not 'NAME: horizontal, vertical'"),
+        (
+            ["--displacement", "NDE: 1 um"],
+            64,
+            r"with a name out of NDE, DE; write for example 'NDE: 10 um, -20 um'",
+        ),
+        (["--velocity", "NDE: 1 um, 2 um"], 64, r"'1 um' is not a velocity|' 1 um' is not a velocity"),
+        (["--levitated", "--velocity", "NDE: 0 m/s, 0 m/s"], 64, r"--levitated cannot go with"),
+        (["--duration", "-1 s"], 5, r"duration is -1\.0; expected a positive, finite number"),
+        (["-o", "nowhere/drop.h5"], 6, r"the folder nowhere does not exist; create it first"),
+        (["--reduction", "fast"], 64, r"'fast' is not one of"),
+    ],
+)
+def test_a_refusal_names_the_value_and_leaves_nothing(
+    tmp_path, monkeypatch, capsys, arguments, code, message
+):
+    import re
+
+    monkeypatch.chdir(tmp_path)
+    assert run([*SHORT, "--json", "drop.json", *arguments]) == code
+    assert re.search(message, capsys.readouterr().err)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_machine_without_the_part_is_told_so():
+    with pytest.raises(UsageError, match=r"'NDE: 0 N, 1 N' names a part of the machine, which has none"):
+        named_pairs(["NDE: 0 N, 1 N"], "force", [])
