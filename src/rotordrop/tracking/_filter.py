@@ -38,7 +38,7 @@ class ParameterTargets(NamedTuple):
 
     ``target`` (R, 4): parameter, kind, row, column; ``factor`` (R,) [1]; ``logarithmic`` (P,) flags; ``step`` (P,) of the
     finite difference by which the right-hand side is differentiated; ``drift`` (P,) standard deviation of the random walk
-    of each parameter per square root of a second; ``plane_shape`` (U, m) mode shapes of the planes.
+    of each parameter per square root of a second, ``late_drift`` the same later in a drop; ``plane_shape`` (U, m) mode shapes of the planes.
     """
 
     target: IntArray
@@ -46,6 +46,7 @@ class ParameterTargets(NamedTuple):
     logarithmic: IntArray
     step: Array
     drift: Array
+    late_drift: Array
     plane_shape: Array
 
 
@@ -54,7 +55,7 @@ class FilterSettings(NamedTuple):
 
     ``impulse`` is the standard deviation of an unknown impulse per sample at each bearing and axis, ``share`` the same
     as a fraction of the contact impulse, ``spin_noise`` that of the race spins per sample [rad/s], ``speed_noise`` that
-    of the rotor speed [rad/s].
+    of the rotor speed [rad/s]. After ``learning_end`` [s] the late drift of the parameters holds.
     """
 
     dt: float
@@ -63,6 +64,7 @@ class FilterSettings(NamedTuple):
     share: float
     spin_noise: float
     speed_noise: float
+    learning_end: float
 
 
 @kernel
@@ -387,7 +389,8 @@ def forward_pass(
             P[:s] = head
             P[:s, :s] = np.dot(np.ascontiguousarray(head[:, : s + n_p]), F.T)
             P[s:, :s] = head[:, s:].T
-            add_process_noise(P, p, settings, impulses, targets.drift)
+            drift = targets.late_drift if times[i] > settings.learning_end else targets.drift
+            add_process_noise(P, p, settings, impulses, drift)
             if keep:
                 transitions[i] = F
         for c in range(n_c + 1):

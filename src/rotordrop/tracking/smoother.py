@@ -29,13 +29,18 @@ class PassSettings:
         Standard deviation of the race spin per 50 µs [rad/s].
     speed_noise : float
         Standard deviation of the rotor speed per 50 µs [rad/s].
+    learning_end : float
+        Time [s] after which friction and race may drift faster: once a race turns with the rotor, the
+        friction law near zero speed decides, which no record of positions shows, and must not rewrite what the first
+        impacts said.
     """
 
     substeps: int = 4
     impulse: float = 2e-4
     share: float = 0.01
-    spin_noise: float = 0.02
+    spin_noise: float = 0.1
     speed_noise: float = 1e-3
+    learning_end: float = 0.05
 
     def for_sampling(self, dt: float) -> F.FilterSettings:
         """Settings of the kernel for a sample distance [s]; noise grows with the square root of time."""
@@ -47,6 +52,7 @@ class PassSettings:
             share=self.share,
             spin_noise=self.spin_noise * growth,
             speed_noise=self.speed_noise * growth,
+            learning_end=self.learning_end,
         )
 
 
