@@ -9,11 +9,9 @@ from rotordrop.report.content import Level, Section, Statement, Table
 from rotordrop.report.quantity import Quantity
 
 LEVELS: dict[str, Level] = {
-    "error": "bad",
-    "fault": "bad",
+    "stop": "bad",
     "warning": "warning",
-    "notice": "notice",
-    "info": "notice",
+    "note": "notice",
 }
 
 

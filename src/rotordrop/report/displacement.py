@@ -7,11 +7,11 @@ import plotly.graph_objects as go
 from rotordrop.report.history import BearingMotions
 from rotordrop.report.style import (
     MICRO,
-    TIME_TITLE,
     add_gap_limits,
     add_history,
     axis_title,
     fit_legend,
+    label_time,
     panels,
 )
 
@@ -43,7 +43,7 @@ def displacement_figure(bearing: BearingMotions) -> go.Figure:
             add_gap_limits(figure, bearing.air_gap, sign=-1.0, row=row, legend=row == 1)
     if bearing.air_gap is not None:
         add_gap_limits(figure, bearing.air_gap, row=2)
-    figure.update_xaxes(title_text=TIME_TITLE, row=2)
+    label_time(figure, row=2)
     figure.update_yaxes(title_text=axis_title("displacement y", "µm"), row=1)
     figure.update_yaxes(title_text=axis_title("displacement x", "µm"), row=2)
     return fit_legend(figure)

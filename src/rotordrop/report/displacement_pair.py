@@ -9,11 +9,11 @@ import plotly.graph_objects as go
 from rotordrop.report.history import BearingMotions
 from rotordrop.report.style import (
     MICRO,
-    TIME_TITLE,
     add_gap_limits,
     add_history,
     axis_title,
     fit_legend,
+    label_time,
     panels,
 )
 
@@ -40,6 +40,6 @@ def displacement_pair_figure(bearings: Sequence[BearingMotions]) -> go.Figure:
         if bearing.air_gap is not None:
             add_gap_limits(figure, bearing.air_gap, sign=-1.0, row=row, column=2, legend=row == 1)
         figure.update_yaxes(title_text=axis_title("displacement", "µm"), row=row, col=1)
-    figure.update_xaxes(title_text=TIME_TITLE, row=len(bearings))
+    label_time(figure, row=len(bearings))
     figure.update_xaxes(matches="x")
     return fit_legend(figure)

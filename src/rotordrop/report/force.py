@@ -14,12 +14,12 @@ from rotordrop.report.style import (
     INK,
     MILLI,
     MUTED,
-    TIME_TITLE,
     add_band,
     add_history,
     add_level,
     axis_title,
     fit_legend,
+    label_time,
     panels,
 )
 
@@ -81,7 +81,7 @@ def history_panels(
             add_band(figure, bearing.band, scale, unit, row=row, legend=row == 1)
         for history in bearing.histories:
             add_history(figure, history, scale, unit, row=row, legend=row == 1)
-    figure.update_xaxes(title_text=TIME_TITLE, row=len(bearings))
+    label_time(figure, row=len(bearings))
     return figure
 
 

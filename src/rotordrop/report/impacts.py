@@ -14,6 +14,7 @@ from rotordrop.report.style import axis_title, panels, single
 from rotordrop.simulation.result import ContactLog
 
 LISTED = 24
+CONTACT_FORCE = "contact force"
 LATE, EARLY = "#cfe2f5", "#0b3d73"
 
 
@@ -30,7 +31,7 @@ class Impact:
     azimuth : Quantity
         Direction from the race's centre to the rotor [rad ccw from +x]; −90° is the bottom.
     peak_force, impulse, dissipated_energy : Quantity
-        Peak normal force [N], normal impulse [N s], energy lost in contact and friction [J].
+        Peak normal force or ball force [N], normal impulse [N s], energy lost in contact and friction [J].
     """
 
     bearing: str
@@ -63,13 +64,15 @@ def _signed(angle: float) -> float:
     return float(np.angle(np.exp(1j * angle)))
 
 
-def impact_table(impacts: Sequence[Impact], *, listed: int = LISTED) -> Table:
+def impact_table(impacts: Sequence[Impact], *, force: str = CONTACT_FORCE, listed: int = LISTED) -> Table:
     """List the strongest impacts in the order of time.
 
     Parameters
     ----------
     impacts : sequence of Impact
         All impacts of the drop.
+    force : str
+        Name of the force whose peak is stated.
     listed : int
         Number of impacts in the table; the strongest are kept.
     """
@@ -93,19 +96,18 @@ def impact_table(impacts: Sequence[Impact], *, listed: int = LISTED) -> Table:
             "bearing",
             "time of peak",
             "azimuth",
-            "peak contact force",
+            f"peak {force}",
             "impulse",
             "dissipated energy",
             "duration",
         ),
         rows=rows,
         caption=f"Impacts ({len(rows)} of {len(impacts)})",
-        note="Azimuth counter-clockwise from +x, −90° is the bottom; contact force between rotor and race."
-        + rest,
+        note=f"Azimuth counter-clockwise from +x, −90° is the bottom.{rest}",
     )
 
 
-def impact_figure(impacts: Sequence[Impact]) -> go.Figure:
+def impact_figure(impacts: Sequence[Impact], *, force: str = CONTACT_FORCE) -> go.Figure:
     """Draw the peak force of every impact over its azimuth, the earlier the darker, with known intervals."""
     bearings = list(dict.fromkeys(impact.bearing for impact in impacts))
     figure = panels(bearings, height=310)
@@ -113,7 +115,7 @@ def impact_figure(impacts: Sequence[Impact]) -> go.Figure:
     for column, bearing in enumerate(bearings, start=1):
         _add_impacts(figure, [impact for impact in impacts if impact.bearing == bearing], column, latest)
     figure.update_xaxes(title_text=axis_title("azimuth from +x, −90° at the bottom", "°"), dtick=30)
-    figure.update_yaxes(title_text=axis_title("peak contact force", "N"), col=1)
+    figure.update_yaxes(title_text=axis_title(f"peak {force}", "N"), col=1)
     figure.update_yaxes(rangemode="tozero")
     figure.update_layout(
         coloraxis={

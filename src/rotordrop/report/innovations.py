@@ -14,10 +14,10 @@ from rotordrop.report.style import (
     MICRO,
     MILLI,
     SERIES,
-    TIME_TITLE,
     add_history,
     axis_title,
     fit_legend,
+    label_time,
     panels,
     plain,
     single,
@@ -27,6 +27,8 @@ Array = NDArray[np.float64]
 
 EXPECTED = "90 % expected by the filter"
 LIMIT_LINE = {"color": LIMIT, "width": 1.2, "dash": "dash"}
+SHOWN_SHARE = 0.995
+"""Share of the innovations inside the drawn range [1]; the first ones, before anything is known, are huge."""
 NORMAL_90 = 1.6448536269514722
 """Half width of the 90 % interval of a normal distribution in standard deviations."""
 
@@ -60,7 +62,9 @@ def innovations_figure(
                 limit = History(label=EXPECTED, time=time, values=sign * half)
                 shown = legend and sign > 0.0
                 add_history(figure, limit, MICRO, "µm", row=row, column=column, legend=shown, line=LIMIT_LINE)
-    figure.update_xaxes(title_text=TIME_TITLE, row=rows)
+        reach = 1.1 * MICRO * float(np.nanquantile(np.abs(innovations[:, index]), SHOWN_SHARE)) or 1.0
+        figure.update_yaxes(range=[-reach, reach], row=row, col=column)
+    label_time(figure, row=rows)
     figure.update_yaxes(title_text=axis_title("innovation", "µm"), col=1)
     return fit_legend(figure)
 
@@ -93,10 +97,10 @@ def nis_figure(
         y1=limits[1],
         fillcolor="rgba(20, 113, 61, 0.13)",
         line_width=0,
-        name=f"consistent mean, {limits[0]:.2g} to {limits[1]:.2g}",
+        name=f"consistent mean, {limits[0]:.3g} to {limits[1]:.3g}",
         showlegend=True,
     )
-    figure.update_xaxes(title_text=TIME_TITLE)
+    label_time(figure)
     figure.update_yaxes(title_text=axis_title("NIS per channel", "1"), rangemode="tozero")
     return fit_legend(figure)
 

@@ -20,6 +20,8 @@ DISPLAY: dict[str, tuple[float, str]] = {
     "impulse": (1.0, "N s"),
     "energy": (1.0, "J"),
     "inertia": (1e-6, "kg mm²"),
+    "contact_stiffness": (1e9, "× 10⁹ N/m^n"),
+    "short_time": (1e-6, "µs"),
     "voltage_sensitivity": (1e3, "mV/µm"),
     "share": (1e-2, "%"),
     "probability": (1e-2, "%"),
@@ -27,7 +29,7 @@ DISPLAY: dict[str, tuple[float, str]] = {
 }
 """Unit in which a report shows a kind, so that the numbers of a column can be compared."""
 
-PLACES_OF_SCIENCE = 7
+PLACES_OF_SCIENCE = (-4, 7)
 FIXED_PLACES = {"count": 0, "probability": 1}
 THIN_SPACE = "\u202f"
 
@@ -62,6 +64,12 @@ class Quantity:
     upper: float | None = None
     status: str = ""
     digits: int = 4
+
+    def __post_init__(self) -> None:
+        if self.kind not in DISPLAY and self.kind not in KINDS:
+            raise ValueError(
+                f"{self.kind!r} is not a kind a report can show; known are {', '.join((*DISPLAY, *KINDS))}"
+            )
 
     @classmethod
     def of(cls, known: Estimated | IdentifiedValue | float | None, kind: str, digits: int = 4) -> Quantity:
@@ -131,7 +139,7 @@ class Quantity:
             return 0
         if self.kind in FIXED_PLACES:
             return FIXED_PLACES[self.kind]
-        if abs(_magnitude(value)) >= PLACES_OF_SCIENCE:
+        if not PLACES_OF_SCIENCE[0] < _magnitude(value) < PLACES_OF_SCIENCE[1]:
             return None
         error = self._error()
         if error > 0.0 and math.isfinite(error):

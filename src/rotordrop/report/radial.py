@@ -9,11 +9,11 @@ import plotly.graph_objects as go
 from rotordrop.report.history import BearingMotions
 from rotordrop.report.style import (
     MICRO,
-    TIME_TITLE,
     add_gap_limits,
     add_history,
     axis_title,
     fit_legend,
+    label_time,
     panels,
 )
 
@@ -38,5 +38,5 @@ def radial_figure(bearings: Sequence[BearingMotions]) -> go.Figure:
         if bearing.air_gap is not None:
             add_gap_limits(figure, bearing.air_gap, row=row, legend=row == 1)
     figure.update_yaxes(title_text=axis_title("radial displacement", "µm"), rangemode="tozero")
-    figure.update_xaxes(title_text=TIME_TITLE, row=len(bearings))
+    label_time(figure, row=len(bearings))
     return fit_legend(figure)

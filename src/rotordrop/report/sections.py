@@ -10,7 +10,7 @@ from rotordrop.report.displacement_pair import displacement_pair_figure
 from rotordrop.report.first_contact import FirstContact, first_contact_figure
 from rotordrop.report.force import Peak, force_figure
 from rotordrop.report.history import BearingHistories, BearingMotions
-from rotordrop.report.impacts import Impact, impact_figure, impact_table
+from rotordrop.report.impacts import CONTACT_FORCE, Impact, impact_figure, impact_table
 from rotordrop.report.orbit import orbit_figure
 from rotordrop.report.quantity import Quantity
 from rotordrop.report.radial import radial_figure
@@ -22,7 +22,7 @@ EARLY = 0.04
 """Window [s] around the first contacts that gets figures of its own."""
 
 
-def motion_section(bearings: Sequence[BearingMotions], origin: str) -> Section:
+def motion_section(bearings: Sequence[BearingMotions], origin: str, *text: str) -> Section:
     """Displacement against time: every bearing for itself, and all side by side."""
     figures = [
         Figure(
@@ -36,7 +36,7 @@ def motion_section(bearings: Sequence[BearingMotions], origin: str) -> Section:
         chart=displacement_pair_figure(bearings),
         caption="All bearings side by side; the panels zoom together (Neisi 2020, Fig. 13).",
     )
-    return Section(heading="Displacement", figures=(*figures, pair))
+    return Section(heading="Displacement", text=text, figures=(*figures, pair))
 
 
 def first_contact_section(
@@ -104,18 +104,17 @@ def stress_section(
     return Section(heading="Hertz stress", text=text, figures=(history, box), tables=(stress_table(boxes),))
 
 
-def impact_section(impacts: Sequence[Impact], statements: tuple[Statement, ...] = ()) -> Section:
+def impact_section(impacts: Sequence[Impact], *, force: str = CONTACT_FORCE) -> Section:
     """Where around the race and how hard the rotor hit."""
     if not impacts:
         none = Statement(text="The rotor did not touch a bearing in this window.", level="notice")
-        return Section(heading="Impacts", statements=(none, *statements))
+        return Section(heading="Impacts", statements=(none,))
     figure = Figure(
-        chart=impact_figure(impacts),
-        caption="Peak contact force of every impact over its place on the race; −90° is the bottom.",
+        chart=impact_figure(impacts, force=force),
+        caption=f"Peak {force} of every impact over its place on the race; −90° is the bottom.",
     )
-    return Section(
-        heading="Impacts", statements=statements, figures=(figure,), tables=(impact_table(impacts),)
-    )
+    table = impact_table(impacts, force=force)
+    return Section(heading="Impacts", figures=(figure,), tables=(table,))
 
 
 def static_limit_statement(bearing: str, stress: float) -> Statement:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import plotly.graph_objects as go
 
 from rotordrop.report.history import History
-from rotordrop.report.style import TIME_TITLE, add_history, axis_title, fit_legend, panels
+from rotordrop.report.style import add_history, axis_title, fit_legend, label_time, panels
 
 PER_TURN = 1.0 / (2.0 * math.pi)
 
@@ -35,7 +35,7 @@ def speed_figure(rotor: Sequence[History], races: Sequence[History] = ()) -> go.
         dash = "solid" if index == 0 else "8px,4px"
         line = {"color": "#5d6d1e" if index == 0 else "#8e44ad", "width": 1.5, "dash": dash}
         add_history(figure, history, PER_TURN, "Hz", column=2, line=line)
-    figure.update_xaxes(title_text=TIME_TITLE)
+    label_time(figure)
     figure.update_yaxes(title_text=f"{axis_title('speed', 'Hz')}, × 60 in rpm", col=1)
     if races:
         figure.update_yaxes(title_text=f"{axis_title('race speed', 'Hz')}, × 60 in rpm", col=2)

@@ -116,6 +116,12 @@ def panels(
     return figure
 
 
+def label_time(figure: go.Figure, row: int | None = None) -> None:
+    """Title the time axes, of one row or all, and begin them at power-off."""
+    figure.update_xaxes(title_text=TIME_TITLE, row=row)
+    figure.update_xaxes(rangemode="tozero")
+
+
 def line_style(role: Role, index: int | None = None) -> dict[str, Any]:
     """Colour and width of a history; an index takes the colour of a series instead of the role's."""
     colour = COLOURS[role] if index is None else SERIES[index % len(SERIES)]

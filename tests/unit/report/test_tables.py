@@ -131,7 +131,7 @@ def test_findings_tell_channel_time_and_remedy_the_serious_ones_first() -> None:
     section = data_quality_section(
         [
             Finding("hum", "S_DE_B", None, "50 Hz hum of 1.2 µm peak", "ground the cable", "warning"),
-            Finding("clipping", "S_NDE_A", 0.0082, "clipped at 500 µm", "use a larger range", "fault"),
+            Finding("clipping", "S_NDE_A", 0.0082, "clipped at 500 µm", "use a larger range", "stop"),
         ]
     )
     assert [(s.level, s.text) for s in section.statements] == [

@@ -1,0 +1,100 @@
+"""The numbers of an estimate: headline per bearing, identified values with verdict."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from rotordrop.estimated import IdentifiedValue
+from rotordrop.report.content import Card, Cell, KeyFigure, Table
+from rotordrop.report.quantity import Quantity
+
+Values = Mapping[str, IdentifiedValue]
+
+HEADLINE = (
+    ("peak_force_N", "Peak bearing force", "force"),
+    ("peak_stress_Pa", "Peak Hertz stress", "pressure"),
+    ("mean_force_0p15_0p2_N", "Mean force, 150 to 200 ms", "force"),
+    ("mean_stress_Pa", "Mean Hertz stress", "pressure"),
+)
+IDENTIFIED = (
+    ("air_gap_m", "air gap", "length"),
+    ("equivalent_stiffness_N_per_m", "equivalent stiffness, bearing and support", "stiffness"),
+    ("support.stiffness_N_per_m", "support stiffness", "stiffness"),
+    ("support.damping_N_s_per_m", "support damping", "damping"),
+    ("support.mass_kg", "support mass", "mass"),
+    ("friction.static", "static friction coefficient", "dimensionless"),
+    ("friction.dynamic", "dynamic friction coefficient", "dimensionless"),
+)
+KIND_OF_UNIT = {
+    "m": "length",
+    "N/m": "stiffness",
+    "kg": "mass",
+    "N s/m": "damping",
+    "N/m^n": "contact_stiffness",
+    "s/m": "contact_damping",
+    "kg m^2": "inertia",
+    "m/s": "velocity",
+    "s": "duration",
+    "kg m": "unbalance",
+    "N": "force",
+    "Pa": "pressure",
+    "rad": "angle",
+    "rad/s": "speed",
+}
+
+
+def kind_of_unit(unit: str) -> str:
+    """Kind in which a report shows a value of an SI unit; a unit without one counts as a pure number."""
+    return KIND_OF_UNIT.get(unit, "dimensionless")
+
+
+def headline_card(bearing: str, values: Values, peak_times: Mapping[str, float]) -> Card:
+    """Headline numbers of one bearing, peaks first, with the time of a peak where it is known.
+
+    Parameters
+    ----------
+    bearing : str
+        Name of the bearing.
+    values : mapping
+        Identified values by the field names of the estimate's JSON.
+    peak_times : mapping
+        Time [s] of the peaks by field name.
+    """
+    figures = []
+    for field, label, kind in HEADLINE:
+        if field not in values:
+            continue
+        value = Quantity.of(values[field], kind)
+        note = "" if value.interval_90 or not value.status else f"no interval: {value.status}"
+        if field in peak_times:
+            moment = Quantity(value=peak_times[field], kind="time", digits=3).text
+            note = f"at {moment}{f'; {note}' if note else ''}"
+        figures.append(KeyFigure(label=label, value=value, note=note))
+    return Card(title=f"{bearing} touchdown bearing", figures=tuple(figures))
+
+
+def identified_table(bearings: Mapping[str, Values]) -> Table:
+    """Identified values of every bearing side by side, each with its interval and verdict."""
+    rows: list[tuple[Cell, ...]] = []
+    for field, label, kind in IDENTIFIED:
+        if any(field in values for values in bearings.values()):
+            cells: list[Cell] = []
+            for values in bearings.values():
+                value = values.get(field)
+                cells += [Quantity.of(value, kind), value.status if value is not None else "not estimated"]
+            rows.append((label, *cells))
+    columns = [text for bearing in bearings for text in (bearing, f"{bearing}: verdict")]
+    return Table(
+        columns=("identified", *columns),
+        rows=tuple(rows),
+        caption="Identified values",
+        note="Below a value: its 90 % interval, or the limits the record itself sets.",
+    )
+
+
+def half_width(value: IdentifiedValue) -> float:
+    """Half width of the 90 % interval relative to the value [1]; NaN without an interval."""
+    if value.interval_90 is None or not value.value:
+        return math.nan
+    return 0.5 * (value.interval_90[1] - value.interval_90[0]) / abs(value.value)
