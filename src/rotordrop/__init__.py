@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from rotordrop.machine import load_machine as load_machine
     from rotordrop.machine import machine_schema as machine_schema
     from rotordrop.machine import save_machine as save_machine
+    from rotordrop.measurement import Record as Record
+    from rotordrop.measurement import check_record as check_record
+    from rotordrop.measurement import example_record_path as example_record_path
+    from rotordrop.measurement import read_record as read_record
     from rotordrop.model.parameters import DropModel as DropModel
     from rotordrop.model.parameters import build_drop_model as build_drop_model
     from rotordrop.simulation.case import DropCase as DropCase
@@ -27,6 +31,8 @@ if TYPE_CHECKING:
     from rotordrop.simulation.drop import simulate_drop as simulate_drop
     from rotordrop.simulation.result import DropResult as DropResult
     from rotordrop.simulation.result import load_result as load_result
+    from rotordrop.synthesis import score_estimate as score_estimate
+    from rotordrop.synthesis import synthesize_drop as synthesize_drop
     from rotordrop.units import format_quantity as format_quantity
     from rotordrop.units import parse_quantity as parse_quantity
 
@@ -39,16 +45,22 @@ _PUBLIC = {
     "LevitatedStart": "rotordrop.simulation.case",
     "Machine": "rotordrop.machine",
     "PlacedStart": "rotordrop.simulation.case",
+    "Record": "rotordrop.measurement",
     "RotordropError": "rotordrop.errors",
     "build_drop_model": "rotordrop.model.parameters",
+    "check_record": "rotordrop.measurement",
     "example_machine": "rotordrop.machine",
+    "example_record_path": "rotordrop.measurement",
     "format_quantity": "rotordrop.units",
     "load_machine": "rotordrop.machine",
     "load_result": "rotordrop.simulation.result",
     "machine_schema": "rotordrop.machine",
     "parse_quantity": "rotordrop.units",
+    "read_record": "rotordrop.measurement",
     "save_machine": "rotordrop.machine",
+    "score_estimate": "rotordrop.synthesis",
     "simulate_drop": "rotordrop.simulation.drop",
+    "synthesize_drop": "rotordrop.synthesis",
 }
 
 __all__ = ["__version__", *_PUBLIC]
