@@ -60,6 +60,9 @@ class LevitatedStart:
         Decay of that force [s].
     offset : ndarray, shape (A, 2), optional
         Position in which the controller holds the rotor at each AMB [m]; centre by default.
+    orbit : ndarray of complex, shape (A,), optional
+        Circular synchronous orbit at each AMB [m], ``x + jy`` at rotor angle zero, as a controller that
+        follows the runout of its sensors makes it; by default the response to the unbalance alone.
     """
 
     rotor_angle: float = 0.0
@@ -67,6 +70,7 @@ class LevitatedStart:
     remanent_force: Array | None = None
     remanence_time_constant: float = 2e-3
     offset: Array | None = None
+    orbit: NDArray[np.complex128] | None = None
 
 
 Start: TypeAlias = CentredStart | PlacedStart | StateStart | LevitatedStart

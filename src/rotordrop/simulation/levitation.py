@@ -92,22 +92,33 @@ def _placed(model: DropModel, start: PlacedStart, state: Array) -> Array:
     return state
 
 
-def levitated_orbit(model: DropModel, speed: float) -> Array:
+def levitated_orbit(
+    model: DropModel, speed: float, orbit: NDArray[np.complex128] | None = None
+) -> NDArray[np.complex128]:
     """Complex synchronous response (m, 2), in x and y: amplitudes are ``Re(q e^(jθ))`` at rotor angle θ.
 
-    Solves the unbalance response of the rotor in its AMBs (stiffness and damping in every direction alike).
+    The response to the unbalance of the rotor in its AMBs (stiffness and damping in every direction alike);
+    with a given orbit at the AMBs (A,) [m] the magnets also apply the synchronous forces it takes.
     """
     p = model.parameters
     m = p.eigenvalue.shape[0]
-    stiffness = np.einsum("a,ak,aj->kj", p.magnet[:, L.AMB_STIFFNESS], p.magnet_shape, p.magnet_shape)
-    damping = np.einsum("a,ak,aj->kj", p.magnet[:, L.AMB_DAMPING], p.magnet_shape, p.magnet_shape)
-    damping = damping + np.diag(p.damping)
-    dynamic = np.diag(p.eigenvalue) + stiffness - speed**2 * np.eye(m) + 1j * speed * damping
-    coupling = 1j * speed**2 * p.polar
-    matrix = np.block([[dynamic, coupling], [-coupling, dynamic]])
     force = speed**2 * (p.unbalance_cos + 1j * p.unbalance_sin)
-    response = np.linalg.solve(matrix, np.concatenate([force, -1j * force]))
-    return np.column_stack([response[:m], response[m:]])
+    damping = np.diag(p.damping).astype(np.complex128)
+    dynamic = np.diag(p.eigenvalue) - speed**2 * np.eye(m) + 1j * speed * damping + speed**2 * p.polar
+    if orbit is None:
+        stiffness = np.einsum("a,ak,aj->kj", p.magnet[:, L.AMB_STIFFNESS], p.magnet_shape, p.magnet_shape)
+        damper = np.einsum("a,ak,aj->kj", p.magnet[:, L.AMB_DAMPING], p.magnet_shape, p.magnet_shape)
+        forward = np.linalg.solve(dynamic + stiffness + 1j * speed * damper, force)
+    else:
+        n_a = p.magnet_shape.shape[0]
+        if np.shape(orbit) != (n_a,):
+            raise SimulationError(
+                f"the orbit has shape {np.shape(orbit)}; expected ({n_a},): "
+                "one complex amplitude for each AMB."
+            )
+        held = np.block([[dynamic, -p.magnet_shape.T], [p.magnet_shape, np.zeros((n_a, n_a))]])
+        forward = np.linalg.solve(held, np.concatenate([force, np.asarray(orbit)]))[:m]
+    return np.column_stack([forward, -1j * forward])
 
 
 def levitated_static(model: DropModel, offset: Array | None) -> tuple[Array, Array]:
@@ -136,7 +147,9 @@ def _levitated(
             "Add [[amb]] entries with node, stiffness and damping, or use another start."
         )
     static, holding = levitated_static(model, start.offset)
-    orbit = levitated_orbit(model, speed) if speed != 0.0 else np.zeros_like(static, dtype=complex)
+    orbit = np.zeros(static.shape, dtype=np.complex128)
+    if speed != 0.0:
+        orbit = levitated_orbit(model, speed, start.orbit)
     turn = complex(math.cos(start.rotor_angle), math.sin(start.rotor_angle))
     position = static + (orbit * turn).real
     velocity = (1j * speed * orbit * turn).real

@@ -1,0 +1,108 @@
+"""Compare an estimate with the truth of a simulated recording.
+
+Reads truth files of 'rotordrop synthesize' and those that come with the supplied records.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rotordrop.cli._options import JsonOption
+from rotordrop.cli._output import deliver
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+_KINDS = {
+    "air_gap_m": ("air gap", "length"),
+    "support.stiffness_N_per_m": ("support stiffness", "stiffness"),
+    "support.damping_N_s_per_m": ("support damping", "damping"),
+    "support.mass_kg": ("support mass", "mass"),
+    "friction.dynamic": ("dynamic friction", "dimensionless"),
+    "friction.static": ("static friction", "dimensionless"),
+    "contact.stiffness": ("contact stiffness", "contact_stiffness"),
+    "preload_N": ("preload", "force"),
+    "race.inertia_kg_m2": ("race inertia", "inertia"),
+    "peak_force_N": ("peak bearing force", "force"),
+    "mean_force_0p15_0p2_N": ("mean force, 150 to 200 ms", "force"),
+    "peak_stress_Pa": ("peak Hertz stress", "pressure"),
+    "mean_stress_Pa": ("mean Hertz stress", "pressure"),
+    "drop_instant_s": ("drop instant", "time"),
+    "speed_Hz": ("speed", "frequency"),
+}
+
+
+def score(
+    estimate: Annotated[
+        Path, typer.Argument(metavar="ESTIMATE", help="JSON of 'rotordrop estimate'.", show_default=False)
+    ],
+    truth: Annotated[Path, typer.Argument(metavar="TRUTH", help="Truth file, a .json.", show_default=False)],
+    drop: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Which recording of an estimate of several.")
+    ] = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Compare an estimate with the truth of a simulated recording, quantity by quantity."""
+    from rotordrop.synthesis import score_estimate
+
+    scores = score_estimate(estimate, truth, drop=drop)
+
+    def summarise(out: Console) -> None:
+        out.print(_table(scores))
+        for name, impacts in scores["impacts"].items():
+            out.print(_impact_line(name, impacts))
+        coverage = scores["coverage"]
+        if coverage["intervals"]:
+            out.print(
+                f"{coverage['covered']} of {coverage['intervals']} intervals of 90 % hold the true value."
+            )
+        else:
+            out.print("The estimate states no interval.")
+
+    deliver(scores, json_file, summarise)
+
+
+def _table(scores: dict[str, Any]) -> Any:
+    from rich import box
+    from rich.table import Table
+
+    table = Table(
+        title=f"{scores['name']}: estimate against truth", title_justify="left", box=box.SIMPLE_HEAD
+    )
+    for column in ("quantity", "estimate", "truth", "error", "90 % interval"):
+        table.add_column(column, justify="left" if column in ("quantity", "90 % interval") else "right")
+    rows = [("", path, score) for path, score in scores["drop"].items()]
+    for name, fields in scores["bearings"].items():
+        rows += [(f"{name} ", path, score) for path, score in fields.items()]
+    for where, path, entry in rows:
+        table.add_row(*_cells(where, path, entry))
+    return table
+
+
+def _cells(where: str, path: str, entry: dict[str, Any]) -> tuple[str, ...]:
+    from rotordrop.units import format_quantity
+
+    words, kind = _KINDS.get(path, (path, "dimensionless"))
+    relative = entry.get("relative_error")
+    absolute = format_quantity(entry["error"], kind, digits=2)
+    error = absolute
+    if relative is not None and path != "drop_instant_s":
+        error = f"{absolute} ({100.0 * relative:+.2g} %)"
+    held = {True: "holds", False: "misses", None: ""}[entry.get("covered")]
+    width = f" (± {100.0 * entry['half_width']:.2g} %)" if "half_width" in entry else ""
+    return (
+        f"{where}{words}",
+        format_quantity(entry["estimate"], kind, digits=4),
+        format_quantity(entry["truth"], kind, digits=4),
+        error,
+        f"{held}{width}",
+    )
+
+
+def _impact_line(name: str, impacts: dict[str, Any]) -> str:
+    median = impacts["median_absolute_error"]
+    text = f"{name}: {impacts['found']} of {impacts['true_impacts']} impacts above 500 N found"
+    return text if median is None else f"{text}, median error of their peaks {100.0 * median:.2g} %"

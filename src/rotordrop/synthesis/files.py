@@ -1,0 +1,92 @@
+"""Write a synthetic drop: recording and tail for the estimator, the truth in a folder of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.atomic_file import atomic_path, write_json
+from rotordrop.errors import OutputError
+from rotordrop.measurement.record import Record
+from rotordrop.measurement.writers import recording_of, write_delimited, write_hdf5
+from rotordrop.synthesis.recording import SyntheticDrop
+
+Format = Literal["csv", "h5"]
+TRUTH_FOLDER = "truth"
+
+
+def write_synthetic(
+    drop: SyntheticDrop,
+    folder: str | Path,
+    *,
+    name: str | None = None,
+    formats: Sequence[Format] = ("csv",),
+    histories: bool = True,
+) -> tuple[Path, ...]:
+    """Write the files of a synthetic drop.
+
+    Parameters
+    ----------
+    drop : SyntheticDrop
+        What to write.
+    folder : path-like
+        Where to; it is made when it does not exist. The truth goes into its subfolder ``truth``.
+    name : str, optional
+        Stem of the files; the name of the drop by default.
+    formats : sequence of {"csv", "h5"}
+        Formats of the recording; the tail is always text.
+    histories : bool
+        Whether the true histories are written beside the truth.
+
+    Returns
+    -------
+    tuple of Path
+        The files, the recording first.
+    """
+    folder, stem = Path(folder), name or str(drop.truth["name"])
+    try:
+        (folder / TRUTH_FOLDER).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"cannot make the folder {folder}: {error.strerror}; name another one") from error
+    paths = []
+    for kind in formats:
+        paths.append(folder / f"{stem}.{kind}")
+        _write_record(drop.record, paths[-1])
+    if drop.tail is not None:
+        paths.append(folder / f"{stem}_tail.csv")
+        _write_record(drop.tail, paths[-1])
+    paths.append(folder / TRUTH_FOLDER / f"{stem}.json")
+    write_json(paths[-1], {**drop.truth, "name": stem})
+    if histories:
+        paths.append(folder / TRUTH_FOLDER / f"{stem}.npz")
+        _write_histories(drop.histories, paths[-1])
+    return tuple(paths)
+
+
+def _write_record(record: Record, path: Path) -> None:
+    recording = recording_of(
+        record.time,
+        record.signals,
+        record.channel_names,
+        speed_time=record.speed_time,
+        speed=record.speed_readings,
+        metadata=record.metadata,
+    )
+    if path.suffix == ".h5":
+        write_hdf5(recording, path)
+    else:
+        write_delimited(recording, path)
+
+
+def _write_histories(histories: Mapping[str, NDArray[np.float64]], path: Path) -> None:
+    """Store forces and stresses in single precision, displacements in double, as the supplied files do."""
+    precise = ("t0", "fs", "first_250ms_t0", "bearing_displacement", "sensor_plane_displacement")
+    stored = {
+        key: values if key in precise else values.astype(np.float32) for key, values in histories.items()
+    }
+    with atomic_path(path) as temporary, temporary.open("wb") as stream:
+        np.savez_compressed(stream, **stored)  # type: ignore[arg-type]

@@ -1,0 +1,207 @@
+"""Make a recording of a drop of a hidden machine, in memory, together with its truth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop._version import __version__
+from rotordrop.measurement.record import Record
+from rotordrop.simulation.case import DropCase
+from rotordrop.simulation.drop import simulate_drop
+from rotordrop.simulation.result import DropResult
+from rotordrop.synthesis.event import LARGEST_JITTER, DropConditions, HiddenMachine, drop_conditions
+from rotordrop.synthesis.motion import true_motion
+from rotordrop.synthesis.random_streams import stream
+from rotordrop.synthesis.sensor_chain import (
+    OVERSAMPLING,
+    SensorChain,
+    SensorErrors,
+    drawn_errors,
+    readings,
+    speed_readings,
+    true_rows,
+)
+from rotordrop.synthesis.settled import Swing, settled_coordinates, swinging_amplitudes
+from rotordrop.synthesis.true_values import true_histories, true_values
+
+Array = NDArray[np.float64]
+
+TRUE_TOLERANCE = 1e-8
+TAIL_DURATION = 3.0
+TAIL_RATE = 1000.0
+TAIL_START = 54.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class SyntheticDrop:
+    """A simulated recording with everything that is true about it.
+
+    Attributes
+    ----------
+    record : Record
+        The recording, with the sensors as the owner knows them; time 0 is the trigger.
+    tail : Record or None
+        The settled tail at standstill.
+    truth : dict
+        True parameters, sensor errors, forces and stresses, ready for JSON.
+    histories : dict of ndarray
+        True histories, on the clock of the true power-off.
+    result : DropResult
+        The simulated drop itself.
+    """
+
+    record: Record
+    tail: Record | None
+    truth: dict[str, Any]
+    histories: dict[str, Array] = field(repr=False)
+    result: DropResult = field(repr=False)
+
+
+def synthesize_drop(
+    hidden: HiddenMachine,
+    speed: float,
+    seed: int,
+    *,
+    sensor_chain: SensorChain | None = None,
+    duration: float = 0.3,
+    before: float = 0.25,
+    tail: bool = True,
+    conditions: DropConditions | None = None,
+    tolerance: float = TRUE_TOLERANCE,
+    name: str = "synthetic",
+) -> SyntheticDrop:
+    """Simulate a drop of a hidden machine and record it.
+
+    Parameters
+    ----------
+    hidden : HiddenMachine
+        The true machine.
+    speed : float
+        Speed at power-off [rad/s].
+    seed : int
+        Seed of this drop: start, noise, trigger. The sensor errors belong to the machine.
+    sensor_chain : SensorChain, optional
+        Quality of the measuring chain.
+    duration, before : float
+        Length of the recording after and before the trigger [s].
+    tail : bool
+        Whether the settled tail is made too.
+    conditions : DropConditions, optional
+        Start of the drop, in place of a drawn one.
+    tolerance : float
+        Tolerance of the true simulation [1].
+    name : str
+        Name of the recording.
+
+    Returns
+    -------
+    SyntheticDrop
+        Recording, tail, truth and histories.
+    """
+    chain = _violated_chain(sensor_chain or SensorChain(), hidden)
+    conditions = conditions or drop_conditions(hidden, speed, seed)
+    case = DropCase(
+        speed=conditions.speed,
+        duration=duration + 2.0 * LARGEST_JITTER,
+        start=conditions.start,
+        tolerance=tolerance,
+    )
+    result = simulate_drop(hidden.model, case)
+    errors = drawn_errors(chain, len(hidden.machine.sensors), stream(hidden.seed, "sensors"))
+    record = _record(hidden, result, conditions, chain, errors, seed, before, duration, name)
+    rest = settled_coordinates(hidden.model)
+    swing = _drawn_swing(hidden, stream(seed, "swing"))
+    truth = true_values(hidden, result, conditions, chain, errors, rest, name)
+    return SyntheticDrop(
+        record=record,
+        tail=_tail(hidden, rest, swing, chain, errors, seed, name) if tail else None,
+        truth=truth,
+        histories=true_histories(hidden, result, conditions, chain.sampling_rate),
+        result=result,
+    )
+
+
+def _violated_chain(chain: SensorChain, hidden: HiddenMachine) -> SensorChain:
+    broken = hidden.violations
+    corner = broken.anti_alias_frequency or chain.anti_alias_frequency
+    shift = chain.plane_shift + broken.sensor_plane_shift
+    return replace(chain, plane_shift=shift, anti_alias_frequency=corner)
+
+
+def _record(
+    hidden: HiddenMachine,
+    result: DropResult,
+    conditions: DropConditions,
+    chain: SensorChain,
+    errors: SensorErrors,
+    seed: int,
+    before: float,
+    duration: float,
+    name: str,
+) -> Record:
+    dense = OVERSAMPLING if chain.anti_alias_frequency is not None else 1
+    rate = chain.sampling_rate
+    start, stop = -round(before * rate), round(duration * rate)
+    time = np.arange(start * dense, stop * dense + 1) / (rate * dense)
+    amplitudes, angle, speed = true_motion(hidden, result, conditions, time - conditions.jitter)
+    rows = true_rows(hidden.machine, hidden.model.basis, chain, errors)
+    signals = readings(amplitudes @ rows.T, time, angle, chain, errors, stream(seed, "noise"))
+    time, speed = time[::dense], speed[::dense]
+    when, read = speed_readings(time, speed, chain, stream(seed, "tacho"))
+    return Record(
+        time=time,
+        signals=signals,
+        sensors=hidden.known.sensors,
+        sampling_rate=rate,
+        speed=np.interp(time, when, read),
+        speed_time=when,
+        speed_readings=read,
+        metadata=_metadata(hidden, name),
+    )
+
+
+def _drawn_swing(hidden: HiddenMachine, random: np.random.Generator) -> Swing:
+    count = len(hidden.machine.touchdown_bearings)
+    return Swing(
+        amplitude=np.exp(random.uniform(np.log(0.003), np.log(0.1), count)),
+        phase=random.uniform(0.0, 2.0 * np.pi, count),
+        decay_time=float(random.uniform(2.0, 20.0)),
+    )
+
+
+def _tail(
+    hidden: HiddenMachine,
+    rest: Array,
+    swing: Swing,
+    chain: SensorChain,
+    errors: SensorErrors,
+    seed: int,
+    name: str,
+) -> Record:
+    random = stream(seed, "tail")
+    slow = replace(chain, sampling_rate=TAIL_RATE, anti_alias_frequency=None)
+    time = np.arange(round(TAIL_DURATION * TAIL_RATE)) / TAIL_RATE
+    amplitudes = swinging_amplitudes(hidden.model, rest, swing, time)
+    rows = true_rows(hidden.machine, hidden.model.basis, chain, errors)
+    angle = np.full(len(time), random.uniform(0.0, 2.0 * np.pi))
+    signals = readings(amplitudes @ rows.T, TAIL_START + time, angle, slow, errors, random)
+    return Record(
+        time=TAIL_START + time,
+        signals=signals,
+        sensors=hidden.known.sensors,
+        sampling_rate=TAIL_RATE,
+        metadata=_metadata(hidden, f"{name}_tail") | {"event": "settled tail, standstill"},
+    )
+
+
+def _metadata(hidden: HiddenMachine, name: str) -> dict[str, str]:
+    return {
+        "machine": hidden.known.name,
+        "name": name,
+        "origin": f"simulated by rotordrop {__version__}, not measured",
+        "event": "AMB power off",
+    }

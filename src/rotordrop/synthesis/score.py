@@ -1,0 +1,246 @@
+"""Score an estimate against the truth: errors of every quantity, and whether the intervals hold."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.errors import UsageError
+from rotordrop.synthesis.truth import Truth, read_truth, truth_of
+
+Array = NDArray[np.float64]
+Estimate = Mapping[str, Any]
+
+LARGE_IMPACT = 500.0
+"""Impacts whose true peak exceeds this [N] are scored."""
+
+SAME_IMPACT = 5e-4
+"""An estimated impact belongs to a true one when it peaks within it, widened by this [s]."""
+
+_ELSEWHERE = {
+    "contact.stiffness": ("contact.stiffness", "contact.stiffness_N_per_m_n", "contact_stiffness"),
+    "preload_N": ("preload_N", "bearing.preload_N"),
+    "race.inertia_kg_m2": ("race.inertia_kg_m2", "race.inertia"),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Score:
+    """How far one estimated value is from the truth.
+
+    Attributes
+    ----------
+    estimate, truth : float
+        The two values (SI).
+    error : float
+        Estimate minus truth.
+    relative_error : float or None
+        Error over truth [1].
+    covered : bool or None
+        Whether the 90 % interval holds the truth; None without an interval.
+    half_width : float or None
+        Half the interval over the truth [1].
+    """
+
+    estimate: float
+    truth: float
+    error: float
+    relative_error: float | None
+    covered: bool | None
+    half_width: float | None
+
+    def as_json(self) -> dict[str, Any]:
+        """The fields that are known."""
+        return {name: value for name, value in vars(self).items() if value is not None}
+
+
+def score_estimate(
+    estimate: Estimate | str | Path, truth: Truth | Mapping[str, Any] | str | Path, *, drop: str | None = None
+) -> dict[str, Any]:
+    """Compare an estimate with the truth of its recording.
+
+    Parameters
+    ----------
+    estimate : mapping or path
+        Result of ``rotordrop estimate --json``, of one recording or of several.
+    truth : Truth, mapping or path
+        Truth file of a recording, ours or a supplied one.
+    drop : str, optional
+        Which recording of an estimate of several; the name of the truth when left out.
+
+    Returns
+    -------
+    dict
+        ``drop`` and ``bearings.<name>.<quantity>``, each with ``estimate``, ``truth``, ``error``,
+        ``relative_error`` and, where an interval was given, ``covered`` and ``half_width``;
+        ``impacts`` per bearing where the estimate lists impacts; ``coverage`` over all intervals.
+    """
+    known = _truth(truth)
+    found = _one_drop(_estimate(estimate), known, drop)
+    bearings = {name: _bearing_scores(found, known, name) for name in known.bearing_names}
+    whole = _drop_scores(found, known)
+    impacts = {name: score for name in known.bearing_names if (score := _impact_scores(found, known, name))}
+    every = [*whole.values(), *(score for scores in bearings.values() for score in scores.values())]
+    if not every:
+        raise UsageError(
+            f"the estimate holds none of the quantities of the truth {known.name!r}: it has "
+            f"{', '.join(sorted(found)) or 'nothing'}; expected the JSON of 'rotordrop estimate'"
+        )
+    return {
+        "name": known.name,
+        "method": found.get("method"),
+        "drop": {name: score.as_json() for name, score in whole.items()},
+        "bearings": {
+            name: {path: score.as_json() for path, score in scores.items()}
+            for name, scores in bearings.items()
+        },
+        "impacts": impacts,
+        "coverage": _coverage(every),
+    }
+
+
+def _truth(truth: Truth | Mapping[str, Any] | str | Path) -> Truth:
+    if isinstance(truth, Truth):
+        return truth
+    return truth_of(truth) if isinstance(truth, Mapping) else read_truth(truth)
+
+
+def _estimate(estimate: Estimate | str | Path) -> Estimate:
+    if isinstance(estimate, Mapping):
+        return estimate
+    try:
+        loaded = json.loads(Path(estimate).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise UsageError(
+            f"{estimate} cannot be read as an estimate ({error}); "
+            "give the file of 'rotordrop estimate --json'"
+        ) from error
+    if not isinstance(loaded, Mapping):
+        raise UsageError(f"{estimate} holds no estimate; give the file of 'rotordrop estimate --json'")
+    return loaded
+
+
+def _one_drop(estimate: Estimate, truth: Truth, drop: str | None) -> Estimate:
+    drops = estimate.get("drops")
+    if not isinstance(drops, Mapping):
+        return estimate
+    wanted = drop or truth.name
+    if wanted not in drops:
+        raise UsageError(
+            f"the estimate has no drop {wanted!r}; it has {', '.join(map(repr, drops))}: name one with --drop"
+        )
+    machine = estimate.get("machine")
+    shared = machine.get("bearings", {}) if isinstance(machine, Mapping) else {}
+    mine = drops[wanted]
+    names = {*shared, *mine.get("bearings", {})}
+    merged = {name: {**shared.get(name, {}), **mine.get("bearings", {}).get(name, {})} for name in names}
+    return {**mine, "bearings": merged}
+
+
+def _bearing_scores(estimate: Estimate, truth: Truth, bearing: str) -> dict[str, Score]:
+    fields = estimate.get("bearings", {}).get(bearing, {})
+    scores = {}
+    for path, true in truth.of_bearing(bearing).items():
+        entry = next((e for p in _ELSEWHERE.get(path, (path,)) if (e := _at(fields, p)) is not None), None)
+        score = _score(entry, true)
+        if score is not None:
+            scores[path] = score
+    return scores
+
+
+def _drop_scores(estimate: Estimate, truth: Truth) -> dict[str, Score]:
+    pairs = (("drop_instant_s", "t_off_in_record_s"), ("speed_Hz", "n0_hz"))
+    scores = {}
+    for name, key in pairs:
+        true = truth.values.get(key)
+        score = None if true is None else _score(estimate.get(name), float(true))
+        if score is not None:
+            scores[name] = score
+    return scores
+
+
+def _at(fields: Any, path: str) -> Any:
+    for key in path.split("."):
+        if not isinstance(fields, Mapping) or key not in fields:
+            return None
+        fields = fields[key]
+    return fields
+
+
+def _score(entry: Any, truth: float) -> Score | None:
+    value = entry.get("value") if isinstance(entry, Mapping) else entry
+    if not isinstance(value, int | float) or not math.isfinite(value):
+        return None
+    interval = entry.get("interval_90") if isinstance(entry, Mapping) else None
+    relative = (value - truth) / truth if truth != 0.0 else None
+    covered = half = None
+    if interval is not None:
+        low, high = float(interval[0]), float(interval[1])
+        covered = low <= truth <= high
+        half = 0.5 * (high - low) / abs(truth) if truth != 0.0 else None
+    return Score(
+        estimate=float(value),
+        truth=truth,
+        error=float(value) - truth,
+        relative_error=relative,
+        covered=covered,
+        half_width=half,
+    )
+
+
+def _impact_scores(estimate: Estimate, truth: Truth, bearing: str) -> dict[str, Any]:
+    """Errors of the peaks of all large impacts that the estimate lists, and how many it missed."""
+    listed = estimate.get("bearings", {}).get(bearing, {}).get("impacts")
+    if not isinstance(listed, list):
+        return {}
+    true = truth.impacts(bearing)
+    true = true[true[:, 2] > LARGE_IMPACT]
+    matches = [_matching(listed, row) for row in true]
+    errors = [(m[0] - row[2]) / row[2] for m, row in zip(matches, true, strict=True) if m is not None]
+    covered = [m[1] <= row[2] <= m[2] for m, row in zip(matches, true, strict=True) if m is not None and m[3]]
+    return {
+        "true_impacts": len(true),
+        "found": len(errors),
+        "relative_errors": errors,
+        "median_absolute_error": float(np.median(np.abs(errors))) if errors else None,
+        "covered": float(np.mean(covered)) if covered else None,
+    }
+
+
+def _matching(listed: list[Any], row: Array) -> tuple[float, float, float, bool] | None:
+    best = None
+    for impact in listed:
+        time, peak = _number(impact, "time_s", "peak_time_s"), _number(impact, "peak_force_N", "peak_N")
+        if time is None or peak is None or not row[0] - SAME_IMPACT <= time <= row[1] + SAME_IMPACT:
+            continue
+        entry = impact.get("peak_force_N", impact.get("peak_N"))
+        interval = entry.get("interval_90") if isinstance(entry, Mapping) else None
+        low, high = interval if interval is not None else (math.nan, math.nan)
+        if best is None or peak > best[0]:
+            best = (peak, low, high, interval is not None)
+    return best
+
+
+def _number(entry: Any, *names: str) -> float | None:
+    for name in names:
+        value = entry.get(name) if isinstance(entry, Mapping) else None
+        value = value.get("value") if isinstance(value, Mapping) else value
+        if isinstance(value, int | float):
+            return float(value)
+    return None
+
+
+def _coverage(scores: list[Score]) -> dict[str, Any]:
+    judged = [score.covered for score in scores if score.covered is not None]
+    return {
+        "intervals": len(judged),
+        "covered": int(sum(judged)),
+        "fraction": float(np.mean(judged)) if judged else None,
+    }

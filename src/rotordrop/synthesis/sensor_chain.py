@@ -1,0 +1,233 @@
+"""From the motion of the shaft to the numbers in a recording: sensors, disturbances, filter, quantisation."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.errors import UsageError
+from rotordrop.machine import Machine
+from rotordrop.model.reduction import RotorBasis
+
+Array = NDArray[np.float64]
+
+OVERSAMPLING = 5
+FILTER_ORDER = 4
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorChain:
+    """How good the measuring chain is; the defaults are those of an ordinary eddy-current system.
+
+    Attributes
+    ----------
+    sampling_rate : float
+        Samples per second [Hz].
+    gain_error : float
+        Largest deviation of a gain from 1 [1].
+    offset : float
+        Largest offset of a sensor [m].
+    noise : float
+        Noise [m rms].
+    hum, hum_frequency : float
+        Amplitude of the mains hum [m] and its frequency [Hz].
+    runout_1x, runout_2x : float
+        Largest amplitude of electrical runout at once and twice per turn [m].
+    angle_error : float
+        Largest error of a sensor's direction [rad].
+    plane_shift : float
+        Distance by which every sensor plane lies nearer to the middle of the rotor than stated [m].
+    bits : int
+        Bits of the converter; 0 for none.
+    full_scale : float
+        Largest reading [m], in both directions; readings beyond are clipped.
+    anti_alias_frequency : float, optional
+        Corner frequency of a Butterworth filter of fourth order before the sampling [Hz].
+    speed_interval : float
+        Time between two readings of the speed [s].
+    speed_noise : float
+        Noise of a speed reading [rad/s rms].
+    speed_resolution : float
+        Step of the speed readings [rad/s].
+    """
+
+    sampling_rate: float = 20e3
+    gain_error: float = 0.01
+    offset: float = 10e-6
+    noise: float = 0.45e-6
+    hum: float = 0.1e-6
+    hum_frequency: float = 50.0
+    runout_1x: float = 0.3e-6
+    runout_2x: float = 0.15e-6
+    angle_error: float = 0.0
+    plane_shift: float = 0.0
+    bits: int = 16
+    full_scale: float = 600e-6
+    anti_alias_frequency: float | None = None
+    speed_interval: float = 0.01
+    speed_noise: float = 2.0 * math.pi * 0.02
+    speed_resolution: float = 2.0 * math.pi * 0.01
+
+    def __post_init__(self) -> None:
+        if not self.sampling_rate > 0.0:
+            raise UsageError(f"the sampling rate is {self.sampling_rate!r} Hz; expected a positive number")
+        corner = self.anti_alias_frequency
+        if corner is not None and not 0.0 < corner < 0.5 * OVERSAMPLING * self.sampling_rate:
+            raise UsageError(
+                f"the corner frequency {corner!r} Hz does not fit a sampling rate of "
+                f"{self.sampling_rate:g} Hz"
+            )
+        if not 0 <= self.bits <= 32:
+            raise UsageError(f"{self.bits} bits are no converter; expected 0 (none) to 32")
+
+
+PERFECT = SensorChain(
+    gain_error=0.0,
+    offset=0.0,
+    noise=0.0,
+    hum=0.0,
+    runout_1x=0.0,
+    runout_2x=0.0,
+    bits=0,
+    speed_noise=0.0,
+    speed_resolution=0.0,
+)
+"""Sensors without any error."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorErrors:
+    """Errors of the sensors of one machine, the same in all its recordings; shape (S,) throughout.
+
+    Attributes
+    ----------
+    gain : ndarray
+        Reading over true displacement [1].
+    offset : ndarray
+        Reading of the centred rotor [m].
+    angle : ndarray
+        True minus stated direction [rad].
+    runout_1x, runout_2x : ndarray
+        Complex amplitude of the runout [m] at rotor angle zero.
+    """
+
+    gain: Array
+    offset: Array
+    angle: Array
+    runout_1x: NDArray[np.complex128]
+    runout_2x: NDArray[np.complex128]
+
+
+def drawn_errors(chain: SensorChain, sensors: int, random: np.random.Generator) -> SensorErrors:
+    """Draw the errors of a machine's sensors within the limits of the chain."""
+    gain = 1.0 + chain.gain_error * random.uniform(-1.0, 1.0, sensors)
+    offset = chain.offset * random.uniform(-1.0, 1.0, sensors)
+    angle = chain.angle_error * random.uniform(-1.0, 1.0, sensors)
+    size = random.uniform(0.3, 1.0, (2, sensors))
+    turn = np.exp(2j * np.pi * random.uniform(0.0, 1.0, (2, sensors)))
+    return SensorErrors(
+        gain=gain,
+        offset=offset,
+        angle=angle,
+        runout_1x=chain.runout_1x * size[0] * turn[0],
+        runout_2x=chain.runout_2x * size[1] * turn[1],
+    )
+
+
+def true_rows(machine: Machine, basis: RotorBasis, chain: SensorChain, errors: SensorErrors) -> Array:
+    """Displacement along every true sensor per modal amplitude, shape (S, 2m): x amplitudes, then y."""
+    positions = np.asarray(machine.rotor.node_positions)
+    middle = 0.5 * (positions[0] + positions[-1])
+    rows = []
+    for sensor, wrong in zip(machine.sensors, errors.angle, strict=True):
+        place = positions[sensor.node - 1]
+        place = place + math.copysign(chain.plane_shift, middle - place)
+        shape = shape_at(positions, basis, place)
+        angle = float(sensor.angle) + wrong
+        rows.append(sensor.polarity * np.concatenate([math.cos(angle) * shape, math.sin(angle) * shape]))
+    return np.array(rows)
+
+
+def shape_at(positions: Array, basis: RotorBasis, place: float) -> Array:
+    """Displacement per modal amplitude, shape (m,), anywhere along the rotor [m], by cubics."""
+    if not positions[0] <= place <= positions[-1]:
+        raise UsageError(
+            f"a sensor plane at {1e3 * place:.4g} mm lies outside the rotor, which reaches from "
+            f"{1e3 * positions[0]:.4g} to {1e3 * positions[-1]:.4g} mm; shift it less"
+        )
+    i = int(np.clip(np.searchsorted(positions, place, side="right") - 1, 0, len(positions) - 2))
+    length = positions[i + 1] - positions[i]
+    s = (place - positions[i]) / length
+    left, right = basis.node_row(i + 1), basis.node_row(i + 2)
+    slope_left, slope_right = basis.slope_row(i + 1), basis.slope_row(i + 2)
+    return np.asarray(
+        (1.0 - 3.0 * s**2 + 2.0 * s**3) * left
+        + length * (s - 2.0 * s**2 + s**3) * slope_left
+        + (3.0 * s**2 - 2.0 * s**3) * right
+        + length * (s**3 - s**2) * slope_right
+    )
+
+
+def readings(
+    along: Array,
+    time: Array,
+    angle: Array,
+    chain: SensorChain,
+    errors: SensorErrors,
+    random: np.random.Generator,
+) -> Array:
+    """Readings of the sensors [m], shape (N, S), at the sampling rate.
+
+    Parameters
+    ----------
+    along : ndarray, shape (M, S)
+        True displacement along the sensors [m]; M = N without filter, else five times as dense.
+    time : ndarray, shape (M,)
+        Record time [s].
+    angle : ndarray, shape (M,)
+        Rotor angle [rad].
+    """
+    turn = np.exp(1j * angle)[:, None]
+    signal = errors.gain * along + errors.offset
+    signal = signal + (errors.runout_1x * turn + errors.runout_2x * turn**2).real
+    phase = random.uniform(0.0, 2.0 * np.pi, along.shape[1])
+    signal = signal + chain.hum * np.cos(2.0 * np.pi * chain.hum_frequency * time[:, None] + phase)
+    if chain.anti_alias_frequency is not None:
+        signal = _filtered(signal, chain)[::OVERSAMPLING]
+    signal = signal + chain.noise * random.standard_normal(signal.shape)
+    return quantised(signal, chain)
+
+
+def quantised(signal: Array, chain: SensorChain) -> Array:
+    """Readings after clipping and rounding to the steps of the converter [m]."""
+    if chain.bits == 0:
+        return signal
+    step = 2.0 * chain.full_scale / 2.0**chain.bits
+    top = 2 ** (chain.bits - 1)
+    return np.asarray(step * np.clip(np.round(signal / step), -top, top - 1))
+
+
+def _filtered(signal: Array, chain: SensorChain) -> Array:
+    from scipy.signal import butter, sosfilt, sosfilt_zi
+
+    assert chain.anti_alias_frequency is not None
+    rate = OVERSAMPLING * chain.sampling_rate
+    sections = butter(FILTER_ORDER, chain.anti_alias_frequency, fs=rate, output="sos")
+    start = sosfilt_zi(sections)[:, :, None] * signal[0]
+    return np.asarray(sosfilt(sections, signal, axis=0, zi=start)[0])
+
+
+def speed_readings(
+    time: Array, speed: Array, chain: SensorChain, random: np.random.Generator
+) -> tuple[Array, Array]:
+    """Times [s] and readings [rad/s] of the tacho, shape (K,): one per interval, with noise, rounded."""
+    interval = max(1, round(chain.speed_interval * chain.sampling_rate))
+    first = int(random.integers(0, interval))
+    chosen = np.arange(first, len(time), interval)
+    values = speed[chosen] + chain.speed_noise * random.standard_normal(len(chosen))
+    if chain.speed_resolution > 0.0:
+        values = chain.speed_resolution * np.round(values / chain.speed_resolution)
+    return time[chosen], values

@@ -1,0 +1,117 @@
+"""Read what is true about a simulated recording: ours and the supplied truth files have the same layout."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.errors import UsageError
+
+Array = NDArray[np.float64]
+
+_NEEDED = ("air_gap_m", "peak_force_N")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Truth:
+    """What is true about one simulated recording.
+
+    Attributes
+    ----------
+    values : mapping
+        The fields of the truth file.
+    histories : mapping of str to ndarray
+        True histories, empty when there is no file of them.
+    path : Path, optional
+        Where the truth was read.
+    """
+
+    values: Mapping[str, Any]
+    histories: Mapping[str, Array] = field(default_factory=dict, repr=False)
+    path: Path | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of the recording."""
+        return str(self.values.get("name", self.path.stem if self.path else "truth"))
+
+    @property
+    def bearing_names(self) -> tuple[str, ...]:
+        """Names of the touchdown bearings."""
+        return tuple(self.values["air_gap_m"])
+
+    def of_bearing(self, bearing: str) -> dict[str, float]:
+        """True values of one bearing (SI) by path in an estimate, such as ``"support.mass_kg"``."""
+        found = {}
+        for path, (key, factor) in _FIELDS.items():
+            value = self.values.get(key)
+            if isinstance(value, Mapping):
+                value = value.get(bearing)
+            if value is not None:
+                found[path] = factor * float(value)
+        return found
+
+    def impacts(self, bearing: str) -> Array:
+        """Start [s], end [s] and peak force [N] of every contact of a bearing, shape (R, 3)."""
+        rows = self.values.get("contact_intervals_0_0p25_s", {}).get(bearing, [])
+        return np.asarray(rows, dtype=np.float64).reshape(-1, 3)
+
+
+_FIELDS: dict[str, tuple[str, float]] = {
+    "air_gap_m": ("air_gap_m", 1.0),
+    "support.stiffness_N_per_m": ("support_stiffness", 1.0),
+    "support.damping_N_s_per_m": ("support_damping", 1.0),
+    "support.mass_kg": ("support_mass", 1.0),
+    "friction.dynamic": ("friction_dynamic", 1.0),
+    "friction.static": ("friction_static", 1.0),
+    "contact.stiffness": ("contact_K", 1.0),
+    "preload_N": ("preload_N", 1.0),
+    "race.inertia_kg_m2": ("ring_Ip", 1.0),
+    "peak_force_N": ("peak_force_N", 1.0),
+    "mean_force_0p15_0p2_N": ("mean_force_0p15_0p2_N", 1.0),
+    "peak_stress_Pa": ("max_stress_MPa", 1e6),
+    "mean_stress_Pa": ("mean_stress_MPa", 1e6),
+}
+
+
+def read_truth(path: str | Path) -> Truth:
+    """Read a truth file, ours or a supplied one; the histories beside it (.npz) come along where they exist.
+
+    Raises
+    ------
+    UsageError
+        When the file cannot be read or is no truth file.
+    """
+    path = Path(path)
+    try:
+        values = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise UsageError(
+            f"{path} cannot be read as a truth file ({error}); give the .json of a recording"
+        ) from error
+    return truth_of(values, path=path, histories=_histories(path.with_suffix(".npz")))
+
+
+def truth_of(values: Any, *, path: Path | None = None, histories: Mapping[str, Array] | None = None) -> Truth:
+    """Truth from the fields of a truth file, refused when it is none."""
+    missing = [key for key in _NEEDED if not isinstance(values, Mapping) or key not in values]
+    if missing:
+        raise UsageError(
+            f"{path or 'the given object'} is no truth file: it has no "
+            f"{' and no '.join(map(repr, missing))}; "
+            "give the .json that 'rotordrop synthesize' wrote, or a supplied truth file"
+        )
+    return Truth(values=values, histories=histories or {}, path=path)
+
+
+def _histories(path: Path) -> dict[str, Array]:
+    if not path.is_file():
+        return {}
+    with np.load(path) as stored:
+        return {name: stored[name] for name in stored.files}
