@@ -9,11 +9,11 @@ from rotordrop.estimation.tracked import TrackedDrop
 from rotordrop.machine import Machine
 from rotordrop.report.content import ReportContent, Section, Statement
 from rotordrop.report.cross_check import CrossCheck, cross_check_statements, cross_check_table
-from rotordrop.report.data_quality import FindingLike, data_quality_section, quality_statements
 from rotordrop.report.estimate_numbers import headline_card, identified_table
 from rotordrop.report.machine_sections import defaults_section, weight_shares
 from rotordrop.report.measured_motion import CARRIED
 from rotordrop.report.quantity import Quantity
+from rotordrop.report.record_quality import FindingLike, quality_statements, record_quality_section
 from rotordrop.report.sections import (
     first_contact_section,
     force_section,
@@ -140,7 +140,7 @@ def _sections(
     ]
     if cross_checks:
         sections.append(_cross_check_section(cross_checks))
-    return (*sections, data_quality_section(findings), *defaults_section(machine))
+    return (*sections, record_quality_section(findings), *defaults_section(machine))
 
 
 def _cross_check_section(cross_checks: Sequence[CrossCheck]) -> Section:

@@ -10,10 +10,10 @@ from numpy.testing import assert_allclose
 
 from rotordrop.report.content import Table
 from rotordrop.report.cross_check import CrossCheck, cross_check_statements, cross_check_table
-from rotordrop.report.data_quality import data_quality_section
 from rotordrop.report.impacts import impact_figure, impact_table, impacts_of
 from rotordrop.report.parameters import ParameterRow, parameter_figure, parameter_table
 from rotordrop.report.quantity import Quantity
+from rotordrop.report.record_quality import record_quality_section
 from rotordrop.report.stress_box import stress_box, stress_box_figure, stress_table, thinned
 from rotordrop.severity.statistics import stress_statistics
 from rotordrop.simulation.result import DropResult
@@ -128,7 +128,7 @@ class Finding:
 
 
 def test_findings_tell_channel_time_and_remedy_the_serious_ones_first() -> None:
-    section = data_quality_section(
+    section = record_quality_section(
         [
             Finding("hum", "S_DE_B", None, "50 Hz hum of 1.2 µm peak", "ground the cable", "warning"),
             Finding("clipping", "S_NDE_A", 0.0082, "clipped at 500 µm", "use a larger range", "stop"),
@@ -148,7 +148,7 @@ def test_findings_tell_channel_time_and_remedy_the_serious_ones_first() -> None:
 
 
 def test_a_sound_record_is_called_sound() -> None:
-    (statement,) = data_quality_section([]).statements
+    (statement,) = record_quality_section([]).statements
     assert statement.level == "good"
 
 

@@ -35,7 +35,7 @@ class FindingLike(Protocol):
     def severity(self) -> str: ...  # noqa: D102
 
 
-def data_quality_section(findings: Sequence[FindingLike]) -> Section:
+def record_quality_section(findings: Sequence[FindingLike]) -> Section:
     """Tell what the gate found, each with channel, time and remedy; or that it found nothing."""
     if not findings:
         sound = Statement(text="The plausibility checks found nothing wrong with the record.", level="good")
