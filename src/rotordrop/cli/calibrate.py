@@ -1,0 +1,85 @@
+"""Calibrate a machine on several recorded drops and write the machine file with estimates.
+
+One fit over all drops: supports, contacts, air gaps, friction, preload, sensors, each with a 90 % interval.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rotordrop.cli._options import JsonOption, MachineArgument
+from rotordrop.cli._output import deliver, progress_bar, require_places
+from rotordrop.errors import UsageError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from rotordrop.estimation.calibrated import Calibration
+
+
+def calibrate(
+    machine: MachineArgument,
+    records: Annotated[list[Path], typer.Argument(metavar="RECORD...", help="Recorded drops of this machine.")],
+    output: Annotated[
+        Path, typer.Option("--output", metavar="FILE", help="Calibrated machine file to write (.toml).")
+    ],
+    tail: Annotated[
+        list[Path] | None,
+        typer.Option("--tail", metavar="FILE", help="Settled tail: one for all drops, or one for each in order."),
+    ] = None,
+    profile: Annotated[
+        Path | None, typer.Option("--profile", metavar="FILE", help="Channel map of the recorder.")
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """Calibrate a machine on recorded drops."""
+    from rotordrop.estimation.calibrated import calibrate_machine, calibration_json
+    from rotordrop.machine import load_machine, save_machine
+    from rotordrop.measurement.record import read_record
+
+    require_places(output, json)
+    description = load_machine(machine)
+    tails = tail or []
+    if len(tails) not in (0, 1, len(records)):
+        raise UsageError(
+            f"{len(tails)} tails for {len(records)} records; expected one for all, one for each, or none. "
+            "Repeat --tail in the order of the records."
+        )
+    read = [read_record(path, description, profile=profile) for path in records]
+    rests = [read_record(path, description, profile=profile) for path in tails]
+    per_drop = [None] * len(read) if not rests else rests * len(read) if len(rests) == 1 else rests
+    with progress_bar() as report:
+        result = calibrate_machine(description, read, per_drop, progress=report)
+    save_machine(result.machine, output)
+    deliver(calibration_json(result), json, lambda out: _summary(result, output, out))
+
+
+def _summary(result: Calibration, output: Path, out: Console) -> None:
+    from rich.table import Table
+
+    from rotordrop.report.quantity import with_unit
+
+    table = Table("parameter", "estimate", "90 % interval", "verdict", box=None)
+    verdicts = {entry.path.replace("axial_offset", "preload"): entry.verdict for entry in result.identifiability}
+    for path, value in result.values.items():
+        low, high = value.interval_90 or (value.value, value.value)
+        table.add_row(
+            path,
+            with_unit(value.value, value.unit),
+            f"{with_unit(low, value.unit)} … {with_unit(high, value.unit)}",
+            verdicts.get(path, "determined"),
+        )
+    out.print(table)
+    for pair in result.confounded:
+        out.print(
+            f"confounded: {pair.first} and {pair.second} (correlation {pair.correlation:.2f}); {pair.way_out}"
+        )
+    for name, checks in result.checks.items():
+        for check in checks:
+            if not check.passed:
+                out.print(f"{name}: {check.message}")
+    out.print(result.sentence())
+    out.print(f"Calibrated machine: {output}")
