@@ -1,59 +1,79 @@
-"""The start of a simulated drop from what the user writes, such as ``--place "NDE: 10 um, -5 um"``."""
+"""How a simulated drop starts, from what was written on the command line."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from rotordrop.errors import UsageError
 from rotordrop.units import parse_quantity
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from rotordrop.machine import Machine
-    from rotordrop.simulation.case import Start
+    from rotordrop.simulation.case import LevitatedStart, PlacedStart
 
-_STARTS = ("centred", "levitated", "given")
+_EXAMPLES = {"length": "10 um, -20 um", "velocity": "0 mm/s, -5 mm/s", "force": "0 N, 40 N"}
 
 
-def start_of(name: str, machine: Machine, places: list[str], velocities: list[str]) -> Start:
-    """The start a user asks for: by name, with places and velocities at the bearings when given."""
-    from rotordrop.simulation.case import CentredStart, LevitatedStart, PlacedStart
+def named_pairs(texts: Sequence[str], kind: str, names: Sequence[str]) -> NDArray[np.float64]:
+    """Read entries such as ``"NDE: 10 um, -20 um"`` into SI values, shape (names, 2), zero where not named.
 
-    if name not in _STARTS:
-        raise UsageError(f"--start is {name!r}; choose one of {', '.join(_STARTS)}")
-    if name != "given":
-        if places or velocities:
-            raise UsageError(f"--place and --velocity belong to '--start given', not to '--start {name}'")
-        return CentredStart() if name == "centred" else LevitatedStart()
-    if not places:
-        raise UsageError(f"'--start given' needs a --place for each bearing: {_bearing_names(machine)}")
+    Parameters
+    ----------
+    texts : sequence of str
+        A name, a colon, and a horizontal and a vertical quantity.
+    kind : str
+        Kind of both quantities, as in `rotordrop.units.KINDS`.
+    names : sequence of str
+        All names there are.
+
+    Examples
+    --------
+    >>> from rotordrop.cli._start import named_pairs
+    >>> named_pairs(["DE: 10 um, -20 um"], "length", ["NDE", "DE"]).tolist()
+    [[0.0, 0.0], [1e-05, -2e-05]]
+    """
+    import numpy as np
+
+    if texts and not names:
+        raise UsageError(f"{texts[0]!r} names a part of the machine, which has none of this kind")
+    values = np.zeros((len(names), 2))
+    for text in texts:
+        name, _, pair = text.rpartition(":")
+        parts = pair.split(",")
+        if name.strip() not in names or len(parts) != 2:
+            raise UsageError(
+                f"{text!r} is not 'NAME: horizontal, vertical' with a name out of {', '.join(names)}; "
+                f"write for example '{names[0]}: {_EXAMPLES[kind]}'"
+            )
+        values[list(names).index(name.strip())] = [parse_quantity(part, kind) for part in parts]
+    return values
+
+
+def placed_start(machine: Machine, displacements: Sequence[str], velocities: Sequence[str]) -> PlacedStart:
+    """Start from given displacements and velocities at the touchdown bearings; zero where not given."""
+    from rotordrop.simulation.case import PlacedStart
+
+    names = [bearing.name for bearing in machine.touchdown_bearings]
     return PlacedStart(
-        displacement=_per_bearing("--place", places, machine, "length", needed=True),
-        velocity=_per_bearing("--velocity", velocities, machine, "velocity", needed=False),
+        displacement=named_pairs(displacements, "length", names),
+        velocity=named_pairs(velocities, "velocity", names),
     )
 
 
-def _bearing_names(machine: Machine) -> str:
-    return ", ".join(bearing.name for bearing in machine.touchdown_bearings)
+def levitated_start(
+    machine: Machine, rotor_angle: float, delay: float, remanent_force: Sequence[str], decay: float
+) -> LevitatedStart:
+    """Start on the synchronous orbit in the AMBs, with what the magnets still do after power-off."""
+    from rotordrop.simulation.case import LevitatedStart
 
-
-def _per_bearing(option: str, texts: list[str], machine: Machine, kind: str, *, needed: bool) -> Any:
-    """Values (B, 2) from texts such as ``"NDE: 10 um, -5 um"``."""
-    import numpy as np
-
-    found: dict[str, tuple[float, float]] = {}
-    for text in texts:
-        name, colon, rest = text.partition(":")
-        parts = rest.split(",")
-        if not colon or len(parts) != 2:
-            raise UsageError(f'{option} {text!r} is not of the form "NDE: x, y" with two values and units')
-        found[name.strip()] = (parse_quantity(parts[0].strip(), kind), parse_quantity(parts[1].strip(), kind))
-    names = [bearing.name for bearing in machine.touchdown_bearings]
-    unknown = sorted(found.keys() - set(names))
-    if unknown:
-        raise UsageError(f"{option} names the bearing {unknown[0]!r}; the machine has {', '.join(names)}")
-    missing = [name for name in names if name not in found]
-    if needed and missing:
-        raise UsageError(
-            f"{option} is missing for the bearing {missing[0]}; give one for each of {', '.join(names)}"
-        )
-    return np.array([found.get(name, (0.0, 0.0)) for name in names])
+    names = [amb.name for amb in machine.ambs]
+    return LevitatedStart(
+        rotor_angle=rotor_angle,
+        delay=delay,
+        remanent_force=named_pairs(remanent_force, "force", names) if remanent_force else None,
+        remanence_time_constant=decay,
+    )

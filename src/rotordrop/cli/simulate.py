@@ -1,139 +1,144 @@
-"""Simulate one drop from a machine file.
+"""Simulate a drop and show forces, stresses and contacts.
 
-Prints peaks, contacts, how the computation ended and how far it can be trusted.
+Starts centred, from given displacements and velocities, or levitated in the AMBs.
 """
 
 from __future__ import annotations
 
+from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rotordrop.cli._options import JsonOption, MachineArgument, quantity
-from rotordrop.cli._output import deliver
-from rotordrop.cli._start import start_of
+from rotordrop.cli._output import deliver, require_places
+from rotordrop.cli._start import levitated_start, placed_start
+from rotordrop.errors import UsageError
 
 if TYPE_CHECKING:
-    from rotordrop.model.reduction import Reduction
-    from rotordrop.simulation.case import DropCase
-    from rotordrop.simulation.result import DropResult
+    from rotordrop.simulation.case import Start
 
-_PLACE_HELP = 'Where the rotor starts at a bearing, x and y, such as "NDE: 10 um, -5 um"; with --start given.'
+
+class Reduction(StrEnum):
+    """Presets of the reduction of the rotor."""
+
+    accurate = "accurate"
+    quick = "quick"
+    full = "full"
+
+
+class Spin(StrEnum):
+    """What makes the speed fall."""
+
+    dynamic = "dynamic"
+    prescribed = "prescribed"
+    constant = "constant"
+
+
+class Integrator(StrEnum):
+    """Runge–Kutta pairs."""
+
+    tsit5 = "tsit5"
+    dp5 = "dp5"
 
 
 def simulate(
     machine: MachineArgument,
     speed: Annotated[
-        float,
-        typer.Option(parser=quantity("speed"), metavar="SPEED", help='Speed at power-off, such as "60 Hz".'),
+        float, typer.Option(parser=quantity("speed"), metavar="SPEED", help='Speed at power-off, "60 Hz".')
     ],
     duration: Annotated[
-        float, typer.Option(parser=quantity("time"), metavar="TIME", help="Length of the simulation.")
+        float,
+        typer.Option(
+            parser=quantity("time"), metavar="TIME", help="How long to simulate.", show_default="0.2 s"
+        ),
     ] = 0.2,
-    start: Annotated[
-        str,
+    output_step: Annotated[
+        float,
         typer.Option(
-            metavar="START",
-            help="centred (at rest), levitated (AMBs, orbit, sag) or given (see --place and --velocity).",
+            parser=quantity("time"), metavar="TIME", help="Step of the histories.", show_default="10 us"
         ),
-    ] = "centred",
-    place: Annotated[list[str] | None, typer.Option(metavar="PLACE", help=_PLACE_HELP)] = None,
-    velocity: Annotated[
+    ] = 1e-5,
+    displacement: Annotated[
         list[str] | None,
-        typer.Option(metavar="VELOCITY", help='Its velocity there, such as "NDE: 0 m/s, -2 mm/s".'),
+        typer.Option(metavar="PLACE", help='Start displaced: "NDE: 10 um, -20 um" (horizontal, vertical).'),
     ] = None,
-    reduction: Annotated[
-        str, typer.Option(metavar="BASIS", help="Rotor basis: accurate, quick, full, or a number of modes.")
-    ] = "accurate",
-    tolerance: Annotated[float, typer.Option(metavar="NUMBER", help="Accuracy of a step.")] = 1e-6,
-    certify: Annotated[
-        bool,
+    velocity: Annotated[
+        list[str] | None, typer.Option(metavar="PLACE", help='Start moving: "NDE: 0 mm/s, -5 mm/s".')
+    ] = None,
+    levitated: Annotated[
+        bool, typer.Option("--levitated", help="Start floating in the AMBs: synchronous orbit and sag.")
+    ] = False,
+    rotor_angle: Annotated[
+        float,
         typer.Option(
-            "--certify/--no-certify",
-            help="Repeat with a tighter tolerance and more modes; say what moves (three times as long).",
+            parser=quantity("angle"), metavar="ANGLE", help="Levitated: rotor angle.", show_default="0 deg"
         ),
-    ] = True,
+    ] = 0.0,
+    delay: Annotated[
+        float,
+        typer.Option(
+            parser=quantity("time"), metavar="TIME", help="Levitated: magnets hold on.", show_default="0 s"
+        ),
+    ] = 0.0,
+    remanent_force: Annotated[
+        list[str] | None,
+        typer.Option(metavar="FORCE", help='Levitated: force left at power-off, "NDE: 0 N, 40 N".'),
+    ] = None,
+    remanence_time: Annotated[
+        float,
+        typer.Option(
+            parser=quantity("time"), metavar="TIME", help="Levitated: its decay.", show_default="2 ms"
+        ),
+    ] = 2e-3,
+    spin: Annotated[Spin, typer.Option(help="What makes the speed fall.")] = Spin.dynamic,
+    reduction: Annotated[Reduction, typer.Option(help="Modes of the rotor.")] = Reduction.accurate,
+    tolerance: Annotated[float, typer.Option(min=1e-12, max=1e-3, help="Accuracy of a step.")] = 1e-6,
+    integrator: Annotated[Integrator, typer.Option(help="Runge–Kutta pair.")] = Integrator.tsit5,
+    certify: Annotated[
+        bool, typer.Option("--certify", help="Also measure the numerical error (three times the time).")
+    ] = False,
     output: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write the histories as HDF5, readable as NetCDF4.")
+        Path | None,
+        typer.Option("--output", "-o", metavar="FILE", help="Write all histories as HDF5 (NetCDF4)."),
     ] = None,
     report: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write an HTML page with the figures.")
+        Path | None, typer.Option(metavar="FILE", help="Write the report as one HTML file.")
     ] = None,
     json_file: JsonOption = None,
 ) -> None:
-    """Simulate one drop: bearing forces, Hertz stress, contacts, and how exact they are."""
+    """Simulate a drop and show forces, stresses and contacts of every touchdown bearing."""
     from rotordrop.machine import load_machine
+    from rotordrop.report.page import write_page
     from rotordrop.report.simulate_page import simulate_page
+    from rotordrop.report.simulation_numbers import simulation_numbers
     from rotordrop.report.terminal import print_summary
     from rotordrop.simulation.case import DropCase
     from rotordrop.simulation.drop import simulate_drop
 
+    require_places(output, report, json_file)
     described = load_machine(machine)
+    if levitated:
+        if displacement or velocity:
+            raise UsageError("--levitated cannot go with --displacement or --velocity; choose one start")
+        start: Start = levitated_start(described, rotor_angle, delay, remanent_force or (), remanence_time)
+    else:
+        start = placed_start(described, displacement or (), velocity or ())
     case = DropCase(
         speed=speed,
         duration=duration,
+        output_step=output_step,
         tolerance=tolerance,
-        reduction=_reduction(reduction),
-        start=start_of(start, described, place or [], velocity or []),
+        reduction=reduction.value,
+        start=start,
+        spin=spin.value,
+        integrator=integrator.value,
     )
     result = simulate_drop(described, case, certify=certify)
+    page = simulate_page(result, described)
     if output is not None:
         result.save(output)
-    content = simulate_page(result, described)
     if report is not None:
-        from rotordrop.report.page import write_page
-
-        write_page(content, report)
-    written = [(name, path) for name, path in (("histories", output), ("report", report)) if path is not None]
-
-    def summarise(out: Any) -> None:
-        print_summary(content, out)
-        for name, path in written:
-            out.print(f"{name}: {path}")
-
-    deliver(result_json(result, case), json_file, summarise)
-
-
-def result_json(result: DropResult, case: DropCase) -> dict[str, Any]:
-    """The numbers of a simulated drop, SI units in the names, ready for JSON."""
-    from rotordrop.report.from_simulation import peak_stress
-
-    bearings = {}
-    for index, name in enumerate(result.bearing_names):
-        force, stress = result.peak_force(index), peak_stress(result, index)
-        log = result.contacts.of_bearing(index)
-        bearings[name] = {
-            "peak_force_N": {"value": force[0], "time_s": force[1]},
-            "peak_stress_Pa": {"value": stress[0], "time_s": stress[1]},
-            "mean_stress_Pa": {"value": float(result.max_stress[:, index].mean())},
-            "contacts": [
-                {"start_s": float(a), "end_s": float(b) if b == b else None, "peak_force_N": float(f)}
-                for a, b, f in zip(log.start, log.end, log.peak_force, strict=True)
-            ],
-        }
-    return {
-        "machine": result.machine_name,
-        "speed_Hz": result.initial_speed / 6.283185307179586,
-        "duration_s": float(result.time[-1]),
-        "start": type(case.start).__name__,
-        "reduction": result.reduction,
-        "tolerance": result.tolerance,
-        "finished": result.finished,
-        "outcome": result.outcome,
-        "certificate": _certificate_json(result),
-        "bearings": bearings,
-    }
-
-
-def _certificate_json(result: DropResult) -> dict[str, Any]:
-    numbers = {name: value for name, value in vars(result.certificate).items() if value is not None}
-    return {name: value.tolist() if hasattr(value, "tolist") else value for name, value in numbers.items()}
-
-
-def _reduction(text: str) -> str | Reduction:
-    if not text.isdigit():
-        return text
-    from rotordrop.model.reduction import Reduction
-
-    return Reduction(modes=int(text), attachment=False)
+        write_page(page, report)
+    deliver(simulation_numbers(result), json_file, lambda out: print_summary(page, out))
