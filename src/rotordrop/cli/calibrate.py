@@ -22,13 +22,17 @@ if TYPE_CHECKING:
 
 def calibrate(
     machine: MachineArgument,
-    records: Annotated[list[Path], typer.Argument(metavar="RECORD...", help="Recorded drops of this machine.")],
+    records: Annotated[
+        list[Path], typer.Argument(metavar="RECORD...", help="Recorded drops of this machine.")
+    ],
     output: Annotated[
         Path, typer.Option("--output", metavar="FILE", help="Calibrated machine file to write (.toml).")
     ],
     tail: Annotated[
         list[Path] | None,
-        typer.Option("--tail", metavar="FILE", help="Settled tail: one for all drops, or one for each in order."),
+        typer.Option(
+            "--tail", metavar="FILE", help="Settled tail: one for all drops, or one for each in order."
+        ),
     ] = None,
     profile: Annotated[
         Path | None, typer.Option("--profile", metavar="FILE", help="Channel map of the recorder.")
@@ -63,7 +67,9 @@ def _summary(result: Calibration, output: Path, out: Console) -> None:
     from rotordrop.report.quantity import with_unit
 
     table = Table("parameter", "estimate", "90 % interval", "verdict", box=None)
-    verdicts = {entry.path.replace("axial_offset", "preload"): entry.verdict for entry in result.identifiability}
+    verdicts = {
+        entry.path.replace("axial_offset", "preload"): entry.verdict for entry in result.identifiability
+    }
     for path, value in result.values.items():
         low, high = value.interval_90 or (value.value, value.value)
         table.add_row(

@@ -33,7 +33,9 @@ SEPARATED_BY: dict[frozenset[str], str] = {
     ),
     frozenset({"air_gap", "offset"}): "a lift test of the rotor in its magnets gives the diametral clearance",
     frozenset({"friction.dynamic", "race.inertia"}): "a speed sensor on the inner race gives its spin-up",
-    frozenset({"contact.stiffness", "air_gap"}): "a static push with a known force gives the contact stiffness",
+    frozenset(
+        {"contact.stiffness", "air_gap"}
+    ): "a static push with a known force gives the contact stiffness",
 }
 
 
@@ -89,7 +91,9 @@ class Calibration:
     def sentence(self) -> str:
         """The outcome in words."""
         found = sum(entry.verdict == "determined" for entry in self.identifiability)
-        text = f"{found} of {len(self.identifiability)} parameters are determined by {len(self.checks)} drop(s)"
+        text = (
+            f"{found} of {len(self.identifiability)} parameters are determined by {len(self.checks)} drop(s)"
+        )
         if self.consistent:
             return f"{text}; the model is consistent with all of them."
         bad = [name for name, checks in self.checks.items() if not all(check.passed for check in checks)]
@@ -168,8 +172,12 @@ def _values(
     for c, sensor in enumerate(problem.model.machine.sensors):
         gain, offset = first + c, first + problem.n_channels + c
         reading = 1.0 + float(mean[gain])
-        values[f"sensors.{sensor.name}.gain"] = _plain(1.0 / reading, float(sigma[gain]) / reading**2, widening, "1")
-        values[f"sensors.{sensor.name}.offset"] = _plain(float(mean[offset]), float(sigma[offset]), widening, "m")
+        values[f"sensors.{sensor.name}.gain"] = _plain(
+            1.0 / reading, float(sigma[gain]) / reading**2, widening, "1"
+        )
+        values[f"sensors.{sensor.name}.offset"] = _plain(
+            float(mean[offset]), float(sigma[offset]), widening, "m"
+        )
     return values
 
 
@@ -187,7 +195,11 @@ def machine_values(values: dict[str, IdentifiedValue], source: str) -> dict[str,
         if path.endswith("support.anisotropy"):
             continue
         entries[path] = Estimated(
-            value=value.value, status="estimated", interval_90=value.interval_90, source=source, unit=value.unit
+            value=value.value,
+            status="estimated",
+            interval_90=value.interval_90,
+            source=source,
+            unit=value.unit,
         )
     for path, value in values.items():
         if path.endswith("support.anisotropy"):

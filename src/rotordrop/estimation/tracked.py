@@ -203,7 +203,9 @@ def track_drops(
         if quick:
             return track(coarse, CALIBRATED_SCHEDULE[1:2], progress=progress)
         fine_model = build_drop_model(machine, FINE_BASIS)
-        return track([drop_problem(fine_model, p, until) for p in prepared], CALIBRATED_SCHEDULE, progress=progress)
+        return track(
+            [drop_problem(fine_model, p, until) for p in prepared], CALIBRATED_SCHEDULE, progress=progress
+        )
     contact = max(_first_contact(item) for item in prepared)
     first = track(coarse, shifted(BLIND_SCHEDULE, contact), progress=progress)
     fine_model = build_drop_model(machine, FINE_BASIS)
@@ -231,7 +233,9 @@ def best_noise_factor(problem: DropProblem, smoothed: Smoothed, stage: Stage) ->
     return NOISE_FACTORS[int(np.argmin(scores))]
 
 
-def tracked_drop(prepared: Preparation, problem: DropProblem, smoothed: Smoothed, noise_factor: float) -> TrackedDrop:
+def tracked_drop(
+    prepared: Preparation, problem: DropProblem, smoothed: Smoothed, noise_factor: float
+) -> TrackedDrop:
     """Forces, values, impacts and checks of one smoothed drop."""
     checks = consistency_checks(problem, smoothed, noise_factor)
     consistent = all(check.passed for check in checks)
@@ -286,7 +290,10 @@ def _force_values(forces: ForceHistory, b: int, widening: float) -> tuple[dict[s
     late = (forces.time >= 0.15) & (forces.time <= 0.2)
     if forces.time[-1] >= 0.199:
         values["mean_force_0p15_0p2_N"] = with_interval(
-            float(np.mean(forces.magnitude[late, b])), float(np.mean(forces.magnitude_sigma[late, b])), widening, "N"
+            float(np.mean(forces.magnitude[late, b])),
+            float(np.mean(forces.magnitude_sigma[late, b])),
+            widening,
+            "N",
         )
     return values, moment
 

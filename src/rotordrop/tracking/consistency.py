@@ -51,7 +51,8 @@ def normalised_innovations(smoothed: Smoothed) -> Array:
     """Innovations of the displacement channels over their standard deviation [1], shape (N, C)."""
     done = smoothed.filtered.done
     return np.asarray(
-        smoothed.filtered.innovations[:done, :-1] / np.sqrt(smoothed.filtered.innovation_variances[:done, :-1])
+        smoothed.filtered.innovations[:done, :-1]
+        / np.sqrt(smoothed.filtered.innovation_variances[:done, :-1])
     )
 
 

@@ -12,7 +12,7 @@ from rotordrop.model.layout import KernelParameters
 from rotordrop.physics._compile import kernel
 from rotordrop.physics.ball_bearing_planar import largest_ball_load, planar_ball_force
 from rotordrop.simulation._loop import contact_at
-from rotordrop.tracking import _filter as F
+from rotordrop.tracking import _propagation as P
 from rotordrop.tracking.problem import DropProblem, private_copy
 from rotordrop.tracking.smoother import Smoothed
 
@@ -60,7 +60,7 @@ def _bearing_values(
 def force_values(
     means: Array,
     s: int,
-    targets: F.ParameterTargets,
+    targets: P.ParameterTargets,
     p: KernelParameters,
     n_parameters: int,
     values: Array,
@@ -79,7 +79,7 @@ def force_values(
     y = np.zeros(s + 2)
     step_d = 1e-9
     for i in range(means.shape[0]):
-        F.apply_parameters(means[i, s : s + n_parameters].copy(), targets, p)
+        P.apply_parameters(means[i, s : s + n_parameters].copy(), targets, p)
         y[:s] = means[i, :s]
         for b in range(n_b):
             r = 2 * m + 2 * b

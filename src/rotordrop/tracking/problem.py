@@ -15,6 +15,7 @@ from rotordrop.model.statics import levitated_sag, settled_sag
 from rotordrop.physics import aerodynamics
 from rotordrop.physics.ball_bearing import bearing_constants
 from rotordrop.tracking import _filter as F
+from rotordrop.tracking import _propagation as P
 from rotordrop.tracking.sensors import LevitatedPhase, levitated_phase, without_hum_and_runout
 from rotordrop.tracking.unknowns import NINETY, Unknown, all_unknowns, parameter_targets
 
@@ -59,7 +60,7 @@ class DropProblem:
 
     model: DropModel
     unknowns: tuple[Unknown, ...]
-    targets: F.ParameterTargets
+    targets: P.ParameterTargets
     time: Array
     readings: Array
     speed: Array
@@ -127,9 +128,13 @@ def build_problem(
     unknowns = all_unknowns(model) if unknowns is None else unknowns
     known = np.isfinite(speed)
     if not np.any(known):
-        raise IdentificationError("the record has no rotor speed; expected a speed channel or a given speed in Hz.")
-    omega = float(np.median(speed[known & (time < 0.005)])) if np.any(known & (time < 0.005)) else float(
-        speed[known][0]
+        raise IdentificationError(
+            "the record has no rotor speed; expected a speed channel or a given speed in Hz."
+        )
+    omega = (
+        float(np.median(speed[known & (time < 0.005)]))
+        if np.any(known & (time < 0.005))
+        else float(speed[known][0])
     )
     phase = levitated_phase(time, readings, omega)
     clean = without_hum_and_runout(time, readings, omega * time, phase)
@@ -236,7 +241,9 @@ def _rotor_prior(model: DropModel, rows: Array, readings: Array, mean: Array, si
     amplitude[: basis.n_rigid] = 0.0
     mean[layout.modal_y] = amplitude
     rigid = slice(0, basis.n_rigid)
-    observed = readings[: min(10, len(readings))].mean(axis=0) - rows[:, : mean.size][:, layout.modal_y] @ amplitude
+    observed = (
+        readings[: min(10, len(readings))].mean(axis=0) - rows[:, : mean.size][:, layout.modal_y] @ amplitude
+    )
     design = np.hstack([rows[:, layout.modal_x][:, rigid], rows[:, layout.modal_y][:, rigid]])
     fitted, *_ = np.linalg.lstsq(design, observed, rcond=None)
     mean[layout.modal_x][rigid] = fitted[: basis.n_rigid]
@@ -275,7 +282,7 @@ def settled_displacement(problem: DropProblem, theta: Array) -> Array:
 
 def _with_theta(problem: DropProblem, theta: Array) -> L.KernelParameters:
     p = private_copy(problem.model.parameters)
-    F.apply_parameters(np.asarray(theta, dtype=np.float64).copy(), problem.targets, p)
+    P.apply_parameters(np.asarray(theta, dtype=np.float64).copy(), problem.targets, p)
     return p
 
 
@@ -294,7 +301,7 @@ def apply_tail(problem: DropProblem, tail_level: Array, mean: Array, covariance:
     height = settled_displacement(problem, theta)
     slopes = np.zeros((n_c, n_p))
     for k in range(n_p):
-        if not np.any((problem.targets.target[:, 0] == k) & (problem.targets.target[:, 1] == F.ON_BEARING)):
+        if not np.any((problem.targets.target[:, 0] == k) & (problem.targets.target[:, 1] == P.ON_BEARING)):
             continue
         trial = theta.copy()
         trial[k] += problem.targets.step[k]

@@ -43,7 +43,9 @@ MINIMUM_CYCLES = 2.0
 MAINS_FREQUENCY = 50.0
 
 
-def levitated_phase(time: Array, readings: Array, omega: float, mains: float = MAINS_FREQUENCY) -> LevitatedPhase:
+def levitated_phase(
+    time: Array, readings: Array, omega: float, mains: float = MAINS_FREQUENCY
+) -> LevitatedPhase:
     """Fit level, 1X, 2X and hum to the readings before power-off by linear least squares.
 
     Parameters

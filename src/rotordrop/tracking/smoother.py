@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.tracking import _filter as F
+from rotordrop.tracking import _propagation as P
 from rotordrop.tracking.problem import DropProblem, private_copy
 
 Array = NDArray[np.float64]
@@ -42,10 +43,10 @@ class PassSettings:
     speed_noise: float = 1e-3
     learning_end: float = 0.05
 
-    def for_sampling(self, dt: float) -> F.FilterSettings:
+    def for_sampling(self, dt: float) -> P.FilterSettings:
         """Settings of the kernel for a sample distance [s]; noise grows with the square root of time."""
         growth = np.sqrt(dt / 50e-6)
-        return F.FilterSettings(
+        return P.FilterSettings(
             dt=dt,
             substeps=max(1, round(self.substeps * dt / 50e-6)),
             impulse=self.impulse * growth,

@@ -15,7 +15,7 @@ from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.model import layout as L
 from rotordrop.model.parameters import DropModel
 from rotordrop.physics.ball_bearing import BearingConstants, bearing_constants
-from rotordrop.tracking import _filter as F
+from rotordrop.tracking import _propagation as P
 
 Array = NDArray[np.float64]
 Scope = Literal["machine", "drop"]
@@ -122,7 +122,7 @@ def bearing_unknowns(bearing: TouchdownBearing, row: int) -> Iterator[Unknown]:
             sigma=relative_sigma(quantity, path),
             logarithmic=True,
             scope="machine",
-            targets=tuple((F.ON_BEARING, row, column, factor) for column, factor in columns),
+            targets=tuple((P.ON_BEARING, row, column, factor) for column, factor in columns),
             unit=unit,
         )
 
@@ -133,7 +133,7 @@ def bearing_unknowns(bearing: TouchdownBearing, row: int) -> Iterator[Unknown]:
         sigma=_absolute_sigma(bearing.air_gap, GAP_SIGMA),
         logarithmic=False,
         scope="machine",
-        targets=((F.ON_BEARING, row, L.AIR_GAP, 1.0),),
+        targets=((P.ON_BEARING, row, L.AIR_GAP, 1.0),),
         unit="m",
     )
     sideways = float(support.stiffness_horizontal) / float(support.stiffness)
@@ -150,7 +150,7 @@ def bearing_unknowns(bearing: TouchdownBearing, row: int) -> Iterator[Unknown]:
         sigma=ANISOTROPY_SIGMA,
         logarithmic=True,
         scope="machine",
-        targets=((F.SCALE_BEARING, row, L.SUPPORT_STIFFNESS_X, 1.0),),
+        targets=((P.SCALE_BEARING, row, L.SUPPORT_STIFFNESS_X, 1.0),),
         unit="1",
     )
     yield relative(
@@ -191,7 +191,7 @@ def _bearing_damping(bearing: TouchdownBearing, row: int) -> Unknown:
         sigma=relative_sigma(bearing.damping_time, "damping_time"),
         logarithmic=True,
         scope="machine",
-        targets=((F.ON_BEARING, row, L.BEARING_DAMPING, math.nan),),
+        targets=((P.ON_BEARING, row, L.BEARING_DAMPING, math.nan),),
         unit="s",
     )
 
@@ -212,7 +212,7 @@ def _axial_offset(bearing: TouchdownBearing, row: int) -> Unknown:
         sigma=preload * spread / slope,
         logarithmic=False,
         scope="machine",
-        targets=((F.ON_BEARING, row, L.AXIAL_OFFSET, 1.0),),
+        targets=((P.ON_BEARING, row, L.AXIAL_OFFSET, 1.0),),
         unit="m",
     )
 
@@ -250,7 +250,7 @@ def drop_unknowns(model: DropModel) -> Iterator[Unknown]:
                 sigma=max(float(unbalance.amount), 1e-9),
                 logarithmic=False,
                 scope="drop",
-                targets=((F.ON_UNBALANCE, plane, column, 1.0),),
+                targets=((P.ON_UNBALANCE, plane, column, 1.0),),
                 unit="kg m",
             )
     for a, amb in enumerate(machine.ambs):
@@ -261,7 +261,7 @@ def drop_unknowns(model: DropModel) -> Iterator[Unknown]:
                 sigma=REMANENT_SIGMA,
                 logarithmic=False,
                 scope="drop",
-                targets=((F.ON_MAGNET, a, column, 1.0),),
+                targets=((P.ON_MAGNET, a, column, 1.0),),
                 unit="N",
             )
     if machine.ambs:
@@ -276,7 +276,7 @@ def _positive(path: str, value: float, sigma: float, entry: int, unit: str) -> U
         sigma=sigma,
         logarithmic=True,
         scope="drop",
-        targets=((F.ON_SPIN, 0, entry, 1.0),),
+        targets=((P.ON_SPIN, 0, entry, 1.0),),
         unit=unit,
     )
 
@@ -296,17 +296,17 @@ def all_unknowns(model: DropModel) -> tuple[Unknown, ...]:
     return tuple(found)
 
 
-def parameter_targets(model: DropModel, unknowns: tuple[Unknown, ...]) -> F.ParameterTargets:
+def parameter_targets(model: DropModel, unknowns: tuple[Unknown, ...]) -> P.ParameterTargets:
     """Flat table of what the unknowns set in the kernel, in the order given."""
     rows, factors = [], []
     for index, unknown in enumerate(unknowns):
         for kind, row, column, factor in unknown.targets:
             rows.append((index, kind, row, column))
             factors.append(_stiffness_of_damping(model, unknown, row) if math.isnan(factor) else factor)
-    order = sorted(range(len(rows)), key=lambda i: rows[i][1] == F.SCALE_BEARING)
+    order = sorted(range(len(rows)), key=lambda i: rows[i][1] == P.SCALE_BEARING)
     planes = [model.basis.node_row(unbalance.node) for unbalance in model.machine.unbalances]
     shape = np.array(planes) if planes else np.zeros((0, model.layout.n_modes))
-    return F.ParameterTargets(
+    return P.ParameterTargets(
         target=np.array([rows[i] for i in order], dtype=np.int64).reshape(-1, 4),
         factor=np.array([factors[i] for i in order]),
         logarithmic=np.array([int(u.logarithmic) for u in unknowns], dtype=np.int64),

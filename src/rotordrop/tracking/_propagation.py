@@ -1,0 +1,254 @@
+"""One step of the drop model with its sensitivity to state and parameters, and the noise added to it."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.model import layout as L
+from rotordrop.model.layout import KernelParameters
+from rotordrop.physics._compile import kernel
+from rotordrop.simulation._loop import contact_at
+from rotordrop.simulation._rhs import drop_derivative
+from rotordrop.simulation._sensitivity import drop_jacobian
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+# What a parameter acts on.
+ON_BEARING = 0
+ON_SPIN = 1
+ON_MAGNET = 2
+ON_UNBALANCE = 3
+SCALE_BEARING = 4
+
+
+class ParameterTargets(NamedTuple):
+    """Which kernel entries the unknown parameters set; R targets, P parameters, U unbalance planes.
+
+    ``target`` (R, 4): parameter, kind, row, column; ``factor`` (R,) [1]; ``logarithmic`` (P,) flags; ``step`` (P,) of the
+    finite difference by which the right-hand side is differentiated; ``drift`` (P,) standard deviation of the random walk
+    of each parameter per square root of a second, ``late_drift`` the same later in a drop; ``plane_shape`` (U, m) mode shapes of the planes.
+    """
+
+    target: IntArray
+    factor: Array
+    logarithmic: IntArray
+    step: Array
+    drift: Array
+    late_drift: Array
+    plane_shape: Array
+
+
+class FilterSettings(NamedTuple):
+    """Numbers of one pass: sample distance [s], integration steps per sample, impulse noise [N s] and its share.
+
+    ``impulse`` is the standard deviation of an unknown impulse per sample at each bearing and axis, ``share`` the same
+    as a fraction of the contact impulse, ``spin_noise`` that of the race spins per sample [rad/s], ``speed_noise`` that
+    of the rotor speed [rad/s]. After ``learning_end`` [s] the late drift of the parameters holds.
+    """
+
+    dt: float
+    substeps: int
+    impulse: float
+    share: float
+    spin_noise: float
+    speed_noise: float
+    learning_end: float
+
+
+@kernel
+def apply_parameters(theta: Array, targets: ParameterTargets, p: KernelParameters) -> None:
+    """Write parameter values into the kernel arrays (which must be private copies)."""
+    cleared = False
+    for i in range(targets.target.shape[0]):
+        k = targets.target[i, 0]
+        kind = targets.target[i, 1]
+        row = targets.target[i, 2]
+        column = targets.target[i, 3]
+        value = theta[k]
+        if targets.logarithmic[k] != 0:
+            value = math.exp(value)
+        value *= targets.factor[i]
+        if kind == ON_BEARING:
+            p.bearing[row, column] = value
+            if column == L.AIR_GAP:
+                p.bearing[row, L.ROTOR_RADIUS] = p.bearing[row, L.BORE_RADIUS] - value
+        elif kind == SCALE_BEARING:
+            p.bearing[row, column] *= value
+        elif kind == ON_SPIN:
+            p.spin[column] = value
+        elif kind == ON_MAGNET:
+            p.magnet[row, column] = value
+        else:
+            if not cleared:
+                p.unbalance_cos[:] = 0.0
+                p.unbalance_sin[:] = 0.0
+                cleared = True
+            for j in range(p.unbalance_cos.shape[0]):
+                if column == 0:
+                    p.unbalance_cos[j] += value * targets.plane_shape[row, j]
+                else:
+                    p.unbalance_sin[j] += value * targets.plane_shape[row, j]
+
+
+@kernel
+def parameter_jacobian(
+    t: float,
+    y: Array,
+    theta: Array,
+    targets: ParameterTargets,
+    p: KernelParameters,
+    base: Array,
+    other: Array,
+    work: Array,
+    B: Array,
+) -> None:
+    """Derivative of the right-hand side by the parameters, shape (s, P), by one-sided differences."""
+    drop_derivative(t, y, p, base, work)
+    s = B.shape[0]
+    for k in range(theta.shape[0]):
+        value = theta[k]
+        theta[k] = value + targets.step[k]
+        apply_parameters(theta, targets, p)
+        drop_derivative(t, y, p, other, work)
+        theta[k] = value
+        for i in range(s):
+            B[i, k] = (other[i] - base[i]) / targets.step[k]
+    apply_parameters(theta, targets, p)
+
+
+@kernel
+def gather_entries(J: Array, entries: Array, columns: IntArray, starts: IntArray) -> None:
+    """List the entries of a mostly empty square matrix row by row, so that products need not look for them."""
+    n = J.shape[0]
+    count = 0
+    for i in range(n):
+        starts[i] = count
+        for k in range(n):
+            if J[i, k] != 0.0:
+                entries[count] = J[i, k]
+                columns[count] = k
+                count += 1
+    starts[n] = count
+
+
+@kernel
+def sparse_product(entries: Array, columns: IntArray, starts: IntArray, V: Array, out: Array) -> None:
+    """Product of a listed matrix (see `gather_entries`) with a full one; rows of ``V`` are contiguous."""
+    c = V.shape[1]
+    for i in range(starts.shape[0] - 1):
+        for j in range(c):
+            out[i, j] = 0.0
+        for e in range(starts[i], starts[i + 1]):
+            value = entries[e]
+            k = columns[e]
+            for j in range(c):
+                out[i, j] += value * V[k, j]
+
+
+@kernel
+def rk4_step(t: float, h: float, y: Array, p: KernelParameters, k: Array, trial: Array, work: Array) -> None:
+    """One classical Runge–Kutta step in place; ``k`` (5, n) and ``trial`` (n,) are scratch, ``k[4]`` the midpoint state."""
+    n = y.shape[0]
+    drop_derivative(t, y, p, k[0], work)
+    for i in range(n):
+        trial[i] = y[i] + 0.5 * h * k[0, i]
+    drop_derivative(t + 0.5 * h, trial, p, k[1], work)
+    for i in range(n):
+        k[4, i] = y[i] + 0.5 * h * k[1, i]
+    drop_derivative(t + 0.5 * h, k[4], p, k[2], work)
+    for i in range(n):
+        trial[i] = y[i] + h * k[2, i]
+    drop_derivative(t + h, trial, p, k[3], work)
+    for i in range(n):
+        y[i] += h / 6.0 * (k[0, i] + 2.0 * k[1, i] + 2.0 * k[2, i] + k[3, i])
+
+
+@kernel
+def propagate(
+    t: float,
+    y: Array,
+    theta: Array,
+    targets: ParameterTargets,
+    p: KernelParameters,
+    settings: FilterSettings,
+    F: Array,
+    impulses: Array,
+) -> None:
+    """Advance a state by one sample in place and fill its sensitivity ``F`` (s, s + P) to state and parameters.
+
+    ``impulses`` (B,) receives the contact impulse of each bearing over the sample [N s].
+    """
+    n = y.shape[0]
+    s, columns = F.shape
+    J = np.empty((s, s))
+    B = np.empty((s, columns - s))
+    first = np.empty((s, columns))
+    second = np.empty((s, columns))
+    third = np.empty((s, columns))
+    entries = np.empty(s * s)
+    places = np.empty(s * s, dtype=np.int64)
+    starts = np.empty(s + 1, dtype=np.int64)
+    k = np.empty((5, n))
+    trial = np.empty(n)
+    work = np.empty((2, p.ball_cos.shape[1]))
+    contact = np.empty(6)
+    h = settings.dt / settings.substeps
+    F[:, :] = 0.0
+    for i in range(s):
+        F[i, i] = 1.0
+    impulses[:] = 0.0
+    for step in range(settings.substeps):
+        now = t + step * h
+        rk4_step(now, h, y, p, k, trial, work)
+        middle = k[4].copy()
+        drop_jacobian(now + 0.5 * h, middle, p, J)
+        gather_entries(J, entries, places, starts)
+        if columns > s and step % 2 == 0:
+            parameter_jacobian(now + 0.5 * h, middle, theta, targets, p, k[0], k[1], work, B)
+        for b in range(p.bearing.shape[0]):
+            contact_at(b, middle, p, contact)
+            impulses[b] += h * contact[1]
+        # F <- exp(hJ) F + what the parameters add, to third order: the second order would let light modes grow
+        sparse_product(entries, places, starts, F, first)
+        for i in range(s):
+            for j in range(columns - s):
+                first[i, s + j] += B[i, j]
+        sparse_product(entries, places, starts, first, second)
+        sparse_product(entries, places, starts, second, third)
+        for i in range(s):
+            for j in range(columns):
+                F[i, j] += h * (first[i, j] + h * (0.5 * second[i, j] + h / 6.0 * third[i, j]))
+
+
+@kernel
+def add_process_noise(
+    P: Array, p: KernelParameters, settings: FilterSettings, impulses: Array, drift: Array
+) -> None:
+    """Add unknown impulses between rotor and race, noise of the spins and drift of the parameters to a covariance."""
+    m = p.eigenvalue.shape[0]
+    n_b = p.bearing.shape[0]
+    n_q = 2 * m + 4 * n_b
+    g = np.empty(m + 1)
+    place = np.empty(m + 1, dtype=np.int64)
+    for b in range(n_b):
+        sigma = settings.impulse + settings.share * impulses[b]
+        for axis in range(2):
+            for k in range(m):
+                g[k] = -p.bearing_shape[b, k]
+                place[k] = n_q + axis * m + k
+            g[m] = 1.0 / p.bearing[b, L.RACE_MASS]
+            place[m] = n_q + 2 * m + 2 * b + axis
+            for i in range(m + 1):
+                for j in range(m + 1):
+                    P[place[i], place[j]] += sigma * sigma * g[i] * g[j]
+        spin = settings.spin_noise + sigma * p.bearing[b, L.BORE_RADIUS] / p.bearing[b, L.RACE_INERTIA] * 0.1
+        P[2 * n_q + b, 2 * n_q + b] += spin * spin
+    P[2 * n_q + n_b, 2 * n_q + n_b] += settings.speed_noise * settings.speed_noise
+    s = 2 * n_q + n_b + 2
+    for k in range(drift.shape[0]):
+        P[s + k, s + k] += drift[k] * drift[k] * settings.dt
