@@ -8,9 +8,10 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import binary_closing, label
 
+from rotordrop.spectrum._found_line import FIVE_MOMENTS, FoundLine, path_range, radius
 from rotordrop.spectrum.detection import Peak, clearest_peak, stretches_of
-from rotordrop.spectrum.frequency_path import FrequencyPath
 from rotordrop.spectrum.line_extraction import Envelope, Offset, drift_phase, extract, mean_offset, smooth
 from rotordrop.spectrum.line_settings import LineSettings
 from rotordrop.spectrum.line_spectra import FramePower, frequency_power, offset_power, order_power
@@ -22,10 +23,32 @@ Mask = NDArray[np.bool_]
 TURN = 2.0 * math.pi
 
 LASTING = 4
-"""Frames [1] in which a line must be seen to be looked for first; what lasts shorter is looked for last."""
+"""Fewest frames [1] in which a line must be seen."""
 
-LAG = 0.2
-"""Time [s] over which the turning of an envelope is measured; unambiguous to ± 2.5 Hz."""
+LAGS = (0.2, 0.2, 0.4, 0.8)
+"""Times [s] over which the turning of an envelope is measured; 0.2 s is unambiguous to ± 2.5 Hz."""
+
+SHORT_FRAME = 0.25
+"""Share [1] of the usual frame in which brief lines are looked for."""
+
+BRIEF = 0.2
+"""Share of the signal [1] below which a line is brief."""
+
+DECIDED = 2.0
+"""Lines of resolution [1] by which an order must move for it to be told from a steady line."""
+
+LEFT_OVER = 0.25
+"""Share of a peak's power [1] that may be left when its line is taken out."""
+
+CLOSE = 5.0
+"""Bandwidths [1] by which an order may move for a steady line to hold part of its power, and the reverse."""
+
+HARMLESS = 30.0
+"""Amplitude over the floor [1] up to which nothing is left of a line that was taken out."""
+
+MOST_REFUSED = 40
+BURST = 30.0
+"""Amplitude over the usual one [1] from which a brief line is taken out before all others."""
 
 STEADY_PARTNERS = 3
 COMBINED_ORDERS = (-2.0, -1.0, 1.0, 2.0)
@@ -33,36 +56,29 @@ BESIDE = 25.0
 """Band [Hz] on either side of a moving path whose power is its floor."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class FoundLine:
-    """A line that was found, before it has a name; fields as in `rotordrop.spectrum.lines.Line`."""
+@dataclass(frozen=True, kw_only=True)
+class _View:
+    """One way to look at the signal: over frequency, or over order."""
 
-    kind: LineKind
-    frequency: float
-    frequency_error: float
-    order: float | None
-    order_error: float | None
-    drift: tuple[float, float]
-    width: float
-    amplitude: Array
-    forward: Array
-    backward: Array
-    floor: float
-    ratio: float
-    first_seen: float
-    last_seen: float
-    existence: float
-    phase: Array
-    time: Array
-    path: Array
-    strength: float
-    parent: FoundLine | None = None
-    multiple: float = 0.0
+    frames: FramePower
+    of_orders: bool
+    length: Array
+    share: float
 
-    def path_of_frequency(self) -> FrequencyPath:
-        """Frequency over time, about twenty values per second."""
-        step = max(round(0.05 / (self.time[1] - self.time[0])), 1)
-        return FrequencyPath(time=self.time[::step], frequency=self.path[::step])
+    @property
+    def resolution(self) -> float:
+        """Of a usual frame [Hz]."""
+        return 1.0 / float(np.median(self.length))
+
+
+@dataclass(frozen=True)
+class _Refused:
+    """A peak that turned out to be no line, and when."""
+
+    of_orders: bool
+    coordinate: float
+    first: float
+    last: float
 
 
 class LineSearch:
@@ -86,120 +102,200 @@ class LineSearch:
         self._time = start_time + np.arange(len(signal)) / sampling_rate
         self._rest = signal - smooth(signal, round(sampling_rate / settings.lowest_frequency))
         self._angle = None if profile is None else profile.angle_at(self._time)
-        self._speed = None if profile is None else profile.speed_at(self._time) / TURN
+        self._speed = np.zeros(len(signal)) if profile is None else profile.speed_at(self._time) / TURN
+        self._refused: list[_Refused] = []
         self.found: list[FoundLine] = []
 
     def run(self) -> list[FoundLine]:
-        """Lasting lines first, then sums and differences, then what is seen for a while, then for a
-        moment.
+        """Strong bursts first, since they blur all else; then lasting lines, sums and differences, the
+        rest.
         """
-        self._single_lines(speed_change=0.4)
+        self._bursts()
+        self._single_lines(speed_change=0.4, shares=(1.0,))
         self._combinations()
-        self._single_lines(speed_change=0.0)
+        self._single_lines(speed_change=0.0, shares=(1.0, SHORT_FRAME))
         return self.found
 
-    def _single_lines(self, *, speed_change: float) -> None:
-        """Take lines out as long as any is seen while the speed falls by such a share of itself."""
-        while len(self.found) < self.settings.most_lines:
-            steady, orders = self._frequency_view(), self._order_view()
-            of_steady = self._clearest(steady, speed_change, order=False)
-            of_orders = orders and self._clearest(orders, speed_change, order=True)
-            if of_orders and orders and (not of_steady or of_orders.score > of_steady.score):
-                self._take(of_orders, orders, order=True)
-            elif of_steady:
-                self._take(of_steady, steady, order=False)
+    def _bursts(self) -> None:
+        """Take out what is strong for a moment only, against what the same frequency usually shows."""
+        while len(self._refused) < MOST_REFUSED and self._profile is not None:
+            view = self._frequency_view(SHORT_FRAME)
+            usual = np.median(view.frames.power, axis=0)
+            peak = self._clearest(view, 0.0, usual)
+            if peak is None or peak.ratio < BURST:
+                break
+            line = self._follow(peak, view)
+            moved = math.inf if line is None else abs(line.frequency - peak.coordinate)
+            if line is not None and line.brief and line.kind == "steady" and moved < 0.3 * view.resolution:
+                self._keep(line)
             else:
+                self._refuse(peak, view)
+        self._refused = []
+
+    def _single_lines(self, *, speed_change: float, shares: tuple[float, ...]) -> None:
+        """Take lines out as long as any is seen while the speed falls by such a share of itself."""
+        while len(self.found) < self.settings.most_lines and len(self._refused) < MOST_REFUSED:
+            views = [view for share in shares for view in self._views(share)]
+            peaks = [(self._clearest(view, speed_change), view) for view in views]
+            seen = [(peak, view) for peak, view in peaks if peak is not None]
+            if not seen:
                 return
+            peak, view = max(seen, key=lambda one: one[0].score)
+            line = self._follow(peak, view)
+            if line is None:
+                self._refuse(peak, view)
+            else:
+                self._keep(line)
 
-    def _clearest(self, view: FramePower, speed_change: float, *, order: bool) -> Peak | None:
-        speed = self._at(view.time, self._speed)
-        stretches = [
-            (first, last)
-            for first, last in stretches_of(len(view.time), LASTING)
-            if speed[first] - speed[last - 1] >= speed_change * speed[first:last].mean()
-        ]
-        return clearest_peak(view, self._free(view, order), self.settings.detection, stretches)
+    def _keep(self, line: FoundLine) -> None:
+        self.found.append(line)
+        self._rest = self._rest - line.taken
 
-    @property
-    def _frame(self) -> float:
-        """Length of a frame [s]: as set, or a third of a short signal."""
-        return min(self.settings.frame, len(self._rest) / self._rate / 3.0)
+    def _refuse(self, peak: Peak, view: _View) -> None:
+        first, last = view.frames.time[[peak.first, peak.last - 1]]
+        self._refused.append(_Refused(view.of_orders, peak.coordinate, float(first), float(last)))
 
-    def _frequency_view(self) -> FramePower:
-        return frequency_power(
-            self._rest, self._rate, start_time=self._start, frame=self._frame, highest=self.highest_frequency
+    def _views(self, share: float) -> list[_View]:
+        views = (self._frequency_view(share), self._order_view(share))
+        return [view for view in views if view is not None]
+
+    def _same_view(self, view: _View, signal: Array) -> FramePower:
+        """The same look at another signal."""
+        again = (
+            self._order_view(view.share, signal)
+            if view.of_orders
+            else self._frequency_view(view.share, signal)
         )
+        assert again is not None
+        return again.frames
 
-    def _order_view(self) -> FramePower | None:
-        if self._profile is None or self._speed is None:
+    def _frequency_view(self, share: float, signal: Array | None = None) -> _View:
+        length = share * min(self.settings.frame, len(self._rest) / self._rate / 3.0)
+        frames = frequency_power(
+            self._rest if signal is None else signal,
+            self._rate,
+            start_time=self._start,
+            frame=length,
+            highest=self.highest_frequency,
+        )
+        lengths = np.full(len(frames.time), length)
+        return _View(frames=frames, of_orders=False, length=lengths, share=share)
+
+    def _order_view(self, share: float, signal: Array | None = None) -> _View | None:
+        if self._profile is None:
             return None
-        return order_power(
-            self._rest,
+        turns = 2 * round(0.5 * self.settings.turns * (share if share == 1.0 else 2.0 * share))
+        slowest = max(self.settings.lowest_frequency / self.settings.highest_order, 0.5)
+        frames = order_power(
+            self._rest if signal is None else signal,
             self._rate,
             self._profile,
             start_time=self._start,
-            turns=self.settings.turns,
+            turns=turns,
             highest_order=self.settings.highest_order,
             highest_frequency=self.highest_frequency,
-            lowest_speed=max(TURN * self.settings.lowest_frequency / self.settings.highest_order, 0.5 * TURN),
+            lowest_speed=TURN * slowest,
         )
+        if frames is None:
+            return None
+        lengths = turns / np.maximum(self._at(frames.time, self._speed), 0.1)
+        return _View(frames=frames, of_orders=True, length=lengths, share=share)
 
-    def _free(self, view: FramePower, order: bool) -> Mask:
-        """Where a new line may be looked for: not at low frequency, not on the path of a line already taken
-        out.
-        """
-        speed = self._at(view.time, self._speed)
-        place = view.coordinate * (speed[:, None] if order else 1.0)
-        free = np.broadcast_to(place >= self.settings.lowest_frequency, view.power.shape[:2]).copy()
-        length = (
-            self.settings.turns / np.maximum(speed, 0.1) if order else np.full(len(view.time), self._frame)
-        )
-        apart = 2.0 * np.maximum(self.settings.bandwidth, 1.0 / length)
-        unit = np.maximum(speed, 0.1) if order else np.ones(len(view.time))
+    def _clearest(self, view: _View, speed_change: float, usual: Array | None = None) -> Peak | None:
+        speed = self._at(view.frames.time, self._speed)
+        stretches = [
+            (first, last)
+            for first, last in stretches_of(len(speed), LASTING)
+            if speed[first] - speed[last - 1] >= speed_change * speed[first:last].mean()
+        ]
+        return clearest_peak(view.frames, self._free(view), self.settings.detection, stretches, usual)
+
+    def _free(self, view: _View) -> Mask:
+        """Where a new line may be: not at low frequency, not on the path of a line already taken out."""
+        time, place = view.frames.time, view.frames.coordinate
+        unit = np.ones((len(time), len(FIVE_MOMENTS)))
+        if view.of_orders:
+            moments = [self._at(time + share * view.length, self._speed) for share in FIVE_MOMENTS]
+            unit = np.maximum(np.column_stack(moments), 0.1)
+        middle = unit[:, 2]
+        free = place * middle[:, None] >= self.settings.lowest_frequency
+        width = np.maximum(self.settings.bandwidth, 1.0 / view.length) / middle
         for line in self.found:
+            of_orders = line.kind == "order" or (line.kind == "undecided" and line.order is not None)
+            if of_orders != view.of_orders and line.ratio < HARMLESS:
+                continue
+            apart = width * (2.0 if of_orders == view.of_orders else line.skirt)
             # Within a frame the speed changes, and with it the path moves across the view.
-            low, high = self._path_range(line, view.time, length, order)
-            free &= (view.coordinate < (low - apart / unit)[:, None]) | (
-                view.coordinate > (high + apart / unit)[:, None]
+            low, high = path_range(line, time, view.length, unit)
+            free &= (
+                (place < (low - apart)[:, None]) | (place > (high + apart)[:, None]) | np.isinf(low)[:, None]
             )
+        for refused in self._refused:
+            if refused.of_orders == view.of_orders:
+                then = (time >= refused.first) & (time <= refused.last)
+                free &= ~(then[:, None] & (np.abs(place - refused.coordinate) < 2.0 * width[:, None]))
         return free
 
-    def _path_range(self, line: FoundLine, time: Array, length: Array, order: bool) -> tuple[Array, Array]:
-        """Lowest and highest place of a line in each frame, as frequency [Hz] or order [1]."""
-        places = []
-        for share in (-0.4, -0.2, 0.0, 0.2, 0.4):
-            when = time + share * length
-            frequency = self._at(when, line.path)
-            places.append(frequency / np.maximum(self._at(when, self._speed), 0.1) if order else frequency)
-        return np.min(places, axis=0), np.max(places, axis=0)
+    def _at(self, time: Array, values: Array) -> Array:
+        """Values at other times."""
+        return np.interp(time, self._time, values)
 
-    def _at(self, time: Array, values: Array | None) -> Array:
-        """Values at other times; zero without any."""
-        return np.zeros(len(time)) if values is None else np.interp(time, self._time, values)
-
-    def _take(self, peak: Peak, view: FramePower, *, order: bool) -> None:
-        """Follow a peak through the signal, note it, and take it out."""
-        advance = cast(Array, self._angle if order else TURN * self._time)
-        span = view.time[peak.first], view.time[peak.last - 1]
-        half = 0.5 * float(np.median(np.diff(view.time))) if len(view.time) > 1 else self._time[-1]
-        spoken = (self._time >= span[0] - 2 * half) & (self._time <= span[1] + 2 * half)
+    def _follow(self, peak: Peak, view: _View) -> FoundLine | None:
+        """Follow a peak through the signal; None if a line only swept past it."""
+        advance = cast(Array, self._angle) if view.of_orders else TURN * self._time
+        spoken = self._spoken(peak, view)
         coordinate, offset = peak.coordinate, Offset(value=0.0, error=math.inf)
-        for _ in range(3):
+        for lag in LAGS:
             envelope = self._extract(coordinate * advance)
             present = self._present(envelope, peak, spoken)
-            alone = present & self._alone(coordinate * advance)
-            used = alone if alone.sum() > 0.3 * present.sum() else present
-            offset = mean_offset(envelope.value, advance, lag=round(LAG * self._rate), present=used)
+            used = self._undisturbed(envelope, peak, present, spoken)
+            offset = mean_offset(envelope.value, advance, lag=round(lag * self._rate), present=used)
             coordinate += offset.value
         phase = coordinate * advance
-        if not order and peak.ratio > 6.0:
+        if not view.of_orders and peak.ratio > 6.0:
             envelope = self._extract(phase)
             phase = phase + drift_phase(envelope.value, self._rate, present, span=1.0)
         envelope = self._extract(phase)
         present = self._present(envelope, peak, spoken)
-        line = self._describe(envelope, present, peak, view, coordinate, offset.error, order=order)
-        self.found.append(line)
-        self._remove(envelope, present)
+        taken = self._part(envelope, present)
+        if not self._explained(peak, view, taken) or self._better_otherwise(
+            envelope, view, coordinate, spoken
+        ):
+            return None
+        return self._describe(envelope, present, taken, peak, view, coordinate, offset.error)
+
+    def _explained(self, peak: Peak, view: _View, taken: Array) -> bool:
+        """Whether a line taken out is what made the peak: a line that only sweeps past leaves most of it."""
+        row = slice(peak.first, peak.last)
+        after = self._same_view(view, self._rest - taken).power[row, :, peak.channel]
+        line = int(np.argmin(np.abs(view.frames.coordinate - peak.coordinate)))
+        near = slice(max(line - 1, 0), line + 2)
+        left = np.nanmedian(np.nanmax(after[:, near], axis=1))
+        whole = np.nanmedian(np.nanmax(view.frames.power[row, near, peak.channel], axis=1))
+        return bool(left < LEFT_OVER * whole)
+
+    def _better_otherwise(self, envelope: Envelope, view: _View, coordinate: float, spoken: Mask) -> bool:
+        """Whether the other kind of line, steady or order, holds more of the power where the peak was
+        seen.
+        """
+        if self._angle is None:
+            return False
+        speed = float(np.mean(self._speed[spoken]))
+        order = coordinate if view.of_orders else coordinate / speed
+        if order * float(np.ptp(self._speed[spoken])) > CLOSE * self.settings.bandwidth:
+            return False
+        other = coordinate * speed * TURN * self._time if view.of_orders else order * self._angle
+        rival = self._extract(other)
+        usual = 4.0 * np.median(np.abs(envelope.value[spoken]) ** 2, axis=0)
+        own, others = (np.minimum(np.abs(e.value[spoken]) ** 2, usual).sum() for e in (envelope, rival))
+        return bool(others > 1.05 * own)
+
+    def _spoken(self, peak: Peak, view: _View) -> Mask:
+        """The part of the signal in which a peak was seen."""
+        times, length = view.frames.time, view.length
+        first = times[peak.first] - 0.5 * length[peak.first]
+        last = times[peak.last - 1] + 0.5 * length[peak.last - 1]
+        return np.asarray((self._time >= first) & (self._time <= last))
 
     def _extract(self, phase: Array) -> Envelope:
         return extract(self._rest, self._rate, phase, bandwidth=self.settings.bandwidth)
@@ -212,96 +308,129 @@ class LineSearch:
         frequency = np.abs(self._rate_of(phase))
         return (frequency >= self.settings.lowest_frequency) & (frequency <= self.highest_frequency)
 
-    def _alone(self, phase: Array) -> Mask:
-        """Where no line taken out before, of which something may be left, comes near."""
-        frequency = np.abs(self._rate_of(phase))
-        alone = np.ones(len(phase), dtype=np.bool_)
+    def _undisturbed(self, envelope: Envelope, peak: Peak, present: Mask, spoken: Mask) -> Mask:
+        """Where no bang swells the line, and no line taken out before, of which a rest stays, comes near."""
+        frequency = np.abs(self._rate_of(envelope.phase))
+        size = np.abs(envelope.value[:, peak.channel])
+        seen = present & spoken if (present & spoken).any() else present
+        alone = seen & (size < 5.0 * float(np.median(size[seen])))
         for line in self.found:
-            alone &= np.abs(frequency - line.path) > 2.0 * self.settings.bandwidth
-        return alone
+            alone &= ~(np.abs(frequency - line.frequency_at(self._time)) < 2.0 * self.settings.bandwidth)
+            if line.brief and line.ratio > BURST:
+                # The start and end of a burst spread over all frequencies.
+                alone &= (self._time < line.first_seen) | (self._time > line.last_seen)
+        return alone if alone.sum() > 0.3 * seen.sum() else seen
 
     def _present(self, envelope: Envelope, peak: Peak, spoken: Mask) -> Mask:
         """Where the line stands clear of the floor; where it was detected if it hardly does."""
         size = np.abs(envelope.value[:, peak.channel])
-        clear = (size > 2.0 * peak.floor) & self._reachable(envelope.phase)
-        if spoken.mean() < 0.2:
-            clear &= spoken
-        return clear if clear[spoken].mean() > 0.2 else spoken & self._reachable(envelope.phase)
+        reachable = self._reachable(envelope.phase)
+        clear = (size > 2.0 * peak.floor) & reachable
+        if spoken.mean() < BRIEF:
+            clear &= _connected(clear, spoken, round(0.5 * self._rate))
+        return clear if clear[spoken].mean() > 0.2 else spoken & reachable
+
+    def _part(self, envelope: Envelope, present: Mask) -> Array:
+        """The line where it is present [m], fading in and out."""
+        reach = round(self._rate / self.settings.bandwidth)
+        near = smooth(present.astype(np.float64), reach) > 0.02
+        fade = smooth((near & self._reachable(envelope.phase)).astype(np.float64), max(reach // 4, 1))
+        return fade[:, None] * envelope.line()
 
     def _describe(
         self,
         envelope: Envelope,
         present: Mask,
+        taken: Array,
         peak: Peak,
-        view: FramePower,
+        view: _View,
         coordinate: float,
         error: float,
-        *,
-        order: bool,
     ) -> FoundLine:
-        power = np.where(present[:, None], np.abs(envelope.value) ** 2, 0.0)
-        weight = power.sum(axis=1) / power.sum()
+        weight = _weight(envelope, present)
         frequency = self._rate_of(envelope.phase)
         mean = float(np.sum(weight * frequency))
-        when = self._time[present]
-        decided = self._decided(weight, mean)
-        resolution = 1.44 * view.spacing
-        width = math.sqrt(max(peak.width**2 - resolution**2, 0.0))
-        if order:
-            speed = mean / coordinate
-            kind: LineKind = "order" if decided else "undecided"
+        speed = float(np.sum(weight * self._speed))
+        decided = self._decided(weight, mean, view.resolution)
+        width = math.sqrt(max(peak.width**2 - (1.44 * view.frames.spacing) ** 2, 0.0))
+        if view.of_orders:
+            order: float | None = coordinate
+            order_error: float | None = error
+            scale = mean / coordinate
             drift = (mean, mean)
-            scale = speed
         else:
-            speed = self._mean_speed(weight)
-            kind = "steady" if decided else "undecided"
+            known = not decided and speed > 0.0
+            order, order_error = (mean / speed, error / speed) if known else (None, None)
+            scale = 1.0
             low, high = np.percentile(frequency[present], [5.0, 95.0])
             drift = (float(low), float(high))
-            scale = 1.0
-        follows = order or (not decided and speed > 0.0)
-        return FoundLine(
+        kind: LineKind = ("order" if view.of_orders else "steady") if decided else "undecided"
+        return self._line(
+            envelope,
+            present,
+            taken,
+            peak,
             kind=kind,
             frequency=mean,
             frequency_error=error * scale,
-            order=(coordinate if order else mean / speed) if follows else None,
-            order_error=(error if order else error / speed) if follows else None,
+            order=order,
+            order_error=order_error,
             drift=drift,
             width=width * scale,
-            amplitude=np.sqrt(power[present].mean(axis=0)),
-            forward=_radius(envelope.value[present], 1.0),
-            backward=_radius(envelope.value[present], -1.0),
+        )
+
+    def _line(
+        self,
+        envelope: Envelope,
+        present: Mask,
+        taken: Array,
+        peak: Peak,
+        *,
+        kind: LineKind,
+        frequency: float,
+        frequency_error: float,
+        order: float | None,
+        order_error: float | None,
+        drift: tuple[float, float],
+        width: float,
+        parent: FoundLine | None = None,
+        multiple: float = 0.0,
+    ) -> FoundLine:
+        there = envelope.value[present]
+        when = self._time[present]
+        return FoundLine(
+            kind=kind,
+            frequency=frequency,
+            frequency_error=frequency_error,
+            order=order,
+            order_error=order_error,
+            drift=drift,
+            width=width,
+            amplitude=np.sqrt(np.mean(np.abs(there) ** 2, axis=0)),
+            forward=radius(there, 1.0),
+            backward=radius(there, -1.0),
             floor=peak.floor,
             ratio=peak.ratio,
             first_seen=float(when[0]),
             last_seen=float(when[-1]),
             existence=1.0 - self.settings.detection.false_alarm,
-            phase=envelope.phase,
             time=self._time,
-            path=np.abs(frequency),
-            strength=float(power.sum()),
+            phase=envelope.phase,
+            path=np.abs(self._rate_of(envelope.phase)),
+            taken=taken,
+            brief=bool(when[-1] - when[0] < BRIEF * (self._time[-1] - self._time[0])),
+            parent=parent,
+            multiple=multiple,
         )
 
-    def _mean_speed(self, weight: Array) -> float:
-        return 0.0 if self._speed is None else float(np.sum(weight * self._speed))
-
-    def _decided(self, weight: Array, frequency: float) -> bool:
+    def _decided(self, weight: Array, frequency: float, resolution: float) -> bool:
         """Whether the speed changed enough, while the line was seen, to say whether the line follows it."""
-        if self._speed is None:
+        if self._profile is None:
             return False
-        cumulative = np.cumsum(weight)
-        first, last = np.searchsorted(cumulative, [0.1, 0.9])
+        first, last = np.searchsorted(np.cumsum(weight), [0.1, 0.9])
         early, late = float(self._speed[first]), float(self._speed[min(last, len(self._speed) - 1)])
         middle = 0.5 * (early + late)
-        if middle <= 0.0:
-            return True
-        return frequency / middle * abs(late - early) > 2.0 / self._frame
-
-    def _remove(self, envelope: Envelope, present: Mask) -> None:
-        """Take a line out of the signal where it is present, fading in and out."""
-        reach = round(self._rate / self.settings.bandwidth)
-        near = smooth(present.astype(np.float64), reach) > 0.02
-        fade = smooth((near & self._reachable(envelope.phase)).astype(np.float64), max(reach // 4, 1))
-        self._rest = self._rest - fade[:, None] * envelope.line()
+        return middle <= 0.0 or frequency / middle * abs(late - early) > DECIDED * resolution
 
     def _combinations(self) -> None:
         """Lines at a steady one plus or minus an order: look along every such path."""
@@ -322,65 +451,56 @@ class LineSearch:
 
     def _along(self, phase: Array) -> Peak | None:
         """The peak, if there is one, on a moving path against what lies beside it."""
+        length = min(self.settings.frame, len(self._rest) / self._rate / 3.0)
         turned = 2.0 * self._rest * np.exp(-1j * phase)[:, None]
-        view = offset_power(turned, self._rate, start_time=self._start, frame=self._frame, reach=BESIDE)
+        view = offset_power(turned, self._rate, start_time=self._start, frame=length, reach=BESIDE)
         usable = self._at(view.time, self._reachable(phase).astype(np.float64)) > 0.99
-        length = np.full(len(view.time), self._frame)
         path = np.abs(self._rate_of(phase))
         for line in self.found:
-            apart = np.abs([self._at(view.time + s * length, path - line.path) for s in (-0.4, 0.0, 0.4)])
-            usable &= apart.min(axis=0) > 2.0 * self.settings.bandwidth * _skirt(line)
+            moments = [view.time + share * length for share in FIVE_MOMENTS]
+            apart = np.abs([self._at(when, path) - line.frequency_at(when) for when in moments])
+            usable &= apart.min(axis=0) > 2.0 * self.settings.bandwidth * max(line.skirt, 1.0)
         allowed = usable[:, None] & (np.abs(view.coordinate) < 2.5 * view.spacing)
-        peak = clearest_peak(
-            view, allowed, self.settings.detection, list(stretches_of(len(view.time), LASTING))
-        )
+        stretches = [
+            (first, last)
+            for first, last in stretches_of(len(view.time), LASTING)
+            if usable[first:last].mean() >= 0.75
+        ]
+        peak = clearest_peak(view, allowed, self.settings.detection, stretches)
         return peak if peak is not None and abs(peak.coordinate) < 1.5 * view.spacing else None
 
     def _take_combination(self, peak: Peak, partner: FoundLine, k: float) -> None:
         phase = partner.phase + k * cast(Array, self._angle)
         envelope = self._extract(phase)
         present = self._present(envelope, peak, self._reachable(phase))
-        power = np.where(present[:, None], np.abs(envelope.value) ** 2, 0.0)
-        weight = power.sum(axis=1) / power.sum()
         frequency = np.abs(self._rate_of(phase))
         low, high = np.percentile(frequency[present], [5.0, 95.0])
-        when = self._time[present]
-        self.found.append(
-            FoundLine(
-                kind="combination",
-                frequency=float(np.sum(weight * frequency)),
-                frequency_error=partner.frequency_error,
-                order=None,
-                order_error=None,
-                drift=(float(low), float(high)),
-                width=0.0,
-                amplitude=np.sqrt(power[present].mean(axis=0)),
-                forward=_radius(envelope.value[present], 1.0),
-                backward=_radius(envelope.value[present], -1.0),
-                floor=peak.floor,
-                ratio=peak.ratio,
-                first_seen=float(when[0]),
-                last_seen=float(when[-1]),
-                existence=1.0 - self.settings.detection.false_alarm,
-                phase=phase,
-                time=self._time,
-                path=frequency,
-                strength=float(power.sum()),
-                parent=partner,
-                multiple=k,
-            )
+        line = self._line(
+            envelope,
+            present,
+            self._part(envelope, present),
+            peak,
+            kind="combination",
+            frequency=float(np.sum(_weight(envelope, present) * frequency)),
+            frequency_error=partner.frequency_error,
+            order=None,
+            order_error=None,
+            drift=(float(low), float(high)),
+            width=0.0,
+            parent=partner,
+            multiple=k,
         )
-        self._remove(envelope, present)
+        self._keep(line)
 
 
-def _skirt(line: FoundLine) -> float:
-    """How much more distance a strong line needs than a weak one: a little of it is always left [1]."""
-    return 1.0 + max(math.log10(max(line.ratio, 1.0)) - 2.0, 0.0)
+def _connected(clear: Mask, spoken: Mask, gap: int) -> Mask:
+    """Stretches of samples, joined over short gaps, that touch the part in which a line was detected."""
+    closed = binary_closing(np.pad(clear, gap), np.ones(gap, dtype=np.bool_))[gap:-gap] | clear
+    stretch, _ = label(closed | spoken)
+    return np.asarray(np.isin(stretch, np.unique(stretch[spoken])))
 
 
-def _radius(value: NDArray[np.complex128], direction: float) -> Array:
-    """Root-mean-square radius [m] of the forward (+1) or backward (−1) turning part in each plane, shape
-    (P,).
-    """
-    turning = np.abs(value[:, 0::2] + direction * 1j * value[:, 1::2]) / 2.0
-    return cast(Array, np.sqrt(np.mean(turning**2, axis=0)))
+def _weight(envelope: Envelope, present: Mask) -> Array:
+    """Share of the line's power at each sample [1], where it is present."""
+    power = np.where(present[:, None], np.abs(envelope.value) ** 2, 0.0).sum(axis=1)
+    return cast(Array, power / power.sum())

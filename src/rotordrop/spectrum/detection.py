@@ -81,6 +81,7 @@ def clearest_peak(
     allowed: Mask,
     settings: DetectionSettings,
     stretches: Sequence[tuple[int, int]],
+    usual: Array | None = None,
 ) -> Peak | None:
     """Find the peak that noise explains worst, over all channels and all given stretches of frames.
 
@@ -93,6 +94,9 @@ def clearest_peak(
     stretches : sequence of (int, int)
         First frame and last one, excluded, of every stretch in which a line must be seen half the time.
 
+    usual : shape (K, C), optional
+        Power [m²] that is not to count as a line: the floor is nowhere lower.
+
     Returns
     -------
     Peak or None
@@ -101,6 +105,8 @@ def clearest_peak(
     trials = max(int(np.sum(allowed.any(axis=0))), 1) * frames.power.shape[2] * max(len(stretches), 1)
     threshold = math.log(trials / settings.false_alarm)
     floor = _floor(frames.power, settings.floor_lines)
+    if usual is not None:
+        floor = np.maximum(floor, usual)
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = np.where(allowed[:, :, None] & (floor > 0.0), frames.power / floor, np.nan)
     best: tuple[float, int, int, int, int] = (threshold, -1, -1, -1, -1)

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from rotordrop.errors import RecordError
-from rotordrop.spectrum._search import FoundLine, LineSearch
+from rotordrop.spectrum._found_line import FoundLine
+from rotordrop.spectrum._search import LineSearch
 from rotordrop.spectrum.candidates import Candidate, harmonic_candidates
 from rotordrop.spectrum.frequency_path import FrequencyPath
 from rotordrop.spectrum.line_settings import STANDARD_SETTINGS, LineSettings
@@ -223,10 +224,16 @@ def _joined(lines: Sequence[Line]) -> list[Line]:
 
 
 def _same(line: Line, other: Line) -> bool:
-    if line.kind != other.kind or line.label != other.label or set(line.forward) & set(other.forward):
+    """Whether two entries are one line: in different planes, or in one plane at different times."""
+    if line.label != other.label:
         return False
-    if line.kind == "combination":
-        return True
+    apart = line.first_seen >= other.last_seen - 1.0 or other.first_seen >= line.last_seen - 1.0
+    if set(line.forward) & set(other.forward) and not (apart and line.named):
+        return False
+    if "combination" in (line.kind, other.kind):
+        return line.kind == other.kind
+    if line.kind != other.kind and "undecided" not in (line.kind, other.kind):
+        return False
     if line.order is not None and other.order is not None:
         return abs(line.order - other.order) <= 0.01
     return abs(line.frequency - other.frequency) <= 0.15 + 3.0 * (

@@ -1,0 +1,119 @@
+"""A line as the search finds it, before it has a name."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.spectrum.frequency_path import FrequencyPath
+from rotordrop.spectrum.naming import LineKind
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FoundLine:
+    """A line that was found; fields as in `rotordrop.spectrum.lines.Line`, and what the search goes on with.
+
+    Attributes
+    ----------
+    phase : shape (N,)
+        Phase that the line follows [rad].
+    path : shape (N,)
+        Its frequency [Hz].
+    taken : shape (N, C)
+        What was taken out of the signal [m].
+    brief : bool
+        Seen only for a short part of the signal.
+    parent, multiple
+        For a sum or difference: the steady line, and the order that is added to it [1].
+    """
+
+    kind: LineKind
+    frequency: float
+    frequency_error: float
+    order: float | None
+    order_error: float | None
+    drift: tuple[float, float]
+    width: float
+    amplitude: Array
+    forward: Array
+    backward: Array
+    floor: float
+    ratio: float
+    first_seen: float
+    last_seen: float
+    existence: float
+    time: Array
+    phase: Array
+    path: Array
+    taken: Array
+    brief: bool
+    parent: FoundLine | None = None
+    multiple: float = 0.0
+
+    @property
+    def strength(self) -> float:
+        """Sum of squares of what was taken out [m²]."""
+        return float(np.sum(self.taken**2))
+
+    @property
+    def skirt(self) -> float:
+        """Distance to keep from the line, by how much of it is left when it is taken out [1]: 1 at 30
+        floors.
+        """
+        return max(math.log10(max(self.ratio, 1.0)) - 0.5, 0.5)
+
+    def path_of_frequency(self) -> FrequencyPath:
+        """Frequency over time, about twenty values per second."""
+        step = max(round(0.05 / (self.time[1] - self.time[0])), 1)
+        return FrequencyPath(time=self.time[::step], frequency=self.path[::step])
+
+    def frequency_at(self, time: Array) -> Array:
+        """Frequency [Hz] at times [s]; infinite where a brief line is not there."""
+        frequency = np.interp(time, self.time, self.path)
+        if self.brief:
+            frequency[(time < self.first_seen - 1.0) | (time > self.last_seen + 1.0)] = np.inf
+        return frequency
+
+
+def path_range(line: FoundLine, time: Array, length: Array, unit: Array) -> tuple[Array, Array]:
+    """Lowest and highest frequency of a line within frames, in units [Hz] that change with time.
+
+    Parameters
+    ----------
+    line : FoundLine
+    time, length : shape (F,)
+        Middle and length of the frames [s].
+    unit : shape (F, 5)
+        What one step of the view is worth at five moments of each frame [Hz]: 1, or the rotor speed for
+        orders.
+
+    Returns
+    -------
+    low, high : shape (F,)
+        Infinite where the line is not there.
+    """
+    places = np.array(
+        [line.frequency_at(time + share * length) / unit[:, k] for k, share in enumerate(FIVE_MOMENTS)]
+    )
+    there = np.isfinite(places)
+    low = np.where(there, places, np.inf).min(axis=0)
+    high = np.where(there, places, -np.inf).max(axis=0)
+    return low, np.where(there.any(axis=0), high, np.inf)
+
+
+FIVE_MOMENTS = (-0.4, -0.2, 0.0, 0.2, 0.4)
+"""Moments within a Hann frame [share of its length] between which it looks."""
+
+
+def radius(value: NDArray[np.complex128], direction: float) -> Array:
+    """Root-mean-square radius [m] of the forward (+1) or backward (−1) turning part in each plane, shape
+    (P,).
+    """
+    turning = np.abs(value[:, 0::2] + direction * 1j * value[:, 1::2]) / 2.0
+    return np.asarray(np.sqrt(np.mean(turning**2, axis=0)))
