@@ -55,7 +55,7 @@ def calibrate(
     read = [read_record(path, description, profile=profile) for path in records]
     rests = [read_record(path, description, profile=profile) for path in tails]
     per_drop = [None] * len(read) if not rests else rests * len(read) if len(rests) == 1 else rests
-    with progress_bar() as report:
+    with progress_bar("calibrating") as report:
         result = calibrate_machine(description, read, per_drop, progress=report)
     save_machine(result.machine, output)
     deliver(calibration_json(result), json, lambda out: _summary(result, output, out))
@@ -63,8 +63,6 @@ def calibrate(
 
 def _summary(result: Calibration, output: Path, out: Console) -> None:
     from rich.table import Table
-
-    from rotordrop.report.quantity import with_unit
 
     table = Table("parameter", "estimate", "90 % interval", "verdict", box=None)
     verdicts = {
@@ -74,8 +72,8 @@ def _summary(result: Calibration, output: Path, out: Console) -> None:
         low, high = value.interval_90 or (value.value, value.value)
         table.add_row(
             path,
-            with_unit(value.value, value.unit),
-            f"{with_unit(low, value.unit)} … {with_unit(high, value.unit)}",
+            _text(value.value, value.unit),
+            f"{_text(low, value.unit)} … {_text(high, value.unit)}",
             verdicts.get(path, "determined"),
         )
     out.print(table)
@@ -89,3 +87,7 @@ def _summary(result: Calibration, output: Path, out: Console) -> None:
                 out.print(f"{name}: {check.message}")
     out.print(result.sentence())
     out.print(f"Calibrated machine: {output}")
+
+
+def _text(value: float, unit: str) -> str:
+    return f"{value:.4g}" if unit in ("", "1") else f"{value:.4g} {unit}"

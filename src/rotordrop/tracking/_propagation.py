@@ -208,7 +208,8 @@ def propagate(
         middle = k[4].copy()
         drop_jacobian(now + 0.5 * h, middle, p, J)
         gather_entries(J, entries, places, starts)
-        if columns > s and step % 2 == 0:
+        # at every substep: position and gap must see the same contact, or the gap looks better known than it is
+        if columns > s:
             parameter_jacobian(now + 0.5 * h, middle, theta, targets, p, k[0], k[1], work, B)
         for b in range(p.bearing.shape[0]):
             contact_at(b, middle, p, contact)
