@@ -178,6 +178,15 @@ def crossing_fraction(
 
 
 @kernel
+def note_peak(time: float, contact: Array, entry: Array) -> None:
+    """Keep the largest force of a contact with its time and azimuth."""
+    if contact[1] > entry[LOG_PEAK_FORCE]:
+        entry[LOG_PEAK_FORCE] = contact[1]
+        entry[LOG_PEAK_TIME] = time
+        entry[LOG_AZIMUTH] = math.atan2(contact[4], contact[3])
+
+
+@kernel
 def log_contacts(
     t: float,
     h: float,
@@ -193,7 +202,7 @@ def log_contacts(
 ) -> int:
     """Update the contact log with an accepted step; returns the number of entries opened so far."""
     now = np.empty(6)
-    at_crossing = np.empty(6)
+    between = np.empty(6)
     for b in range(p.bearing.shape[0]):
         contact_at(b, y_new, p, now)
         was = running[b, RUN_IN_CONTACT] > 0.0
@@ -201,9 +210,7 @@ def log_contacts(
         begin = t
         end = t + h
         if was != touches:
-            moment = t + h * crossing_fraction(
-                b, h, y, k, tab, p, running[b, RUN_DELTA], scratch, at_crossing
-            )
+            moment = t + h * crossing_fraction(b, h, y, k, tab, p, running[b, RUN_DELTA], scratch, between)
             if touches:
                 begin = moment
             else:
@@ -217,12 +224,14 @@ def log_contacts(
             running[b, RUN_IN_CONTACT] = n_log
         row = int(running[b, RUN_IN_CONTACT]) - 1
         if 0 <= row < log.shape[0]:
-            log[row, LOG_IMPULSE] += 0.5 * (end - begin) * (running[b, RUN_FORCE] + now[1])
-            log[row, LOG_DISSIPATED] += 0.5 * (end - begin) * (running[b, RUN_POWER] + now[5])
-            if now[1] > log[row, LOG_PEAK_FORCE]:
-                log[row, LOG_PEAK_FORCE] = now[1]
-                log[row, LOG_PEAK_TIME] = t + h
-                log[row, LOG_AZIMUTH] = math.atan2(now[4], now[3])
+            middle = 0.5 * (begin + end)
+            dense_output((middle - t) / h, h, y, k, tab, scratch)
+            contact_at(b, scratch, p, between)
+            sixth = (end - begin) / 6.0
+            log[row, LOG_IMPULSE] += sixth * (running[b, RUN_FORCE] + 4.0 * between[1] + now[1])
+            log[row, LOG_DISSIPATED] += sixth * (running[b, RUN_POWER] + 4.0 * between[5] + now[5])
+            note_peak(middle, between, log[row])
+            note_peak(t + h, now, log[row])
             if not touches:
                 log[row, LOG_END] = end
         if not touches:

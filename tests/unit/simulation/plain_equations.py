@@ -62,7 +62,10 @@ def bearing_motion(model, b, row, place, velocity, state, rate, force) -> float:
     race, support = layout.race.start + 2 * b, layout.support.start + 2 * b
     shift = layout.n_coordinates
     race_place, race_velocity = state[race : race + 2], state[race + shift : race + shift + 2]
-    support_place, support_velocity = state[support : support + 2], state[support + shift : support + shift + 2]
+    support_place, support_velocity = (
+        state[support : support + 2],
+        state[support + shift : support + shift + 2],
+    )
     omega, omega_i = state[layout.rotor_speed], state[layout.race_spin][b]
     on_race, friction = contact(bearing, place - race_place, velocity - race_velocity, omega, omega_i)
     force -= on_race[:, None] * row
@@ -77,7 +80,12 @@ def bearing_motion(model, b, row, place, velocity, state, rate, force) -> float:
     rate[support + shift : support + shift + 2] = (
         -through - damper * support_velocity - spring * support_place
     ) / mass
-    drag = float(bearing.race.drag_coefficient) * np.linalg.norm(balls) * float(bearing.bearing.pitch_diameter) / 2
+    drag = (
+        float(bearing.race.drag_coefficient)
+        * np.linalg.norm(balls)
+        * float(bearing.bearing.pitch_diameter)
+        / 2
+    )
     drag *= math.tanh(omega_i / float(bearing.race.drag_speed))
     bore = float(bearing.bore_radius)
     rate[layout.race_spin.start + b] = (friction * bore - drag) / float(bearing.race.inertia)
@@ -85,7 +93,7 @@ def bearing_motion(model, b, row, place, velocity, state, rate, force) -> float:
 
 
 def contact(bearing, place, velocity, omega, omega_i) -> tuple[np.ndarray, float]:
-    """Force of the rotor on the race [N] and friction force [N], positive when it drives the race forwards."""
+    """Force of the rotor on the race [N] and friction force [N], positive if it drives the race."""
     radius = math.hypot(*place)
     depth = radius - float(bearing.air_gap)
     if depth <= 0.0:
@@ -103,7 +111,7 @@ def contact(bearing, place, velocity, omega, omega_i) -> tuple[np.ndarray, float
 
 
 def coefficient(law, slip: float) -> float:
-    """Stribeck coefficient with the sign of the slip; the cubic below the smoothing speed from its conditions."""
+    """Stribeck coefficient with the sign of the slip; the cubic near zero from its conditions."""
     static, dynamic = float(law.static), float(law.dynamic)
     speed, smooth, decay = abs(slip), float(law.smoothing_speed), float(law.stribeck_speed)
     if speed >= smooth:
@@ -138,7 +146,9 @@ def vertical_stiffness(bearing, weight: float) -> float:
     low, high = 0.0, 50e-6
     for _ in range(60):
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if ball_force(bearing, np.array([0.0, -middle]))[1] > weight else (middle, high)
+        low, high = (
+            (low, middle) if ball_force(bearing, np.array([0.0, -middle]))[1] > weight else (middle, high)
+        )
     step = 2e-9
     upper, lower = (ball_force(bearing, np.array([0.0, -low + s]))[1] for s in (step, -step))
     return float((lower - upper) / (2 * step))

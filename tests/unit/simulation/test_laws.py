@@ -47,7 +47,9 @@ def test_turning_the_start_turns_the_drop(quick, pitches):
     start = PlacedStart(
         displacement=np.array([[0.0, -2e-4], [1e-4, 1e-4]]), velocity=np.array([[0.05, -0.08], [-0.06, 0.05]])
     )
-    other = replace(start, displacement=turned(start.displacement, angle), velocity=turned(start.velocity, angle))
+    other = replace(
+        start, displacement=turned(start.displacement, angle), velocity=turned(start.velocity, angle)
+    )
     p = model.parameters
     c, s = np.cos(angle), np.sin(angle)
     ahead = with_parameters(
@@ -92,7 +94,7 @@ def test_mirroring_speed_place_and_unbalance_mirrors_the_drop(paper, skewed_star
 
 
 def scaled_by_mass(model: DropModel, factor: float) -> DropModel:
-    """All masses, stiffnesses, dampings and the preload stiffness times a factor: the same motion, other forces."""
+    """All masses, stiffnesses and dampings times a factor: the same motion, other forces."""
     p, root = model.parameters, np.sqrt(factor)
     bearing, spin = p.bearing.copy(), p.spin.copy()
     columns = [
@@ -130,7 +132,8 @@ def slowed_down(model: DropModel, factor: float) -> DropModel:
     bearing, spin = p.bearing.copy(), p.spin.copy()
     forces = [L.CONTACT_STIFFNESS, L.BALL_STIFFNESS, L.SUPPORT_STIFFNESS_X, L.SUPPORT_STIFFNESS_Y]
     rates = [
-        L.STRIBECK_SPEED, L.SMOOTHING_SPEED, L.DRAG_SPEED, L.BEARING_DAMPING, L.SUPPORT_DAMPING_X, L.SUPPORT_DAMPING_Y,
+        L.STRIBECK_SPEED, L.SMOOTHING_SPEED, L.DRAG_SPEED,
+        L.BEARING_DAMPING, L.SUPPORT_DAMPING_X, L.SUPPORT_DAMPING_Y,
     ]  # fmt: skip
     bearing[:, forces] /= factor**2
     bearing[:, rates] /= factor
@@ -215,7 +218,7 @@ def test_a_heavily_damped_drop_settles_there(paper, quick):
 
 
 def contact_on_race(model: DropModel, azimuth: float, speed: float, velocity=(0.0, 0.0), depth=20e-6):
-    """Force [N] of the rotor on each race when it stands at a depth in direction ``azimuth``, races at rest."""
+    """Force [N] of the rotor on each race when it stands at a depth in a direction, races at rest."""
     layout = model.layout
     case = DropCase(speed=speed, spin="constant")
     _, p = start_of_drop(model, case)
@@ -226,7 +229,10 @@ def contact_on_race(model: DropModel, azimuth: float, speed: float, velocity=(0.
     moving = rigid_amplitudes(model, positions, np.tile(velocity, (len(nodes), 1)))
     state = layout.zeros()
     state[layout.modal_x], state[layout.modal_y] = place[:, 0], place[:, 1]
-    state[layout.velocity_of(layout.modal_x)], state[layout.velocity_of(layout.modal_y)] = moving[:, 0], moving[:, 1]
+    state[layout.velocity_of(layout.modal_x)], state[layout.velocity_of(layout.modal_y)] = (
+        moving[:, 0],
+        moving[:, 1],
+    )
     state[layout.rotor_speed] = speed
     rate, work = layout.zeros(), np.empty((2, p.ball_cos.shape[1]))
     drop_derivative(0.0, state, p, rate, work)
@@ -281,7 +287,7 @@ def test_free_fall_is_a_parabola(quick):
 
 
 def test_the_race_that_is_dragged_takes_the_momentum_the_rotor_loses(quick):
-    """Angular momentum: what friction takes from the rotor drives the races, but for the drag of the balls."""
+    """Angular momentum: what friction takes from the rotor drives the races."""
     model = with_columns(quick, {L.DRAG_COEFFICIENT: 0.0})
     result = simulate_drop(model, DropCase(speed=SPEED, duration=0.02, spin="constant", tolerance=1e-8))
     p = model.parameters

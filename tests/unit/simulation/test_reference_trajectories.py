@@ -34,7 +34,9 @@ ABSOLUTE = {
 STRESS = "max_inner_race_stress"
 
 
-def simulated(machine: Machine, reduction: object, tolerance: float, duration: float, start: PlacedStart) -> DropResult:
+def simulated(
+    machine: Machine, reduction: object, tolerance: float, duration: float, start: PlacedStart
+) -> DropResult:
     model = build_drop_model(machine, reduction)
     case = DropCase(speed=SPEED, duration=duration, tolerance=tolerance, start=start)
     return simulate_drop(model, case)
@@ -43,7 +45,8 @@ def simulated(machine: Machine, reduction: object, tolerance: float, duration: f
 def deviations(result: DropResult, reference: dict[str, np.ndarray], prefix: str) -> dict[str, float]:
     rows = np.round(reference[f"{prefix}t"] / 1e-5).astype(int)
     found = {
-        name: float(np.max(np.abs(getattr(result, name)[rows] - reference[f"{prefix}{name}"]))) for name in ABSOLUTE
+        name: float(np.max(np.abs(getattr(result, name)[rows] - reference[f"{prefix}{name}"])))
+        for name in ABSOLUTE
     }
     stress = reference[f"{prefix}{STRESS}"]
     found[STRESS] = float(np.max(np.abs(result.max_stress[rows] / stress - 1.0)))
@@ -127,7 +130,7 @@ def test_a_slightly_different_machine_is_noticed(path, factor, paper, reference_
 
 
 def test_friction_below_a_metre_per_second_shows_only_later(paper, reference_start, twelve_reference):
-    """Over 20 ms sliding stays fast and only the dynamic coefficient acts; the whole drop sees the static one."""
+    """Over 20 ms sliding stays fast and only the dynamic coefficient acts; later the static one."""
     values = {f"{bearing}.friction.static": 0.11 for bearing in ("NDE", "DE")}
     reduction = Reduction(modes=12, attachment=False)
     result = simulated(paper.with_values(values), reduction, 1e-9, 0.2, reference_start)

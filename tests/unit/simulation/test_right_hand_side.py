@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.unit.simulation import plain_equations
 
 from rotordrop.model.parameters import build_drop_model
 from rotordrop.simulation._rhs import drop_derivative
 from rotordrop.simulation._sensitivity import drop_jacobian
 from rotordrop.simulation.case import DropCase
 from rotordrop.simulation.levitation import rigid_amplitudes, start_of_drop
-from tests.unit.simulation import plain_equations
 
 SPEED = 2.0 * np.pi * 60.0
 CASE = DropCase(speed=SPEED)
@@ -76,7 +76,9 @@ def test_every_arrangement_of_the_machine_reaches_the_kernel(paper):
     found = kernel_derivative(model, state)[: len(expected)]
     assert np.max(np.abs(found - expected)) < 2e-6 * np.max(np.abs(expected))
     plain = build_drop_model(paper, "quick")
-    assert np.max(np.abs(kernel_derivative(plain, state)[: len(expected)] - expected)) > 1e-3 * np.max(np.abs(expected))
+    assert np.max(np.abs(kernel_derivative(plain, state)[: len(expected)] - expected)) > 1e-3 * np.max(
+        np.abs(expected)
+    )
 
 
 @pytest.mark.parametrize("slip", [0.0, 0.98, 1.3])
