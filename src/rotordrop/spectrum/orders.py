@@ -238,9 +238,13 @@ def _window_fit(
     coefficients = inverse @ (basis.T @ measured)
     first = (degree + 1) * 2 * np.arange(orders.size)
     amplitude = coefficients[first] - 1j * coefficients[first + degree + 1]
-    freedom = max(len(basis) - basis.shape[1], 1)
-    spread = np.sqrt(np.sum((measured - basis @ coefficients) ** 2, axis=0) / freedom)
-    return amplitude, np.sqrt(np.maximum(np.diag(inverse)[first], 0.0))[:, None] * spread
+    residual = measured - basis @ coefficients
+    freedom = max(float(np.sum(weight**2)) * (1.0 - basis.shape[1] / len(basis)), 1.0)
+    spread = np.sqrt(np.sum(residual**2, axis=0) / freedom)
+    # Equal noise in all samples, unequal weights: the weights enter the variance once more.
+    spreading = inverse @ (basis * weight).T
+    variance = np.sum(spreading[first] ** 2, axis=1)
+    return amplitude, np.sqrt(variance)[:, None] * spread
 
 
 def _distinct(

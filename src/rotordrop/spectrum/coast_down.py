@@ -1,0 +1,307 @@
+"""A whole coast-down taken apart: waterfalls, lines, orders, resonances, displacement, speed law."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.errors import RecordError
+from rotordrop.estimated import IdentifiedValue
+from rotordrop.spectrum.candidates import Candidate
+from rotordrop.spectrum.coast_down_law import (
+    DragFit,
+    ExponentialFit,
+    find_standstill,
+    fit_drag,
+    fit_exponential,
+)
+from rotordrop.spectrum.indentation import (
+    DisplacementHistory,
+    Settling,
+    displacement_history,
+    find_settling,
+    held_maximum,
+)
+from rotordrop.spectrum.lines import Line, find_lines
+from rotordrop.spectrum.orders import OrderTrack, track_orders
+from rotordrop.spectrum.resonances import PassedResonance, find_resonances
+from rotordrop.spectrum.speed_profile import SpeedProfile
+from rotordrop.spectrum.waterfall import (
+    PAPER_SETTINGS,
+    AmplitudeKind,
+    Component,
+    PlanarSignal,
+    Waterfall,
+    WaterfallSettings,
+    waterfall,
+)
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, float], None]
+
+ORDERS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
+RACES_SPUN_UP = 1.0
+"""Time [s] from which the speed law is fitted: before it the rotor hands spin to the races."""
+SHORTEST_LAW = 3.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CoastDownSignal:
+    """Displacement and speed of a coast-down, recorded or simulated.
+
+    Attributes
+    ----------
+    planes : mapping of str to signal (N, 2)
+        Displacement (x, y) [m] by name of the plane, from power-off on, from the centre of the race.
+    air_gap : mapping of str to float
+        Radius of the air-gap window of each plane [m].
+    sampling_rate : float
+        [Hz].
+    start_time : float
+        Time of the first sample after power-off [s].
+    profile : SpeedProfile or None
+        Rotor speed.
+    speed_time, speed : ndarray, shape (K,), or None
+        Speed as it was recorded or simulated [s], [rad/s].
+    recorded : bool
+        False for a simulation.
+    """
+
+    planes: Mapping[str, PlanarSignal]
+    air_gap: Mapping[str, float]
+    sampling_rate: float
+    start_time: float
+    profile: SpeedProfile | None
+    speed_time: Array | None
+    speed: Array | None
+    recorded: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class WaterfallChoice:
+    """Which waterfalls are wanted.
+
+    Attributes
+    ----------
+    components : tuple of {"x", "y", "full"}
+        Directions, or forward and backward.
+    amplitude_kind : {"zero-to-peak", "peak-to-peak"}
+        Said in every label.
+    highest_frequency : float
+        [Hz].
+    settings : WaterfallSettings
+        Those of the paper by default.
+    """
+
+    components: tuple[Component, ...] = ("x", "y", "full")
+    amplitude_kind: AmplitudeKind = "zero-to-peak"
+    highest_frequency: float = 600.0
+    settings: WaterfallSettings = PAPER_SETTINGS
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpeedLaw:
+    """How the rotor slowed down.
+
+    Attributes
+    ----------
+    exponential : ExponentialFit
+        One time constant, as in the paper.
+    drag : DragFit
+        Dry, linear and quadratic drag.
+    standstill : IdentifiedValue
+        When it stopped [s].
+    """
+
+    exponential: ExponentialFit
+    drag: DragFit
+    standstill: IdentifiedValue
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlaneAnalysis:
+    """What one plane shows."""
+
+    waterfalls: tuple[Waterfall, ...]
+    history: DisplacementHistory
+    settling: Settling
+    track: OrderTrack | None
+    resonances: tuple[PassedResonance, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class CoastDownAnalysis:
+    """What a coast-down shows, plane by plane and line by line."""
+
+    signal: CoastDownSignal
+    planes: Mapping[str, PlaneAnalysis]
+    lines: tuple[Line, ...]
+    speed_law: SpeedLaw | None
+
+    def as_json(self) -> dict[str, Any]:
+        """All findings, ready for JSON; amplitudes are zero-to-peak in m unless the name says otherwise."""
+        return {
+            "recorded": self.signal.recorded,
+            "sampling_rate_hz": self.signal.sampling_rate,
+            "speed_law": None if self.speed_law is None else _law_json(self.speed_law),
+            "lines": [line.as_json() for line in self.lines],
+            "planes": {name: _plane_json(plane) for name, plane in self.planes.items()},
+        }
+
+
+def analyse_coast_down(
+    signal: CoastDownSignal,
+    candidates: Sequence[Candidate],
+    choice: WaterfallChoice | None = None,
+    *,
+    progress: Progress | None = None,
+) -> CoastDownAnalysis:
+    """Take a coast-down apart; the same for a recording and for a simulation.
+
+    Parameters
+    ----------
+    signal : CoastDownSignal
+        Displacements and speed.
+    candidates : sequence of Candidate
+        What lines could be, e.g. from `rotordrop.spectrum.machine_candidates.machine_candidates`.
+    choice : WaterfallChoice
+        Which waterfalls are drawn.
+    progress : callable, optional
+        Called with a stage and the fraction done.
+    """
+    if not signal.planes:
+        raise RecordError("coast-down: no plane given; at least one displacement (x, y) is needed")
+    choice, tell = choice or WaterfallChoice(), progress or (lambda stage, fraction: None)
+    tell("lines", 0.05)
+    lines = find_lines(
+        signal.planes,
+        signal.sampling_rate,
+        signal.profile,
+        start_time=signal.start_time,
+        candidates=candidates,
+        air_gap=float(np.mean(list(signal.air_gap.values()))),
+    )
+    planes = {}
+    for number, name in enumerate(signal.planes):
+        tell(f"orders and waterfall, {name}", 0.5 + 0.4 * number / len(signal.planes))
+        planes[name] = _plane(signal, name, lines, candidates, choice)
+    tell("speed", 0.95)
+    return CoastDownAnalysis(signal=signal, planes=planes, lines=lines, speed_law=_speed_law(signal))
+
+
+def _plane(
+    signal: CoastDownSignal,
+    name: str,
+    lines: Sequence[Line],
+    candidates: Sequence[Candidate],
+    choice: WaterfallChoice,
+) -> PlaneAnalysis:
+    moved, rate, start = signal.planes[name], signal.sampling_rate, signal.start_time
+    track = None
+    resonances: tuple[PassedResonance, ...] = ()
+    if signal.profile is not None:
+        steady = [line.path for line in lines if line.kind == "steady" and name in line.forward]
+        track = track_orders(
+            moved, rate, signal.profile, orders=ORDERS, start_time=start, steady_lines=steady
+        )
+        resonances = find_resonances(track, name, candidates=candidates)
+    return PlaneAnalysis(
+        waterfalls=_waterfalls(signal, moved, choice),
+        history=displacement_history(moved, rate, air_gap=signal.air_gap[name], start_time=start),
+        settling=find_settling(moved, rate, start_time=start),
+        track=track,
+        resonances=resonances,
+    )
+
+
+def _waterfalls(
+    signal: CoastDownSignal, moved: PlanarSignal, choice: WaterfallChoice
+) -> tuple[Waterfall, ...]:
+    if choice.settings.frame_count(moved.shape[0]) == 0:
+        return ()
+    speed = None
+    if signal.profile is not None:
+        speed = signal.profile.speed_at(signal.start_time + np.arange(moved.shape[0]) / signal.sampling_rate)
+    return tuple(
+        waterfall(
+            moved,
+            signal.sampling_rate,
+            component=component,
+            speed=speed,
+            settings=choice.settings,
+            amplitude_kind=choice.amplitude_kind,
+            start_time=signal.start_time,
+            highest_frequency=choice.highest_frequency,
+        )
+        for component in choice.components
+    )
+
+
+def _speed_law(signal: CoastDownSignal) -> SpeedLaw | None:
+    time, speed = signal.speed_time, signal.speed
+    if time is None or speed is None or time[-1] < RACES_SPUN_UP + SHORTEST_LAW:
+        return None
+    return SpeedLaw(
+        exponential=fit_exponential(time, speed, start=RACES_SPUN_UP),
+        drag=fit_drag(time, speed, start=RACES_SPUN_UP),
+        standstill=find_standstill(time, speed),
+    )
+
+
+def _law_json(law: SpeedLaw) -> dict[str, Any]:
+    return {
+        "time_constant_s": law.exponential.time_constant.as_json(),
+        "exponential_residual_rms_rad_s": law.exponential.residual_rms,
+        "exponential_statement": law.exponential.statement,
+        "dry_rad_s2": law.drag.constant.as_json(),
+        "linear_1_s": law.drag.linear.as_json(),
+        "quadratic_1_rad": law.drag.quadratic.as_json(),
+        "drag_residual_rms_rad_s": law.drag.residual_rms,
+        "drag_statement": law.drag.statement,
+        "standstill_s": law.standstill.as_json(),
+    }
+
+
+def _plane_json(plane: PlaneAnalysis) -> dict[str, Any]:
+    history, track = plane.history, plane.track
+    later = np.isfinite(history.largest_later)
+    found: dict[str, Any] = {
+        "largest_displacement_m": history.largest,
+        "largest_displacement_time_s": history.largest_time,
+        "largest_indentation_m": history.largest_indentation,
+        "largest_later_m": history.largest_later if later else None,
+        "largest_later_time_s": history.largest_later_time if later else None,
+        "first_0.2_s_held_the_maximum": bool(held_maximum(history)),
+        "statement": history.statement,
+        "settled": plane.settling.settled,
+        "last_lift_off_s": plane.settling.last_lift_off,
+        "settling": plane.settling.statement,
+        "resonances": [resonance.as_json() for resonance in plane.resonances],
+        "waterfalls": [_waterfall_json(item) for item in plane.waterfalls],
+    }
+    if track is not None:
+        found["orders"] = {
+            "time_s": track.time.tolist(),
+            "speed_hz": (track.speed / (2.0 * np.pi)).tolist(),
+            "orders": track.orders.tolist(),
+            "major_axis_zero_to_peak_m": track.major_axis.tolist(),
+        }
+    return found
+
+
+def _waterfall_json(fall: Waterfall) -> dict[str, Any]:
+    """Settings and the average over the frames; the whole field is in the figure and the record."""
+    return {
+        "component": fall.component,
+        "amplitude_kind": fall.amplitude_kind,
+        "points": fall.settings.points,
+        "overlap": fall.settings.overlap,
+        "resolution_hz": fall.resolution,
+        "frames": len(fall.time),
+        "frequency_hz": fall.frequency.tolist(),
+        "rms_over_frames_m": fall.average().tolist(),
+    }

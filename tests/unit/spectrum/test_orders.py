@@ -1,0 +1,121 @@
+"""Order tracking reads the amplitude of a falling 1X, beside other orders and across steady lines."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tests.unit.spectrum.synthetic import TURN, CoastDown
+
+from rotordrop.errors import RecordError, UsageError
+from rotordrop.spectrum.frequency_path import FrequencyPath, steady_path
+from rotordrop.spectrum.orders import TrackingSettings, track_orders
+from rotordrop.spectrum.speed_profile import exact_speed_profile
+from rotordrop.spectrum.waterfall import waterfall
+
+
+def chirp(**options) -> tuple[CoastDown, callable]:
+    """1X that grows with the square of the speed on top of a constant runout, and 2X."""
+    down = CoastDown(duration=20.0, time_constant=5.9, **options)
+
+    def amplitude(time):
+        return 20e-6 * np.exp(-2.0 * np.asarray(time) / 5.9) + 2e-6
+
+    a = amplitude(down.time)
+    down.xy += np.column_stack([a * np.cos(down.angle + 0.3), 0.7 * a * np.sin(down.angle + 0.5)])
+    down.xy += 1e-6 * np.column_stack([np.cos(2.0 * down.angle), np.sin(2.0 * down.angle)])
+    return down, amplitude
+
+
+def test_exact_speed_gives_the_amplitude_within_a_thousandth():
+    down, amplitude = chirp(noise=0.0)
+    track = track_orders(down.xy, down.sampling_rate, down.exact())
+    error = np.abs(track.amplitude[:, 0, 0]) / amplitude(track.time) - 1.0
+    assert len(error) > 100
+    assert np.abs(error).max() < 1e-3
+    assert np.abs(np.abs(track.amplitude[:, 1, 1]) / 1e-6 - 1.0).max() < 1e-3
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_recorded_speed_gives_the_amplitude_within_a_hundredth(seed):
+    down, amplitude = chirp(noise=0.0, seed=seed)
+    track = track_orders(down.xy, down.sampling_rate, down.recorded(noise=0.05, step=0.1))
+    error = np.abs(track.amplitude[:, 0, 0]) / amplitude(track.time) - 1.0
+    assert np.abs(error).max() < 1e-2
+
+
+def test_frames_smear_what_tracking_does_not():
+    down, amplitude = chirp(noise=0.0)
+    frames = waterfall(down.xy, down.sampling_rate, component="x")
+    assert frames.settings.points == 32768  # 13 s at this sampling rate: the smear is drastic
+    assert frames.amplitude[0, frames.frequency > 30.0].max() < 0.25 * amplitude(3.0)
+    track = track_orders(down.xy, down.sampling_rate, down.exact())
+    row = np.argmin(np.abs(track.time - 3.0))
+    assert np.abs(track.amplitude[row, 0, 0]) == pytest.approx(amplitude(track.time[row]), rel=1e-3)
+
+
+def test_phase_and_direction_of_an_order():
+    down = CoastDown(duration=10.0, noise=0.0)
+    down.xy += 3e-6 * np.column_stack([np.cos(down.angle - 0.4), np.sin(down.angle - 0.4)])
+    down.xy += 1e-6 * np.column_stack([np.cos(down.angle + 1.1), -np.sin(down.angle + 1.1)])
+    track = track_orders(down.xy, down.sampling_rate, down.exact(), orders=(1.0,))
+    assert track.forward[:, 0] == pytest.approx(np.full(len(track.time), 3e-6), rel=1e-3)
+    assert track.backward[:, 0] == pytest.approx(np.full(len(track.time), 1e-6), rel=1e-3)
+    assert track.major_axis[:, 0] == pytest.approx(np.full(len(track.time), 4e-6), rel=1e-3)
+    turning = track.amplitude[:, 0, 0] + 1j * track.amplitude[:, 0, 1]
+    assert np.angle(turning) == pytest.approx(np.full(len(track.time), -0.4), abs=1e-3)
+
+
+def test_a_strong_steady_line_is_explained_instead_of_leaking():
+    down, amplitude = chirp(noise=0.0)
+    down.xy[:, 0] += 80e-6 * np.cos(TURN * 29.03 * down.time)
+    known = track_orders(
+        down.xy, down.sampling_rate, down.exact(), orders=(1.0,), steady_lines=[steady_path(29.03)]
+    )
+    error = np.abs(known.amplitude[:, 0, 0]) / amplitude(known.time) - 1.0
+    apart = known.separable[:, 0]
+    assert 0.5 < apart.mean() < 1.0
+    assert np.abs(error[apart]).max() < 5e-3
+    unknown = track_orders(down.xy, down.sampling_rate, down.exact(), orders=(1.0,))
+    assert np.abs(np.abs(unknown.amplitude[:, 0, 0]) / amplitude(unknown.time) - 1.0).max() > 1.0
+
+
+def test_a_wandering_steady_line_is_followed_by_its_path():
+    down, amplitude = chirp(noise=0.0)
+    frequency = 29.3 - 0.6 * np.exp(-down.time / 5.0)
+    phase = TURN * np.cumsum(frequency) / down.sampling_rate
+    down.xy[:, 0] += 80e-6 * np.cos(phase)
+    path = FrequencyPath(time=down.time[::50], frequency=frequency[::50])
+    found = track_orders(down.xy, down.sampling_rate, down.exact(), orders=(1.0,), steady_lines=[path])
+    error = np.abs(found.amplitude[:, 0, 0]) / amplitude(found.time) - 1.0
+    assert np.abs(error[found.separable[:, 0]]).max() < 1e-2
+
+
+def test_standard_error_is_the_scatter():
+    down, _ = chirp(noise=1e-6, seed=5)
+    truth, _ = chirp(noise=0.0)
+    found = track_orders(down.xy, down.sampling_rate, down.exact(), orders=(1.0, 2.0))
+    clean = track_orders(truth.xy, truth.sampling_rate, truth.exact(), orders=(1.0, 2.0))
+    ratio = (np.abs(found.amplitude) - np.abs(clean.amplitude)) / found.standard_error
+    assert 0.8 < np.sqrt(np.mean(ratio**2)) < 1.25
+
+
+def test_close_orders_need_more_turns_and_stop_earlier():
+    down, _ = chirp(noise=0.0)
+    short = TrackingSettings(longest_window=1.0)
+    whole = track_orders(down.xy, down.sampling_rate, down.exact(), orders=(1.0, 2.0), settings=short)
+    halves = track_orders(down.xy, down.sampling_rate, down.exact(), orders=(0.5, 1.0, 1.5), settings=short)
+    assert halves.speed.min() > whole.speed.min()
+    assert (halves.window * halves.speed / TURN).min() >= 6.0 - 1e-9
+
+
+def test_wrong_calls_are_refused():
+    down, _ = chirp(noise=0.0)
+    with pytest.raises(UsageError, match=r"orders \[-1\.0\] given"):
+        track_orders(down.xy, down.sampling_rate, down.exact(), orders=(-1.0,))
+    with pytest.raises(UsageError, match="2 turns per window"):
+        TrackingSettings(revolutions=2.0)
+    slow = exact_speed_profile(np.arange(10.0), np.full(10, 0.1))
+    with pytest.raises(RecordError, match="holds no whole window"):
+        track_orders(down.xy, down.sampling_rate, slow)
+    with pytest.raises(UsageError, match=r"order 3X was not tracked; tracked are 1X"):
+        track_orders(down.xy, down.sampling_rate, down.exact(), orders=(1.0,)).of(3.0)
