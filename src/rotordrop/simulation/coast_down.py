@@ -46,7 +46,7 @@ from rotordrop.simulation.coast_down_file import Frame, write_coast_down, write_
 from rotordrop.simulation.coast_down_result import QUANTITIES, CoastDownResult, WindowStatistics
 
 Array = NDArray[np.float64]
-Progress = Callable[[float, str], None]
+Progress = Callable[[str, float], None]
 
 
 def simulate_coast_down(
@@ -72,7 +72,7 @@ def simulate_coast_down(
     resume : bool
         Go on with a run to the same output that was killed; the result is the same to the last bit.
     progress : callable, optional
-        Called with the fraction done and a few words.
+        Called with a few words and the fraction done.
     windows_at_most : int, optional
         Stop after so many windows, as if killed; the run can then be resumed. None is returned.
 
@@ -100,7 +100,7 @@ def simulate_coast_down(
     folder = None if output is None else _folder(output, resume=resume)
     stored = None if folder is None or not resume else load_checkpoint(folder, digest)
     run = begin(setup) if stored is None else Run.of(stored)
-    tell = progress or (lambda fraction, stage: None)
+    tell = progress or (lambda stage, fraction: None)
     while run.status[PHASE] == RUNNING:
         if windows_at_most is not None and run.status[WINDOW] >= windows_at_most:
             return None
@@ -109,7 +109,7 @@ def simulate_coast_down(
             write_part(part_path(folder, int(run.status[PARTS])), samples, log)
             run.status[PARTS] += 1.0
             save_checkpoint(folder, digest, run.arrays())
-        tell(_fraction(setup, run), _stage(setup, run))
+        tell(_stage(setup, run), _fraction(setup, run))
     result = _result(setup, run, output)
     if folder is not None and output is not None:
         gaps = model.parameters.bearing[:, L.AIR_GAP]

@@ -1,0 +1,106 @@
+"""Find and name the frequencies of a coast-down, recorded or simulated.
+
+Waterfalls as in the paper, orders without smear, lines with names, resonances, displacement, speed law.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rotordrop.cli._options import JsonOption, MachineArgument, quantity
+from rotordrop.cli._output import deliver, progress_bar, require_places
+
+if TYPE_CHECKING:
+    from rotordrop.machine import Machine
+    from rotordrop.spectrum.coast_down import CoastDownSignal
+
+
+class Direction(StrEnum):
+    """What of the displacement is transformed."""
+
+    x = "x"
+    y = "y"
+    full = "full"
+
+
+class Amplitude(StrEnum):
+    """How amplitudes are given."""
+
+    zero_to_peak = "zero-to-peak"
+    peak_to_peak = "peak-to-peak"
+
+
+def waterfall(
+    machine: MachineArgument,
+    record: Annotated[
+        Path, typer.Argument(metavar="RECORD", help="Recorded coast-down, or one from 'coast-down --output'.")
+    ],
+    component: Annotated[
+        list[Direction] | None, typer.Option(help="Direction, or forward and backward; all when left out.")
+    ] = None,
+    amplitude: Annotated[Amplitude, typer.Option(help="Amplitudes of the waterfalls.")] = (
+        Amplitude.zero_to_peak
+    ),
+    points: Annotated[int, typer.Option(min=16, help="Samples per frame; the paper's by default.")] = 32768,
+    overlap: Annotated[float, typer.Option(min=0.0, max=0.95, help="Share used again.")] = 0.5,
+    highest: Annotated[
+        float,
+        typer.Option(
+            parser=quantity("frequency"),
+            metavar="FREQUENCY",
+            help="Highest frequency drawn.",
+            show_default="600 Hz",
+        ),
+    ] = 600.0,
+    profile: Annotated[Path | None, typer.Option(metavar="FILE", help="Channel map of the recorder.")] = None,
+    report: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write the report as one HTML file.")
+    ] = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Find and name the frequencies of a coast-down, and say whether 0.2 s held the maximum."""
+    from rotordrop.machine import load_machine
+    from rotordrop.report.page import write_page
+    from rotordrop.report.terminal import print_summary
+    from rotordrop.report.waterfall_page import waterfall_page
+    from rotordrop.spectrum.coast_down import WaterfallChoice, analyse_coast_down
+    from rotordrop.spectrum.machine_candidates import machine_candidates
+    from rotordrop.spectrum.waterfall import WaterfallSettings
+
+    require_places(report, json_file)
+    described = load_machine(machine)
+    signal, simulated = _signal(described, record, profile)
+    choice = WaterfallChoice(
+        components=tuple(direction.value for direction in component or tuple(Direction)),
+        amplitude_kind=amplitude.value,
+        highest_frequency=highest,
+        settings=WaterfallSettings(points=points, overlap=overlap),
+    )
+    with progress_bar("frequencies") as progress:
+        found = analyse_coast_down(signal, machine_candidates(described), choice, progress=progress)
+    page = waterfall_page(
+        found,
+        title=f"Frequencies of a coast-down of {described.name}",
+        facts=(("machine", f"{described.name} ({machine.name})"), ("record", record.name)),
+        simulated=simulated,
+    )
+    if report is not None:
+        write_page(page, report)
+    deliver(found.as_json(), json_file, lambda out: print_summary(page, out))
+
+
+def _signal(machine: Machine, path: Path, profile: Path | None) -> tuple[CoastDownSignal, str]:
+    """Open a recording or a simulated file, with the sentence that says it is simulated."""
+    from rotordrop.estimation.recorded_coast_down import recorded_coast_down
+    from rotordrop.estimation.simulated_coast_down import simulated_coast_down
+    from rotordrop.measurement.record import read_record
+    from rotordrop.simulation.coast_down_file import is_coast_down
+
+    if is_coast_down(path):
+        text = "Everything on this page is computed from the machine description; nothing was measured."
+        return simulated_coast_down(path, machine), text
+    return recorded_coast_down(machine, read_record(path, machine, profile=profile)), ""

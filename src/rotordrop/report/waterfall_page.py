@@ -1,0 +1,244 @@
+"""The report on the frequencies of a coast-down, recorded or simulated."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotordrop._version import __version__
+from rotordrop.report.coast_down_figures import displacement_history_figure, speed_law_figure
+from rotordrop.report.content import Card, Figure, KeyFigure, ReportContent, Section, Statement, Table
+from rotordrop.report.quantity import Quantity
+from rotordrop.report.waterfall_figure import order_figure, waterfall_figure
+from rotordrop.spectrum.indentation import held_maximum
+
+if TYPE_CHECKING:
+    from rotordrop.spectrum.coast_down import CoastDownAnalysis, PlaneAnalysis, SpeedLaw
+
+_COMPONENTS = {
+    "x": "horizontal",
+    "y": "vertical",
+    "full": "forward (right) and backward (left) parts",
+}
+
+
+def waterfall_page(
+    analysis: CoastDownAnalysis, *, title: str, facts: tuple[tuple[str, str], ...] = (), simulated: str = ""
+) -> ReportContent:
+    """Build the report on the frequencies of a coast-down.
+
+    Parameters
+    ----------
+    analysis : CoastDownAnalysis
+        What was found.
+    title : str
+        Whose coast-down this is.
+    facts : tuple of (str, str)
+        Machine and record.
+    simulated : str
+        Sentence that says the record is simulated; empty for a measured one.
+    """
+    return ReportContent(
+        title=title,
+        simulated=simulated,
+        verdict=_verdict(analysis),
+        cards=tuple(_card(name, plane) for name, plane in analysis.planes.items()),
+        facts=(*facts, ("rotordrop", __version__)),
+        summary=(line_table(analysis),),
+        sections=frequency_sections(analysis),
+    )
+
+
+def frequency_sections(analysis: CoastDownAnalysis) -> tuple[Section, ...]:
+    """Displacement, waterfalls, lines, orders with the resonances they pass, and the speed law."""
+    sections = [_displacement_section(analysis), _waterfall_section(analysis), _line_section(analysis)]
+    if any(plane.track is not None for plane in analysis.planes.values()):
+        sections.append(_order_section(analysis))
+    if analysis.speed_law is not None:
+        sections.append(_law_section(analysis, analysis.speed_law))
+    return tuple(sections)
+
+
+def _verdict(analysis: CoastDownAnalysis) -> tuple[Statement, ...]:
+    statements = []
+    for name, plane in analysis.planes.items():
+        held = held_maximum(plane.history)
+        level = "good" if held else "warning"
+        statements.append(Statement(text=f"{name}: {plane.history.statement}", level=level))
+        statements.append(
+            Statement(
+                text=f"{name}: {plane.settling.statement}",
+                level="good" if plane.settling.settled else "notice",
+            )
+        )
+    unnamed = sum(not line.named for line in analysis.lines)
+    statements.append(
+        Statement(
+            text=f"{len(analysis.lines)} lines found, {len(analysis.lines) - unnamed} named, {unnamed} "
+            "without a name: nothing in the machine description or the mains explains them well enough."
+        )
+    )
+    if analysis.speed_law is not None:
+        statements.append(Statement(text=_standstill(analysis.speed_law)))
+    return tuple(statements)
+
+
+def _standstill(law: SpeedLaw) -> str:
+    stop = law.standstill
+    if stop.status != "determined":
+        return f"When the rotor stopped is open: {stop.status}."
+    low, high = stop.interval_90 or (stop.value, stop.value)
+    return f"The rotor stopped {stop.value:.1f} s after power-off (90 %: {low:.1f} to {high:.1f} s)."
+
+
+def _card(name: str, plane: PlaneAnalysis) -> Card:
+    history = plane.history
+    figures = [
+        KeyFigure(
+            label="Largest displacement",
+            value=Quantity(value=history.largest, kind="length"),
+            note=f"at {Quantity(value=history.largest_time, kind='duration', digits=3).text}",
+        ),
+        KeyFigure(
+            label="Beyond the air gap",
+            value=Quantity(value=history.largest_indentation, kind="length", digits=3),
+        ),
+        KeyFigure(
+            label="Largest after 0.2 s", value=Quantity(value=history.largest_later, kind="length", digits=4)
+        ),
+        KeyFigure(
+            label="Last lift-off",
+            value=Quantity(value=plane.settling.last_lift_off, kind="duration", digits=3),
+        ),
+    ]
+    return Card(title=f"{name} plane", figures=tuple(figures))
+
+
+def line_table(analysis: CoastDownAnalysis) -> Table:
+    """Every line with frequency or order, amplitude, width, confidence and the reason for its name."""
+    rows = []
+    for line in analysis.lines:
+        where = f"{line.order:.3f}X" if line.order is not None else f"{line.frequency:.2f} Hz"
+        error = line.order_error if line.order is not None else line.frequency_error
+        rows.append(
+            (
+                line.label,
+                f"{where} ± {0.0 if error is None else error:.2g}",
+                Quantity(value=line.amplitude, kind="length", digits=3),
+                f"{line.ratio:.0f}",
+                "below resolution" if line.width == 0.0 else f"{line.width:.2f} Hz",
+                f"{line.first_seen:.0f} to {line.last_seen:.0f} s",
+                Quantity(value=line.confidence, kind="probability"),
+            )
+        )
+    return Table(
+        columns=("name", "where", "amplitude", "× floor", "width", "seen", "confidence"),
+        rows=tuple(rows),
+        caption="Lines found, strongest first",
+        note="Amplitudes are zero-to-peak, in the direction and plane where they are largest, root mean "
+        "square over the time the line was seen.",
+    )
+
+
+def _displacement_section(analysis: CoastDownAnalysis) -> Section:
+    role = "measured" if analysis.signal.recorded else "simulated"
+    histories = {name: plane.history for name, plane in analysis.planes.items()}
+    figure = Figure(
+        chart=displacement_history_figure(histories, role),
+        caption=f"Distance of the rotor from the bearing centre over the whole coast-down, {role}, with the "
+        "air-gap window (Neisi 2020, Fig. 17).",
+    )
+    return Section(heading="Displacement over the coast-down", figures=(figure,))
+
+
+def _waterfall_section(analysis: CoastDownAnalysis) -> Section:
+    figures = []
+    for name, plane in analysis.planes.items():
+        for fall in plane.waterfalls:
+            lines = [line for line in analysis.lines if name in line.forward and line.named]
+            figures.append(
+                Figure(
+                    chart=waterfall_figure(fall, name, lines),
+                    caption=f"{name}, {_COMPONENTS[fall.component]}: amplitude {fall.amplitude_kind} of "
+                    f"frames of {fall.settings.points} points, Hann window, {100 * fall.settings.overlap:.0f} % "
+                    f"overlap, lines {fall.resolution:.3f} Hz apart (Neisi 2020, Fig. 18). A falling speed "
+                    "smears the orders here; their true amplitude is below.",
+                )
+            )
+    if not figures:
+        short = Statement(text="The signal is shorter than one frame; there is no waterfall.", level="notice")
+        return Section(heading="Waterfall", statements=(short,))
+    return Section(heading="Waterfall", figures=tuple(figures))
+
+
+def _line_section(analysis: CoastDownAnalysis) -> Section:
+    reasons = Table(
+        columns=("line", "reason for its name"),
+        rows=tuple((line.label, line.reason) for line in analysis.lines),
+        caption="Why the lines are called so",
+    )
+    return Section(heading="Lines", tables=(line_table(analysis), reasons))
+
+
+def _order_section(analysis: CoastDownAnalysis) -> Section:
+    figures, rows = [], []
+    for name, plane in analysis.planes.items():
+        if plane.track is None:
+            continue
+        figures.append(
+            Figure(
+                chart=order_figure(plane.track, name),
+                caption=f"{name}: amplitude of the orders, zero-to-peak, tracked in the angle the rotor "
+                "really turned through. Gaps: a steady line lies too close to tell it from the order.",
+            )
+        )
+        rows += [
+            (
+                name,
+                f"{r.order:g}X",
+                f"{r.frequency:.1f} ± {r.frequency_error:.1f} Hz",
+                f"{r.speed / (2 * np.pi):.1f} Hz",
+                Quantity(value=r.amplitude, kind="length", digits=3),
+                f"{r.rise:.1f}",
+                r.name.label if r.certain else f"{r.name.label} (a steady line crosses here)",
+            )
+            for r in plane.resonances
+        ]
+    table = Table(
+        columns=("plane", "order", "excited at", "rotor speed", "amplitude", "rise", "mode"),
+        rows=tuple(rows),
+        caption="Resonances passed on the way down",
+    )
+    if not rows:
+        none = Statement(text="No order rises above its surroundings on the way down.")
+        return Section(heading="Orders and resonances", statements=(none,), figures=tuple(figures))
+    return Section(heading="Orders and resonances", figures=tuple(figures), tables=(table,))
+
+
+def _law_section(analysis: CoastDownAnalysis, law: SpeedLaw) -> Section:
+    time, speed = analysis.signal.speed_time, analysis.signal.speed
+    assert time is not None and speed is not None
+    role = "measured" if analysis.signal.recorded else "simulated"
+    figure = Figure(
+        chart=speed_law_figure(time, speed, law, role),
+        caption="Speed with the exponential fit of the paper and a fit of dry, linear and quadratic drag; "
+        "below what each leaves over.",
+    )
+    values = (
+        ("time constant of the exponential fit", law.exponential.time_constant),
+        ("dry drag: balls and races", law.drag.constant),
+        ("linear drag: speed.aero_linear", law.drag.linear),
+        ("quadratic drag: speed.aero_quadratic", law.drag.quadratic),
+        ("standstill", law.standstill),
+    )
+    rows = []
+    for label, value in values:
+        low, high = value.interval_90 or (np.nan, np.nan)
+        interval = f"{low:.4g} to {high:.4g}" if np.isfinite(low) else "–"
+        rows.append((label, f"{value.value:.4g} {value.unit}", interval, value.status))
+    table = Table(
+        columns=("quantity", "value", "90 % interval", "verdict"), rows=tuple(rows), caption="Speed law"
+    )
+    text = (law.exponential.statement, law.drag.statement)
+    return Section(heading="Speed law", text=text, figures=(figure,), tables=(table,))
