@@ -44,13 +44,13 @@ def test_the_magnets_carry_the_weight_and_hold_their_places(levitated):
     )
 
 
-def test_the_sag_at_the_bearings_is_that_of_the_feasibility_study(levitated):
-    """Between its magnets the rotor sags: -6.6 and +4.9 µm at the bearings against the rigid line."""
+def test_the_sag_at_the_bearings_against_the_rigid_line(levitated):
+    """An independent study of this machine found -6.6 and +4.9 µm."""
     model = build_drop_model(levitated.machine, "full")
     static, _ = levitated_static(model, None)
-    sag = model.parameters.bearing_shape @ static[:, 1]
-    assert np.max(np.abs(model.parameters.bearing_shape @ static[:, 0])) < 1e-15
-    assert 1e-6 < np.max(np.abs(sag)) < 20e-6
+    sag = model.parameters.bearing_shape[:, 2:] @ static[2:]
+    assert sag[:, 1] == pytest.approx([-6.6e-6, 4.9e-6], abs=0.1e-6)
+    assert np.max(np.abs(sag[:, 0])) < 1e-15
 
 
 def test_a_given_orbit_is_met_at_the_magnets(levitated):
