@@ -10,7 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.estimated import Estimated, IdentifiedValue
-from rotordrop.estimation.tracked import identified, parameter_sample, prepare, preload_value, track_drops
+from rotordrop.estimation.tracked import (
+    INCONSISTENT_WIDENING,
+    MODEL_GAP_SIGMA,
+    identified,
+    parameter_sample,
+    parameter_widening,
+    preload_value,
+    prepare,
+    track_drops,
+)
 from rotordrop.machine import Machine
 from rotordrop.measurement.record import Record
 from rotordrop.tracking.calibration import TrackedDrops
@@ -23,9 +32,6 @@ Progress = Callable[[str, float], None]
 
 CONFOUNDED = 0.9
 """Correlation from which two parameters are reported as confounded [1]."""
-
-WIDENING = 1.5
-"""Factor on calibrated standard errors [1]: what the linearised fit leaves out, as measured on synthetic machines."""
 
 SEPARATED_BY: dict[frozenset[str], str] = {
     frozenset({"support.stiffness", "support.mass"}): (
@@ -138,7 +144,7 @@ def calibrate_machine(
     at = parameter_sample(smoothed)
     covariance = smoothed.covariance(at)
     mean = smoothed.means[at]
-    widening = WIDENING * (1.0 if consistent else 2.0)
+    widening = 1.0 if consistent else INCONSISTENT_WIDENING
     values = _values(problem, mean, covariance, widening)
     source = f"calibrated on {', '.join(stems)}"
     return Calibration(
@@ -163,11 +169,12 @@ def _values(
             continue
         i = problem.n_dynamic + k
         owner, _, path = unknown.path.partition(".")
-        wide = max(1.0, min(widening, unknown.sigma / max(sigma[i], 1e-300)))
+        error = math.hypot(float(sigma[i]), MODEL_GAP_SIGMA) if path == "air_gap" else float(sigma[i])
+        wide = parameter_widening(unknown, error, widening)
         if path == "axial_offset":
-            values[f"{owner}.preload"] = preload_value(problem, owner, unknown, mean[i], sigma[i], wide)
+            values[f"{owner}.preload"] = preload_value(problem, owner, unknown, float(mean[i]), error, wide)
         else:
-            values[unknown.path] = identified(unknown, float(mean[i]), float(sigma[i]), wide)
+            values[unknown.path] = identified(unknown, float(mean[i]), error, wide)
     first = problem.n_dynamic + len(problem.unknowns)
     for c, sensor in enumerate(problem.model.machine.sensors):
         gain, offset = first + c, first + problem.n_channels + c

@@ -51,6 +51,12 @@ NOISE_FACTORS = (0.5, 1.0, 2.0, 4.0)
 MODEL_FORCE_SIGMA = 0.01
 """Relative standard deviation of a force peak by what every model here leaves out (basis, sampling) [1]."""
 MODEL_STRESS_SIGMA = 0.004
+MODEL_MEAN_STRESS_SIGMA = 0.04
+"""The same for the mean stress: preload sets it, and the record knows preload only through the ball stiffness [1]."""
+MODEL_GAP_SIGMA = 2.5e-6
+"""Standard deviation of an air gap by what confounds it with gains and offsets beyond the linearised fit [m]."""
+PARAMETER_WIDENING = 1.5
+"""Factor on standard errors of parameters for what the linearised fit leaves out [1]."""
 INCONSISTENT_WIDENING = 2.0
 """Factor on intervals when the model is not consistent with the record [1]."""
 
@@ -280,12 +286,12 @@ def _force_values(forces: ForceHistory, b: int, widening: float) -> tuple[dict[s
     highest, _ = refined_peak(forces.time, forces.stress[:, b])
     top = int(np.argmax(forces.stress[:, b]))
     stress_sigma = math.hypot(float(forces.stress_sigma[top, b]), MODEL_STRESS_SIGMA * highest)
+    mean_stress = float(np.mean(forces.stress[:, b]))
+    mean_sigma = math.hypot(float(np.mean(forces.stress_sigma[:, b])), MODEL_MEAN_STRESS_SIGMA * mean_stress)
     values = {
         "peak_force_N": with_interval(peak, sigma, widening, "N"),
         "peak_stress_Pa": with_interval(highest, stress_sigma, widening, "Pa"),
-        "mean_stress_Pa": with_interval(
-            float(np.mean(forces.stress[:, b])), float(np.mean(forces.stress_sigma[:, b])), widening, "Pa"
-        ),
+        "mean_stress_Pa": with_interval(mean_stress, mean_sigma, widening, "Pa"),
     }
     late = (forces.time >= 0.15) & (forces.time <= 0.2)
     if forces.time[-1] >= 0.199:
@@ -334,6 +340,11 @@ def identified(unknown: Unknown, theta: float, sigma: float, widening: float = 1
     )
 
 
+def parameter_widening(unknown: Unknown, sigma: float, widening: float = 1.0) -> float:
+    """Factor on a parameter's standard error [1]; the widened error stays within that of the prior."""
+    return max(1.0, min(PARAMETER_WIDENING * widening, unknown.sigma / max(sigma, 1e-300)))
+
+
 def _parameter_values(
     problem: DropProblem, smoothed: Smoothed, name: str, widening: float
 ) -> dict[str, IdentifiedValue]:
@@ -343,10 +354,14 @@ def _parameter_values(
     values = {}
     for unknown, t, s in zip(problem.unknowns, theta, sigma, strict=True):
         owner, _, path = unknown.path.partition(".")
-        if owner == name and path in _FIELDS:
-            values[_FIELDS[path]] = identified(unknown, float(t), float(s), widening)
-        elif owner == name and path == "axial_offset":
-            values["preload_N"] = preload_value(problem, name, unknown, float(t), float(s), widening)
+        if owner != name:
+            continue
+        error = math.hypot(float(s), MODEL_GAP_SIGMA) if path == "air_gap" else float(s)
+        wide = parameter_widening(unknown, error, widening)
+        if path in _FIELDS:
+            values[_FIELDS[path]] = identified(unknown, float(t), error, wide)
+        elif path == "axial_offset":
+            values["preload_N"] = preload_value(problem, name, unknown, float(t), error, wide)
     values["friction.static"] = _static_friction(problem, name, values["friction.dynamic"])
     values["equivalent_stiffness_N_per_m"] = _equivalent_stiffness(problem, name, values)
     return values

@@ -1,0 +1,89 @@
+"""The published JSON Schema of an estimate document."""
+
+from __future__ import annotations
+
+from typing import Any
+
+_NUMBER = {"type": "number"}
+_VALUE: dict[str, Any] = {
+    "type": "object",
+    "properties": {
+        "value": {**_NUMBER, "description": "Value in the unit of the field name."},
+        "standard_error": {**_NUMBER, "description": "Standard error in the same unit."},
+        "interval_90": {
+            "type": "array",
+            "items": _NUMBER,
+            "minItems": 2,
+            "maxItems": 2,
+            "description": "Interval that holds the true value with 90 % probability.",
+        },
+        "lower": {**_NUMBER, "description": "Lower limit set by the record."},
+        "upper": {**_NUMBER, "description": "Upper limit set by the record."},
+        "status": {"type": "string", "description": "Verdict, or why there is no interval."},
+        "start": _NUMBER,
+        "bounds": {"type": "array", "items": _NUMBER, "minItems": 2, "maxItems": 2},
+        "unit": {"type": "string"},
+        "time_s": {**_NUMBER, "description": "When, from power-off."},
+    },
+    "required": ["value"],
+}
+_OBJECT = {"type": "object", "additionalProperties": {"$ref": "#/$defs/value"}}
+_BEARING: dict[str, Any] = {
+    "type": "object",
+    "properties": {
+        **{
+            name: {"$ref": "#/$defs/value"}
+            for name in (
+                "air_gap_m",
+                "equivalent_stiffness_N_per_m",
+                "peak_force_N",
+                "mean_force_0p15_0p2_N",
+                "peak_stress_Pa",
+                "mean_stress_Pa",
+                "preload_N",
+            )
+        },
+        "support": {
+            **_OBJECT,
+            "description": "stiffness_N_per_m, damping_N_s_per_m, mass_kg",
+        },
+        "friction": {**_OBJECT, "description": "static, dynamic"},
+        "contact": _OBJECT,
+        "race": _OBJECT,
+        "stress_statistics_Pa": {"type": "object"},
+        "impacts": {"type": "array", "items": {"type": "object"}},
+    },
+    "required": ["peak_force_N", "peak_stress_Pa"],
+}
+_DROP: dict[str, Any] = {
+    "type": "object",
+    "properties": {
+        "drop_instant_s": {**_NUMBER, "description": "Power-off in record time."},
+        "speed_Hz": {**_NUMBER, "description": "Rotor speed at power-off."},
+        "method": {"enum": ["tracked", "replay"]},
+        "warnings": {"type": "array", "items": {"type": "string"}},
+        "bearings": {"type": "object", "additionalProperties": {"$ref": "#/$defs/bearing"}},
+    },
+    "required": ["drop_instant_s", "speed_Hz", "method", "warnings", "bearings"],
+}
+
+
+def estimate_schema() -> dict[str, Any]:
+    """JSON Schema of the document that ``rotordrop estimate --json`` writes; times are from power-off."""
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "rotordrop estimate",
+        "description": "Force and stress of touchdown bearings from one recorded drop, or from several of a machine.",
+        "oneOf": [
+            {"$ref": "#/$defs/drop"},
+            {
+                "type": "object",
+                "properties": {
+                    "machine": {"type": "string"},
+                    "drops": {"type": "object", "additionalProperties": {"$ref": "#/$defs/drop"}},
+                },
+                "required": ["machine", "drops"],
+            },
+        ],
+        "$defs": {"value": _VALUE, "bearing": _BEARING, "drop": _DROP},
+    }

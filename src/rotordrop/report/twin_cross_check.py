@@ -1,0 +1,41 @@
+"""The tracked twin against the estimate that knows no contact law."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rotordrop.estimation.tracked import TrackedDrop
+from rotordrop.report.cross_check import CrossCheck
+from rotordrop.report.quantity import Quantity
+from rotordrop.tracking.input_state import KNOWN_PEAK_ERROR, input_state_estimate
+
+KNOWN_MEAN_ERROR = 0.10
+"""Relative error of the mean force that the cross-check is known to make [1]."""
+
+
+def twin_cross_checks(drop: TrackedDrop) -> tuple[CrossCheck, ...]:
+    """Peak and mean force of every bearing found in both ways."""
+    check = input_state_estimate(drop.problem, drop.smoothed)
+    found = []
+    late = drop.forces.time >= 0.15
+    for b, (name, values) in enumerate(drop.values.items()):
+        peak = values["peak_force_N"]
+        found.append(
+            CrossCheck(
+                name=f"{name} peak force",
+                estimate=Quantity(value=peak.value, kind="force", interval_90=peak.interval_90),
+                check=Quantity(value=float(check.peak[b]), kind="force", digits=3),
+                accuracy=KNOWN_PEAK_ERROR,
+            )
+        )
+        if np.isfinite(check.mean_late[b]):
+            mean = float(np.hypot(*drop.forces.force[late, b].mean(axis=0)))
+            found.append(
+                CrossCheck(
+                    name=f"{name} force of the mean, 150 to 200 ms",
+                    estimate=Quantity(value=mean, kind="force", digits=3),
+                    check=Quantity(value=float(check.mean_late[b]), kind="force", digits=3),
+                    accuracy=KNOWN_MEAN_ERROR,
+                )
+            )
+    return tuple(found)
