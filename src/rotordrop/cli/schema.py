@@ -1,11 +1,13 @@
-"""Print the JSON Schema of a machine file.
+"""Print the JSON Schema of machine files or of estimates.
 
-Editors that know it complete and check a machine file while one types.
+Editors that know the first complete and check a machine file while one types; programs that read an estimate
+find its fields in the second.
 """
 
 from __future__ import annotations
 
 import json
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -15,15 +17,28 @@ from rotordrop.cli._options import ForceOption
 from rotordrop.cli._output import deliver_text
 
 
+class Document(StrEnum):
+    """Documents with a published schema."""
+
+    machine = "machine"
+    estimate = "estimate"
+
+
 def schema(
+    document: Annotated[
+        Document, typer.Argument(help="A machine file, or what 'rotordrop estimate --json' writes.")
+    ] = Document.machine,
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", metavar="FILE", help="Write to FILE instead of printing."),
     ] = None,
     force: ForceOption = False,
 ) -> None:
-    """Print the JSON Schema of a machine file, for editors and programs."""
-    from rotordrop.machine import machine_schema
+    """Print the JSON Schema of a machine file or of an estimate, for editors and programs."""
+    if document is Document.machine:
+        from rotordrop.machine import machine_schema as schema_of
+    else:
+        from rotordrop.estimation.schema import estimate_schema as schema_of
 
-    text = json.dumps(machine_schema(), indent=2, ensure_ascii=False) + "\n"
+    text = json.dumps(schema_of(), indent=2, ensure_ascii=False) + "\n"
     deliver_text(text, output, overwrite=force)

@@ -39,14 +39,14 @@ Progress = Callable[[str, float], None]
 COARSE_BASIS = Reduction(modes=6, attachment=True)
 FINE_BASIS = Reduction(modes=10, attachment=True)
 FINE_SCHEDULE: tuple[Stage, ...] = (
-    Stage(until=0.06, impulse=2e-3, share=0.02, passes=2),
-    Stage(until=0.1, impulse=2e-3, share=0.02, passes=1),
-    Stage(until=0.15, impulse=2e-3, share=0.02, passes=1),
-    Stage(until=0.2, impulse=2e-3, share=0.02, passes=2),
+    Stage(until=0.06, impulse=1e-3, share=0.01, passes=2),
+    Stage(until=0.1, impulse=1e-3, share=0.01, passes=1),
+    Stage(until=0.15, impulse=1e-3, share=0.01, passes=1),
+    Stage(until=0.2, impulse=1e-3, share=0.01, passes=2),
 )
 CALIBRATION_SCHEDULE = FINE_SCHEDULE[:1]
 WINDOW = 0.2
-NOISE_FACTORS = (0.5, 1.0, 2.0, 4.0)
+NOISE_FACTORS = (0.5, 1.0, 2.0, 4.0, 8.0)
 
 MODEL_FORCE_SIGMA = 0.01
 """Relative standard deviation of a force peak by what every model here leaves out (basis, sampling) [1]."""
@@ -57,6 +57,10 @@ MODEL_GAP_SIGMA = 2.5e-6
 """Standard deviation of an air gap by what confounds it with gains and offsets beyond the linearised fit [m]."""
 PARAMETER_WIDENING = 1.5
 """Factor on standard errors of parameters for what the linearised fit leaves out [1]."""
+MODEL_MEAN_FORCE_SIGMA = 0.01
+"""Relative standard deviation of a mean force by what every model here leaves out [1]."""
+INDEPENDENT_SPANS = 50.0
+"""Independent stretches in the 50 ms over which the mean force is taken: its errors last about a millisecond [1]."""
 INCONSISTENT_WIDENING = 2.0
 """Factor on intervals when the model is not consistent with the record [1]."""
 
@@ -295,12 +299,10 @@ def _force_values(forces: ForceHistory, b: int, widening: float) -> tuple[dict[s
     }
     late = (forces.time >= 0.15) & (forces.time <= 0.2)
     if forces.time[-1] >= 0.199:
-        values["mean_force_0p15_0p2_N"] = with_interval(
-            float(np.mean(forces.magnitude[late, b])),
-            float(np.mean(forces.magnitude_sigma[late, b])),
-            widening,
-            "N",
-        )
+        mean = float(np.mean(forces.magnitude[late, b]))
+        spread = float(np.mean(forces.magnitude_sigma[late, b])) / math.sqrt(INDEPENDENT_SPANS)
+        sigma = math.hypot(spread, MODEL_MEAN_FORCE_SIGMA * mean)
+        values["mean_force_0p15_0p2_N"] = with_interval(mean, sigma, widening, "N")
     return values, moment
 
 

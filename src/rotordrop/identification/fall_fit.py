@@ -107,7 +107,7 @@ def unbalance_nodes(machine: Machine) -> tuple[int, ...]:
 def _unbalance_sigma(machine: Machine, nodes: tuple[int, ...], mass: float) -> Array:
     if machine.unbalances:
         sums = [sum(float(u.amount) for u in machine.unbalances if u.node == node) for node in nodes]
-        return np.maximum(np.array(sums), 1e-7)
+        return np.asarray(np.maximum(np.array(sums), 1e-7))
     usual = 2.5e-3 * mass / float(machine.speed.nominal)
     return np.full(len(nodes), usual / np.sqrt(len(nodes)))
 

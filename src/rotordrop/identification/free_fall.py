@@ -32,6 +32,8 @@ class FreeFall:
         The rotor.
     speed : float
         Rotor speed [rad/s], constant during the fall.
+    nodes : tuple of int
+        Nodes of the unbalance planes, counted from 1.
     planes : ndarray, shape (U, m)
         Mode shapes at the unbalance planes.
     system : ndarray, shape (n, n)
@@ -40,6 +42,7 @@ class FreeFall:
 
     model: DropModel
     speed: float
+    nodes: tuple[int, ...]
     planes: Array
     system: Array
 
@@ -171,7 +174,7 @@ def build_free_fall(model: DropModel, speed: float, unbalance_nodes: tuple[int, 
         i = 4 * m + 1 + 2 * n_a + 2 * u
         system[vx, i] = system[vy, i + 1] = speed**2 * planes[u]
         system[i, i + 1], system[i + 1, i] = -speed, speed
-    return FreeFall(model=model, speed=speed, planes=planes, system=system)
+    return FreeFall(model=model, speed=speed, nodes=unbalance_nodes, planes=planes, system=system)
 
 
 def sagging_amplitudes(model: DropModel) -> Array:

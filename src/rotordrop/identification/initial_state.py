@@ -19,8 +19,10 @@ from rotordrop.identification.air_gap import SettledRest
 from rotordrop.identification.fall_fit import Evidence, FallFit, Unknowns, unbalance_nodes
 from rotordrop.identification.free_fall import FreeFall, build_free_fall
 from rotordrop.identification.sensing import Sensing, displacements_along
+from rotordrop.machine.sensor import Sensor
 from rotordrop.measurement.axes import along_sensors
 from rotordrop.measurement.events import DropInstant
+from rotordrop.measurement.preprocess import LevitatedModel
 from rotordrop.measurement.record import Record
 from rotordrop.model.parameters import DropModel
 
@@ -42,6 +44,12 @@ class InitialState:
         Linear model of the falling rotor.
     sensing : Sensing
         What the sensors see of it.
+    sensors : tuple of Sensor
+        The sensors of the record.
+    rest_along : ndarray, shape (S,)
+        Displacements along the sensors at rest [m], from which deviations count.
+    levitated : LevitatedModel
+        Readings before the drop: hum and 2X runout are taken off with it.
     unknowns : Unknowns
         Where each unknown is in `mean`.
     mean, covariance : ndarray, shapes (n,), (n, n)
@@ -64,6 +72,9 @@ class InitialState:
 
     fall: FreeFall
     sensing: Sensing
+    sensors: tuple[Sensor, ...]
+    rest_along: Array
+    levitated: LevitatedModel
     unknowns: Unknowns
     mean: Array
     covariance: Array
@@ -105,6 +116,10 @@ class InitialState:
         values = self.mean if unknowns is None else unknowns
         decay = float(np.exp(values[self.unknowns.decay]))
         return self.fall.transition(decay, time) @ values[self.unknowns.states]
+
+    def deviation_of(self, record: Record) -> Array:
+        """Displacements along the sensors from the rest position, hum and 2X runout taken off [m], shape (N, S)."""
+        return deviations(record, self.rest_along, self.levitated, self.drop_instant)
 
     def square_root(self) -> Array:
         """Matrix L with L Lᵀ the covariance, shape (n, n); a draw is ``mean + L @ standard_normal``."""
@@ -190,13 +205,16 @@ def fit_initial_state(
             f"least {FEWEST_SAMPLES} are needed for the initial state. Sample faster, or check the air gap."
         )
     fall = build_free_fall(model, speed, unbalance_nodes(model.machine))
-    evidence = _evidence(record, rest, drop, time[inside], along[inside])
+    evidence = _evidence(record, rest, drop, inside)
     problem = FallFit(fall, sensing, evidence, settled_along(rest, sensing), model, drop.standard_error)
     mean, covariance, misfit = problem.solve()
     shift = 1e-3 * mean[problem.unknowns.shift]
     return InitialState(
         fall=fall,
         sensing=sensing,
+        sensors=record.sensors,
+        rest_along=rest.along,
+        levitated=drop.levitated,
         unknowns=problem.unknowns,
         mean=mean,
         covariance=covariance * max(misfit, 1.0),
@@ -226,21 +244,32 @@ def _notes(model: DropModel, misfit: float) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _evidence(record: Record, rest: SettledRest, drop: DropInstant, time: Array, along: Array) -> Evidence:
-    levitated = drop.levitated
-    waves = 2.0 * np.pi * np.asarray(levitated.tones)
-    turned = np.exp(1j * waves * drop.value)[:, None] * levitated.amplitudes
-    own = turned[1:]
-    since = np.exp(1j * np.outer(time, waves[1:]))
+def deviations(record: Record, rest: Array, levitated: LevitatedModel, power_off: float) -> Array:
+    """Displacements along the sensors from the rest position (S,), hum and 2X runout taken off [m], shape (N, S).
+
+    A levitated rotor on its orbit shows no 2X of its own: what is there is runout and turns on with the
+    shaft.
+    """
+    waves = 2.0 * np.pi * np.asarray(levitated.tones)[1:]
+    own = np.exp(1j * waves * power_off)[:, None] * levitated.amplitudes[1:]
+    since = np.exp(1j * np.outer(record.time - power_off, waves))
     gain = np.array([float(sensor.gain) for sensor in record.sensors])
-    orbit = along_sensors((levitated.mean + turned[0].real)[None, :], record.sensors)[0]
+    return np.asarray(displacements_along(record) - (since @ own).real * gain - rest)
+
+
+def _evidence(record: Record, rest: SettledRest, drop: DropInstant, inside: NDArray[np.bool_]) -> Evidence:
+    levitated = drop.levitated
+    turning = 2.0 * np.pi * levitated.tones[0]
+    turned = np.exp(1j * turning * drop.value) * levitated.amplitudes[0]
+    gain = np.array([float(sensor.gain) for sensor in record.sensors])
+    orbit = along_sensors((levitated.mean + turned.real)[None, :], record.sensors)[0]
     return Evidence(
-        time=time,
-        deviation=along - (since @ own).real * gain - rest.along,
+        time=record.time[inside] - drop.value,
+        deviation=deviations(record, rest.along, levitated, drop.value)[inside],
         noise=np.maximum(levitated.noise * gain, 1e-9),
         orbit=orbit - rest.along,
-        orbit_velocity=(1j * waves[0] * turned[0]).real * gain,
-        orbit_acceleration=(-(waves[0] ** 2) * turned[0]).real * gain,
+        orbit_velocity=(1j * turning * turned).real * gain,
+        orbit_acceleration=(-(turning**2) * turned).real * gain,
     )
 
 

@@ -110,10 +110,21 @@ def find_drop_instant(record: Record, machine: Machine) -> DropInstant:
 
 
 def find_fall(
-    record: Record, machine: Machine, planes: tuple[Plane, ...], levitated: LevitatedModel, coarse: CoarseDrop
+    record: Record,
+    machine: Machine,
+    planes: tuple[Plane, ...],
+    levitated: LevitatedModel,
+    coarse: CoarseDrop,
+    *,
+    until: float | None = None,
 ) -> Fall:
-    """Fit the fall by the released rotor of the machine, from a first guess of the drop."""
+    """Fit the fall by the released rotor of the machine, from a first guess of the drop.
+
+    The window ends where the readings leave the free fall, or at `until` [s] whether they fit or not.
+    """
     window = (coarse.instant, coarse.sunk, coarse.contact)
+    if until is not None:
+        window = (coarse.instant, until, until)
     return fit_fall(record, planes, free_rotor(machine, planes), levitated, window)
 
 

@@ -7,14 +7,12 @@ from pathlib import Path
 
 from rotordrop.errors import UsageError
 
-_FOLDER = "rotordrop.examples"
 _SUFFIXES = (".h5", ".csv")
 
 
 def example_record_names() -> tuple[str, ...]:
-    """Name the recordings that come with the package."""
-    items = files(_FOLDER).iterdir()
-    return tuple(sorted(Path(item.name).stem for item in items if Path(item.name).suffix in _SUFFIXES))
+    """Name the recordings that come with the package, machine first: ``"lp400_drop_060"``."""
+    return tuple(sorted(_paths()))
 
 
 def example_record_path(name: str) -> Path:
@@ -25,8 +23,13 @@ def example_record_path(name: str) -> Path:
     UsageError
         When there is none of this name; says which there are.
     """
-    for suffix in _SUFFIXES:
-        path = Path(str(files(_FOLDER).joinpath(name + suffix)))
-        if path.is_file():
-            return path
-    raise UsageError(f"no example recording {name!r}; there are {', '.join(example_record_names())}")
+    paths = _paths()
+    if name not in paths:
+        raise UsageError(f"no example recording {name!r}; there are {', '.join(sorted(paths))}")
+    return paths[name]
+
+
+def _paths() -> dict[str, Path]:
+    folder = Path(str(files("rotordrop"))) / "examples"
+    found = sorted(path for path in folder.glob("*/*") if path.suffix in _SUFFIXES)
+    return {f"{path.parent.name}_{path.stem}": path for path in found}

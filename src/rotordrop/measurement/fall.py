@@ -55,6 +55,8 @@ class Fall:
         Lift left at the release, x and y per magnetic bearing [N].
     remanent_time : float
         Time constant of its decay [s].
+    gain_errors : array, shape (S,)
+        How much more than the model each sensor reads, relative [1]; held near zero by the known gains.
     misfit : float
         Mean square of the residual over the noise (1 is a perfect model).
     start, end : float
@@ -71,6 +73,7 @@ class Fall:
     standard_error: float
     remanent_force: Array
     remanent_time: float
+    gain_errors: Array
     misfit: float
     start: float
     end: float
@@ -207,6 +210,7 @@ def _fall(
         standard_error=float(1e-3 * np.sqrt(covariance[0, 0])),
         remanent_force=np.column_stack([unknown[:ambs] * rotor.lift, unknown[ambs : 2 * ambs] * rotor.lift]),
         remanent_time=decay,
+        gain_errors=unknown[-len(gain) :],
         misfit=misfit,
         start=float(problem.time[0]),
         end=float(problem.time[-1]),

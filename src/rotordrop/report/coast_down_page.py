@@ -74,7 +74,8 @@ def _verdict(result: CoastDownResult) -> tuple[Statement, ...]:
     statements.append(
         Statement(
             text=f"Energy balanced to {result.energy_residual:.2g} J of {abs(result.energy_scale):.4g} J "
-            "over the whole coast-down. After about 50 ms a drop is chaotic: compare statistics, not histories.",
+            "over the whole coast-down. After about 50 ms a drop is chaotic: compare "
+            "statistics, not histories.",
         )
     )
     settled = result.windows.settled

@@ -41,8 +41,8 @@ def _bearing(result: DropResult, index: int) -> dict[str, Any]:
         "peak_force_N": {"value": force, "time_s": force_time},
         "peak_stress_Pa": {"value": stress, "time_s": stress_time},
         "mean_stress_Pa": {"value": float(np.mean(result.max_stress[:, index]))},
-        "stress_statistics": stress_statistics(result.max_stress[:, index]).as_json(),
-        "contacts": _contacts(result, index),
+        "stress_statistics_Pa": stress_statistics(result.max_stress[:, index]).as_json(),
+        "impacts": _impacts(result, index),
     }
     if result.time[-1] >= SETTLED_TO:
         window = (result.time >= SETTLED_FROM) & (result.time <= SETTLED_TO)
@@ -51,18 +51,18 @@ def _bearing(result: DropResult, index: int) -> dict[str, Any]:
     return numbers
 
 
-def _contacts(result: DropResult, index: int) -> list[dict[str, float | None]]:
+def _impacts(result: DropResult, index: int) -> list[dict[str, Any]]:
     """List every contact; the end is null where it still lasts."""
     log = result.contacts.of_bearing(index)
     return [
         {
             "start_s": float(log.start[i]),
             "end_s": None if math.isnan(log.end[i]) else float(log.end[i]),
-            "peak_force_N": float(log.peak_force[i]),
+            "peak_force_N": {"value": float(log.peak_force[i])},
             "peak_time_s": float(log.peak_time[i]),
             "azimuth_rad": float(log.azimuth[i]),
-            "impulse_N_s": float(log.impulse[i]),
-            "dissipated_energy_J": float(log.dissipated_energy[i]),
+            "impulse_N_s": {"value": float(log.impulse[i])},
+            "dissipated_energy_J": {"value": float(log.dissipated_energy[i])},
         }
         for i in range(len(log))
     ]

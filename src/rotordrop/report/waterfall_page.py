@@ -161,8 +161,8 @@ def _waterfall_section(analysis: CoastDownAnalysis) -> Section:
                 Figure(
                     chart=waterfall_figure(fall, name, lines),
                     caption=f"{name}, {_COMPONENTS[fall.component]}: amplitude {fall.amplitude_kind} of "
-                    f"frames of {fall.settings.points} points, Hann window, {100 * fall.settings.overlap:.0f} % "
-                    f"overlap, lines {fall.resolution:.3f} Hz apart (Neisi 2020, Fig. 18). A falling speed "
+                    f"frames of {fall.settings.points} points, Hann window, "
+                    f"{100 * fall.settings.overlap:.0f} % overlap, lines {fall.resolution:.3f} Hz apart (Neisi 2020, Fig. 18). A falling speed "
                     "smears the orders here; their true amplitude is below.",
                 )
             )

@@ -51,6 +51,9 @@ BURST = 30.0
 """Amplitude over the usual one [1] from which a brief line is taken out before all others."""
 
 STEADY_PARTNERS = 3
+SURE_COMBINATION = 25.0
+"""Minus the logarithm of the chance of noise [1] from which a sum or difference is believed: many are tried."""
+
 COMBINED_ORDERS = (-2.0, -1.0, 1.0, 2.0)
 BESIDE = 25.0
 """Band [Hz] on either side of a moving path whose power is its floor."""
@@ -467,7 +470,9 @@ class LineSearch:
             if usable[first:last].mean() >= 0.75
         ]
         peak = clearest_peak(view, allowed, self.settings.detection, stretches)
-        return peak if peak is not None and abs(peak.coordinate) < 1.5 * view.spacing else None
+        if peak is None or peak.score < SURE_COMBINATION or abs(peak.coordinate) > 1.5 * view.spacing:
+            return None
+        return peak
 
     def _take_combination(self, peak: Peak, partner: FoundLine, k: float) -> None:
         phase = partner.phase + k * cast(Array, self._angle)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -144,13 +145,15 @@ class CoastDownAnalysis:
 
     def as_json(self) -> dict[str, Any]:
         """All findings, ready for JSON; amplitudes are zero-to-peak in m unless the name says otherwise."""
-        return {
-            "recorded": self.signal.recorded,
-            "sampling_rate_hz": self.signal.sampling_rate,
-            "speed_law": None if self.speed_law is None else _law_json(self.speed_law),
-            "lines": [line.as_json() for line in self.lines],
-            "planes": {name: _plane_json(plane) for name, plane in self.planes.items()},
-        }
+        return _finite(
+            {
+                "recorded": self.signal.recorded,
+                "sampling_rate_hz": self.signal.sampling_rate,
+                "speed_law": None if self.speed_law is None else _law_json(self.speed_law),
+                "lines": [line.as_json() for line in self.lines],
+                "planes": {name: _plane_json(plane) for name, plane in self.planes.items()},
+            }
+        )
 
 
 def analyse_coast_down(
@@ -250,6 +253,15 @@ def _speed_law(signal: CoastDownSignal) -> SpeedLaw | None:
         drag=fit_drag(time, speed, start=RACES_SPUN_UP),
         standstill=find_standstill(time, speed),
     )
+
+
+def _finite(content: Any) -> Any:
+    """The same content with null for every number that JSON cannot hold."""
+    if isinstance(content, dict):
+        return {key: _finite(value) for key, value in content.items()}
+    if isinstance(content, list | tuple):
+        return [_finite(value) for value in content]
+    return None if isinstance(content, float) and not math.isfinite(content) else content
 
 
 def _law_json(law: SpeedLaw) -> dict[str, Any]:

@@ -43,8 +43,8 @@ BLIND_SCHEDULE: tuple[Stage, ...] = (
 """From nominal guesses: windows for a first contact at about 7 ms; they are shifted when it comes later."""
 
 CALIBRATED_SCHEDULE: tuple[Stage, ...] = (
-    Stage(until=0.02, impulse=2e-3, share=0.02, passes=1),
-    Stage(until=0.2, impulse=2e-3, share=0.02, passes=2),
+    Stage(until=0.02, impulse=1e-3, share=0.01, passes=1),
+    Stage(until=0.2, impulse=1e-3, share=0.01, passes=2),
 )
 """With a calibrated machine: what is left is the state, the sensors and the drop's own unknowns."""
 

@@ -86,3 +86,14 @@ def test_the_schema_goes_to_a_file(capsys):
     )
     assert run(["schema", "-o", "nowhere/machine.schema.json"]) == 6
     assert "the folder nowhere does not exist; create it first" in capsys.readouterr().err
+
+
+def test_the_schema_of_an_estimate_knows_its_fields(capsys):
+    assert run(["schema", "estimate"]) == 0
+    schema = json.loads(capsys.readouterr().out)
+    jsonschema.Draft202012Validator.check_schema(schema)
+    bearing = {"peak_force_N": {"value": 2907.0}, "peak_stress_Pa": {"value": 1.7e9}}
+    drop = {"drop_instant_s": 0.0, "speed_Hz": 60.0, "method": "tracked", "warnings": []}
+    jsonschema.validate(drop | {"bearings": {"NDE": bearing}}, schema)
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(drop | {"bearings": {"NDE": bearing | {"peak_force_N": 2907.0}}}, schema)

@@ -16,9 +16,10 @@ from rotordrop.errors import RecordError
 from rotordrop.measurement.axes import sensor_planes
 from rotordrop.measurement.events import coarse_drop
 from rotordrop.measurement.preprocess import LevitatedModel, fit_levitated
-from rotordrop.measurement.quality.arrangement import check_ends, check_planes, fall_of
+from rotordrop.measurement.quality.arrangement import check_planes, fall_of
 from rotordrop.measurement.quality.channels import check_channels
 from rotordrop.measurement.quality.clock import check_blocks, check_clock
+from rotordrop.measurement.quality.ends import check_ends
 from rotordrop.measurement.quality.finding import Finding, Severity, ranked, refuse_unusable, stops
 from rotordrop.measurement.quality.motion import (
     check_length,
@@ -68,7 +69,8 @@ def check_record(record: Record, machine: Machine, tail: Record | None = None) -
     findings += check_blocks(record) + check_units(record, machine, sensor_planes(record.sensors))
     findings += check_speed(record, machine)
     if stops(findings):
-        return ranked(findings)
+        misread = any(found.kind == "wrong unit factor" for found in findings)
+        return ranked(found for found in findings if not (misread and found.kind == "coarse quantisation"))
     return ranked(findings + _check_motion(record, machine, tail))
 
 
@@ -96,16 +98,15 @@ def _check_motion(record: Record, machine: Machine, tail: Record | None) -> list
         assert record.speed_readings is not None
         findings += check_rotation_line(record, before, float(record.speed_readings[0]))
         level = levitated.mean
-    tone = None if levitated is None or findings else levitated.amplitudes[0]
-    if levitated is not None:
-        findings += check_planes(planes, fall_of(record, level, sunk_at), tone)
+    if levitated is not None and not stops(findings):
+        findings += check_planes(planes, fall_of(record, level, sunk_at), levitated.amplitudes[0])
     if stops(findings):
         return findings
     try:
         coarse = coarse_drop(record, machine, planes)
         levitated = fit_levitated(record, coarse.instant - _MARGIN, speed=coarse.speed)
     except RecordError as error:
-        return [no_drop(error)]
+        return [no_drop(error, record)]
     findings += check_levitated(levitated, record)
     findings += check_length(record, coarse.instant, tail is not None)
     findings += check_ends(record, machine, planes, levitated, coarse)

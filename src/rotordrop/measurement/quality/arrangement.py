@@ -2,26 +2,25 @@
 
 A fall shows where down is; the levitated 1X orbit runs with the spin. Together they tell an inverted sensor
 from exchanged or turned ones in every plane. Which end is which shows only in how the rotor leaves its
-levitated shape, through the model of the rotor.
+levitated shape, see `rotordrop.measurement.quality.ends`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rotordrop.measurement.axes import Plane, along_sensors
-from rotordrop.measurement.events import CoarseDrop, find_fall
-from rotordrop.measurement.preprocess import LevitatedModel
 from rotordrop.measurement.quality.finding import Finding
 from rotordrop.measurement.recording import Array
 
 if TYPE_CHECKING:
-    from rotordrop.machine import Machine
     from rotordrop.measurement.record import Record
+
+Tone = np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
 
 MOST_TILT = 30.0
 """A fall may lean this far from the vertical [deg]."""
@@ -29,10 +28,6 @@ MOST_TILT = 30.0
 CLEAR_ORBIT = 3.0
 """Forward over backward part of the orbit above which its sense is clear."""
 
-GOOD_FIT = 2.0
-"""Misfit of the fall up to which the arrangement counts as confirmed."""
-
-_BETTER = 3.0
 _AFTER_FALL = 0.06
 _SMALLEST_ORBIT = 3e-7
 
@@ -66,7 +61,7 @@ def _changes(count: int) -> list[_Change]:
 def check_planes(
     planes: tuple[Plane, ...],
     sunk: Array,
-    levitated_1x: np.ndarray[tuple[int, ...], np.dtype[np.complex128]] | None,
+    levitated_1x: Tone,
 ) -> list[Finding]:
     """Check polarity and order of the sensors in every plane.
 
@@ -76,11 +71,11 @@ def check_planes(
         Sensor planes as described.
     sunk : array, shape (S,)
         Change of the readings by the fall [m].
-    levitated_1x : array, shape (S,), complex, optional
+    levitated_1x : array, shape (S,), complex
         1X tone of the levitated readings [m].
     """
     verdicts = [_verdict(plane, sunk, levitated_1x) for plane in planes]
-    if levitated_1x is not None and all(verdict == "backward" for verdict in verdicts):
+    if all(verdict == "backward" for verdict in verdicts):
         return [
             Finding(
                 kind="swapped axes",
@@ -101,9 +96,7 @@ def check_planes(
     return findings
 
 
-def _verdict(
-    plane: Plane, sunk: Array, tone: np.ndarray[tuple[int, ...], np.dtype[np.complex128]] | None
-) -> str:
+def _verdict(plane: Plane, sunk: Array, tone: Tone) -> str:
     identity = _changes(len(plane.columns))[0]
     down = _tilt(plane, sunk, identity) <= MOST_TILT
     sense = _sense(plane, tone, identity)
@@ -126,12 +119,8 @@ def _tilt(plane: Plane, sunk: Array, change: _Change) -> float:
     return float(np.degrees(np.arctan2(abs(x), -y)))
 
 
-def _sense(
-    plane: Plane, tone: np.ndarray[tuple[int, ...], np.dtype[np.complex128]] | None, change: _Change
-) -> int:
+def _sense(plane: Plane, tone: Tone, change: _Change) -> int:
     """1 for an orbit with the spin, −1 against it, 0 where it is too flat or small to tell."""
-    if tone is None:
-        return 0
     own = tone[list(plane.columns)][list(change.order)] * np.array(change.signs)
     x, y = plane.to_planar @ own
     forward, backward = abs(x + 1j * y) / 2, abs(x - 1j * y) / 2
@@ -146,7 +135,7 @@ def _plane_finding(
     plane: Plane,
     verdict: str,
     sunk: Array,
-    tone: np.ndarray[tuple[int, ...], np.dtype[np.complex128]] | None,
+    tone: Tone,
 ) -> Finding:
     names = ", ".join(plane.names)
     if verdict == "undecided":
@@ -206,64 +195,3 @@ def fall_of(record: Record, level: Array, sunk_at: int) -> Array:
     last = sunk_at + max(int(_AFTER_FALL * record.sampling_rate), 1)
     mean = np.mean(record.signals[sunk_at:last], axis=0)
     return along_sensors(mean, record.sensors) - along_sensors(level, record.sensors)
-
-
-def check_ends(
-    record: Record, machine: Machine, planes: tuple[Plane, ...], levitated: LevitatedModel, coarse: CoarseDrop
-) -> list[Finding]:
-    """Compare the fall with the rotor model: ends as described, exchanged, with channels crossed."""
-    if len({amb.node for amb in machine.ambs}) < 2 or len(planes) != 2:
-        return [_undecided("the machine file does not give two AMB planes")]
-    own = find_fall(record, machine, planes, levitated, coarse).misfit
-    if own <= GOOD_FIT:
-        return []
-    found = {}
-    for words, order in _exchanges(planes, len(record.sensors)):
-        other = replace(record, signals=record.signals[:, order])
-        exchanged = replace(
-            levitated,
-            mean=levitated.mean[order],
-            amplitudes=levitated.amplitudes[:, order],
-            noise=levitated.noise[order],
-        )
-        found[words] = find_fall(other, machine, planes, exchanged, coarse).misfit
-    best = min(found, key=lambda words: found[words]) if found else ""
-    if best and found[best] * _BETTER < own and found[best] < _BETTER * GOOD_FIT:
-        return [
-            Finding(
-                kind="swapped ends",
-                message=f"the fall deviates from the rotor model by {own**0.5:.1f} × the noise as described "
-                "and by "
-                f"{found[best] ** 0.5:.1f} × with {best}",
-                remedy="correct the channel map in the profile or the nodes in the machine file",
-                severity="stop",
-                channel=", ".join(record.channel_names),
-            )
-        ]
-    return [_undecided(f"the fall deviates from the rotor model by {own**0.5:.1f} × the noise whichever way")]
-
-
-def _exchanges(planes: tuple[Plane, ...], count: int) -> list[tuple[str, list[int]]]:
-    first, second = planes
-    if len(first.columns) != len(second.columns):
-        return []
-    pairs = list(zip(first.columns, second.columns, strict=True))
-    result = []
-    for chosen in [pairs, *([pair] for pair in pairs)]:
-        order = list(range(count))
-        for a, b in chosen:
-            order[a], order[b] = b, a
-        names = dict(zip(first.columns + second.columns, first.names + second.names, strict=True))
-        words = " and ".join(f"{names[a]} and {names[b]}" for a, b in chosen)
-        result.append((f"{words} exchanged", order))
-    return result
-
-
-def _undecided(why: str) -> Finding:
-    return Finding(
-        kind="ends",
-        message=f"whether the two ends are exchanged cannot be decided: {why}",
-        remedy="make sure by moving one end by hand; rotor model, sensor positions and AMB planes decide it "
-        "when right",
-        severity="note",
-    )

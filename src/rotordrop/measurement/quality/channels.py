@@ -113,9 +113,13 @@ def _stuck(record: Record, channel: str, values: Array) -> Finding | None:
 
 
 def _clipped(record: Record, channel: str, values: Array) -> Finding | None:
-    for extreme, side in ((float(np.max(values)), "upper"), (float(np.min(values)), "lower")):
+    low, high = float(np.min(values)), float(np.max(values))
+    inside = (values > low) & (values < high)
+    _, elsewhere = runs_of((np.diff(values) == 0) & inside[1:])
+    usual = int(np.max(elsewhere, initial=0)) + 1  # coarse steps make runs everywhere
+    for extreme, side in ((high, "upper"), (low, "lower")):
         starts, lengths = runs_of(values == extreme)
-        if len(lengths) and int(np.max(lengths)) >= CLIPPED_RUN:
+        if len(lengths) and int(np.max(lengths)) >= max(CLIPPED_RUN, 3 * usual):
             first = int(starts[np.argmax(lengths >= CLIPPED_RUN)])
             return Finding(
                 kind="clipping",

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 MOST_LEAN = 25.0
 """A rotor at rest may lie this far from straight below its levitated position [deg]."""
 
+_SOME_LEAN = 10.0
+
 DEPTH = (0.6, 1.7)
 """How far it may lie below it, in nominal air gaps."""
 
@@ -76,6 +78,17 @@ def _place(path: Array, plane: Plane, gap: float) -> list[Finding]:
                 f"{depth / gap:.3g} × the nominal air gap of {format_quantity(gap, 'length')}",
                 remedy="correct unit, sensitivity or offset of the tail, or the nominal air gap",
                 severity="stop",
+                channel=names,
+            )
+        ]
+    if _SOME_LEAN < lean <= MOST_LEAN:
+        return [
+            Finding(
+                kind="leaning rest",
+                message=f"tail: the rotor rests {lean:.0f}° from straight below its levitated position "
+                f"(x = {x * 1e6:+.4g} µm, y = {y * 1e6:+.4g} µm)",
+                remedy="a gain, an angle or an offset of this plane is off, or the race is not round; check them",
+                severity="warning",
                 channel=names,
             )
         ]
