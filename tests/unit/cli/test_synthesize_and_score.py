@@ -1,0 +1,92 @@
+"""The verbs synthesize and score: files, sentences, refusals."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from rotordrop.cli.app import run
+from rotordrop.machine import example_path
+
+LP400 = str(example_path("lp400"))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    path = tmp_path_factory.mktemp("synthetic")
+    arguments = ["--speed", "60 Hz", "--speed", "60 Hz", "--duration", "210 ms", "--seed", "3"]
+    assert run(["synthesize", LP400, *arguments, "--output", str(path)]) == 0
+    return path
+
+
+def test_drops_of_the_same_speed_are_numbered(folder):
+    names = sorted(file.name for file in folder.iterdir())
+    records = [f"drop_060_{i}{kind}.csv" for i in (1, 2) for kind in ("", "_tail")]
+    assert names == sorted([*records, "truth"])
+    assert len(list((folder / "truth").glob("*.json"))) == 2
+
+
+def test_the_summary_says_that_nothing_was_measured(tmp_path, capsys):
+    arguments = ["--speed", "100 Hz", "--duration", "10 ms", "--hdf5", "--violation", "contact exponent 1.5"]
+    assert run(["synthesize", LP400, *arguments, "--output", str(tmp_path)]) == 0
+    out = capsys.readouterr().out
+    assert "Simulated recordings of LP-400 gas turbine, low-pressure rotor (not measured)" in out
+    assert f"written: {tmp_path / 'drop_100.h5'}" in out.replace("\n", "")
+    truth = json.loads((tmp_path / "truth" / "drop_100.json").read_text())
+    assert truth["violations"]["contact_exponent"] == 1.5
+    assert truth["contact"][0]["n"] == 1.5
+
+
+def test_a_fault_is_in_the_record_and_named_in_the_truth(tmp_path, folder):
+    arguments = ["--speed", "60 Hz", "--duration", "10 ms", "--seed", "3", "--fault", "dead channel"]
+    assert (
+        run(["synthesize", LP400, *arguments, "--output", str(tmp_path), "--json", str(tmp_path / "j")]) == 0
+    )
+    assert json.loads((tmp_path / "truth" / "drop_060.json").read_text())["fault"] == "dead channel"
+    rows = (tmp_path / "drop_060.csv").read_text().splitlines()
+    last = {row.split(";")[4] for row in rows if row[:1] in "-0123456789"}
+    assert len(last) == 1
+    assert json.loads((tmp_path / "j").read_text())["origin"] == "simulated, not measured"
+
+
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        (["--violation", "moon"], "there is no 'moon'; choose one of 'none', 'contact stiffness +25 %'"),
+        (["--fault", "fire"], "there is no 'fire'; choose one of 'inverted polarity'"),
+        (["--duration", "10"], "'10' has no unit"),
+    ],
+)
+def test_wrong_choices_name_the_right_ones(option, message, tmp_path, capsys):
+    assert run(["synthesize", LP400, "--speed", "60 Hz", "--output", str(tmp_path), *option]) == 64
+    assert message in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_lists_are_printed(tmp_path, capsys):
+    assert run(["synthesize", LP400, "--speed", "60 Hz", "--output", str(tmp_path), "--fault", "list"]) == 0
+    assert "swapped ends" in capsys.readouterr().out
+
+
+def test_a_score_is_a_table_with_units_and_a_sentence(folder, tmp_path, capsys):
+    truth = json.loads((folder / "truth" / "drop_060_1.json").read_text())
+    peak = truth["peak_force_N"]["NDE"]
+    fields = {"peak_force_N": {"value": 1.02 * peak, "interval_90": [0.9 * peak, 1.1 * peak]}}
+    estimate = tmp_path / "estimate.json"
+    estimate.write_text(json.dumps({"speed_Hz": 60.0, "bearings": {"NDE": fields}}))
+    assert run(["score", str(estimate), str(folder / "truth" / "drop_060_1.json")]) == 0
+    out = capsys.readouterr().out
+    assert "NDE peak bearing force" in out
+    assert "(+2 %)" in out
+    assert "holds (± 10 %)" in out
+    assert "1 of 1 intervals of 90 % hold the true value." in out
+
+
+def test_a_score_of_the_wrong_file_says_which_one_is_wanted(folder, tmp_path, capsys):
+    wrong = tmp_path / "wrong.json"
+    wrong.write_text("{}")
+    assert run(["score", str(wrong), str(folder / "truth" / "drop_060_1.json")]) == 64
+    assert "expected the JSON of 'rotordrop estimate'" in capsys.readouterr().err
+    assert run(["score", str(wrong), str(wrong)]) == 64
+    assert "is no truth file: it has no 'air_gap_m'" in capsys.readouterr().err

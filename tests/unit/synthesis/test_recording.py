@@ -1,0 +1,253 @@
+"""A synthetic recording against the truth it was made from."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rotordrop.measurement.axes import planar
+from rotordrop.synthesis import SensorChain, hidden_machine, synthesize_drop
+from rotordrop.synthesis.event import drop_conditions
+from rotordrop.synthesis.sensor_chain import PERFECT, SensorErrors, quantised, readings, shape_at
+from rotordrop.synthesis.settled import Swing, settled_coordinates, swinging_amplitudes
+
+SPEED = 2.0 * np.pi * 60.0
+
+
+@pytest.fixture(scope="module")
+def perfect(hidden):
+    return synthesize_drop(hidden, SPEED, 8, sensor_chain=PERFECT, duration=0.05, tail=True)
+
+
+def along(drop):
+    """True displacement along the sensors on the clock of the record, from the histories, shape (N, S)."""
+    h = drop.histories
+    clock = float(h["first_250ms_t0"]) + np.arange(len(h["sensor_plane_displacement"])) / float(h["fs"])
+    record = drop.record
+    time = record.time - drop.truth["t_off_in_record_s"]
+    inside = (time > -0.019) & (time < 0.045)
+    planes = [s.node for s in record.sensors]
+    places = [sorted(set(planes), key=planes.index).index(node) for node in planes]
+    columns = []
+    for s, sensor in enumerate(record.sensors):
+        xy = h["sensor_plane_displacement"][:, places[s]]
+        a = float(sensor.angle)
+        columns.append(np.interp(time[inside], clock, xy[:, 0] * np.cos(a) + xy[:, 1] * np.sin(a)))
+    return inside, np.column_stack(columns)
+
+
+def test_perfect_sensors_read_the_true_motion(perfect):
+    inside, true = along(perfect)
+    assert np.max(np.abs(true)) > 1e-4
+    assert perfect.record.signals[inside] == pytest.approx(true, abs=2e-8)
+
+
+def test_the_errors_of_the_sensors_are_those_of_the_truth(synthetic):
+    inside, true = along(synthetic)
+    signals, truth = synthetic.record.signals[inside], synthetic.truth
+    for s in range(4):
+        (gain, offset), *_ = np.linalg.lstsq(
+            np.column_stack([true[:, s], np.ones(len(true))]), signals[:, s], rcond=None
+        )
+        assert gain == pytest.approx(truth["sensor_gain"][s], abs=2e-3)
+        assert offset == pytest.approx(truth["sensor_offset_m"][s], abs=3e-7)
+        rest = signals[:, s] - truth["sensor_gain"][s] * true[:, s] - truth["sensor_offset_m"][s]
+        assert np.std(rest) == pytest.approx(0.45e-6, rel=0.25)
+
+
+def test_the_same_seed_makes_the_same_bits_and_another_one_does_not(hidden, synthetic):
+    again = synthesize_drop(hidden, SPEED, 8, duration=0.21)
+    assert again.record.signals.tobytes() == synthetic.record.signals.tobytes()
+    assert again.tail.signals.tobytes() == synthetic.tail.signals.tobytes()
+    assert again.truth == synthetic.truth
+    other = synthesize_drop(hidden, SPEED, 9, duration=0.05, tail=False)
+    assert other.truth["peak_force_N"] != synthetic.truth["peak_force_N"]
+    assert other.tail is None
+
+
+def test_gains_and_offsets_belong_to_the_machine_not_to_the_drop(hidden, synthetic):
+    other = synthesize_drop(hidden, SPEED, 9, duration=0.02, tail=False)
+    assert other.truth["sensor_gain"] == synthetic.truth["sensor_gain"]
+    assert other.truth["sensor_offset_m"] == synthetic.truth["sensor_offset_m"]
+
+
+def test_the_levitated_part_is_a_circle_with_an_offset(perfect, hidden):
+    record = perfect.record
+    before = record.time < perfect.truth["t_off_in_record_s"] - 1e-4
+    displacement, _ = planar(record)
+    z = displacement[before, 0, 0] + 1j * displacement[before, 0, 1]
+    turn = np.exp(1j * SPEED * record.time[before])
+    basis = np.column_stack([np.ones(len(z)), turn, turn.conj()])
+    (offset, forward, backward), *_ = np.linalg.lstsq(basis, z, rcond=None)
+    assert np.max(np.abs(z - basis @ [offset, forward, backward])) < 1e-12
+    assert abs(forward) > 1e-6
+    assert abs(backward) < 1e-12
+
+
+def test_nothing_jumps_at_power_off(perfect):
+    step = np.abs(np.diff(perfect.record.signals, n=2, axis=0))
+    at = int(np.searchsorted(perfect.record.time, perfect.truth["t_off_in_record_s"]))
+    # letting go changes the acceleration by some 30 m/s²; a jump of the velocity would show as 2e-7
+    assert np.max(step[at - 5 : at + 5]) < 1.2e-7
+
+
+def test_the_trigger_is_off_by_the_jitter(hidden, perfect):
+    conditions = drop_conditions(hidden, SPEED, 8)
+    assert perfect.truth["t_off_in_record_s"] == conditions.jitter != 0.0
+    later = replace(conditions, jitter=conditions.jitter + 1e-3)
+    shifted = synthesize_drop(
+        hidden, SPEED, 8, sensor_chain=PERFECT, duration=0.03, tail=False, conditions=later
+    )
+    rows = slice(4000, 5400)
+    moved = shifted.record.signals[rows.start + 20 : rows.stop + 20]
+    assert moved == pytest.approx(perfect.record.signals[rows], abs=1e-10)
+
+
+def test_the_tail_lies_where_the_rotor_rests(hidden, perfect):
+    """Mean of the tail: the settled place; what the swing adds is known."""
+    rest = settled_coordinates(hidden.model)
+    layout = hidden.model.layout
+    mean = np.mean(planar(perfect.tail)[0], axis=0)
+    for p, node in enumerate(dict.fromkeys(s.node for s in hidden.known.sensors)):
+        row = hidden.model.basis.node_row(node)
+        assert mean[p, 1] == pytest.approx(row @ rest[layout.modal_y], abs=1.5e-6)
+        assert abs(mean[p, 0]) < 1.5e-6
+    assert perfect.tail.sampling_rate == 1000.0
+    assert perfect.tail.duration == pytest.approx(3.0, abs=0.01)
+
+
+def test_settled_place_of_the_supplied_machine(known):
+    """The supplied truth gives the mean place after its own simulation; the DE still swung by 0.107 rad."""
+    values = {
+        "NDE.air_gap": 275e-6, "DE.air_gap": 285e-6,
+        "NDE.support.stiffness": 78e6, "DE.support.stiffness": 550e6,
+        "NDE.contact.stiffness": 1.05e9, "DE.contact.stiffness": 1.18e9,
+        "NDE.preload": 460.0, "DE.preload": 495.0,
+    }  # fmt: skip
+    model = hidden_machine(known.with_values(values), 0, drawn=False).model
+    rest = settled_coordinates(model)
+    radius = np.abs(model.parameters.bearing_shape @ rest[model.layout.modal_y])
+    swing = np.array([0.0, 0.107])
+    assert radius * (1.0 - swing**2 / 4.0) == pytest.approx([278.358e-6, 287.302e-6], abs=0.1e-6)
+
+
+def test_swinging_ends_stay_on_their_circles(hidden):
+    rest = settled_coordinates(hidden.model)
+    swing = Swing(amplitude=np.array([0.2, 0.0]), phase=np.zeros(2), decay_time=1e9)
+    time = np.linspace(0.0, 0.2, 500)
+    m = hidden.model.layout.n_modes
+    amplitudes = swinging_amplitudes(hidden.model, rest, swing, time)
+    shape = hidden.model.parameters.bearing_shape
+    x, y = amplitudes[:, :m] @ shape.T, amplitudes[:, m:] @ shape.T
+    assert np.hypot(x, y)[:, 0] == pytest.approx(np.abs(y[0, 1] * 0 + shape[0] @ rest[m : 2 * m]), rel=1e-9)
+    assert np.max(np.abs(x[:, 1])) < 1e-15
+    zero = time[np.flatnonzero(np.diff(np.sign(x[:, 0])))]
+    period = 2.0 * np.mean(np.diff(zero))
+    assert period == pytest.approx(2.0 * np.pi * np.sqrt(np.hypot(x[0, 0], y[0, 0]) / 9.81), rel=0.01)
+
+
+def test_the_speed_is_read_every_hundredth_of_a_second(synthetic):
+    record = synthetic.record
+    assert np.diff(record.speed_time) == pytest.approx(0.01, abs=1e-9)
+    before = record.speed_time < -0.001
+    assert np.mean(record.speed_readings[before]) == pytest.approx(SPEED, abs=0.1)
+    steps = record.speed_readings / (2 * np.pi * 0.01)
+    assert steps == pytest.approx(np.round(steps), abs=1e-6)
+
+
+def test_a_shifted_plane_reads_what_is_there(known):
+    """30 mm nearer to the middle of the rotor the sensors see another point of the shaft."""
+    plain = hidden_machine(known, 3)
+    shifted = hidden_machine(known, 3, "sensor planes 30 mm off")
+    one, two = (
+        synthesize_drop(h, SPEED, 8, sensor_chain=PERFECT, duration=0.05, tail=False)
+        for h in (plain, shifted)
+    )
+    assert two.truth["sensor_plane_shift_m"] == 0.03
+    assert two.truth["peak_force_N"] == one.truth["peak_force_N"]
+    difference = np.max(np.abs(two.record.signals - one.record.signals))
+    assert 2e-6 < difference < 6e-5
+
+
+def test_an_anti_alias_filter_delays_and_smooths(known):
+    filtered = hidden_machine(known, 3, "anti-alias filter")
+    plain = hidden_machine(known, 3)
+    one, two = (
+        synthesize_drop(h, SPEED, 8, sensor_chain=PERFECT, duration=0.05, tail=False)
+        for h in (plain, filtered)
+    )
+    assert two.record.signals.shape == one.record.signals.shape
+    # fourth order at 4 kHz: a group delay of 2.6/(2π 4000 Hz) = 104 µs at low frequency
+    delayed = np.interp(one.record.time - 1.04e-4, one.record.time, one.record.signals[:, 0])
+    inner = slice(100, -10)
+    late = np.max(np.abs(two.record.signals[inner, 0] - delayed[inner]))
+    undelayed = np.max(np.abs(two.record.signals[inner, 0] - one.record.signals[inner, 0]))
+    assert late < 0.15 * undelayed
+
+
+@pytest.mark.parametrize("bits", [12, 14, 16])
+def test_the_converter_rounds_to_its_steps_and_clips(bits):
+    chain = SensorChain(bits=bits)
+    step = 1.2e-3 / 2**bits
+    values = np.array([0.4 * step, 0.6 * step, 1e-4, 2e-3, -2e-3])
+    read = quantised(values, chain)
+    assert read / step == pytest.approx(np.round(read / step), abs=1e-6)
+    assert np.max(np.abs(read[:3] - values[:3])) <= 0.5 * step
+    assert read[3] == pytest.approx(600e-6 - step)
+    assert read[4] == pytest.approx(-600e-6)
+    assert np.array_equal(quantised(values, replace(chain, bits=0)), values)
+
+
+def test_hum_and_runout_have_their_frequencies():
+    chain = replace(PERFECT, hum=1e-6)
+    count, rate, turns = 4000, 20e3, 130.0
+    time = np.arange(count) / rate
+    zero = np.zeros((count, 1))
+    errors = SensorErrors(
+        gain=np.ones(1),
+        offset=np.zeros(1),
+        angle=np.zeros(1),
+        runout_1x=np.array([2e-6 + 0j]),
+        runout_2x=np.array([3e-6j]),
+    )
+    read = readings(zero, time, 2 * np.pi * turns * time, chain, errors, np.random.default_rng(1))[:, 0]
+    size = 2.0 * np.abs(np.fft.rfft(read)) / count
+    lines = {round(f * rate / count): size[f] for f in np.flatnonzero(size > 1e-9)}
+    assert lines == pytest.approx({50: 1e-6, 130: 2e-6, 260: 3e-6}, rel=1e-6)
+
+
+def test_the_shape_between_nodes_is_that_of_the_nodes_at_the_nodes(hidden):
+    positions = np.asarray(hidden.machine.rotor.node_positions)
+    basis = hidden.model.basis
+    for node in (1, 5, 20, len(positions)):
+        assert shape_at(positions, basis, positions[node - 1]) == pytest.approx(
+            basis.node_row(node), abs=1e-15
+        )
+    middle = 0.5 * (positions[4] + positions[5])
+    rigid = shape_at(positions, basis, middle)[:2]
+    assert rigid == pytest.approx(0.5 * (basis.node_row(5) + basis.node_row(6))[:2], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"sampling_rate": 0.0}, "the sampling rate is 0.0 Hz"),
+        ({"anti_alias_frequency": 1e6}, "corner frequency 1000000.0 Hz does not fit"),
+        ({"bits": 40}, "40 bits are no converter"),
+    ],
+)
+def test_impossible_chains_are_refused(changes, message):
+    from rotordrop.errors import UsageError
+
+    with pytest.raises(UsageError, match=message):
+        SensorChain(**changes)
+
+
+def test_a_plane_beside_the_rotor_is_refused(hidden):
+    from rotordrop.errors import UsageError
+
+    chain = replace(PERFECT, plane_shift=-2.0)
+    with pytest.raises(UsageError, match=r"a sensor plane at .* mm lies outside the rotor"):
+        synthesize_drop(hidden, SPEED, 8, sensor_chain=chain, duration=0.01, tail=False)

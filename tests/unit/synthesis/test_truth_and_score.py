@@ -1,0 +1,219 @@
+"""Truth files, ours and supplied ones, and the scores of estimates against them."""
+
+from __future__ import annotations
+
+import copy
+import json
+
+import numpy as np
+import pytest
+
+from rotordrop.errors import OutputError, UsageError
+from rotordrop.measurement.record import read_record
+from rotordrop.synthesis import FAULTS, read_truth, score_estimate, with_fault, write_synthetic
+
+
+@pytest.fixture(scope="module")
+def folder(synthetic, tmp_path_factory):
+    path = tmp_path_factory.mktemp("synthetic") / "deeper"
+    write_synthetic(synthetic, path, name="drop_060", formats=("csv", "h5"))
+    return path
+
+
+def estimate_of(truth, factor=1.01):
+    """An estimate that is wrong by a factor everywhere, in the form of 'rotordrop estimate --json'."""
+    bearings = {}
+    for name in truth.bearing_names:
+        fields = {}
+        for path, value in truth.of_bearing(name).items():
+            *groups, last = path.split(".")
+            place = fields
+            for group in groups:
+                place = place.setdefault(group, {})
+            wide = 0.03 if path == "peak_force_N" else 0.005
+            value *= factor
+            place[last] = {"value": value, "interval_90": [value * (1 - wide), value * (1 + wide)]}
+        bearings[name] = fields
+    instant = truth.values["t_off_in_record_s"] + 2e-5
+    return {
+        "drop_instant_s": instant,
+        "speed_Hz": 60.0,
+        "method": "tracked",
+        "warnings": [],
+        "bearings": bearings,
+    }
+
+
+def test_what_was_written_is_read_back(folder, synthetic, known):
+    for file in ("drop_060.csv", "drop_060.h5"):
+        record = read_record(folder / file, known)
+        assert record.signals == pytest.approx(synthetic.record.signals, abs=6e-10)
+        assert record.time == pytest.approx(synthetic.record.time, abs=1e-9)
+        assert record.speed_readings == pytest.approx(synthetic.record.speed_readings, abs=1e-3)
+        assert "not measured" in record.metadata["origin"]
+    tail = read_record(folder / "drop_060_tail.csv", known)
+    assert tail.signals == pytest.approx(synthetic.tail.signals, abs=6e-10)
+
+
+def test_the_truth_is_in_no_file_beside_the_record(folder, synthetic):
+    beside = [file for file in folder.iterdir() if file.is_file()]
+    assert len(beside) == 3
+    stiffness = f"{synthetic.truth['support_stiffness']['NDE']:.6g}"
+    assert not any(stiffness in file.read_text(errors="ignore") for file in beside)
+
+
+def test_truth_and_histories_come_back(folder, synthetic):
+    truth = read_truth(folder / "truth" / "drop_060.json")
+    assert truth.name == "drop_060"
+    assert truth.bearing_names == ("NDE", "DE")
+    assert truth.of_bearing("DE")["peak_stress_Pa"] == pytest.approx(
+        1e6 * synthetic.truth["max_stress_MPa"]["DE"]
+    )
+    assert truth.histories["bearing_displacement"] == pytest.approx(
+        synthetic.histories["bearing_displacement"]
+    )
+    assert set(truth.histories) == set(synthetic.histories)
+
+
+def test_numbers_and_histories_of_the_truth_agree(synthetic):
+    h, truth = synthetic.histories, synthetic.truth
+    clock = float(h["t0"]) + np.arange(len(h["bearing_force"])) / float(h["fs"])
+    whole, late = (clock >= 0) & (clock <= 0.2), (clock >= 0.15) & (clock <= 0.2)
+    for b, name in enumerate(("NDE", "DE")):
+        assert np.max(h["bearing_force"][whole, b]) == pytest.approx(truth["peak_force_N"][name], rel=0.01)
+        mean = truth["mean_force_0p15_0p2_N"][name]
+        assert np.mean(h["bearing_force"][late, b]) == pytest.approx(mean, rel=5e-3)
+        assert np.mean(h["max_inner_race_stress_MPa"][whole, b]) == pytest.approx(
+            truth["mean_stress_MPa"][name], rel=2e-3
+        )
+        first = truth["first_contact_time_s"][name]
+        assert np.all(h["contact_force"][clock < first - 1e-4, b] == 0.0)
+        assert np.max(h["contact_force"][(clock > first) & (clock < first + 1e-3), b]) > 100.0
+    assert np.linalg.norm(h["bearing_force_xy"], axis=-1) == pytest.approx(h["bearing_force"])
+
+
+def test_the_layout_is_that_of_the_supplied_files(folder):
+    """Names and kinds of the fields of a supplied truth file, kept as a list."""
+    supplied = """
+        name n0_hz fs t_off_in_record_s peak_force_N peak_force_time_s peak_contact_force_N
+        mean_force_0p15_0p2_N rms_force_0_0p2_N max_stress_MPa mean_stress_MPa
+        median_stress_MPa stress_q1_MPa stress_q3_MPa stress_std_MPa first_contact_time_s
+        first_contact_duration_s contact_intervals_0_0p25_s ring_speed_0p2_Hz speed_0p2_Hz
+        max_radial_displacement_m air_gap_m support_stiffness support_damping support_mass
+        friction_dynamic friction_static contact_K preload_N ring_Ip tau_aero settled_radius_um
+        initial_xy_at_bearings_m initial_velocity_xy_m_s remanent_force sensor_gain
+        sensor_offset_m noise_rms_m hum_50hz_m contact support ring bearing unbalance
+        modal_damping amb time_note
+    """.split()
+    ours = json.loads((folder / "truth" / "drop_060.json").read_text())
+    assert sorted(set(supplied) - set(ours)) == []
+    assert {"n", "K", "lam", "gap", "r_bore", "mu_s", "mu_d", "v_stribeck"} <= set(ours["contact"][0])
+
+
+def test_errors_and_coverage_of_an_estimate(folder):
+    truth = read_truth(folder / "truth" / "drop_060.json")
+    scores = score_estimate(estimate_of(truth), truth)
+    peak = scores["bearings"]["NDE"]["peak_force_N"]
+    assert peak["relative_error"] == pytest.approx(0.01)
+    assert peak["covered"] is True
+    assert peak["half_width"] == pytest.approx(0.03 * 1.01)
+    stiffness = scores["bearings"]["DE"]["support.stiffness_N_per_m"]
+    assert stiffness["covered"] is False
+    assert stiffness["error"] == pytest.approx(0.01 * truth.values["support_stiffness"]["DE"])
+    assert scores["drop"]["drop_instant_s"]["error"] == pytest.approx(2e-5)
+    assert len(scores["bearings"]["NDE"]) == 13
+    assert scores["coverage"] == {"intervals": 26, "covered": 2, "fraction": pytest.approx(2 / 26)}
+    json.dumps(scores, allow_nan=False)
+
+
+def test_a_perfect_estimate_has_no_error(folder):
+    truth = read_truth(folder / "truth" / "drop_060.json")
+    scores = score_estimate(estimate_of(truth, 1.0), truth)
+    assert all(s["error"] == 0.0 for fields in scores["bearings"].values() for s in fields.values())
+    assert scores["coverage"]["fraction"] == 1.0
+
+
+def test_an_estimate_of_several_drops(folder, tmp_path):
+    truth = read_truth(folder / "truth" / "drop_060.json")
+    one = estimate_of(truth)
+    shared = {"air_gap_m", "support"}
+    machine = {n: {k: v for k, v in f.items() if k in shared} for n, f in one["bearings"].items()}
+    own = {n: {k: v for k, v in f.items() if k not in shared} for n, f in one["bearings"].items()}
+    several = {"machine": {"bearings": machine}, "drops": {"drop_060": {**one, "bearings": own}}}
+    file = tmp_path / "estimate.json"
+    file.write_text(json.dumps(several))
+    scores = score_estimate(file, folder / "truth" / "drop_060.json")
+    assert scores["bearings"] == score_estimate(one, truth)["bearings"]
+    with pytest.raises(UsageError, match="no drop 'drop_100'; it has 'drop_060': name one with --drop"):
+        score_estimate(several, truth, drop="drop_100")
+
+
+def test_impacts_are_matched_by_time(folder):
+    truth = read_truth(folder / "truth" / "drop_060.json")
+    estimate = estimate_of(truth)
+    rows = truth.impacts("NDE")
+    large = rows[rows[:, 2] > 500.0]
+    impacts = [
+        {"time_s": 0.5 * (a + b), "peak_force_N": {"value": 0.98 * f, "interval_90": [0.9 * f, 1.1 * f]}}
+        for a, b, f in large[:-1]
+    ]
+    estimate["bearings"]["NDE"]["impacts"] = impacts
+    score = score_estimate(estimate, truth)["impacts"]["NDE"]
+    assert score["true_impacts"] == len(large) == score["found"] + 1
+    assert score["median_absolute_error"] == pytest.approx(0.02)
+    assert score["covered"] == 1.0
+
+
+def test_missing_and_unusable_values_are_left_out(folder):
+    truth = read_truth(folder / "truth" / "drop_060.json")
+    estimate = copy.deepcopy(estimate_of(truth))
+    del estimate["bearings"]["NDE"]["peak_force_N"]
+    estimate["bearings"]["DE"]["air_gap_m"] = {"value": None, "status": "not found"}
+    scores = score_estimate(estimate, truth)["bearings"]
+    assert "peak_force_N" not in scores["NDE"]
+    assert "air_gap_m" not in scores["DE"]
+    with pytest.raises(UsageError, match=r"none of the quantities of the truth 'drop_060': it has nothing"):
+        score_estimate({}, truth)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [("{", "cannot be read as a truth file"), ('{"name": 1}', "no 'air_gap_m' and no 'peak")],
+)
+def test_what_is_no_truth_file_is_refused(tmp_path, content, message):
+    file = tmp_path / "truth.json"
+    file.write_text(content)
+    with pytest.raises(UsageError, match=message):
+        read_truth(file)
+
+
+def test_what_is_no_estimate_is_refused(tmp_path, folder):
+    file = tmp_path / "estimate.json"
+    file.write_text("[1]")
+    with pytest.raises(UsageError, match=r"estimate\.json holds no estimate"):
+        score_estimate(file, folder / "truth" / "drop_060.json")
+
+
+def test_a_folder_that_cannot_be_made_is_named(synthetic, tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match="cannot make the folder"):
+        write_synthetic(synthetic, tmp_path / "file" / "deeper")
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_changes_the_record_and_nothing_else(synthetic, fault):
+    record = synthetic.record
+    broken = with_fault(record, fault)
+    assert broken.signals.shape == record.signals.shape
+    assert not np.array_equal(broken.signals, record.signals)
+    assert np.array_equal(broken.time, record.time)
+
+
+def test_faults_do_what_they_say(synthetic):
+    signals = synthetic.record.signals
+    assert np.array_equal(with_fault(synthetic.record, "swapped ends").signals, signals[:, [2, 3, 0, 1]])
+    assert np.array_equal(with_fault(synthetic.record, "swapped axes").signals, signals[:, [1, 0, 2, 3]])
+    assert np.array_equal(with_fault(synthetic.record, "inverted polarity").signals, signals * [-1, 1, 1, 1])
+    assert np.ptp(with_fault(synthetic.record, "dead channel").signals[:, 3]) == 0.0
+    with pytest.raises(UsageError, match="unknown fault 'fire'; choose one of 'inverted polarity'"):
+        with_fault(synthetic.record, "fire")
