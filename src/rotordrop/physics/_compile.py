@@ -21,7 +21,7 @@ from numba.core import config
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 _PACKAGE = Path(__file__).resolve().parent.parent
-_MARK = "rotordrop.physics._compile import kernel"
+_MARK = "rotordrop.physics._compile import"
 
 
 def _kernel_sources() -> list[Path]:
@@ -44,11 +44,29 @@ def cache_folder() -> str:
 
 def kernel(function: Function) -> Function:
     """Compile a function with strict floating point, without the interpreter lock, cached on disk."""
+    return _compiled(function)
+
+
+def lean_kernel(function: Function) -> Function:
+    """Compile a kernel that makes no arrays: without reference counts, which cost half of a right-hand side.
+
+    Views of arrays are allowed; new arrays and the assignment of an array to a slice of another are not.
+    """
+    return _compiled(function, _nrt=False)
+
+
+def inner_kernel(function: Function) -> Function:
+    """Compile a lean kernel into its callers: for what is called millions of times and does little."""
+    return _compiled(function, _nrt=False, forceinline=True)
+
+
+def _compiled(function: Function, **options: Any) -> Function:
     settings: Any = config
+    options |= {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": False}
     previous = settings.CACHE_DIR
     settings.CACHE_DIR = cache_folder()
     try:
-        compiled = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=False)(function)
+        compiled = numba.njit(**options)(function)
     finally:
         settings.CACHE_DIR = previous
     return cast(Function, compiled)

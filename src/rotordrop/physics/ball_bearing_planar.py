@@ -12,12 +12,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.physics._compile import kernel
+from rotordrop.physics._compile import inner_kernel, lean_kernel
 
 Array = NDArray[np.float64]
 
 
-@kernel
+@inner_kernel
 def lane_sum(values: Array) -> float:
     """Sum of an array whose length is a multiple of eight, in eight partial sums of fixed order.
 
@@ -36,7 +36,7 @@ def lane_sum(values: Array) -> float:
     return ((s0 + s4) + (s1 + s5)) + ((s2 + s6) + (s3 + s7))
 
 
-@kernel
+@inner_kernel
 def planar_ball_force(
     dx: float,
     dy: float,
@@ -88,7 +88,7 @@ def planar_ball_force(
     return lane_sum(work[0]), lane_sum(work[1])
 
 
-@kernel
+@lean_kernel
 def planar_ball_gradient(
     dx: float,
     dy: float,
@@ -125,7 +125,7 @@ def planar_ball_gradient(
     return f_x, f_y, k_xx, k_xy, k_yy
 
 
-@kernel
+@inner_kernel
 def largest_ball_load(
     dx: float,
     dy: float,
@@ -145,12 +145,12 @@ def largest_ball_load(
     for j in range(cosines.shape[0]):
         if weights[j] > 0.0:
             radial = radial_offset + dx * cosines[j] + dy * sines[j]
-            delta = math.sqrt(radial * radial + axial_offset * axial_offset) - groove_distance
-            largest = max(largest, delta)
-    return K * largest * math.sqrt(largest)
+            largest = max(largest, radial * radial)
+    delta = max(math.sqrt(largest + axial_offset * axial_offset) - groove_distance, 0.0)
+    return K * delta * math.sqrt(delta)
 
 
-@kernel
+@lean_kernel
 def planar_ball_energy(
     dx: float,
     dy: float,

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from rotordrop.physics._compile import kernel
+from rotordrop.physics._compile import inner_kernel, kernel
 
 
-@kernel
+@inner_kernel
 def hunt_crossley_force(delta: float, delta_dot: float, K: float, n: float, lam: float) -> float:
     """Normal force [N] pressing rotor and race apart at an indentation and its rate.
 

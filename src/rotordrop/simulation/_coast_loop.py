@@ -231,7 +231,7 @@ def integrate_window(  # noqa: C901, PLR0915  one compiled loop
         tried += 1
         step = min(h, t_end - t, landing)
         runge_kutta_stages(t, step, y, p, tab, k, y_new, work)
-        error = scaled_error(step, y, y_new, k, tab.e, scale, tolerance)
+        error = scaled_error(step, y, y_new, k, tab.e, scale, tolerance, scratch)
         if not error <= 1.0:
             progress[REJECTED] += 1.0
             h = 0.1 * step if not math.isfinite(error) else step * max(SHRINK, SAFETY * error**-0.2)

@@ -71,7 +71,7 @@ def bearing_histories(states: Array, p: KernelParameters, out: Array) -> None:
             out[i, b, H_BEARING_FORCE_X] = -F_x
             out[i, b, H_BEARING_FORCE_Y] = -F_y
             out[i, b, H_BALL_LOAD] = load
-            out[i, b, H_STRESS] = row[L.STRESS_COEFFICIENT] * load ** (1.0 / 3.0)
+            out[i, b, H_STRESS] = row[L.STRESS_COEFFICIENT] * np.cbrt(load)
 
 
 @kernel

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from rotordrop.model import layout as L
 from rotordrop.model.layout import KernelParameters
-from rotordrop.physics._compile import kernel
-from rotordrop.simulation._rhs import contact_state, drop_derivative, project
+from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
+from rotordrop.simulation._rhs import contact_state, drop_derivative, relative_motion
 from rotordrop.simulation._tableau import Tableau
 
 Array = NDArray[np.float64]
@@ -43,115 +43,98 @@ SAFETY = 0.9
 SHRINK = 0.2
 GROW = 5.0
 BETA = 0.04
+ALPHA = 0.2 - 0.75 * BETA
+LOG_SMALLEST_ERROR = math.log(1e-4)
 
 
-@kernel
+@inner_kernel
+def combine(y: Array, h: float, weights: Array, k: Array, count: int, out: Array) -> None:
+    """Fill ``out`` with ``y + h Σ_j weights_j k_j`` over the first ``count`` stages, summed in order."""
+    n = y.shape[0]
+    first, w = k[0], weights[0]
+    for i in range(n):
+        out[i] = w * first[i]
+    for j in range(1, count):
+        stage, w = k[j], weights[j]
+        for i in range(n):
+            out[i] += w * stage[i]
+    for i in range(n):
+        out[i] = y[i] + h * out[i]
+
+
+@lean_kernel
 def runge_kutta_stages(
     t: float, h: float, y: Array, p: KernelParameters, tab: Tableau, k: Array, y_new: Array, work: Array
 ) -> None:
     """Fill stages 2 to 7 (stage 1 is ``k[0]``) and the new state."""
-    n = y.shape[0]
-    a = tab.a
-    for i in range(n):
-        y_new[i] = y[i] + h * a[1, 0] * k[0, i]
-    drop_derivative(t + tab.c[1] * h, y_new, p, k[1], work)
-    for i in range(n):
-        y_new[i] = y[i] + h * (a[2, 0] * k[0, i] + a[2, 1] * k[1, i])
-    drop_derivative(t + tab.c[2] * h, y_new, p, k[2], work)
-    for i in range(n):
-        y_new[i] = y[i] + h * (a[3, 0] * k[0, i] + a[3, 1] * k[1, i] + a[3, 2] * k[2, i])
-    drop_derivative(t + tab.c[3] * h, y_new, p, k[3], work)
-    for i in range(n):
-        y_new[i] = y[i] + h * (a[4, 0] * k[0, i] + a[4, 1] * k[1, i] + a[4, 2] * k[2, i] + a[4, 3] * k[3, i])
-    drop_derivative(t + tab.c[4] * h, y_new, p, k[4], work)
-    for i in range(n):
-        y_new[i] = y[i] + h * (
-            a[5, 0] * k[0, i] + a[5, 1] * k[1, i] + a[5, 2] * k[2, i] + a[5, 3] * k[3, i] + a[5, 4] * k[4, i]
-        )
-    drop_derivative(t + h, y_new, p, k[5], work)
-    for i in range(n):
-        y_new[i] = y[i] + h * (
-            a[6, 0] * k[0, i]
-            + a[6, 1] * k[1, i]
-            + a[6, 2] * k[2, i]
-            + a[6, 3] * k[3, i]
-            + a[6, 4] * k[4, i]
-            + a[6, 5] * k[5, i]
-        )
-    drop_derivative(t + h, y_new, p, k[6], work)
+    for stage in range(1, 7):
+        combine(y, h, tab.a[stage], k, stage, y_new)
+        drop_derivative(t + tab.c[stage] * h, y_new, p, k[stage], work)
 
 
-@kernel
+@inner_kernel
 def scaled_error(
-    h: float, y: Array, y_new: Array, k: Array, e: Array, scale: Array, tolerance: float
+    h: float, y: Array, y_new: Array, k: Array, e: Array, scale: Array, tolerance: float, scratch: Array
 ) -> float:
     """Root mean square over the states of the embedded error over ``tolerance · (scale + |y|)``."""
-    total = 0.0
     n = scale.shape[0]
+    first, w = k[0], e[0]
     for i in range(n):
-        error = h * (
-            e[0] * k[0, i]
-            + e[1] * k[1, i]
-            + e[2] * k[2, i]
-            + e[3] * k[3, i]
-            + e[4] * k[4, i]
-            + e[5] * k[5, i]
-            + e[6] * k[6, i]
-        )
-        ratio = error / (scale[i] + max(abs(y[i]), abs(y_new[i])))
-        total += ratio * ratio
+        scratch[i] = w * first[i]
+    for j in range(1, 7):
+        stage, w = k[j], e[j]
+        for i in range(n):
+            scratch[i] += w * stage[i]
+    for i in range(n):
+        ratio = h * scratch[i] / (scale[i] + max(abs(y[i]), abs(y_new[i])))
+        scratch[i] = ratio * ratio
+    total = 0.0
+    for i in range(n):
+        total += scratch[i]
     return math.sqrt(total / n) / tolerance
 
 
-@kernel
+@lean_kernel
 def dense_output(theta: float, h: float, y: Array, k: Array, tab: Tableau, out: Array) -> None:
     """State within a step at fraction ``theta``, fourth order."""
     t2 = theta * theta
-    w = np.empty(7)
+    n = y.shape[0]
+    for i in range(n):
+        out[i] = 0.0
     for j in range(7):
-        w[j] = h * (tab.p[j, 0] * theta + t2 * (tab.p[j, 1] + theta * (tab.p[j, 2] + theta * tab.p[j, 3])))
-    for i in range(y.shape[0]):
-        out[i] = y[i] + (
-            w[0] * k[0, i]
-            + w[1] * k[1, i]
-            + w[2] * k[2, i]
-            + w[3] * k[3, i]
-            + w[4] * k[4, i]
-            + w[5] * k[5, i]
-            + w[6] * k[6, i]
-        )
+        p = tab.p[j]
+        w = p[0] * theta + t2 * (p[1] + theta * (p[2] + theta * p[3]))
+        stage = k[j]
+        for i in range(n):
+            out[i] += w * stage[i]
+    for i in range(n):
+        out[i] = y[i] + h * out[i]
 
 
-@kernel
-def contact_at(b: int, y: Array, p: KernelParameters, out: Array) -> None:
-    """Contact of one bearing in a state: indentation [m], normal force [N], friction force [N], normal, power
-    [W].
-
-    Filled as ``delta, F_r, F_mu, n_x, n_y, power dissipated in the contact``.
+@inner_kernel
+def contact_values(b: int, y: Array, p: KernelParameters) -> tuple[float, float, float, float, float, float]:
+    """Contact of one bearing in a state: indentation [m], normal force [N], friction force [N], normal
+    x and y [1], power dissipated in the contact [W].
     """
-    m = p.eigenvalue.shape[0]
     n_b = p.bearing.shape[0]
-    n_q = 2 * m + 4 * n_b
-    r = 2 * m + 2 * b
-    shape = p.bearing_shape[b]
-    ux = project(shape, y[:m]) - y[r]
-    uy = project(shape, y[m : 2 * m]) - y[r + 1]
-    vx = project(shape, y[n_q : n_q + m]) - y[n_q + r]
-    vy = project(shape, y[n_q + m : n_q + 2 * m]) - y[n_q + r + 1]
+    n_q = 2 * p.eigenvalue.shape[0] + 4 * n_b
+    ux, uy, vx, vy = relative_motion(b, y, p)
     row = p.bearing[b]
     delta, F_r, mu, nx, ny, v_t = contact_state(ux, uy, vx, vy, y[2 * n_q + n_b], y[2 * n_q + b], row)
-    elastic = 0.0
+    power = 0.0
     if delta > 0.0:
         elastic = row[L.CONTACT_STIFFNESS] * delta ** row[L.CONTACT_EXPONENT]
-    out[0] = delta
-    out[1] = F_r
-    out[2] = mu * F_r
-    out[3] = nx
-    out[4] = ny
-    out[5] = mu * F_r * v_t + (F_r - elastic) * (vx * nx + vy * ny)
+        power = mu * F_r * v_t + (F_r - elastic) * (vx * nx + vy * ny)
+    return delta, F_r, mu * F_r, nx, ny, power
 
 
-@kernel
+@inner_kernel
+def contact_at(b: int, y: Array, p: KernelParameters, out: Array) -> None:
+    """Fill ``out`` (6,) with the contact of one bearing in a state, in the order of `contact_values`."""
+    out[0], out[1], out[2], out[3], out[4], out[5] = contact_values(b, y, p)
+
+
+@lean_kernel
 def crossing_fraction(
     b: int,
     h: float,
@@ -161,7 +144,6 @@ def crossing_fraction(
     p: KernelParameters,
     delta_0: float,
     scratch: Array,
-    out: Array,
 ) -> float:
     """Fraction of a step at which the indentation changes sign, by bisection on the dense output."""
     low = 0.0
@@ -169,24 +151,24 @@ def crossing_fraction(
     for _ in range(30):
         middle = 0.5 * (low + high)
         dense_output(middle, h, y, k, tab, scratch)
-        contact_at(b, scratch, p, out)
-        if (out[0] > 0.0) == (delta_0 > 0.0):
+        ux, uy, _vx, _vy = relative_motion(b, scratch, p)
+        if (math.sqrt(ux * ux + uy * uy) > p.bearing[b, L.AIR_GAP]) == (delta_0 > 0.0):
             low = middle
         else:
             high = middle
     return 0.5 * (low + high)
 
 
-@kernel
-def note_peak(time: float, contact: Array, entry: Array) -> None:
+@inner_kernel
+def note_peak(time: float, force: float, nx: float, ny: float, entry: Array) -> None:
     """Keep the largest force of a contact with its time and azimuth."""
-    if contact[1] > entry[LOG_PEAK_FORCE]:
-        entry[LOG_PEAK_FORCE] = contact[1]
+    if force > entry[LOG_PEAK_FORCE]:
+        entry[LOG_PEAK_FORCE] = force
         entry[LOG_PEAK_TIME] = time
-        entry[LOG_AZIMUTH] = math.atan2(contact[4], contact[3])
+        entry[LOG_AZIMUTH] = math.atan2(ny, nx)
 
 
-@kernel
+@lean_kernel
 def log_contacts(
     t: float,
     h: float,
@@ -201,16 +183,16 @@ def log_contacts(
     scratch: Array,
 ) -> int:
     """Update the contact log with an accepted step; returns the number of entries opened so far."""
-    now = np.empty(6)
-    between = np.empty(6)
+    scratch_time = -math.inf
     for b in range(p.bearing.shape[0]):
-        contact_at(b, y_new, p, now)
+        delta, force, _friction, nx, ny, power = contact_values(b, y_new, p)
         was = running[b, RUN_IN_CONTACT] > 0.0
-        touches = now[0] > 0.0
+        touches = delta > 0.0
         begin = t
         end = t + h
         if was != touches:
-            moment = t + h * crossing_fraction(b, h, y, k, tab, p, running[b, RUN_DELTA], scratch, between)
+            moment = t + h * crossing_fraction(b, h, y, k, tab, p, running[b, RUN_DELTA], scratch)
+            scratch_time = -math.inf
             if touches:
                 begin = moment
             else:
@@ -225,20 +207,22 @@ def log_contacts(
         row = int(running[b, RUN_IN_CONTACT]) - 1
         if 0 <= row < log.shape[0]:
             middle = 0.5 * (begin + end)
-            dense_output((middle - t) / h, h, y, k, tab, scratch)
-            contact_at(b, scratch, p, between)
+            if middle != scratch_time:
+                dense_output((middle - t) / h, h, y, k, tab, scratch)
+                scratch_time = middle
+            _delta, between, _friction, mid_x, mid_y, mid_power = contact_values(b, scratch, p)
             sixth = (end - begin) / 6.0
-            log[row, LOG_IMPULSE] += sixth * (running[b, RUN_FORCE] + 4.0 * between[1] + now[1])
-            log[row, LOG_DISSIPATED] += sixth * (running[b, RUN_POWER] + 4.0 * between[5] + now[5])
-            note_peak(middle, between, log[row])
-            note_peak(t + h, now, log[row])
+            log[row, LOG_IMPULSE] += sixth * (running[b, RUN_FORCE] + 4.0 * between + force)
+            log[row, LOG_DISSIPATED] += sixth * (running[b, RUN_POWER] + 4.0 * mid_power + power)
+            note_peak(middle, between, mid_x, mid_y, log[row])
+            note_peak(t + h, force, nx, ny, log[row])
             if not touches:
                 log[row, LOG_END] = end
         if not touches:
             running[b, RUN_IN_CONTACT] = 0.0
-        running[b, RUN_FORCE] = now[1]
-        running[b, RUN_POWER] = now[5]
-        running[b, RUN_DELTA] = now[0]
+        running[b, RUN_FORCE] = force
+        running[b, RUN_POWER] = power
+        running[b, RUN_DELTA] = delta
     return n_log
 
 
@@ -317,7 +301,7 @@ def integrate_drop(  # noqa: C901, PLR0915  one compiled loop
     states[0] = y
     done = 1
     h = min(first_step, largest_step)
-    previous = 1.0
+    log_previous = 0.0
     accepted = 0
     rejected = 0
     outcome = FINISHED
@@ -328,7 +312,7 @@ def integrate_drop(  # noqa: C901, PLR0915  one compiled loop
             break
         step = min(h, t_end - t)
         runge_kutta_stages(t, step, y, p, tab, k, y_new, work)
-        error = scaled_error(step, y, y_new, k, tab.e, scale, tolerance)
+        error = scaled_error(step, y, y_new, k, tab.e, scale, tolerance, scratch)
         if not error <= 1.0:
             rejected += 1
             if not math.isfinite(error):
@@ -348,9 +332,11 @@ def integrate_drop(  # noqa: C901, PLR0915  one compiled loop
             done += 1
         n_log = log_contacts(t, step, y, y_new, k, tab, p, running, log, n_log, scratch)
         growth = GROW
+        log_error = LOG_SMALLEST_ERROR
         if error > 0.0:
-            growth = min(GROW, max(SHRINK, SAFETY * error ** -(0.2 - 0.75 * BETA) * previous**BETA))
-        previous = max(error, 1e-4)
+            log_error = math.log(error)
+            growth = min(GROW, max(SHRINK, SAFETY * math.exp(BETA * log_previous - ALPHA * log_error)))
+        log_previous = max(log_error, LOG_SMALLEST_ERROR)
         h = min(step * growth, largest_step) if step >= h else h
         t = t_new
         for i in range(n):

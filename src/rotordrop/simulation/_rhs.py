@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rotordrop.model import layout as L
 from rotordrop.model.layout import KernelParameters
 from rotordrop.physics import aerodynamics
-from rotordrop.physics._compile import kernel
+from rotordrop.physics._compile import inner_kernel, lean_kernel
 from rotordrop.physics.aerodynamics import exponential_deceleration, speed_dependent_deceleration
 from rotordrop.physics.ball_bearing_planar import planar_ball_force
 from rotordrop.physics.contact import hunt_crossley_force
@@ -28,7 +28,7 @@ IN_TIME = aerodynamics.EXPONENTIAL_IN_TIME
 OF_SPEED = aerodynamics.FUNCTION_OF_SPEED
 
 
-@kernel
+@lean_kernel
 def project(shape: Array, amplitudes: Array) -> float:
     """Physical displacement or velocity of a node from modal amplitudes: one row of mode shapes times
     amplitudes.
@@ -39,7 +39,25 @@ def project(shape: Array, amplitudes: Array) -> float:
     return total
 
 
-@kernel
+@inner_kernel
+def relative_motion(b: int, y: Array, p: KernelParameters) -> tuple[float, float, float, float]:
+    """Displacement [m] and velocity [m/s] of the rotor relative to the race of one bearing, x and y."""
+    m = p.eigenvalue.shape[0]
+    n_q = 2 * m + 4 * p.bearing.shape[0]
+    r = 2 * m + 2 * b
+    shape = p.bearing_shape[b]
+    qx, qy = y[:m], y[m : 2 * m]
+    sx, sy = y[n_q : n_q + m], y[n_q + m : n_q + 2 * m]
+    ux = uy = vx = vy = 0.0
+    for k in range(m):
+        ux += shape[k] * qx[k]
+        uy += shape[k] * qy[k]
+        vx += shape[k] * sx[k]
+        vy += shape[k] * sy[k]
+    return ux - y[r], uy - y[r + 1], vx - y[n_q + r], vy - y[n_q + r + 1]
+
+
+@inner_kernel
 def contact_state(
     ux: float, uy: float, vx: float, vy: float, omega: float, omega_i: float, bearing: Array
 ) -> tuple[float, float, float, float, float, float]:
@@ -74,7 +92,32 @@ def contact_state(
     return delta, F_r, mu, nx, ny, v_t
 
 
-@kernel
+@inner_kernel
+def gyroscopic_forces(
+    polar: Array,
+    ux: Array,
+    uy: Array,
+    vx: Array,
+    vy: Array,
+    omega: float,
+    omega_dot: float,
+    gx: Array,
+    gy: Array,
+) -> None:
+    """Fill modal gyroscopic and spin-up forces ``gx, gy`` (m,) from the symmetric polar inertia (m, m)."""
+    for k in range(gx.shape[0]):
+        gx[k] = 0.0
+        gy[k] = 0.0
+    for j in range(polar.shape[0]):
+        row = polar[j]
+        along = omega * vy[j] + omega_dot * uy[j]
+        across = omega * vx[j] + omega_dot * ux[j]
+        for k in range(row.shape[0]):
+            gx[k] += row[k] * along
+            gy[k] += row[k] * across
+
+
+@inner_kernel
 def add_rotor_accelerations(
     y: Array, omega: float, omega_dot: float, p: KernelParameters, dy: Array
 ) -> tuple[float, float]:
@@ -89,26 +132,24 @@ def add_rotor_accelerations(
     w2 = omega * omega
     along = w2 * c + omega_dot * s
     across = w2 * s - omega_dot * c
+    ux, uy = y[:m], y[m : 2 * m]
+    vx, vy = y[n_q : n_q + m], y[n_q + m : n_q + 2 * m]
+    ax, ay = dy[n_q : n_q + m], dy[n_q + m : n_q + 2 * m]
+    gx, gy = dy[:m], dy[m : 2 * m]
+    gyroscopic_forces(p.polar, ux, uy, vx, vy, omega, omega_dot, gx, gy)
     dissipated = 0.0
     put_in = 0.0
     for k in range(m):
-        gx = 0.0
-        gy = 0.0
-        for j in range(m):
-            gx += p.polar[k, j] * (omega * y[n_q + m + j] + omega_dot * y[m + j])
-            gy += p.polar[k, j] * (omega * y[n_q + j] + omega_dot * y[j])
-        vx = y[n_q + k]
-        vy = y[n_q + m + k]
         fx = p.unbalance_cos[k] * along - p.unbalance_sin[k] * across
         fy = p.unbalance_cos[k] * across + p.unbalance_sin[k] * along
-        dy[n_q + k] += fx - p.eigenvalue[k] * y[k] - p.damping[k] * vx - gx
-        dy[n_q + m + k] += fy + p.gravity[k] - p.eigenvalue[k] * y[m + k] - p.damping[k] * vy + gy
-        dissipated += p.damping[k] * (vx * vx + vy * vy)
-        put_in += (fx - gx) * vx + (fy + gy) * vy
+        ax[k] += fx - p.eigenvalue[k] * ux[k] - p.damping[k] * vx[k] - gx[k]
+        ay[k] += fy + p.gravity[k] - p.eigenvalue[k] * uy[k] - p.damping[k] * vy[k] + gy[k]
+        dissipated += p.damping[k] * (vx[k] * vx[k] + vy[k] * vy[k])
+        put_in += (fx - gx[k]) * vx[k] + (fy + gy[k]) * vy[k]
     return dissipated, put_in
 
 
-@kernel
+@lean_kernel
 def add_magnet_forces(t: float, y: Array, p: KernelParameters, dy: Array) -> float:
     """Add holding, spring, damper and remanent forces of the AMBs; returns the power they put in [W]."""
     m = p.eigenvalue.shape[0]
@@ -138,7 +179,7 @@ def add_magnet_forces(t: float, y: Array, p: KernelParameters, dy: Array) -> flo
     return put_in
 
 
-@kernel
+@inner_kernel
 def bearing_accelerations(
     b: int, y: Array, omega: float, p: KernelParameters, dy: Array, work: Array
 ) -> tuple[float, float]:
@@ -154,10 +195,7 @@ def bearing_accelerations(
     r = 2 * m + 2 * b
     h = r + 2 * n_b
     spin = 2 * n_q + b
-    ux = project(shape, y[:m]) - y[r]
-    uy = project(shape, y[m : 2 * m]) - y[r + 1]
-    vx = project(shape, y[n_q : n_q + m]) - y[n_q + r]
-    vy = project(shape, y[n_q + m : n_q + 2 * m]) - y[n_q + r + 1]
+    ux, uy, vx, vy = relative_motion(b, y, p)
     delta, F_r, mu, nx, ny, v_t = contact_state(ux, uy, vx, vy, omega, y[spin], row)
     F_x, F_y = planar_ball_force(
         y[r] - y[h],
@@ -197,9 +235,10 @@ def bearing_accelerations(
         torque = F_mu
         elastic = row[L.CONTACT_STIFFNESS] * delta ** row[L.CONTACT_EXPONENT]
         dissipated += F_mu * v_t + (F_r - elastic) * (vx * nx + vy * ny)
+        ax, ay = dy[n_q : n_q + m], dy[n_q + m : n_q + 2 * m]
         for k in range(m):
-            dy[n_q + k] -= shape[k] * contact_x
-            dy[n_q + m + k] -= shape[k] * contact_y
+            ax[k] -= shape[k] * contact_x
+            ay[k] -= shape[k] * contact_y
     dy[n_q + r] = (contact_x - F_x) / row[L.RACE_MASS]
     dy[n_q + r + 1] = (contact_y - F_y) / row[L.RACE_MASS]
     dy[n_q + h] = (F_x - row[L.SUPPORT_DAMPING_X] * sx - row[L.SUPPORT_STIFFNESS_X] * y[h]) / row[
@@ -212,7 +251,7 @@ def bearing_accelerations(
     return -torque * row[L.ROTOR_RADIUS], dissipated
 
 
-@kernel
+@inner_kernel
 def aerodynamic_deceleration(t: float, omega: float, p: KernelParameters) -> float:
     """Deceleration [rad/s²] by air alone, in the mode of the case; zero without a speed model."""
     mode = p.flags[L.SPIN_MODE]
@@ -223,7 +262,7 @@ def aerodynamic_deceleration(t: float, omega: float, p: KernelParameters) -> flo
     return 0.0
 
 
-@kernel
+@lean_kernel
 def drop_derivative(t: float, y: Array, p: KernelParameters, dy: Array, work: Array) -> None:
     """Time derivative of the state of a drop.
 
@@ -235,9 +274,10 @@ def drop_derivative(t: float, y: Array, p: KernelParameters, dy: Array, work: Ar
     n_q = 2 * m + 4 * n_b
     i_w = 2 * n_q + n_b
     omega = y[i_w]
+    rates, accelerations = dy[:n_q], dy[n_q : 2 * n_q]
+    velocities = y[n_q : 2 * n_q]
     for i in range(n_q):
-        dy[i] = y[n_q + i]
-        dy[n_q + i] = 0.0
+        accelerations[i] = 0.0
     contact_torque = 0.0
     dissipated = 0.0
     for b in range(n_b):
@@ -254,6 +294,8 @@ def drop_derivative(t: float, y: Array, p: KernelParameters, dy: Array, work: Ar
     lost, gained = add_rotor_accelerations(y, omega, omega_dot, p, dy)
     if p.flags[L.MAGNETS_ACT] != 0:
         gained += add_magnet_forces(t, y, p, dy)
+    for i in range(n_q):
+        rates[i] = velocities[i]
     dy[i_w] = omega_dot
     dy[i_w + 1] = omega
     dy[i_w + 2] = dissipated + lost
