@@ -52,7 +52,7 @@ BURST = 30.0
 
 STEADY_PARTNERS = 3
 SURE_COMBINATION = 25.0
-"""Minus the logarithm of the chance of noise [1] from which a sum or difference is believed: many are tried."""
+"""Minus the logarithm of the chance of noise [1] for a sum or difference to be believed."""
 
 COMBINED_ORDERS = (-2.0, -1.0, 1.0, 2.0)
 BESIDE = 25.0

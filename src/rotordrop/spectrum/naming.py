@@ -213,9 +213,7 @@ def _place(line: LineEvidence) -> str:
 def _label(together: Sequence[Match]) -> str:
     first = together[0]
     rivals = [m for m in together[1:] if m.probability > 0.2 * first.probability]
-    if not rivals:
-        return first.candidate.name
-    return " or ".join([first.candidate.name, *(m.candidate.name for m in rivals)])
+    return " or ".join(dict.fromkeys([first.candidate.name, *(m.candidate.name for m in rivals)]))
 
 
 def _why(line: LineEvidence, match: Match) -> str:

@@ -1,0 +1,200 @@
+"""Lines of synthetic coast-downs are found where they are and named rightly or not at all."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from tests.unit.spectrum.synthetic import CoastDown
+
+from rotordrop.errors import RecordError
+from rotordrop.spectrum.candidates import (
+    Candidate,
+    mains_candidates,
+    mode_candidate,
+    order_candidates,
+    pendulum_candidate,
+)
+from rotordrop.spectrum.line_settings import LineSettings
+from rotordrop.spectrum.lines import Line, find_lines
+
+SETTINGS = LineSettings(highest_frequency=450.0)
+AIR_GAP = 285e-6
+KNOWN = (*order_candidates(), *mains_candidates(), pendulum_candidate("pendulum", 28.3, 29.8))
+
+
+class Drawn:
+    """A coast-down with lines drawn at random, and the truth about them."""
+
+    def __init__(self, seed: int, *, unbalance: float, whirl: bool) -> None:
+        self.random = np.random.default_rng(1000 + seed)
+        self.down = CoastDown(seed=seed)
+        self.names: dict[float, str | None] = {}
+        self.candidates: list[Candidate] = list(KNOWN)
+        self._taken = [29, 58, 87, 116, 145, *range(50, 301, 50), *range(60, 361, 60)]
+        floor = self.down.floor()
+        growth = self.random.choice([0.0, 1.0, 2.0])
+        self.down.add_order(1.0, unbalance * 10 ** self.random.uniform(-6.3, -5.0), growth=growth)
+        for order in (0.5, 1.5, 2.0, 2.5, 3.0):
+            if self.random.random() < 0.6:
+                self.down.add_order(order, floor * 10 ** self.random.uniform(0.6, 2.2))
+        self.swing = self.down.add_pendulum(28.7, 29.3, self.random.uniform(20e-6, 110e-6))
+        self._steady(50.0 + self.random.uniform(-0.05, 0.05), 1.5, "mains hum 50 Hz")
+        for k in range(3):
+            frequency = self._free()
+            off = frequency + self.random.uniform(-0.5, 0.5)
+            self.candidates.append(mode_candidate(f"mode {k}", off, 1.0))
+            self._steady(frequency, 2.5, f"mode {k}")
+        for _ in range(2):
+            self._steady(self._free(), 2.0, None)
+        self.whirl = -92.0 + self.random.uniform(-4.0, 4.0) if whirl else None
+        if self.whirl is not None:
+            self.down.add_whirl(self.whirl, 250e-6, 0.3, 1.5)
+
+    def _free(self) -> float:
+        while True:
+            frequency = self.random.uniform(12.0, 420.0)
+            if min(abs(frequency - taken) for taken in self._taken) > 6.0:
+                self._taken.append(frequency)
+                return frequency
+
+    def _steady(self, frequency: float, decades: float, name: str | None) -> None:
+        amplitude = self.down.floor() * 10 ** self.random.uniform(0.6, decades)
+        decay = self.random.choice([15.0, 40.0, math.inf])
+        self.down.add_steady(frequency, amplitude, decay_time=decay)
+        self.names[frequency] = name
+
+    def truth(self) -> list[tuple[str, float]]:
+        """Kind and place of every line above three times the floor."""
+        least = 3.0 * self.down.floor()
+        orders = [("order", k) for k, a in self.down.orders.items() if a >= least]
+        return orders + [("steady", f) for f, a in self.down.steady.items() if a >= least]
+
+    def search(self) -> tuple[Line, ...]:
+        return find_lines(
+            {"DE": self.down.xy},
+            self.down.sampling_rate,
+            self.down.recorded(),
+            candidates=self.candidates,
+            air_gap=AIR_GAP,
+            settings=SETTINGS,
+        )
+
+    def right_name(self, line: Line) -> bool:
+        """Whether a name is true: it must belong to a line that is there."""
+        for k in self.down.orders:
+            if line.label == f"{k:g}X":
+                return abs(line.order - k) <= 0.01 * k
+        for frequency, name in self.names.items():
+            if line.label == name:
+                return abs(line.frequency - frequency) <= 0.5
+        if line.label == "backward whirl":
+            return self.whirl is not None and abs(line.frequency - abs(self.whirl)) <= 0.5
+        harmonics = {"pendulum": 1, **{f"pendulum, harmonic {k}": k for k in range(2, 6)}}
+        k = harmonics.get(line.label, 0)
+        return k > 0 and abs(line.frequency - k * self.swing) <= 0.3 * k
+
+
+def place(line: Line) -> float | None:
+    return line.order if line.kind == "order" else line.frequency
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["usual", "8 times unbalance", "whirl"])
+def test_lines_are_found_and_none_is_named_wrongly(kind):
+    wanted = found = 0
+    missed = []
+    for seed in range(3):
+        case = Drawn(seed, unbalance=8.0 if "8" in kind else 1.0, whirl=kind == "whirl")
+        lines = case.search()
+        for what, value in case.truth():
+            near = 0.002 * value if what == "order" else 0.5
+            seen = any(line.kind == what and abs(place(line) - value) <= near for line in lines)
+            wanted, found = wanted + 1, found + seen
+            missed += [] if seen else [(seed, what, value)]
+        wrong = [(line.label, line.frequency) for line in lines if line.named and not case.right_name(line)]
+        assert wrong == [], seed
+        assert sum(line.label == "backward whirl" for line in lines) == (kind == "whirl")
+    assert wanted > 20
+    assert found >= 0.95 * wanted, missed
+
+
+@pytest.fixture(scope="module")
+def typical() -> tuple[CoastDown, tuple[Line, ...]]:
+    down = CoastDown(seed=7)
+    down.add_order(1.0, 4e-6, growth=2.0)
+    down.add_order(1.5, 0.4e-6)
+    down.add_pendulum(28.7, 29.3, 80e-6)
+    down.add_steady(50.0, 0.1e-6)
+    down.add_steady(134.2, 0.3e-6, decay_time=15.0)
+    candidates = [*KNOWN, mode_candidate("bending mode 1", 133.0, 12.0)]
+    lines = find_lines(
+        {"DE": down.xy, "NDE": 0.5 * down.xy},
+        down.sampling_rate,
+        down.recorded(),
+        candidates=candidates,
+        air_gap=AIR_GAP,
+        settings=SETTINGS,
+    )
+    return down, lines
+
+
+def named(lines: tuple[Line, ...], label: str) -> Line:
+    chosen = [line for line in lines if line.label == label]
+    assert len(chosen) == 1, [line.label for line in lines]
+    return chosen[0]
+
+
+def test_amplitudes_are_zero_to_peak_in_both_planes(typical):
+    _, lines = typical
+    rub = named(lines, "1.5X")
+    assert rub.amplitude_xy["DE"] == pytest.approx((0.4e-6, 0.28e-6), rel=0.05)
+    assert rub.amplitude_xy["NDE"] == pytest.approx((0.2e-6, 0.14e-6), rel=0.05)
+    assert rub.forward["DE"] == pytest.approx(0.34e-6, rel=0.05)
+    assert rub.backward["DE"] == pytest.approx(0.06e-6, rel=0.3)
+    assert "sign of rub" in rub.reason
+
+
+def test_pendulum_and_its_harmonic_are_named_with_their_drift(typical):
+    _, lines = typical
+    swing = named(lines, "pendulum")
+    assert 28.6 < swing.drift[0] < swing.drift[1] < 29.2
+    assert swing.path.frequency_at([35.0]) == pytest.approx([29.11], abs=0.05)
+    assert named(lines, "pendulum, harmonic 2").frequency == pytest.approx(2.0 * swing.frequency, abs=0.3)
+
+
+def test_hum_stands_still_to_a_hundredth_of_a_hertz(typical):
+    _, lines = typical
+    hum = named(lines, "mains hum 50 Hz")
+    assert hum.frequency == pytest.approx(50.0, abs=0.01)
+    assert hum.width < 0.5
+
+
+def test_a_mode_known_only_roughly_gives_a_question_not_a_name(typical):
+    _, lines = typical
+    line = next(line for line in lines if abs(line.frequency - 134.2) < 0.5)
+    assert not line.named
+    assert line.label == "unnamed (bending mode 1?)"
+    assert line.as_json()["candidates"][0]["name"] == "bending mode 1"
+
+
+def test_constant_speed_leaves_the_kind_open():
+    down = CoastDown(duration=8.0, time_constant=1e6, seed=3)
+    down.add_order(1.0, 5e-6)
+    lines = find_lines({"DE": down.xy}, down.sampling_rate, down.exact(), candidates=KNOWN, settings=SETTINGS)
+    line = max(lines, key=lambda one: one.amplitude)
+    assert line.kind == "undecided"
+    assert not line.named
+    assert "1X" in line.label and "mains hum 60 Hz" in line.label
+
+
+def test_noise_alone_has_no_lines():
+    for seed in range(3):
+        down = CoastDown(seed=seed)
+        assert find_lines({"DE": down.xy}, down.sampling_rate, down.exact(), settings=SETTINGS) == ()
+
+
+def test_no_plane_and_unequal_planes_are_refused():
+    with pytest.raises(RecordError, match="no plane given"):
+        find_lines({}, 1000.0, None)
