@@ -24,12 +24,6 @@ LARGE_IMPACT = 500.0
 SAME_IMPACT = 5e-4
 """An estimated impact belongs to a true one when it peaks within it, widened by this [s]."""
 
-_ELSEWHERE = {
-    "contact.stiffness": ("contact.stiffness", "contact.stiffness_N_per_m_n", "contact_stiffness"),
-    "preload_N": ("preload_N", "bearing.preload_N"),
-    "race.inertia_kg_m2": ("race.inertia_kg_m2", "race.inertia"),
-}
-
 
 @dataclass(frozen=True, kw_only=True)
 class Score:
@@ -78,9 +72,10 @@ def score_estimate(
     Returns
     -------
     dict
-        ``drop`` and ``bearings.<name>.<quantity>``, each with ``estimate``, ``truth``, ``error``,
-        ``relative_error`` and, where an interval was given, ``covered`` and ``half_width``;
-        ``impacts`` per bearing where the estimate lists impacts; ``coverage`` over all intervals.
+        ``method`` and ``consistent`` (what the estimate says of itself); ``drop`` and
+        ``bearings.<name>.<quantity>``, each with ``estimate``, ``truth``, ``error``, ``relative_error``
+        and, where an interval was given, ``covered`` and ``half_width``; ``impacts`` per bearing where
+        the estimate lists impacts; ``coverage`` over all intervals.
     """
     known = _truth(truth)
     found = _one_drop(_estimate(estimate), known, drop)
@@ -96,6 +91,7 @@ def score_estimate(
     return {
         "name": known.name,
         "method": found.get("method"),
+        "consistent": _at(found, "consistency.consistent"),
         "drop": {name: score.as_json() for name, score in whole.items()},
         "bearings": {
             name: {path: score.as_json() for path, score in scores.items()}
@@ -148,8 +144,7 @@ def _bearing_scores(estimate: Estimate, truth: Truth, bearing: str) -> dict[str,
     fields = estimate.get("bearings", {}).get(bearing, {})
     scores = {}
     for path, true in truth.of_bearing(bearing).items():
-        entry = next((e for p in _ELSEWHERE.get(path, (path,)) if (e := _at(fields, p)) is not None), None)
-        score = _score(entry, true)
+        score = _score(_at(fields, path), true)
         if score is not None:
             scores[path] = score
     return scores
@@ -160,7 +155,10 @@ def _drop_scores(estimate: Estimate, truth: Truth) -> dict[str, Score]:
     scores = {}
     for name, key in pairs:
         true = truth.values.get(key)
-        score = None if true is None else _score(estimate.get(name), float(true))
+        entry = estimate.get(name)
+        if name == "drop_instant_s" and not isinstance(entry, Mapping):
+            entry = {"value": entry, "interval_90": estimate.get("drop_instant_interval_90_s")}
+        score = None if true is None else _score(entry, float(true))
         if score is not None:
             scores[name] = score
     return scores

@@ -55,6 +55,11 @@ class Truth:
                 value = value.get(bearing)
             if value is not None:
                 found[path] = factor * float(value)
+        index = self.bearing_names.index(bearing)
+        for path, (group, key) in _LISTED.items():
+            rows = self.values.get(group)
+            if rows is not None:
+                found[path] = float(rows[index][key])
         return found
 
     def impacts(self, bearing: str) -> Array:
@@ -70,13 +75,19 @@ _FIELDS: dict[str, tuple[str, float]] = {
     "support.mass_kg": ("support_mass", 1.0),
     "friction.dynamic": ("friction_dynamic", 1.0),
     "friction.static": ("friction_static", 1.0),
-    "contact.stiffness": ("contact_K", 1.0),
+    "contact.stiffness_N_per_m_n": ("contact_K", 1.0),
     "preload_N": ("preload_N", 1.0),
     "race.inertia_kg_m2": ("ring_Ip", 1.0),
     "peak_force_N": ("peak_force_N", 1.0),
     "mean_force_0p15_0p2_N": ("mean_force_0p15_0p2_N", 1.0),
     "peak_stress_Pa": ("max_stress_MPa", 1e6),
     "mean_stress_Pa": ("mean_stress_MPa", 1e6),
+}
+
+
+_LISTED = {
+    "contact.damping_s_per_m": ("contact", "lam"),
+    "damping_time_s": ("bearing", "Cb_over_Kb"),
 }
 
 

@@ -121,8 +121,8 @@ def test_errors_and_coverage_of_an_estimate(folder):
     assert stiffness["covered"] is False
     assert stiffness["error"] == pytest.approx(0.01 * truth.values["support_stiffness"]["DE"])
     assert scores["drop"]["drop_instant_s"]["error"] == pytest.approx(2e-5)
-    assert len(scores["bearings"]["NDE"]) == 13
-    assert scores["coverage"] == {"intervals": 26, "covered": 2, "fraction": pytest.approx(2 / 26)}
+    assert len(scores["bearings"]["NDE"]) == 15
+    assert scores["coverage"] == {"intervals": 30, "covered": 2, "fraction": pytest.approx(2 / 30)}
     json.dumps(scores, allow_nan=False)
 
 
