@@ -169,7 +169,13 @@ def statistics_figure(result: CoastDownResult) -> go.Figure:
 
 
 def _add_levels(
-    figure: go.Figure, time: Array, levels: Array, peak: Array, place: dict[str, int], *, legend: bool
+    figure: go.Figure,
+    time: NDArray[np.float32],
+    levels: Array,
+    peak: Array,
+    place: dict[str, int],
+    *,
+    legend: bool,
 ) -> None:
     hidden = {"mode": "lines", "line": {"width": 0}, "x": time}
     low = go.Scatter(y=single(levels[:, _LOW]), showlegend=False, hoverinfo="skip", **hidden)

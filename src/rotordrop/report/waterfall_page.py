@@ -64,8 +64,9 @@ def _verdict(analysis: CoastDownAnalysis) -> tuple[Statement, ...]:
     statements = []
     for name, plane in analysis.planes.items():
         held = held_maximum(plane.history)
-        level = "good" if held else "warning"
-        statements.append(Statement(text=f"{name}: {plane.history.statement}", level=level))
+        statements.append(
+            Statement(text=f"{name}: {plane.history.statement}", level="good" if held else "warning")
+        )
         statements.append(
             Statement(
                 text=f"{name}: {plane.settling.statement}",
@@ -162,7 +163,8 @@ def _waterfall_section(analysis: CoastDownAnalysis) -> Section:
                     chart=waterfall_figure(fall, name, lines),
                     caption=f"{name}, {_COMPONENTS[fall.component]}: amplitude {fall.amplitude_kind} of "
                     f"frames of {fall.settings.points} points, Hann window, "
-                    f"{100 * fall.settings.overlap:.0f} % overlap, lines {fall.resolution:.3f} Hz apart (Neisi 2020, Fig. 18). A falling speed "
+                    f"{100 * fall.settings.overlap:.0f} % overlap, lines "
+                    f"{fall.resolution:.3f} Hz apart (Neisi 2020, Fig. 18). A falling speed "
                     "smears the orders here; their true amplitude is below.",
                 )
             )

@@ -67,7 +67,8 @@ class CoastDownCertificate:
         text = (
             f"At a tolerance of {self.tighter_tolerance:g} instead of {self.tolerance:g}, without the "
             f"settled scheme, the largest values move by up to "
-            f"{100 * float(np.max(self.peak_change)):.2g} %, the median force of a second by {100 * self.median_force_change:.2g} % and its 99 % quantile by "
+            f"{100 * float(np.max(self.peak_change)):.2g} %, the "
+            f"median force of a second by {100 * self.median_force_change:.2g} % and its 99 % quantile by "
             f"{100 * self.high_force_change:.2g} % (rms), the speed by {100 * self.speed_change:.2g} % of "
             f"its start, the energy dissipated by {100 * self.dissipated_change:.2g} %"
         )

@@ -145,15 +145,14 @@ class CoastDownAnalysis:
 
     def as_json(self) -> dict[str, Any]:
         """All findings, ready for JSON; amplitudes are zero-to-peak in m unless the name says otherwise."""
-        return _finite(
-            {
-                "recorded": self.signal.recorded,
-                "sampling_rate_hz": self.signal.sampling_rate,
-                "speed_law": None if self.speed_law is None else _law_json(self.speed_law),
-                "lines": [line.as_json() for line in self.lines],
-                "planes": {name: _plane_json(plane) for name, plane in self.planes.items()},
-            }
-        )
+        content = {
+            "recorded": self.signal.recorded,
+            "sampling_rate_hz": self.signal.sampling_rate,
+            "speed_law": None if self.speed_law is None else _law_json(self.speed_law),
+            "lines": [line.as_json() for line in self.lines],
+            "planes": {name: _plane_json(plane) for name, plane in self.planes.items()},
+        }
+        return {key: _finite(value) for key, value in content.items()}
 
 
 def analyse_coast_down(
