@@ -34,6 +34,9 @@ _BACKWARD_SHARE = 0.3
 _GROWTH = 4e-4
 """Step by which the window of the fit grows [s]."""
 
+_GOOD = 2.0
+"""Mean square over the noise up to which a search counts as successful."""
+
 _STILL_FREE = 4.0
 """Mean square over the noise up to which the newest samples count as free fall."""
 
@@ -172,8 +175,7 @@ def fit_fall(
     """
     origin, surely, latest = window
     problem = _problem(record, rotor, levitated, planes, (origin, min(surely, latest)))
-    starts = [np.array([offset, np.log(REMANENT_TIME[0])]) for offset in (0.0, -0.7, 0.6)]
-    best = min((_search(problem, start) for start in starts), key=lambda found: found[1])
+    best = _from_several_starts(problem)
     while problem.time[-1] + _GROWTH <= latest:
         longer = _problem(record, rotor, levitated, planes, (origin, float(problem.time[-1]) + _GROWTH))
         found = _search(longer, best[0])
@@ -181,6 +183,14 @@ def fit_fall(
             break
         problem, best = longer, found
     return _fall(problem, best, levitated, np.array([float(sensor.gain) for sensor in record.sensors]))
+
+
+def _from_several_starts(problem: _Problem) -> tuple[Array, float, Array]:
+    """Search from the first guess; from earlier and later ones too when that does not end at noise level."""
+    found = [_search(problem, np.array([0.0, np.log(REMANENT_TIME[0])]))]
+    if 2.0 * found[0][1] > _GOOD * problem.deviation.size:
+        found += [_search(problem, np.array([offset, np.log(REMANENT_TIME[0])])) for offset in (-0.7, 0.6)]
+    return min(found, key=lambda one: one[1])
 
 
 def _search(problem: _Problem, start: Array) -> tuple[Array, float, Array]:

@@ -87,7 +87,7 @@ def _place(path: Array, plane: Plane, gap: float) -> list[Finding]:
                 kind="leaning rest",
                 message=f"tail: the rotor rests {lean:.0f}° from straight below its levitated position "
                 f"(x = {x * 1e6:+.4g} µm, y = {y * 1e6:+.4g} µm)",
-                remedy="a gain, an angle or an offset of this plane is off, or the race is not round; check them",
+                remedy="check gains, angles and offsets of this plane, and whether the race is round",
                 severity="warning",
                 channel=names,
             )

@@ -1,0 +1,171 @@
+"""Which end is which: decided by how the rotor leaves its levitated shape, through the model of the rotor.
+
+Where the described arrangement explains the fall up to the first contact at noise level, it is confirmed.
+Where not, ends exchanged, single channels crossed between the ends and wrong gains are tried on one and the
+same part of the fall. If none of them explains it clearly better, the record does not decide. A gain that is
+off by less than about a third hides behind the remanent lift and is not found here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotordrop.estimated import Estimated
+from rotordrop.measurement.axes import Plane
+from rotordrop.measurement.events import CoarseDrop, find_fall
+from rotordrop.measurement.fall import Fall
+from rotordrop.measurement.preprocess import LevitatedModel
+from rotordrop.measurement.quality.finding import Finding
+
+if TYPE_CHECKING:
+    from rotordrop.machine import Machine
+    from rotordrop.measurement.record import Record
+
+GOOD_FIT = 2.0
+"""Mean square of the residual over the noise up to which the arrangement counts as confirmed."""
+
+_BETTER = 3.0
+_NEAR_CONTACT = 6e-4
+"""The fit should reach this close to the first sudden acceleration [s]."""
+
+_POSSIBLE_LIFT = (-0.15, 0.8)
+"""Remanent over static lift that a magnetic bearing can have at power-off."""
+
+_ANY_GAIN = (0.2, 1.8)
+_WRONG_GAIN = 0.08
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Case:
+    """The record read another way."""
+
+    words: str
+    kind: str
+    channels: tuple[str, ...]
+    record: Record
+    levitated: LevitatedModel
+
+
+def check_ends(
+    record: Record,
+    machine: Machine,
+    planes: tuple[Plane, ...],
+    levitated: LevitatedModel,
+    coarse: CoarseDrop,
+) -> list[Finding]:
+    """Compare the fall with the rotor model: as described, ends exchanged, channels crossed, gain wrong."""
+    if len({amb.node for amb in machine.ambs}) < 2 or len(planes) != 2:
+        return [_undecided("it takes two AMB planes in the machine file and two sensor planes")]
+    own = find_fall(record, machine, planes, levitated, coarse)
+    if own.misfit <= GOOD_FIT and own.end >= coarse.contact - _NEAR_CONTACT:
+        return _implausible_lift(own, machine)
+    cases = _other_cases(record, planes, levitated)
+    grown = [find_fall(case.record, machine, planes, case.levitated, coarse) for case in cases]
+    until = max([own.end, *(fall.end for fall in grown if fall.misfit <= GOOD_FIT)])
+    mine = find_fall(record, machine, planes, levitated, coarse, until=until).misfit
+    if mine <= GOOD_FIT:
+        return _implausible_lift(own, machine)
+    finals = [
+        find_fall(case.record, machine, planes, case.levitated, coarse, until=until)
+        if case.kind == "wrong gain" or fall.end >= until - _NEAR_CONTACT
+        else None
+        for case, fall in zip(cases, grown, strict=True)
+    ]
+    return [_decide(mine, cases, finals)]
+
+
+def _implausible_lift(fall: Fall, machine: Machine) -> list[Finding]:
+    """A fall that fits only with an impossible remanent lift is too fast or too slow: a gain is wrong."""
+    share = fall.remanent_force[:, 1] / fall.rotor.lift
+    worst = int(np.argmax(np.abs(share - np.mean(_POSSIBLE_LIFT))))
+    if _POSSIBLE_LIFT[0] <= share[worst] <= _POSSIBLE_LIFT[1]:
+        return []
+    return [
+        Finding(
+            kind="wrong gain",
+            message=f"the fall fits only with a remanent lift of {fall.remanent_force[worst, 1]:.3g} N at "
+            f"AMB {machine.ambs[worst].name}, {share[worst]:.0%} of its static lift: the rotor seems to "
+            f"fall too {'fast' if share[worst] < 0 else 'slowly'} there",
+            remedy="check sensitivity and gain of the sensors at that end, and the sampling rate",
+            severity="warning",
+        )
+    ]
+
+
+def _decide(mine: float, cases: list[_Case], falls: list[Fall | None]) -> Finding:
+    tried = [(case, fall) for case, fall in zip(cases, falls, strict=True) if fall is not None]
+    best = min(tried, key=lambda pair: pair[1].misfit, default=None)
+    if best is None or best[1].misfit * _BETTER > mine or best[1].misfit > _BETTER * GOOD_FIT:
+        return _undecided(
+            f"as described, the fall deviates from the rotor model by {mine**0.5:.1f} × the noise, and no "
+            "exchange of channels explains it clearly better"
+        )
+    case, fall = best
+    words = case.words
+    if case.kind == "wrong gain":
+        errors = fall.gain_errors
+        index = int(np.argmax(np.abs(errors)))
+        if abs(errors[index]) < _WRONG_GAIN:
+            return _undecided(
+                f"as described, the fall deviates from the rotor model by {mine**0.5:.1f} × the noise"
+            )
+        name = case.record.channel_names[index]
+        words = f"{name} reading {1.0 + errors[index]:.3g} × what the fall under gravity gives"
+        case = replace(case, channels=(name,))
+    return Finding(
+        kind=case.kind,
+        message=f"the fall deviates from the rotor model by {mine**0.5:.1f} × the noise as described and by "
+        f"{fall.misfit**0.5:.1f} × with {words}",
+        remedy="correct the channel map, or node and sensitivity of the sensor in the machine file",
+        severity="stop",
+        channel=", ".join(case.channels),
+    )
+
+
+def _other_cases(record: Record, planes: tuple[Plane, ...], levitated: LevitatedModel) -> list[_Case]:
+    first, second = planes
+    cases = []
+    if len(first.columns) == len(second.columns):
+        pairs = list(zip(first.columns, second.columns, strict=True))
+        cases.append(_exchanged(record, levitated, pairs, "swapped ends"))
+    for pair in product(first.columns, second.columns):
+        cases.append(_exchanged(record, levitated, [pair], "swapped channels"))
+    free = tuple(
+        sensor.model_copy(update={"gain": Estimated(value=float(sensor.gain), range=_ANY_GAIN)})
+        for sensor in record.sensors
+    )
+    loose = replace(record, sensors=free)
+    cases.append(_Case(words="", kind="wrong gain", channels=(), record=loose, levitated=levitated))
+    return cases
+
+
+def _exchanged(record: Record, levitated: LevitatedModel, pairs: list[tuple[int, int]], kind: str) -> _Case:
+    order = list(range(len(record.sensors)))
+    for a, b in pairs:
+        order[a], order[b] = b, a
+    names = record.channel_names
+    return _Case(
+        words=" and ".join(f"{names[a]} and {names[b]} exchanged" for a, b in pairs),
+        kind=kind,
+        channels=tuple(names[i] for pair in pairs for i in pair),
+        record=replace(record, signals=record.signals[:, order]),
+        levitated=replace(
+            levitated,
+            mean=levitated.mean[order],
+            amplitudes=levitated.amplitudes[:, order],
+            noise=levitated.noise[order],
+        ),
+    )
+
+
+def _undecided(why: str) -> Finding:
+    return Finding(
+        kind="ends",
+        message=f"whether the two ends are exchanged cannot be decided: {why}",
+        remedy="make sure by moving one end by hand; check rotor model, sensor nodes and AMB nodes",
+        severity="note",
+    )
