@@ -1,0 +1,408 @@
+"""Least squares with priors over windows that grow, from many starts at once: the search behind every drop fit.
+
+A drop is chaotic, so a plain fit over a long window lands in a wrong minimum. Here the window starts with the
+first impacts and grows; several starts run side by side on threads; those that fall behind are given up on
+the way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
+from dataclasses import dataclass
+from os import cpu_count
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.errors import IdentificationError
+
+Array = NDArray[np.float64]
+Progress = Callable[[float, str], None]
+
+LARGEST_RISE = 8.0
+"""Factor by which the damping of a step rises when the step fails [1]."""
+
+EASING = 5.0
+WORST = 1e30
+TRIALS = 6
+
+
+class Misfit(Protocol):
+    """A problem to fit: weighted residual over a window, and what is believed beforehand."""
+
+    @property
+    def prior_mean(self) -> Array:
+        """Prior mean of the unknowns, shape (n,)."""
+
+    @property
+    def prior_sigma(self) -> Array:
+        """Prior standard deviation of the unknowns, shape (n,)."""
+
+    @property
+    def step(self) -> Array:
+        """Step of the finite differences, shape (n,)."""
+
+    @property
+    def reach(self) -> Array:
+        """Largest change of an unknown in one iteration, shape (n,)."""
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Lower and upper bounds of the unknowns, shape (n,) each."""
+
+    @property
+    def leading(self) -> NDArray[np.bool_]:
+        """Unknowns that are fitted while many starts run; the others wait at their start, shape (n,)."""
+
+    def residual(self, x: Array, window: float) -> Array:
+        """Residual over its standard deviation up to a time [s], shape (r,)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fit:
+    """A minimum of a misfit over one window; n unknowns.
+
+    Attributes
+    ----------
+    x : ndarray, shape (n,)
+        The unknowns.
+    cost : float
+        Sum of squares of weighted residuals and priors.
+    misfit : float
+        Mean square of the weighted residuals [1]; 1 is noise level.
+    covariance : ndarray, shape (n, n)
+        Covariance of the unknowns (Laplace), scaled up where the misfit exceeds the noise.
+    window : float
+        End of the window [s].
+    evaluations : int
+        Simulations used for it.
+    active : tuple of bool
+        Which unknowns lie at a bound.
+    """
+
+    x: Array
+    cost: float
+    misfit: float
+    covariance: Array
+    window: float
+    evaluations: int
+    active: tuple[bool, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Point:
+    x: Array
+    residual: Array
+    cost: float
+
+
+def fit_window(
+    problem: Misfit,
+    start: Array,
+    window: float,
+    *,
+    iterations: int = 12,
+    tolerance: float = 1e-4,
+    fitted: NDArray[np.bool_] | None = None,
+    pool: Executor | None = None,
+) -> Fit:
+    """Levenberg–Marquardt over one window.
+
+    Parameters
+    ----------
+    problem : Misfit
+        What is fitted.
+    start : ndarray, shape (n,)
+        Start of the unknowns.
+    window : float
+        End of the window [s].
+    iterations : int
+        Bound of the number of Jacobians.
+    tolerance : float
+        Ends when the cost falls by less than this share.
+    fitted : ndarray of bool, shape (n,), optional
+        Unknowns that are fitted; all by default.
+    pool : Executor, optional
+        Threads for the columns of the Jacobian.
+    """
+    count = 1
+    point = _evaluated(problem, np.clip(start, *problem.bounds), window)
+    damping = 1e-3
+    normal = np.eye(len(start))
+    chosen = np.ones(len(start), dtype=np.bool_) if fitted is None else fitted
+    for _ in range(iterations):
+        jacobian = _jacobian(problem, point, window, chosen, pool)
+        count += int(chosen.sum())
+        normal, gradient = _normal(problem, point, jacobian)
+        better, damping, tried = _improved(problem, point, window, chosen, normal, gradient, damping)
+        count += tried
+        if better is None:
+            break
+        fall = (point.cost - better.cost) / max(point.cost, 1e-300)
+        point = better
+        if fall < tolerance:
+            break
+    size = max(len(point.residual), 1)
+    misfit = float(point.residual @ point.residual / size)
+    lower, upper = problem.bounds
+    return Fit(
+        x=point.x,
+        cost=point.cost,
+        misfit=misfit,
+        covariance=_inverse(normal) * max(misfit, 1.0),
+        window=window,
+        evaluations=count,
+        active=tuple((point.x <= lower + 1e-9) | (point.x >= upper - 1e-9)),
+    )
+
+
+def _evaluated(problem: Misfit, x: Array, window: float) -> _Point:
+    try:
+        residual = problem.residual(x, window)
+    except IdentificationError:
+        return _Point(x=x, residual=np.full(1, np.sqrt(WORST)), cost=WORST)
+    prior = (x - problem.prior_mean) / problem.prior_sigma
+    return _Point(x=x, residual=residual, cost=float(residual @ residual + prior @ prior))
+
+
+def _jacobian(
+    problem: Misfit, point: _Point, window: float, chosen: NDArray[np.bool_], pool: Executor | None
+) -> Array:
+    def column(k: int) -> Array:
+        x = point.x.copy()
+        step = problem.step[k]
+        if x[k] + step > problem.bounds[1][k]:
+            step = -step
+        x[k] += step
+        try:
+            moved = problem.residual(x, window)
+        except IdentificationError:
+            return np.zeros_like(point.residual)
+        return np.asarray((moved - point.residual) / step)
+
+    if point.cost >= WORST:
+        return np.zeros((1, len(point.x)))
+    columns = [int(k) for k in np.flatnonzero(chosen)]
+    jacobian = np.zeros((len(point.residual), len(point.x)))
+    moved = map(column, columns) if pool is None else pool.map(column, columns)
+    for k, values in zip(columns, moved, strict=True):
+        jacobian[:, k] = values
+    return jacobian
+
+
+def _normal(problem: Misfit, point: _Point, jacobian: Array) -> tuple[Array, Array]:
+    weight = 1.0 / problem.prior_sigma**2
+    normal = jacobian.T @ jacobian + np.diag(weight)
+    gradient = jacobian.T @ point.residual + weight * (point.x - problem.prior_mean)
+    return normal, gradient
+
+
+def _improved(
+    problem: Misfit,
+    point: _Point,
+    window: float,
+    chosen: NDArray[np.bool_],
+    normal: Array,
+    gradient: Array,
+    damping: float,
+) -> tuple[_Point | None, float, int]:
+    """A point of lower cost, the damping for the next step, and the simulations it took."""
+    lower, upper = problem.bounds
+    held = ((point.x <= lower) & (gradient > 0.0)) | ((point.x >= upper) & (gradient < 0.0))
+    free = chosen & ~held
+    for trial in range(TRIALS):
+        damped = normal + damping * np.diag(np.diag(normal))
+        step = np.zeros(len(point.x))
+        step[free] = -np.linalg.solve(damped[np.ix_(free, free)], gradient[free])
+        step *= min(1.0, float(1.0 / np.max(np.abs(step) / problem.reach, initial=1e-12)))
+        candidate = _evaluated(problem, np.clip(point.x + step, lower, upper), window)
+        if candidate.cost < point.cost:
+            return candidate, damping / EASING, trial + 1
+        damping *= LARGEST_RISE
+    return None, damping, TRIALS
+
+
+def _inverse(normal: Array) -> Array:
+    scale = 1.0 / np.sqrt(np.diag(normal))
+    return np.asarray(np.linalg.inv(normal * np.outer(scale, scale)) * np.outer(scale, scale))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Schedule:
+    """How a search from many starts goes.
+
+    Attributes
+    ----------
+    windows : tuple of float
+        Ends of the windows, growing [s].
+    kept : tuple of int
+        How many starts go on after each window; the last number holds for the rest.
+    draws : tuple of int
+        Points drawn from the covariance of the fits before each window grows; the last number holds for the rest.
+    few : int
+        Number of first windows in which only the leading unknowns are fitted.
+    iterations : tuple of int
+        Jacobians per window while several starts run, and for the last one.
+    breaking : float
+        A window whose misfit exceeds that of the window before by this factor (and 1.5) is given up.
+    """
+
+    windows: tuple[float, ...]
+    kept: tuple[int, ...] = (3, 3, 2, 1)
+    draws: tuple[int, ...] = (200, 200, 100, 50)
+    few: int = 2
+    iterations: tuple[int, int] = (4, 8)
+    breaking: float = 1.6
+
+
+@dataclass(frozen=True, kw_only=True)
+class Search:
+    """Result of a search from many starts.
+
+    Attributes
+    ----------
+    best : Fit
+        The best fit over the longest window that the model explains.
+    by_window : tuple of Fit
+        The best fit of every window.
+    starts : ndarray, shape (k, n)
+        Where the search began.
+    costs : tuple of tuple of float
+        Costs of the fits that ran in each window, best first.
+    agreeing : int
+        Fits within five percent of the best cost in the last window that several reached.
+    evaluations : int
+        Simulations in all.
+    ended_early : str
+        Why the window stopped growing before the end of the schedule; empty when it did not.
+    """
+
+    best: Fit
+    by_window: tuple[Fit, ...]
+    starts: Array
+    costs: tuple[tuple[float, ...], ...]
+    agreeing: int
+    evaluations: int
+    ended_early: str
+
+
+def search(
+    problem: Misfit,
+    starts: Sequence[Array],
+    schedule: Schedule,
+    *,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Search:
+    """Fit from many starts over growing windows; those that fall behind are given up on the way.
+
+    Before a window grows, points are drawn from the covariance of the fits so far, and the best of them in the
+    longer window start there: what the short window leaves open is searched before the next impact decides it.
+
+    Parameters
+    ----------
+    problem : Misfit
+        What is fitted; its residual must be safe to call from several threads.
+    starts : sequence of ndarray
+        Starts of the unknowns.
+    schedule : Schedule
+        Windows, and how many starts go on.
+    threads : int, optional
+        Threads; all cores by default.
+    progress : callable, optional
+        Called with the share done and a text.
+    """
+    report = progress or (lambda share, text: None)
+    with ThreadPoolExecutor(max_workers=threads or cpu_count() or 1) as pool:
+        return _Searching(problem, schedule, pool, report).run(list(starts))
+
+
+class _Searching:
+    """One search under way."""
+
+    def __init__(self, problem: Misfit, schedule: Schedule, pool: Executor, report: Progress) -> None:
+        self.problem, self.schedule, self.pool, self.report = problem, schedule, pool, report
+        self.evaluations = 0
+        self.random = np.random.Generator(np.random.Philox(20))
+
+    def run(self, starts: list[Array]) -> Search:
+        schedule = self.schedule
+        points, best, costs, agreeing, ended = starts, list[Fit](), list[tuple[float, ...]](), 0, ""
+        for stage, window in enumerate(schedule.windows):
+            self.report(stage / len(schedule.windows), f"{len(points)} starts to {1e3 * window:.1f} ms")
+            fits = self._fitted(points, window, stage)
+            if best and fits[0].misfit > max(1.5, schedule.breaking * best[-1].misfit):
+                ended = (
+                    f"from {1e3 * best[-1].window:.1f} to {1e3 * window:.1f} ms the misfit rises from "
+                    f"{best[-1].misfit:.2g} to {fits[0].misfit:.2g}: the model no longer follows the record"
+                )
+                break
+            best.append(fits[0])
+            costs.append(tuple(fit.cost for fit in fits))
+            if len(fits) > 1:
+                agreeing = sum(fit.cost < 1.05 * fits[0].cost for fit in fits)
+            if stage + 1 < len(schedule.windows):
+                kept = schedule.kept[min(stage, len(schedule.kept) - 1)]
+                points = self._drawn(fits[:kept], schedule.windows[stage + 1], stage, kept)
+        return Search(
+            best=best[-1],
+            by_window=tuple(best),
+            starts=np.array(starts),
+            costs=tuple(costs),
+            agreeing=agreeing,
+            evaluations=self.evaluations,
+            ended_early=ended,
+        )
+
+    def _fitted(self, points: list[Array], window: float, stage: int) -> list[Fit]:
+        """Fits from several points side by side, or from one with its Jacobian side by side; best first."""
+        schedule = self.schedule
+        chosen = self.problem.leading if stage < schedule.few else None
+        if len(points) == 1:
+            fits = [
+                fit_window(self.problem, points[0], window, iterations=schedule.iterations[1], pool=self.pool)
+            ]
+        else:
+            tasks = [
+                self.pool.submit(
+                    fit_window, self.problem, x, window, iterations=schedule.iterations[0], fitted=chosen
+                )
+                for x in points
+            ]
+            fits = [task.result() for task in tasks]
+        self.evaluations += sum(fit.evaluations for fit in fits)
+        return sorted(fits, key=lambda fit: fit.cost)
+
+    def _drawn(self, fits: list[Fit], window: float, stage: int, kept: int) -> list[Array]:
+        """The best points for the next window: from every fit itself and points of its covariance."""
+        draws = self.schedule.draws
+        each = max(1, draws[min(stage, len(draws) - 1)] // len(fits))
+        moved = np.ones(len(fits[0].x)) if stage >= self.schedule.few else self.problem.leading.astype(float)
+        points = [fit.x for fit in fits]
+        for fit in fits:
+            root = np.linalg.cholesky(fit.covariance + 1e-12 * np.diag(np.diag(fit.covariance)))
+            noise = self.random.standard_normal((each, len(fit.x)))
+            points += [np.clip(fit.x + moved * (root @ z), *self.problem.bounds) for z in noise]
+        costs = list(self.pool.map(lambda x: _evaluated(self.problem, x, window).cost, points))
+        self.evaluations += len(points)
+        return [points[k] for k in np.argsort(costs, kind="stable")[:kept]]
+
+
+def sobol_starts(centre: Array, spread: Array, count: int, seed: int = 1) -> list[Array]:
+    """Quasi-random starts, the first at the centre; ``spread`` (n,) is the half width of the box (0 keeps a value).
+
+    Source: Sobol sequence with a fixed scramble.
+    """
+    from scipy.stats import qmc
+
+    moved = np.flatnonzero(spread)
+    points = qmc.Sobol(d=max(len(moved), 1), seed=seed).random(max(count, 1))
+    starts = []
+    for k in range(count):
+        x = centre.copy()
+        if k > 0:
+            x[moved] += spread[moved] * (2.0 * points[k] - 1.0)
+        starts.append(x)
+    return starts
