@@ -1,0 +1,1 @@
+"""From a recorded drop to force and stress, with their uncertainty."""

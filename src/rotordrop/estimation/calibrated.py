@@ -1,4 +1,4 @@
-"""Calibrate a machine: one fit over several drops, written back as a machine file with intervals and provenance."""
+"""Calibrate a machine: one fit over several drops, written back with intervals and provenance."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ CONFOUNDED = 0.9
 
 SEPARATED_BY: dict[frozenset[str], str] = {
     frozenset({"support.stiffness", "support.mass"}): (
-        "a hammer test of the touchdown-bearing housing gives the support frequency and the stiffness separately"
+        "a hammer test of the touchdown-bearing housing gives support frequency and stiffness"
     ),
     frozenset({"air_gap", "offset"}): "a lift test of the rotor in its magnets gives the diametral clearance",
     frozenset({"friction.dynamic", "race.inertia"}): "a speed sensor on the inner race gives its spin-up",
@@ -196,7 +196,7 @@ def _plain(value: float, sigma: float, widening: float, unit: str) -> Identified
 
 
 def machine_values(values: dict[str, IdentifiedValue], source: str) -> dict[str, Estimated]:
-    """Calibrated values as entries of a machine description, the horizontal support and static friction with them."""
+    """Calibrated values as entries of a machine description, the horizontal support with them."""
     entries: dict[str, Estimated] = {}
     for path, value in values.items():
         if path.endswith("support.anisotropy"):

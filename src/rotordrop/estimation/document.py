@@ -84,7 +84,7 @@ def statistics_entry(stress: Array, time: Array, preload_stress: float) -> dict[
 
 
 def impact_entry(impact: Impact) -> dict[str, Any]:
-    """One impact: times from power-off [s], azimuth [rad], peak [N], impulse [N s], energy [J], with intervals."""
+    """One impact: times from power-off [s], azimuth [rad], peak [N], impulse [N s], energy [J]."""
     return {
         "start_s": impact.start,
         "end_s": impact.end,

@@ -73,7 +73,7 @@ def estimate_schema() -> dict[str, Any]:
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "rotordrop estimate",
-        "description": "Force and stress of touchdown bearings from one recorded drop, or from several of a machine.",
+        "description": "Force and stress of touchdown bearings from one or several recorded drops.",
         "oneOf": [
             {"$ref": "#/$defs/drop"},
             {

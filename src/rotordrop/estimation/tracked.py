@@ -52,15 +52,15 @@ MODEL_FORCE_SIGMA = 0.01
 """Relative standard deviation of a force peak by what every model here leaves out (basis, sampling) [1]."""
 MODEL_STRESS_SIGMA = 0.004
 MODEL_MEAN_STRESS_SIGMA = 0.04
-"""The same for the mean stress: preload sets it, and the record knows preload only through the ball stiffness [1]."""
+"""The same for the mean stress: preload sets it, known only through the ball stiffness [1]."""
 MODEL_GAP_SIGMA = 2.5e-6
-"""Standard deviation of an air gap by what confounds it with gains and offsets beyond the linearised fit [m]."""
+"""Standard deviation of an air gap by what confounds it with gains and offsets beyond the fit [m]."""
 PARAMETER_WIDENING = 1.5
 """Factor on standard errors of parameters for what the linearised fit leaves out [1]."""
 MODEL_MEAN_FORCE_SIGMA = 0.01
 """Relative standard deviation of a mean force by what every model here leaves out [1]."""
 INDEPENDENT_SPANS = 50.0
-"""Independent stretches in the 50 ms over which the mean force is taken: its errors last about a millisecond [1]."""
+"""Independent stretches in the 50 ms of the mean force: its errors last about a millisecond [1]."""
 INCONSISTENT_WIDENING = 2.0
 """Factor on intervals when the model is not consistent with the record [1]."""
 
@@ -69,7 +69,8 @@ INCONSISTENT_WIDENING = 2.0
 class Impact:
     """One impact at one bearing, each number with its 90 % interval.
 
-    Times [s] from power-off, azimuth [rad ccw from +x] of the contact normal at the peak, peak ball force [N], normal
+    Times [s] from power-off, azimuth [rad ccw from +x] of the contact normal at the peak, peak ball force
+    [N], normal
     impulse [N s], energy dissipated in the contact [J].
     """
 
@@ -171,7 +172,7 @@ def drop_problem(model: DropModel, prepared: Preparation, until: float = WINDOW)
     record = prepared.record
     if record.speed is None:
         raise IdentificationError(
-            f"the record {prepared.name} has no rotor speed; expected a speed channel. Map one with a profile."
+            f"the record {prepared.name} has no rotor speed; expected one. Map it with a profile."
         )
     near = record.time < prepared.instant.value + until + 0.01
     return build_problem(
@@ -203,7 +204,8 @@ def track_drops(
 ) -> TrackedDrops:
     """Follow recorded drops of one machine with the drop model.
 
-    From guesses, a coarse basis finds the parameters in growing windows and a finer one refines them; a calibrated
+    From guesses, a coarse basis finds the parameters in growing windows and a finer one refines them; a
+    calibrated
     machine starts with the finer one (with ``quick``, one pass of the coarse one).
     """
     until = BLIND_SCHEDULE[-1].until + 0.01 if calibrate_only else WINDOW
@@ -232,7 +234,7 @@ def _first_contact(item: Preparation) -> float:
 
 
 def best_noise_factor(problem: DropProblem, smoothed: Smoothed, stage: Stage) -> float:
-    """Size of the unknown impulses, relative to the usual one, under which the readings are most likely [1]."""
+    """Size of the unknown impulses, relative to the usual one, that makes the readings most likely [1]."""
     scores = []
     for factor in NOISE_FACTORS:
         settings = PassSettings(impulse=stage.impulse * factor, share=stage.share * factor)
@@ -322,7 +324,7 @@ DETERMINED_SHARE = 0.7
 
 
 def parameter_sample(smoothed: Smoothed) -> int:
-    """Sample at which parameters are read: shortly after the first contacts, where they are best determined."""
+    """Sample at which parameters are read: shortly after the first contacts."""
     return min(200, len(smoothed.means) - 1)
 
 

@@ -1,9 +1,12 @@
-"""Forward filter and backward smoother of a drop: states, unknown parameters and sensor errors in one estimate.
+"""Forward filter and backward smoother of a drop: state, parameters and sensor errors in one.
 
-The vector estimated is ``[dynamic state (s), parameters (P), sensor gains (C), offsets (C), 1X runout cosine and
+The vector estimated is ``[dynamic state (s), parameters (P), sensor gains (C), offsets (C), 1X runout
+cosine and
 sine (C, C)]``. The forward pass
-is an extended Kalman filter with analytic sensitivities of the drop model; given a reference trajectory (the smoothed
-one of an earlier pass) it linearises there, so that repeated passes are a Gauss–Newton solution of the whole problem.
+is an extended Kalman filter with analytic sensitivities of the drop model; given a reference trajectory
+(the smoothed
+one of an earlier pass) it linearises there, so that repeated passes are a Gauss–Newton solution of the
+whole problem.
 The backward pass is the modified Bryson–Frazier smoother: it needs no inverse of a covariance.
 """
 
@@ -76,7 +79,8 @@ def measurement_row(c: int, at: Array, sensor_row: Array, s: int, n_p: int, n_c:
     row[k + n_c] = 1.0
     row[k + 2 * n_c] = cosine
     row[k + 3 * n_c] = sine
-    return growth * seen + at[k + n_c] + at[k + 2 * n_c] * cosine + at[k + 3 * n_c] * sine
+    predicted: float = growth * seen + at[k + n_c] + at[k + 2 * n_c] * cosine + at[k + 3 * n_c] * sine
+    return predicted
 
 
 @kernel
@@ -118,7 +122,8 @@ def forward_pass(
     mean_0, P_0 : ndarray, shapes (n,), (n, n)
         Estimate before the first sample.
     times, readings, speed : ndarray, shapes (N,), (N, C), (N,)
-        Time from power-off [s], readings with polarity removed [m] (NaN is left out), rotor speed [rad/s] (NaN too).
+        Time from power-off [s], readings with polarity removed [m] (NaN is left out), rotor speed [rad/s]
+        (NaN too).
     sensor_rows : ndarray, shape (C, s)
         Displacement along each sensor's direction from the dynamic state.
     variances, speed_variance : ndarray (C,), float
@@ -210,7 +215,7 @@ def forward_pass(
             covariances[i] = P
         if not math.isfinite(mean[0]) or not math.isfinite(P[0, 0]):
             return i
-    return times.shape[0]
+    return len(times)
 
 
 @kernel
@@ -236,7 +241,8 @@ def backward_pass(
     information : ndarray, shape (N, n, n)
         Filled with Λ of each sample: the smoothed covariance is ``P − P Λ P`` with the filtered ``P``.
     final_score, final_information : ndarray, shapes (n,), (n, n)
-        λ and Λ that later records put on the last sample (zero for a single record); overwritten by their values
+        λ and Λ that later records put on the last sample (zero for a single record); overwritten by their
+        values
         *before* the first measurement, to be handed to an earlier record.
     """
     n_t, n = means.shape

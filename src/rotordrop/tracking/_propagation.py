@@ -29,9 +29,12 @@ SCALE_BEARING = 4
 class ParameterTargets(NamedTuple):
     """Which kernel entries the unknown parameters set; R targets, P parameters, U unbalance planes.
 
-    ``target`` (R, 4): parameter, kind, row, column; ``factor`` (R,) [1]; ``logarithmic`` (P,) flags; ``step`` (P,) of the
-    finite difference by which the right-hand side is differentiated; ``drift`` (P,) standard deviation of the random walk
-    of each parameter per square root of a second, ``late_drift`` the same later in a drop; ``plane_shape`` (U, m) mode shapes of the planes.
+    ``target`` (R, 4): parameter, kind, row, column; ``factor`` (R,) [1]; ``logarithmic`` (P,) flags;
+    ``step`` (P,) of the
+    finite difference by which the right-hand side is differentiated; ``drift`` (P,) standard deviation of
+    the random walk
+    of each parameter per square root of a second, ``late_drift`` the same later in a drop; ``plane_shape``
+    (U, m) mode shapes of the planes.
     """
 
     target: IntArray
@@ -44,10 +47,12 @@ class ParameterTargets(NamedTuple):
 
 
 class FilterSettings(NamedTuple):
-    """Numbers of one pass: sample distance [s], integration steps per sample, impulse noise [N s] and its share.
+    """Numbers of one pass: sample distance [s], steps per sample, impulse noise [N s] and its share.
 
-    ``impulse`` is the standard deviation of an unknown impulse per sample at each bearing and axis, ``share`` the same
-    as a fraction of the contact impulse, ``spin_noise`` that of the race spins per sample [rad/s], ``speed_noise`` that
+    ``impulse`` is the standard deviation of an unknown impulse per sample at each bearing and axis,
+    ``share`` the same
+    as a fraction of the contact impulse, ``spin_noise`` that of the race spins per sample [rad/s],
+    ``speed_noise`` that
     of the rotor speed [rad/s]. After ``learning_end`` [s] the late drift of the parameters holds.
     """
 
@@ -123,7 +128,7 @@ def parameter_jacobian(
 
 @kernel
 def gather_entries(J: Array, entries: Array, columns: IntArray, starts: IntArray) -> None:
-    """List the entries of a mostly empty square matrix row by row, so that products need not look for them."""
+    """List the entries of a mostly empty square matrix row by row, for fast products."""
     n = J.shape[0]
     count = 0
     for i in range(n):
@@ -152,7 +157,7 @@ def sparse_product(entries: Array, columns: IntArray, starts: IntArray, V: Array
 
 @kernel
 def rk4_step(t: float, h: float, y: Array, p: KernelParameters, k: Array, trial: Array, work: Array) -> None:
-    """One classical Runge–Kutta step in place; ``k`` (5, n) and ``trial`` (n,) are scratch, ``k[4]`` the midpoint state."""
+    """One classical Runge–Kutta step in place; ``k`` (5, n) and ``trial`` (n,) are scratch."""
     n = y.shape[0]
     drop_derivative(t, y, p, k[0], work)
     for i in range(n):
@@ -179,7 +184,7 @@ def propagate(
     F: Array,
     impulses: Array,
 ) -> None:
-    """Advance a state by one sample in place and fill its sensitivity ``F`` (s, s + P) to state and parameters.
+    """Advance a state by one sample in place and fill its sensitivity ``F`` (s, s + P).
 
     ``impulses`` (B,) receives the contact impulse of each bearing over the sample [N s].
     """
@@ -208,13 +213,15 @@ def propagate(
         middle = k[4].copy()
         drop_jacobian(now + 0.5 * h, middle, p, J)
         gather_entries(J, entries, places, starts)
-        # at every substep: position and gap must see the same contact, or the gap looks better known than it is
+        # at every substep: position and gap must see the same contact, or the gap looks better known than
+        # it is
         if columns > s:
             parameter_jacobian(now + 0.5 * h, middle, theta, targets, p, k[0], k[1], work, B)
         for b in range(p.bearing.shape[0]):
             contact_at(b, middle, p, contact)
             impulses[b] += h * contact[1]
-        # F <- exp(hJ) F + what the parameters add, to third order: the second order would let light modes grow
+        # F <- exp(hJ) F + what the parameters add, to third order: the second order would let light modes
+        # grow
         sparse_product(entries, places, starts, F, first)
         for i in range(s):
             for j in range(columns - s):
@@ -230,7 +237,7 @@ def propagate(
 def add_process_noise(
     P: Array, p: KernelParameters, settings: FilterSettings, impulses: Array, drift: Array
 ) -> None:
-    """Add unknown impulses between rotor and race, noise of the spins and drift of the parameters to a covariance."""
+    """Add unknown impulses at the bearings, noise of the spins and drift of the parameters to ``P``."""
     m = p.eigenvalue.shape[0]
     n_b = p.bearing.shape[0]
     n_q = 2 * m + 4 * n_b

@@ -1,7 +1,9 @@
 """One fit of a drop model to several recorded drops of a machine, by repeated filter and smoother passes.
 
-Each pass linearises at the smoothed trajectory of the pass before: a Gauss–Newton step of the whole problem. The window
-grows, because a long chaotic window has no use for a start that is wrong. The drops are chained: what belongs to the
+Each pass linearises at the smoothed trajectory of the pass before: a Gauss–Newton step of the whole
+problem. The window
+grows, because a long chaotic window has no use for a start that is wrong. The drops are chained: what
+belongs to the
 machine is carried from the end of one drop to the beginning of the next, what belongs to a drop is not.
 """
 
@@ -151,7 +153,7 @@ def one_pass(
         )
         if result.done < min(samples, 10):
             raise IdentificationError(
-                f"the filter lost the drop after {result.done} samples of {samples}; the first guesses of the machine "
+                f"the filter lost the drop after {result.done} of {samples} samples; the machine's guesses "
                 "are too far from it. Check air gap, bearing nodes, sensor angles and support guesses."
             )
         filtered.append(result)

@@ -1,4 +1,4 @@
-"""Does the model fit the record? Checks that decide whether intervals hold, each with the numbers compared."""
+"""Does the model fit the record? Checks that decide whether intervals hold."""
 
 from __future__ import annotations
 
@@ -68,7 +68,8 @@ def _innovation_checks(problem: DropProblem, smoothed: Smoothed) -> tuple[Check,
             name="innovation size",
             passed=bool(NIS_RANGE[0] <= nis[worst] <= NIS_RANGE[1]),
             message=(
-                f"mean squared innovation {np.nanmean(nis):.2f} × expected, channel {names[worst]} {nis[worst]:.2f} × "
+                f"mean squared innovation {np.nanmean(nis):.2f} × expected, "
+                f"{names[worst]} {nis[worst]:.2f} × "
                 f"(usual {NIS_RANGE[0]:g} to {NIS_RANGE[1]:g})"
             ),
         ),
@@ -102,7 +103,7 @@ def _sensor_check(problem: DropProblem, smoothed: Smoothed) -> Check:
         name="sensor errors",
         passed=bool(abs(departure[worst]) < SENSOR_LIMIT),
         message=(
-            f"{kind} of channel {channel} departs by {abs(departure[worst]):.1f} of its prior standard deviations "
+            f"{kind} of channel {channel} departs by {abs(departure[worst]):.1f} prior standard deviations "
             f"(limit {SENSOR_LIMIT:g})"
         ),
     )
@@ -117,7 +118,8 @@ def _parameter_check(problem: DropProblem, smoothed: Smoothed) -> Check:
         name="parameters",
         passed=bool(abs(departure[worst]) < PARAMETER_LIMIT),
         message=(
-            f"{problem.unknowns[worst].path} departs by {abs(departure[worst]):.1f} of its prior standard deviations "
+            f"{problem.unknowns[worst].path} departs by {abs(departure[worst]):.1f} "
+            "prior standard deviations "
             f"(limit {PARAMETER_LIMIT:g})"
         ),
     )

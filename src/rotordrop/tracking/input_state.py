@@ -1,7 +1,9 @@
 """Cross-check without any contact law: forces at the bearing nodes from the rotor's own motion.
 
-The rotor model alone (modes, gyroscopics, gravity) is driven by unknown forces at the touchdown-bearing nodes; their
-rates are random walks whose size follows the local force, and they are held at zero while the rotor is clearly inside
+The rotor model alone (modes, gyroscopics, gravity) is driven by unknown forces at the touchdown-bearing
+nodes; their
+rates are random walks whose size follows the local force, and they are held at zero while the rotor is
+clearly inside
 the air gap. Known accuracy on simulated records: main peaks 4–7 %, single impacts up to 150 %; no waveform.
 """
 
@@ -54,7 +56,8 @@ class InputEstimate:
 def input_state_estimate(problem: DropProblem, smoothed: Smoothed) -> InputEstimate:
     """Joint estimate of motion and bearing forces from the readings, by a linear filter and smoother.
 
-    The tracked twin lends gains, offsets, air gaps and the radius that gates; no contact, friction or support enters.
+    The tracked twin lends gains, offsets, air gaps and the radius that gates; no contact, friction or
+    support enters.
     """
     count = len(smoothed.means)
     radius, gaps = _radius_and_gap(problem, smoothed)
@@ -126,7 +129,7 @@ def _transition(model: DropModel, speed: float, dt: float) -> tuple[Array, Array
     return E[:-1, :-1], E[:-1, -1], n
 
 
-def _smooth_forces(problem: DropProblem, readings: Array, gate: Array, rate: Array) -> Array:
+def _smooth_forces(problem: DropProblem, readings: Array, gate: NDArray[np.bool_], rate: Array) -> Array:
     model = problem.model
     dt = float(problem.time[1] - problem.time[0])
     speed = float(problem.mean[model.layout.rotor_speed])

@@ -34,13 +34,13 @@ NOISE_FLOOR = 0.1e-6
 TAIL_VERTICAL_SIGMA = 0.7e-6
 TAIL_HORIZONTAL_SIGMA = 25e-6
 SMOOTHED_FRICTION_SPEED = 0.15
-"""Sliding speed [m/s] below which friction is smoothed in the filter: the spin of a race is not known better, so the
+"""Sliding speed [m/s] below which the filter smooths friction: the spin of a race is not known better, so the
 mean of the friction law over what is possible is what a linearisation may use."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class DropProblem:
-    """One recorded drop with everything the filter needs; N samples, C channels, n estimated, s dynamic states.
+    """One recorded drop with all the filter needs; N samples, C channels, n estimated, s dynamic.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ class DropProblem:
 
     @property
     def machine_indices(self) -> NDArray[np.int64]:
-        """Entries of the estimate that all drops of the machine share: parameters of the machine, gains, offsets."""
+        """Entries of the estimate that all drops share: parameters of the machine, gains, offsets."""
         start = self.n_dynamic
         shared = [start + i for i, unknown in enumerate(self.unknowns) if unknown.scope == "machine"]
         first = start + len(self.unknowns)
@@ -186,7 +186,7 @@ def _variances(phase: LevitatedPhase, channels: int) -> Array:
 
 
 def sensor_rows(model: DropModel) -> Array:
-    """Displacement along each sensor's positive direction from the dynamic state, shape (C, s) [m per state]."""
+    """Displacement along each sensor's direction from the dynamic state, shape (C, s) [m per state]."""
     layout = model.layout
     rows = np.zeros((len(model.machine.sensors), layout.size - 2))
     for c, sensor in enumerate(model.machine.sensors):
@@ -260,7 +260,8 @@ def _rotor_prior(model: DropModel, rows: Array, readings: Array, mean: Array, si
 def settled_displacement(problem: DropProblem, theta: Array) -> Array:
     """Vertical displacement [m] of the resting rotor at each sensor, shape (C,), for parameter values.
 
-    Gap, indentation, race and support sag under the static load shares, the line between the bearings, and the bending
+    Gap, indentation, race and support sag under the static load shares, the line between the bearings, and
+    the bending
     of the rotor on its touchdown bearings.
     """
     model = problem.model
@@ -288,7 +289,8 @@ def _with_theta(problem: DropProblem, theta: Array) -> L.KernelParameters:
 
 def private_copy(p: L.KernelParameters) -> L.KernelParameters:
     """Kernel arrays that may be written to."""
-    return L.KernelParameters(*(array.copy() for array in p))
+    copies = {name: getattr(p, name).copy() for name in p._fields}
+    return L.KernelParameters(**copies)
 
 
 def apply_tail(problem: DropProblem, tail_level: Array, mean: Array, covariance: Array) -> None:

@@ -1,4 +1,4 @@
-"""What the sensors say before the drop: noise, hum, runout and orbit of the levitated phase, level of the settled tail."""
+"""What the sensors say before the drop: noise, hum, runout and orbit of the levitated phase."""
 
 from __future__ import annotations
 
@@ -95,9 +95,9 @@ def levitated_phase(
 
 
 def without_hum_and_runout(time: Array, readings: Array, theta: Array, phase: LevitatedPhase) -> Array:
-    """Readings [m] less the hum and the 2X runout found in the levitated phase; 1X is left to orbit and noise.
+    """Readings [m] less the hum and the 2X runout of the levitated phase; 1X stays.
 
-    ``theta`` (N,) is the rotor angle since power-off [rad]. A linear rotor on a synchronous orbit has no 2X of its own,
+    ``theta`` (N,) is the rotor angle since power-off [rad]. A linear rotor on a synchronous orbit has no 2X,
     so 2X in the levitated phase is electrical or mechanical runout of the sensor track.
     """
     if phase.samples == 0:

@@ -32,7 +32,8 @@ class PassSettings:
         Standard deviation of the rotor speed per 50 µs [rad/s].
     learning_end : float
         Time [s] after which friction and race may drift faster: once a race turns with the rotor, the
-        friction law near zero speed decides, which no record of positions shows, and must not rewrite what the first
+        friction law near zero speed decides, which no record of positions shows, and must not rewrite what
+        the first
         impacts said.
     """
 
@@ -61,7 +62,8 @@ class PassSettings:
 class Forward:
     """What a forward pass leaves: filtered estimates and what the smoother needs; N samples, n estimated.
 
-    ``done`` is the number of samples reached; ``innovations`` and ``innovation_variances`` have one column per channel
+    ``done`` is the number of samples reached; ``innovations`` and ``innovation_variances`` have one column
+    per channel
     and one for the speed, NaN where nothing was measured.
     """
 

@@ -1,4 +1,4 @@
-"""What the tracked twin does not know: the parameters it estimates with the state, and what is believed beforehand."""
+"""What the tracked twin does not know: parameters estimated with the state, and their priors."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Unknown:
     Attributes
     ----------
     path : str
-        Path in the machine, such as ``"NDE.support.stiffness"``, or a name of its own for what belongs to a drop.
+        Path in the machine, such as ``"NDE.support.stiffness"``, or a name for what belongs to a drop.
     mean, sigma : float
         Prior mean and standard deviation, of the logarithm when ``logarithmic``; SI unit.
     logarithmic : bool
@@ -67,7 +67,7 @@ RELATIVE_PRIOR: dict[str, tuple[float, float]] = {
     "damping_time": (0.5, 0.5),
     "preload": (0.15, 0.15),
 }
-"""Prior standard deviation of the logarithm: of a guess without a range or a default, and of a plain given value [1]."""
+"""Prior standard deviation of the logarithm [1]: of a guess without a range, and of a given value."""
 
 DRIFT: dict[str, float] = {
     "friction.dynamic": 1.0,
@@ -81,9 +81,9 @@ DRIFT: dict[str, float] = {
     "race.inertia": 0.1,
     "air_gap": 8e-6,
 }
-"""Random walk of a parameter per square root of a second, in the unit it is estimated in (most by their logarithm).
+"""Random walk of a parameter per square root of a second, most of its logarithm.
 
-It keeps what the simplified model gets wrong late in a drop from spoiling what the first impacts determine."""
+It keeps what the model gets wrong late in a drop from spoiling what the first impacts say."""
 
 LATE_FACTOR = 5.0
 
@@ -94,7 +94,7 @@ REMANENT_SIGMA = 60.0
 
 
 def relative_sigma(quantity: Estimated, path: str) -> float:
-    """Prior standard deviation [1] of the logarithm of a positive quantity, from what the machine file says of it."""
+    """Prior standard deviation [1] of the logarithm of a quantity, from what the machine file says."""
     value = float(quantity)
     for interval in (quantity.interval_90, quantity.range):
         if interval is not None and interval[0] > 0.0:
@@ -184,7 +184,7 @@ def bearing_unknowns(bearing: TouchdownBearing, row: int) -> Iterator[Unknown]:
 
 
 def _bearing_damping(bearing: TouchdownBearing, row: int) -> Unknown:
-    """Bearing damping by its time constant C_b/K_b; the stiffness it multiplies is fixed at the static load."""
+    """Bearing damping by its time constant C_b/K_b, with K_b at the static load."""
     return Unknown(
         path=f"{bearing.name}.damping_time",
         mean=math.log(float(bearing.damping_time)),
@@ -222,7 +222,7 @@ def preload_of_offset(constants: BearingConstants, axial_offset: float) -> float
     distance = math.hypot(constants.radial_offset, axial_offset)
     approach = max(distance - constants.groove_distance, 0.0)
     load = constants.ball_stiffness * approach**1.5
-    return len(constants.ball_angles) * load * axial_offset / distance
+    return float(len(constants.ball_angles) * load * axial_offset / distance)
 
 
 def drift_of(unknown: Unknown) -> float:
@@ -234,13 +234,13 @@ def drift_of(unknown: Unknown) -> float:
 
 
 def late_factor(unknown: Unknown) -> float:
-    """Factor on the drift late in a drop [1], when what happens between rotor and race is a matter of creep."""
+    """Factor on the drift late in a drop [1], when creep decides between rotor and race."""
     late = ("friction.dynamic", "friction.stribeck_speed", "race.drag_coefficient", "race.inertia")
     return LATE_FACTOR if unknown.path.endswith(late) else 1.0
 
 
 def drop_unknowns(model: DropModel) -> Iterator[Unknown]:
-    """Unknowns that belong to one drop: unbalance against an unknown mark, remanent forces, aerodynamic constant."""
+    """Unknowns of one drop: unbalance against an unknown mark, remanent forces, aerodynamic constant."""
     machine = model.machine
     for plane, unbalance in enumerate(machine.unbalances):
         for column, part in enumerate(("cosine", "sine")):
