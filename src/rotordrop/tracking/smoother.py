@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.model import layout as L
 from rotordrop.tracking import _filter as F
 from rotordrop.tracking import _propagation as P
 from rotordrop.tracking.problem import DropProblem, private_copy
 
 Array = NDArray[np.float64]
+
+
+LARGEST_PHASE = 1.0
+"""Largest phase [rad] by which the fastest mode may turn in one integration step of the filter."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,12 +50,15 @@ class PassSettings:
     speed_noise: float = 1e-3
     learning_end: float = 0.05
 
-    def for_sampling(self, dt: float) -> P.FilterSettings:
-        """Settings of the kernel for a sample distance [s]; noise grows with the square root of time."""
+    def for_sampling(self, dt: float, fastest: float = 0.0) -> P.FilterSettings:
+        """Settings of the kernel for a sample distance [s]; noise grows with the square root of time.
+
+        ``fastest`` is the highest natural frequency of the model [rad/s]; it sets a least number of steps.
+        """
         growth = np.sqrt(dt / 50e-6)
         return P.FilterSettings(
             dt=dt,
-            substeps=max(1, round(self.substeps * dt / 50e-6)),
+            substeps=max(1, round(self.substeps * dt / 50e-6), math.ceil(fastest * dt / LARGEST_PHASE)),
             impulse=self.impulse * growth,
             share=self.share,
             spin_noise=self.spin_noise * growth,
@@ -88,6 +97,16 @@ class Forward:
         S = self.innovation_variances[: self.done]
         values = self.innovations[: self.done] ** 2 / S + np.log(S)
         return 0.5 * float(np.nansum(values))
+
+
+def fastest_frequency(problem: DropProblem) -> float:
+    """Highest natural frequency [rad/s] of the model: of the rotor's basis or of a race on its balls."""
+    p = problem.model.parameters
+    races = p.bearing[:, L.BEARING_DAMPING] / np.array(
+        [float(b.damping_time) for b in problem.model.machine.touchdown_bearings]
+    )
+    race = np.sqrt(np.max(races / p.bearing[:, L.RACE_MASS]))
+    return float(max(np.sqrt(np.max(p.eigenvalue)), race))
 
 
 def forward(
@@ -141,7 +160,7 @@ def forward(
         problem.speed_variance,
         problem.targets,
         private_copy(problem.model.parameters),
-        settings.for_sampling(dt),
+        settings.for_sampling(dt, fastest_frequency(problem)),
         np.zeros((0, n)) if reference is None else np.ascontiguousarray(reference[:count]),
         result.means,
         result.covariances,
