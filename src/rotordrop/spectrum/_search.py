@@ -444,7 +444,11 @@ class LineSearch:
         )
         pairs = [(line, k) for line in steady[:STEADY_PARTNERS] for k in COMBINED_ORDERS]
         while pairs and len(self.found) < self.settings.most_lines:
-            scored = [(self._along(line.phase + k * self._angle), line, k) for line, k in pairs]
+            scored = [
+                (self._along(line.phase + k * self._angle, share), line, k)
+                for line, k in pairs
+                for share in (1.0, 0.5)
+            ]
             peak, line, k = max(scored, key=lambda entry: entry[0].score if entry[0] else 0.0)
             if peak is None:
                 return
@@ -452,9 +456,9 @@ class LineSearch:
             if peak.amplitude < float(line.amplitude.max()):
                 self._take_combination(peak, line, k)
 
-    def _along(self, phase: Array) -> Peak | None:
+    def _along(self, phase: Array, share: float) -> Peak | None:
         """The peak, if there is one, on a moving path against what lies beside it."""
-        length = min(self.settings.frame, len(self._rest) / self._rate / 3.0)
+        length = share * min(self.settings.frame, len(self._rest) / self._rate / 3.0)
         turned = 2.0 * self._rest * np.exp(-1j * phase)[:, None]
         view = offset_power(turned, self._rate, start_time=self._start, frame=length, reach=BESIDE)
         usable = self._at(view.time, self._reachable(phase).astype(np.float64)) > 0.99

@@ -20,7 +20,13 @@ ComplexArray = NDArray[np.complex128]
 
 TURN = 2.0 * math.pi
 LEAST_APART = 3.0
-"""Turns per window by which two lines must differ to be told apart [1]."""
+"""Turns per window by which two orders must differ to be told apart [1]."""
+
+STEADY_APART = 4.5
+"""The same for an order and a steady line, which may be a thousand times stronger [1]."""
+
+STEADY_EXTRA = 2
+"""How much higher the degree of a steady line's amplitude is: two swings may beat in it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -179,7 +185,7 @@ def track_orders(
         amplitude=np.array([row[0] for row in rows]),
         standard_error=np.array([row[1] for row in rows]),
         window=window,
-        separable=_separable(wanted, time, speed, window, steady_lines),
+        separable=_separable(wanted, time, profile, window, steady_lines),
     )
 
 
@@ -229,10 +235,11 @@ def _window_fit(
     time, cut = signal.cut(centre, window)
     angle = signal.profile.angle_at(time)
     beside = _distinct(steady, orders, signal.profile, centre, window)
-    phases = [k * angle for k in orders] + [line.phase_over(time) for line in beside]
     u = 2.0 * (time - centre) / window
     weight = np.cos(0.5 * np.pi * u)[:, None]
-    basis = _basis(phases, u, degree) * weight
+    following = _basis([k * angle for k in orders], u, degree)
+    standing = _basis([line.phase_over(time) for line in beside], u, degree + STEADY_EXTRA)
+    basis = np.hstack([following, standing, u[:, None] ** np.arange(degree + 1)]) * weight
     measured = (cut - cut.mean(axis=0)) * weight
     inverse = np.linalg.pinv(basis.T @ basis, rcond=1e-13, hermitian=True)
     coefficients = inverse @ (basis.T @ measured)
@@ -263,18 +270,22 @@ def _distinct(
 
 
 def _basis(phases: list[Array], u: Array, degree: int) -> Array:
-    """Cosine and sine of every phase, times powers of the place in the window, then a slow trend."""
+    """Cosine and sine of every phase, times powers of the place in the window."""
     powers = u[:, None] ** np.arange(degree + 1)
     columns = [part[:, None] * powers for phase in phases for part in (np.cos(phase), np.sin(phase))]
-    return np.hstack([*columns, powers])
+    return np.hstack(columns) if columns else np.empty((u.size, 0))
 
 
 def _separable(
-    orders: Array, time: Array, speed: Array, window: Array, steady: Sequence[FrequencyPath]
+    orders: Array, time: Array, profile: SpeedProfile, window: Array, steady: Sequence[FrequencyPath]
 ) -> NDArray[np.bool_]:
-    """Whether every steady line is ``LEAST_APART`` turns per window away from an order."""
+    """Whether every steady line stays ``STEADY_APART`` turns per window away from an order within its
+    window.
+    """
+    place = orders * profile.speed_at(time)[:, None] / TURN
+    sweep = 0.4 * orders * np.abs(profile.change_at(time) * window)[:, None] / TURN
     apart = np.ones((time.size, orders.size), dtype=np.bool_)
     for line in steady:
-        distance = np.abs(orders * speed[:, None] / TURN - line.frequency_at(time)[:, None])
-        apart &= distance * window[:, None] > LEAST_APART
+        distance = np.abs(place - line.frequency_at(time)[:, None]) - sweep
+        apart &= distance * window[:, None] > STEADY_APART
     return apart

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import label
 from scipy.signal import find_peaks, peak_widths
 
 from rotordrop.spectrum.candidates import Candidate
@@ -40,11 +41,11 @@ class PassedResonance:
     width : float
         Full width of the rise at half of its height [Hz].
     amplitude : float
-        Longest half axis of the orbit [m], zero-to-peak.
+        Longest half axis of the orbit [m], zero-to-peak; at least, where the rise is not certain.
     rise : float
         Amplitude over that beside the rise [1].
     certain : bool
-        False where a steady line at the same frequency may have made part of the rise.
+        False where the top is hidden under a steady line at the same frequency.
     name : Name
         The mode, if one is known there.
     """
@@ -93,8 +94,9 @@ def find_resonances(
     """Find where the amplitude of each tracked order rises and falls again while the speed falls.
 
     A rise counts when it stands ``least_rise`` times above the level on both sides and five standard errors
-    clear of it. Where an order crosses a steady line (a pendulum swing, hum) the amplitude may hold some of
-    it: such a rise is reported as uncertain.
+    clear of it. Where an order crosses a steady line (a pendulum swing, hum) its amplitude is unknown: there
+    it is taken to be no higher than on the better known side, and a rise found so is reported as uncertain,
+    with the least amplitude it must have had.
 
     Parameters
     ----------
@@ -102,7 +104,7 @@ def find_resonances(
     plane : str
         Its name.
     candidates : sequence of Candidate
-        Modes; those of kind "steady" are compared.
+        Modes; those of kind "steady" are compared, mains hum left out.
     least_rise : float
         [1].
     lowest_frequency : float
@@ -115,62 +117,96 @@ def find_resonances(
     tuple of PassedResonance
         In the order of time.
     """
-    modes = [c for c in candidates if c.kind == "steady" and c.family != "mains"]
+    modes = [c for c in candidates if c.kind == "steady" and not c.family.startswith("mains")]
     found: list[PassedResonance] = []
     for column, order in enumerate(track.orders.tolist()):
-        frequency = order * track.speed / TURN
-        usable = frequency >= lowest_frequency
-        if usable.sum() >= 5:
+        curve = _curve(track, column, order, lowest_frequency)
+        if curve is not None:
             found += [
-                _resonance(track, column, plane, peak, usable, modes, band)
-                for peak in _peaks(track, column, usable, least_rise)
+                _resonance(track, curve, order, plane, peak, modes, band)
+                for peak in _peaks(curve, least_rise)
             ]
     return tuple(sorted(found, key=lambda resonance: resonance.time))
 
 
 @dataclass(frozen=True)
+class _Curve:
+    """Amplitude of one order over time, with what is hidden under steady lines levelled off."""
+
+    rows: NDArray[np.intp]
+    frequency: Array
+    amplitude: Array
+    error: Array
+    known: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
 class _Rise:
     at: int
+    first: int
+    last: int
     base: float
     left: float
     right: float
 
 
-def _peaks(track: OrderTrack, column: int, usable: NDArray[np.bool_], least_rise: float) -> list[_Rise]:
-    amplitude = track.major_axis[usable, column]
-    error = np.linalg.norm(track.standard_error[usable, column], axis=1)
-    peaks, facts = find_peaks(amplitude, prominence=1e-12)
+def _curve(track: OrderTrack, column: int, order: float, lowest: float) -> _Curve | None:
+    frequency = order * track.speed / TURN
+    known = track.separable[:, column]
+    # Hidden ends say nothing about a rise: begin and end with amplitudes that are known.
+    usable = np.flatnonzero(known & (frequency >= lowest))
+    if usable.size < 5:
+        return None
+    rows = np.arange(usable[0], usable[-1] + 1)
+    rows = rows[frequency[rows] >= lowest]
+    amplitude = track.major_axis[rows, column].copy()
+    known = known[rows]
+    gaps, count = label(~known)
+    for gap in range(1, count + 1):
+        hidden = np.flatnonzero(gaps == gap)
+        amplitude[hidden] = max(amplitude[hidden[0] - 1], amplitude[hidden[-1] + 1])
+    error = np.linalg.norm(track.standard_error[rows, column], axis=1)
+    return _Curve(rows, frequency[rows], amplitude, np.where(known, error, 0.0), known)
+
+
+def _peaks(curve: _Curve, least_rise: float) -> list[_Rise]:
+    amplitude = curve.amplitude
+    peaks, facts = find_peaks(amplitude, prominence=1e-12, plateau_size=1)
     base = amplitude[peaks] - facts["prominences"]
-    clear = (amplitude[peaks] >= least_rise * base) & (facts["prominences"] >= 5.0 * error[peaks])
+    clear = amplitude[peaks] >= least_rise * base
+    noise = [curve.error[first : last + 1].max() for first, last in _edges(facts)]
+    clear &= facts["prominences"] >= 5.0 * np.asarray(noise, dtype=np.float64)
     _, _, left, right = peak_widths(amplitude, peaks[clear], rel_height=0.5)
+    edges = [edge for edge, good in zip(_edges(facts), clear, strict=True) if good]
     return [
-        _Rise(int(at), float(low), float(start), float(end))
-        for at, low, start, end in zip(peaks[clear], base[clear], left, right, strict=True)
+        _Rise(int(at), *edge, float(low), float(start), float(end))
+        for at, edge, low, start, end in zip(peaks[clear], edges, base[clear], left, right, strict=True)
     ]
+
+
+def _edges(facts: Mapping[str, NDArray[np.intp]]) -> list[tuple[int, int]]:
+    return [(int(a), int(b)) for a, b in zip(facts["left_edges"], facts["right_edges"], strict=True)]
 
 
 def _resonance(
     track: OrderTrack,
-    column: int,
+    curve: _Curve,
+    order: float,
     plane: str,
     rise: _Rise,
-    usable: NDArray[np.bool_],
     modes: Sequence[Candidate],
     band: float,
 ) -> PassedResonance:
-    order = float(track.orders[column])
-    speed = track.speed[usable]
-    frequency = order * speed / TURN
-    place = np.arange(speed.size)
-    start, end = np.interp([rise.left, rise.right], place, frequency)
+    row = int(curve.rows[rise.at])
+    start, end = np.interp([rise.left, rise.right], np.arange(curve.rows.size), curve.frequency)
     width = abs(float(start - end))
-    top = float(frequency[rise.at])
-    # The amplitude is taken over a window, in which the frequency moves: no rise is placed better than that.
-    sweep = abs(float(np.gradient(frequency)[rise.at])) / float(np.median(np.diff(track.time)))
-    error = max(0.16 * width, 0.15 * sweep * float(track.window[usable][rise.at]))
-    rows = slice(math.floor(rise.left), math.ceil(rise.right) + 1)
-    certain = bool(track.separable[usable, column][rows].all())
-    amplitude = float(track.major_axis[usable, column][rise.at])
+    top = float(curve.frequency[rise.at])
+    # The amplitude is taken over a window, in which the frequency moves: no rise is placed better than that;
+    # nor better than the stretch in which it is hidden.
+    sweep = abs(float(np.gradient(curve.frequency)[rise.at])) / float(np.median(np.diff(track.time)))
+    hidden = 0.5 * abs(float(curve.frequency[rise.first] - curve.frequency[rise.last]))
+    error = max(0.16 * width, 0.15 * sweep * float(track.window[row]), hidden)
+    amplitude = float(curve.amplitude[rise.at])
     evidence = LineEvidence(
         kind="steady",
         frequency=top,
@@ -186,13 +222,13 @@ def _resonance(
     return PassedResonance(
         order=order,
         plane=plane,
-        time=float(track.time[usable][rise.at]),
-        speed=float(speed[rise.at]),
+        time=float(track.time[row]),
+        speed=float(track.speed[row]),
         frequency=top,
         frequency_error=error,
         width=width,
         amplitude=amplitude,
         rise=amplitude / max(rise.base, 1e-300),
-        certain=certain,
+        certain=bool(curve.known[rise.first : rise.last + 1].all()),
         name=name_line(evidence, modes),
     )
