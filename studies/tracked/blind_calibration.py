@@ -1,9 +1,9 @@
-"""Hidden machines, calibrated blind on two drops and scored on four others, tracked twin and replay side by side.
+"""Hidden machines, calibrated blind on two drops and scored on four others.
 
-Usage: python studies/tracked/blind_calibration.py KIND SEED [SEED ...] [--violation NAME] [--out FOLDER] [--replay]
+Usage: python studies/tracked/blind_calibration.py KIND SEED [SEED ...] [--violation NAME] [--replay]
 
-KIND is ``lp400`` (the paper's rotor) or ``small`` (a 10–20 kg rotor at 500 Hz). Seeds below 1000 were used while the
-estimator was made; only seeds from 1000 on are scored. One JSON file per machine, with every raw number.
+KIND is ``lp400`` (the paper's rotor) or ``small`` (a 10–20 kg rotor at 500 Hz). Seeds below 1000 were
+used while the estimator was made; only seeds from 1000 on are scored. One JSON file per machine, with every raw number.
 """
 
 from __future__ import annotations
@@ -28,7 +28,11 @@ from rotordrop.machine import example_machine
 from rotordrop.synthesis.event import hidden_machine
 from rotordrop.synthesis.recording import SyntheticDrop, synthesize_drop
 
-SPEEDS_HZ = {"lp400": ((60.0, 150.0), (60.0, 100.0, 150.0, 210.0)), "small": ((200.0, 400.0), (150.0, 250.0, 350.0, 500.0))}
+SPEEDS_HZ = {
+    "lp400": ((60.0, 150.0), (60.0, 100.0, 150.0, 210.0)),
+    "small": ((200.0, 400.0), (150.0, 250.0, 350.0, 500.0)),
+}
+"""Speeds of the two drops to calibrate on and of the four scored [Hz]."""
 HERE = Path(__file__).parent
 
 
@@ -124,7 +128,11 @@ def parameter_scores(calibration: Any, made: SyntheticDrop) -> dict[str, Any]:
             ("race.inertia", truth["ring"][i]["Ip"]),
         ):
             value = calibration.values[f"{name}.{path}"]
-            scores[f"{name}.{path}"] = {"estimate": value.value, "interval_90": value.interval_90, "truth": true}
+            scores[f"{name}.{path}"] = {
+                "estimate": value.value,
+                "interval_90": value.interval_90,
+                "truth": true,
+            }
     return scores
 
 
@@ -136,9 +144,13 @@ def replay_scores(machine: Any, made: list[SyntheticDrop]) -> list[dict[str, Any
     for drop in made:
         try:
             estimate = replay_drop(machine, drop.record, tail=drop.tail).as_json()
+            truth = drop.truth
             entry = {
                 name: {
-                    "peak_force_N": {"estimate": b["peak_force_N"]["value"], "truth": drop.truth["peak_force_N"][name]},
+                    "peak_force_N": {
+                        "estimate": b["peak_force_N"]["value"],
+                        "truth": truth["peak_force_N"][name],
+                    },
                     "peak_stress_Pa": {
                         "estimate": b["peak_stress_Pa"]["value"],
                         "truth": drop.truth["max_stress_MPa"][name] * 1e6,
@@ -174,7 +186,9 @@ def study(kind: str, seed: int, violation: str, with_replay: bool) -> dict[str, 
     for drop in scored:
         started = time.perf_counter()
         try:
-            tracked = estimate_tracked(calibration.machine, [drop.record], [drop.tail], names=[drop.truth["name"]])[0]
+            tracked = estimate_tracked(
+                calibration.machine, [drop.record], [drop.tail], names=[drop.truth["name"]]
+            )[0]
             entry = drop_scores(tracked, drop)
         except Exception as error:  # a lost drop is a result too
             entry = {"error": f"{type(error).__name__}: {error}"}
