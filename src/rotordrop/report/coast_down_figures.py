@@ -28,6 +28,8 @@ from rotordrop.spectrum.indentation import DisplacementHistory
 
 Array = NDArray[np.float64]
 TURN = 2.0 * math.pi
+NEAR = 0.97
+"""Share of the air gap at which the enlarged panel begins [1]."""
 TIME = axis_title("time from power-off", "s")
 _MEDIAN = QUANTILES.index(0.5)
 _LOW, _HIGH = QUANTILES.index(0.05), QUANTILES.index(0.95)
@@ -49,42 +51,49 @@ def displacement_history_figure(histories: Mapping[str, DisplacementHistory], ro
     Figure
         A band from the smallest to the largest magnitude, in µm, with the air-gap window.
     """
-    figure = panels(list(histories), rows=len(histories), columns=1, height=240)
-    colour = COLOURS["measured" if role == "measured" else "simulated"]
+    titles = [title for name in histories for title in (name, f"{name}: near the air gap")]
+    figure = panels(titles, rows=len(histories), columns=2, height=240, spacing=0.07)
     for row, history in enumerate(histories.values(), start=1):
-        time = single(history.time)
-        edge = {"mode": "lines", "line": {"width": 0.6, "color": colour}, "x": time, "legendgroup": role}
-        place = {"row": row, "col": 1}
-        figure.add_trace(
-            go.Scatter(y=single(MICRO * history.lowest), showlegend=False, hoverinfo="skip", **edge), **place
-        )
-        figure.add_trace(
-            go.Scatter(
-                y=single(MICRO * history.highest),
-                fill="tonexty",
-                name=f"{role}, smallest to largest",
-                showlegend=row == 1,
-                hovertemplate="%{x:.2f} s: up to %{y:.4~g} µm<extra></extra>",
-                **edge,
-            ),
-            **place,
-        )
-        add_gap_limits(figure, AirGap.of(history.air_gap), row=row, legend=row == 1)
-        figure.add_trace(
-            go.Scatter(
-                x=[history.largest_time],
-                y=[MICRO * history.largest],
-                mode="markers",
-                marker={"color": SERIES[4], "size": 8, "symbol": "circle-open", "line": {"width": 2}},
-                name="largest",
-                showlegend=row == 1,
-                hovertemplate="largest: %{y:.4~g} µm at %{x:.4f} s<extra></extra>",
-            ),
-            **place,
-        )
-    figure.update_yaxes(title_text=axis_title("displacement", "µm"), rangemode="tozero")
+        for column in (1, 2):
+            _add_envelope(figure, history, role, (row, column))
+        near = MICRO * np.array([NEAR * history.air_gap, history.largest + (1.0 - NEAR) * history.air_gap])
+        figure.update_yaxes(range=near.tolist(), row=row, col=2)
+    figure.update_yaxes(title_text=axis_title("displacement", "µm"), rangemode="tozero", col=1)
     figure.update_xaxes(title_text=TIME, row=len(histories))
     return fit_legend(figure)
+
+
+def _add_envelope(figure: go.Figure, history: DisplacementHistory, role: str, place: tuple[int, int]) -> None:
+    colour = COLOURS["measured" if role == "measured" else "simulated"]
+    edge = {"mode": "lines", "line": {"width": 0.6, "color": colour}, "x": single(history.time)}
+    shown, where = place == (1, 1), {"row": place[0], "col": place[1]}
+    figure.add_trace(
+        go.Scatter(y=single(MICRO * history.lowest), showlegend=False, hoverinfo="skip", **edge), **where
+    )
+    figure.add_trace(
+        go.Scatter(
+            y=single(MICRO * history.highest),
+            fill="tonexty",
+            name=f"{role}, smallest to largest",
+            showlegend=shown,
+            hovertemplate="%{x:.2f} s: up to %{y:.4~g} µm<extra></extra>",
+            **edge,
+        ),
+        **where,
+    )
+    add_gap_limits(figure, AirGap.of(history.air_gap), row=place[0], column=place[1], legend=shown)
+    figure.add_trace(
+        go.Scatter(
+            x=[history.largest_time],
+            y=[MICRO * history.largest],
+            mode="markers",
+            marker={"color": SERIES[4], "size": 8, "symbol": "circle-open", "line": {"width": 2}},
+            name="largest",
+            showlegend=shown,
+            hovertemplate="largest: %{y:.4~g} µm at %{x:.4f} s<extra></extra>",
+        ),
+        **where,
+    )
 
 
 def speed_law_figure(time: Array, speed: Array, law: SpeedLaw, role: str) -> go.Figure:

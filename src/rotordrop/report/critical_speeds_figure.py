@@ -46,9 +46,8 @@ def critical_speed_figure(found: CriticalSpeedMap) -> go.Figure:
                     mode="lines",
                     line={"color": SERIES[k % len(SERIES)], "width": 1.6},
                     name=f"line {k + 1}",
-                    legendgroup=f"line {k + 1}",
-                    showlegend=column == 1,
-                    hovertemplate="%{x:.3~g} N/m: %{y:.1f} Hz<extra></extra>",
+                    showlegend=False,
+                    hovertemplate="%{x:.3~g} N/m: %{y:.1f} Hz<extra>" + f"line {k + 1}</extra>",
                 ),
                 row=1,
                 col=column,
@@ -57,8 +56,9 @@ def critical_speed_figure(found: CriticalSpeedMap) -> go.Figure:
     figure.update_xaxes(
         title_text=axis_title("equivalent stiffness", "N/m"), type="log", exponentformat="power", dtick=1
     )
-    figure.update_yaxes(type="log", range=[1.0, math.log10(1000.0)])
-    figure.update_yaxes(title_text=axis_title("natural frequency", "Hz"), col=1)
+    figure.update_yaxes(type="log", range=[1.0, math.log10(1000.0)], dtick="D2")
+    what = "natural frequency" if found.whirl == "standstill" else "critical speed"
+    figure.update_yaxes(title_text=axis_title(what, "Hz"), col=1)
     return fit_legend(figure)
 
 

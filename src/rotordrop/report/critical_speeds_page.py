@@ -163,7 +163,7 @@ def _map_section(found: CriticalSpeedMap) -> Section:
         chart=critical_speed_figure(found),
         caption=f"Undamped {_WHIRL_WORDS[found.whirl]} against the equivalent stiffness of bearing and "
         "support in series, equal at all bearings (Neisi 2020, Fig. 19). Vertical: the machine's own "
-        "stiffness, full by the tangent of the ball forces with preload, dashed by the simple engineering formula.",
+        "stiffness, full by the tangent of the ball forces with preload, dashed by the simple formula.",
     )
     text = (
         "Right: the support's mass sits between bearing and support spring; it adds modes of its own and "

@@ -18,8 +18,8 @@ from rotordrop.spectrum.waterfall import Waterfall
 Array = NDArray[np.float64]
 
 MOST_COLUMNS = 900
-LOWEST_SHARE = 1e-4
-"""Amplitudes below this share of the largest one [1] share the darkest colour."""
+LEAST_DISTANCE = 0.03
+"""Distance of two marked lines as a share of the width [1]; of closer ones only the stronger is marked."""
 COMPONENT_TITLES = {"x": "horizontal, x", "y": "vertical, y", "full": "full spectrum of x + jy"}
 TURN = 2.0 * math.pi
 
@@ -55,7 +55,7 @@ def waterfall_figure(
         level, title = fall.speed[order] / TURN, axis_title("rotor speed", "Hz")
     else:
         level, title = fall.time, axis_title("time from power-off", "s")
-    floor = LOWEST_SHARE * float(np.max(amplitude))
+    floor = float(np.median(amplitude))  # half of the map is noise: it takes the darkest colour
     shown = np.log10(MICRO * np.maximum(amplitude[order], floor))
     figure.add_trace(
         go.Heatmap(
@@ -126,7 +126,7 @@ def _colour_bar(shown: Array, kind: str) -> dict[str, object]:
     low, high = math.ceil(float(np.min(shown))), math.floor(float(np.max(shown)))
     ticks = list(range(low, high + 1))
     return {
-        "title": {"text": f"amplitude, {kind} [µm]", "side": "right"},
+        "title": {"text": f"amplitude, {kind} [µm]", "side": "right", "font": {"size": 12.5}},
         "tickvals": ticks,
         "ticktext": [f"{10.0**tick:g}" for tick in ticks],
         "thickness": 14,
@@ -134,9 +134,16 @@ def _colour_bar(shown: Array, kind: str) -> dict[str, object]:
 
 
 def _mark_lines(figure: go.Figure, fall: Waterfall, lines: Sequence[Line]) -> None:
-    for line in lines:
-        if line.kind != "steady" or not fall.frequency[0] <= line.frequency <= fall.frequency[-1]:
+    lowest, highest = float(fall.frequency[0]), float(fall.frequency[-1])
+    figure.update_annotations(yshift=26)
+    figure.update_layout(margin_t=figure.layout.margin.t + 26, height=figure.layout.height + 26)
+    marked: list[float] = []
+    for line in sorted(lines, key=lambda line: -line.amplitude):
+        if line.kind != "steady" or not lowest <= line.frequency <= highest:
             continue
+        if any(abs(line.frequency - other) < LEAST_DISTANCE * (highest - lowest) for other in marked):
+            continue
+        marked.append(line.frequency)
         figure.add_vline(
             x=line.frequency, line={"color": "#ffffff", "width": 0.8, "dash": "dot"}, opacity=0.6
         )

@@ -125,7 +125,7 @@ def line_table(analysis: CoastDownAnalysis) -> Table:
         rows.append(
             (
                 line.label,
-                f"{where} ± {0.0 if error is None else error:.2g}",
+                f"{where} ± {error:.2g}" if error is not None and np.isfinite(error) else where,
                 Quantity(value=line.amplitude, kind="length", digits=3),
                 f"{line.ratio:.0f}",
                 "below resolution" if line.width == 0.0 else f"{line.width:.2f} Hz",

@@ -27,6 +27,7 @@ from rotordrop.spectrum.indentation import (
     find_settling,
     held_maximum,
 )
+from rotordrop.spectrum.line_settings import STANDARD_SETTINGS, LineSettings
 from rotordrop.spectrum.lines import Line, find_lines
 from rotordrop.spectrum.orders import OrderTrack, track_orders
 from rotordrop.spectrum.resonances import PassedResonance, find_resonances
@@ -48,6 +49,8 @@ ORDERS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
 RACES_SPUN_UP = 1.0
 """Time [s] from which the speed law is fitted: before it the rotor hands spin to the races."""
 SHORTEST_LAW = 3.0
+LINES_OF_A_SIMULATION = 12
+"""A simulation has no noise at which the search for lines would end; in each plane it ends after so many."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -186,6 +189,7 @@ def analyse_coast_down(
         start_time=signal.start_time,
         candidates=candidates,
         air_gap=float(np.mean(list(signal.air_gap.values()))),
+        settings=STANDARD_SETTINGS if signal.recorded else LineSettings(most_lines=LINES_OF_A_SIMULATION),
     )
     planes = {}
     for number, name in enumerate(signal.planes):
