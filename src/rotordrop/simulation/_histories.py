@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.model import layout as L
 from rotordrop.model.layout import KernelParameters
-from rotordrop.physics._compile import kernel
+from rotordrop.physics._compile import kernel, lean_kernel
 from rotordrop.physics.ball_bearing_planar import largest_ball_load, planar_ball_energy, planar_ball_force
 from rotordrop.physics.contact import elastic_contact_energy
 from rotordrop.simulation._loop import contact_at
+from rotordrop.simulation._rhs import relative_motion
 
 Array = NDArray[np.float64]
 
@@ -74,7 +77,7 @@ def bearing_histories(states: Array, p: KernelParameters, out: Array) -> None:
             out[i, b, H_STRESS] = row[L.STRESS_COEFFICIENT] * np.cbrt(load)
 
 
-@kernel
+@lean_kernel
 def stored_energy(y: Array, p: KernelParameters, with_rotor_spin: bool) -> float:
     """Energy [J] of a state: motion, bending, contacts, balls, supports, gravity and spin."""
     m = p.eigenvalue.shape[0]
@@ -84,13 +87,13 @@ def stored_energy(y: Array, p: KernelParameters, with_rotor_spin: bool) -> float
     for k in range(m):
         energy += 0.5 * (y[n_q + k] ** 2 + y[n_q + m + k] ** 2)
         energy += 0.5 * p.eigenvalue[k] * (y[k] ** 2 + y[m + k] ** 2) - p.gravity[k] * y[m + k]
-    contact = np.empty(6)
     for b in range(n_b):
         row = p.bearing[b]
         r = 2 * m + 2 * b
         h = r + 2 * n_b
-        contact_at(b, y, p, contact)
-        energy += elastic_contact_energy(contact[0], row[L.CONTACT_STIFFNESS], row[L.CONTACT_EXPONENT])
+        ux, uy, _vx, _vy = relative_motion(b, y, p)
+        delta = math.sqrt(ux * ux + uy * uy) - row[L.AIR_GAP]
+        energy += elastic_contact_energy(delta, row[L.CONTACT_STIFFNESS], row[L.CONTACT_EXPONENT])
         energy += planar_ball_energy(
             y[r] - y[h],
             y[r + 1] - y[h + 1],
@@ -113,3 +116,10 @@ def stored_energy(y: Array, p: KernelParameters, with_rotor_spin: bool) -> float
     if with_rotor_spin:
         energy += 0.5 * p.spin[L.POLAR_INERTIA] * y[2 * n_q + n_b] ** 2
     return energy
+
+
+@kernel
+def stored_energies(states: Array, p: KernelParameters, with_rotor_spin: bool, out: Array) -> None:
+    """Fill ``out`` (T,) with the energy [J] of each of the ``states`` (T, n)."""
+    for i in range(states.shape[0]):
+        out[i] = stored_energy(states[i], p, with_rotor_spin)

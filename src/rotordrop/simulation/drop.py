@@ -193,7 +193,8 @@ def _energy_certificate(
     layout = model.layout
     with_spin = case.spin != "prescribed"
     chosen = np.unique(np.linspace(0, len(states) - 1, 200).astype(int))
-    stored = np.array([H.stored_energy(states[i], parameters, with_spin) for i in chosen])
+    stored = np.empty(len(chosen))
+    H.stored_energies(states[chosen], parameters, with_spin, stored)
     balance = stored + states[chosen, layout.dissipated] - states[chosen, layout.work_in]
     return Certificate(
         energy_residual=float(np.max(np.abs(balance - balance[0]))),
