@@ -16,7 +16,7 @@ from rotordrop.measurement.recording import Array
 if TYPE_CHECKING:
     from rotordrop.measurement.record import Record
 
-LEAST_RATIO = 0.05
+LEAST_RATIO = 0.026
 """Smaller ratios of the singular values of the sensor directions count as singular (about 3° apart)."""
 
 

@@ -102,7 +102,8 @@ class Record:
 
     def window(self, start: float, end: float) -> Self:
         """Cut out the samples from `start` to `end` [s]; the speed readings stay whole."""
-        keep = (self.time >= start) & (self.time <= end)
+        slack = 1e-3 / self.sampling_rate if np.isfinite(self.sampling_rate) else 0.0
+        keep = (self.time >= start - slack) & (self.time <= end + slack)
         if not keep.any():
             raise RecordError(
                 f"the record reaches from {self.time[0]:.6g} s to {self.time[-1]:.6g} s; nothing lies "

@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from rotordrop.measurement.record import Record
 
 
+_FEW = 5
+_AFTER = 0.2
+
+
 @dataclass(frozen=True, kw_only=True)
 class SpeedAtDrop:
     """Speed when the rotor was let go.
@@ -25,7 +29,7 @@ class SpeedAtDrop:
     standard_error : float
         Standard error of `value` [rad/s].
     slope : float
-        Rate of change after the drop [rad/s²].
+        Mean rate of change over the first 0.2 s after the drop [rad/s²].
     scatter : float
         Standard deviation of one reading [rad/s].
     readings : int
@@ -57,11 +61,11 @@ def readings_of_held_signal(time: Array, values: Array) -> tuple[Array, Array]:
     changes = np.flatnonzero(np.diff(values)) + 1
     if len(changes) < 3 or len(changes) > 0.5 * len(values):
         return time, values
-    interval = int(np.median(np.diff(changes)))
+    # a reading equal to the one before leaves no step: longer intervals are missed steps
+    interval = int(np.percentile(np.diff(changes), 25, method="lower"))
     first = changes[0] - interval * (1 + (changes[0] - 1) // interval)
     at = [max(int(first), 0)]
     for change in changes:
-        # a reading equal to the one before leaves no step: fill in where it must have been
         missed = round((change - at[-1]) / interval) - 1
         at += [int(change) - interval * k for k in range(missed, 0, -1)] if len(at) > 1 else []
         at.append(int(change))
@@ -71,7 +75,10 @@ def readings_of_held_signal(time: Array, values: Array) -> tuple[Array, Array]:
 
 
 def speed_at_drop(record: Record, drop: float, *, span: float = 0.5) -> SpeedAtDrop:
-    """Speed at the drop from a robust fit of a straight line before and one after, meeting at the drop.
+    """Speed at the drop from the readings before it, outliers aside, and how it begins to fall.
+
+    The readings before are taken as constant unless they clearly drift. Those after are left out of the value
+    where there are any before: friction changes the speed within milliseconds of the first contact.
 
     Parameters
     ----------
@@ -80,7 +87,7 @@ def speed_at_drop(record: Record, drop: float, *, span: float = 0.5) -> SpeedAtD
     drop : float
         Drop instant, in record time [s].
     span : float
-        Readings up to this long before and after are used [s].
+        Readings up to this long before are used, and up to 0.2 s after [s].
 
     Raises
     ------
@@ -88,25 +95,40 @@ def speed_at_drop(record: Record, drop: float, *, span: float = 0.5) -> SpeedAtD
         When the record has no speed near the drop.
     """
     time, readings = require_speed(record)
-    near = (np.abs(time - drop) <= span) & np.isfinite(readings)
-    if int(near.sum()) < 2:
+    good = np.isfinite(readings)
+    before = good & (time <= drop) & (time >= drop - span)
+    after = good & (time > drop) & (time <= drop + _AFTER)
+    used = before if int(before.sum()) >= _FEW else before | after
+    if int(used.sum()) < 2:
         raise RecordError(
-            f"{record.name}: {int(near.sum())} speed readings within {span:g} s of the drop at {drop:.6g} s; "
+            f"{record.name}: {int(used.sum())} speed readings within {span:g} s of the drop at {drop:.6g} s; "
             "the "
             f"speed was read from {time[0]:.6g} s to {time[-1]:.6g} s"
         )
-    when, values = time[near] - drop, readings[near]
-    columns = [np.ones_like(when)]
-    columns += [part for part in (np.minimum(when, 0.0), np.maximum(when, 0.0)) if np.count_nonzero(part) > 2]
-    design = np.column_stack(columns)
-    solution, scatter, covariance = _robust(design, values)
+    solution, scatter, covariance = _level_or_line(time[used] - drop, readings[used])
+    value = float(solution[0])
     return SpeedAtDrop(
-        value=float(solution[0]),
+        value=value,
         standard_error=float(scatter * np.sqrt(covariance[0, 0])),
-        slope=float(solution[-1]) if len(columns) > 1 and np.any(when > 0) else 0.0,
+        slope=_slope_after(time[after] - drop, readings[after] - value),
         scatter=scatter,
-        readings=len(values),
+        readings=int(used.sum()),
     )
+
+
+def _level_or_line(when: Array, values: Array) -> tuple[Array, float, Array]:
+    """A constant, or a straight line where its slope is beyond doubt."""
+    level = _robust(np.ones((len(when), 1)), values)
+    if len(when) < _FEW:
+        return level
+    line = _robust(np.column_stack([np.ones_like(when), when]), values)
+    doubt = 4.0 * line[1] * float(np.sqrt(line[2][1, 1]))
+    return line if abs(line[0][1]) > doubt else level
+
+
+def _slope_after(when: Array, change: Array) -> float:
+    """Robust slope [rad/s²] of the readings after the drop through the speed at it; 0 without any."""
+    return float(np.median(change / when)) if len(when) else 0.0
 
 
 def smooth_speed(record: Record, *, span: float = 0.1) -> Array:

@@ -163,7 +163,8 @@ def _jumps(record: Record) -> list[Finding]:
     around = np.median(np.stack([step[:-4], step[1:-3], step[3:-1], step[4:]]), axis=0)
     kink = np.abs(step[2:-2] - around)
     usual = np.maximum(1.4826 * np.median(kink, axis=0), 1e-12)
-    limit = np.maximum(12.0 * usual, 2e-6)
+    finest = np.array([np.min(np.diff(np.unique(column)), initial=np.inf) for column in signals.T])
+    limit = np.maximum(np.maximum(12.0 * usual, 2e-6), 4.0 * np.where(np.isfinite(finest), finest, 0.0))
     many = np.sum(kink > limit, axis=1) >= max(2, signals.shape[1] // 2 + 1)
     beside = np.append(many[1:], False) | np.append(False, many[:-1])
     alone = np.flatnonzero(many & ~beside)  # a spike makes two such steps in a row

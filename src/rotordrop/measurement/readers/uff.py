@@ -17,6 +17,9 @@ _HEADER_LINES = 11
 _BYTES = {2: 4, 4: 8, 5: 8, 6: 16}
 """Bytes per sample by ordinate data type: real and complex, single and double."""
 
+_ABSCISSA_BYTES = {2: 4, 4: 8, 5: 4, 6: 8}
+"""Bytes per time stamp where the samples are not evenly spaced."""
+
 
 def read_uff(path: Path, profile: Profile) -> Recording:
     """Read the time histories of a universal file; channels are named in the first identification line.
@@ -93,9 +96,11 @@ def _walk_58(content: bytes, kind: bytes, at: int, path: Path) -> tuple[int, int
     lines = content[at : at + 2000].split(b"\n")[:_HEADER_LINES]
     name = lines[0].decode("latin-1").strip()
     try:
-        data_type, count = (int(part) for part in lines[6].split()[:2])
+        data_type, count, even = (int(part) for part in lines[6].split()[:3])
     except (ValueError, IndexError) as error:
-        raise RecordError(f"{path}: dataset {name!r} has no readable line 7 (type and count)") from error
+        raise RecordError(
+            f"{path}: dataset {name!r} has no readable line 7 (type, count, spacing)"
+        ) from error
     start = at + sum(len(line) + 1 for line in lines)
     if not kind.split()[0].endswith(b"b"):
         return count, start
@@ -103,7 +108,7 @@ def _walk_58(content: bytes, kind: bytes, at: int, path: Path) -> tuple[int, int
         declared = int(kind.split()[4])
     except (ValueError, IndexError) as error:
         raise RecordError(f"{path}: dataset {name!r} does not declare its bytes ({kind!r})") from error
-    expected = count * _BYTES.get(data_type, 0)
+    expected = count * (_BYTES.get(data_type, 0) + (0 if even else _ABSCISSA_BYTES.get(data_type, 0)))
     present = min(declared, len(content) - start)
     if declared != expected or present < declared:
         raise RecordError(

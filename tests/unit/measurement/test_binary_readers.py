@@ -1,0 +1,313 @@
+"""Binary recordings: the same samples in every format, and damage that must not pass silently."""
+
+import h5py
+import numpy as np
+import pytest
+import scipy.io
+
+from rotordrop.errors import RecordError
+from rotordrop.measurement import example_record_path, read_record, save_record, write_delimited
+from rotordrop.measurement.readers import find_reader, known_formats
+from rotordrop.measurement.readers import matlab as matlab_reader
+
+
+@pytest.fixture(scope="module")
+def short(drop):
+    return drop.window(-0.05, 0.05)
+
+
+def as_matlab(record, path, *, packed=True, time=False):
+    speed = {"t": record.speed_time, "hz": record.speed_readings / (2 * np.pi)}
+    content = {
+        "disp_um": (record.signals * 1e6).astype(np.float64),
+        "channel": np.array(record.channel_names, dtype=object),
+        "speed": speed,
+        "info": "LP-400 drop",
+    }
+    content |= {"t": record.time} if time else {"fs": record.sampling_rate, "t0": record.time[0]}
+    scipy.io.savemat(path, content, do_compression=packed)
+
+
+def as_tdms(record, path):
+    nptdms = pytest.importorskip("nptdms")
+
+    def channel(group, name, values, unit, start, step):
+        properties = {
+            "wf_increment": step,
+            "wf_start_offset": start,
+            "wf_start_time": np.datetime64("2019-10-16"),
+            "unit_string": unit,
+        }
+        return nptdms.ChannelObject(group, name, values, properties=properties)
+
+    objects = [
+        channel("Displacement", name, record.signals[:, i] * 1e6, "um", record.time[0], 5e-5)
+        for i, name in enumerate(record.channel_names)
+    ]
+    step = float(np.median(np.diff(record.speed_time)))
+    objects.append(
+        channel("Speed", "ShaftSpeed", record.speed_readings / (2 * np.pi), "Hz", record.speed_time[0], step)
+    )
+    with nptdms.TdmsWriter(path) as writer:
+        writer.write_segment([nptdms.RootObject({"name": "drop"}), *objects])
+
+
+def as_uff(record, path, binary=True):
+    """Dataset 58 as the format prescribes, written by hand: an independent counterpart of the reader."""
+    pytest.importorskip("pyuff")
+    count = len(record.time)
+    parts = []
+    for i, name in enumerate(record.channel_names):
+        kind = (
+            f"{58:6d}b{1:6d}{2:6d}{11:12d}{8 * count:12d}{0:6d}{0:6d}{0:12d}{0:12d}"
+            if binary
+            else f"{58:6d}{'':74}"
+        )
+        lines = [f"{-1:6d}", kind, *(f"{text:<80}" for text in (name, "drop", "NONE", "NONE", "NONE"))]
+        lines.append(f"{1:5d}{0:10d}{0:5d}{0:10d} {'NONE':>10}{1:10d}{1:4d} {'NONE':>10}{0:10d}{0:4d} ")
+        lines.append(f"{4:10d}{count:10d}{1:10d}{record.time[0]:13.5e}{5e-5:13.5e}{0.0:13.5e}")
+        for what, label, unit in (
+            (17, "Time", "s"),
+            (8, "Displacement", "m"),
+            (0, "NONE", "NONE"),
+            (0, "NONE", "NONE"),
+        ):
+            lines.append(f"{what:10d}{0:5d}{0:5d}{0:5d} {label:<20} {unit:<20}")
+        parts.append(("\n".join(lines) + "\n").encode())
+        values = record.signals[:, i]
+        if binary:
+            parts.append(values.astype("<f8").tobytes())
+        else:
+            rows = [values[k : k + 4] for k in range(0, count, 4)]
+            parts.append("".join("".join(f"{v:20.11e}" for v in row) + "\n" for row in rows).encode())
+        parts.append(f"{-1:6d}\n".encode())
+    path.write_bytes(b"".join(parts))
+
+
+WRITERS = {"mat": as_matlab, "tdms": as_tdms, "uff": as_uff, "h5": save_record}
+
+
+@pytest.mark.parametrize("suffix", WRITERS)
+def test_every_format_gives_the_same_samples(suffix, short, machine, tmp_path):
+    path = tmp_path / f"drop.{suffix}"
+    WRITERS[suffix](short, path)
+    record = read_record(path, machine)
+    np.testing.assert_allclose(record.signals, short.signals, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(record.time, short.time, rtol=0, atol=1e-9)
+    if suffix == "uff":
+        assert record.speed is None
+    else:
+        np.testing.assert_allclose(record.speed, short.speed, rtol=1e-6)
+
+
+@pytest.mark.parametrize("suffix", ["mat", "tdms", "uff", "h5"])
+@pytest.mark.parametrize("kept", [0.03, 0.3, 0.6, 0.9, 0.999])
+def test_truncated_files_are_refused(suffix, kept, short, machine, tmp_path):
+    path = tmp_path / f"drop.{suffix}"
+    WRITERS[suffix](short, path)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: int(kept * len(whole))])
+    with pytest.raises(
+        RecordError, match=r"truncated|declares|no intact HDF5|cannot be read|is truncated|no TDMS segment"
+    ):
+        read_record(path, machine)
+
+
+def test_matlab_vectors_with_a_time_vector(short, machine, tmp_path):
+    path = tmp_path / "drop.mat"
+    columns = {f"{name}_um": short.signals[:, i] * 1e6 for i, name in enumerate(short.channel_names)}
+    scipy.io.savemat(path, columns | {"t": short.time})
+    record = read_record(path, machine)
+    np.testing.assert_allclose(record.signals, short.signals, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(record.time, short.time, rtol=0, atol=1e-12)
+
+
+def test_matlab_without_clock_is_refused(short, machine, tmp_path):
+    path = tmp_path / "drop.mat"
+    scipy.io.savemat(path, {"S_NDE_A": short.signals[:, 0]})
+    with pytest.raises(RecordError, match=r"no samples with a clock among S_NDE_A"):
+        read_record(path, machine)
+
+
+def test_matlab_73_is_refused_with_the_way_out(machine, tmp_path):
+    path = tmp_path / "drop.mat"
+    path.write_bytes(b"MATLAB 7.3 MAT-file".ljust(600, b" "))
+    with pytest.raises(RecordError, match=r"version 7.3; save it with save\(..., '-v7'\)"):
+        read_record(path, machine)
+
+
+def test_a_packed_matlab_variable_with_a_flipped_byte_is_refused(short, machine, tmp_path):
+    path = tmp_path / "drop.mat"
+    as_matlab(short, path)
+    content = bytearray(path.read_bytes())
+    content[len(content) // 3] ^= 0x55
+    path.write_bytes(content)
+    with pytest.raises(RecordError, match=r"cannot be unpacked|unpacks to"):
+        read_record(path, machine)
+
+
+def test_matlab_lengths_are_those_of_the_file(short, tmp_path):
+    path = tmp_path / "drop.mat"
+    as_matlab(short, path, packed=False, time=True)
+    matlab_reader._check_lengths(path)
+    path.write_bytes(path.read_bytes() + b"\x0e\x00\x00\x00\xff\x00\x00\x00")
+    with pytest.raises(RecordError, match=r"declares 255 bytes and 0 are present"):
+        matlab_reader._check_lengths(path)
+
+
+def test_uff_with_another_count_than_declared_is_refused(short, machine, tmp_path):
+    path = tmp_path / "drop.uff"
+    as_uff(short, path)
+    content = path.read_bytes()
+    declared = f"{4:10d}{len(short.time):10d}".encode()
+    path.write_bytes(content.replace(declared, f"{4:10d}{len(short.time) - 7:10d}".encode(), 1))
+    with pytest.raises(RecordError, match=rf"'S_NDE_A' declares {len(short.time) - 7} samples"):
+        read_record(path, machine)
+
+
+def test_uff_as_text(short, machine, tmp_path):
+    path = tmp_path / "drop.uff"
+    as_uff(short.window(-0.01, 0.0), path, binary=False)
+    record = read_record(path, machine)
+    np.testing.assert_allclose(record.signals, short.window(-0.01, 0.0).signals, rtol=1e-6)
+
+
+def test_tdms_with_garbage_behind_is_refused(short, machine, tmp_path):
+    path = tmp_path / "drop.tdms"
+    as_tdms(short, path)
+    size = path.stat().st_size
+    path.write_bytes(path.read_bytes() + b"garbage" * 8)
+    with pytest.raises(RecordError, match=rf"no TDMS segment at byte {size} of {size + 56}"):
+        read_record(path, machine)
+
+
+def test_tdms_that_was_never_closed_is_refused(short, machine, tmp_path):
+    path = tmp_path / "drop.tdms"
+    as_tdms(short, path)
+    content = bytearray(path.read_bytes())
+    content[12:20] = b"\xff" * 8
+    path.write_bytes(content)
+    with pytest.raises(RecordError, match=r"the segment at byte 0 declares no length"):
+        read_record(path, machine)
+
+
+class TestDangerousHDF5:
+    """What points outside the file, or is not there, is refused before it is read."""
+
+    @pytest.fixture
+    def file(self, short, tmp_path):
+        path = tmp_path / "drop.h5"
+        save_record(short, path)
+        return path
+
+    def test_an_external_link(self, file, machine, tmp_path):
+        with h5py.File(file, "r+") as h5:
+            h5["displacement/other"] = h5py.ExternalLink(str(tmp_path / "secret.h5"), "/x")
+        with pytest.raises(RecordError, match=r"'displacement/other' is a ExternalLink \(to .*secret.h5:/x"):
+            read_record(file, machine)
+
+    def test_external_storage(self, file, machine, tmp_path):
+        (tmp_path / "raw.bin").write_bytes(b"\x00" * 800)
+        with h5py.File(file, "r+") as h5:
+            h5.create_dataset("raw", (100,), "f8", external=[(str(tmp_path / "raw.bin"), 0, 800)])
+        with pytest.raises(RecordError, match=r"the data of 'raw' lie in the file .*raw.bin"):
+            read_record(file, machine)
+
+    def test_a_virtual_dataset(self, file, machine, tmp_path):
+        layout = h5py.VirtualLayout(shape=(100,), dtype="f8")
+        layout[:] = h5py.VirtualSource(str(tmp_path / "other.h5"), "x", shape=(100,))
+        with h5py.File(file, "r+") as h5:
+            h5.create_virtual_dataset("virtual", layout)
+        with pytest.raises(RecordError, match=r"'virtual' is a virtual dataset"):
+            read_record(file, machine)
+
+    def test_a_shape_bomb(self, file, machine):
+        with h5py.File(file, "r+") as h5:
+            h5.create_dataset("bomb", (10**12,), "f8", chunks=(1024,))
+        with pytest.raises(
+            RecordError, match=r"'bomb' claims 1000000000000 samples \(8000000000000 bytes\) but 0 bytes"
+        ):
+            read_record(file, machine)
+
+    def test_blocks_that_were_never_written(self, file, machine):
+        with h5py.File(file, "r+") as h5:
+            item = h5.create_dataset("cut", (4096,), "f8", chunks=(1024,))
+            item[:2048] = 1.0
+        with pytest.raises(RecordError, match=r"of 'cut' only 2 of 4 blocks were written"):
+            read_record(file, machine)
+
+    def test_no_clock(self, file, machine):
+        with h5py.File(file, "r+") as h5:
+            del h5["displacement/S_DE_A"].attrs["dt_s"]
+        with pytest.raises(
+            RecordError, match=r"'displacement/S_DE_A' has neither an attribute 'fs_hz' or 'dt_s'"
+        ):
+            read_record(file, machine)
+
+    def test_a_flipped_byte_is_noticed(self, file, machine):
+        with h5py.File(file, "r") as h5:
+            offset = h5["displacement/S_DE_A"].id.get_chunk_info(0).byte_offset
+        content = bytearray(file.read_bytes())
+        content[offset + 40] ^= 0x10
+        file.write_bytes(content)
+        with pytest.raises(RecordError, match=r"'displacement/S_DE_A' cannot be unpacked"):
+            read_record(file, machine)
+
+    def test_channels_of_different_length(self, file, machine):
+        with h5py.File(file, "r+") as h5:
+            values, attributes = h5["displacement/S_DE_A"][:-5], dict(h5["displacement/S_DE_A"].attrs)
+            del h5["displacement/S_DE_A"]
+            h5["displacement/S_DE_A"] = values
+            h5["displacement/S_DE_A"].attrs.update(attributes)
+        with pytest.raises(
+            RecordError, match=r"'displacement/S_NDE_A' has 2001 samples and 'displacement/S_DE_A' 1996"
+        ):
+            read_record(file, machine)
+
+    def test_clocks_that_differ(self, file, machine):
+        with h5py.File(file, "r+") as h5:
+            h5["displacement/S_DE_B"].attrs["t0_s"] = -0.0495
+        with pytest.raises(RecordError, match=r"clocks of .* and 'displacement/S_DE_B' differ by 500 µs"):
+            read_record(file, machine)
+
+
+def test_the_bundled_recording_reads(machine, whole_drop, tail):
+    assert whole_drop.signals.shape == (45001, 4)
+    assert whole_drop.sampling_rate == 20000.0
+    assert whole_drop.time[0] == -0.25
+    np.testing.assert_allclose(whole_drop.signals[0] * 1e6, [8.185, -6.976, -16.846, -16.315], atol=5e-4)
+    assert tail.signals.shape == (3000, 4)
+    assert tail.sampling_rate == 1000.0
+    assert example_record_path("lp400_drop_060").name == "drop_060.h5"
+
+
+def test_another_package_may_add_a_reader(monkeypatch, machine, short):
+    class Entry:
+        name = "vendor"
+
+        @staticmethod
+        def load():
+            return lambda path, profile: "read by the vendor"
+
+    monkeypatch.setattr(
+        "rotordrop.measurement.readers.entry_points",
+        lambda group: [Entry()] if group == "rotordrop.readers" else [],
+    )
+    assert find_reader("vendor", None)(None, None) == "read by the vendor"
+    assert "vendor" in known_formats()
+
+
+def test_text_written_here_is_read_back(short, machine, tmp_path):
+    from rotordrop.measurement import recording_of
+
+    recording = recording_of(
+        short.time, short.signals, short.channel_names, speed_time=short.speed_time,
+        speed=short.speed_readings, metadata={"Machine": "LP-400"},
+    )  # fmt: skip
+    for separator, decimal in ((";", ","), (",", "."), ("\t", ".")):
+        path = tmp_path / "drop.csv"
+        write_delimited(recording, path, separator=separator, decimal=decimal)
+        record = read_record(path, machine)
+        np.testing.assert_allclose(record.signals, short.signals, rtol=0, atol=0.6e-9)
+        np.testing.assert_allclose(record.time, short.time, rtol=0, atol=1e-9)
+        assert record.metadata["Machine"] == "LP-400"
