@@ -1,4 +1,4 @@
-"""Settings of the documentation; the pages under ``generated/`` are written from the sources before each build."""
+"""Settings of the documentation; pages under ``generated/`` are written from the sources at each build."""
 
 from __future__ import annotations
 
