@@ -124,6 +124,7 @@ def _tracked(
     from rotordrop.estimation.document import tracked_document
     from rotordrop.estimation.tracked import estimate_tracked
     from rotordrop.report.estimate_page import tracked_page
+    from rotordrop.report.simulated_record import simulated_notice
     from rotordrop.report.twin_cross_check import twin_cross_checks
 
     drops = estimate_tracked(machine, records, tails, quick=quick, progress=progress)
@@ -132,6 +133,7 @@ def _tracked(
         checks = () if quick else twin_cross_checks(drop)
         words = _warnings(found, tail)
         documents[drop.name] = tracked_document(drop, machine, words)
+        documents[drop.name]["simulated_record"] = bool(simulated_notice(drop.record))
         documents[drop.name]["cross_check"] = [
             {
                 "name": check.name,

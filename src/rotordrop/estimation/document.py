@@ -58,7 +58,6 @@ def heading(drop: TrackedDrop, machine: Machine) -> dict[str, Any]:
         "machine": machine.name,
         "record": record.name if record.path is None else record.path.name,
         "record_sha256": record.sha256,
-        "simulated_record": any("simulated" in str(value).lower() for value in record.metadata.values()),
         "drop_instant_s": drop.drop_instant.value,
         "drop_instant_interval_90_s": list(drop.drop_instant.interval_90),
         "speed_Hz": drop.speed / (2.0 * np.pi),

@@ -1,0 +1,117 @@
+"""Compare several drops: which was worst, and how sure that is.
+
+Reads what 'rotordrop estimate --json' wrote, one file per drop or one of several drops.
+"""
+
+from __future__ import annotations
+
+import json as json_module
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rotordrop.cli._options import JsonOption
+from rotordrop.cli._output import deliver, require_places
+from rotordrop.errors import UsageError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from rotordrop.report.compared_drop import ComparedDrop
+
+
+def compare(
+    estimates: Annotated[
+        list[Path], typer.Argument(metavar="ESTIMATE...", help="Estimates (.json) of one or more drops each.")
+    ],
+    scatter: Annotated[
+        float | None,
+        typer.Option(
+            "--scatter",
+            metavar="NEWTONS",
+            help="Standard deviation of the peak force between equal drops [N], to judge speeds, not drops.",
+        ),
+    ] = None,
+    report: Annotated[
+        Path | None, typer.Option("--report", metavar="FILE", help="Write the report, one offline HTML file.")
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """Compare several drops: which was worst, and how sure that is."""
+    from rotordrop.report.compare_page import compare_page
+    from rotordrop.report.page import write_page
+    from rotordrop.report.terminal import print_summary
+
+    require_places(json, report)
+    documents = _documents(estimates)
+    drops = _compared(documents)
+    if len(drops) < 2:
+        raise UsageError(
+            f"{len(drops)} drop to compare; at least two are needed. Give several estimates, or one of several drops."
+        )
+    machines = {str(document.get("machine", "")) for document in documents.values()}
+    drop_scatter = None if scatter is None else {"peak_force_N": scatter}
+    page = compare_page(drops, machine_name=", ".join(sorted(machines - {""})), drop_scatter=drop_scatter)
+    if report is not None:
+        write_page(page, report)
+
+    def summarise(out: Console) -> None:
+        print_summary(page, out)
+        if report is not None:
+            out.print(f"Report: {report}")
+
+    deliver(_ranked(drops, drop_scatter), json, summarise)
+
+
+def _documents(paths: list[Path]) -> dict[str, dict[str, Any]]:
+    """Every drop of every file, by name; the same name in two files gets the file's name before it."""
+    found: dict[str, dict[str, Any]] = {}
+    for path in paths:
+        content = _read(path)
+        drops = content.get("drops", {path.stem: content})
+        for name, drop in drops.items():
+            found[name if name not in found else f"{path.stem}: {name}"] = drop
+    return found
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        content = json_module.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UsageError(
+            f"{path} cannot be read ({error.strerror}); give a file of 'rotordrop estimate --json'."
+        ) from error
+    except ValueError as error:
+        raise UsageError(
+            f"{path} is not JSON ({error}); give a file written by 'rotordrop estimate --json'."
+        ) from error
+    if not isinstance(content, dict):
+        raise UsageError(f"{path} holds a {type(content).__name__}; expected the object of an estimate.")
+    return content
+
+
+def _compared(documents: Mapping[str, dict[str, Any]]) -> list[ComparedDrop]:
+    from rotordrop.report.compared_drop import ComparedDrop
+
+    return [
+        ComparedDrop.of_document(name, document, simulated=bool(document.get("simulated_record", False)))
+        for name, document in documents.items()
+    ]
+
+
+def _ranked(drops: list[ComparedDrop], scatter: Mapping[str, float] | None) -> dict[str, Any]:
+    from rotordrop.report.compare_page import rankings
+
+    tree: dict[str, Any] = {}
+    for (bearing, key), ranking in rankings(drops, list(drops[0].numbers), scatter or {}).items():
+        condition = ranking.worst_condition
+        tree.setdefault(bearing, {})[key] = {
+            "worst_first": list(ranking.names),
+            "values": list(ranking.values),
+            "probability_worst_drop": list(ranking.worst_drop),
+            "probability_worst_condition": None if condition is None else list(condition),
+            "statement": ranking.statement,
+        }
+    return tree
