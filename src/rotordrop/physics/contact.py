@@ -6,6 +6,26 @@ from rotordrop.physics._compile import inner_kernel, kernel
 
 
 @inner_kernel
+def elastic_contact_force(delta: float, K: float, n: float) -> float:
+    """Elastic part [N] of the contact force, ``K δ^n``, at a positive indentation [m].
+
+    Source: Neisi 2020, eq. (8) without damping.
+    """
+    force: float = K * delta**n
+    return force
+
+
+@inner_kernel
+def damped_contact_force(elastic: float, delta_dot: float, lam: float) -> float:
+    """Normal force [N] from its elastic part [N] and the rate of indentation [m/s]; never pulls.
+
+    Source: Neisi 2020, eq. (8), ``max(0, K δ^n (1 + 1.5 λ δ̇))``.
+    """
+    force: float = elastic * (1.0 + 1.5 * lam * delta_dot)
+    return max(0.0, force)
+
+
+@inner_kernel
 def hunt_crossley_force(delta: float, delta_dot: float, K: float, n: float, lam: float) -> float:
     """Normal force [N] pressing rotor and race apart at an indentation and its rate.
 
@@ -34,8 +54,7 @@ def hunt_crossley_force(delta: float, delta_dot: float, K: float, n: float, lam:
     """
     if delta <= 0.0:
         return 0.0
-    force: float = K * delta**n * (1.0 + 1.5 * lam * delta_dot)
-    return max(0.0, force)
+    return damped_contact_force(elastic_contact_force(delta, K, n), delta_dot, lam)
 
 
 @kernel

@@ -119,12 +119,9 @@ def contact_values(b: int, y: Array, p: KernelParameters) -> tuple[float, float,
     n_b = p.bearing.shape[0]
     n_q = 2 * p.eigenvalue.shape[0] + 4 * n_b
     ux, uy, vx, vy = relative_motion(b, y, p)
-    row = p.bearing[b]
-    delta, F_r, mu, nx, ny, v_t = contact_state(ux, uy, vx, vy, y[2 * n_q + n_b], y[2 * n_q + b], row)
-    power = 0.0
-    if delta > 0.0:
-        elastic = row[L.CONTACT_STIFFNESS] * delta ** row[L.CONTACT_EXPONENT]
-        power = mu * F_r * v_t + (F_r - elastic) * (vx * nx + vy * ny)
+    omega, omega_i = y[2 * n_q + n_b], y[2 * n_q + b]
+    delta, F_r, mu, nx, ny, v_t, elastic = contact_state(ux, uy, vx, vy, omega, omega_i, p.bearing[b])
+    power = mu * F_r * v_t + (F_r - elastic) * (vx * nx + vy * ny)
     return delta, F_r, mu * F_r, nx, ny, power
 
 

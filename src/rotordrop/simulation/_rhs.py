@@ -17,7 +17,7 @@ from rotordrop.physics import aerodynamics
 from rotordrop.physics._compile import inner_kernel, lean_kernel
 from rotordrop.physics.aerodynamics import exponential_deceleration, speed_dependent_deceleration
 from rotordrop.physics.ball_bearing_planar import planar_ball_force
-from rotordrop.physics.contact import hunt_crossley_force
+from rotordrop.physics.contact import damped_contact_force, elastic_contact_force
 from rotordrop.physics.friction import stribeck_coefficient
 from rotordrop.physics.remanence import remanent_fraction
 from rotordrop.physics.spin import race_drag_torque, surface_speed
@@ -60,27 +60,22 @@ def relative_motion(b: int, y: Array, p: KernelParameters) -> tuple[float, float
 @inner_kernel
 def contact_state(
     ux: float, uy: float, vx: float, vy: float, omega: float, omega_i: float, bearing: Array
-) -> tuple[float, float, float, float, float, float]:
+) -> tuple[float, float, float, float, float, float, float]:
     """Contact of rotor and race from their relative displacement [m] and velocity [m/s].
 
     Returns indentation [m], normal force [N], signed friction coefficient [1], normal (x, y) [1] from race to
-    rotor, and relative surface speed [m/s]. The tangent is the normal turned by 90° in the sense of positive
-    spin.
+    rotor, relative surface speed [m/s] and the elastic part of the normal force [N]. The tangent is the
+    normal turned by 90° in the sense of positive spin.
     """
     e_r = math.sqrt(ux * ux + uy * uy)
     delta = e_r - bearing[L.AIR_GAP]
     if delta <= 0.0:
-        return delta, 0.0, 0.0, 0.0, 0.0, 0.0
+        return delta, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     nx = ux / e_r
     ny = uy / e_r
     delta_dot = vx * nx + vy * ny
-    F_r = hunt_crossley_force(
-        delta,
-        delta_dot,
-        bearing[L.CONTACT_STIFFNESS],
-        bearing[L.CONTACT_EXPONENT],
-        bearing[L.CONTACT_DAMPING],
-    )
+    elastic = elastic_contact_force(delta, bearing[L.CONTACT_STIFFNESS], bearing[L.CONTACT_EXPONENT])
+    F_r = damped_contact_force(elastic, delta_dot, bearing[L.CONTACT_DAMPING])
     v_t = surface_speed(vy * nx - vx * ny, omega, bearing[L.ROTOR_RADIUS], omega_i, bearing[L.BORE_RADIUS])
     mu = stribeck_coefficient(
         v_t,
@@ -89,7 +84,7 @@ def contact_state(
         bearing[L.STRIBECK_SPEED],
         bearing[L.SMOOTHING_SPEED],
     )
-    return delta, F_r, mu, nx, ny, v_t
+    return delta, F_r, mu, nx, ny, v_t, elastic
 
 
 @inner_kernel
@@ -196,7 +191,7 @@ def bearing_accelerations(
     h = r + 2 * n_b
     spin = 2 * n_q + b
     ux, uy, vx, vy = relative_motion(b, y, p)
-    delta, F_r, mu, nx, ny, v_t = contact_state(ux, uy, vx, vy, omega, y[spin], row)
+    delta, F_r, mu, nx, ny, v_t, elastic = contact_state(ux, uy, vx, vy, omega, y[spin], row)
     F_x, F_y = planar_ball_force(
         y[r] - y[h],
         y[r + 1] - y[h + 1],
@@ -233,7 +228,6 @@ def bearing_accelerations(
         contact_x = F_r * nx - F_mu * ny
         contact_y = F_r * ny + F_mu * nx
         torque = F_mu
-        elastic = row[L.CONTACT_STIFFNESS] * delta ** row[L.CONTACT_EXPONENT]
         dissipated += F_mu * v_t + (F_r - elastic) * (vx * nx + vy * ny)
         ax, ay = dy[n_q : n_q + m], dy[n_q + m : n_q + 2 * m]
         for k in range(m):
