@@ -91,9 +91,8 @@ def _verdict(
     warnings: Sequence[str],
 ) -> tuple[Statement, ...]:
     consistency = Statement(text=drop.sentence(), level="good" if drop.consistent else "bad")
-    serious = [
-        statement for statement in quality_statements(findings) if statement.level in ("bad", "warning")
-    ]
+    told = [finding for finding in findings if finding.message not in warnings]
+    serious = [statement for statement in quality_statements(told) if statement.level in ("bad", "warning")]
     limits = [
         static_limit_statement(name, values["peak_stress_Pa"].value) for name, values in drop.values.items()
     ]

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.estimation.tracked import (
     INCONSISTENT_WIDENING,
+    MODEL_FORCE_SIGMA,
+    MODEL_GAP_SIGMA,
+    MODEL_STRESS_SIGMA,
     TrackedDrop,
     identified,
     parameter_sample,
+    parameter_widening,
     preload_value,
 )
 from rotordrop.machine import Machine
@@ -77,16 +83,20 @@ def corrected_readings(drop: TrackedDrop) -> Array:
 
 def tracked_forces(drop: TrackedDrop) -> tuple[BearingHistories, ...]:
     """Bearing force of every bearing with its 90 % band."""
-    return _banded(drop, drop.forces.magnitude, drop.forces.magnitude_sigma)
+    return _banded(drop, drop.forces.magnitude, drop.forces.magnitude_sigma, MODEL_FORCE_SIGMA)
 
 
 def tracked_stresses(drop: TrackedDrop) -> tuple[BearingHistories, ...]:
     """Hertz stress of every bearing with its 90 % band."""
-    return _banded(drop, drop.forces.stress, drop.forces.stress_sigma)
+    return _banded(drop, drop.forces.stress, drop.forces.stress_sigma, MODEL_STRESS_SIGMA)
 
 
-def _banded(drop: TrackedDrop, values: Array, sigma: Array) -> tuple[BearingHistories, ...]:
-    time, half = drop.forces.time, NORMAL_90 * widening(drop) * sigma
+def _banded(
+    drop: TrackedDrop, values: Array, sigma: Array, model_share: float
+) -> tuple[BearingHistories, ...]:
+    """Histories with bands as wide as the stated intervals: what every model leaves out belongs to them."""
+    time = drop.forces.time
+    half = NORMAL_90 * widening(drop) * np.hypot(sigma, model_share * values)
     return tuple(
         BearingHistories(
             bearing=name,
@@ -185,14 +195,16 @@ PRIOR_NOTE = (
 def _row(drop: TrackedDrop, unknown: Unknown, mean: float, sigma: float) -> ParameterRow:
     """One unknown; the axial offset is shown as the preload it stands for."""
     name = unknown.path
+    error = math.hypot(sigma, MODEL_GAP_SIGMA) if name.endswith(".air_gap") else sigma
+    wide = parameter_widening(unknown, error, widening(drop))
     if unknown.path.endswith(".axial_offset"):
         owner = unknown.path.removesuffix(".axial_offset")
         name = f"{owner}.preload"
         prior = preload_value(drop.problem, owner, unknown, unknown.mean, unknown.sigma)
-        estimate = preload_value(drop.problem, owner, unknown, mean, sigma, widening(drop))
+        estimate = preload_value(drop.problem, owner, unknown, mean, error, wide)
     else:
         prior = identified(unknown, unknown.mean, unknown.sigma)
-        estimate = identified(unknown, mean, sigma, widening(drop))
+        estimate = identified(unknown, mean, error, wide)
     kind = "short_time" if name.endswith("damping_time") else kind_of_unit(estimate.unit)
     return ParameterRow(
         name=name,
