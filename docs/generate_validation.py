@@ -67,12 +67,20 @@ def summary(cases: list[Case], computed: Mapping[str, Mapping[str, float]]) -> l
         if not chosen:
             continue
         shares = [
-            entry.deviation(computed[case.id][entry.name]) / entry.tolerance
+            _share(entry, computed[case.id][entry.name])
             for case in chosen
             for entry in case.expected
         ]
         lines.append(f"| {kind} | {about} | {len(chosen)} | {len(shares)} | {max(shares):.0%} |")
     return [*lines, ""]
+
+
+def _share(entry: Expected, value: float) -> float:
+    """Share of the tolerance that a number uses; a count must be exact, so it uses none."""
+    deviation = entry.deviation(value)
+    if entry.tolerance == 0.0:
+        return 0.0 if deviation == 0.0 else float("inf")
+    return deviation / entry.tolerance
 
 
 def disagreement_table() -> list[str]:

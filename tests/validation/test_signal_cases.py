@@ -1,0 +1,113 @@
+"""Signal and statistics cases: the paper's waterfall grid, Hann correction, coast-down, axes, quartiles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+from cases import Compute, check, load_case
+
+from rotordrop.machine.sensor import Sensor
+from rotordrop.measurement.axes import planar_of, sensor_planes
+from rotordrop.physics.aerodynamics import exponential_deceleration
+from rotordrop.severity.statistics import stress_statistics
+from rotordrop.spectrum.coast_down_law import exponential_time_constant
+from rotordrop.spectrum.waterfall import WaterfallSettings, waterfall
+
+pytestmark = pytest.mark.acceptance
+Inputs = Mapping[str, Any]
+
+
+def waterfall_grid(inputs: Inputs) -> dict[str, float]:
+    settings = WaterfallSettings(points=inputs["nfft"], overlap=inputs["overlap"])
+    frames = {f"frames for N={n}": float(settings.frame_count(n)) for n in inputs["points"]}
+    # The count is that of frames really computed, not only of the formula.
+    shortest = min(inputs["points"])
+    computed = waterfall(np.zeros((shortest, 2)), inputs["fs"], settings=settings, highest_frequency=10.0)
+    assert len(computed.time) == frames[f"frames for N={shortest}"]
+    return frames | {"frequency resolution": computed.resolution}
+
+
+def hann_amplitudes(inputs: Inputs) -> dict[str, float]:
+    points = 32768
+
+    def highest(off: float) -> float:
+        phase = 2.0 * math.pi * (1000.0 + off) * np.arange(points) / points
+        tone = inputs["A"] * np.column_stack([np.cos(phase), np.zeros(points)])
+        found = waterfall(tone, float(points), component="x", settings=WaterfallSettings(points=points))
+        return float(found.amplitude.max())
+
+    half = highest(0.5)
+    return {
+        "bin-centred amplitude": highest(0.0),
+        "amplitude half-way between bins": half,
+        "amplitude a quarter bin off": highest(0.25),
+        "worst scalloping loss": 20.0 * math.log10(half / inputs["A"]),
+    }
+
+
+def exponential_coast_down(inputs: Inputs) -> dict[str, float]:
+    tau = exponential_time_constant(inputs["n0"], inputs["n1"], inputs["dt"])
+    omega = 2.0 * math.pi * inputs["n0"]
+    return {
+        "time constant": tau,
+        "speed after 48 s": inputs["n0"] * math.exp(-48.0 / tau),
+        "aerodynamic torque at t=0 for Ip=0.05": inputs["Ip"] * exponential_deceleration(0.0, omega, tau),
+    }
+
+
+def sensor_axes(inputs: Inputs) -> dict[str, float]:
+    angles = {"S1": "45 deg", "S2": "135 deg"}
+    sensors = [Sensor.model_validate({"name": n, "node": 5, "angle": a}) for n, a in angles.items()]
+    along = np.array([[inputs["s1"], inputs["s2"]]])
+    (displacement,) = planar_of(along, sensor_planes(sensors))[0]
+    return {"horizontal": float(displacement[0]), "vertical": float(displacement[1])}
+
+
+def box_plot(inputs: Inputs) -> dict[str, float]:
+    hazen = stress_statistics(inputs["data"], rule="hazen")
+    linear = stress_statistics(inputs["data"], rule="linear")
+    return {
+        "25 percentile Hazen/MATLAB": hazen.lower_quartile,
+        "50 percentile Hazen/MATLAB": hazen.median,
+        "75 percentile Hazen/MATLAB": hazen.upper_quartile,
+        "25 percentile linear/numpy": linear.lower_quartile,
+        "50 percentile linear/numpy": linear.median,
+        "75 percentile linear/numpy": linear.upper_quartile,
+        "mean": hazen.mean,
+        "sd (n-1)": hazen.standard_deviation,
+        "outliers > mean+3sd": float(hazen.above_three_sigma),
+    }
+
+
+CASES: dict[str, Compute] = {
+    "S01": waterfall_grid,
+    "S02": hann_amplitudes,
+    "S03": exponential_coast_down,
+    "S05": sensor_axes,
+    "S06a": box_plot,
+}
+
+PERTURBED: dict[str, dict[str, Any]] = {
+    "S01": {"overlap": 0.49},
+    "S02": {"A": 1.0001},
+    "S03": {"n1": 58.001},
+    "S05": {"s2": -5.0001e-5},
+    "S06a": {"data": [*range(1, 11), 101.0]},
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_case(name: str) -> None:
+    case = load_case(name)
+    check(case, CASES[name](case.inputs))
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_perturbed_input_fails_the_case(name: str) -> None:
+    case = load_case(name).with_inputs(**PERTURBED[name])
+    with pytest.raises(AssertionError, match=f"{name} .*\n.*deviation .* tolerance"):
+        check(case, CASES[name](case.inputs))
