@@ -1,4 +1,4 @@
-"""Least squares with priors over windows that grow, from many starts at once: the search behind every drop fit.
+"""Least squares with priors over growing windows, from many starts at once: the search behind a fit.
 
 A drop is chaotic, so a plain fit over a long window lands in a wrong minimum. Here the window starts with the
 first impacts and grows; several starts run side by side on threads; those that fall behind are given up on
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from rotordrop.errors import IdentificationError
 
 Array = NDArray[np.float64]
-Progress = Callable[[float, str], None]
+Progress = Callable[[str, float], None]
 
 LARGEST_RISE = 8.0
 """Factor by which the damping of a step rises when the step fails [1]."""
@@ -240,7 +240,8 @@ class Schedule:
     kept : tuple of int
         How many starts go on after each window; the last number holds for the rest.
     draws : tuple of int
-        Points drawn from the covariance of the fits before each window grows; the last number holds for the rest.
+        Points drawn from the covariance of the fits before each window grows; the last number holds for the
+        rest.
     few : int
         Number of first windows in which only the leading unknowns are fitted.
     iterations : tuple of int
@@ -250,7 +251,7 @@ class Schedule:
     """
 
     windows: tuple[float, ...]
-    kept: tuple[int, ...] = (3, 3, 2, 1)
+    kept: tuple[int, ...] = (4, 4, 3, 2)
     draws: tuple[int, ...] = (200, 200, 100, 50)
     few: int = 2
     iterations: tuple[int, int] = (4, 8)
@@ -277,6 +278,8 @@ class Search:
         Simulations in all.
     ended_early : str
         Why the window stopped growing before the end of the schedule; empty when it did not.
+    finalists : tuple of Fit
+        All fits over the last window, best first.
     """
 
     best: Fit
@@ -286,6 +289,7 @@ class Search:
     agreeing: int
     evaluations: int
     ended_early: str
+    finalists: tuple[Fit, ...]
 
 
 def search(
@@ -298,8 +302,9 @@ def search(
 ) -> Search:
     """Fit from many starts over growing windows; those that fall behind are given up on the way.
 
-    Before a window grows, points are drawn from the covariance of the fits so far, and the best of them in the
-    longer window start there: what the short window leaves open is searched before the next impact decides it.
+    Before a window grows, points are drawn from the covariance of the fits so far, and the best of them in
+    the longer window start there: what the short window leaves open is searched before the next impact
+    decides it.
 
     Parameters
     ----------
@@ -312,9 +317,9 @@ def search(
     threads : int, optional
         Threads; all cores by default.
     progress : callable, optional
-        Called with the share done and a text.
+        Called with a text and the share done.
     """
-    report = progress or (lambda share, text: None)
+    report = progress or (lambda text, share: None)
     with ThreadPoolExecutor(max_workers=threads or cpu_count() or 1) as pool:
         return _Searching(problem, schedule, pool, report).run(list(starts))
 
@@ -330,8 +335,9 @@ class _Searching:
     def run(self, starts: list[Array]) -> Search:
         schedule = self.schedule
         points, best, costs, agreeing, ended = starts, list[Fit](), list[tuple[float, ...]](), 0, ""
+        finalists: list[Fit] = []
         for stage, window in enumerate(schedule.windows):
-            self.report(stage / len(schedule.windows), f"{len(points)} starts to {1e3 * window:.1f} ms")
+            self.report(f"{len(points)} starts to {1e3 * window:.1f} ms", stage / len(schedule.windows))
             fits = self._fitted(points, window, stage)
             if best and fits[0].misfit > max(1.5, schedule.breaking * best[-1].misfit):
                 ended = (
@@ -340,6 +346,7 @@ class _Searching:
                 )
                 break
             best.append(fits[0])
+            finalists = fits
             costs.append(tuple(fit.cost for fit in fits))
             if len(fits) > 1:
                 agreeing = sum(fit.cost < 1.05 * fits[0].cost for fit in fits)
@@ -354,6 +361,7 @@ class _Searching:
             agreeing=agreeing,
             evaluations=self.evaluations,
             ended_early=ended,
+            finalists=tuple(finalists),
         )
 
     def _fitted(self, points: list[Array], window: float, stage: int) -> list[Fit]:
@@ -376,7 +384,7 @@ class _Searching:
         return sorted(fits, key=lambda fit: fit.cost)
 
     def _drawn(self, fits: list[Fit], window: float, stage: int, kept: int) -> list[Array]:
-        """The best points for the next window: from every fit itself and points of its covariance."""
+        """Points for the next window: the best fit itself, then the best of the others and of the draws."""
         draws = self.schedule.draws
         each = max(1, draws[min(stage, len(draws) - 1)] // len(fits))
         moved = np.ones(len(fits[0].x)) if stage >= self.schedule.few else self.problem.leading.astype(float)
@@ -385,13 +393,31 @@ class _Searching:
             root = np.linalg.cholesky(fit.covariance + 1e-12 * np.diag(np.diag(fit.covariance)))
             noise = self.random.standard_normal((each, len(fit.x)))
             points += [np.clip(fit.x + moved * (root @ z), *self.problem.bounds) for z in noise]
-        costs = list(self.pool.map(lambda x: _evaluated(self.problem, x, window).cost, points))
-        self.evaluations += len(points)
-        return [points[k] for k in np.argsort(costs, kind="stable")[:kept]]
+        costs = list(self.pool.map(lambda x: _evaluated(self.problem, x, window).cost, points[1:]))
+        self.evaluations += len(points) - 1
+        return [points[0], *(points[1 + k] for k in np.argsort(costs, kind="stable")[: kept - 1])]
+
+
+def widened_covariance(fit: Fit, prior_sigma: Array, factor: float) -> Array:
+    """Covariance with the information of the record divided by ``factor²``; the prior keeps its own.
+
+    Parameters
+    ----------
+    fit : Fit
+        The fit.
+    prior_sigma : ndarray, shape (n,)
+        Prior standard deviations of its unknowns.
+    factor : float
+        What standard errors of a determined unknown grow by [1].
+    """
+    prior = np.diag(1.0 / prior_sigma**2)
+    scale = max(fit.misfit, 1.0)
+    record = _inverse(fit.covariance) * scale - prior
+    return _inverse(record / (scale * factor**2) + prior)
 
 
 def sobol_starts(centre: Array, spread: Array, count: int, seed: int = 1) -> list[Array]:
-    """Quasi-random starts, the first at the centre; ``spread`` (n,) is the half width of the box (0 keeps a value).
+    """Quasi-random starts, the first at the centre; ``spread`` (n,) is half the box (0 keeps a value).
 
     Source: Sobol sequence with a fixed scramble.
     """

@@ -118,7 +118,7 @@ class InitialState:
         return self.fall.transition(decay, time) @ values[self.unknowns.states]
 
     def deviation_of(self, record: Record) -> Array:
-        """Displacements along the sensors from the rest position, hum and 2X runout taken off [m], shape (N, S)."""
+        """Displacements along the sensors from rest, hum and 2X runout taken off [m], shape (N, S)."""
         return deviations(record, self.rest_along, self.levitated, self.drop_instant)
 
     def square_root(self) -> Array:
@@ -245,7 +245,7 @@ def _notes(model: DropModel, misfit: float) -> tuple[str, ...]:
 
 
 def deviations(record: Record, rest: Array, levitated: LevitatedModel, power_off: float) -> Array:
-    """Displacements along the sensors from the rest position (S,), hum and 2X runout taken off [m], shape (N, S).
+    """Displacements along the sensors from rest (S,), hum and 2X runout taken off [m], shape (N, S).
 
     A levitated rotor on its orbit shows no 2X of its own: what is there is runout and turns on with the
     shaft.

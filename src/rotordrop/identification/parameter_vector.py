@@ -1,4 +1,4 @@
-"""A vector of unknown parameters over the flat arrays of the drop model: set fast, many times, from many threads."""
+"""A vector of unknown parameters over the flat arrays of the drop model: set fast, from many threads."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class ParameterVector:
 
 
 def with_bearing(parameters: KernelParameters, bearing: Array) -> KernelParameters:
-    """The same kernel parameters with other rows of bearing parameters; the rotor radius follows the air gap."""
+    """The same kernel parameters with other rows of bearings; the rotor radius follows the air gap."""
     bearing[:, L.ROTOR_RADIUS] = bearing[:, L.BORE_RADIUS] - bearing[:, L.AIR_GAP]
     return parameters._replace(bearing=bearing)
 

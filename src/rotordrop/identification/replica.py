@@ -1,4 +1,4 @@
-"""The recorded drop run again with other parameters: from just before the first contact, as fast as can be."""
+"""The recorded drop run again with other parameters, from just before the first contact."""
 
 from __future__ import annotations
 
@@ -186,7 +186,7 @@ def build_replica(
 def drop_parameters(
     model: DropModel, initial: InitialState, remanent: Array, unbalance: Array
 ) -> KernelParameters:
-    """Kernel parameters of one drop: its speed, its remanent forces (A, 2) [N], its modal unbalance (2, m)."""
+    """Kernel parameters of one drop: speed, remanent forces (A, 2) [N], modal unbalance (2, m)."""
     p = model.parameters
     magnet, spin, flags = p.magnet.copy(), p.spin.copy(), p.flags.copy()
     magnet[:, MAGNET_FORCES] = remanent

@@ -1,4 +1,4 @@
-"""Support stiffness, damping and mass of each touchdown bearing from the first impacts (Neisi 2020, section 3.2).
+"""Support of each touchdown bearing from the first impacts (Neisi 2020, section 3.2).
 
 The sensors' displacements over the first impacts are fitted by the drop model. With the supports, everything
 else that shapes these displacements is fitted under its prior: contact, friction, preload, race, and the
@@ -15,7 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.estimated import IdentifiedValue, Verdict
-from rotordrop.identification.fit import Progress, Schedule, Search, search, sobol_starts
+from rotordrop.identification.fit import (
+    Progress,
+    Schedule,
+    Search,
+    search,
+    sobol_starts,
+    widened_covariance,
+)
 from rotordrop.identification.parameter_vector import (
     ParameterVector,
     joined,
@@ -28,6 +35,12 @@ Array = NDArray[np.float64]
 
 WINDOWS = (1.75e-3, 3.25e-3, 5.25e-3, 7.25e-3, 11e-3, 16e-3)
 """Ends of the windows after the later of the first contacts [s]."""
+
+COARSE_WINDOWS = 3
+"""How many of them are searched with a coarse basis; the last of these is the first of the fine basis."""
+
+WIDENING = 1.5
+"""Factor on standard errors for what the linearised fit leaves out [1]."""
 
 DIRECTIONS = 16
 """Directions of the initial state's uncertainty that are fitted along."""
@@ -43,7 +56,7 @@ BOUND_FACTOR = np.log(6.0)
 """The search may leave the prior mean by this much, in logarithms, on both sides."""
 
 UNDETERMINED = 0.7
-"""A posterior standard deviation above this share of the prior's means that the record does not determine it."""
+"""Posterior over prior standard deviation above which the record does not determine a value [1]."""
 
 NINETY = 1.6448536269514722
 
@@ -62,12 +75,15 @@ class ImpactFit:
         Directions of the unknowns of the fall, one standard deviation each.
     states : ndarray, shape (n, K)
         What these directions change in the state at the start of the simulation.
+    remaining_directions : ndarray, shape (u, u - K)
+        Directions of the fall's unknowns that matter too little to be fitted along.
     """
 
     replica: Replica
     vector: ParameterVector
     directions: Array
     states: Array
+    remaining_directions: Array
 
     @cached_property
     def prior_mean(self) -> Array:
@@ -107,7 +123,7 @@ class ImpactFit:
 
     @cached_property
     def leading(self) -> NDArray[np.bool_]:
-        """Unknowns that the first window can tell apart: supports, contact stiffness, the first directions."""
+        """Unknowns that the first window tells apart: supports, contact stiffness, first directions."""
         ends = ("support.stiffness", "support.mass", "support.damping", "contact.stiffness")
         own = [unknown.path.endswith(ends) for unknown in self.vector.unknowns]
         return np.array(own + [k < LEADING_DIRECTIONS for k in range(self.directions.shape[1])])
@@ -138,9 +154,13 @@ class SupportFit:
     Attributes
     ----------
     problem : ImpactFit
-        The problem that was solved.
+        The problem that was solved, with the fine basis.
+    coarse : Search
+        Search from many starts over the first windows.
     search : Search
-        Starts, windows and the best fit.
+        Fits over the longer windows.
+    covariance : ndarray, shape (n, n)
+        Covariance of all unknowns, widened for what the linearised fit leaves out.
     values : dict
         Identified value by path, such as ``"NDE.support.stiffness"``.
     correlations : dict
@@ -148,12 +168,14 @@ class SupportFit:
     """
 
     problem: ImpactFit
+    coarse: Search
     search: Search
+    covariance: Array
     values: dict[str, IdentifiedValue]
     correlations: dict[str, float]
 
 
-def influential_directions(replica: Replica, count: int = DIRECTIONS) -> tuple[Array, Array]:
+def influential_directions(replica: Replica, count: int = DIRECTIONS) -> tuple[Array, Array, Array]:
     """Directions of the fall's unknowns that move the drop most, one standard deviation each.
 
     Returns
@@ -162,6 +184,8 @@ def influential_directions(replica: Replica, count: int = DIRECTIONS) -> tuple[A
         Change of the unknowns of the fall.
     states : ndarray, shape (n, count)
         Change of the state at the start of the simulation.
+    remaining : ndarray, shape (u, u - count)
+        The other directions.
     """
     initial, layout = replica.initial, replica.model.layout
     root = initial.square_root()
@@ -175,20 +199,28 @@ def influential_directions(replica: Replica, count: int = DIRECTIONS) -> tuple[A
         effects += [shapes @ changes[place] / 1e-6, shapes @ changes[rate] / 3e-4]
         effects += [(reach * changes[place])[2:5] / 1e-6, (reach * changes[rate])[2:5] / 1e-3]
     effects += [root[initial.unknowns.gain] / 5e-3, root[initial.unknowns.rest] / 5e-6]
-    _, _, turned = np.linalg.svd(np.vstack(effects), full_matrices=False)
-    return np.asarray(root @ turned[:count].T), np.asarray(changes @ turned[:count].T)
+    _, _, turned = np.linalg.svd(np.vstack(effects), full_matrices=True)
+    leading, others = turned[:count].T, turned[count:].T
+    return np.asarray(root @ leading), np.asarray(changes @ leading), np.asarray(root @ others)
 
 
 def impact_problem(replica: Replica, *, nuisance: ParameterVector | None = None) -> ImpactFit:
     """The problem of the first impacts for a drop that can be run again."""
     beside = nuisance_vector(replica.model) if nuisance is None else nuisance
     vector = joined(support_vector(replica.model), beside) if len(beside) else support_vector(replica.model)
-    directions, states = influential_directions(replica)
-    return ImpactFit(replica=replica, vector=vector, directions=directions, states=states)
+    directions, states, remaining = influential_directions(replica)
+    return ImpactFit(
+        replica=replica,
+        vector=vector,
+        directions=directions,
+        states=states,
+        remaining_directions=remaining,
+    )
 
 
 def fit_support(
-    problem: ImpactFit,
+    coarse: ImpactFit,
+    fine: ImpactFit,
     later_contact: float,
     *,
     starts: int = 8,
@@ -199,37 +231,63 @@ def fit_support(
 
     Parameters
     ----------
-    problem : ImpactFit
-        From `impact_problem`.
+    coarse, fine : ImpactFit
+        The problem with a basis for the search from many starts, and with one for the result.
     later_contact : float
         Time of the later of the first contacts, from power-off [s]; the windows count from it.
     starts : int
         Quasi-random starts.
+    threads : int, optional
+        Threads; all cores by default.
+    progress : callable, optional
+        Called with a text and the share done.
 
     Notes
     -----
     Source: Neisi 2020, section 3.2 (least squares up to 0.015 s). Differs from the paper: windows that grow,
-    many starts, horizontal displacements too, and everything else uncertain is marginalised.
+    many starts, horizontal displacements too, and everything else that is uncertain is marginalised.
     """
-    supports = len(support_vector(problem.replica.model))
-    spread = np.zeros(len(problem.prior_mean))
-    spread[:supports] = NINETY * problem.prior_sigma[:supports]
-    begin = sobol_starts(problem.prior_mean, spread, starts)
-    last = problem.replica.time[-1]
+    report = progress or (lambda text, share: None)
+    last = min(coarse.replica.time[-1], fine.replica.time[-1])
     windows = tuple(later_contact + w for w in WINDOWS if later_contact + w <= last)
-    found = search(problem, begin, Schedule(windows=windows), threads=threads, progress=progress)
+    spread = np.zeros(len(coarse.prior_mean))
+    supports = len(support_vector(coarse.replica.model))
+    spread[:supports] = NINETY * coarse.prior_sigma[:supports]
+    first = search(
+        coarse,
+        sobol_starts(coarse.prior_mean, spread, starts),
+        Schedule(windows=windows[:COARSE_WINDOWS]),
+        threads=threads,
+        progress=lambda text, share: report(text, 0.5 * share),
+    )
+    found = search(
+        fine,
+        [_handed_over(fit.x, coarse, fine) for fit in first.finalists[:2]],
+        Schedule(windows=windows[COARSE_WINDOWS - 1 :], kept=(2,), draws=(60,), few=0, iterations=(10, 10)),
+        threads=threads,
+        progress=lambda text, share: report(text, 0.5 + 0.5 * share),
+    )
+    covariance = widened_covariance(found.best, fine.prior_sigma, WIDENING)
     return SupportFit(
-        problem=problem,
+        problem=fine,
+        coarse=first,
         search=found,
-        values={path: _identified(problem, found, k) for k, path in enumerate(problem.vector.paths)},
-        correlations=_correlations(problem, found, supports),
+        covariance=covariance,
+        values={path: _identified(fine, found, covariance, k) for k, path in enumerate(fine.vector.paths)},
+        correlations=_correlations(fine, found, supports),
     )
 
 
-def _identified(problem: ImpactFit, found: Search, place: int) -> IdentifiedValue:
+def _handed_over(x: Array, coarse: ImpactFit, fine: ImpactFit) -> Array:
+    """The same parameters for another basis; the directions of the initial state begin anew."""
+    count = len(coarse.vector)
+    return np.concatenate([x[:count], np.zeros(fine.directions.shape[1])])
+
+
+def _identified(problem: ImpactFit, found: Search, covariance: Array, place: int) -> IdentifiedValue:
     unknown = problem.vector.unknowns[place]
     x = float(found.best.x[place])
-    error = float(np.sqrt(found.best.covariance[place, place]))
+    error = float(np.sqrt(covariance[place, place]))
     low, high = (float(b[place]) for b in problem.bounds)
     value = unknown.value_of(x)
     return IdentifiedValue(
