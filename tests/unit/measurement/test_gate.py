@@ -93,6 +93,22 @@ class TestSingleChannels:
         assert found.time == pytest.approx(0.05)
         assert "(25 ms) read exactly" in found.message
 
+    def test_a_short_hold_is_stuck_too(self, drop, machine, edited):
+        def change(signals):
+            signals[6000:6012, 0] = signals[6000, 0]
+
+        found = only(edited(drop, change), machine)
+        assert (found.kind, found.channel) == ("stuck channel", "S_NDE_A")
+        assert "12 samples (0.6 ms)" in found.message
+
+    def test_a_damaged_block(self, drop, tail, machine, edited):
+        def change(signals):
+            signals[9000:9006, 3] = 0.0
+
+        found = only(edited(drop, change), machine, tail, severity="warning")
+        assert (found.kind, found.channel) == ("spikes", "S_DE_B")
+        assert "2 steps of up to" in found.message
+
     def test_spikes(self, drop, tail, machine, edited):
         def change(signals):
             signals[9000, 2] += 60e-6

@@ -23,8 +23,7 @@ CLIPPED_RUN = 5
 COARSE_STEP = 1e-6
 """Quantisation coarser than this is worth a warning [m]."""
 
-_STUCK_TIME = 5e-3
-_STUCK_SAMPLES = 20
+_STUCK_SAMPLES = 8
 _SPIKE = 12.0
 _SPIKE_LEAST = 5e-6
 
@@ -95,7 +94,8 @@ def _stuck(record: Record, channel: str, values: Array) -> Finding | None:
         return None
     longest = int(np.argmax(lengths))
     count = int(lengths[longest]) + 1
-    if count < max(_STUCK_SAMPLES, _STUCK_TIME * record.sampling_rate):
+    usual = int(np.percentile(lengths, 99.9, method="lower")) + 1  # coarse steps make runs everywhere
+    if count < max(_STUCK_SAMPLES, 4 * usual):
         return None
     if values[starts[longest]] in (np.min(values), np.max(values)):
         return None  # flat at the extreme is clipping, which is looked for by itself
@@ -141,13 +141,32 @@ def _spikes(record: Record, channel: str, values: Array) -> Finding | None:
     across = np.abs(values[2:] - values[:-2])
     spikes = np.flatnonzero((np.abs(middle) > limit) & (across < 0.5 * np.abs(middle)))
     if not len(spikes):
-        return None
+        return _steps(record, channel, values)
     at = float(record.time[spikes[0] + 1])
     size = format_quantity(float(np.max(np.abs(middle[spikes]))), "length")
     return Finding(
         kind="spikes",
         message=f"{len(spikes)} single samples stand out by up to {size}, the first at {at:.6g} s",
         remedy="look for loose contacts or switching noise; single spikes pull every fit",
+        severity="warning",
+        channel=channel,
+        time=at,
+    )
+
+
+def _steps(record: Record, channel: str, values: Array) -> Finding | None:
+    """Steps from one sample to the next far beyond those of the motion."""
+    step = np.abs(np.diff(values))
+    limit = max(8.0 * float(np.percentile(step, 99.9)), _SPIKE_LEAST)
+    steps = np.flatnonzero(step > limit)
+    if not len(steps):
+        return None
+    at = float(record.time[steps[0] + 1])
+    return Finding(
+        kind="spikes",
+        message=f"{len(steps)} steps of up to {format_quantity(float(np.max(step)), 'length')} from one "
+        f"sample to the next, the first at {at:.6g} s",
+        remedy="look for loose contacts or damaged blocks of the file",
         severity="warning",
         channel=channel,
         time=at,

@@ -120,8 +120,7 @@ def check_blocks(record: Record) -> list[Finding]:
 
 def _copies(record: Record) -> list[Finding]:
     """Rows that repeat earlier rows one after the other: noise never does that."""
-    _, label = np.unique(record.signals, axis=0, return_inverse=True)
-    label = np.asarray(label).ravel()
+    label = _row_hashes(record.signals)
     order = np.argsort(label, kind="stable")
     same = label[order][1:] == label[order][:-1]
     later, earlier = order[1:][same], order[:-1][same]
@@ -142,6 +141,16 @@ def _copies(record: Record) -> list[Finding]:
             time=float(record.time[start]),
         )
     ]
+
+
+def _row_hashes(signals: Array) -> NDArray[np.uint64]:
+    """One number per row, the same for the same readings; far faster to sort than the rows."""
+    odd = np.random.default_rng(0).integers(1, 2**62, signals.shape[1], dtype=np.uint64) * np.uint64(
+        2
+    ) + np.uint64(1)
+    bits = np.ascontiguousarray(signals + 0.0).view(np.uint64)
+    mixed = (bits ^ (bits >> np.uint64(29))) * odd
+    return np.asarray(np.bitwise_xor.reduce(mixed ^ (mixed >> np.uint64(32)), axis=1))
 
 
 def _longest_run(lag: NDArray[np.int64]) -> tuple[int, int]:

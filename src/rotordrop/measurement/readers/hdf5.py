@@ -43,23 +43,25 @@ def read_hdf5(path: Path, profile: Profile) -> Recording:
     import h5py
 
     try:
-        file = h5py.File(path, "r")
-    except OSError as error:
+        with h5py.File(path, "r") as file:
+            return _recording(file, profile, path)
+    except (OSError, KeyError, RuntimeError, ValueError, TypeError) as error:
         raise RecordError(
-            f"{path} is no intact HDF5 file ({_first_line(error)}; the file has {path.stat().st_size} "
-            "bytes); "
+            f"{path} is no intact HDF5 file ({_first_line(error)}; it has {path.stat().st_size} bytes); "
             "copy or export it again"
         ) from error
-    with file:
-        datasets = _safe_datasets(file, path)
-        entries = {str(key): _text(value) for key, value in file.attrs.items()}
-        times = {name: item for name, item in datasets.items() if _is_time(name)}
-        channels = tuple(
-            _channel(name, item, times, profile, path) for name, item in datasets.items() if name not in times
-        )
-        notes, warnings = (_texts(file, key) for key in ("notes", "warnings"))
+
+
+def _recording(file: Any, profile: Profile, path: Path) -> Recording:
+    datasets = _safe_datasets(file, path)
+    entries = {str(key): _text(value) for key, value in file.attrs.items()}
+    times = {name: item for name, item in datasets.items() if _is_time(name)}
+    channels = tuple(
+        _channel(name, item, times, profile, path) for name, item in datasets.items() if name not in times
+    )
     if not channels:
         raise RecordError(f"{path} holds no one-dimensional numeric dataset; export the channels one by one")
+    notes, warnings = (_texts(file, key) for key in ("notes", "warnings"))
     return Recording(channels=channels, metadata=entries, notes=notes, warnings=warnings)
 
 
