@@ -46,6 +46,10 @@ Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
 ORDERS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
+BOUNCE_MARGIN = 0.1
+"""Time [s] after the last lift-off from which lines are looked for."""
+LONGEST_BOUNCE = 0.1
+"""Share of the signal [1] that is left out at most."""
 RACES_SPUN_UP = 1.0
 """Time [s] from which the speed law is fitted: before it the rotor hands spin to the races."""
 SHORTEST_LAW = 3.0
@@ -187,6 +191,7 @@ def analyse_coast_down(
         signal.sampling_rate,
         signal.profile,
         start_time=signal.start_time,
+        skip=_bouncing(signal),
         candidates=candidates,
         air_gap=float(np.mean(list(signal.air_gap.values()))),
         settings=STANDARD_SETTINGS if signal.recorded else LineSettings(most_lines=LINES_OF_A_SIMULATION),
@@ -197,6 +202,16 @@ def analyse_coast_down(
         planes[name] = _plane(signal, name, lines, candidates, choice)
     tell("speed", 0.95)
     return CoastDownAnalysis(signal=signal, planes=planes, lines=lines, speed_law=_speed_law(signal))
+
+
+def _bouncing(signal: CoastDownSignal) -> float:
+    """How long the rotor bounces at the beginning [s]; nothing if it does not settle soon."""
+    last = 0.0
+    for moved in signal.planes.values():
+        found = find_settling(moved, signal.sampling_rate, start_time=signal.start_time)
+        last = max(last, found.last_lift_off if found.settled else 0.0)
+    duration = next(iter(signal.planes.values())).shape[0] / signal.sampling_rate
+    return last + BOUNCE_MARGIN - signal.start_time if last < LONGEST_BOUNCE * duration else 0.0
 
 
 def _plane(

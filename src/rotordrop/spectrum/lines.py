@@ -117,6 +117,7 @@ def find_lines(
     profile: SpeedProfile | None,
     *,
     start_time: float = 0.0,
+    skip: float = 0.0,
     candidates: Sequence[Candidate] = (),
     air_gap: float | None = None,
     settings: LineSettings = STANDARD_SETTINGS,
@@ -139,6 +140,8 @@ def find_lines(
         Rotor speed; without it every line stays undecided.
     start_time : float
         Time of the first sample [s].
+    skip : float
+        How much of the beginning to leave out [s]: while the rotor bounces it shows everything at once.
     candidates : sequence of Candidate
         What lines could be.
     air_gap : float, optional
@@ -160,8 +163,14 @@ def find_lines(
     found: list[tuple[str, FoundLine]] = []
     for plane, displacement in planes.items():
         thin, rate = reduce_rate(displacement, sampling_rate, highest, samples_per_turn=2.7)
+        first = round(skip * rate)
         search = LineSearch(
-            thin, rate, profile, start_time=start_time, settings=settings, highest_frequency=highest
+            thin[first:],
+            rate,
+            profile,
+            start_time=start_time + first / rate,
+            settings=settings,
+            highest_frequency=highest,
         )
         found += [(plane, line) for line in search.run()]
     bands = (highest, settings.highest_order)
