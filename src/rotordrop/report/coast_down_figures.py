@@ -172,6 +172,11 @@ def statistics_figure(result: CoastDownResult) -> go.Figure:
             peak = scale * result.windows.peak[:, b, column]
             place, legend = {"row": row, "col": b + 1}, row == 1 and b == 0
             _add_levels(figure, time, levels, peak, place, legend=legend)
+        if column == 0:
+            top = scale * float(np.max(result.windows.peak[..., 0]))
+            figure.update_yaxes(range=[-0.15 * top, 1.1 * top], row=row)
+        else:
+            figure.update_yaxes(type="log", dtick="D2", row=row)
         figure.update_yaxes(title_text=axis_title(plain(label), unit), row=row, col=1)
     figure.update_xaxes(title_text=TIME, row=len(_SHOWN))
     return fit_legend(figure)

@@ -18,6 +18,8 @@ from rotordrop.spectrum.waterfall import Waterfall
 Array = NDArray[np.float64]
 
 MOST_COLUMNS = 900
+LOWEST_SHARE = 1e-5
+"""Amplitudes below this share of the largest [1], or below the median, take the darkest colour."""
 LEAST_DISTANCE = 0.03
 """Distance of two marked lines as a share of the width [1]; of closer ones only the stronger is marked."""
 COMPONENT_TITLES = {"x": "horizontal, x", "y": "vertical, y", "full": "full spectrum of x + jy"}
@@ -55,7 +57,7 @@ def waterfall_figure(
         level, title = fall.speed[order] / TURN, axis_title("rotor speed", "Hz")
     else:
         level, title = fall.time, axis_title("time from power-off", "s")
-    floor = float(np.median(amplitude))  # half of the map is noise: it takes the darkest colour
+    floor = max(float(np.median(amplitude)), LOWEST_SHARE * float(np.max(amplitude)))
     shown = np.log10(MICRO * np.maximum(amplitude[order], floor))
     figure.add_trace(
         go.Heatmap(

@@ -1,0 +1,104 @@
+"""Simulated against recorded coast-down of the same machine: lines, amplitudes, maxima, standstill.
+
+The machine keeps its first guesses but for what the record shows directly: air gaps (settled radius less
+sag), drag (fitted to the speed).
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import tempfile
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+from common import keep
+
+from rotordrop.estimation.recorded_coast_down import recorded_coast_down, with_recorded_drag
+from rotordrop.estimation.simulated_coast_down import simulated_coast_down
+from rotordrop.machine import load_machine
+from rotordrop.measurement.record import read_record
+from rotordrop.simulation.case import LevitatedStart
+from rotordrop.simulation.coast_down import simulate_coast_down
+from rotordrop.simulation.coast_down_case import CoastDownCase
+from rotordrop.spectrum.coast_down import WaterfallChoice, analyse_coast_down
+from rotordrop.spectrum.machine_candidates import machine_candidates, swing_ranges
+
+CHOICE = WaterfallChoice(components=("x", "y"))
+
+
+def lines_of(analysis):
+    return [
+        {
+            "label": line.label,
+            "frequency_hz": round(line.frequency, 3),
+            "order": None if line.order is None else round(line.order, 4),
+            "amplitude_zero_to_peak_um": round(1e6 * line.amplitude, 4),
+            "seen_s": [round(line.first_seen, 1), round(line.last_seen, 1)],
+        }
+        for line in analysis.lines
+    ]
+
+
+def maxima_of(analysis):
+    return {
+        name: {
+            "largest_um": round(1e6 * plane.history.largest, 2),
+            "at_s": round(plane.history.largest_time, 4),
+            "later_um": round(1e6 * plane.history.largest_later, 2),
+            "last_lift_off_s": round(plane.settling.last_lift_off, 4),
+            "statement": plane.history.statement,
+        }
+        for name, plane in analysis.planes.items()
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("machine", type=Path)
+    parser.add_argument("record", type=Path)
+    options = parser.parse_args()
+    machine = load_machine(options.machine)
+    record = recorded_coast_down(machine, read_record(options.record, machine))
+    same = with_recorded_drag(machine, record)
+    same = same.with_values({f"{name}.air_gap": gap for name, gap in record.air_gap.items()})
+    speed = float(record.profile.speed_at(0.0))
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "c.h5"
+        case = CoastDownCase(speed=speed, rest=5.0, start=LevitatedStart())
+        result = simulate_coast_down(same, case, output=file)
+        candidates = machine_candidates(same)
+        measured = analyse_coast_down(record, candidates, CHOICE)
+        computed = analyse_coast_down(simulated_coast_down(file, same), candidates, CHOICE)
+    keep(
+        "side_by_side",
+        {
+            "machine": machine.name,
+            "speed_hz": speed / (2.0 * math.pi),
+            "air_gap_um": {name: round(1e6 * gap, 2) for name, gap in record.air_gap.items()},
+            "drag": {
+                "aero_linear": float(same.speed.aero_linear),
+                "aero_quadratic": float(same.speed.aero_quadratic),
+                "race_drag_coefficient": float(same.touchdown_bearings[0].race.drag_coefficient),
+            },
+            "pendulum_small_hz": {swing.bearing: round(swing.small, 3) for swing in swing_ranges(same)},
+            "recorded": {
+                "standstill_s": measured.speed_law.standstill.as_json(),
+                "time_constant_s": measured.speed_law.exponential.time_constant.value,
+                "lines": lines_of(measured),
+                "maxima": maxima_of(measured),
+            },
+            "simulated": {
+                "standstill_s": result.standstill_time,
+                "time_constant_s": computed.speed_law.exponential.time_constant.value,
+                "lines": lines_of(computed),
+                "maxima": maxima_of(computed),
+                "force_and_stress": [maximum.as_json() for maximum in result.maxima()],
+            },
+        },
+    )
+
+
+if __name__ == "__main__":
+    main()
