@@ -74,11 +74,10 @@ def _verdict(analysis: CoastDownAnalysis) -> tuple[Statement, ...]:
             )
         )
     unnamed = sum(not line.named for line in analysis.lines)
+    why = ": nothing in the machine description or the mains explains them well enough" if unnamed else ""
+    count = len(analysis.lines)
     statements.append(
-        Statement(
-            text=f"{len(analysis.lines)} lines found, {len(analysis.lines) - unnamed} named, {unnamed} "
-            "without a name: nothing in the machine description or the mains explains them well enough."
-        )
+        Statement(text=f"{count} lines found, {count - unnamed} named, {unnamed} without a name{why}.")
     )
     if analysis.speed_law is not None:
         statements.append(Statement(text=_standstill(analysis.speed_law)))

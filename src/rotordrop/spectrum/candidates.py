@@ -199,6 +199,7 @@ def harmonic_candidates(name: str, frequency: float, error: float, highest: int 
             value=k * frequency,
             tolerance=k * error,
             reason=f"{k} times the {name} found at {frequency:.2f} Hz",
+            weight=0.5 ** (k - 2),
         )
         for k in range(2, highest + 1)
     )

@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from rotordrop.errors import RecordError
 from rotordrop.spectrum._found_line import FoundLine
 from rotordrop.spectrum._search import LineSearch
@@ -111,6 +113,10 @@ class Line:
         }
 
 
+SWING_ERROR = 0.05
+"""How well the frequency of a wandering swing is known at any time [Hz]."""
+
+
 def find_lines(
     planes: Mapping[str, PlanarSignal],
     sampling_rate: float,
@@ -191,13 +197,12 @@ def _named(
 
     single = [(plane, line) for plane, line in found if line.parent is None]
     first = [named(plane, line, candidates) for plane, line in single]
-    more = [
-        candidate
-        for line in first
-        if line.named and line.kind == "steady" and _swings(line)
-        for candidate in harmonic_candidates(line.label, line.frequency, _spread(line))
+    swings = [
+        (name.label, line)
+        for (_, line), name in zip(single, first, strict=True)
+        if name.named and name.kind == "steady" and _swings(name)
     ]
-    lines = [named(plane, line, (*candidates, *more)) for plane, line in single] if more else first
+    lines = [named(plane, line, (*candidates, *_harmonics(line, swings))) for plane, line in single]
     label = {
         id(line): (result.label if result.named else f"{line.frequency:.1f} Hz")
         for (_, line), result in zip(single, lines, strict=True)
@@ -269,8 +274,20 @@ def _swings(line: Line) -> bool:
     return family in ("pendulum", "whirl")
 
 
-def _spread(line: Line) -> float:
-    return 0.5 * (line.drift[1] - line.drift[0]) + line.frequency_error + 0.05
+def _harmonics(line: FoundLine, swings: Sequence[tuple[str, FoundLine]]) -> list[Candidate]:
+    """Where the multiples of each swing would be seen, as it wanders, while this line was there."""
+    weight = np.sum(line.taken**2, axis=1)
+    total = float(weight.sum())
+    if total == 0.0:
+        return []
+    return [
+        candidate
+        for label, swing in swings
+        if swing is not line
+        for candidate in harmonic_candidates(
+            label, float(weight @ swing.path) / total, swing.frequency_error + SWING_ERROR
+        )
+    ]
 
 
 def _evidence(found: FoundLine, plane: str, bands: tuple[float, float]) -> LineEvidence:

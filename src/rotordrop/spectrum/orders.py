@@ -22,7 +22,7 @@ TURN = 2.0 * math.pi
 LEAST_APART = 3.0
 """Turns per window by which two orders must differ to be told apart [1]."""
 
-STEADY_APART = 4.5
+STEADY_APART = 6.0
 """The same for an order and a steady line, which may be a thousand times stronger [1]."""
 
 STEADY_EXTRA = 2
@@ -283,7 +283,7 @@ def _separable(
     window.
     """
     place = orders * profile.speed_at(time)[:, None] / TURN
-    sweep = 0.4 * orders * np.abs(profile.change_at(time) * window)[:, None] / TURN
+    sweep = 0.5 * orders * np.abs(profile.change_at(time) * window)[:, None] / TURN
     apart = np.ones((time.size, orders.size), dtype=np.bool_)
     for line in steady:
         distance = np.abs(place - line.frequency_at(time)[:, None]) - sweep
