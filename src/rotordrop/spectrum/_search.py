@@ -10,17 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_closing, label
 
+from rotordrop.spectrum._clock import TURN, Clock, View
 from rotordrop.spectrum._found_line import FIVE_MOMENTS, FoundLine, path_range, radius
 from rotordrop.spectrum.detection import Peak, clearest_peak, stretches_of
-from rotordrop.spectrum.line_extraction import Envelope, Offset, drift_phase, extract, mean_offset, smooth
+from rotordrop.spectrum.line_extraction import Envelope, Offset, drift_phase, mean_offset, smooth
 from rotordrop.spectrum.line_settings import LineSettings
-from rotordrop.spectrum.line_spectra import FramePower, frequency_power, offset_power, order_power
+from rotordrop.spectrum.line_spectra import offset_power
 from rotordrop.spectrum.naming import LineKind
 from rotordrop.spectrum.speed_profile import SpeedProfile
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-TURN = 2.0 * math.pi
 
 LASTING = 4
 """Fewest frames [1] in which a line must be seen."""
@@ -59,21 +59,6 @@ BESIDE = 25.0
 """Band [Hz] on either side of a moving path whose power is its floor."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class _View:
-    """One way to look at the signal: over frequency, or over order."""
-
-    frames: FramePower
-    of_orders: bool
-    length: Array
-    share: float
-
-    @property
-    def resolution(self) -> float:
-        """Of a usual frame [Hz]."""
-        return 1.0 / float(np.median(self.length))
-
-
 @dataclass(frozen=True)
 class _Refused:
     """A peak that turned out to be no line, and when."""
@@ -98,14 +83,15 @@ class LineSearch:
         highest_frequency: float,
     ) -> None:
         self.settings = settings
-        self.highest_frequency = highest_frequency
-        self._rate = sampling_rate
-        self._profile = profile
-        self._start = start_time
-        self._time = start_time + np.arange(len(signal)) / sampling_rate
+        self._clock = Clock(
+            len(signal),
+            sampling_rate,
+            profile,
+            start_time=start_time,
+            settings=settings,
+            highest_frequency=highest_frequency,
+        )
         self._rest = signal - smooth(signal, round(sampling_rate / settings.lowest_frequency))
-        self._angle = None if profile is None else profile.angle_at(self._time)
-        self._speed = np.zeros(len(signal)) if profile is None else profile.speed_at(self._time) / TURN
         self._refused: list[_Refused] = []
         self.found: list[FoundLine] = []
 
@@ -121,8 +107,8 @@ class LineSearch:
 
     def _bursts(self) -> None:
         """Take out what is strong for a moment only, against what the same frequency usually shows."""
-        while len(self._refused) < MOST_REFUSED and self._profile is not None:
-            view = self._frequency_view(SHORT_FRAME)
+        while len(self._refused) < MOST_REFUSED and self._clock.profile is not None:
+            view = self._clock.frequency_view(self._rest, SHORT_FRAME)
             usual = np.median(view.frames.power, axis=0)
             peak = self._clearest(view, 0.0, usual)
             if peak is None or peak.ratio < BURST:
@@ -138,7 +124,7 @@ class LineSearch:
     def _single_lines(self, *, speed_change: float, shares: tuple[float, ...]) -> None:
         """Take lines out as long as any is seen while the speed falls by such a share of itself."""
         while len(self.found) < self.settings.most_lines and len(self._refused) < MOST_REFUSED:
-            views = [view for share in shares for view in self._views(share)]
+            views = [view for share in shares for view in self._clock.views(self._rest, share)]
             peaks = [(self._clearest(view, speed_change), view) for view in views]
             seen = [(peak, view) for peak, view in peaks if peak is not None]
             if not seen:
@@ -154,58 +140,12 @@ class LineSearch:
         self.found.append(line)
         self._rest = self._rest - line.taken
 
-    def _refuse(self, peak: Peak, view: _View) -> None:
+    def _refuse(self, peak: Peak, view: View) -> None:
         first, last = view.frames.time[[peak.first, peak.last - 1]]
         self._refused.append(_Refused(view.of_orders, peak.coordinate, float(first), float(last)))
 
-    def _views(self, share: float) -> list[_View]:
-        views = (self._frequency_view(share), self._order_view(share))
-        return [view for view in views if view is not None]
-
-    def _same_view(self, view: _View, signal: Array) -> FramePower:
-        """The same look at another signal."""
-        again = (
-            self._order_view(view.share, signal)
-            if view.of_orders
-            else self._frequency_view(view.share, signal)
-        )
-        assert again is not None
-        return again.frames
-
-    def _frequency_view(self, share: float, signal: Array | None = None) -> _View:
-        length = share * min(self.settings.frame, len(self._rest) / self._rate / 3.0)
-        frames = frequency_power(
-            self._rest if signal is None else signal,
-            self._rate,
-            start_time=self._start,
-            frame=length,
-            highest=self.highest_frequency,
-        )
-        lengths = np.full(len(frames.time), length)
-        return _View(frames=frames, of_orders=False, length=lengths, share=share)
-
-    def _order_view(self, share: float, signal: Array | None = None) -> _View | None:
-        if self._profile is None:
-            return None
-        turns = 2 * round(0.5 * self.settings.turns * (share if share == 1.0 else 2.0 * share))
-        slowest = max(self.settings.lowest_frequency / self.settings.highest_order, 0.5)
-        frames = order_power(
-            self._rest if signal is None else signal,
-            self._rate,
-            self._profile,
-            start_time=self._start,
-            turns=turns,
-            highest_order=self.settings.highest_order,
-            highest_frequency=self.highest_frequency,
-            lowest_speed=TURN * slowest,
-        )
-        if frames is None:
-            return None
-        lengths = turns / np.maximum(self._at(frames.time, self._speed), 0.1)
-        return _View(frames=frames, of_orders=True, length=lengths, share=share)
-
-    def _clearest(self, view: _View, speed_change: float, usual: Array | None = None) -> Peak | None:
-        speed = self._at(view.frames.time, self._speed)
+    def _clearest(self, view: View, speed_change: float, usual: Array | None = None) -> Peak | None:
+        speed = self._clock.at(view.frames.time, self._clock.speed)
         stretches = [
             (first, last)
             for first, last in stretches_of(len(speed), LASTING)
@@ -213,12 +153,14 @@ class LineSearch:
         ]
         return clearest_peak(view.frames, self._free(view), self.settings.detection, stretches, usual)
 
-    def _free(self, view: _View) -> Mask:
+    def _free(self, view: View) -> Mask:
         """Where a new line may be: not at low frequency, not on the path of a line already taken out."""
         time, place = view.frames.time, view.frames.coordinate
         unit = np.ones((len(time), len(FIVE_MOMENTS)))
         if view.of_orders:
-            moments = [self._at(time + share * view.length, self._speed) for share in FIVE_MOMENTS]
+            moments = [
+                self._clock.at(time + share * view.length, self._clock.speed) for share in FIVE_MOMENTS
+            ]
             unit = np.maximum(np.column_stack(moments), 0.1)
         middle = unit[:, 2]
         free = place * middle[:, None] >= self.settings.lowest_frequency
@@ -239,26 +181,22 @@ class LineSearch:
                 free &= ~(then[:, None] & (np.abs(place - refused.coordinate) < 2.0 * width[:, None]))
         return free
 
-    def _at(self, time: Array, values: Array) -> Array:
-        """Values at other times."""
-        return np.interp(time, self._time, values)
-
-    def _follow(self, peak: Peak, view: _View) -> FoundLine | None:
+    def _follow(self, peak: Peak, view: View) -> FoundLine | None:
         """Follow a peak through the signal; None if a line only swept past it."""
-        advance = cast(Array, self._angle) if view.of_orders else TURN * self._time
+        advance = cast(Array, self._clock.angle) if view.of_orders else TURN * self._clock.time
         spoken = self._spoken(peak, view)
         coordinate, offset = peak.coordinate, Offset(value=0.0, error=math.inf)
         for lag in LAGS:
-            envelope = self._extract(coordinate * advance)
+            envelope = self._clock.extract(self._rest, coordinate * advance)
             present = self._present(envelope, peak, spoken)
             used = self._undisturbed(envelope, peak, present, spoken)
-            offset = mean_offset(envelope.value, advance, lag=round(lag * self._rate), present=used)
+            offset = mean_offset(envelope.value, advance, lag=round(lag * self._clock.rate), present=used)
             coordinate += offset.value
         phase = coordinate * advance
         if not view.of_orders and peak.ratio > 6.0:
-            envelope = self._extract(phase)
-            phase = phase + drift_phase(envelope.value, self._rate, present, span=1.0)
-        envelope = self._extract(phase)
+            envelope = self._clock.extract(self._rest, phase)
+            phase = phase + drift_phase(envelope.value, self._clock.rate, present, span=1.0)
+        envelope = self._clock.extract(self._rest, phase)
         present = self._present(envelope, peak, spoken)
         taken = self._part(envelope, present)
         if not self._explained(peak, view, taken) or self._better_otherwise(
@@ -267,77 +205,68 @@ class LineSearch:
             return None
         return self._describe(envelope, present, taken, peak, view, coordinate, offset.error)
 
-    def _explained(self, peak: Peak, view: _View, taken: Array) -> bool:
+    def _explained(self, peak: Peak, view: View, taken: Array) -> bool:
         """Whether a line taken out is what made the peak: a line that only sweeps past leaves most of it."""
         row = slice(peak.first, peak.last)
-        after = self._same_view(view, self._rest - taken).power[row, :, peak.channel]
+        after = self._clock.same_view(view, self._rest - taken).power[row, :, peak.channel]
         line = int(np.argmin(np.abs(view.frames.coordinate - peak.coordinate)))
         near = slice(max(line - 1, 0), line + 2)
         left = np.nanmedian(np.nanmax(after[:, near], axis=1))
         whole = np.nanmedian(np.nanmax(view.frames.power[row, near, peak.channel], axis=1))
         return bool(left < LEFT_OVER * whole)
 
-    def _better_otherwise(self, envelope: Envelope, view: _View, coordinate: float, spoken: Mask) -> bool:
+    def _better_otherwise(self, envelope: Envelope, view: View, coordinate: float, spoken: Mask) -> bool:
         """Whether the other kind of line, steady or order, holds more of the power where the peak was
         seen.
         """
-        if self._angle is None:
+        if self._clock.angle is None:
             return False
-        speed = float(np.mean(self._speed[spoken]))
+        speed = float(np.mean(self._clock.speed[spoken]))
         order = coordinate if view.of_orders else coordinate / speed
-        if order * float(np.ptp(self._speed[spoken])) > CLOSE * self.settings.bandwidth:
+        if order * float(np.ptp(self._clock.speed[spoken])) > CLOSE * self.settings.bandwidth:
             return False
-        other = coordinate * speed * TURN * self._time if view.of_orders else order * self._angle
-        rival = self._extract(other)
+        other = coordinate * speed * TURN * self._clock.time if view.of_orders else order * self._clock.angle
+        rival = self._clock.extract(self._rest, other)
         usual = 4.0 * np.median(np.abs(envelope.value[spoken]) ** 2, axis=0)
         own, others = (np.minimum(np.abs(e.value[spoken]) ** 2, usual).sum() for e in (envelope, rival))
         return bool(others > 1.05 * own)
 
-    def _spoken(self, peak: Peak, view: _View) -> Mask:
+    def _spoken(self, peak: Peak, view: View) -> Mask:
         """The part of the signal in which a peak was seen."""
         times, length = view.frames.time, view.length
         first = times[peak.first] - 0.5 * length[peak.first]
         last = times[peak.last - 1] + 0.5 * length[peak.last - 1]
-        return np.asarray((self._time >= first) & (self._time <= last))
-
-    def _extract(self, phase: Array) -> Envelope:
-        return extract(self._rest, self._rate, phase, bandwidth=self.settings.bandwidth)
-
-    def _rate_of(self, phase: Array) -> Array:
-        """Frequency [Hz] of a phase at each sample."""
-        return cast(Array, np.gradient(phase) * self._rate / TURN)
-
-    def _reachable(self, phase: Array) -> Mask:
-        frequency = np.abs(self._rate_of(phase))
-        return (frequency >= self.settings.lowest_frequency) & (frequency <= self.highest_frequency)
+        return np.asarray((self._clock.time >= first) & (self._clock.time <= last))
 
     def _undisturbed(self, envelope: Envelope, peak: Peak, present: Mask, spoken: Mask) -> Mask:
         """Where no bang swells the line, and no line taken out before, of which a rest stays, comes near."""
-        frequency = np.abs(self._rate_of(envelope.phase))
+        frequency = np.abs(self._clock.rate_of(envelope.phase))
         size = np.abs(envelope.value[:, peak.channel])
         seen = present & spoken if (present & spoken).any() else present
         alone = seen & (size < 5.0 * float(np.median(size[seen])))
         for line in self.found:
-            alone &= ~(np.abs(frequency - line.frequency_at(self._time)) < 2.0 * self.settings.bandwidth)
+            alone &= ~(
+                np.abs(frequency - line.frequency_at(self._clock.time)) < 2.0 * self.settings.bandwidth
+            )
             if line.brief and line.ratio > BURST:
                 # The start and end of a burst spread over all frequencies.
-                alone &= (self._time < line.first_seen) | (self._time > line.last_seen)
+                alone &= (self._clock.time < line.first_seen) | (self._clock.time > line.last_seen)
         return alone if alone.sum() > 0.3 * seen.sum() else seen
 
     def _present(self, envelope: Envelope, peak: Peak, spoken: Mask) -> Mask:
         """Where the line stands clear of the floor; where it was detected if it hardly does."""
         size = np.abs(envelope.value[:, peak.channel])
-        reachable = self._reachable(envelope.phase)
+        reachable = self._clock.reachable(envelope.phase)
         clear = (size > 2.0 * peak.floor) & reachable
         if spoken.mean() < BRIEF:
-            clear &= _connected(clear, spoken, round(0.5 * self._rate))
+            clear &= _connected(clear, spoken, round(0.5 * self._clock.rate))
         return clear if clear[spoken].mean() > 0.2 else spoken & reachable
 
     def _part(self, envelope: Envelope, present: Mask) -> Array:
         """The line where it is present [m], fading in and out."""
-        reach = round(self._rate / self.settings.bandwidth)
+        reach = round(self._clock.rate / self.settings.bandwidth)
         near = smooth(present.astype(np.float64), reach) > 0.02
-        fade = smooth((near & self._reachable(envelope.phase)).astype(np.float64), max(reach // 4, 1))
+        fade = smooth((near & self._clock.reachable(envelope.phase)).astype(np.float64), max(reach // 4, 1))
         return fade[:, None] * envelope.line()
 
     def _describe(
@@ -346,14 +275,14 @@ class LineSearch:
         present: Mask,
         taken: Array,
         peak: Peak,
-        view: _View,
+        view: View,
         coordinate: float,
         error: float,
     ) -> FoundLine:
         weight = _weight(envelope, present)
-        frequency = self._rate_of(envelope.phase)
+        frequency = self._clock.rate_of(envelope.phase)
         mean = float(np.sum(weight * frequency))
-        speed = float(np.sum(weight * self._speed))
+        speed = float(np.sum(weight * self._clock.speed))
         decided = self._decided(weight, mean, view.resolution)
         width = math.sqrt(max(peak.width**2 - (1.44 * view.frames.spacing) ** 2, 0.0))
         if view.of_orders:
@@ -400,7 +329,7 @@ class LineSearch:
         multiple: float = 0.0,
     ) -> FoundLine:
         there = envelope.value[present]
-        when = self._time[present]
+        when = self._clock.time[present]
         return FoundLine(
             kind=kind,
             frequency=frequency,
@@ -417,27 +346,30 @@ class LineSearch:
             first_seen=float(when[0]),
             last_seen=float(when[-1]),
             existence=1.0 - self.settings.detection.false_alarm,
-            time=self._time,
+            time=self._clock.time,
             phase=envelope.phase,
-            path=np.abs(self._rate_of(envelope.phase)),
+            path=np.abs(self._clock.rate_of(envelope.phase)),
             taken=taken,
-            brief=bool(when[-1] - when[0] < BRIEF * (self._time[-1] - self._time[0])),
+            brief=bool(when[-1] - when[0] < BRIEF * (self._clock.time[-1] - self._clock.time[0])),
             parent=parent,
             multiple=multiple,
         )
 
     def _decided(self, weight: Array, frequency: float, resolution: float) -> bool:
         """Whether the speed changed enough, while the line was seen, to say whether the line follows it."""
-        if self._profile is None:
+        if self._clock.profile is None:
             return False
         first, last = np.searchsorted(np.cumsum(weight), [0.1, 0.9])
-        early, late = float(self._speed[first]), float(self._speed[min(last, len(self._speed) - 1)])
+        early, late = (
+            float(self._clock.speed[first]),
+            float(self._clock.speed[min(last, len(self._clock.speed) - 1)]),
+        )
         middle = 0.5 * (early + late)
         return middle <= 0.0 or frequency / middle * abs(late - early) > DECIDED * resolution
 
     def _combinations(self) -> None:
         """Lines at a steady one plus or minus an order: look along every such path."""
-        if self._angle is None:
+        if self._clock.angle is None:
             return
         steady = sorted(
             (line for line in self.found if line.kind == "steady"), key=lambda line: -line.strength
@@ -445,7 +377,7 @@ class LineSearch:
         pairs = [(line, k) for line in steady[:STEADY_PARTNERS] for k in COMBINED_ORDERS]
         while pairs and len(self.found) < self.settings.most_lines:
             scored = [
-                (self._along(line.phase + k * self._angle, share), line, k)
+                (self._along(line.phase + k * self._clock.angle, share), line, k)
                 for line, k in pairs
                 for share in (1.0, 0.5)
             ]
@@ -458,14 +390,16 @@ class LineSearch:
 
     def _along(self, phase: Array, share: float) -> Peak | None:
         """The peak, if there is one, on a moving path against what lies beside it."""
-        length = share * min(self.settings.frame, len(self._rest) / self._rate / 3.0)
+        length = share * self._clock.frame
         turned = 2.0 * self._rest * np.exp(-1j * phase)[:, None]
-        view = offset_power(turned, self._rate, start_time=self._start, frame=length, reach=BESIDE)
-        usable = self._at(view.time, self._reachable(phase).astype(np.float64)) > 0.99
-        path = np.abs(self._rate_of(phase))
+        view = offset_power(
+            turned, self._clock.rate, start_time=self._clock.start, frame=length, reach=BESIDE
+        )
+        usable = self._clock.at(view.time, self._clock.reachable(phase).astype(np.float64)) > 0.99
+        path = np.abs(self._clock.rate_of(phase))
         for line in self.found:
             moments = [view.time + share * length for share in FIVE_MOMENTS]
-            apart = np.abs([self._at(when, path) - line.frequency_at(when) for when in moments])
+            apart = np.abs([self._clock.at(when, path) - line.frequency_at(when) for when in moments])
             usable &= apart.min(axis=0) > 2.0 * self.settings.bandwidth * max(line.skirt, 1.0)
         allowed = usable[:, None] & (np.abs(view.coordinate) < 2.5 * view.spacing)
         stretches = [
@@ -479,10 +413,10 @@ class LineSearch:
         return peak
 
     def _take_combination(self, peak: Peak, partner: FoundLine, k: float) -> None:
-        phase = partner.phase + k * cast(Array, self._angle)
-        envelope = self._extract(phase)
-        present = self._present(envelope, peak, self._reachable(phase))
-        frequency = np.abs(self._rate_of(phase))
+        phase = partner.phase + k * cast(Array, self._clock.angle)
+        envelope = self._clock.extract(self._rest, phase)
+        present = self._present(envelope, peak, self._clock.reachable(phase))
+        frequency = np.abs(self._clock.rate_of(phase))
         low, high = np.percentile(frequency[present], [5.0, 95.0])
         line = self._line(
             envelope,

@@ -1,0 +1,125 @@
+"""Time, speed and rotor angle of the signal that is searched for lines, and the ways to look at it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.spectrum.line_extraction import Envelope, extract
+from rotordrop.spectrum.line_settings import LineSettings
+from rotordrop.spectrum.line_spectra import FramePower, frequency_power, order_power
+from rotordrop.spectrum.speed_profile import SpeedProfile
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+TURN = 2.0 * math.pi
+
+
+@dataclass(frozen=True, kw_only=True)
+class View:
+    """One way to look at a signal: over frequency, or over order.
+
+    Attributes
+    ----------
+    frames : FramePower
+    of_orders : bool
+    length : shape (F,)
+        Length of the frames [s].
+    share : float
+        Of the usual length [1].
+    """
+
+    frames: FramePower
+    of_orders: bool
+    length: Array
+    share: float
+
+    @property
+    def resolution(self) -> float:
+        """Of a usual frame [Hz]."""
+        return 1.0 / float(np.median(self.length))
+
+
+class Clock:
+    """Times of the samples, with rotor speed and angle if they are known."""
+
+    def __init__(
+        self,
+        samples: int,
+        sampling_rate: float,
+        profile: SpeedProfile | None,
+        *,
+        start_time: float,
+        settings: LineSettings,
+        highest_frequency: float,
+    ) -> None:
+        self.settings = settings
+        self.highest_frequency = highest_frequency
+        self.rate = sampling_rate
+        self.profile = profile
+        self.start = start_time
+        self.time: Array = start_time + np.arange(samples, dtype=np.float64) / sampling_rate
+        self.angle = None if profile is None else profile.angle_at(self.time)
+        self.speed = np.zeros(samples) if profile is None else profile.speed_at(self.time) / TURN
+        self.frame = min(settings.frame, samples / sampling_rate / 3.0)
+
+    def at(self, time: Array, values: Array) -> Array:
+        """Values [any] of the samples at other times."""
+        return np.interp(time, self.time, values)
+
+    def rate_of(self, phase: Array) -> Array:
+        """Frequency [Hz] of a phase [rad] at each sample."""
+        return cast(Array, np.gradient(phase) * self.rate / TURN)
+
+    def reachable(self, phase: Array) -> Mask:
+        """Where a phase [rad] runs at a frequency that is looked at."""
+        frequency = np.abs(self.rate_of(phase))
+        return (frequency >= self.settings.lowest_frequency) & (frequency <= self.highest_frequency)
+
+    def extract(self, signal: Array, phase: Array) -> Envelope:
+        """The part of a signal [m] that follows a phase [rad]."""
+        return extract(signal, self.rate, phase, bandwidth=self.settings.bandwidth)
+
+    def views(self, signal: Array, share: float) -> list[View]:
+        """All ways to look at a signal [m] in frames of a share of the usual length."""
+        views = (self.frequency_view(signal, share), self.order_view(signal, share))
+        return [view for view in views if view is not None]
+
+    def same_view(self, view: View, signal: Array) -> FramePower:
+        """The same look at another signal [m]."""
+        again = (self.order_view if view.of_orders else self.frequency_view)(signal, view.share)
+        assert again is not None
+        return again.frames
+
+    def frequency_view(self, signal: Array, share: float) -> View:
+        """Power over frequency, in frames of equal time."""
+        length = share * self.frame
+        frames = frequency_power(
+            signal, self.rate, start_time=self.start, frame=length, highest=self.highest_frequency
+        )
+        return View(frames=frames, of_orders=False, length=np.full(len(frames.time), length), share=share)
+
+    def order_view(self, signal: Array, share: float) -> View | None:
+        """Power over order, in frames of equal rotor angle; None without speed or whole frame."""
+        if self.profile is None:
+            return None
+        turns = 2 * round(0.5 * self.settings.turns * (share if share == 1.0 else 2.0 * share))
+        slowest = max(self.settings.lowest_frequency / self.settings.highest_order, 0.5)
+        frames = order_power(
+            signal,
+            self.rate,
+            self.profile,
+            start_time=self.start,
+            turns=turns,
+            highest_order=self.settings.highest_order,
+            highest_frequency=self.highest_frequency,
+            lowest_speed=TURN * slowest,
+        )
+        if frames is None:
+            return None
+        lengths = turns / np.maximum(self.at(frames.time, self.speed), 0.1)
+        return View(frames=frames, of_orders=True, length=lengths, share=share)
