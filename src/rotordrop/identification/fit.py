@@ -56,6 +56,10 @@ class Misfit(Protocol):
     def leading(self) -> NDArray[np.bool_]:
         """Unknowns that are fitted while many starts run; the others wait at their start, shape (n,)."""
 
+    @property
+    def considered(self) -> NDArray[np.bool_]:
+        """Unknowns that keep their prior; their uncertainty reaches the others, shape (n,)."""
+
     def residual(self, x: Array, window: float) -> Array:
         """Residual over its standard deviation up to a time [s], shape (r,)."""
 
@@ -80,6 +84,8 @@ class Fit:
         Simulations used for it.
     active : tuple of bool
         Which unknowns lie at a bound.
+    information : ndarray, shape (n, n)
+        What the record alone says: the normal matrix without the priors.
     """
 
     x: Array
@@ -89,6 +95,7 @@ class Fit:
     window: float
     evaluations: int
     active: tuple[bool, ...]
+    information: Array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,13 +137,15 @@ def fit_window(
     count = 1
     point = _evaluated(problem, np.clip(start, *problem.bounds), window)
     damping = 1e-3
-    normal = np.eye(len(start))
+    information = np.zeros((len(start),) * 2)
     chosen = np.ones(len(start), dtype=np.bool_) if fitted is None else fitted
     for _ in range(iterations):
         jacobian = _jacobian(problem, point, window, chosen, pool)
         count += int(chosen.sum())
-        normal, gradient = _normal(problem, point, jacobian)
-        better, damping, tried = _improved(problem, point, window, chosen, normal, gradient, damping)
+        information = jacobian.T @ jacobian
+        gradient = jacobian.T @ point.residual
+        free = chosen & ~problem.considered
+        better, damping, tried = _improved(problem, point, window, free, information, gradient, damping)
         count += tried
         if better is None:
             break
@@ -151,10 +160,11 @@ def fit_window(
         x=point.x,
         cost=point.cost,
         misfit=misfit,
-        covariance=_inverse(normal) * max(misfit, 1.0),
+        covariance=considered_covariance(problem, information, max(misfit, 1.0)),
         window=window,
         evaluations=count,
         active=tuple((point.x <= lower + 1e-9) | (point.x >= upper - 1e-9)),
+        information=information,
     )
 
 
@@ -192,24 +202,20 @@ def _jacobian(
     return jacobian
 
 
-def _normal(problem: Misfit, point: _Point, jacobian: Array) -> tuple[Array, Array]:
-    weight = 1.0 / problem.prior_sigma**2
-    normal = jacobian.T @ jacobian + np.diag(weight)
-    gradient = jacobian.T @ point.residual + weight * (point.x - problem.prior_mean)
-    return normal, gradient
-
-
 def _improved(
     problem: Misfit,
     point: _Point,
     window: float,
     chosen: NDArray[np.bool_],
-    normal: Array,
-    gradient: Array,
+    information: Array,
+    slope: Array,
     damping: float,
 ) -> tuple[_Point | None, float, int]:
     """A point of lower cost, the damping for the next step, and the simulations it took."""
     lower, upper = problem.bounds
+    weight = 1.0 / problem.prior_sigma**2
+    normal = information + np.diag(weight)
+    gradient = slope + weight * (point.x - problem.prior_mean)
     held = ((point.x <= lower) & (gradient > 0.0)) | ((point.x >= upper) & (gradient < 0.0))
     free = chosen & ~held
     for trial in range(TRIALS):
@@ -222,6 +228,36 @@ def _improved(
             return candidate, damping / EASING, trial + 1
         damping *= LARGEST_RISE
     return None, damping, TRIALS
+
+
+def considered_covariance(problem: Misfit, information: Array, scale: float) -> Array:
+    """Covariance of the unknowns, with those that are only considered at their prior.
+
+    Parameters
+    ----------
+    problem : Misfit
+        Gives priors, and which unknowns are considered.
+    information : ndarray, shape (n, n)
+        Normal matrix of the record without the priors.
+    scale : float
+        What the information is divided by [1]: misfit over noise, and widening.
+
+    Notes
+    -----
+    Source: consider covariance of orbit determination (Tapley, Schutz and Born, Statistical Orbit
+    Determination).
+    """
+    prior = problem.prior_sigma**2
+    fitted, kept = np.flatnonzero(~problem.considered), np.flatnonzero(problem.considered)
+    record = information / scale
+    inner = _inverse(record[np.ix_(fitted, fitted)] + np.diag(1.0 / prior[fitted]))
+    pull = inner @ record[np.ix_(fitted, kept)]
+    covariance = np.zeros_like(information)
+    covariance[np.ix_(fitted, fitted)] = inner + (pull * prior[kept]) @ pull.T
+    covariance[np.ix_(fitted, kept)] = -pull * prior[kept]
+    covariance[np.ix_(kept, fitted)] = (-pull * prior[kept]).T
+    covariance[kept, kept] = prior[kept]
+    return covariance
 
 
 def _inverse(normal: Array) -> Array:
@@ -387,7 +423,8 @@ class _Searching:
         """Points for the next window: the best fit itself, then the best of the others and of the draws."""
         draws = self.schedule.draws
         each = max(1, draws[min(stage, len(draws) - 1)] // len(fits))
-        moved = np.ones(len(fits[0].x)) if stage >= self.schedule.few else self.problem.leading.astype(float)
+        free = ~self.problem.considered
+        moved = (free if stage >= self.schedule.few else free & self.problem.leading).astype(np.float64)
         points = [fit.x for fit in fits]
         for fit in fits:
             root = np.linalg.cholesky(fit.covariance + 1e-12 * np.diag(np.diag(fit.covariance)))
@@ -396,24 +433,6 @@ class _Searching:
         costs = list(self.pool.map(lambda x: _evaluated(self.problem, x, window).cost, points[1:]))
         self.evaluations += len(points) - 1
         return [points[0], *(points[1 + k] for k in np.argsort(costs, kind="stable")[: kept - 1])]
-
-
-def widened_covariance(fit: Fit, prior_sigma: Array, factor: float) -> Array:
-    """Covariance with the information of the record divided by ``factor²``; the prior keeps its own.
-
-    Parameters
-    ----------
-    fit : Fit
-        The fit.
-    prior_sigma : ndarray, shape (n,)
-        Prior standard deviations of its unknowns.
-    factor : float
-        What standard errors of a determined unknown grow by [1].
-    """
-    prior = np.diag(1.0 / prior_sigma**2)
-    scale = max(fit.misfit, 1.0)
-    record = _inverse(fit.covariance) * scale - prior
-    return _inverse(record / (scale * factor**2) + prior)
 
 
 def sobol_starts(centre: Array, spread: Array, count: int, seed: int = 1) -> list[Array]:

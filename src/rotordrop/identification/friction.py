@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rotordrop.estimated import IdentifiedValue
 from rotordrop.identification.parameter_vector import FRICTION
-from rotordrop.identification.support import ImpactFit
+from rotordrop.identification.support import WIDENING, ImpactFit
 
 Array = NDArray[np.float64]
 
@@ -142,8 +142,7 @@ def orbit_distance(problem: ImpactFit, x: Array, count: int) -> Array:
     replica = problem.replica
     theta, fall = problem.split(x)
     rows = replica.bearing_rows(problem.vector, theta, fall[replica.initial.unknowns.rest].reshape(-1, 2))
-    state = replica.state + problem.states @ x[len(problem.vector) :]
-    states, _ = replica.states(rows, replica.time[:count], state)
+    states, _ = replica.states(rows, replica.time[:count], *problem.start(x))
     apart = replica.sensing.at_bearings(replica.predicted(states, fall) - replica.deviation[:count])
     return np.asarray(np.hypot(apart[..., 0], apart[..., 1]))
 
@@ -161,7 +160,7 @@ def _lowest(coefficients: Array, values: Array) -> float:
 def _value(problem: ImpactFit, best: Array, coefficients: Array) -> IdentifiedValue:
     value = float(best[0])
     grid = float(coefficients[1] - coefficients[0]) / np.sqrt(12.0)
-    error = float(np.hypot(np.std(best, ddof=1), 0.2 * grid)) if len(best) > 2 else grid
+    error = WIDENING * float(np.hypot(np.std(best, ddof=1), 0.1 * grid)) if len(best) > 2 else grid
     low, high = float(coefficients[0]), float(coefficients[-1])
     unknown = problem.vector.unknowns[problem.vector.place(FRICTION)]
     at_bound = value in (low, high)

@@ -91,8 +91,21 @@ class Replica:
         rows[:, L.AIR_GAP] = self.radius - down - sag
         return rows
 
-    def states(self, rows: Array, time: Array, state: Array | None = None) -> tuple[Array, Array]:
+    def states(
+        self, rows: Array, time: Array, state: Array | None = None, unbalance: Array | None = None
+    ) -> tuple[Array, Array]:
         """States at times after the start, shape (T, n), and the contact log.
+
+        Parameters
+        ----------
+        rows : ndarray, shape (B, columns)
+            Bearing parameters.
+        time : ndarray, shape (T,)
+            Times [s from power-off].
+        state : ndarray, shape (n,), optional
+            State at the start; the replica's own by default.
+        unbalance : ndarray, shape (2, m), optional
+            Modal unbalance, cosine and sine; the replica's own by default.
 
         Raises
         ------
@@ -103,10 +116,13 @@ class Replica:
         out = np.empty((len(times), len(self.state)))
         log = np.zeros((LOG_ROWS, _loop.N_LOG_COLUMNS))
         counters = np.zeros(5)
+        parameters = with_bearing(self.model.parameters, rows)
+        if unbalance is not None:
+            parameters = parameters._replace(unbalance_cos=unbalance[0], unbalance_sin=unbalance[1])
         outcome = _loop.integrate_drop(
             self.state if state is None else state,
             times,
-            with_bearing(self.model.parameters, rows),
+            parameters,
             tsit5(),
             self.scale,
             TOLERANCE,
@@ -141,10 +157,13 @@ class Replica:
         """Number of samples up to a time from power-off [s]."""
         return int(np.searchsorted(self.time, time + 1e-9))
 
-    def start_state(self, unknowns: Array) -> Array:
-        """State of the drop model at the start for other values of the unknowns of the fall."""
+    def start_state(self, unknowns: Array) -> tuple[Array, Array]:
+        """State (n,) at the start and modal unbalance (2, m) for other values of the unknowns of the fall."""
         fall = self.initial.fall
-        return kernel_state(fall, self.initial.state_at(self.start, unknowns), fall.speed * self.start)[0]
+        state, _, unbalance = kernel_state(
+            fall, self.initial.state_at(self.start, unknowns), fall.speed * self.start
+        )
+        return state, unbalance
 
 
 def build_replica(

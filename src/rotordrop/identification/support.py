@@ -8,22 +8,28 @@ uncertainty of all of it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 from functools import cached_property
+from os import cpu_count
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.estimated import IdentifiedValue, Verdict
 from rotordrop.identification.fit import (
+    Fit,
     Progress,
     Schedule,
     Search,
+    considered_covariance,
+    fit_window,
     search,
     sobol_starts,
-    widened_covariance,
 )
 from rotordrop.identification.parameter_vector import (
+    FRICTION,
     ParameterVector,
     joined,
     nuisance_vector,
@@ -39,7 +45,7 @@ WINDOWS = (1.75e-3, 3.25e-3, 5.25e-3, 7.25e-3, 11e-3, 16e-3)
 COARSE_WINDOWS = 3
 """How many of them are searched with a coarse basis; the last of these is the first of the fine basis."""
 
-WIDENING = 1.5
+WIDENING = 2.0
 """Factor on standard errors for what the linearised fit leaves out [1]."""
 
 DIRECTIONS = 16
@@ -50,6 +56,10 @@ LEADING_DIRECTIONS = 8
 
 MODEL_NOISE = 0.1e-6
 """What the reduced rotor leaves out, beside the sensor noise [m]."""
+
+CONSIDERED = ("axial_offset", "race.inertia", "contact.damping")
+"""Parameters that are not fitted, though their uncertainty is carried: a fit would move them to hide what
+the model lacks, and the mean stress would follow."""
 
 STEP = 1e-4
 BOUND_FACTOR = np.log(6.0)
@@ -75,6 +85,8 @@ class ImpactFit:
         Directions of the unknowns of the fall, one standard deviation each.
     states : ndarray, shape (n, K)
         What these directions change in the state at the start of the simulation.
+    unbalances : ndarray, shape (2, m, K)
+        What they change in the modal unbalance.
     remaining_directions : ndarray, shape (u, u - K)
         Directions of the fall's unknowns that matter too little to be fitted along.
     """
@@ -83,6 +95,7 @@ class ImpactFit:
     vector: ParameterVector
     directions: Array
     states: Array
+    unbalances: Array
     remaining_directions: Array
 
     @cached_property
@@ -128,10 +141,23 @@ class ImpactFit:
         own = [unknown.path.endswith(ends) for unknown in self.vector.unknowns]
         return np.array(own + [k < LEADING_DIRECTIONS for k in range(self.directions.shape[1])])
 
+    @cached_property
+    def considered(self) -> NDArray[np.bool_]:
+        """Unknowns that keep their prior: what a record tells little of, such as the preload."""
+        own = [unknown.path.endswith(CONSIDERED) for unknown in self.vector.unknowns]
+        return np.array(own + [False] * self.directions.shape[1])
+
     def split(self, x: Array) -> tuple[Array, Array]:
         """Parameters of the bearings, and unknowns of the fall."""
         count = len(self.vector)
         return x[:count], self.replica.initial.mean + self.directions @ x[count:]
+
+    def start(self, x: Array) -> tuple[Array, Array]:
+        """State at the start of the simulation, and modal unbalance (2, m)."""
+        moved = x[len(self.vector) :]
+        p = self.replica.model.parameters
+        unbalance = np.stack([p.unbalance_cos, p.unbalance_sin]) + self.unbalances @ moved
+        return self.replica.state + self.states @ moved, unbalance
 
     def residual(self, x: Array, window: float) -> Array:
         """Weighted residual up to a time from power-off [s], shape (r,)."""
@@ -140,8 +166,7 @@ class ImpactFit:
         count = replica.until(window)
         rest = fall[replica.initial.unknowns.rest].reshape(-1, 2)
         rows = replica.bearing_rows(self.vector, theta, rest)
-        state = replica.state + self.states @ x[len(self.vector) :]
-        states, _ = replica.states(rows, replica.time[:count], state)
+        states, _ = replica.states(rows, replica.time[:count], *self.start(x))
         return np.asarray(
             ((replica.predicted(states, fall) - replica.deviation[:count]) / self.noise).ravel()
         )
@@ -175,46 +200,68 @@ class SupportFit:
     correlations: dict[str, float]
 
 
-def influential_directions(replica: Replica, count: int = DIRECTIONS) -> tuple[Array, Array, Array]:
-    """Directions of the fall's unknowns that move the drop most, one standard deviation each.
+@dataclass(frozen=True, kw_only=True)
+class Directions:
+    """Directions of the fall's unknowns, one standard deviation each, that which matters most first.
 
-    Returns
-    -------
-    directions : ndarray, shape (u, count)
+    Attributes
+    ----------
+    unknowns : ndarray, shape (u, K)
         Change of the unknowns of the fall.
-    states : ndarray, shape (n, count)
+    states : ndarray, shape (n, K)
         Change of the state at the start of the simulation.
-    remaining : ndarray, shape (u, u - count)
+    unbalances : ndarray, shape (2, m, K)
+        Change of the modal unbalance.
+    remaining : ndarray, shape (u, u - K)
         The other directions.
     """
+
+    unknowns: Array
+    states: Array
+    unbalances: Array
+    remaining: Array
+
+
+def influential_directions(replica: Replica, count: int = DIRECTIONS) -> Directions:
+    """Directions of the fall's unknowns that move the drop most."""
     initial, layout = replica.initial, replica.model.layout
     root = initial.square_root()
-    changes = np.column_stack([replica.start_state(initial.mean + column) for column in root.T])
-    changes -= replica.state[:, None]
-    shapes = replica.model.parameters.bearing_shape
-    reach = np.max(np.abs(shapes), axis=0)[:, None]
+    starts = [replica.start_state(initial.mean + column) for column in root.T]
+    base = replica.start_state(initial.mean)
+    changes = np.column_stack([state - base[0] for state, _ in starts])
+    unbalances = np.stack([unbalance - base[1] for _, unbalance in starts], axis=-1)
+    p, speed = replica.model.parameters, initial.fall.speed
+    reach = np.max(np.abs(p.bearing_shape), axis=0)[:, None]
     effects = []
     for place in (layout.modal_x, layout.modal_y):
         rate = layout.velocity_of(place)
-        effects += [shapes @ changes[place] / 1e-6, shapes @ changes[rate] / 3e-4]
+        effects += [p.bearing_shape @ changes[place] / 1e-6, p.bearing_shape @ changes[rate] / 3e-4]
         effects += [(reach * changes[place])[2:5] / 1e-6, (reach * changes[rate])[2:5] / 1e-3]
+    answer = speed**2 / np.maximum(np.abs(p.eigenvalue - speed**2), 0.2 * speed**2)
+    effects += [(reach * answer[:, None] * part)[:5] / 1e-6 for part in unbalances]
     effects += [root[initial.unknowns.gain] / 5e-3, root[initial.unknowns.rest] / 5e-6]
     _, _, turned = np.linalg.svd(np.vstack(effects), full_matrices=True)
     leading, others = turned[:count].T, turned[count:].T
-    return np.asarray(root @ leading), np.asarray(changes @ leading), np.asarray(root @ others)
+    return Directions(
+        unknowns=root @ leading,
+        states=changes @ leading,
+        unbalances=unbalances @ leading,
+        remaining=root @ others,
+    )
 
 
 def impact_problem(replica: Replica, *, nuisance: ParameterVector | None = None) -> ImpactFit:
     """The problem of the first impacts for a drop that can be run again."""
     beside = nuisance_vector(replica.model) if nuisance is None else nuisance
     vector = joined(support_vector(replica.model), beside) if len(beside) else support_vector(replica.model)
-    directions, states, remaining = influential_directions(replica)
+    directions = influential_directions(replica)
     return ImpactFit(
         replica=replica,
         vector=vector,
-        directions=directions,
-        states=states,
-        remaining_directions=remaining,
+        directions=directions.unknowns,
+        states=directions.states,
+        unbalances=directions.unbalances,
+        remaining_directions=directions.remaining,
     )
 
 
@@ -267,15 +314,44 @@ def fit_support(
         threads=threads,
         progress=lambda text, share: report(text, 0.5 + 0.5 * share),
     )
-    covariance = widened_covariance(found.best, fine.prior_sigma, WIDENING)
+    covariance = widened_covariance(fine, found.best)
     return SupportFit(
         problem=fine,
         coarse=first,
         search=found,
         covariance=covariance,
-        values={path: _identified(fine, found, covariance, k) for k, path in enumerate(fine.vector.paths)},
+        values=identified_values(fine, found.best.x, covariance, active=found.best.active),
         correlations=_correlations(fine, found, supports),
     )
+
+
+def widened_covariance(problem: ImpactFit, fit: Fit) -> Array:
+    """Covariance with the information of the record reduced for what the linearised fit leaves out."""
+    return considered_covariance(problem, fit.information, max(fit.misfit, 1.0) * WIDENING**2)
+
+
+def refit_with_friction(
+    problem: ImpactFit, fit: Fit, friction: IdentifiedValue, *, threads: int | None = None
+) -> tuple[ImpactFit, Array, Array]:
+    """Fit once more over the same window with the friction coefficient that the sweep found.
+
+    Returns
+    -------
+    problem : ImpactFit
+        The problem with that friction as its prior.
+    x, covariance : ndarray, shapes (n,), (n, n)
+        Best unknowns and their widened covariance.
+    """
+    place = problem.vector.place(FRICTION)
+    unknowns = list(problem.vector.unknowns)
+    error = (friction.standard_error or 0.0) / friction.value
+    unknowns[place] = replace(unknowns[place], mean=math.log(friction.value), sigma=max(error, 1e-4))
+    known = replace(problem, vector=ParameterVector(unknowns=tuple(unknowns)))
+    start = fit.x.copy()
+    start[place] = known.prior_mean[place]
+    with ThreadPoolExecutor(max_workers=threads or cpu_count() or 1) as pool:
+        again = fit_window(known, start, fit.window, iterations=6, tolerance=1e-3, pool=pool)
+    return known, again.x, widened_covariance(known, again)
 
 
 def _handed_over(x: Array, coarse: ImpactFit, fine: ImpactFit) -> Array:
@@ -284,21 +360,43 @@ def _handed_over(x: Array, coarse: ImpactFit, fine: ImpactFit) -> Array:
     return np.concatenate([x[:count], np.zeros(fine.directions.shape[1])])
 
 
-def _identified(problem: ImpactFit, found: Search, covariance: Array, place: int) -> IdentifiedValue:
-    unknown = problem.vector.unknowns[place]
-    x = float(found.best.x[place])
-    error = float(np.sqrt(covariance[place, place]))
-    low, high = (float(b[place]) for b in problem.bounds)
-    value = unknown.value_of(x)
-    return IdentifiedValue(
-        value=value,
-        status=_verdict(bool(found.best.active[place]), error, unknown.sigma),
-        standard_error=value * error if unknown.logarithmic else error,
-        interval_90=(unknown.value_of(x - NINETY * error), unknown.value_of(x + NINETY * error)),
-        start=unknown.value_of(unknown.mean),
-        bounds=(unknown.value_of(low), unknown.value_of(high)),
-        unit=unknown.unit,
-    )
+def identified_values(
+    problem: ImpactFit,
+    x: Array,
+    covariance: Array,
+    *,
+    active: tuple[bool, ...] = (),
+    given: bool = False,
+) -> dict[str, IdentifiedValue]:
+    """Values of the parameters by path, each with error, interval, start, bounds and verdict.
+
+    Parameters
+    ----------
+    problem : ImpactFit
+        The problem they belong to.
+    x, covariance : ndarray, shapes (n,), (n, n)
+        The unknowns and their covariance.
+    active : tuple of bool
+        Which unknowns lie at a bound.
+    given : bool
+        Whether the values were taken over and not found from this record.
+    """
+    values = {}
+    low, high = problem.bounds
+    for k, unknown in enumerate(problem.vector.unknowns):
+        mean, error = float(x[k]), float(np.sqrt(covariance[k, k]))
+        at_bound = bool(active[k]) if active else False
+        value = unknown.value_of(mean)
+        values[unknown.path] = IdentifiedValue(
+            value=value,
+            status="prior" if given else _verdict(at_bound, error, unknown.sigma),
+            standard_error=value * error if unknown.logarithmic else error,
+            interval_90=(unknown.value_of(mean - NINETY * error), unknown.value_of(mean + NINETY * error)),
+            start=unknown.value_of(unknown.mean),
+            bounds=(unknown.value_of(float(low[k])), unknown.value_of(float(high[k]))),
+            unit=unknown.unit,
+        )
+    return values
 
 
 def _verdict(at_bound: bool, error: float, prior: float) -> Verdict:

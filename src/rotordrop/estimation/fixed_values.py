@@ -1,0 +1,113 @@
+"""Supports and friction of an earlier estimate, applied to another drop (Neisi 2020, section 5.1)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from rotordrop.errors import UsageError
+from rotordrop.estimated import Estimated
+from rotordrop.machine import Machine
+
+Document = Mapping[str, Any]
+
+NEEDED = {
+    "support.stiffness": "support.stiffness_N_per_m",
+    "support.mass": "support.mass_kg",
+    "support.damping": "support.damping_N_s_per_m",
+    "friction.dynamic": "friction.dynamic",
+}
+WELCOME = {
+    "friction.static": "friction.static",
+    "contact.stiffness": "contact.stiffness_N_per_m_n",
+    "contact.damping": "contact.damping_s_per_m",
+    "race.inertia": "race.inertia_kg_m2",
+    "damping_time": "damping_time_s",
+    "preload": "preload_N",
+}
+"""Values that are taken over where the estimate has them: they were found together with the supports."""
+
+
+def read_fixed(fixed: str | Path | Document) -> tuple[Document, str]:
+    """Document of an earlier estimate, and where it comes from.
+
+    Raises
+    ------
+    UsageError
+        If it cannot be read, or holds several drops.
+    """
+    if isinstance(fixed, Mapping):
+        document, place = fixed, "an earlier estimate"
+    else:
+        place = str(fixed)
+        try:
+            document = json.loads(Path(fixed).read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise UsageError(
+                f"{place} cannot be read as an estimate ({error}); give a file written by 'rotordrop "
+                "estimate --json'."
+            ) from error
+        if not isinstance(document, Mapping):
+            raise UsageError(
+                f"{place} holds a {type(document).__name__}; expected an object with 'bearings'. Give a file "
+                "written by 'rotordrop estimate --json'."
+            )
+    if isinstance(document.get("drops"), Mapping):
+        raise UsageError(
+            f"{place} holds the drops {', '.join(document['drops'])}; expected one. Write the drop whose "
+            "supports are to be used to a file of its own."
+        )
+    if not isinstance(document.get("bearings"), Mapping):
+        raise UsageError(
+            f"{place} holds {', '.join(document) or 'nothing'}; expected 'bearings' with their supports. "
+            "Give a file written by 'rotordrop estimate --json'."
+        )
+    return document, place
+
+
+def machine_with_fixed(machine: Machine, document: Document, place: str) -> Machine:
+    """The machine with supports, friction and what was found beside them in an earlier estimate.
+
+    Raises
+    ------
+    UsageError
+        If the estimate lacks a bearing of the machine, or its support or friction.
+    """
+    values: dict[str, Estimated] = {}
+    for bearing in machine.touchdown_bearings:
+        entry = document["bearings"].get(bearing.name)
+        if not isinstance(entry, Mapping):
+            raise UsageError(
+                f"{place} has no touchdown bearing {bearing.name!r}; it has "
+                f"{', '.join(document['bearings'])}. Use an estimate of the same machine."
+            )
+        for path, field in {**NEEDED, **WELCOME}.items():
+            found = _at(entry, field)
+            if found is not None:
+                values[f"{bearing.name}.{path}"] = _estimated(found, f"estimate {place}")
+            elif path in NEEDED:
+                raise UsageError(
+                    f"{place} has no {field!r} for {bearing.name!r}; it has {', '.join(entry)}. Give an "
+                    "estimate that identified supports and friction."
+                )
+    return machine.with_values(values)
+
+
+def _at(entry: Mapping[str, Any], field: str) -> Mapping[str, Any] | None:
+    at: Any = entry
+    for key in field.split("."):
+        at = at.get(key) if isinstance(at, Mapping) else None
+    return at if isinstance(at, Mapping) and "value" in at else None
+
+
+def _estimated(found: Mapping[str, Any], source: str) -> Estimated:
+    interval = found.get("interval_90")
+    return Estimated(
+        value=float(found["value"]),
+        status="estimated",
+        interval_90=None if interval is None else (float(interval[0]), float(interval[1])),
+        standard_error=found.get("standard_error"),
+        source=source,
+    )

@@ -1,0 +1,160 @@
+"""Identified values of a replayed drop, by the field names of the estimate's document."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.estimated import IdentifiedValue
+from rotordrop.estimation.uncertainty import FEWEST_DRAWS, Draws, drop_numbers, interval
+from rotordrop.identification.air_gap import AirGap
+from rotordrop.identification.first_contact import FirstContact
+from rotordrop.identification.friction import FrictionSweep
+from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.physics.ball_bearing import bearing_constants
+from rotordrop.simulation.certificate import refined_peak
+from rotordrop.simulation.result import DropResult
+from rotordrop.tracking.unknowns import preload_of_offset
+
+Array = NDArray[np.float64]
+Values = dict[str, IdentifiedValue]
+
+NINETY = 1.6448536269514722
+FIELDS = {
+    "support.stiffness": "support.stiffness_N_per_m",
+    "support.damping": "support.damping_N_s_per_m",
+    "support.mass": "support.mass_kg",
+    "contact.stiffness": "contact.stiffness_N_per_m_n",
+    "contact.damping": "contact.damping_s_per_m",
+    "race.inertia": "race.inertia_kg_m2",
+    "damping_time": "damping_time_s",
+}
+LOADS = ("peak_force_N", "mean_force_0p15_0p2_N", "peak_stress_Pa", "mean_stress_Pa")
+
+
+def replay_values(
+    fitted: Mapping[str, IdentifiedValue],
+    machine: Machine,
+    gap: AirGap,
+    contacts: tuple[FirstContact, ...],
+    friction: FrictionSweep | None,
+    simulated: DropResult,
+    draws: Draws | None,
+) -> dict[str, Values]:
+    """Identified values per bearing.
+
+    Parameters
+    ----------
+    fitted : mapping
+        Values of the impact fit by path, such as ``"NDE.support.stiffness"``.
+    machine : Machine
+        The machine that was replayed.
+    gap, contacts, friction
+        Results of the steps; ``friction`` is None when it was taken over.
+    simulated : DropResult
+        The replayed drop.
+    draws : Draws or None
+        Draws behind the intervals.
+    """
+    found: dict[str, Values] = {}
+    for b, bearing in enumerate(machine.touchdown_bearings):
+        values: Values = {
+            "air_gap_m": _air_gap(gap, b),
+            "equivalent_stiffness_N_per_m": IdentifiedValue(
+                value=contacts[b].equivalent_stiffness, standard_error=contacts[b].standard_error, unit="N/m"
+            ),
+        }
+        for path, field in FIELDS.items():
+            values[field] = fitted[f"{bearing.name}.{path}"]
+        values["preload_N"] = _preload(bearing, fitted[f"{bearing.name}.axial_offset"])
+        values |= _friction(bearing, friction)
+        values |= _loads(simulated, draws, b)
+        found[bearing.name] = values
+    return found
+
+
+def peak_time(result: DropResult, bearing: int) -> float:
+    """Time of the peak force [s]."""
+    return refined_peak(result.time, result.bearing_force_magnitude[:, bearing])[1]
+
+
+def _air_gap(gap: AirGap, b: int) -> IdentifiedValue:
+    value, error = float(gap.value[b]), float(gap.standard_error[b])
+    return IdentifiedValue(
+        value=value,
+        standard_error=error,
+        interval_90=(value - NINETY * error, value + NINETY * error),
+        lower=float(gap.lower[b]),
+        upper=float(gap.upper[b]),
+        unit="m",
+    )
+
+
+def _preload(bearing: TouchdownBearing, offset: IdentifiedValue) -> IdentifiedValue:
+    """Preload [N] of the fitted axial offset of the rows."""
+    constants = bearing_constants(bearing.bearing)
+
+    def preload(axial: float) -> float:
+        return preload_of_offset(constants, axial)
+
+    low, high = offset.interval_90 or (offset.value, offset.value)
+    return replace(
+        offset,
+        value=preload(offset.value),
+        standard_error=(preload(high) - preload(low)) / (2.0 * NINETY),
+        interval_90=(preload(low), preload(high)),
+        start=None if offset.start is None else preload(offset.start),
+        bounds=None if offset.bounds is None else (preload(offset.bounds[0]), preload(offset.bounds[1])),
+        unit="N",
+    )
+
+
+def _friction(bearing: TouchdownBearing, sweep: FrictionSweep | None) -> Values:
+    law = bearing.friction
+    ratio = float(law.static) / float(law.dynamic)
+    if sweep is not None:
+        dynamic = sweep.value
+    else:
+        dynamic = IdentifiedValue(
+            value=float(law.dynamic),
+            status="prior",
+            standard_error=law.dynamic.standard_error,
+            interval_90=law.dynamic.interval_90,
+            unit="1",
+        )
+    low, high = dynamic.interval_90 or (dynamic.value, dynamic.value)
+    static = IdentifiedValue(
+        value=ratio * dynamic.value,
+        status="prior",
+        standard_error=None if dynamic.standard_error is None else ratio * dynamic.standard_error,
+        interval_90=(0.85 * ratio * low, 1.15 * ratio * high),
+        unit="1",
+    )
+    return {"friction.static": static, "friction.dynamic": dynamic}
+
+
+def _loads(simulated: DropResult, draws: Draws | None, b: int) -> Values:
+    force, stress = drop_numbers(simulated)
+    values = (force[0, b], force[1, b], stress[0, b], stress[1, b])
+    samples: tuple[Array | None, ...] = (None,) * 4
+    if draws is not None and len(draws) >= FEWEST_DRAWS:
+        samples = (
+            draws.peak_force[:, b],
+            draws.mean_force[:, b],
+            draws.peak_stress[:, b],
+            draws.mean_stress[:, b],
+        )
+    found = {}
+    for field, value, sample in zip(LOADS, values, samples, strict=True):
+        if np.isfinite(value):
+            found[field] = IdentifiedValue(
+                value=float(value),
+                status="determined" if sample is not None else "the record does not determine it",
+                standard_error=None if sample is None else float(np.std(sample, ddof=1)),
+                interval_90=None if sample is None else interval(sample),
+                unit=field.rsplit("_", 1)[1],
+            )
+    return found
