@@ -44,8 +44,10 @@ KIND_OF_UNIT = {
 }
 
 
-def kind_of_unit(unit: str) -> str:
-    """Kind in which a report shows a value of an SI unit; a unit without one counts as a pure number."""
+def kind_of_unit(unit: str, path: str = "") -> str:
+    """Kind in which a report shows a parameter by its SI unit and path; no unit counts as a pure number."""
+    if path.endswith("damping_time"):
+        return "short_time"
     return KIND_OF_UNIT.get(unit, "dimensionless")
 
 

@@ -44,7 +44,7 @@ class Impact:
 
 
 def impacts_of(contacts: ContactLog, bearing_names: Sequence[str]) -> tuple[Impact, ...]:
-    """List the contacts of a simulated drop as impacts, without intervals."""
+    """List the contacts of a simulated drop as impacts, bearing by bearing, without intervals."""
     return tuple(
         Impact(
             bearing=bearing_names[int(contacts.bearing[i])],
@@ -55,7 +55,7 @@ def impacts_of(contacts: ContactLog, bearing_names: Sequence[str]) -> tuple[Impa
             impulse=Quantity(value=float(contacts.impulse[i]), kind="impulse", digits=3),
             dissipated_energy=Quantity(value=float(contacts.dissipated_energy[i]), kind="energy", digits=3),
         )
-        for i in range(len(contacts))
+        for i in np.argsort(contacts.bearing, kind="stable")
     )
 
 

@@ -37,6 +37,8 @@ MILLI = 1e3
 MICRO = 1e6
 TIME_TITLE = "time from power-off [ms]"
 PANEL_HEIGHT = 300
+VISIBLE_GAP = 1.0
+"""Difference of two limits [µm] from which they are drawn as a strip."""
 TOP_MARGIN = 62
 LEGEND_ROW = 22
 LEGEND_WIDTH = 720
@@ -214,10 +216,10 @@ def add_band(
 def add_gap_limits(
     figure: go.Figure, gap: AirGap, *, sign: float = 1.0, row: int = 1, column: int = 1, legend: bool = False
 ) -> None:
-    """Draw the air gap as a horizontal limit, or as a strip between its lower and upper value."""
+    """Draw the air gap as a horizontal limit, or as a strip where its limits differ visibly."""
     lower, upper = sorted((sign * MICRO * gap.lower, sign * MICRO * gap.upper))
     place = {"row": row, "col": column}
-    if upper > lower:
+    if upper - lower >= VISIBLE_GAP:
         figure.add_hrect(
             y0=lower,
             y1=upper,
@@ -228,7 +230,7 @@ def add_gap_limits(
             **place,
         )
     else:
-        add_level(figure, lower, "air gap", legend=legend, **place)
+        add_level(figure, 0.5 * (lower + upper), "air gap", legend=legend, **place)
 
 
 def add_level(figure: go.Figure, value: float, name: str, *, row: int, col: int, legend: bool) -> None:

@@ -142,7 +142,9 @@ def tracked_impacts(drop: TrackedDrop) -> tuple[Impact, ...]:
             impulse=Quantity.of(impact.impulse, "impulse", digits=3),
             dissipated_energy=Quantity.of(impact.dissipated_energy, "energy", digits=3),
         )
+        for name in drop.values
         for impact in drop.impacts
+        if impact.bearing == name
     )
 
 
@@ -205,7 +207,7 @@ def _row(drop: TrackedDrop, unknown: Unknown, mean: float, sigma: float) -> Para
     else:
         prior = identified(unknown, unknown.mean, unknown.sigma)
         estimate = identified(unknown, mean, error, wide)
-    kind = "short_time" if name.endswith("damping_time") else kind_of_unit(estimate.unit)
+    kind = kind_of_unit(estimate.unit, name)
     return ParameterRow(
         name=name,
         prior=Quantity.of(prior, kind),
