@@ -1,4 +1,4 @@
-"""Calibrate a machine on several recorded drops and write the machine file with estimates.
+"""Calibrate a machine on several recorded drops.
 
 One fit over all drops: supports, contacts, air gaps, friction, preload, sensors, each with a 90 % interval.
 """

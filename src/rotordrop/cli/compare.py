@@ -1,4 +1,4 @@
-"""Compare several drops: which was worst, and how sure that is.
+"""Compare drops: which was worst, and how sure that is.
 
 Reads what 'rotordrop estimate --json' wrote, one file per drop or one of several drops.
 """

@@ -1,4 +1,4 @@
-"""Show critical speeds: map over support stiffness, Campbell diagrams, mode shapes.
+"""Show critical speeds, Campbell diagrams and mode shapes.
 
 Undamped map as in the paper and with support mass; damped modes free-free, in the AMBs, in the bearings.
 """

@@ -1,4 +1,4 @@
-"""Estimate touchdown-bearing force and stress from recorded drops.
+"""Estimate bearing force and stress from recorded drops.
 
 Prints the verdict; writes the numbers as JSON and an offline report on request.
 """

@@ -1,4 +1,4 @@
-"""Find and name the frequencies of a coast-down, recorded or simulated.
+"""Name the frequencies of a recorded or simulated coast-down.
 
 Waterfalls as in the paper, orders without smear, lines with names, resonances, displacement, speed law.
 """
