@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rotordrop.cli._options import JsonOption
+from rotordrop.cli._options import JsonOption, quantity
 from rotordrop.cli._output import deliver, require_places
 from rotordrop.errors import UsageError
 
@@ -30,8 +30,9 @@ def compare(
         float | None,
         typer.Option(
             "--scatter",
-            metavar="NEWTONS",
-            help="Standard deviation of the peak force between equal drops [N], to judge speeds, not drops.",
+            parser=quantity("force"),
+            metavar="FORCE",
+            help='Scatter of the peak force between equal drops (1 s.d.), "400 N", to judge speeds.',
         ),
     ] = None,
     report: Annotated[

@@ -34,13 +34,22 @@ def synthesize(
         int, typer.Option(metavar="NUMBER", min=0, help="Seed of the first drop; the next ones follow.")
     ] = 0,
     duration: Annotated[
-        float, typer.Option(parser=quantity("time"), metavar="TIME", help="Recording after the trigger.")
+        float,
+        typer.Option(
+            parser=quantity("time"), metavar="TIME", help="Recorded after power-off.", show_default="0.3 s"
+        ),
     ] = 0.3,
     sampling_rate: Annotated[
-        float, typer.Option(parser=quantity("frequency"), metavar="RATE", help="Sampling rate.")
+        float,
+        typer.Option(
+            parser=quantity("frequency"), metavar="RATE", help="Sampling rate.", show_default="20 kHz"
+        ),
     ] = 20e3,
     noise: Annotated[
-        float, typer.Option(parser=quantity("length"), metavar="LENGTH", help="Sensor noise, rms.")
+        float,
+        typer.Option(
+            parser=quantity("length"), metavar="LENGTH", help="Sensor noise, rms.", show_default="0.45 um"
+        ),
     ] = 0.45e-6,
     bits: Annotated[int, typer.Option(metavar="NUMBER", help="Bits of the converter; 0 for none.")] = 16,
     violation: Annotated[
