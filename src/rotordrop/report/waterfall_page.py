@@ -183,7 +183,7 @@ def _line_section(analysis: CoastDownAnalysis) -> Section:
 
 
 def _order_section(analysis: CoastDownAnalysis) -> Section:
-    figures, rows = [], []
+    figures, rows, crossed = [], [], 0
     for name, plane in analysis.planes.items():
         if plane.track is None:
             continue
@@ -202,19 +202,25 @@ def _order_section(analysis: CoastDownAnalysis) -> Section:
                 f"{r.speed / (2 * np.pi):.1f} Hz",
                 Quantity(value=r.amplitude, kind="length", digits=3),
                 f"{r.rise:.1f}",
-                r.name.label if r.certain else f"{r.name.label} (a steady line crosses here)",
+                r.name.label,
             )
             for r in plane.resonances
+            if r.certain
         ]
+        crossed += sum(not r.certain for r in plane.resonances)
     table = Table(
         columns=("plane", "order", "excited at", "rotor speed", "amplitude", "rise", "mode"),
         rows=tuple(rows),
         caption="Resonances passed on the way down",
     )
     if not rows:
-        none = Statement(text="No order rises above its surroundings on the way down.")
-        return Section(heading="Orders and resonances", statements=(none,), figures=tuple(figures))
-    return Section(heading="Orders and resonances", figures=tuple(figures), tables=(table,))
+        none = "No order rises above its surroundings on the way down, but where it crosses a steady line"
+        left_out = (Statement(text=f"{none} ({crossed} times)."),)
+        return Section(heading="Orders and resonances", statements=left_out, figures=tuple(figures))
+    text = (
+        f"{crossed} more rises are left out: a steady line crosses the order there and makes part of them.",
+    )
+    return Section(heading="Orders and resonances", text=text, figures=tuple(figures), tables=(table,))
 
 
 def _law_section(analysis: CoastDownAnalysis, law: SpeedLaw) -> Section:
