@@ -66,11 +66,7 @@ def summary(cases: list[Case], computed: Mapping[str, Mapping[str, float]]) -> l
         chosen = [case for case in cases if case.kind == kind]
         if not chosen:
             continue
-        shares = [
-            _share(entry, computed[case.id][entry.name])
-            for case in chosen
-            for entry in case.expected
-        ]
+        shares = [_share(entry, computed[case.id][entry.name]) for case in chosen for entry in case.expected]
         lines.append(f"| {kind} | {about} | {len(chosen)} | {len(shares)} | {max(shares):.0%} |")
     return [*lines, ""]
 

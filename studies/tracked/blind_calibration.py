@@ -3,7 +3,8 @@
 Usage: python studies/tracked/blind_calibration.py KIND SEED [SEED ...] [--violation NAME] [--replay]
 
 KIND is ``lp400`` (the paper's rotor) or ``small`` (a 10–20 kg rotor at 500 Hz). Seeds below 1000 were
-used while the estimator was made; only seeds from 1000 on are scored. One JSON file per machine, with every raw number.
+used while the estimator was made; only seeds from 1000 on are scored. One JSON file per machine,
+with every raw number.
 """
 
 from __future__ import annotations

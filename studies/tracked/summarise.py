@@ -2,8 +2,10 @@
 
 Usage: python studies/tracked/summarise.py [FOLDER]
 
-Writes ``summary.json`` and ``summary.md`` beside the raw results. Coverage is counted over bearings and drops; its
-Wilson interval takes machines as the independent units (the effective number of trials is the number of intervals
+Writes ``summary.json`` and ``summary.md`` beside the raw results. Coverage is counted over
+bearings and drops; its
+Wilson interval takes machines as the independent units (the effective number of trials is the
+number of intervals
 over the design effect of clustering by machine).
 """
 

@@ -64,7 +64,10 @@ def replay_values(
         values: Values = {
             "air_gap_m": _air_gap(gap, b),
             "equivalent_stiffness_N_per_m": IdentifiedValue(
-                value=contacts[b].equivalent_stiffness, standard_error=contacts[b].standard_error, unit="N/m"
+                value=contacts[b].equivalent_stiffness,
+                status="the record does not determine it",
+                standard_error=contacts[b].standard_error,
+                unit="N/m",
             ),
         }
         for path, field in FIELDS.items():
