@@ -52,7 +52,6 @@ def compare(
         raise UsageError(
             f"{len(drops)} drop to compare; at least two are needed. "
             "Give several estimates, or one of several drops."
-            "Give several estimates, or one of several drops."
         )
     machines = {str(document.get("machine", "")) for document in documents.values()}
     drop_scatter = None if scatter is None else {"peak_force_N": scatter}
