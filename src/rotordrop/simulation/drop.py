@@ -150,7 +150,7 @@ def _result(
         rejected_steps=int(counters[1]),
         outcome=_sentence(outcome, case, counters, len(log), n_b),
         finished=outcome == _loop.FINISHED,
-        certificate=_energy_certificate(model, case, parameters, times, states, force),
+        certificate=_energy_certificate(model, parameters, times, states, force),
     )
 
 
@@ -188,13 +188,12 @@ def _sentence(outcome: int, case: DropCase, counters: Array, contacts: int, n_be
 
 
 def _energy_certificate(
-    model: DropModel, case: DropCase, parameters: KernelParameters, times: Array, states: Array, force: Array
+    model: DropModel, parameters: KernelParameters, times: Array, states: Array, force: Array
 ) -> Certificate:
     layout = model.layout
-    with_spin = case.spin != "prescribed"
     chosen = np.unique(np.linspace(0, len(states) - 1, 200).astype(int))
     stored = np.empty(len(chosen))
-    H.stored_energies(states[chosen], parameters, with_spin, stored)
+    H.stored_energies(states[chosen], parameters, True, stored)
     balance = stored + states[chosen, layout.dissipated] - states[chosen, layout.work_in]
     return Certificate(
         energy_residual=float(np.max(np.abs(balance - balance[0]))),
