@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from importlib.resources import files
 
 import pytest
 
@@ -81,3 +82,38 @@ def test_critical_speeds_of_the_paper(tmp_path, capsys):
     text = capsys.readouterr().out
     assert "134.0, 235.0" in text and "132.9, 206.4" in text
     assert "Critical speed map" in files["page"].read_text()
+
+
+def test_the_page_of_a_coast_down_states_maxima_and_certificate(machine, tmp_path, capsys):
+    page, numbers = tmp_path / "c.html", tmp_path / "c.json"
+    arguments = ["coast-down", machine, "--speed", "60 Hz", "--until", "0.3 s", "--certify"]
+    assert run([*arguments, "--report", str(page), "--json", str(numbers)]) == 0
+    text = page.read_text()
+    for expected in (
+        "Does 0.2 s hold the maximum?",
+        "Second by second",
+        "Largest Hertz stress",
+        "Friction law",
+    ):
+        assert expected in text
+    certificate = json.loads(numbers.read_text())["certificate"]
+    assert certificate["tighter_tolerance"] == pytest.approx(1e-7)
+    assert max(max(row) for row in certificate["peak_change"]) < 0.05
+    assert "At a tolerance of 1e-07" in capsys.readouterr().out
+
+
+def test_waterfall_of_the_bundled_record(tmp_path, capsys):
+    lp400 = str(example_path("lp400"))
+    record = files("rotordrop") / "examples" / "lp400" / "drop_060.h5"
+    numbers = tmp_path / "w.json"
+    arguments = ["waterfall", lp400, str(record), "--points", "8192", "--amplitude", "peak-to-peak"]
+    assert run([*arguments, "--component", "y", "--json", str(numbers)]) == 0
+    found = json.loads(numbers.read_text())
+    assert found["recorded"]
+    assert found["speed_law"] is None
+    for plane in found["planes"].values():
+        assert plane["first_0.2_s_held_the_maximum"]
+        assert plane["largest_displacement_time_s"] < 0.05
+        assert plane["waterfalls"][0]["amplitude_kind"] == "peak-to-peak"
+    assert any(line["label"].startswith("pendulum") for line in found["lines"])
+    assert "simulated" in capsys.readouterr().out
