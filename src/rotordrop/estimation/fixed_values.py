@@ -111,3 +111,17 @@ def _estimated(found: Mapping[str, Any], source: str) -> Estimated:
         standard_error=found.get("standard_error"),
         source=source,
     )
+
+
+def fixed_correlations(document: Document) -> dict[tuple[str, str], float]:
+    """Correlations of support values in an earlier estimate by pairs of paths [1]; may be empty."""
+    at: Any = document.get("identification")
+    for key in ("support", "correlations"):
+        at = at.get(key) if isinstance(at, Mapping) else None
+    if not isinstance(at, Mapping):
+        return {}
+    pairs = {}
+    for names, value in at.items():
+        first, _, second = str(names).partition(" ~ ")
+        pairs[first, second] = float(value)
+    return pairs

@@ -15,7 +15,12 @@ from numpy.typing import NDArray
 
 from rotordrop.estimated import Estimated, IdentifiedValue
 from rotordrop.estimation.agreement import Agreement, compare_orbits, spread_horizon
-from rotordrop.estimation.fixed_values import Document, machine_with_fixed, read_fixed
+from rotordrop.estimation.fixed_values import (
+    Document,
+    fixed_correlations,
+    machine_with_fixed,
+    read_fixed,
+)
 from rotordrop.estimation.recorded_fall import RecordedFall, measured_drop, recorded_fall
 from rotordrop.estimation.replay_document import replay_document as replay_document
 from rotordrop.estimation.replay_values import peak_time, replay_values
@@ -131,10 +136,11 @@ def replay_drop(
     marginalised; the friction from a number; the intervals from draws.
     """
     say = progress or (lambda text, share: None)
-    known, origin = _known(machine, fixed)
+    document, origin = ({}, "") if fixed is None else read_fixed(fixed)
+    known = machine_with_fixed(machine, document, origin) if origin else machine
     say("air gap, speed, initial state, first contact", 0.0)
     fall = recorded_fall(known, record, tail)
-    impacts = _taken_over(fall) if origin else _first_impacts(fall, starts, threads, say)
+    impacts = _taken_over(fall, document) if origin else _first_impacts(fall, starts, threads, say)
     gap = _steady_gap(fall, impacts)
     say("replay of the whole drop", STAGES["replay"])
     simulated, middle, lower, upper = _replay(impacts, gap)
@@ -167,20 +173,19 @@ def replay_drop(
     )
 
 
-def _known(machine: Machine, fixed: str | Path | Document | None) -> tuple[Machine, str]:
-    """The machine with what an earlier estimate fixes, and where that comes from."""
-    if fixed is None:
-        return machine, ""
-    document, place = read_fixed(fixed)
-    return machine_with_fixed(machine, document, place), place
-
-
-def _taken_over(fall: RecordedFall) -> Impacts:
+def _taken_over(fall: RecordedFall, document: Document) -> Impacts:
     """Supports and friction of an earlier estimate, with their own uncertainty."""
     problem = impact_problem(
         build_replica(fall.record, fall.rest, fall.initial, fall.model, until=IDENTIFIED_UNTIL)
     )
     covariance = np.diag(problem.prior_sigma**2)
+    paths = problem.vector.paths
+    for (first, second), correlation in fixed_correlations(document).items():
+        if first in paths and second in paths:
+            i, k = paths.index(first), paths.index(second)
+            covariance[i, k] = covariance[k, i] = (
+                correlation * problem.prior_sigma[i] * problem.prior_sigma[k]
+            )
     return Impacts(
         problem=problem,
         x=problem.prior_mean,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.estimated import IdentifiedValue
+from rotordrop.estimation.tracked import MODEL_FORCE_SIGMA, MODEL_MEAN_FORCE_SIGMA, MODEL_STRESS_SIGMA
 from rotordrop.estimation.uncertainty import FEWEST_DRAWS, Draws, drop_numbers, interval
 from rotordrop.identification.air_gap import AirGap
 from rotordrop.identification.first_contact import FirstContact
@@ -32,7 +34,15 @@ FIELDS = {
     "race.inertia": "race.inertia_kg_m2",
     "damping_time": "damping_time_s",
 }
-LOADS = ("peak_force_N", "mean_force_0p15_0p2_N", "peak_stress_Pa", "mean_stress_Pa")
+MODEL_SIGMA = {
+    "peak_force_N": MODEL_FORCE_SIGMA,
+    "mean_force_0p15_0p2_N": MODEL_MEAN_FORCE_SIGMA,
+    "peak_stress_Pa": MODEL_STRESS_SIGMA,
+    "mean_stress_Pa": MODEL_STRESS_SIGMA,
+}
+"""Relative standard deviation by what every model here leaves out, beside the draws [1]."""
+
+LOADS = tuple(MODEL_SIGMA)
 
 
 def replay_values(
@@ -153,11 +163,20 @@ def _loads(simulated: DropResult, draws: Draws | None, b: int) -> Values:
     found = {}
     for field, value, sample in zip(LOADS, values, samples, strict=True):
         if np.isfinite(value):
-            found[field] = IdentifiedValue(
-                value=float(value),
-                status="determined" if sample is not None else "the record does not determine it",
-                standard_error=None if sample is None else float(np.std(sample, ddof=1)),
-                interval_90=None if sample is None else interval(sample),
-                unit=field.rsplit("_", 1)[1],
-            )
+            found[field] = _load(float(value), sample, MODEL_SIGMA[field], field.rsplit("_", 1)[1])
     return found
+
+
+def _load(value: float, sample: Array | None, model: float, unit: str) -> IdentifiedValue:
+    """A force or stress with the interval of its draws, widened by what every model here leaves out."""
+    if sample is None:
+        return IdentifiedValue(value=value, status="the record does not determine it", unit=unit)
+    low, high = interval(sample)
+    middle = float(np.median(sample))
+    beside = NINETY * model * value
+    return IdentifiedValue(
+        value=value,
+        standard_error=math.hypot(float(np.std(sample, ddof=1)), model * value),
+        interval_90=(middle - math.hypot(middle - low, beside), middle + math.hypot(high - middle, beside)),
+        unit=unit,
+    )

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import cpu_count
 from typing import Protocol
 
@@ -140,11 +140,11 @@ def fit_window(
     information = np.zeros((len(start),) * 2)
     chosen = np.ones(len(start), dtype=np.bool_) if fitted is None else fitted
     for _ in range(iterations):
-        jacobian = _jacobian(problem, point, window, chosen, pool)
-        count += int(chosen.sum())
+        free = chosen & ~problem.considered
+        jacobian = _jacobian(problem, point, window, free, pool)
+        count += int(free.sum())
         information = jacobian.T @ jacobian
         gradient = jacobian.T @ point.residual
-        free = chosen & ~problem.considered
         better, damping, tried = _improved(problem, point, window, free, information, gradient, damping)
         count += tried
         if better is None:
@@ -165,6 +165,20 @@ def fit_window(
         evaluations=count,
         active=tuple((point.x <= lower + 1e-9) | (point.x >= upper - 1e-9)),
         information=information,
+    )
+
+
+def completed(problem: Misfit, fit: Fit, *, pool: Executor | None = None) -> Fit:
+    """The same fit with its covariance made anew at the minimum, considered unknowns included."""
+    point = _evaluated(problem, fit.x, fit.window)
+    everything = np.ones(len(fit.x), dtype=np.bool_)
+    jacobian = _jacobian(problem, point, fit.window, everything, pool)
+    information = jacobian.T @ jacobian
+    return replace(
+        fit,
+        information=information,
+        covariance=considered_covariance(problem, information, max(fit.misfit, 1.0)),
+        evaluations=fit.evaluations + len(fit.x) + 1,
     )
 
 
@@ -282,6 +296,8 @@ class Schedule:
         Number of first windows in which only the leading unknowns are fitted.
     iterations : tuple of int
         Jacobians per window while several starts run, and for the last one.
+    tolerances : tuple of float
+        Share of the cost below which a fit ends, on the way and in the last window.
     breaking : float
         A window whose misfit exceeds that of the window before by this factor (and 1.5) is given up.
     """
@@ -291,6 +307,7 @@ class Schedule:
     draws: tuple[int, ...] = (200, 200, 100, 50)
     few: int = 2
     iterations: tuple[int, int] = (4, 8)
+    tolerances: tuple[float, float] = (2e-3, 2e-3)
     breaking: float = 1.6
 
 
@@ -404,18 +421,21 @@ class _Searching:
         """Fits from several points side by side, or from one with its Jacobian side by side; best first."""
         schedule = self.schedule
         chosen = self.problem.leading if stage < schedule.few else None
-        if len(points) == 1:
-            fits = [
-                fit_window(self.problem, points[0], window, iterations=schedule.iterations[1], pool=self.pool)
-            ]
-        else:
-            tasks = [
-                self.pool.submit(
-                    fit_window, self.problem, x, window, iterations=schedule.iterations[0], fitted=chosen
-                )
-                for x in points
-            ]
-            fits = [task.result() for task in tasks]
+        last = stage + 1 == len(schedule.windows)
+        alone = len(points) == 1
+
+        def fit(start: Array) -> Fit:
+            return fit_window(
+                self.problem,
+                start,
+                window,
+                iterations=schedule.iterations[alone],
+                tolerance=schedule.tolerances[last],
+                fitted=chosen,
+                pool=self.pool if alone else None,
+            )
+
+        fits = [fit(points[0])] if alone else list(self.pool.map(fit, points))
         self.evaluations += sum(fit.evaluations for fit in fits)
         return sorted(fits, key=lambda fit: fit.cost)
 

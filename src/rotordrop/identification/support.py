@@ -23,6 +23,7 @@ from rotordrop.identification.fit import (
     Progress,
     Schedule,
     Search,
+    completed,
     considered_covariance,
     fit_window,
     search,
@@ -43,7 +44,7 @@ WINDOWS = (1.75e-3, 3.25e-3, 5.25e-3, 7.25e-3, 11e-3, 16e-3)
 """Ends of the windows after the later of the first contacts [s]."""
 
 COARSE_WINDOWS = 3
-"""How many of them are searched with a coarse basis; the last of these is the first of the fine basis."""
+"""How many of them are searched with a coarse basis."""
 
 WIDENING = 2.0
 """Factor on standard errors for what the linearised fit leaves out [1]."""
@@ -310,11 +311,21 @@ def fit_support(
     found = search(
         fine,
         [_handed_over(fit.x, coarse, fine) for fit in first.finalists[:2]],
-        Schedule(windows=windows[COARSE_WINDOWS - 1 :], kept=(2,), draws=(60,), few=0, iterations=(10, 10)),
+        Schedule(
+            windows=windows[COARSE_WINDOWS:],
+            kept=(2,),
+            draws=(60,),
+            few=0,
+            iterations=(10, 10),
+            tolerances=(1e-3, 3e-4),
+        ),
         threads=threads,
         progress=lambda text, share: report(text, 0.5 + 0.5 * share),
     )
-    covariance = widened_covariance(fine, found.best)
+    with ThreadPoolExecutor(max_workers=threads or cpu_count() or 1) as pool:
+        best = completed(fine, found.best, pool=pool)
+    found = replace(found, best=best, evaluations=found.evaluations + len(best.x) + 1)
+    covariance = widened_covariance(fine, best)
     return SupportFit(
         problem=fine,
         coarse=first,
@@ -351,6 +362,7 @@ def refit_with_friction(
     start[place] = known.prior_mean[place]
     with ThreadPoolExecutor(max_workers=threads or cpu_count() or 1) as pool:
         again = fit_window(known, start, fit.window, iterations=6, tolerance=1e-3, pool=pool)
+        again = completed(known, again, pool=pool)
     return known, again.x, widened_covariance(known, again)
 
 
