@@ -3,9 +3,9 @@
     python tools/mutate.py [--count 100] [--seed 2020] [--first 0] [--last 100] [--only-survivors]
 
 The kernels run as plain Python, so nothing is compiled: the part of the suite takes well under a minute.
-Every fault is put into a temporary copy of the tree; the working tree is never touched. A fault is caught when
-a test fails or does not end in time. Results are kept in tests/mutation/mutants.json as they come, so a run
-can be continued; a survivor needs a justification in tests/mutation/equivalent.json.
+Every fault is put into a temporary copy of the tree; the working tree is never touched. A fault is caught
+when a test fails or does not end in time. Results are kept in tests/mutation/mutants.json as they come, so a
+run can be continued; a survivor needs a justification in tests/mutation/equivalent.json.
 """
 
 from __future__ import annotations

@@ -145,7 +145,7 @@ def _statement(first: str, drop: float, condition: Array | None) -> str:
     if drop >= CLEAR:
         text = f"the drop {first} was the worst of those recorded ({drop:.0%})"
     else:
-        text = f"{first} shows the largest value; the probability that it was the worst drop is only {drop:.0%}"
+        text = f"{first} shows the largest value; that it was the worst drop has a probability of {drop:.0%}"
     if condition is None:
         return f"{text}; the scatter between equal drops is unknown, so nothing follows for its conditions"
     sure = float(condition[0])
