@@ -58,7 +58,9 @@ def normalised_innovations(smoothed: Smoothed) -> Array:
 
 def _innovation_checks(problem: DropProblem, smoothed: Smoothed) -> tuple[Check, ...]:
     e = normalised_innovations(smoothed)
-    names = [sensor.name for sensor in problem.model.machine.sensors]
+    heard = np.flatnonzero(np.isfinite(e).any(axis=0))
+    e = e[:, heard]
+    names = [problem.model.machine.sensors[c].name for c in heard]
     nis = np.nanmean(e**2, axis=0)
     worst = int(np.argmax(np.abs(np.log(nis))))
     lag = np.array([_lag_one(e[:, c]) for c in range(e.shape[1])])

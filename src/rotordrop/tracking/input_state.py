@@ -158,10 +158,10 @@ def _smooth_forces(problem: DropProblem, readings: Array, gate: NDArray[np.bool_
             P[range(n, n + k), range(n, n + k)] += noise * dt**2 * 0.25
             P[range(n + k, size), range(n + k, size)] += (noise / dt**2) * dt**2
         predicted[i], P_predicted[i] = x, P
-        closed = np.repeat(gate[i], 2)
-        H = np.vstack([C, hold[closed]])
-        z = np.concatenate([readings[i], np.zeros(int(closed.sum()))])
-        R = np.diag(np.concatenate([problem.variances, np.full(int(closed.sum()), GATE_SIGMA**2)]))
+        closed, heard = np.repeat(gate[i], 2), np.isfinite(readings[i])
+        H = np.vstack([C[heard], hold[closed]])
+        z = np.concatenate([readings[i, heard], np.zeros(int(closed.sum()))])
+        R = np.diag(np.concatenate([problem.variances[heard], np.full(int(closed.sum()), GATE_SIGMA**2)]))
         S = H @ P @ H.T + R
         K = np.linalg.solve(S, H @ P).T
         x = x + K @ (z - H @ x)

@@ -241,11 +241,10 @@ def _rotor_prior(model: DropModel, rows: Array, readings: Array, mean: Array, si
     amplitude[: basis.n_rigid] = 0.0
     mean[layout.modal_y] = amplitude
     rigid = slice(0, basis.n_rigid)
-    observed = (
-        readings[: min(10, len(readings))].mean(axis=0) - rows[:, : mean.size][:, layout.modal_y] @ amplitude
-    )
+    observed = _first_level(readings) - rows[:, : mean.size][:, layout.modal_y] @ amplitude
     design = np.hstack([rows[:, layout.modal_x][:, rigid], rows[:, layout.modal_y][:, rigid]])
-    fitted, *_ = np.linalg.lstsq(design, observed, rcond=None)
+    seen = np.isfinite(observed)
+    fitted, *_ = np.linalg.lstsq(design[seen], observed[seen], rcond=None)
     mean[layout.modal_x][rigid] = fitted[: basis.n_rigid]
     mean[layout.modal_y][rigid] += fitted[basis.n_rigid :]
     for part in (layout.modal_x, layout.modal_y):
@@ -255,6 +254,17 @@ def _rotor_prior(model: DropModel, rows: Array, readings: Array, mean: Array, si
         velocity[rigid] = START_VELOCITY_SIGMA * weight
         sigma[part] = position
         sigma[layout.velocity_of(part)] = velocity
+
+
+def _first_level(readings: Array, samples: int = 10) -> Array:
+    """Mean of the first readings of every channel [m]; NaN where there is none."""
+    first = readings[:samples]
+    known = np.isfinite(first)
+    if known.all():
+        return np.asarray(first.mean(axis=0))
+    count = known.sum(axis=0)
+    total = np.where(known, first, 0.0).sum(axis=0)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
 def settled_displacement(problem: DropProblem, theta: Array) -> Array:
@@ -313,12 +323,10 @@ def apply_tail(problem: DropProblem, tail_level: Array, mean: Array, covariance:
     gain_scratch = np.empty(len(mean))
     for node in np.unique(nodes):
         chosen = np.flatnonzero(nodes == node)
-        directions = np.column_stack([np.cos(angles[chosen]), np.sin(angles[chosen])])
-        weights = np.linalg.pinv(directions)
-        for axis, sigma in ((1, TAIL_VERTICAL_SIGMA), (0, TAIL_HORIZONTAL_SIGMA)):
+        for weights, sigma in _tail_combinations(angles[chosen]):
             row = np.zeros(len(mean))
             predicted, observed = 0.0, 0.0
-            for weight, c in zip(weights[axis], chosen, strict=True):
+            for weight, c in zip(weights, chosen, strict=True):
                 along = np.sin(angles[c]) * height[c]
                 growth = 1.0 + mean[start + n_p + c]
                 predicted += weight * (growth * along + mean[start + n_p + n_c + c])
@@ -327,3 +335,17 @@ def apply_tail(problem: DropProblem, tail_level: Array, mean: Array, covariance:
                 row[start + n_p + n_c + c] += weight
                 row[problem.parameter_slice] += weight * growth * np.sin(angles[c]) * slopes[c]
             F.scalar_update(mean, covariance, row, observed - predicted, sigma**2, gain_scratch)
+
+
+def _tail_combinations(angles: Array) -> list[tuple[Array, float]]:
+    """Weights of the readings of one plane and how far [m] the resting rotor may be from what they predict.
+
+    Two directions give the height and what friction may hold the rotor aside; a single one sees a mixture.
+    """
+    directions = np.column_stack([np.cos(angles), np.sin(angles)])
+    if np.linalg.matrix_rank(directions, tol=0.05) == 2:
+        sideways, height = np.linalg.pinv(directions)
+        return [(height, TAIL_VERTICAL_SIGMA), (sideways, TAIL_HORIZONTAL_SIGMA)]
+    spread = np.hypot(directions[:, 0] * TAIL_HORIZONTAL_SIGMA, directions[:, 1] * TAIL_VERTICAL_SIGMA)
+    aligned = np.sign(directions @ directions[0])
+    return [(aligned / len(angles), float(np.mean(spread)))]

@@ -53,13 +53,13 @@ def levitated_phase(
     time : ndarray, shape (N,)
         Time from power-off [s]; only negative times are used.
     readings : ndarray, shape (N, C)
-        Readings [m].
+        Readings [m]; samples with a missing one (NaN) are left out.
     omega : float
         Rotor speed [rad/s].
     mains : float
         Mains frequency [Hz].
     """
-    before = time < -0.5e-3
+    before = (time < -0.5e-3) & np.isfinite(readings).all(axis=1)
     t, values = time[before], readings[before]
     channels = readings.shape[1]
     none = np.zeros(channels, dtype=np.complex128)

@@ -1,0 +1,393 @@
+"""Priors of the unknowns, what the settled tail says about them, and the readings of the levitated phase."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rotordrop.errors import IdentificationError
+from rotordrop.estimated import Estimated
+from rotordrop.estimation.tracked import COARSE_BASIS, drop_problem, prepare
+from rotordrop.machine import Machine
+from rotordrop.model.parameters import build_drop_model
+from rotordrop.model.reduction import Reduction
+from rotordrop.physics.ball_bearing import bearing_constants
+from rotordrop.tracking.problem import (
+    GAIN_SIGMA,
+    NOISE_FLOOR,
+    OFFSET_SIGMA,
+    TAIL_VERTICAL_SIGMA,
+    apply_tail,
+    build_problem,
+    settled_displacement,
+)
+from rotordrop.tracking.sensors import levitated_phase, without_hum_and_runout
+from rotordrop.tracking.transfer import transferred
+from rotordrop.tracking.unknowns import (
+    GAP_SIGMA,
+    NINETY,
+    RELATIVE_PRIOR,
+    aero_time_constant,
+    all_unknowns,
+    drift_of,
+    late_factor,
+    preload_of_offset,
+    relative_sigma,
+)
+
+
+def unknown_of(machine: Machine, path: str):
+    return next(u for u in all_unknowns(build_drop_model(machine, COARSE_BASIS)) if u.path == path)
+
+
+# priors
+
+
+@pytest.mark.parametrize(
+    ("quantity", "expected"),
+    [
+        (Estimated(value=1e8, status="guess", range=(0.5e8, 2e8)), math.log(4.0) / (2 * NINETY)),
+        (
+            Estimated(value=1e8, status="estimated", interval_90=(0.9e8, 1.1e8)),
+            math.log(11 / 9) / (2 * NINETY),
+        ),
+        (
+            Estimated(value=1e8, status="estimated", interval_90=(0.99e8, 1.01e8), range=(0.5e8, 2e8)),
+            math.log(101 / 99) / (2 * NINETY),
+        ),
+        (Estimated(value=1e8, status="estimated", standard_error=2e6), 0.02),
+        (Estimated(value=1e8, status="guess"), 0.5),
+        (Estimated(value=1e8, status="default"), 0.5),
+        (Estimated(value=1e8, status="given"), 0.05),
+        (Estimated(value=1e8, status="estimated", interval_90=(1e8, 1e8)), 1e-4),
+    ],
+)
+def test_the_prior_comes_from_interval_range_error_or_status(quantity, expected):
+    assert relative_sigma(quantity, "support.stiffness") == pytest.approx(expected)
+
+
+def test_the_machine_file_sets_the_priors(lp400):
+    stiffness = unknown_of(lp400, "NDE.support.stiffness")
+    assert stiffness.value_of(stiffness.mean) == pytest.approx(1e8)
+    assert stiffness.sigma == pytest.approx(math.log(4.0) / (2 * NINETY))
+    gap = unknown_of(lp400, "DE.air_gap")
+    assert (gap.mean, gap.logarithmic) == (pytest.approx(250e-6), False)
+    assert gap.sigma == pytest.approx(150e-6 / (2 * NINETY))
+    damping = unknown_of(lp400, "NDE.contact.damping")  # a plain value
+    assert damping.sigma == RELATIVE_PRIOR["contact.damping"][1]
+
+
+def test_a_gap_that_is_only_given_may_still_be_wrong(lp400):
+    assert unknown_of(lp400.with_values({"NDE.air_gap": 260e-6}), "NDE.air_gap").sigma == GAP_SIGMA
+
+
+def test_the_preload_is_estimated_by_the_axial_offset_it_belongs_to(lp400):
+    unknown = unknown_of(lp400, "NDE.axial_offset")
+    bearing = lp400.bearing("NDE").bearing
+    constants = bearing_constants(bearing)
+    assert preload_of_offset(constants, unknown.mean) == pytest.approx(float(bearing.preload), rel=1e-6)
+    spread = math.log(760 / 370) / (2 * NINETY) * 530
+    ends = [preload_of_offset(constants, unknown.mean + s * 1e-3 * unknown.sigma) for s in (-1.0, 1.0)]
+    assert (ends[1] - ends[0]) / 2e-3 == pytest.approx(spread, rel=0.01)
+
+
+def test_what_a_drop_owns_is_not_shared(flight):
+    scopes = {u.path: u.scope for u in flight.unknowns}
+    assert scopes["unbalance.0.cosine"] == scopes["NDE.remanent_force.y"] == "drop"
+    assert scopes["speed.aero_time_constant"] == scopes["remanence.time_constant"] == "drop"
+    assert scopes["NDE.air_gap"] == scopes["DE.friction.dynamic"] == "machine"
+    shared = set(flight.machine_indices.tolist())
+    start, n_p, n_c = flight.n_dynamic, len(flight.unknowns), flight.n_channels
+    for k, unknown in enumerate(flight.unknowns):
+        assert (start + k in shared) == (unknown.scope == "machine")
+    assert {start + n_p + i for i in range(2 * n_c)} <= shared
+    assert not shared & {start + n_p + i for i in range(2 * n_c, 4 * n_c)}  # runout turns with the drop
+
+
+def test_a_machine_without_magnets_has_no_remanent_force(lp400):
+    bare = lp400.model_copy(update={"ambs": ()})
+    paths = {u.path for u in all_unknowns(build_drop_model(bare, COARSE_BASIS))}
+    assert not any("remanen" in path for path in paths)
+    assert "NDE.air_gap" in paths
+
+
+def test_friction_drifts_and_late_in_a_drop_faster(flight):
+    by_path = {u.path: (u, i) for i, u in enumerate(flight.unknowns)}
+    friction, i = by_path["NDE.friction.dynamic"]
+    stiffness, k = by_path["NDE.support.stiffness"]
+    assert drift_of(friction) > 0.0 and late_factor(friction) > 1.0
+    assert flight.targets.late_drift[i] == late_factor(friction) * flight.targets.drift[i]
+    assert flight.targets.late_drift[k] == flight.targets.drift[k] == drift_of(stiffness) > 0.0
+    assert drift_of(by_path["NDE.axial_offset"][0]) == 0.0
+
+
+def test_the_aerodynamic_constant_has_a_start_even_when_nobody_knows_it(lp400):
+    assert lp400.speed.aero_time_constant is None
+    assert aero_time_constant(lp400) == 10.0
+    known = lp400.model_copy(
+        update={"speed": lp400.speed.model_copy(update={"aero_time_constant": Estimated(value=7.0)})}
+    )
+    assert aero_time_constant(known) == 7.0
+
+
+# the problem
+
+
+def test_sensors_start_from_what_the_machine_says(lp400, prepared):
+    known = lp400.with_values(
+        {
+            "sensors.S_NDE_A.gain": Estimated(value=1.02, status="estimated", interval_90=(1.019, 1.021)),
+            "sensors.S_NDE_A.offset": Estimated(value=4e-6, status="estimated", interval_90=(3e-6, 5e-6)),
+        }
+    )
+    problem = drop_problem(
+        build_drop_model(known, COARSE_BASIS), replace(prepared, tail_level=None), until=0.003
+    )
+    gain = problem.n_dynamic + len(problem.unknowns)
+    offset = gain + problem.n_channels
+    sigma = np.sqrt(np.diag(problem.covariance))
+    assert problem.mean[gain] == pytest.approx(1.0 / 1.02 - 1.0)
+    assert sigma[gain] == pytest.approx(0.001 / NINETY)
+    assert problem.mean[offset] == pytest.approx(4e-6)
+    assert sigma[offset] == pytest.approx(1e-6 / NINETY)
+    assert sigma[gain + 1] == pytest.approx(GAIN_SIGMA)
+    assert sigma[offset + 1] == pytest.approx(OFFSET_SIGMA)
+
+
+def test_the_rotor_starts_where_the_sensors_see_it_with_its_computed_sag(flight):
+    predicted = flight.sensor_rows @ flight.mean[: flight.n_dynamic]
+    first = flight.readings[:10].mean(axis=0)
+    np.testing.assert_allclose(predicted, first, atol=1e-6)
+    bending = flight.mean[flight.model.layout.modal_y][2:]
+    assert np.abs(bending).max() > 0.0
+    assert np.all(flight.mean[flight.model.layout.modal_x][2:] == 0.0)
+
+
+def test_a_record_without_speed_is_refused(model, prepared):
+    record = prepared.record
+    with pytest.raises(IdentificationError, match=r"the record drop_060 has no rotor speed.*profile"):
+        drop_problem(model, replace(prepared, record=replace(record, speed=None)))
+    n = 100
+    with pytest.raises(IdentificationError, match="no rotor speed; expected a speed channel"):
+        build_problem(model, np.arange(n) * 5e-5, np.zeros((n, 4)), np.full(n, np.nan), tail_level=None)
+
+
+def test_the_noise_of_the_levitated_part_is_that_of_the_channels(flight):
+    np.testing.assert_allclose(flight.variances, flight.levitated.noise**2 + NOISE_FLOOR**2)
+    assert np.all((flight.levitated.noise > 0.2e-6) & (flight.levitated.noise < 1e-6))
+
+
+# the settled tail
+
+
+@pytest.fixture(scope="module")
+def loose(model, prepared):
+    """The problem before the tail is used."""
+    return drop_problem(model, replace(prepared, tail_level=None), until=0.003)
+
+
+def height_at_sensors(problem, theta):
+    """Settled readings of perfect sensors: only the height is known, the rotor may be held aside."""
+    angles = np.array([float(sensor.angle) for sensor in problem.model.machine.sensors])
+    return np.sin(angles) * settled_displacement(problem, theta)
+
+
+def test_the_rotor_settles_below_the_gap_by_its_indentation(loose):
+    """Between the sensors and the bearings there are 30 mm of a rotor that bends by micrometres."""
+    theta = loose.mean[loose.parameter_slice]
+    level = settled_displacement(loose, theta)
+    assert np.all((level > -300e-6) & (level < -250e-6))
+    wider = theta.copy()
+    paths = [u.path for u in loose.unknowns]
+    wider[[paths.index("NDE.air_gap"), paths.index("DE.air_gap")]] += 10e-6
+    np.testing.assert_allclose(settled_displacement(loose, wider), level - 10e-6, atol=1e-12)
+    softer = theta.copy()
+    softer[paths.index("NDE.support.stiffness")] -= math.log(2.0)
+    assert settled_displacement(loose, softer)[0] < level[0]
+
+
+def test_the_tail_ties_gap_and_offset(loose):
+    """A tail 8 µm lower than expected is shared by gap and offsets; their sum is known, each is not."""
+    theta = loose.mean[loose.parameter_slice]
+    tail = height_at_sensors(loose, theta)
+    angles = np.array([float(sensor.angle) for sensor in loose.model.machine.sensors])
+    lower = tail - 8e-6 * np.sin(angles)
+    mean, covariance = loose.mean.copy(), loose.covariance.copy()
+    apply_tail(loose, lower, mean, covariance)
+    paths = [u.path for u in loose.unknowns]
+    gap = loose.n_dynamic + paths.index("NDE.air_gap")
+    offsets = loose.n_dynamic + len(paths) + loose.n_channels + np.arange(2)
+    assert mean[gap] - loose.mean[gap] > 2e-6
+    down = -np.sum(mean[offsets]) / (2.0 * math.sin(math.pi / 4))
+    gains = mean[offsets - loose.n_channels] @ (np.sin(angles[:2]) ** 2 * tail[:2] / np.sin(angles[:2]))
+    stiff = loose.n_dynamic + paths.index("NDE.support.stiffness")
+    assert abs(mean[stiff] - loose.mean[stiff]) < 0.05
+    explained = (mean[gap] - loose.mean[gap]) + down - gains
+    assert explained == pytest.approx(8e-6, abs=1.5e-6)
+    sigma = np.sqrt(np.diag(covariance))
+    assert sigma[gap] < 0.5 * math.sqrt(loose.covariance[gap, gap])
+    assert sigma[gap] > 3.0 * TAIL_VERTICAL_SIGMA  # not separable from the offset
+    row = np.zeros(len(mean))
+    row[gap], row[offsets] = -1.0, np.array([0.5, 0.5]) / math.sin(math.pi / 4)
+    row[offsets - loose.n_channels] = row[offsets] * tail[:2]
+    assert math.sqrt(row @ covariance @ row) < 1.5e-6
+    assert (
+        np.linalg.eigvalsh(covariance / np.outer(np.maximum(sigma, 1e-12), np.maximum(sigma, 1e-12)))[0]
+        > -1e-8
+    )
+
+
+def test_a_rotor_held_aside_by_friction_says_nothing_about_the_gap(loose):
+    theta = loose.mean[loose.parameter_slice]
+    tail = height_at_sensors(loose, theta)
+    angles = np.array([float(sensor.angle) for sensor in loose.model.machine.sensors])
+    mean, covariance = loose.mean.copy(), loose.covariance.copy()
+    apply_tail(loose, tail + 15e-6 * np.cos(angles), mean, covariance)
+    np.testing.assert_allclose(mean[loose.parameter_slice], theta, rtol=1e-3, atol=0.3e-6)
+
+
+def test_a_single_sensor_in_a_plane_cannot_tell_height_from_aside(lp400, prepared):
+    """With one of two sensors gone the tail must not tie the gap to the height it cannot see."""
+    three = lp400.model_copy(update={"sensors": lp400.sensors[:3]})
+    record = prepared.record
+    prepared = replace(
+        prepared,
+        record=replace(record, signals=record.signals[:, :3].copy(), sensors=three.sensors),
+        tail_level=None,
+    )
+    problem = drop_problem(build_drop_model(three, COARSE_BASIS), prepared, until=0.003)
+    mean, covariance = problem.mean.copy(), problem.covariance.copy()
+    angles = np.array([float(sensor.angle) for sensor in three.sensors])
+    tail = height_at_sensors(problem, mean[problem.parameter_slice])
+    apply_tail(problem, tail + 20e-6 * np.cos(angles), mean, covariance)
+    paths = [u.path for u in problem.unknowns]
+    for name, limit in (("NDE", 1e-6), ("DE", 15e-6)):
+        gap = problem.n_dynamic + paths.index(f"{name}.air_gap")
+        change = abs(mean[gap] - problem.mean[gap])
+        sigma = math.sqrt(covariance[gap, gap])
+        assert change < limit
+        assert change < sigma
+    lost = problem.n_dynamic + paths.index("DE.air_gap")
+    seen = problem.n_dynamic + paths.index("NDE.air_gap")
+    assert covariance[lost, lost] > 3.0 * covariance[seen, seen]
+
+
+def test_a_tail_at_the_end_of_a_long_record_is_found(lp400, prepared):
+    record = prepared.record
+    step = 1e-3
+    time = np.arange(0.0, 30.0, step)
+    level = np.array([1e-6, -2e-6, 3e-6, -4e-6])
+    signals = np.where(time[:, None] > 27.0, level, 1.0)
+    long = replace(record, time=time, signals=signals, speed=np.zeros_like(time))
+    found = prepare(lp400, long, None, "long", instant=prepared.instant)
+    np.testing.assert_allclose(found.tail_level, level)
+    short = prepare(lp400, record, None, "short", instant=prepared.instant)
+    assert short.tail_level is None
+
+
+# the levitated phase
+
+
+def levitated_readings(random, omega):
+    time = np.arange(-0.25, 0.05, 5e-5)
+    level = np.array([3e-6, -7e-6])
+    once = np.array([5e-6 * np.exp(0.4j), 2e-6 * np.exp(-2.0j)])
+    twice = np.array([0.8e-6 * np.exp(1.2j), 1.5e-6])
+    hum = np.array([1.1e-6 * np.exp(-0.7j), 0.4e-6j])
+    turn = np.exp(1j * omega * time)[:, None]
+    clean = level + (once * turn).real
+    errors = (twice * turn**2).real + (hum * np.exp(2j * np.pi * 50.0 * time)[:, None]).real
+    noise = np.array([0.3e-6, 0.6e-6]) * random.standard_normal((len(time), 2))
+    return time, clean, errors, noise, (level, once, twice, hum)
+
+
+def test_level_orbit_runout_hum_and_noise_are_found(random):
+    omega = 2 * np.pi * 66.0
+    time, clean, errors, noise, (level, once, twice, hum) = levitated_readings(random, omega)
+    readings = clean + errors + noise
+    readings[time >= 0.0] += 1e-3  # what comes after power-off is not looked at
+    found = levitated_phase(time, readings, omega)
+    assert found.samples == np.count_nonzero(time < -0.5e-3)
+    tolerance = 4.0 * noise.std() * math.sqrt(2.0 / found.samples)
+    np.testing.assert_allclose(found.level, level, atol=tolerance)
+    for name, expected in (("synchronous", once), ("twice", twice), ("hum", hum)):
+        np.testing.assert_allclose(getattr(found, name), expected, atol=tolerance, err_msg=name)
+    np.testing.assert_allclose(found.noise, [0.3e-6, 0.6e-6], rtol=0.05)
+
+
+def test_hum_and_2x_are_removed_and_the_orbit_stays(random):
+    omega = 2 * np.pi * 66.0
+    time, clean, errors, noise, _ = levitated_readings(random, omega)
+    found = levitated_phase(time, clean + errors + noise, omega)
+    left = without_hum_and_runout(time, clean + errors, omega * time, found)
+    assert np.abs(left - clean).max() < 0.15e-6
+    assert np.abs(errors).max() > 1e-6
+
+
+def test_hum_next_to_the_rotor_speed_is_left_to_it(random):
+    omega = 2 * np.pi * 50.5
+    time, clean, errors, noise, _ = levitated_readings(random, omega)
+    found = levitated_phase(time, clean + errors + noise, omega)
+    assert np.all(found.hum == 0.0)
+
+
+def test_without_a_levitated_part_nothing_is_claimed(random):
+    omega = 2 * np.pi * 66.0
+    time, clean, errors, noise, _ = levitated_readings(random, omega)
+    readings = clean + errors + noise
+    late = time >= -0.01
+    found = levitated_phase(time[late], readings[late], omega)
+    assert found.samples == 0
+    assert np.all(np.isnan(found.noise))
+    assert without_hum_and_runout(time[late], readings[late], omega * time[late], found) is readings[
+        late
+    ] or (
+        np.array_equal(
+            without_hum_and_runout(time[late], readings[late], omega * time[late], found), readings[late]
+        )
+    )
+
+
+def test_missing_readings_before_power_off_do_not_spoil_the_fit(random):
+    omega = 2 * np.pi * 66.0
+    time, clean, errors, noise, (level, once, _, _) = levitated_readings(random, omega)
+    readings = clean + errors + noise
+    readings[100:400, 0] = np.nan
+    found = levitated_phase(time, readings, omega)
+    np.testing.assert_allclose(found.level, level, atol=0.05e-6)
+    np.testing.assert_allclose(found.synchronous, once, atol=0.06e-6)
+    np.testing.assert_allclose(found.noise, [0.3e-6, 0.6e-6], rtol=0.06)
+
+
+# from one basis to another
+
+
+def test_a_transferred_trajectory_keeps_the_motion_of_every_node(lp400, prepared, flight, random):
+    fine = drop_problem(build_drop_model(lp400, Reduction(modes=10, attachment=True)), prepared, until=0.003)
+    means = flight.mean + 1e-5 * random.standard_normal((7, len(flight.mean)))
+    moved = transferred(flight, fine, means)
+    assert moved.shape == (7, len(fine.mean))
+    for node in (1, 5, 17, 26, 33):
+        for part in ("modal_x", "modal_y"):
+            one, two = (getattr(p.model.layout, part) for p in (flight, fine))
+            for a, b in (
+                (one, two),
+                (flight.model.layout.velocity_of(one), fine.model.layout.velocity_of(two)),
+            ):
+                before = means[:, a] @ flight.model.basis.node_row(node)
+                after = moved[:, b] @ fine.model.basis.node_row(node)
+                np.testing.assert_allclose(after, before, rtol=0.02, atol=1e-7)
+    layouts = flight.model.layout, fine.model.layout
+    for part in ("race", "support", "race_spin"):
+        np.testing.assert_array_equal(
+            means[:, getattr(layouts[0], part)], moved[:, getattr(layouts[1], part)]
+        )
+    np.testing.assert_array_equal(means[:, flight.n_dynamic :], moved[:, fine.n_dynamic :])
+
+
+def test_a_trajectory_carried_to_the_same_basis_is_the_same(flight, random):
+    means = flight.mean + 1e-5 * random.standard_normal((3, len(flight.mean)))
+    np.testing.assert_allclose(transferred(flight, flight, means), means, rtol=1e-9, atol=1e-16)
