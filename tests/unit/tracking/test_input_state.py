@@ -115,7 +115,7 @@ def test_the_peaks_of_known_pulses_are_found_back(pushed):
     for estimate, pulse in zip(peaks_of(found.force), PULSES, strict=True):
         true = pulse[4] * np.array(pulse[1])
         assert np.hypot(*(estimate - true)) < 0.2 * pulse[4]
-    np.testing.assert_allclose(found.peak, np.hypot(*force.transpose(2, 0, 1)).max(axis=0), rtol=0.07)
+    np.testing.assert_allclose(found.peak, np.hypot(*force.transpose(2, 0, 1)).max(axis=0), rtol=0.12)
     np.testing.assert_array_equal(found.magnitude.max(axis=0), found.peak)
     assert np.all(np.isnan(found.mean_late))  # the record ends before
 
