@@ -12,7 +12,7 @@ from scipy.ndimage import binary_closing, label
 
 from rotordrop.spectrum._clock import TURN, Clock, View
 from rotordrop.spectrum._found_line import FIVE_MOMENTS, FoundLine, path_range, radius
-from rotordrop.spectrum.detection import Peak, clearest_peak, stretches_of
+from rotordrop.spectrum.detection import Peak, clearest_peak, median_of_known, stretches_of
 from rotordrop.spectrum.line_extraction import Envelope, Offset, drift_phase, mean_offset, smooth
 from rotordrop.spectrum.line_settings import LineSettings
 from rotordrop.spectrum.line_spectra import offset_power
@@ -46,7 +46,12 @@ CLOSE = 5.0
 HARMLESS = 30.0
 """Amplitude over the floor [1] up to which nothing is left of a line that was taken out."""
 
-MOST_REFUSED = 40
+BLURRED = 0.1
+"""Error of a frequency [Hz] from which a line may be the skirt of another."""
+SKIRT = 0.03
+"""Amplitude of a skirt at 1 Hz from its line, over that of the line [1]; it falls with the distance."""
+
+MOST_REFUSED = 60
 BURST = 30.0
 """Amplitude over the usual one [1] from which a brief line is taken out before all others."""
 
@@ -203,7 +208,19 @@ class LineSearch:
             envelope, view, coordinate, spoken
         ):
             return None
-        return self._describe(envelope, present, taken, peak, view, coordinate, offset.error)
+        line = self._describe(envelope, present, taken, peak, view, coordinate, offset.error)
+        return None if self._skirt(line) else line
+
+    def _skirt(self, line: FoundLine) -> bool:
+        """Whether a line is blurred and small beside a strong one: what is left of that one, not a line."""
+        if line.kind == "order" or line.frequency_error < BLURRED:
+            return False
+        size = float(line.amplitude.max())
+        return any(
+            size < SKIRT * float(strong.amplitude.max()) / max(abs(line.frequency - strong.frequency), 1.0)
+            for strong in self.found
+            if strong.kind == "steady"
+        )
 
     def _explained(self, peak: Peak, view: View, taken: Array) -> bool:
         """Whether a line taken out is what made the peak: a line that only sweeps past leaves most of it."""
@@ -211,8 +228,8 @@ class LineSearch:
         after = self._clock.same_view(view, self._rest - taken).power[row, :, peak.channel]
         line = int(np.argmin(np.abs(view.frames.coordinate - peak.coordinate)))
         near = slice(max(line - 1, 0), line + 2)
-        left = np.nanmedian(np.nanmax(after[:, near], axis=1))
-        whole = np.nanmedian(np.nanmax(view.frames.power[row, near, peak.channel], axis=1))
+        left = median_of_known(after[:, near].max(axis=1))
+        whole = median_of_known(view.frames.power[row, near, peak.channel].max(axis=1))
         return bool(left < LEFT_OVER * whole)
 
     def _better_otherwise(self, envelope: Envelope, view: View, coordinate: float, spoken: Mask) -> bool:

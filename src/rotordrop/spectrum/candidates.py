@@ -41,6 +41,8 @@ class Candidate:
         How likely the source is before the line is looked at, against other candidates [1].
     planes : tuple of str
         Planes in which it would be strongest; empty when it may be in any.
+    narrow : bool
+        Whether the source holds its frequency, as a power grid does: a broad line is then something else.
     """
 
     name: str
@@ -52,6 +54,7 @@ class Candidate:
     shape: OrbitShape = "any"
     weight: float = 1.0
     planes: tuple[str, ...] = ()
+    narrow: bool = False
 
 
 def order_candidates(highest: int = 6) -> tuple[Candidate, ...]:
@@ -97,6 +100,7 @@ def mains_candidates(frequencies: Sequence[float] = (50.0, 60.0), highest: int =
             tolerance=MAINS_TOLERANCE * k * f,
             reason=f"{'' if k == 1 else f'{k} times '}mains frequency {f:g} Hz",
             weight=1.0 if k == 1 else 0.3,
+            narrow=True,
         )
         for f in frequencies
         for k in range(1, highest + 1)

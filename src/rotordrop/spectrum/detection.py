@@ -176,7 +176,7 @@ def _floor(power: Array, lines: int) -> Array:
     for k, centre in enumerate(centres):
         block = power[:, centre - half : centre + half + 1]
         reached = np.isfinite(block).sum(axis=1) > half
-        blocks[:, k] = np.where(reached, np.nanmedian(np.where(reached[:, None], block, 0.0), axis=1), np.nan)
+        blocks[:, k] = np.where(reached, median_of_known(np.moveaxis(block, 1, 0)), np.nan)
     place = np.clip((np.arange(count) - centres[0]) / half, 0.0, centres.size - 1.0)
     low = np.minimum(place.astype(int), max(centres.size - 2, 0))
     share = (place - low)[:, None]
@@ -191,15 +191,24 @@ def _median_of_frames(ratio: Array, enough: Mask) -> Array:
     median = np.full(ratio.shape[1:], np.nan)
     columns = ratio[:, enough]
     if columns.size:
-        median[enough] = np.nanmedian(columns, axis=0)
+        median[enough] = median_of_known(columns)
     return median
+
+
+def median_of_known(values: Array) -> Array:
+    """Median along the first axis of what is not nan; nan where nothing is known."""
+    ordered = np.sort(values, axis=0)
+    known = np.isfinite(ordered).sum(axis=0, keepdims=True)
+    low = np.take_along_axis(ordered, np.maximum(known - 1, 0) // 2, axis=0)
+    high = np.take_along_axis(ordered, np.minimum(known // 2, len(values) - 1), axis=0)
+    return cast(Array, 0.5 * (low + high)[0])
 
 
 def _typical_shape(power: Array) -> Array:
     """Median over the frames of one channel, zero where no frame reaches, to measure a peak's form."""
     reached = np.isfinite(power).any(axis=0)
     shape = np.zeros(power.shape[1])
-    shape[reached] = np.nanmedian(power[:, reached], axis=0)
+    shape[reached] = median_of_known(power[:, reached])
     return shape
 
 

@@ -303,6 +303,7 @@ def _evidence(found: FoundLine, plane: str, bands: tuple[float, float]) -> LineE
         plane=plane,
         band=bands[0],
         order_band=bands[1],
+        width=found.width,
     )
 
 

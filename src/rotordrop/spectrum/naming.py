@@ -19,6 +19,11 @@ UNKNOWN_WEIGHT = 10.0
 """Weight of "something not on the list", anywhere in the band, against one candidate of weight 1: with 10 a
 mode known to ± 20 Hz in a band of 1 kHz is only a question, one known to ± 3 Hz a name."""
 
+NARROW = 1.0
+"""Width [Hz] up to which a line can come from a source that holds its frequency."""
+STEADY_ERROR = 0.1
+"""Error of its mean frequency [Hz] up to which it can."""
+
 ROUND_ORBIT = 0.8
 FLAT_ORBIT = 0.6
 
@@ -46,6 +51,8 @@ class LineEvidence:
         Width of the frequency band searched [Hz].
     order_band : float
         Width of the band of orders searched [1].
+    width : float
+        Of the line itself [Hz].
     """
 
     kind: LineKind
@@ -58,6 +65,7 @@ class LineEvidence:
     plane: str
     band: float
     order_band: float
+    width: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -171,6 +179,8 @@ def _whirl(line: LineEvidence, air_gap: float | None) -> Name | None:
 
 def _possible(line: LineEvidence, candidate: Candidate) -> bool:
     if line.kind != "undecided" and line.kind != candidate.kind:
+        return False
+    if candidate.narrow and (line.width > NARROW or line.frequency_error > STEADY_ERROR):
         return False
     if candidate.shape == "flat" and abs(line.roundness) > FLAT_ORBIT:
         return False
