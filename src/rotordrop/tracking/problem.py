@@ -31,6 +31,7 @@ BENDING_VELOCITY_SIGMA = 1.5e-3
 SPEED_SIGMA = 0.5
 SPEED_READING_SIGMA = 1.0
 NOISE_FLOOR = 0.1e-6
+USUAL_NOISE = 1e-6
 TAIL_VERTICAL_SIGMA = 0.7e-6
 TAIL_HORIZONTAL_SIGMA = 25e-6
 SMOOTHED_FRICTION_SPEED = 0.15
@@ -181,8 +182,10 @@ def _thinned(speed: Array, every: int = 50) -> Array:
 
 
 def _variances(phase: LevitatedPhase, channels: int) -> Array:
-    noise = phase.noise if phase.samples else np.full(channels, 1e-6)
-    return noise**2 + NOISE_FLOOR**2
+    noise = np.full(channels, USUAL_NOISE)
+    heard = np.isfinite(phase.noise)
+    noise[heard] = phase.noise[heard]
+    return np.asarray(noise**2 + NOISE_FLOOR**2)
 
 
 def sensor_rows(model: DropModel) -> Array:
@@ -322,7 +325,9 @@ def apply_tail(problem: DropProblem, tail_level: Array, mean: Array, covariance:
     nodes = np.array([sensor.node for sensor in problem.model.machine.sensors])
     gain_scratch = np.empty(len(mean))
     for node in np.unique(nodes):
-        chosen = np.flatnonzero(nodes == node)
+        chosen = np.flatnonzero((nodes == node) & np.isfinite(tail_level))
+        if len(chosen) == 0:
+            continue
         for weights, sigma in _tail_combinations(angles[chosen]):
             row = np.zeros(len(mean))
             predicted, observed = 0.0, 0.0

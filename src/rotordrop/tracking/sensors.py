@@ -27,7 +27,7 @@ class LevitatedPhase:
     noise : ndarray, shape (C,)
         Standard deviation of what is left [m].
     samples : int
-        Number of samples used; 0 when the record has no levitated part.
+        Number of samples looked at; 0 when the record has no levitated part.
     """
 
     level: Array
@@ -53,13 +53,13 @@ def levitated_phase(
     time : ndarray, shape (N,)
         Time from power-off [s]; only negative times are used.
     readings : ndarray, shape (N, C)
-        Readings [m]; samples with a missing one (NaN) are left out.
+        Readings [m]; missing ones (NaN) are left out.
     omega : float
         Rotor speed [rad/s].
     mains : float
         Mains frequency [Hz].
     """
-    before = (time < -0.5e-3) & np.isfinite(readings).all(axis=1)
+    before = time < -0.5e-3
     t, values = time[before], readings[before]
     channels = readings.shape[1]
     none = np.zeros(channels, dtype=np.complex128)
@@ -80,8 +80,7 @@ def levitated_phase(
         angles.append(2.0 * np.pi * mains * t)
     columns = [np.ones_like(t)] + [f(a) for a in angles for f in (np.cos, np.sin)]
     design = np.column_stack(columns)
-    coefficients, *_ = np.linalg.lstsq(design, values, rcond=None)
-    left = values - design @ coefficients
+    coefficients, noise = _fitted(design, values)
     amplitude = [coefficients[1 + 2 * i] - 1j * coefficients[2 + 2 * i] for i in range(len(angles))]
     return LevitatedPhase(
         level=coefficients[0],
@@ -89,9 +88,25 @@ def levitated_phase(
         twice=amplitude[1],
         hum=amplitude[2] if hum_apart else none,
         hum_frequency=mains,
-        noise=np.std(left, axis=0, ddof=design.shape[1]),
+        noise=noise,
         samples=len(t),
     )
+
+
+def _fitted(design: Array, values: Array) -> tuple[Array, Array]:
+    """Coefficients and standard deviation of what is left, channel by channel where readings are missing."""
+    if np.isfinite(values).all():
+        coefficients, *_ = np.linalg.lstsq(design, values, rcond=None)
+        return coefficients, np.std(values - design @ coefficients, axis=0, ddof=design.shape[1])
+    coefficients = np.full((design.shape[1], values.shape[1]), np.nan)
+    noise = np.full(values.shape[1], np.nan)
+    for c in range(values.shape[1]):
+        heard = np.isfinite(values[:, c])
+        if np.count_nonzero(heard) > 2 * design.shape[1]:
+            one, few = design[heard], values[heard, c : c + 1]
+            found, left = _fitted(one, few)
+            coefficients[:, c], noise[c] = found[:, 0], left[0]
+    return coefficients, noise
 
 
 def without_hum_and_runout(time: Array, readings: Array, theta: Array, phase: LevitatedPhase) -> Array:

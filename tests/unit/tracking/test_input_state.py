@@ -1,0 +1,147 @@
+"""Forces from the rotor's own motion, for a rotor pushed by known pulses without any contact law."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rotordrop.model.parameters import DropModel
+from rotordrop.tracking.input_state import GATE_MARGIN, input_state_estimate
+from rotordrop.tracking.problem import DropProblem
+from rotordrop.tracking.smoother import Smoothed
+
+DT = 5e-5
+COUNT = 800
+PULSES = (  # bearing, direction (x, y), middle [s], duration [s], peak [N]
+    (0, (0.0, -1.0), 8.0e-3, 2.0e-3, 4000.0),
+    (1, (0.6, -0.8), 15.0e-3, 1.5e-3, 2500.0),
+    (0, (-0.6, -0.8), 24.0e-3, 2.5e-3, 3000.0),
+)
+
+
+def true_force(t: float, n_b: int) -> np.ndarray:
+    """Force of the rotor on the races [N], shape (B, 2): half sines squared."""
+    force = np.zeros((n_b, 2))
+    for b, direction, middle, duration, peak in PULSES:
+        if abs(t - middle) < 0.5 * duration:
+            force[b] += peak * np.cos(np.pi * (t - middle) / duration) ** 2 * np.array(direction)
+    return force
+
+
+def pushed_rotor(model: DropModel, speed: float, start: np.ndarray) -> np.ndarray:
+    """Modal amplitudes and velocities, shape (N, 4m), of the rotor under the pulses."""
+    p = model.parameters
+    m, shapes = len(p.eigenvalue), p.bearing_shape
+
+    def derivative(t, y):
+        x, v = y[: 2 * m].reshape(2, m), y[2 * m :].reshape(2, m)
+        push = -true_force(t, len(shapes)).T @ shapes
+        push[1] += p.gravity
+        turn = speed * np.stack([-p.polar @ v[1], p.polar @ v[0]])
+        return np.concatenate([v.ravel(), (push + turn - p.eigenvalue * x - p.damping * v).ravel()])
+
+    states, y, fine = [start], start.copy(), 8
+    h = DT / fine
+    for i in range((COUNT - 1) * fine):
+        t = i * h
+        k1 = derivative(t, y)
+        k2 = derivative(t + 0.5 * h, y + 0.5 * h * k1)
+        k3 = derivative(t + 0.5 * h, y + 0.5 * h * k2)
+        k4 = derivative(t + h, y + h * k3)
+        y = y + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+        if (i + 1) % fine == 0:
+            states.append(y)
+    return np.array(states)
+
+
+@pytest.fixture(scope="module")
+def pushed(flight: DropProblem) -> tuple[DropProblem, Smoothed, np.ndarray]:
+    """Readings of the pushed rotor with noise, a trajectory that opens the gate at the pulses, true force."""
+    model, layout = flight.model, flight.model.layout
+    m, n_b = layout.n_modes, layout.n_bearings
+    start = np.zeros(4 * m)
+    start[: 2 * m] = flight.mean[: 2 * m]
+    states = pushed_rotor(model, float(flight.mean[layout.rotor_speed]), start)
+    time = DT * np.arange(COUNT)
+    noise = np.sqrt(flight.variances) * np.random.default_rng(3).standard_normal((COUNT, flight.n_channels))
+    clean = states[:, : 2 * m] @ flight.sensor_rows[:, : 2 * m].T
+    gain, offset = np.array([1.01, 0.99, 1.0, 1.005]), np.array([3e-6, -2e-6, 0.0, 1e-6])
+    means = np.zeros((COUNT, len(flight.mean)))
+    means[:] = flight.mean
+    means[:, : 2 * m] = states[:, : 2 * m]
+    first = flight.n_dynamic + len(flight.unknowns)
+    means[:, first : first + 8] = np.concatenate([gain - 1.0, offset])
+    force = np.array([true_force(t, n_b) for t in time])
+    at_bearings = np.stack(
+        [states[:, : 2 * m].reshape(-1, 2, m) @ s for s in model.parameters.bearing_shape], 1
+    )
+    gaps = np.array(
+        [means[0, flight.n_dynamic + k] for k, u in enumerate(flight.unknowns) if u.path.endswith("air_gap")]
+    )
+    touching = np.abs(force).max(axis=2) > 0.0
+    inside = np.where(touching, gaps, gaps - 2.0 * GATE_MARGIN)  # as far from the race as the gate wants it
+    race = at_bearings.copy()
+    race[..., 1] += inside
+    means[:, layout.race] = race.reshape(COUNT, -1)
+    problem = replace(
+        flight, time=time, readings=gain * (clean + noise) + offset, speed=np.full(COUNT, np.nan)
+    )
+    empty = np.zeros((0, 0))
+    smoothed = Smoothed(
+        filtered=None,
+        means=means,
+        information=empty,
+        score_0=empty,
+        information_0=empty,  # type: ignore[arg-type]
+    )
+    return problem, smoothed, force
+
+
+def peaks_of(force: np.ndarray) -> list[np.ndarray]:
+    """Largest force vector within every pulse."""
+    found = []
+    for b, _, middle, duration, _ in PULSES:
+        near = slice(round((middle - 0.5 * duration) / DT), round((middle + 0.5 * duration) / DT) + 1)
+        size = np.hypot(*force[near, b].T)
+        found.append(force[near, b][np.argmax(size)])
+    return found
+
+
+def test_the_peaks_of_known_pulses_are_found_back(pushed):
+    problem, smoothed, force = pushed
+    found = input_state_estimate(problem, smoothed)
+    for estimate, pulse in zip(peaks_of(found.force), PULSES, strict=True):
+        true = pulse[4] * np.array(pulse[1])
+        assert np.hypot(*(estimate - true)) < 0.2 * pulse[4]
+    np.testing.assert_allclose(found.peak, np.hypot(*force.transpose(2, 0, 1)).max(axis=0), rtol=0.12)
+    np.testing.assert_array_equal(found.magnitude.max(axis=0), found.peak)
+    assert np.all(np.isnan(found.mean_late))  # the record ends before
+
+
+def test_impulses_are_those_of_the_pulses(pushed):
+    problem, smoothed, force = pushed
+    found = input_state_estimate(problem, smoothed)
+    np.testing.assert_allclose(
+        DT * found.force.sum(axis=0), DT * force.sum(axis=0), atol=0.05 * DT * np.abs(force).sum(axis=0).max()
+    )
+
+
+def test_in_flight_the_force_is_held_at_zero(pushed):
+    problem, smoothed, force = pushed
+    found = input_state_estimate(problem, smoothed)
+    flying = np.abs(force).max(axis=2) == 0.0
+    assert np.count_nonzero(flying) > 1000
+    assert found.magnitude[flying].max() < 0.05 * found.peak.max()
+
+
+def test_missing_readings_are_bridged(pushed):
+    problem, smoothed, _ = pushed
+    readings = problem.readings.copy()
+    readings[400:405] = np.nan
+    readings[100:130, 2] = np.nan
+    found = input_state_estimate(replace(problem, readings=readings), smoothed)
+    assert np.all(np.isfinite(found.force))
+    whole = input_state_estimate(problem, smoothed)
+    np.testing.assert_allclose(found.peak, whole.peak, rtol=0.05)
