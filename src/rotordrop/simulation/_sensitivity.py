@@ -22,6 +22,7 @@ from rotordrop.physics.spin import surface_speed
 from rotordrop.simulation._rhs import aerodynamic_deceleration, project
 
 Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 PRESCRIBED = aerodynamics.PRESCRIBED_SPEED
 OF_SPEED = aerodynamics.FUNCTION_OF_SPEED
 
@@ -83,7 +84,7 @@ def contact_gradient(
 
 
 @kernel
-def _rotor_jacobian(t: float, y: Array, p: KernelParameters, J: Array) -> None:
+def _rotor_jacobian(y: Array, p: KernelParameters, J: Array) -> None:
     m = p.eigenvalue.shape[0]
     n_b = p.bearing.shape[0]
     n_q = 2 * m + 4 * n_b
@@ -91,7 +92,6 @@ def _rotor_jacobian(t: float, y: Array, p: KernelParameters, J: Array) -> None:
     omega = y[i_w]
     c = math.cos(y[i_w + 1])
     s = math.sin(y[i_w + 1])
-    omega_dot = aerodynamic_deceleration(t, omega, p)
     w2 = omega * omega
     for k in range(m):
         rx = n_q + k
@@ -106,8 +106,6 @@ def _rotor_jacobian(t: float, y: Array, p: KernelParameters, J: Array) -> None:
             g = p.polar[k, j]
             J[rx, n_q + m + j] -= omega * g
             J[ry, n_q + j] += omega * g
-            J[rx, m + j] -= omega_dot * g
-            J[ry, j] += omega_dot * g
             turn_x -= g * y[n_q + m + j]
             turn_y += g * y[n_q + j]
         uc = p.unbalance_cos[k]
@@ -176,7 +174,7 @@ def _spread(place: int, factor: float, g: Array, b: int, p: KernelParameters, J:
 
 
 @kernel
-def _bearing_jacobian(b: int, y: Array, p: KernelParameters, J: Array, g: Array) -> None:
+def _bearing_jacobian(b: int, y: Array, p: KernelParameters, J: Array, g: Array) -> bool:
     m = p.eigenvalue.shape[0]
     n_b = p.bearing.shape[0]
     n_q = 2 * m + 4 * n_b
@@ -195,8 +193,6 @@ def _bearing_jacobian(b: int, y: Array, p: KernelParameters, J: Array, g: Array)
         row,
         g,
     )
-    if touches:
-        _contact_jacobian(b, g, p, J)
     F_x, F_y, k_xx, k_xy, k_yy = planar_ball_gradient(
         y[r] - y[h],
         y[r + 1] - y[h + 1],
@@ -237,6 +233,7 @@ def _bearing_jacobian(b: int, y: Array, p: KernelParameters, J: Array, g: Array)
         J[spin, r + 1] -= by_y
         J[spin, h] += by_x
         J[spin, h + 1] += by_y
+    return touches
 
 
 @kernel
@@ -245,6 +242,37 @@ def drop_jacobian(t: float, y: Array, p: KernelParameters, J: Array) -> None:
 
     The energies behind the rotor angle are left out.
     """
+    n_b = p.bearing.shape[0]
+    g = np.zeros((n_b, 3, 6))
+    touching = np.zeros(n_b, dtype=np.int64)
+    drop_jacobian_parts(t, y, p, J, g, touching)
+    for b in range(n_b):
+        if touching[b] != 0:
+            _contact_jacobian(b, g[b], p, J)
+    _deceleration_jacobian(t, y, p, J)
+
+
+@kernel
+def _deceleration_jacobian(t: float, y: Array, p: KernelParameters, J: Array) -> None:
+    m = p.eigenvalue.shape[0]
+    n_q = 2 * m + 4 * p.bearing.shape[0]
+    omega_dot = aerodynamic_deceleration(t, y[2 * n_q + p.bearing.shape[0]], p)
+    for k in range(m):
+        for j in range(m):
+            J[n_q + k, m + j] -= omega_dot * p.polar[k, j]
+            J[n_q + m + k, j] += omega_dot * p.polar[k, j]
+
+
+@kernel
+def drop_jacobian_parts(
+    t: float, y: Array, p: KernelParameters, J: Array, g: Array, touching: IntArray
+) -> None:
+    """`drop_jacobian` with the contacts apart, because a contact fills the rows and columns of all modes.
+
+    ``J`` (s, s) is filled with everything but the contacts and the ω̇ terms of eq. (1), which are some
+    hundred thousand times smaller than gyroscopics; ``g`` (B, 3, 6) with the gradients of each contact (see
+    `contact_gradient`), valid where ``touching`` (B,) is not zero.
+    """
     m = p.eigenvalue.shape[0]
     n_b = p.bearing.shape[0]
     n_q = 2 * m + 4 * n_b
@@ -252,10 +280,9 @@ def drop_jacobian(t: float, y: Array, p: KernelParameters, J: Array) -> None:
     J[:, :] = 0.0
     for i in range(n_q):
         J[i, n_q + i] = 1.0
-    g = np.zeros((3, 6))
     for b in range(n_b):
-        _bearing_jacobian(b, y, p, J, g)
-    _rotor_jacobian(t, y, p, J)
+        touching[b] = 1 if _bearing_jacobian(b, y, p, J, g[b]) else 0
+    _rotor_jacobian(y, p, J)
     J[i_w + 1, i_w] = 1.0
     if p.flags[L.SPIN_MODE] == OF_SPEED:
         J[i_w, i_w] -= p.spin[L.AERO_LINEAR] + 2.0 * p.spin[L.AERO_QUADRATIC] * abs(y[i_w])
