@@ -463,7 +463,8 @@ def sobol_starts(centre: Array, spread: Array, count: int, seed: int = 1) -> lis
     from scipy.stats import qmc
 
     moved = np.flatnonzero(spread)
-    points = qmc.Sobol(d=max(len(moved), 1), seed=seed).random(max(count, 1))
+    powers = max(count - 1, 1).bit_length()
+    points = qmc.Sobol(d=max(len(moved), 1), seed=seed).random_base2(powers)
     starts = []
     for k in range(count):
         x = centre.copy()

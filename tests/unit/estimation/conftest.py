@@ -1,0 +1,74 @@
+"""A synthetic drop of a hidden machine, and the machine as known after a calibration."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from rotordrop.estimated import Estimated
+from rotordrop.machine import Machine, example_machine
+from rotordrop.synthesis import HiddenMachine, SyntheticDrop, hidden_machine, synthesize_drop
+
+SPEED = 2.0 * math.pi * 60.0
+SEED = 4
+
+CALIBRATED = {  # standard deviation of the logarithm after a calibration on two drops
+    "support.stiffness": 0.015,
+    "support.mass": 0.015,
+    "support.damping": 0.04,
+    "contact.stiffness": 0.03,
+    "contact.damping": 0.2,
+    "friction.dynamic": 0.02,
+    "friction.stribeck_speed": 0.2,
+    "race.inertia": 0.05,
+    "race.drag_coefficient": 0.3,
+    "damping_time": 0.3,
+    "preload": 0.05,
+}
+GAP_SIGMA = 1e-6
+NINETY = 1.6448536269514722
+
+
+@pytest.fixture(scope="session")
+def known() -> Machine:
+    """The machine of the supplied records, as its owner knows it."""
+    return example_machine("lp400")
+
+
+@pytest.fixture(scope="session")
+def hidden(known: Machine) -> HiddenMachine:
+    """A machine drawn around it."""
+    return hidden_machine(known, SEED)
+
+
+@pytest.fixture(scope="session")
+def synthetic(hidden: HiddenMachine) -> SyntheticDrop:
+    """A recorded drop of it, over before the motion dies away."""
+    return synthesize_drop(hidden, SPEED, 10 * SEED, duration=0.22, name="hidden_060")
+
+
+@pytest.fixture(scope="session")
+def calibrated(known: Machine, hidden: HiddenMachine) -> Machine:
+    """The owner's machine with estimates near the truth, off by about their standard error."""
+    random = np.random.default_rng(SEED)
+    values: dict[str, Estimated] = {}
+    for bearing in hidden.machine.touchdown_bearings:
+        for path, sigma in CALIBRATED.items():
+            part = bearing.bearing if path == "preload" else bearing
+            for name in path.split("."):
+                part = getattr(part, name)
+            value = float(part) * math.exp(0.7 * sigma * random.standard_normal())
+            half = math.exp(NINETY * sigma)
+            values[f"{bearing.name}.{path}"] = Estimated(
+                value=value, status="estimated", interval_90=(value / half, value * half), source="calibration"
+            )
+        gap = float(bearing.air_gap) + 0.7 * GAP_SIGMA * random.standard_normal()
+        values[f"{bearing.name}.air_gap"] = Estimated(
+            value=gap,
+            status="estimated",
+            interval_90=(gap - NINETY * GAP_SIGMA, gap + NINETY * GAP_SIGMA),
+            source="calibration",
+        )
+    return known.with_values(values)

@@ -1,0 +1,90 @@
+"""One simulated drop with a known truth, recorded by good sensors, for the tests of the identification."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rotordrop.estimated import Estimated
+from rotordrop.identification.air_gap import SettledRest, find_rest, identify_air_gap
+from rotordrop.identification.initial_state import InitialState, fit_initial_state
+from rotordrop.identification.replica import Replica, build_replica
+from rotordrop.identification.sensing import Sensing, build_sensing
+from rotordrop.identification.support import ImpactFit, impact_problem
+from rotordrop.machine import Machine, example_machine
+from rotordrop.measurement.events import DropInstant, find_drop_instant
+from rotordrop.model.parameters import DropModel, build_drop_model
+from rotordrop.model.reduction import Reduction
+from rotordrop.synthesis import SyntheticDrop, hidden_machine, synthesize_drop
+from rotordrop.synthesis.sensor_chain import PERFECT
+
+SPEED = 2.0 * math.pi * 100.0
+BASIS = Reduction(modes=6, attachment=True)
+
+
+@pytest.fixture(scope="session")
+def truth() -> Machine:
+    """The machine of the records with its sensors known to be exact."""
+    machine = example_machine("lp400")
+    values: dict[str, Estimated | float] = {}
+    for sensor in machine.sensors:
+        values[f"sensors.{sensor.name}.gain"] = Estimated(value=1.0, standard_error=1e-5)
+        values[f"sensors.{sensor.name}.offset"] = Estimated(value=0.0, standard_error=1e-8)
+    return machine.with_values(values)
+
+
+@pytest.fixture(scope="session")
+def drop(truth: Machine) -> SyntheticDrop:
+    """A drop from 100 Hz of that machine, 60 ms long, with 0.45 µm of noise and nothing else wrong."""
+    hidden = hidden_machine(truth, 5, drawn=False, reduction=BASIS)
+    chain = replace(PERFECT, noise=0.45e-6, speed_noise=0.1)
+    return synthesize_drop(hidden, SPEED, 3, sensor_chain=chain, duration=0.06, tolerance=1e-7)
+
+
+@pytest.fixture(scope="session")
+def model(truth: Machine) -> DropModel:
+    """The drop model of that machine, in the basis the record was made with."""
+    return build_drop_model(truth, BASIS)
+
+
+@pytest.fixture(scope="session")
+def sensing(model: DropModel, drop: SyntheticDrop) -> Sensing:
+    return build_sensing(model, drop.record.sensors)
+
+
+@pytest.fixture(scope="session")
+def instant(drop: SyntheticDrop, truth: Machine) -> DropInstant:
+    return find_drop_instant(drop.record, truth)
+
+
+@pytest.fixture(scope="session")
+def rest(drop: SyntheticDrop, sensing: Sensing) -> SettledRest:
+    return find_rest(drop.record, drop.tail, sensing)
+
+
+@pytest.fixture(scope="session")
+def initial(
+    drop: SyntheticDrop, rest: SettledRest, instant: DropInstant, model: DropModel, sensing: Sensing
+) -> InitialState:
+    gaps = identify_air_gap(rest, model, sensing).value
+    return fit_initial_state(drop.record, rest, instant, gaps, model, sensing, speed=SPEED)
+
+
+@pytest.fixture(scope="session")
+def replica(drop: SyntheticDrop, rest: SettledRest, initial: InitialState, model: DropModel) -> Replica:
+    return build_replica(drop.record, rest, initial, model, until=0.045)
+
+
+@pytest.fixture(scope="session")
+def problem(replica: Replica) -> ImpactFit:
+    return impact_problem(replica)
+
+
+@pytest.fixture(scope="session")
+def contacts(drop: SyntheticDrop) -> np.ndarray:
+    """True times of the first contact at every bearing [s from power-off]."""
+    log = drop.result.contacts
+    return np.array([log.of_bearing(b).start[0] for b in range(2)])

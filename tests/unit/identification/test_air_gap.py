@@ -1,0 +1,106 @@
+"""The settled tail gives the air gap; what it cannot tell is stated."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rotordrop.errors import IdentificationError
+from rotordrop.identification.air_gap import SettledRest, find_rest, identify_air_gap, static_sag
+from rotordrop.identification.sensing import Sensing
+from rotordrop.measurement.axes import sensor_directions
+from rotordrop.measurement.record import Record
+from rotordrop.model.parameters import DropModel
+from rotordrop.synthesis import SyntheticDrop
+
+
+def gaps(model: DropModel) -> np.ndarray:
+    return np.array([float(bearing.air_gap) for bearing in model.machine.touchdown_bearings])
+
+
+def test_air_gap_is_found_to_a_tenth_of_a_micrometre(
+    rest: SettledRest, model: DropModel, sensing: Sensing
+) -> None:
+    assert identify_air_gap(rest, model, sensing).value == pytest.approx(gaps(model), abs=0.1e-6)
+
+
+def test_gap_moves_by_the_sag_of_another_support(
+    rest: SettledRest, model: DropModel, sensing: Sensing
+) -> None:
+    softer = model.with_values({"NDE.support.stiffness": 5e7})
+    moved = identify_air_gap(rest, softer, sensing).value - identify_air_gap(rest, model, sensing).value
+    load = float(model.load_shares[0])
+    assert moved == pytest.approx([-load / 5e7 + load / 1e8, 0.0], abs=1e-12)
+
+
+def test_vertical_zero_of_the_sensors_reads_like_a_gap(
+    drop: SyntheticDrop, model: DropModel, sensing: Sensing
+) -> None:
+    assert drop.tail is not None
+    up = sensor_directions(drop.tail.sensors)[:, 1]
+    shifted = replace(drop.tail, signals=drop.tail.signals - 5e-6 * up)
+    gap = identify_air_gap(find_rest(drop.record, shifted, sensing), model, sensing)
+    assert gap.value == pytest.approx(gaps(model) + 5e-6, abs=0.1e-6)
+
+
+def test_sway_does_not_lift_the_rest_position(
+    drop: SyntheticDrop, sensing: Sensing, rest: SettledRest
+) -> None:
+    assert drop.tail is not None
+    time = np.arange(3000) * 1e-3
+    angle = 0.12 * np.sin(2.0 * np.pi * 29.0 * time)
+    radius = rest.radius
+    place = np.stack([np.outer(np.sin(angle), radius), np.outer(-np.cos(angle), radius)], axis=-1)
+    along = np.einsum("sbc,tbc->ts", sensing.from_bearings, place) + sensing.settled_bend
+    swaying = find_rest(drop.record, replace(drop.tail, time=time, signals=along), sensing)
+    assert swaying.radius == pytest.approx(radius, abs=1e-9)
+    assert swaying.sway == pytest.approx(0.12 * radius, rel=0.01)
+    resting = -sensing.from_bearings[..., 1] @ radius + sensing.settled_bend
+    assert swaying.along == pytest.approx(resting, abs=1e-8)
+
+
+def test_sag_is_load_over_stiffness_in_the_support(model: DropModel) -> None:
+    assert static_sag(model).support == pytest.approx(np.asarray(model.load_shares) / [1e8, 4e8], rel=1e-12)
+
+
+def test_limits_enclose_the_gap_and_zero_error_dominates(
+    rest: SettledRest, model: DropModel, sensing: Sensing
+) -> None:
+    vague = replace(sensing, offset_sigma=np.full(4, 10e-6))
+    gap = identify_air_gap(rest, model, vague)
+    assert np.all(gap.lower <= gap.value) and np.all(gap.value <= gap.upper)
+    assert gap.standard_error == pytest.approx([10e-6, 10e-6], rel=0.1)
+
+
+def test_record_that_ends_while_the_shaft_turns_is_refused(drop: SyntheticDrop, sensing: Sensing) -> None:
+    with pytest.raises(IdentificationError, match=r"ends at 0.06 s with the shaft turning at .* Hz.*--tail"):
+        find_rest(drop.record, None, sensing)
+
+
+def test_record_without_speed_is_refused(drop: SyntheticDrop, sensing: Sensing) -> None:
+    with pytest.raises(IdentificationError, match=r"has no shaft speed.*--tail"):
+        find_rest(replace(drop.record, speed=None), None, sensing)
+
+
+def test_standstill_at_the_end_of_the_record_serves_as_tail(drop: SyntheticDrop, sensing: Sensing) -> None:
+    assert drop.tail is not None
+    count = len(drop.tail.time)
+    speed = np.where(np.arange(count) < 1000, 5.0, 0.0)
+    whole = replace(drop.tail, speed=speed)
+    assert find_rest(whole, None, sensing).start == pytest.approx(float(drop.tail.time[1000]))
+
+
+def test_short_tail_is_refused(drop: SyntheticDrop, sensing: Sensing) -> None:
+    assert drop.tail is not None
+    short: Record = drop.tail.window(float(drop.tail.time[0]), float(drop.tail.time[0]) + 0.2)
+    with pytest.raises(IdentificationError, match=r"0.2 s of settled rotor; at least 0.5 s"):
+        find_rest(drop.record, short, sensing)
+
+
+def test_levitated_rotor_is_no_rest(drop: SyntheticDrop, sensing: Sensing) -> None:
+    assert drop.tail is not None
+    floating = replace(drop.tail, signals=-drop.tail.signals)
+    with pytest.raises(IdentificationError, match=r"not at rest on its bearings: mean height 2\d\d"):
+        find_rest(drop.record, floating, sensing)

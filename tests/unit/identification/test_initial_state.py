@@ -1,0 +1,121 @@
+"""The fit over the fall finds where the rotor was and how fast, with an error that is true."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rotordrop.errors import IdentificationError
+from rotordrop.identification.air_gap import SettledRest
+from rotordrop.identification.initial_state import InitialState, end_of_fall, fit_initial_state, settled_along
+from rotordrop.identification.modal_expansion import expand_initial_state
+from rotordrop.identification.replica import transferred
+from rotordrop.identification.sensing import Sensing, displacements_along
+from rotordrop.measurement.events import DropInstant
+from rotordrop.model.parameters import DropModel, build_drop_model
+from rotordrop.synthesis import SyntheticDrop
+
+
+def bearing_state(initial: InitialState, time: float) -> np.ndarray:
+    """Displacement and velocity (2, B, 2) at the bearings by the fall."""
+    state = initial.state_at(time)
+    fall = initial.fall
+    shape = fall.model.parameters.bearing_shape
+    parts = [state[part].reshape(2, -1) for part in (fall.displacement, fall.velocity)]
+    return np.array([shape @ part.T for part in parts])
+
+
+def true_state(drop: SyntheticDrop, time: float) -> np.ndarray:
+    k = round(time / 1e-5)
+    displacement = drop.result.displacement
+    return np.array([displacement[k], (displacement[k + 1] - displacement[k - 1]) / 2e-5])
+
+
+def test_state_shortly_before_contact_is_found(
+    initial: InitialState, drop: SyntheticDrop, contacts: np.ndarray
+) -> None:
+    late = float(round((contacts.min() - 3e-4) / 1e-5) * 1e-5)
+    place, velocity = bearing_state(initial, late) - true_state(drop, late)
+    assert np.abs(place).max() < 0.6e-6
+    assert np.abs(velocity).max() < 1.5e-3
+
+
+def test_power_off_is_found_to_a_sample(initial: InitialState, drop: SyntheticDrop) -> None:
+    assert initial.drop_instant == pytest.approx(drop.truth["t_off_in_record_s"], abs=5e-5)
+
+
+def test_residual_is_noise(initial: InitialState) -> None:
+    assert 0.7 < initial.misfit < 1.3
+
+
+def test_error_is_as_large_as_stated(
+    initial: InitialState, drop: SyntheticDrop, contacts: np.ndarray
+) -> None:
+    late = float(round((contacts.min() - 3e-4) / 1e-5) * 1e-5)
+    error = (bearing_state(initial, late) - true_state(drop, late))[0]
+    turn = initial.fall.transition(initial.decay, late)
+    states = initial.unknowns.states
+    shape = initial.fall.model.parameters.bearing_shape
+    m = initial.fall.n_modes
+    covariance = turn @ initial.covariance[states, states] @ turn.T
+    for axis in range(2):
+        part = slice(axis * m, (axis + 1) * m)
+        sigma = np.sqrt(np.diag(shape @ covariance[part, part] @ shape.T))
+        assert np.all(np.abs(error[:, axis]) < 4.0 * sigma + 0.05e-6)
+
+
+def test_remanent_lift_is_found(initial: InitialState, drop: SyntheticDrop) -> None:
+    true = np.array([[f["x_N"], f["vertical_N"]] for f in drop.truth["remanent_force"]])
+    assert initial.remanent_force == pytest.approx(true, abs=15.0)
+
+
+def test_square_root_squares_to_the_covariance(initial: InitialState) -> None:
+    root = initial.square_root()
+    scale = np.sqrt(np.diag(initial.covariance))
+    product = (root @ root.T) / np.outer(scale, scale)
+    assert product == pytest.approx(initial.covariance / np.outer(scale, scale), abs=1e-8)
+
+
+def test_modal_expansion_misses_the_sag_that_the_fit_finds(
+    drop: SyntheticDrop, initial: InitialState, rest: SettledRest, model: DropModel, sensing: Sensing
+) -> None:
+    along = displacements_along(drop.record) - rest.along + settled_along(rest, sensing)
+    expanded = expand_initial_state(drop.record.time, along, initial.drop_instant, model, sensing)
+    true = true_state(drop, 1e-5)[0]
+    by_fit = np.abs(initial.displacement - true).max()
+    assert np.abs(expanded.at_bearings - true).max() < 6e-6
+    assert by_fit < 1.2e-6
+    assert not np.any(expanded.displacement[2:])
+
+
+def test_transferred_state_is_the_same_motion(initial: InitialState, drop: SyntheticDrop) -> None:
+    richer = transferred(initial, build_drop_model(initial.fall.model.machine, "accurate"))
+    assert richer.displacement == pytest.approx(initial.displacement, abs=2e-9)
+    assert richer.velocity == pytest.approx(initial.velocity, abs=2e-5)
+
+
+def test_end_of_fall_is_where_the_gap_is_near() -> None:
+    time = np.linspace(-1e-3, 9e-3, 201)
+    place = np.zeros((201, 1, 2))
+    place[:, 0, 1] = -0.5 * 9.81 * np.maximum(time, 0.0) ** 2
+    expected = np.sqrt(2.0 * (250e-6 - 8e-6) / 9.81)
+    assert end_of_fall(time, place, np.array([250e-6])) == pytest.approx(expected, abs=6e-5)
+
+
+def test_rotor_that_never_reaches_the_gap_is_refused() -> None:
+    time = np.linspace(0.0, 5e-3, 101)
+    place = np.zeros((101, 1, 2))
+    place[:, 0, 1] = -0.5 * 9.81 * time**2
+    with pytest.raises(IdentificationError, match=r"within 127 µm of the air gap 250 µm at most"):
+        end_of_fall(time, place, np.array([250e-6]))
+
+
+def test_fall_with_too_few_samples_is_refused(
+    drop: SyntheticDrop, rest: SettledRest, instant: DropInstant, model: DropModel, sensing: Sensing
+) -> None:
+    record = drop.record
+    coarse = replace(record, time=record.time[::16], signals=record.signals[::16], sampling_rate=1250.0)
+    with pytest.raises(IdentificationError, match=r"\d samples between power-off and the first contact"):
+        fit_initial_state(coarse, rest, instant, np.array([25e-5, 25e-5]), model, sensing, speed=628.0)
