@@ -10,21 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.estimated import Estimated, IdentifiedValue
-from rotordrop.estimation.tracked import (
-    INCONSISTENT_WIDENING,
+from rotordrop.estimation.tracked import INCONSISTENT_WIDENING, prepare, track_drops
+from rotordrop.estimation.tracked_values import (
     MODEL_GAP_SIGMA,
     identified,
-    parameter_sample,
     parameter_widening,
     preload_value,
-    prepare,
-    track_drops,
 )
 from rotordrop.machine import Machine
 from rotordrop.measurement.record import Record
 from rotordrop.tracking.calibration import TrackedDrops
 from rotordrop.tracking.consistency import Check, consistency_checks
 from rotordrop.tracking.problem import DropProblem
+from rotordrop.tracking.smoother import parameter_sample
 from rotordrop.tracking.unknowns import NINETY, Unknown
 
 Array = NDArray[np.float64]

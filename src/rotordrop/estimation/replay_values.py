@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.estimated import IdentifiedValue
-from rotordrop.estimation.tracked import MODEL_FORCE_SIGMA, MODEL_MEAN_FORCE_SIGMA, MODEL_STRESS_SIGMA
+from rotordrop.estimation.tracked_values import MODEL_FORCE_SIGMA, MODEL_MEAN_FORCE_SIGMA, MODEL_STRESS_SIGMA
 from rotordrop.estimation.uncertainty import FEWEST_DRAWS, Draws, drop_numbers, interval
 from rotordrop.identification.air_gap import AirGap
 from rotordrop.identification.first_contact import FirstContact

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,16 +12,22 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError
 from rotordrop.estimated import IdentifiedValue
+from rotordrop.estimation.tracked_values import (
+    MODEL_FORCE_SIGMA,
+    force_values,
+    parameter_values,
+    with_interval,
+)
 from rotordrop.machine import Machine
 from rotordrop.measurement.events import DropInstant, find_drop_instant
 from rotordrop.measurement.record import Record
 from rotordrop.model.parameters import DropModel, build_drop_model
 from rotordrop.model.reduction import Reduction
-from rotordrop.physics.ball_bearing import bearing_constants
 from rotordrop.simulation.certificate import refined_peak
 from rotordrop.tracking.calibration import (
     BLIND_SCHEDULE,
     CALIBRATED_SCHEDULE,
+    QUICK_SCHEDULE,
     Stage,
     TrackedDrops,
     shifted,
@@ -31,7 +38,6 @@ from rotordrop.tracking.forces import ForceHistory, force_history
 from rotordrop.tracking.problem import DropProblem, build_problem
 from rotordrop.tracking.smoother import PassSettings, Smoothed, forward
 from rotordrop.tracking.transfer import transferred
-from rotordrop.tracking.unknowns import NINETY, Unknown, preload_of_offset
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -47,20 +53,9 @@ FINE_SCHEDULE: tuple[Stage, ...] = (
 CALIBRATION_SCHEDULE = FINE_SCHEDULE[:1]
 WINDOW = 0.2
 NOISE_FACTORS = (0.5, 1.0, 2.0, 4.0, 8.0)
+NOISE_WINDOW = 0.06
+"""Part of the drop on which the size of the unknown impulses is judged [s]."""
 
-MODEL_FORCE_SIGMA = 0.01
-"""Relative standard deviation of a force peak by what every model here leaves out (basis, sampling) [1]."""
-MODEL_STRESS_SIGMA = 0.004
-MODEL_MEAN_STRESS_SIGMA = 0.04
-"""The same for the mean stress: preload sets it, known only through the ball stiffness [1]."""
-MODEL_GAP_SIGMA = 2.5e-6
-"""Standard deviation of an air gap by what confounds it with gains and offsets beyond the fit [m]."""
-PARAMETER_WIDENING = 1.5
-"""Factor on standard errors of parameters for what the linearised fit leaves out [1]."""
-MODEL_MEAN_FORCE_SIGMA = 0.01
-"""Relative standard deviation of a mean force by what every model here leaves out [1]."""
-INDEPENDENT_SPANS = 50.0
-"""Independent stretches in the 50 ms of the mean force: its errors last about a millisecond [1]."""
 INCONSISTENT_WIDENING = 2.0
 """Factor on intervals when the model is not consistent with the record [1]."""
 
@@ -205,23 +200,17 @@ def track_drops(
     """Follow recorded drops of one machine with the drop model.
 
     From guesses, a coarse basis finds the parameters in growing windows and a finer one refines them; a
-    calibrated
-    machine starts with the finer one (with ``quick``, one pass of the coarse one).
+    calibrated machine needs the finer one only (with ``quick``, a single pass of it).
     """
     until = BLIND_SCHEDULE[-1].until + 0.01 if calibrate_only else WINDOW
-    coarse_model = build_drop_model(machine, COARSE_BASIS)
-    coarse = [drop_problem(coarse_model, item, until) for item in prepared]
-    if is_calibrated(machine) and not calibrate_only:
-        if quick:
-            return track(coarse, CALIBRATED_SCHEDULE[1:2], progress=progress)
-        fine_model = build_drop_model(machine, FINE_BASIS)
-        return track(
-            [drop_problem(fine_model, p, until) for p in prepared], CALIBRATED_SCHEDULE, progress=progress
-        )
-    contact = max(_first_contact(item) for item in prepared)
-    first = track(coarse, shifted(BLIND_SCHEDULE, contact), progress=progress)
     fine_model = build_drop_model(machine, FINE_BASIS)
     fine = [drop_problem(fine_model, item, until) for item in prepared]
+    if is_calibrated(machine) and not calibrate_only:
+        return track(fine, QUICK_SCHEDULE if quick else CALIBRATED_SCHEDULE, progress=progress)
+    coarse_model = build_drop_model(machine, COARSE_BASIS)
+    coarse = [drop_problem(coarse_model, item, until) for item in prepared]
+    contact = max(_first_contact(item) for item in prepared)
+    first = track(coarse, shifted(BLIND_SCHEDULE, contact), progress=progress)
     references = [
         transferred(one, two, drop.means) for one, two, drop in zip(coarse, fine, first.smoothed, strict=True)
     ]
@@ -234,15 +223,30 @@ def _first_contact(item: Preparation) -> float:
 
 
 def best_noise_factor(problem: DropProblem, smoothed: Smoothed, stage: Stage) -> float:
-    """Size of the unknown impulses, relative to the usual one, that makes the readings most likely [1]."""
-    scores = []
-    for factor in NOISE_FACTORS:
+    """Size of the unknown impulses, relative to the usual one, that makes the first impacts most likely [1].
+
+    Searched upwards or downwards from the usual size; what later impacts miss shows in their innovations.
+    """
+    samples = min(int(np.searchsorted(problem.time, NOISE_WINDOW)), len(smoothed.means))
+
+    def improbability(factor: float) -> float:
         settings = PassSettings(impulse=stage.impulse * factor, share=stage.share * factor)
-        result = forward(
-            problem, settings, reference=smoothed.means, samples=len(smoothed.means), smoothing=False
-        )
-        scores.append(result.negative_log_likelihood if result.done == len(smoothed.means) else math.inf)
-    return NOISE_FACTORS[int(np.argmin(scores))]
+        result = forward(problem, settings, reference=smoothed.means, samples=samples, smoothing=False)
+        return result.negative_log_likelihood if result.done == samples else math.inf
+
+    usual = NOISE_FACTORS.index(1.0)
+    with ThreadPoolExecutor(max_workers=2) as pool:
+        nearby = list(pool.map(improbability, NOISE_FACTORS[usual - 1 : usual + 2]))
+    if nearby[0] < min(nearby[1:]):
+        return NOISE_FACTORS[usual - 1]
+    best, least = usual, nearby[1]
+    following = nearby[2]
+    while following < least:
+        best, least = best + 1, following
+        if best + 1 == len(NOISE_FACTORS):
+            break
+        following = improbability(NOISE_FACTORS[best + 1])
+    return NOISE_FACTORS[best]
 
 
 def tracked_drop(
@@ -256,8 +260,8 @@ def tracked_drop(
     values: dict[str, dict[str, IdentifiedValue]] = {}
     peak_times: dict[str, float] = {}
     for b, name in enumerate(problem.model.bearing_names):
-        values[name] = _parameter_values(problem, smoothed, name, widening)
-        peak_values, peak_times[name] = _force_values(forces, b, widening)
+        values[name] = parameter_values(problem, smoothed, name, widening)
+        peak_values, peak_times[name] = force_values(forces, b, widening)
         values[name].update(peak_values)
     return TrackedDrop(
         name=prepared.name,
@@ -274,156 +278,6 @@ def tracked_drop(
         consistent=consistent,
         noise_factor=noise_factor,
         nis=smoothed.filtered.nis,
-    )
-
-
-def with_interval(value: float, sigma: float, widening: float = 1.0, unit: str = "") -> IdentifiedValue:
-    """A value with a symmetric 90 % interval."""
-    half = NINETY * sigma * widening
-    return IdentifiedValue(
-        value=value, standard_error=sigma * widening, interval_90=(value - half, value + half), unit=unit
-    )
-
-
-def _force_values(forces: ForceHistory, b: int, widening: float) -> tuple[dict[str, IdentifiedValue], float]:
-    peak, moment = refined_peak(forces.time, forces.magnitude[:, b])
-    at = int(np.argmax(forces.magnitude[:, b]))
-    sigma = math.hypot(float(forces.magnitude_sigma[at, b]), MODEL_FORCE_SIGMA * peak)
-    highest, _ = refined_peak(forces.time, forces.stress[:, b])
-    top = int(np.argmax(forces.stress[:, b]))
-    stress_sigma = math.hypot(float(forces.stress_sigma[top, b]), MODEL_STRESS_SIGMA * highest)
-    mean_stress = float(np.mean(forces.stress[:, b]))
-    mean_sigma = math.hypot(float(np.mean(forces.stress_sigma[:, b])), MODEL_MEAN_STRESS_SIGMA * mean_stress)
-    values = {
-        "peak_force_N": with_interval(peak, sigma, widening, "N"),
-        "peak_stress_Pa": with_interval(highest, stress_sigma, widening, "Pa"),
-        "mean_stress_Pa": with_interval(mean_stress, mean_sigma, widening, "Pa"),
-    }
-    late = (forces.time >= 0.15) & (forces.time <= 0.2)
-    if forces.time[-1] >= 0.199:
-        mean = float(np.mean(forces.magnitude[late, b]))
-        spread = float(np.mean(forces.magnitude_sigma[late, b])) / math.sqrt(INDEPENDENT_SPANS)
-        sigma = math.hypot(spread, MODEL_MEAN_FORCE_SIGMA * mean)
-        values["mean_force_0p15_0p2_N"] = with_interval(mean, sigma, widening, "N")
-    return values, moment
-
-
-_FIELDS = {
-    "air_gap": "air_gap_m",
-    "support.stiffness": "support.stiffness_N_per_m",
-    "support.damping": "support.damping_N_s_per_m",
-    "support.mass": "support.mass_kg",
-    "contact.stiffness": "contact.stiffness_N_per_m_n",
-    "contact.damping": "contact.damping_s_per_m",
-    "friction.dynamic": "friction.dynamic",
-    "race.inertia": "race.inertia_kg_m2",
-    "damping_time": "damping_time_s",
-}
-DETERMINED_SHARE = 0.7
-"""A parameter counts as determined when its error falls below this share of its prior's [1]."""
-
-
-def parameter_sample(smoothed: Smoothed) -> int:
-    """Sample at which parameters are read: shortly after the first contacts."""
-    return min(200, len(smoothed.means) - 1)
-
-
-def identified(unknown: Unknown, theta: float, sigma: float, widening: float = 1.0) -> IdentifiedValue:
-    """An estimated parameter as a value with interval, start and verdict."""
-    half = NINETY * sigma * widening
-    value = unknown.value_of(theta)
-    error = sigma * widening * (value if unknown.logarithmic else 1.0)
-    determined = sigma < DETERMINED_SHARE * unknown.sigma
-    return IdentifiedValue(
-        value=value,
-        status="determined" if determined else "the record does not determine it",
-        standard_error=error,
-        interval_90=(unknown.value_of(theta - half), unknown.value_of(theta + half)),
-        start=unknown.value_of(unknown.mean),
-        unit=unknown.unit,
-    )
-
-
-def parameter_widening(unknown: Unknown, sigma: float, widening: float = 1.0) -> float:
-    """Factor on a parameter's standard error [1]; the widened error stays within that of the prior."""
-    return max(1.0, min(PARAMETER_WIDENING * widening, unknown.sigma / max(sigma, 1e-300)))
-
-
-def _parameter_values(
-    problem: DropProblem, smoothed: Smoothed, name: str, widening: float
-) -> dict[str, IdentifiedValue]:
-    at = parameter_sample(smoothed)
-    theta = smoothed.means[at][problem.parameter_slice]
-    sigma = np.sqrt(np.maximum(np.diag(smoothed.covariance(at))[problem.parameter_slice], 0.0))
-    values = {}
-    for unknown, t, s in zip(problem.unknowns, theta, sigma, strict=True):
-        owner, _, path = unknown.path.partition(".")
-        if owner != name:
-            continue
-        error = math.hypot(float(s), MODEL_GAP_SIGMA) if path == "air_gap" else float(s)
-        wide = parameter_widening(unknown, error, widening)
-        if path in _FIELDS:
-            values[_FIELDS[path]] = identified(unknown, float(t), error, wide)
-        elif path == "axial_offset":
-            values["preload_N"] = preload_value(problem, name, unknown, float(t), error, wide)
-    values["friction.static"] = _static_friction(problem, name, values["friction.dynamic"])
-    values["equivalent_stiffness_N_per_m"] = _equivalent_stiffness(problem, name, values)
-    return values
-
-
-def preload_value(
-    problem: DropProblem, name: str, unknown: Unknown, theta: float, sigma: float, widening: float = 1.0
-) -> IdentifiedValue:
-    """Preload [N] from the estimated axial offset of the rows."""
-    constants = bearing_constants(problem.model.machine.bearing(name).bearing)
-    half = NINETY * sigma * widening
-    low, value, high = (preload_of_offset(constants, theta + d) for d in (-half, 0.0, half))
-    base = identified(unknown, theta, sigma, widening)
-    return replace(
-        base,
-        value=value,
-        standard_error=(high - low) / (2.0 * NINETY),
-        interval_90=(low, high),
-        start=preload_of_offset(constants, unknown.mean),
-        unit="N",
-    )
-
-
-def _static_friction(problem: DropProblem, name: str, dynamic: IdentifiedValue) -> IdentifiedValue:
-    """Static coefficient at its prior ratio to the dynamic one: sliding drops say little about it."""
-    friction = problem.model.machine.bearing(name).friction
-    ratio = float(friction.static) / float(friction.dynamic)
-    low, high = dynamic.interval_90 or (dynamic.value, dynamic.value)
-    return IdentifiedValue(
-        value=ratio * dynamic.value,
-        status="prior",
-        standard_error=None if dynamic.standard_error is None else ratio * dynamic.standard_error,
-        interval_90=(0.85 * ratio * low, 1.15 * ratio * high),
-        unit="1",
-    )
-
-
-def _equivalent_stiffness(
-    problem: DropProblem, name: str, values: dict[str, IdentifiedValue]
-) -> IdentifiedValue:
-    """Support and bearing in series [N/m], the bearing by its tangent at the static load."""
-    from rotordrop.model.parameters import static_bearing_stiffness
-
-    index = problem.model.bearing_names.index(name)
-    constants = bearing_constants(problem.model.machine.bearing(name).bearing)
-    bearing = static_bearing_stiffness(constants, float(problem.model.load_shares[index]))
-    support = values["support.stiffness_N_per_m"]
-    low, high = support.interval_90 or (support.value, support.value)
-
-    def series(stiffness: float) -> float:
-        return stiffness * bearing / (stiffness + bearing)
-
-    return replace(
-        support,
-        value=series(support.value),
-        interval_90=(series(low), series(high)),
-        standard_error=(series(high) - series(low)) / (2.0 * NINETY),
-        start=None,
     )
 
 
@@ -478,7 +332,7 @@ def estimate_tracked(
     names : sequence of str, optional
         Names of the drops; file stems by default.
     quick : bool
-        One pass with a small basis; needs a calibrated machine to be accurate.
+        One pass instead of three; only with a calibrated machine.
     progress : callable, optional
         Called with a sentence and the fraction done.
     """

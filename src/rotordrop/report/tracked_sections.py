@@ -7,14 +7,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.estimation.tracked import (
-    INCONSISTENT_WIDENING,
+from rotordrop.estimation.tracked import INCONSISTENT_WIDENING, TrackedDrop
+from rotordrop.estimation.tracked_values import (
     MODEL_FORCE_SIGMA,
     MODEL_GAP_SIGMA,
     MODEL_STRESS_SIGMA,
-    TrackedDrop,
     identified,
-    parameter_sample,
     parameter_widening,
     preload_value,
 )
@@ -32,6 +30,7 @@ from rotordrop.report.quantity import Quantity
 from rotordrop.report.stress_box import StressBox, stress_box
 from rotordrop.simulation.certificate import refined_peak
 from rotordrop.tracking.consistency import NIS_RANGE, normalised_innovations
+from rotordrop.tracking.smoother import parameter_sample
 from rotordrop.tracking.unknowns import Unknown
 
 Array = NDArray[np.float64]

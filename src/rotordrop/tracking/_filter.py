@@ -28,6 +28,8 @@ from rotordrop.tracking._propagation import (
 )
 
 Array = NDArray[np.float64]
+Compact = NDArray[np.float32]
+IntArray = NDArray[np.int64]
 
 
 @kernel
@@ -108,8 +110,8 @@ def forward_pass(
     settings: FilterSettings,
     reference: Array,
     means: Array,
-    covariances: Array,
-    transitions: Array,
+    covariances: Compact,
+    transitions: Compact,
     rows: Array,
     gains: Array,
     innovations: Array,
@@ -182,6 +184,8 @@ def forward_pass(
             add_process_noise(P, p, settings, impulses, drift)
             if keep:
                 transitions[i] = F
+        elif keep:
+            transitions[i] = 0.0
         for c in range(n_c + 1):
             value = speed[i] if c == n_c else readings[i, c]
             innovations[i, c] = np.nan
@@ -221,13 +225,16 @@ def forward_pass(
 @kernel
 def backward_pass(
     means: Array,
-    covariances: Array,
-    transitions: Array,
+    covariances: Compact,
+    transitions: Compact,
     rows: Array,
     gains: Array,
     innovations: Array,
     innovation_variances: Array,
+    watched: Array,
+    kept: IntArray,
     smoothed: Array,
+    blocks: Array,
     information: Array,
     final_score: Array,
     final_information: Array,
@@ -236,10 +243,16 @@ def backward_pass(
 
     Parameters
     ----------
+    watched : ndarray, shape (G, n)
+        Linear functions of the estimate whose smoothed covariance is wanted at every sample.
+    kept : ndarray, shape (K,)
+        Samples, rising, whose Λ is wanted.
     smoothed : ndarray, shape (N, n)
         Filled with the smoothed estimate.
-    information : ndarray, shape (N, n, n)
-        Filled with Λ of each sample: the smoothed covariance is ``P − P Λ P`` with the filtered ``P``.
+    blocks : ndarray, shape (N, G, G)
+        Filled with the smoothed covariance of the watched functions.
+    information : ndarray, shape (K, n, n)
+        Filled with Λ of the kept samples: the smoothed covariance is ``P − P Λ P`` with the filtered ``P``.
     final_score, final_information : ndarray, shapes (n,), (n, n)
         λ and Λ that later records put on the last sample (zero for a single record); overwritten by their
         values
@@ -251,9 +264,15 @@ def backward_pass(
     lam = final_score
     Lam = final_information
     seen = np.empty(n, dtype=np.int64)
+    left = kept.shape[0] - 1
     for i in range(n_t - 1, -1, -1):
-        information[i] = Lam
-        smoothed[i] = means[i] - np.dot(covariances[i], lam)
+        P = covariances[i].astype(np.float64)
+        smoothed[i] = means[i] - np.dot(P, lam)
+        spread = np.dot(watched, P)
+        blocks[i] = np.dot(spread, watched.T) - np.dot(np.dot(spread, Lam), spread.T)
+        if left >= 0 and kept[left] == i:
+            information[left] = Lam
+            left -= 1
         for c in range(rows.shape[1] - 1, -1, -1):
             S = innovation_variances[i, c]
             if not math.isfinite(S):
@@ -280,7 +299,7 @@ def backward_pass(
             for a in range(n):
                 lam[a] -= row[a] * (score + innovations[i, c] / S)
         if i > 0:
-            F = transitions[i]
+            F = transitions[i].astype(np.float64)
             top = np.ascontiguousarray(Lam[:s])
             tail = np.dot(F.T, top)
             body = np.dot(np.ascontiguousarray(tail[:, :s]), F)

@@ -50,6 +50,9 @@ CALIBRATED_SCHEDULE: tuple[Stage, ...] = (
 )
 """With a calibrated machine: what is left is the state, the sensors and the drop's own unknowns."""
 
+QUICK_SCHEDULE: tuple[Stage, ...] = (Stage(until=0.2, impulse=1e-3, share=0.01, passes=1),)
+"""With a calibrated machine: one pass, linearised at the filter's own estimate."""
+
 FULL_SCHEDULE: tuple[Stage, ...] = (
     *BLIND_SCHEDULE,
     Stage(until=0.1, impulse=2e-3, share=0.02, passes=1),
@@ -126,6 +129,7 @@ def track(
         for _ in range(stage.passes):
             if progress is not None:
                 progress(f"fitting the first {1e3 * stage.until:.0f} ms", done / total)
+            smoothed = []  # a pass fills hundreds of megabytes: the one before must be gone by then
             smoothed = one_pass(problems, settings, trajectories, stage.until)
             trajectories = [s.means for s in smoothed]
             done += stage.until
@@ -160,7 +164,7 @@ def one_pass(
     smoothed: list[Smoothed] = []
     score, information = None, None
     for d in range(len(problems) - 1, -1, -1):
-        back = smooth(filtered[d], score, information)
+        back = smooth(filtered[d], score, information, watched=problems[d].watched)
         smoothed.append(back)
         if d > 0:
             n = len(problems[d].mean)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.tracking.problem import DropProblem
-from rotordrop.tracking.smoother import Smoothed
+from rotordrop.tracking.smoother import Smoothed, parameter_sample
 
 Array = NDArray[np.float64]
 
@@ -112,8 +112,7 @@ def _sensor_check(problem: DropProblem, smoothed: Smoothed) -> Check:
 
 
 def _parameter_check(problem: DropProblem, smoothed: Smoothed) -> Check:
-    index = min(200, len(smoothed.means) - 1)
-    theta = smoothed.means[index][problem.parameter_slice]
+    theta = smoothed.means[parameter_sample(smoothed)][problem.parameter_slice]
     departure = np.array([(t - u.mean) / u.sigma for t, u in zip(theta, problem.unknowns, strict=True)])
     worst = int(np.argmax(np.abs(departure)))
     return Check(

@@ -156,7 +156,7 @@ def force_history(problem: DropProblem, smoothed: Smoothed) -> ForceHistory:
         gradients,
         contacts,
     )
-    sigma = _standard_deviations(problem, smoothed, gradients)
+    sigma = _standard_deviations(smoothed, gradients)
     displacement, displacement_sigma = _displacements(problem, smoothed)
     touching = contacts[..., 0] > 0.0
     return ForceHistory(
@@ -176,38 +176,19 @@ def force_history(problem: DropProblem, smoothed: Smoothed) -> ForceHistory:
     )
 
 
-def smoothed_blocks(smoothed: Smoothed, rows: Array) -> Array:
-    """Covariance (N, g, g) at every sample of fixed linear functions, rows (g, n), of the estimate."""
-    P = smoothed.filtered.covariances[: len(smoothed.means)]
-    spread = rows @ P
-    return np.asarray(spread @ rows.T - spread @ smoothed.information @ spread.transpose(0, 2, 1))
-
-
-def _standard_deviations(problem: DropProblem, smoothed: Smoothed, gradients: Array) -> Array:
-    layout = problem.model.layout
-    n = smoothed.means.shape[1]
+def _standard_deviations(smoothed: Smoothed, gradients: Array) -> Array:
     sigma = np.empty(gradients.shape[:3])
-    for b, name in enumerate(problem.model.bearing_names):
-        rows = np.zeros((3, n))
-        for axis in range(2):
-            rows[axis, layout.race.start + 2 * b + axis] = 1.0
-            rows[axis, layout.support.start + 2 * b + axis] = -1.0
-        for k, unknown in enumerate(problem.unknowns):
-            if unknown.path == f"{name}.axial_offset":
-                rows[2, problem.n_dynamic + k] = 1.0
-        blocks = smoothed_blocks(smoothed, rows)
+    for b in range(gradients.shape[1]):
+        block = smoothed.watched[:, 5 * b : 5 * b + 3, 5 * b : 5 * b + 3]
         g = gradients[:, b]
-        sigma[:, b] = np.sqrt(np.maximum(np.einsum("nvi,nij,nvj->nv", g, blocks, g), 0.0))
+        sigma[:, b] = np.sqrt(np.maximum(np.einsum("nvi,nij,nvj->nv", g, block, g), 0.0))
     return sigma
 
 
 def _displacements(problem: DropProblem, smoothed: Smoothed) -> tuple[Array, Array]:
-    layout, shapes = problem.model.layout, problem.model.parameters.bearing_shape
-    n_b, n = len(shapes), smoothed.means.shape[1]
-    rows = np.zeros((2 * n_b, n))
-    for b in range(n_b):
-        rows[2 * b, layout.modal_x] = shapes[b]
-        rows[2 * b + 1, layout.modal_y] = shapes[b]
-    variance = np.diagonal(smoothed_blocks(smoothed, rows), axis1=1, axis2=2)
-    shape = (len(smoothed.means), n_b, 2)
-    return (smoothed.means @ rows.T).reshape(shape), np.sqrt(np.maximum(variance, 0.0)).reshape(shape)
+    values, sigma = [], []
+    for b, name in enumerate(problem.model.bearing_names):
+        values.append(smoothed.means @ problem.watched_rows(name)[3:].T)
+        variance = np.diagonal(smoothed.watched, axis1=1, axis2=2)[:, 5 * b + 3 : 5 * b + 5]
+        sigma.append(np.sqrt(np.maximum(variance, 0.0)))
+    return np.stack(values, axis=1), np.stack(sigma, axis=1)

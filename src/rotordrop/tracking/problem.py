@@ -96,6 +96,30 @@ class DropProblem:
         sensors = range(first, first + 2 * self.n_channels)
         return np.array([*shared, *sensors], dtype=np.int64)
 
+    def watched_rows(self, name: str) -> Array:
+        """Linear functions of the estimate that forces and orbit at a bearing depend on, shape (5, n).
+
+        Deflection of race against support in x and y [m], axial offset of the ball rows [m], displacement of
+        the rotor in x and y [m].
+        """
+        layout = self.model.layout
+        b = self.model.bearing_names.index(name)
+        rows = np.zeros((5, len(self.mean)))
+        for axis in range(2):
+            rows[axis, layout.race.start + 2 * b + axis] = 1.0
+            rows[axis, layout.support.start + 2 * b + axis] = -1.0
+        for k, unknown in enumerate(self.unknowns):
+            if unknown.path == f"{name}.axial_offset":
+                rows[2, self.n_dynamic + k] = 1.0
+        rows[3, layout.modal_x] = self.model.parameters.bearing_shape[b]
+        rows[4, layout.modal_y] = self.model.parameters.bearing_shape[b]
+        return rows
+
+    @property
+    def watched(self) -> Array:
+        """The watched functions of all bearings, shape (5 B, n)."""
+        return np.concatenate([self.watched_rows(name) for name in self.model.bearing_names])
+
 
 def build_problem(
     model: DropModel,

@@ -97,7 +97,8 @@ def _fitted(design: Array, values: Array) -> tuple[Array, Array]:
     """Coefficients and standard deviation of what is left, channel by channel where readings are missing."""
     if np.isfinite(values).all():
         coefficients, *_ = np.linalg.lstsq(design, values, rcond=None)
-        return coefficients, np.std(values - design @ coefficients, axis=0, ddof=design.shape[1])
+        left = values - design @ coefficients
+        return np.asarray(coefficients), np.asarray(np.std(left, axis=0, ddof=design.shape[1]))
     coefficients = np.full((design.shape[1], values.shape[1]), np.nan)
     noise = np.full(values.shape[1], np.nan)
     for c in range(values.shape[1]):
@@ -106,7 +107,7 @@ def _fitted(design: Array, values: Array) -> tuple[Array, Array]:
             one, few = design[heard], values[heard, c : c + 1]
             found, left = _fitted(one, few)
             coefficients[:, c], noise[c] = found[:, 0], left[0]
-    return coefficients, noise
+    return np.asarray(coefficients), np.asarray(noise)
 
 
 def without_hum_and_runout(time: Array, readings: Array, theta: Array, phase: LevitatedPhase) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +15,11 @@ from rotordrop.tracking import _propagation as P
 from rotordrop.tracking.problem import DropProblem, private_copy
 
 Array = NDArray[np.float64]
+Compact = NDArray[np.float32]
+"""What a pass stores for the smoother: hundreds of megabytes, of which seven digits are plenty."""
 
+PARAMETER_SAMPLE = 200
+"""Sample at which parameters are read: shortly after the first contacts."""
 
 LARGEST_PHASE = 1.0
 """Largest phase [rad] by which the fastest mode may turn in one integration step of the filter."""
@@ -78,8 +83,8 @@ class Forward:
 
     done: int
     means: Array
-    covariances: Array
-    transitions: Array
+    covariances: Compact
+    transitions: Compact
     rows: Array
     gains: Array
     innovations: Array
@@ -142,8 +147,8 @@ def forward(
     result = Forward(
         done=0,
         means=np.empty((count, n)),
-        covariances=np.empty((count, n, n) if smoothing else (count, 0, 0)),
-        transitions=np.zeros((kept, s, columns)),
+        covariances=np.empty((count, n, n) if smoothing else (count, 0, 0), dtype=np.float32),
+        transitions=np.empty((kept, s, columns), dtype=np.float32),
         rows=np.empty((kept, n_c + 1, n)),
         gains=np.empty((kept, n_c + 1, n)),
         innovations=np.empty((count, n_c + 1)),
@@ -181,35 +186,65 @@ class Smoothed:
     ----------
     means : ndarray, shape (N, n)
         Smoothed estimate at each sample.
-    information : ndarray, shape (N, n, n)
-        Λ of each sample: the smoothed covariance is ``P − P Λ P`` with the filtered P.
+    watched : ndarray, shape (N, G, G)
+        Smoothed covariance of the watched linear functions at each sample.
+    kept : ndarray, shape (K,)
+        Samples whose whole covariance can be asked for.
+    information : ndarray, shape (K, n, n)
+        Λ of these samples: the smoothed covariance is ``P − P Λ P`` with the filtered P.
     score_0, information_0 : ndarray, shapes (n,), (n, n)
         λ and Λ before the first measurement.
     """
 
     filtered: Forward
     means: Array
+    watched: Array
+    kept: NDArray[np.int64]
     information: Array
     score_0: Array
     information_0: Array
 
     def covariance(self, sample: int) -> Array:
-        """Smoothed covariance at a sample, shape (n, n)."""
-        P = self.filtered.covariances[sample]
-        return np.asarray(P - P @ self.information[sample] @ P)
-
-    def variance_of(self, sample: int, gradients: Array) -> Array:
-        """Covariance (G, G) of linear functions of the estimate at a sample, gradients (G, n)."""
-        P = self.filtered.covariances[sample]
-        spread = gradients @ P
-        return np.asarray(spread @ gradients.T - spread @ self.information[sample] @ spread.T)
+        """Smoothed covariance at a kept sample, shape (n, n)."""
+        found = np.flatnonzero(self.kept == sample)
+        if len(found) == 0:
+            raise IndexError(f"the covariance of sample {sample} was not kept; kept are {self.kept.tolist()}")
+        P = self.filtered.covariances[sample].astype(np.float64)
+        return np.asarray(P - P @ self.information[found[0]] @ P)
 
 
-def smooth(filtered: Forward, score: Array | None = None, information: Array | None = None) -> Smoothed:
-    """Run the backward pass; ``score`` and ``information`` are what later drops say about the last sample."""
+def parameter_sample(smoothed: Smoothed) -> int:
+    """Sample at which parameters are read: shortly after the first contacts."""
+    return min(PARAMETER_SAMPLE, len(smoothed.means) - 1)
+
+
+def smooth(
+    filtered: Forward,
+    score: Array | None = None,
+    information: Array | None = None,
+    *,
+    watched: Array | None = None,
+    kept: Sequence[int] | None = None,
+) -> Smoothed:
+    """Run the backward pass.
+
+    Parameters
+    ----------
+    score, information : ndarray, shapes (n,), (n, n), optional
+        What later drops say about the last sample.
+    watched : ndarray, shape (G, n), optional
+        Linear functions of the estimate whose covariance is wanted at every sample.
+    kept : sequence of int, optional
+        Samples whose whole covariance is wanted; by default the first, the one that parameters are read at
+        and the last.
+    """
     done, n = filtered.done, filtered.means.shape[1]
+    samples = (0, min(PARAMETER_SAMPLE, done - 1), done - 1) if kept is None else kept
+    chosen = np.unique(np.asarray(samples, dtype=np.int64))
+    rows = np.zeros((0, n)) if watched is None else np.ascontiguousarray(watched)
     means = np.empty((done, n))
-    kept = np.empty((done, n, n))
+    blocks = np.empty((done, len(rows), len(rows)))
+    stored = np.empty((len(chosen), n, n))
     lam = np.zeros(n) if score is None else score.copy()
     Lam = np.zeros((n, n)) if information is None else information.copy()
     F.backward_pass(
@@ -220,9 +255,20 @@ def smooth(filtered: Forward, score: Array | None = None, information: Array | N
         filtered.gains[:done],
         filtered.innovations[:done],
         filtered.innovation_variances[:done],
+        rows,
+        chosen,
         means,
-        kept,
+        blocks,
+        stored,
         lam,
         Lam,
     )
-    return Smoothed(filtered=filtered, means=means, information=kept, score_0=lam, information_0=Lam)
+    return Smoothed(
+        filtered=filtered,
+        means=means,
+        watched=blocks,
+        kept=chosen,
+        information=stored,
+        score_0=lam,
+        information_0=Lam,
+    )

@@ -149,7 +149,7 @@ def test_likelihood_and_size_are_those_of_the_innovations(plain, filtered):
 
 
 def test_the_backward_pass_is_the_plain_smoother(flight, plain, filtered):
-    smoothed = smooth(filtered)
+    smoothed = smooth(filtered, kept=range(filtered.done))
     means, covariances = plain.smoothed()
     for i in range(0, len(means), 5):
         assert in_deviations(smoothed.means[i] - means[i], covariances[i]) < 1e-3
@@ -165,20 +165,39 @@ def test_the_last_sample_has_nothing_to_be_smoothed(filtered):
 
 
 def test_a_later_sample_only_narrows(flight, filtered):
-    smoothed = smooth(filtered)
+    smoothed = smooth(filtered, kept=(0, 20, 40))
     for i in (0, 20, 40):
         before, after = np.diag(filtered.covariances[i]), np.diag(smoothed.covariance(i))
-        assert np.all(after <= before * (1.0 + 1e-9))
+        assert np.all(after <= before * (1.0 + 1e-6))
         assert np.all(after >= 0.0)
         assert np.all(after[before > 0.0] > 0.0)
 
 
-def test_functions_of_the_estimate_have_the_covariance_of_the_whole(flight, filtered, random):
-    smoothed = smooth(filtered)
+def test_watched_functions_have_the_covariance_of_the_whole(flight, filtered, random):
     gradients = random.standard_normal((3, len(flight.mean)))
+    smoothed = smooth(filtered, watched=gradients, kept=(30,))
     np.testing.assert_allclose(
-        smoothed.variance_of(30, gradients), gradients @ smoothed.covariance(30) @ gradients.T, rtol=1e-8
+        smoothed.watched[30], gradients @ smoothed.covariance(30) @ gradients.T, rtol=1e-8
     )
+
+
+def test_a_covariance_that_was_not_kept_is_refused(filtered):
+    with pytest.raises(IndexError, match=r"sample 7 was not kept; kept are \[0, 59\]"):
+        smooth(filtered).covariance(7)
+
+
+def test_the_watched_rows_are_deflection_offset_and_displacement(flight):
+    name = flight.model.bearing_names[1]
+    rows, layout = flight.watched_rows(name), flight.model.layout
+    estimate = np.zeros(len(flight.mean))
+    estimate[layout.race.start + 2], estimate[layout.support.start + 2] = 5e-6, 2e-6
+    estimate[layout.race.start + 3], estimate[layout.support.start + 3] = -4e-6, 1e-6
+    estimate[layout.modal_y] = 1e-5
+    shape = flight.model.parameters.bearing_shape[1]
+    np.testing.assert_allclose(rows @ estimate, [3e-6, -5e-6, 0.0, 0.0, 1e-5 * shape.sum()], atol=1e-18)
+    offset = [u.path for u in flight.unknowns].index(f"{name}.axial_offset")
+    assert rows[2, flight.n_dynamic + offset] == 1.0
+    np.testing.assert_array_equal(flight.watched[5:], rows)
 
 
 def test_missing_readings_are_left_out(flight):
@@ -210,16 +229,17 @@ def test_smoothing_over_a_gap_is_the_plain_one_too(flight):
     assert in_deviations(smoothed.means[22] - means[22], covariances[22]) < 1e-3
 
 
-def test_the_covariance_stays_positive_definite_through_impacts(impacts, impacts_filtered, impacts_smoothed):
+def test_the_covariance_stays_positive_definite_through_impacts(impacts, impacts_filtered):
     assert impacts_filtered.done == len(impacts.time)
     contacts = np.abs(np.diff(impacts_filtered.means[:, impacts.model.layout.race], axis=0)).max(axis=0)
     assert np.all(contacts > 0.2e-6)  # both races were hit
+    smoothed = smooth(impacts_filtered, kept=range(0, impacts_filtered.done, 15))
     for i in range(0, impacts_filtered.done, 15):
-        for covariance in (impacts_filtered.covariances[i], impacts_smoothed.covariance(i)):
+        for covariance in (impacts_filtered.covariances[i].astype(float), smoothed.covariance(i)):
             unit = deviations_of(covariance)
             assert np.all(np.isfinite(unit)) and np.all(np.diag(covariance) >= 0.0)
             lowest = np.linalg.eigvalsh(covariance / np.outer(unit, unit))[0]
-            assert lowest > -1e-8
+            assert lowest > -2e-6  # stored with seven digits
         filtered = impacts_filtered.covariances[i]
         np.testing.assert_array_equal(filtered, filtered.T)
 
@@ -342,7 +362,7 @@ def test_two_chained_drops_are_one_joint_least_squares_fit(flight):
     alone = one_pass([first], NOISELESS, references[:1], 0.003)[0]
     gap = first.n_dynamic + len(first.unknowns) + first.n_channels  # an offset, which both drops see
     assert chained[0].covariance(0)[gap, gap] < alone.covariance(0)[gap, gap]
-    assert chained[0].means[-1][shared] == pytest.approx(chained[1].means[0][shared], rel=1e-6, abs=1e-12)
+    assert chained[0].means[-1][shared] == pytest.approx(chained[1].means[0][shared], rel=1e-4, abs=1e-12)
 
 
 def test_what_belongs_to_one_drop_does_not_reach_the_other(flight):

@@ -92,6 +92,8 @@ def pushed(flight: DropProblem) -> tuple[DropProblem, Smoothed, np.ndarray]:
     smoothed = Smoothed(
         filtered=None,
         means=means,
+        watched=empty,
+        kept=np.zeros(0, dtype=np.int64),
         information=empty,
         score_0=empty,
         information_0=empty,  # type: ignore[arg-type]

@@ -1,0 +1,177 @@
+"""Numbers of a tracked drop with their intervals: forces, stresses and identified parameters."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from rotordrop.estimated import IdentifiedValue
+from rotordrop.physics.ball_bearing import bearing_constants
+from rotordrop.simulation.certificate import refined_peak
+from rotordrop.tracking.forces import ForceHistory
+from rotordrop.tracking.problem import DropProblem
+from rotordrop.tracking.smoother import Smoothed, parameter_sample
+from rotordrop.tracking.unknowns import NINETY, Unknown, preload_of_offset
+
+MODEL_FORCE_SIGMA = 0.01
+"""Relative standard deviation of a force peak by what every model here leaves out (basis, sampling) [1]."""
+MODEL_STRESS_SIGMA = 0.004
+MODEL_MEAN_STRESS_SIGMA = 0.04
+"""The same for the mean stress: preload sets it, known only through the ball stiffness [1]."""
+MODEL_GAP_SIGMA = 2.5e-6
+"""Standard deviation of an air gap by what confounds it with gains and offsets beyond the fit [m]."""
+PARAMETER_WIDENING = 1.5
+"""Factor on standard errors of parameters for what the linearised fit leaves out [1]."""
+MODEL_MEAN_FORCE_SIGMA = 0.01
+"""Relative standard deviation of a mean force by what every model here leaves out [1]."""
+INDEPENDENT_SPANS = 50.0
+"""Independent stretches in the 50 ms of the mean force: its errors last about a millisecond [1]."""
+
+
+def with_interval(value: float, sigma: float, widening: float = 1.0, unit: str = "") -> IdentifiedValue:
+    """A value with a symmetric 90 % interval."""
+    half = NINETY * sigma * widening
+    return IdentifiedValue(
+        value=value, standard_error=sigma * widening, interval_90=(value - half, value + half), unit=unit
+    )
+
+
+def force_values(forces: ForceHistory, b: int, widening: float) -> tuple[dict[str, IdentifiedValue], float]:
+    """Peak force, peak and mean stress and late mean force of one bearing, and when the peak was [s]."""
+    peak, moment = refined_peak(forces.time, forces.magnitude[:, b])
+    at = int(np.argmax(forces.magnitude[:, b]))
+    sigma = math.hypot(float(forces.magnitude_sigma[at, b]), MODEL_FORCE_SIGMA * peak)
+    highest, _ = refined_peak(forces.time, forces.stress[:, b])
+    top = int(np.argmax(forces.stress[:, b]))
+    stress_sigma = math.hypot(float(forces.stress_sigma[top, b]), MODEL_STRESS_SIGMA * highest)
+    mean_stress = float(np.mean(forces.stress[:, b]))
+    mean_sigma = math.hypot(float(np.mean(forces.stress_sigma[:, b])), MODEL_MEAN_STRESS_SIGMA * mean_stress)
+    values = {
+        "peak_force_N": with_interval(peak, sigma, widening, "N"),
+        "peak_stress_Pa": with_interval(highest, stress_sigma, widening, "Pa"),
+        "mean_stress_Pa": with_interval(mean_stress, mean_sigma, widening, "Pa"),
+    }
+    late = (forces.time >= 0.15) & (forces.time <= 0.2)
+    if forces.time[-1] >= 0.199:
+        mean = float(np.mean(forces.magnitude[late, b]))
+        spread = float(np.mean(forces.magnitude_sigma[late, b])) / math.sqrt(INDEPENDENT_SPANS)
+        sigma = math.hypot(spread, MODEL_MEAN_FORCE_SIGMA * mean)
+        values["mean_force_0p15_0p2_N"] = with_interval(mean, sigma, widening, "N")
+    return values, moment
+
+
+_FIELDS = {
+    "air_gap": "air_gap_m",
+    "support.stiffness": "support.stiffness_N_per_m",
+    "support.damping": "support.damping_N_s_per_m",
+    "support.mass": "support.mass_kg",
+    "contact.stiffness": "contact.stiffness_N_per_m_n",
+    "contact.damping": "contact.damping_s_per_m",
+    "friction.dynamic": "friction.dynamic",
+    "race.inertia": "race.inertia_kg_m2",
+    "damping_time": "damping_time_s",
+}
+DETERMINED_SHARE = 0.7
+"""A parameter counts as determined when its error falls below this share of its prior's [1]."""
+
+
+def identified(unknown: Unknown, theta: float, sigma: float, widening: float = 1.0) -> IdentifiedValue:
+    """An estimated parameter as a value with interval, start and verdict."""
+    half = NINETY * sigma * widening
+    value = unknown.value_of(theta)
+    error = sigma * widening * (value if unknown.logarithmic else 1.0)
+    determined = sigma < DETERMINED_SHARE * unknown.sigma
+    return IdentifiedValue(
+        value=value,
+        status="determined" if determined else "the record does not determine it",
+        standard_error=error,
+        interval_90=(unknown.value_of(theta - half), unknown.value_of(theta + half)),
+        start=unknown.value_of(unknown.mean),
+        unit=unknown.unit,
+    )
+
+
+def parameter_widening(unknown: Unknown, sigma: float, widening: float = 1.0) -> float:
+    """Factor on a parameter's standard error [1]; the widened error stays within that of the prior."""
+    return max(1.0, min(PARAMETER_WIDENING * widening, unknown.sigma / max(sigma, 1e-300)))
+
+
+def parameter_values(
+    problem: DropProblem, smoothed: Smoothed, name: str, widening: float
+) -> dict[str, IdentifiedValue]:
+    """Identified parameters of one bearing, as they were shortly after the first contacts."""
+    at = parameter_sample(smoothed)
+    theta = smoothed.means[at][problem.parameter_slice]
+    sigma = np.sqrt(np.maximum(np.diag(smoothed.covariance(at))[problem.parameter_slice], 0.0))
+    values = {}
+    for unknown, t, s in zip(problem.unknowns, theta, sigma, strict=True):
+        owner, _, path = unknown.path.partition(".")
+        if owner != name:
+            continue
+        error = math.hypot(float(s), MODEL_GAP_SIGMA) if path == "air_gap" else float(s)
+        wide = parameter_widening(unknown, error, widening)
+        if path in _FIELDS:
+            values[_FIELDS[path]] = identified(unknown, float(t), error, wide)
+        elif path == "axial_offset":
+            values["preload_N"] = preload_value(problem, name, unknown, float(t), error, wide)
+    values["friction.static"] = _static_friction(problem, name, values["friction.dynamic"])
+    values["equivalent_stiffness_N_per_m"] = _equivalent_stiffness(problem, name, values)
+    return values
+
+
+def preload_value(
+    problem: DropProblem, name: str, unknown: Unknown, theta: float, sigma: float, widening: float = 1.0
+) -> IdentifiedValue:
+    """Preload [N] from the estimated axial offset of the rows."""
+    constants = bearing_constants(problem.model.machine.bearing(name).bearing)
+    half = NINETY * sigma * widening
+    low, value, high = (preload_of_offset(constants, theta + d) for d in (-half, 0.0, half))
+    base = identified(unknown, theta, sigma, widening)
+    return replace(
+        base,
+        value=value,
+        standard_error=(high - low) / (2.0 * NINETY),
+        interval_90=(low, high),
+        start=preload_of_offset(constants, unknown.mean),
+        unit="N",
+    )
+
+
+def _static_friction(problem: DropProblem, name: str, dynamic: IdentifiedValue) -> IdentifiedValue:
+    """Static coefficient at its prior ratio to the dynamic one: sliding drops say little about it."""
+    friction = problem.model.machine.bearing(name).friction
+    ratio = float(friction.static) / float(friction.dynamic)
+    low, high = dynamic.interval_90 or (dynamic.value, dynamic.value)
+    return IdentifiedValue(
+        value=ratio * dynamic.value,
+        status="prior",
+        standard_error=None if dynamic.standard_error is None else ratio * dynamic.standard_error,
+        interval_90=(0.85 * ratio * low, 1.15 * ratio * high),
+        unit="1",
+    )
+
+
+def _equivalent_stiffness(
+    problem: DropProblem, name: str, values: dict[str, IdentifiedValue]
+) -> IdentifiedValue:
+    """Support and bearing in series [N/m], the bearing by its tangent at the static load."""
+    from rotordrop.model.parameters import static_bearing_stiffness
+
+    index = problem.model.bearing_names.index(name)
+    constants = bearing_constants(problem.model.machine.bearing(name).bearing)
+    bearing = static_bearing_stiffness(constants, float(problem.model.load_shares[index]))
+    support = values["support.stiffness_N_per_m"]
+    low, high = support.interval_90 or (support.value, support.value)
+
+    def series(stiffness: float) -> float:
+        return stiffness * bearing / (stiffness + bearing)
+
+    return replace(
+        support,
+        value=series(support.value),
+        interval_90=(series(low), series(high)),
+        standard_error=(series(high) - series(low)) / (2.0 * NINETY),
+        start=None,
+    )
