@@ -17,6 +17,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.model import layout as L
 from rotordrop.model.layout import KernelParameters
 from rotordrop.physics._compile import kernel
 from rotordrop.tracking._propagation import (
@@ -32,12 +33,17 @@ Compact = NDArray[np.float32]
 IntArray = NDArray[np.int64]
 
 
+LARGEST_VARIANCE = 1e20
+SIGN_WIDTH = math.sqrt(0.5 * math.pi)
+
+
 @kernel
 def scalar_update(
     mean: Array, P: Array, row: Array, innovation: float, variance: float, gain: Array
 ) -> float:
     """Update mean and covariance in place with one scalar measurement; returns the innovation's variance.
 
+    The covariance takes the Joseph form, written out for a scalar, which stays symmetric and positive.
     ``row`` (n,) is the measurement's derivative by the estimate, ``gain`` (n,) receives the Kalman gain.
     """
     n = mean.shape[0]
@@ -52,9 +58,11 @@ def scalar_update(
     for j in range(n):
         S += row[j] * gain[j]
     for i in range(n):
-        scaled = gain[i] / S
+        spread = gain[i]
+        weight = spread / S
         for j in range(n):
-            P[i, j] -= scaled * gain[j]
+            k_j = gain[j] / S
+            P[i, j] -= weight * gain[j] + spread * k_j - S * weight * k_j
     for i in range(n):
         gain[i] /= S
         mean[i] += gain[i] * innovation
@@ -83,6 +91,21 @@ def measurement_row(c: int, at: Array, sensor_row: Array, s: int, n_p: int, n_c:
     row[k + 3 * n_c] = sine
     predicted: float = growth * seen + at[k + n_c] + at[k + 2 * n_c] * cosine + at[k + 3 * n_c] * sine
     return predicted
+
+
+@kernel
+def soften_friction(P: Array, least: Array, p: KernelParameters) -> None:
+    """Smooth the sign of friction by how well each race spin is known, never less than ``least`` (B,) [m/s].
+
+    The spin of a race is not seen before it catches up with the rotor. A sign taken at the estimate has
+    no slope there, and the filter cannot learn when that happens; the mean of the sign over a normal
+    distribution of the slip is, to a few per cent, tanh(v / (1.25 σ)).
+    """
+    n_b = least.shape[0]
+    n_q = 2 * p.eigenvalue.shape[0] + 4 * n_b
+    for b in range(n_b):
+        spread = SIGN_WIDTH * p.bearing[b, L.BORE_RADIUS] * math.sqrt(max(P[2 * n_q + b, 2 * n_q + b], 0.0))
+        p.bearing[b, L.SMOOTHING_SPEED] = math.hypot(least[b], spread)
 
 
 @kernel
@@ -160,6 +183,7 @@ def forward_pass(
     gain = np.empty(n)
     theta = mean[s : s + n_p].copy()
     keep = transitions.shape[0] > 0
+    smoothing = p.bearing[:, L.SMOOTHING_SPEED].copy()
     for i in range(times.shape[0]):
         if i > 0:
             at = mean
@@ -168,6 +192,7 @@ def forward_pass(
                 at = reference[i - 1]
             theta[:] = at[s : s + n_p]
             apply_parameters(theta, targets, p)
+            soften_friction(P, smoothing, p)
             y[:] = 0.0
             y[:s] = at[:s]
             propagate(times[i - 1], y, theta, targets, p, settings, F, impulses)
@@ -217,9 +242,18 @@ def forward_pass(
         means[i] = mean
         if covariances.shape[1] > 0:
             covariances[i] = P
-        if not math.isfinite(mean[0]) or not math.isfinite(P[0, 0]):
+        if not is_covariance(P) or not math.isfinite(np.sum(mean)):
             return i
     return len(times)
+
+
+@kernel
+def is_covariance(P: Array) -> bool:
+    """Whether all variances are finite and none is negative; what fails was a filter that diverged."""
+    good = True
+    for i in range(P.shape[0]):
+        good = good and P[i, i] >= 0.0 and P[i, i] < LARGEST_VARIANCE
+    return good
 
 
 @kernel

@@ -35,7 +35,8 @@ class ParameterTargets(NamedTuple):
     finite difference by which the right-hand side is differentiated; ``drift`` (P,) standard deviation of
     the random walk
     of each parameter per square root of a second, ``late_drift`` the same later in a drop; ``plane_shape``
-    (U, m) mode shapes of the planes.
+    (U, m) mode shapes of the planes. Beyond ``lower`` and ``upper`` (P,) the model takes the bound: what
+    drifts without being seen must not make it unstable.
     """
 
     target: IntArray
@@ -45,6 +46,8 @@ class ParameterTargets(NamedTuple):
     drift: Array
     late_drift: Array
     plane_shape: Array
+    lower: Array
+    upper: Array
 
 
 class FilterSettings(NamedTuple):
@@ -71,8 +74,15 @@ def apply_parameters(theta: Array, targets: ParameterTargets, p: KernelParameter
     """Write parameter values into the kernel arrays (which must be private copies)."""
     values = np.empty(theta.shape[0])
     for k in range(theta.shape[0]):
-        values[k] = math.exp(theta[k]) if targets.logarithmic[k] != 0 else theta[k]
+        values[k] = bounded_value(k, theta[k], targets, 0.0)
     write_values(values, targets, p)
+
+
+@kernel
+def bounded_value(k: int, theta: float, targets: ParameterTargets, step: float) -> float:
+    """Parameter ``k`` as the model takes it: within its bounds, then a step on, and no longer a logarithm."""
+    within = min(max(theta, targets.lower[k]), targets.upper[k]) + step
+    return math.exp(within) if targets.logarithmic[k] != 0 else within
 
 
 @kernel
@@ -123,11 +133,10 @@ def parameter_jacobian(
     s = B.shape[0]
     values = np.empty(theta.shape[0])
     for k in range(theta.shape[0]):
-        values[k] = math.exp(theta[k]) if targets.logarithmic[k] != 0 else theta[k]
+        values[k] = bounded_value(k, theta[k], targets, 0.0)
     for k in range(theta.shape[0]):
         value = values[k]
-        moved = theta[k] + targets.step[k]
-        values[k] = math.exp(moved) if targets.logarithmic[k] != 0 else moved
+        values[k] = bounded_value(k, theta[k], targets, targets.step[k])
         write_values(values, targets, p)
         drop_derivative(t, y, p, other, work)
         values[k] = value

@@ -155,6 +155,8 @@ def one_pass(
         result = forward(
             problem, settings, mean=mean, covariance=covariance, reference=references[d], samples=samples
         )
+        if result.done < samples and references[d] is not None:
+            result = forward(problem, settings, mean=mean, covariance=covariance, samples=samples)
         if result.done < min(samples, 10):
             raise IdentificationError(
                 f"the filter lost the drop after {result.done} of {samples} samples; the machine's guesses "

@@ -63,7 +63,7 @@ RELATIVE_PRIOR: dict[str, tuple[float, float]] = {
     "friction.dynamic": (0.4, 0.4),
     "friction.stribeck_speed": (0.4, 0.4),
     "race.inertia": (0.12, 0.12),
-    "race.drag_coefficient": (0.8, 0.8),
+    "race.drag_coefficient": (0.5, 0.5),
     "damping_time": (0.5, 0.5),
     "preload": (0.15, 0.15),
 }
@@ -72,7 +72,7 @@ RELATIVE_PRIOR: dict[str, tuple[float, float]] = {
 DRIFT: dict[str, float] = {
     "friction.dynamic": 1.0,
     "friction.stribeck_speed": 1.0,
-    "race.drag_coefficient": 1.0,
+    "race.drag_coefficient": 0.2,
     "contact.stiffness": 0.2,
     "support.stiffness": 0.02,
     "support.mass": 0.02,
@@ -86,6 +86,16 @@ DRIFT: dict[str, float] = {
 It keeps what the model gets wrong late in a drop from spoiling what the first impacts say."""
 
 LATE_FACTOR = 5.0
+
+FARTHEST: dict[str, float] = {
+    "friction.dynamic": 3.0,
+    "friction.stribeck_speed": 5.0,
+    "race.drag_coefficient": 6.0,
+    "race.inertia": 2.0,
+}
+"""Factor on its prior value up to which the model follows a parameter of friction and race spin [1].
+
+Where nothing shows them they drift, and a race that is braked a thousand times harder is no race."""
 
 GAP_SIGMA = 20e-6
 EXPONENT_SIGMA = 0.03
@@ -233,9 +243,17 @@ def drift_of(unknown: Unknown) -> float:
     return 0.0
 
 
+def farthest(unknown: Unknown) -> float:
+    """Distance from its prior up to which the model follows an unknown, in the unit it is estimated in."""
+    for ending, factor in FARTHEST.items():
+        if unknown.path.endswith(ending):
+            return math.log(factor)
+    return math.inf
+
+
 def late_factor(unknown: Unknown) -> float:
     """Factor on the drift late in a drop [1], when creep decides between rotor and race."""
-    late = ("friction.dynamic", "friction.stribeck_speed", "race.drag_coefficient", "race.inertia")
+    late = ("friction.dynamic", "friction.stribeck_speed", "race.inertia")
     return LATE_FACTOR if unknown.path.endswith(late) else 1.0
 
 
@@ -314,6 +332,8 @@ def parameter_targets(model: DropModel, unknowns: tuple[Unknown, ...]) -> P.Para
         late_drift=np.array([drift_of(u) * late_factor(u) for u in unknowns]),
         step=np.array([1e-5 if u.logarithmic else max(1e-3 * u.sigma, 1e-12) for u in unknowns]),
         plane_shape=np.ascontiguousarray(shape),
+        lower=np.array([u.mean - farthest(u) for u in unknowns]),
+        upper=np.array([u.mean + farthest(u) for u in unknowns]),
     )
 
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import erf
 
 from rotordrop.model import layout as L
 from rotordrop.model.parameters import DropModel
 from rotordrop.tracking import _propagation as P
+from rotordrop.tracking._filter import soften_friction
 from rotordrop.tracking.problem import DropProblem, private_copy
 from rotordrop.tracking.smoother import PassSettings
 from rotordrop.tracking.unknowns import Unknown
@@ -150,6 +153,8 @@ def test_impulses_are_the_time_integral_of_the_contact_force(flight):
     frictionless = [i for i, path in enumerate(paths) if path.endswith("friction.dynamic")]
     theta[still] = 0.0
     theta[frictionless] = -40.0
+    boundless = np.full(len(theta), -np.inf)
+    flight = replace(flight, targets=flight.targets._replace(lower=boundless))
     after, _, impulses = advanced(flight, y, theta, 64)
     uniform = model.basis.shapes.T @ (model.fe.mass @ np.tile([1.0, 0.0], model.fe.mass.shape[0] // 2))
     gained = np.array(
@@ -282,3 +287,43 @@ def test_what_belongs_to_a_drop_sets_magnets_unbalance_and_air(flight):
             np.testing.assert_allclose(getattr(after, kind), value * shape)
         count += 1
     assert count == 4 + 4 + 2
+
+
+def test_the_model_follows_a_drifting_parameter_only_so_far(flight):
+    """Beyond its bounds a parameter acts as at them, with the slope it has there."""
+    paths = [unknown.path for unknown in flight.unknowns]
+    k, mean = (
+        paths.index("NDE.race.drag_coefficient"),
+        theta_of(flight)[paths.index("NDE.race.drag_coefficient")],
+    )
+    bound = mean + np.log(6.0)
+    for theta in (bound, bound + 1.0, bound + 100.0):
+        assert P.bounded_value(k, theta, flight.targets, 0.0) == pytest.approx(6.0 * np.exp(mean), rel=1e-12)
+    assert P.bounded_value(k, mean - 50.0, flight.targets, 0.0) == pytest.approx(
+        np.exp(mean) / 6.0, rel=1e-12
+    )
+    assert P.bounded_value(k, mean + 0.5, flight.targets, 0.0) == pytest.approx(np.exp(mean + 0.5), rel=1e-12)
+    slope = P.bounded_value(k, bound + 9.0, flight.targets, 1e-6) - P.bounded_value(
+        k, bound, flight.targets, 0.0
+    )
+    assert slope == pytest.approx(1e-6 * 6.0 * np.exp(mean), rel=1e-5)
+    free = paths.index("NDE.support.stiffness")
+    assert not np.isfinite(flight.targets.upper[free])
+
+
+def test_friction_changes_its_sign_as_softly_as_the_spin_is_uncertain(flight):
+    """Against the mean of the sign over a normal distribution of the slip."""
+    p = private_copy(flight.model.parameters)
+    least = p.bearing[:, L.SMOOTHING_SPEED].copy()
+    n_q = 2 * flight.model.layout.n_modes + 4 * len(least)
+    covariance = np.zeros((len(flight.mean), len(flight.mean)))
+    soften_friction(covariance, least, p)
+    np.testing.assert_array_equal(p.bearing[:, L.SMOOTHING_SPEED], least)
+    spin_sigma = 50.0
+    covariance[2 * n_q, 2 * n_q] = spin_sigma**2
+    soften_friction(covariance, least, p)
+    sigma = spin_sigma * p.bearing[0, L.BORE_RADIUS]
+    slip = np.linspace(-4.0, 4.0, 41) * sigma
+    mean_sign = erf(slip / sigma / np.sqrt(2.0))
+    assert np.abs(np.tanh(slip / p.bearing[0, L.SMOOTHING_SPEED]) - mean_sign).max() < 0.05
+    assert p.bearing[1, L.SMOOTHING_SPEED] == least[1]
