@@ -2,8 +2,8 @@
 
 Usage: python studies/tracked/degradation.py SEED [SEED ...] [--case NAME ...]
 
-Machines of the paper's rotor, calibrated blind on two drops and scored on two others, all four recorded in the
-same degraded way. One JSON file per machine and case in ``results/degradation``.
+Machines of the paper's rotor, calibrated blind on two drops and scored on two others, all four recorded
+in the same degraded way. One JSON file per machine and case in ``results/degradation``.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import math
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +37,7 @@ SPEEDS_HZ = (60.0, 150.0, 100.0, 210.0)
 class Degradation:
     """What is worse than usual: the measuring chain, the records, the machine file."""
 
-    chain: SensorChain = SensorChain()
+    chain: SensorChain = field(default_factory=SensorChain)
     with_tail: bool = True
     levitated: bool = True
     lost_sensor: int | None = None
@@ -144,8 +144,8 @@ def study(seed: int, case: Degradation) -> dict[str, Any]:
 def summary(folder: Path) -> str:
     """Table of all cases: errors of peak force and stress, share covered, flags."""
     lines = [
-        "| recordings | drops | peak force: median error | worst | covered | half-width | peak stress: median "
-        "| air gap: median | consistent |",
+        "| recordings | drops | peak force: median error | worst | covered | half-width "
+        "| peak stress: median | air gap: median | consistent |",
         "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for label in CASES:

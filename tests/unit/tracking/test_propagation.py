@@ -292,21 +292,18 @@ def test_what_belongs_to_a_drop_sets_magnets_unbalance_and_air(flight):
 def test_the_model_follows_a_drifting_parameter_only_so_far(flight):
     """Beyond its bounds a parameter acts as at them, with the slope it has there."""
     paths = [unknown.path for unknown in flight.unknowns]
-    k, mean = (
-        paths.index("NDE.race.drag_coefficient"),
-        theta_of(flight)[paths.index("NDE.race.drag_coefficient")],
-    )
+    k = paths.index("NDE.race.drag_coefficient")
+    mean = theta_of(flight)[k]
+
+    def taken(theta: float, step: float = 0.0) -> float:
+        return P.bounded_value(k, theta, flight.targets, step) / np.exp(mean)
+
     bound = mean + np.log(6.0)
     for theta in (bound, bound + 1.0, bound + 100.0):
-        assert P.bounded_value(k, theta, flight.targets, 0.0) == pytest.approx(6.0 * np.exp(mean), rel=1e-12)
-    assert P.bounded_value(k, mean - 50.0, flight.targets, 0.0) == pytest.approx(
-        np.exp(mean) / 6.0, rel=1e-12
-    )
-    assert P.bounded_value(k, mean + 0.5, flight.targets, 0.0) == pytest.approx(np.exp(mean + 0.5), rel=1e-12)
-    slope = P.bounded_value(k, bound + 9.0, flight.targets, 1e-6) - P.bounded_value(
-        k, bound, flight.targets, 0.0
-    )
-    assert slope == pytest.approx(1e-6 * 6.0 * np.exp(mean), rel=1e-5)
+        assert taken(theta) == pytest.approx(6.0, rel=1e-12)
+    assert taken(mean - 50.0) == pytest.approx(1.0 / 6.0, rel=1e-12)
+    assert taken(mean + 0.5) == pytest.approx(np.exp(0.5), rel=1e-12)
+    assert taken(bound + 9.0, 1e-6) - taken(bound) == pytest.approx(6e-6, rel=1e-5)
     free = paths.index("NDE.support.stiffness")
     assert not np.isfinite(flight.targets.upper[free])
 
