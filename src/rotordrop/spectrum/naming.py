@@ -19,8 +19,9 @@ UNKNOWN_WEIGHT = 10.0
 """Weight of "something not on the list", anywhere in the band, against one candidate of weight 1: with 10 a
 mode known to ± 20 Hz in a band of 1 kHz is only a question, one known to ± 3 Hz a name."""
 
-NARROW = 1.0
-"""Width [Hz] up to which a line can come from a source that holds its frequency."""
+NARROW = 0.3
+"""Width [Hz] up to which a line can come from a source that holds its frequency: a power grid keeps within
+± 0.05 Hz."""
 STEADY_ERROR = 0.1
 """Error of its mean frequency [Hz] up to which it can."""
 

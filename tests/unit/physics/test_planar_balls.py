@@ -21,8 +21,8 @@ SHIFTS = [(0.0, 0.0), (3e-6, -8e-6), (-11e-6, 2e-6), (0.0, -40e-6)]
 
 @pytest.fixture
 def balls():
-    """23 balls that stand for two each, and one entry of padding that stands for none."""
-    angles = np.append(0.5 * math.pi + 2.0 * math.pi * np.arange(23) / 23, 0.0)
+    """23 balls that stand for two each, without symmetry, and one entry of padding that stands for none."""
+    angles = np.append(0.6 * math.pi + 2.0 * math.pi * np.arange(23) / 23, 0.0)
     weights = np.append(np.full(23, 2.0), 0.0)
     return np.cos(angles), np.sin(angles), weights
 

@@ -16,6 +16,7 @@ from rotordrop.spectrum.candidates import (
     order_candidates,
     pendulum_candidate,
 )
+from rotordrop.spectrum.detection import median_of_known
 from rotordrop.spectrum.line_settings import LineSettings
 from rotordrop.spectrum.lines import Line, find_lines
 
@@ -198,3 +199,19 @@ def test_noise_alone_has_no_lines():
 def test_no_plane_and_unequal_planes_are_refused():
     with pytest.raises(RecordError, match="no plane given"):
         find_lines({}, 1000.0, None)
+
+
+def test_a_broad_line_is_not_called_hum():
+    """Noise in a band about 50 Hz: something is there, but no power grid."""
+    down = CoastDown(seed=11)
+    wander = np.cumsum(down.random.standard_normal(down.time.size)) * 0.04
+    down.xy[:, 0] += 2e-6 * np.cos(2.0 * math.pi * 50.0 * down.time + wander)
+    lines = find_lines({"DE": down.xy}, down.sampling_rate, down.exact(), candidates=KNOWN, settings=SETTINGS)
+    assert any(abs(line.frequency - 50.0) < 3.0 for line in lines)
+    assert not any("mains" in line.label for line in lines if line.named)
+
+
+def test_medians_leave_out_what_is_unknown():
+    values = np.random.default_rng(0).random((9, 50, 2))
+    values[values < 0.4] = np.nan
+    assert median_of_known(values) == pytest.approx(np.nanmedian(values, axis=0), nan_ok=True)
