@@ -40,6 +40,7 @@ from rotordrop.identification.friction import FrictionSweep, sweep_friction
 from rotordrop.identification.parameter_vector import FRICTION
 from rotordrop.identification.replica import build_replica
 from rotordrop.identification.support import (
+    LONGEST_WINDOW,
     ImpactFit,
     SupportFit,
     fit_support,
@@ -221,7 +222,8 @@ def _first_impacts(fall: RecordedFall, starts: int, threads: int | None, say: Pr
         for _ in range(FRICTION_DRAWS)
     ]
     friction = sweep_friction(fine, best.x, fall.first_contact, draws=points, threads=threads)
-    problem, x, covariance = refit_with_friction(fine, best, friction.value, threads=threads)
+    longest = fall.later_contact + LONGEST_WINDOW
+    problem, x, covariance = refit_with_friction(fine, best, friction.value, longest=longest, threads=threads)
     return Impacts(
         problem=problem,
         x=x,

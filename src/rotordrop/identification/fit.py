@@ -24,6 +24,9 @@ Progress = Callable[[str, float], None]
 LARGEST_RISE = 8.0
 """Factor by which the damping of a step rises when the step fails [1]."""
 
+SECOND_TRY = 10
+"""Factor on the draws where a longer window was not followed at first [1]."""
+
 EASING = 5.0
 WORST = 1e30
 TRIALS = 6
@@ -299,7 +302,8 @@ class Schedule:
     tolerances : tuple of float
         Share of the cost below which a fit ends, on the way and in the last window.
     breaking : float
-        A window whose misfit exceeds that of the window before by this factor (and 1.5) is given up.
+        A window whose misfit exceeds that of the window before by this factor (and 1.5) is given up, after a
+        second try from many more draws.
     """
 
     windows: tuple[float, ...]
@@ -392,7 +396,10 @@ class _Searching:
         for stage, window in enumerate(schedule.windows):
             self.report(f"{len(points)} starts to {1e3 * window:.1f} ms", stage / len(schedule.windows))
             fits = self._fitted(points, window, stage)
-            if best and fits[0].misfit > max(1.5, schedule.breaking * best[-1].misfit):
+            if best and self._broken(best[-1], fits[0]):
+                again = self._drawn(finalists, window, stage - 1, more=SECOND_TRY)
+                fits = sorted([*fits, *self._fitted(again, window, stage)], key=lambda fit: fit.cost)
+            if best and self._broken(best[-1], fits[0]):
                 ended = (
                     f"from {1e3 * best[-1].window:.1f} to {1e3 * window:.1f} ms the misfit rises from "
                     f"{best[-1].misfit:.2g} to {fits[0].misfit:.2g}: the model no longer follows the record"
@@ -404,8 +411,7 @@ class _Searching:
             if len(fits) > 1:
                 agreeing = sum(fit.cost < 1.05 * fits[0].cost for fit in fits)
             if stage + 1 < len(schedule.windows):
-                kept = schedule.kept[min(stage, len(schedule.kept) - 1)]
-                points = self._drawn(fits[:kept], schedule.windows[stage + 1], stage, kept)
+                points = self._drawn(fits, schedule.windows[stage + 1], stage)
         return Search(
             best=best[-1],
             by_window=tuple(best),
@@ -416,6 +422,10 @@ class _Searching:
             ended_early=ended,
             finalists=tuple(finalists),
         )
+
+    def _broken(self, before: Fit, fit: Fit) -> bool:
+        """Whether a longer window is not followed."""
+        return fit.misfit > max(1.5, self.schedule.breaking * before.misfit)
 
     def _fitted(self, points: list[Array], window: float, stage: int) -> list[Fit]:
         """Fits from several points side by side, or from one with its Jacobian side by side; best first."""
@@ -439,20 +449,22 @@ class _Searching:
         self.evaluations += sum(fit.evaluations for fit in fits)
         return sorted(fits, key=lambda fit: fit.cost)
 
-    def _drawn(self, fits: list[Fit], window: float, stage: int, kept: int) -> list[Array]:
-        """Points for the next window: the best fit itself, then the best of the others and of the draws."""
-        draws = self.schedule.draws
-        each = max(1, draws[min(stage, len(draws) - 1)] // len(fits))
+    def _drawn(self, found: list[Fit], window: float, stage: int, more: int = 1) -> list[Array]:
+        """Points for the next window: those of the fits and of draws around them that begin it best."""
+        schedule = self.schedule
+        kept = max(schedule.kept[min(stage, len(schedule.kept) - 1)], 2 if more > 1 else 1)
+        fits = found[:kept]
+        each = max(1, more * schedule.draws[min(stage, len(schedule.draws) - 1)] // len(fits))
         free = ~self.problem.considered
-        moved = (free if stage >= self.schedule.few else free & self.problem.leading).astype(np.float64)
+        moved = (free if stage >= schedule.few else free & self.problem.leading).astype(np.float64)
         points = [fit.x for fit in fits]
         for fit in fits:
             root = np.linalg.cholesky(fit.covariance + 1e-12 * np.diag(np.diag(fit.covariance)))
             noise = self.random.standard_normal((each, len(fit.x)))
             points += [np.clip(fit.x + moved * (root @ z), *self.problem.bounds) for z in noise]
-        costs = list(self.pool.map(lambda x: _evaluated(self.problem, x, window).cost, points[1:]))
-        self.evaluations += len(points) - 1
-        return [points[0], *(points[1 + k] for k in np.argsort(costs, kind="stable")[: kept - 1])]
+        costs = np.array(list(self.pool.map(lambda x: _evaluated(self.problem, x, window).cost, points)))
+        self.evaluations += len(points)
+        return [points[k] for k in np.argsort(costs, kind="stable")[:kept]]
 
 
 def sobol_starts(centre: Array, spread: Array, count: int, seed: int = 1) -> list[Array]:

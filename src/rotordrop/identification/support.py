@@ -25,7 +25,6 @@ from rotordrop.identification.fit import (
     Search,
     completed,
     considered_covariance,
-    fit_window,
     search,
     sobol_starts,
 )
@@ -43,8 +42,11 @@ Array = NDArray[np.float64]
 WINDOWS = (1.75e-3, 3.25e-3, 5.25e-3, 7.25e-3, 11e-3, 16e-3)
 """Ends of the windows after the later of the first contacts [s]."""
 
+LONGEST_WINDOW = 25e-3
+"""End of the window of the last fit, with the friction of the sweep, after the later first contact [s]."""
+
 COARSE_WINDOWS = 3
-"""How many of them are searched with a coarse basis."""
+"""How many of them are searched with a coarse basis; the last is fitted again with the fine one."""
 
 WIDENING = 2.0
 """Factor on standard errors for what the linearised fit leaves out [1]."""
@@ -312,9 +314,9 @@ def fit_support(
         fine,
         [_handed_over(fit.x, coarse, fine) for fit in first.finalists[:2]],
         Schedule(
-            windows=windows[COARSE_WINDOWS:],
-            kept=(2,),
-            draws=(60,),
+            windows=windows[COARSE_WINDOWS - 1 :],
+            kept=(1,),
+            draws=(50,),
             few=0,
             iterations=(10, 10),
             tolerances=(1e-3, 3e-4),
@@ -342,9 +344,25 @@ def widened_covariance(problem: ImpactFit, fit: Fit) -> Array:
 
 
 def refit_with_friction(
-    problem: ImpactFit, fit: Fit, friction: IdentifiedValue, *, threads: int | None = None
+    problem: ImpactFit,
+    fit: Fit,
+    friction: IdentifiedValue,
+    *,
+    longest: float | None = None,
+    threads: int | None = None,
 ) -> tuple[ImpactFit, Array, Array]:
-    """Fit once more over the same window with the friction coefficient that the sweep found.
+    """Fit once more, with the friction coefficient that the sweep found, and over a longer window.
+
+    Parameters
+    ----------
+    problem, fit
+        The problem and its best fit.
+    friction : IdentifiedValue
+        Friction coefficient of the sweep.
+    longest : float, optional
+        End of a longer window [s from power-off]; left out where the model does not follow the record so far.
+    threads : int, optional
+        Threads; all cores by default.
 
     Returns
     -------
@@ -360,8 +378,15 @@ def refit_with_friction(
     known = replace(problem, vector=ParameterVector(unknowns=tuple(unknowns)))
     start = fit.x.copy()
     start[place] = known.prior_mean[place]
+    end = min(longest or fit.window, float(problem.replica.time[-1]))
+    windows = (fit.window, end) if end > fit.window else (fit.window,)
+    again = search(
+        known,
+        [start],
+        Schedule(windows=windows, kept=(1,), draws=(50,), few=0, iterations=(6, 8), tolerances=(1e-3, 5e-4)),
+        threads=threads,
+    ).best
     with ThreadPoolExecutor(max_workers=threads or cpu_count() or 1) as pool:
-        again = fit_window(known, start, fit.window, iterations=6, tolerance=1e-3, pool=pool)
         again = completed(known, again, pool=pool)
     return known, again.x, widened_covariance(known, again)
 

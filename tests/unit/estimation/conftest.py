@@ -62,7 +62,10 @@ def calibrated(known: Machine, hidden: HiddenMachine) -> Machine:
             value = float(part) * math.exp(0.7 * sigma * random.standard_normal())
             half = math.exp(NINETY * sigma)
             values[f"{bearing.name}.{path}"] = Estimated(
-                value=value, status="estimated", interval_90=(value / half, value * half), source="calibration"
+                value=value,
+                status="estimated",
+                interval_90=(value / half, value * half),
+                source="calibration",
             )
         gap = float(bearing.air_gap) + 0.7 * GAP_SIGMA * random.standard_normal()
         values[f"{bearing.name}.air_gap"] = Estimated(

@@ -1,0 +1,90 @@
+"""How long one fit of the supports takes, from 8 starts, on a recorded drop.
+
+    python benchmarks/support_fit.py [--output benchmarks/support_fit.json] [--rounds 5] [--threads 2]
+
+The record is made here: a machine drawn around the example of the records, which the fit knows by its owner's
+guesses. Only the fit is timed, after one that fills the caches. Wall time is that of the machine as it is.
+"""
+
+from __future__ import annotations
+
+import os
+
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
+    os.environ[_name] = "1"
+
+import argparse
+import json
+import math
+import statistics
+import time
+from pathlib import Path
+from typing import Any
+
+from rotordrop.estimation.recorded_fall import RecordedFall, recorded_fall
+from rotordrop.identification.replica import build_replica
+from rotordrop.identification.support import SupportFit, fit_support, impact_problem
+from rotordrop.machine import example_machine
+from rotordrop.model.parameters import build_drop_model
+from rotordrop.synthesis import hidden_machine, synthesize_drop
+
+STARTS = 8
+SEED = 1000
+SPEED = 2.0 * math.pi * 60.0
+UNTIL = 0.06
+
+
+def fallen() -> RecordedFall:
+    """The steps before the fit."""
+    known = example_machine("lp400")
+    drop = synthesize_drop(hidden_machine(known, SEED), SPEED, SEED)
+    return recorded_fall(known, drop.record, drop.tail)
+
+
+def fit(fall: RecordedFall, threads: int) -> SupportFit:
+    """One fit as the replay makes it."""
+    coarse, fine = (
+        impact_problem(build_replica(fall.record, fall.rest, fall.initial, model, until=UNTIL))
+        for model in (build_drop_model(fall.model.machine, "quick"), fall.model)
+    )
+    return fit_support(coarse, fine, fall.later_contact, starts=STARTS, threads=threads)
+
+
+def main() -> None:
+    """Time the fit in several rounds."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--output", type=Path)
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--threads", type=int, default=2)
+    options = parser.parse_args()
+    fall = fallen()
+    fit(fall, options.threads)
+    walls, processors = [], []
+    for _ in range(options.rounds):
+        wall, processor = time.perf_counter(), time.process_time()
+        found = fit(fall, options.threads)
+        walls.append(time.perf_counter() - wall)
+        processors.append(time.process_time() - processor)
+        print(f"wall {walls[-1]:.2f} s, processor {processors[-1]:.2f} s", flush=True)
+    results: dict[str, Any] = {
+        "starts": STARTS,
+        "threads": options.threads,
+        "simulations": found.coarse.evaluations + found.search.evaluations,
+        "misfit": found.search.best.misfit,
+        "wall_s": walls,
+        "processor_s": processors,
+        "median_wall_s": statistics.median(walls),
+        "median_processor_s": statistics.median(processors),
+        "load_at_end": os.getloadavg()[0],
+        "cores": os.cpu_count(),
+    }
+    print(
+        "median wall {median_wall_s:.2f} s, processor {median_processor_s:.2f} s, {simulations} simulations, "
+        "load {load_at_end:.1f}".format(**results)
+    )
+    if options.output:
+        options.output.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
