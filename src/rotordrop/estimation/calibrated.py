@@ -23,7 +23,7 @@ from rotordrop.tracking.calibration import TrackedDrops
 from rotordrop.tracking.consistency import Check, consistency_checks
 from rotordrop.tracking.problem import DropProblem
 from rotordrop.tracking.smoother import parameter_sample
-from rotordrop.tracking.unknowns import NINETY, Unknown
+from rotordrop.tracking.unknowns import NINETY, Unknown, typical_depth
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -146,7 +146,7 @@ def calibrate_machine(
     values = _values(problem, mean, covariance, widening)
     source = f"calibrated on {', '.join(stems)}"
     return Calibration(
-        machine=machine.with_values(machine_values(values, source)),
+        machine=machine.with_values(machine_values(at_fitted_exponents(machine, values), source)),
         values=values,
         identifiability=_identifiability(problem, covariance),
         confounded=_confounded(problem, covariance),
@@ -191,6 +191,26 @@ def _plain(value: float, sigma: float, widening: float, unit: str) -> Identified
     return IdentifiedValue(
         value=value, standard_error=sigma * widening, interval_90=(value - half, value + half), unit=unit
     )
+
+
+def at_fitted_exponents(machine: Machine, values: dict[str, IdentifiedValue]) -> dict[str, IdentifiedValue]:
+    """Values whose contact stiffness belongs to the fitted contact exponent.
+
+    The fit, and what is reported, gives the stiffness [N/m^n] of the exponent in the machine description, to
+    be compared with it; a description holds one pair, with the same force at a typical indentation.
+    """
+    found = dict(values)
+    for bearing in machine.touchdown_bearings:
+        exponent = values.get(f"{bearing.name}.contact.exponent")
+        stiffness = values.get(f"{bearing.name}.contact.stiffness")
+        if exponent is None or stiffness is None or stiffness.interval_90 is None:
+            continue
+        factor = typical_depth(bearing) ** (float(bearing.contact.exponent) - exponent.value)
+        low, high = stiffness.interval_90
+        found[f"{bearing.name}.contact.stiffness"] = replace(
+            stiffness, value=factor * stiffness.value, interval_90=(factor * low, factor * high)
+        )
+    return found
 
 
 def machine_values(values: dict[str, IdentifiedValue], source: str) -> dict[str, Estimated]:

@@ -25,6 +25,7 @@ ON_SPIN = 1
 ON_MAGNET = 2
 ON_UNBALANCE = 3
 SCALE_BEARING = 4
+AT_TYPICAL_DEPTH = 5
 
 
 class ParameterTargets(NamedTuple):
@@ -36,7 +37,7 @@ class ParameterTargets(NamedTuple):
     the random walk
     of each parameter per square root of a second, ``late_drift`` the same later in a drop; ``plane_shape``
     (U, m) mode shapes of the planes. Beyond ``lower`` and ``upper`` (P,) the model takes the bound: what
-    drifts without being seen must not make it unstable.
+    drifts without being seen must not make it unstable. ``mean`` (P,) is the prior mean.
     """
 
     target: IntArray
@@ -48,6 +49,7 @@ class ParameterTargets(NamedTuple):
     plane_shape: Array
     lower: Array
     upper: Array
+    mean: Array
 
 
 class FilterSettings(NamedTuple):
@@ -100,6 +102,9 @@ def write_values(values: Array, targets: ParameterTargets, p: KernelParameters) 
                 p.bearing[row, L.ROTOR_RADIUS] = p.bearing[row, L.BORE_RADIUS] - value
         elif kind == SCALE_BEARING:
             p.bearing[row, column] *= value
+        elif kind == AT_TYPICAL_DEPTH:
+            k = targets.target[i, 0]
+            p.bearing[row, column] *= targets.factor[i] ** (math.exp(targets.mean[k]) - values[k])
         elif kind == ON_SPIN:
             p.spin[column] = value
         elif kind == ON_MAGNET:

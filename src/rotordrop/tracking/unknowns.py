@@ -98,7 +98,12 @@ FARTHEST: dict[str, float] = {
 Where nothing shows them they drift, and a race that is braked a thousand times harder is no race."""
 
 GAP_SIGMA = 20e-6
-EXPONENT_SIGMA = 0.03
+EXPONENT_SIGMA = 0.1
+"""Prior standard deviation of the logarithm of the contact exponent [1]: 10/9 for a line, 3/2 for a point."""
+
+TYPICAL_FORCE = 1500.0
+"""Contact force at whose indentation the stiffness keeps its meaning when the exponent differs [N]."""
+
 ANISOTROPY_SIGMA = 0.03
 REMANENT_SIGMA = 60.0
 
@@ -178,6 +183,7 @@ def bearing_unknowns(bearing: TouchdownBearing, row: int) -> Iterator[Unknown]:
         unit="N s/m",
     )
     yield relative("contact.stiffness", contact.stiffness, (L.CONTACT_STIFFNESS, 1.0), unit="N/m^n")
+    yield _exponent(bearing, row)
     yield relative("contact.damping", contact.damping, (L.CONTACT_DAMPING, 1.0), unit="s/m")
     yield relative(
         "friction.dynamic",
@@ -191,6 +197,33 @@ def bearing_unknowns(bearing: TouchdownBearing, row: int) -> Iterator[Unknown]:
     yield relative("race.drag_coefficient", race.drag_coefficient, (L.DRAG_COEFFICIENT, 1.0), unit="1")
     yield _bearing_damping(bearing, row)
     yield _axial_offset(bearing, row)
+
+
+def typical_depth(bearing: TouchdownBearing) -> float:
+    """Indentation at the typical contact force [m]."""
+    contact = bearing.contact
+    return float((TYPICAL_FORCE / float(contact.stiffness)) ** (1.0 / float(contact.exponent)))
+
+
+def _exponent(bearing: TouchdownBearing, row: int) -> Unknown:
+    """Contact exponent; the stiffness is that of the prior exponent at a typical indentation.
+
+    An exponent alone would change the force a hundredfold, and the stiffness would have to follow it.
+    """
+    quantity = bearing.contact.exponent
+    known = quantity.interval_90 or quantity.range
+    return Unknown(
+        path=f"{bearing.name}.contact.exponent",
+        mean=math.log(float(quantity)),
+        sigma=EXPONENT_SIGMA if known is None else math.log(known[1] / known[0]) / (2.0 * NINETY),
+        logarithmic=True,
+        scope="machine",
+        targets=(
+            (P.ON_BEARING, row, L.CONTACT_EXPONENT, 1.0),
+            (P.AT_TYPICAL_DEPTH, row, L.CONTACT_STIFFNESS, typical_depth(bearing)),
+        ),
+        unit="1",
+    )
 
 
 def _bearing_damping(bearing: TouchdownBearing, row: int) -> Unknown:
@@ -321,7 +354,7 @@ def parameter_targets(model: DropModel, unknowns: tuple[Unknown, ...]) -> P.Para
         for kind, row, column, factor in unknown.targets:
             rows.append((index, kind, row, column))
             factors.append(_stiffness_of_damping(model, unknown, row) if math.isnan(factor) else factor)
-    order = sorted(range(len(rows)), key=lambda i: rows[i][1] == P.SCALE_BEARING)
+    order = sorted(range(len(rows)), key=lambda i: rows[i][1] in (P.SCALE_BEARING, P.AT_TYPICAL_DEPTH))
     planes = [model.basis.node_row(unbalance.node) for unbalance in model.machine.unbalances]
     shape = np.array(planes) if planes else np.zeros((0, model.layout.n_modes))
     return P.ParameterTargets(
@@ -334,6 +367,7 @@ def parameter_targets(model: DropModel, unknowns: tuple[Unknown, ...]) -> P.Para
         plane_shape=np.ascontiguousarray(shape),
         lower=np.array([u.mean - farthest(u) for u in unknowns]),
         upper=np.array([u.mean + farthest(u) for u in unknowns]),
+        mean=np.array([u.mean for u in unknowns]),
     )
 
 

@@ -206,6 +206,7 @@ COLUMNS = {
     "support.mass": {L.SUPPORT_MASS_X, L.SUPPORT_MASS_Y},
     "support.damping": {L.SUPPORT_DAMPING_X, L.SUPPORT_DAMPING_Y},
     "contact.stiffness": {L.CONTACT_STIFFNESS},
+    "contact.exponent": {L.CONTACT_EXPONENT, L.CONTACT_STIFFNESS},
     "contact.damping": {L.CONTACT_DAMPING},
     "friction.dynamic": {L.FRICTION_DYNAMIC, L.FRICTION_STATIC},
     "friction.stribeck_speed": {L.STRIBECK_SPEED},
@@ -242,6 +243,23 @@ def test_every_parameter_of_a_bearing_sets_its_own_entries_and_no_others(flight)
         if path in ("air_gap", "contact.stiffness", "race.inertia", "axial_offset"):
             assert after.bearing[row, first] == pytest.approx(value)
     assert seen == set(COLUMNS)
+
+
+def test_another_exponent_keeps_the_force_at_a_typical_indentation(flight):
+    """Whatever stiffness is estimated beside it; below that indentation a higher exponent is softer."""
+    from rotordrop.tracking.unknowns import TYPICAL_FORCE, parameter_targets, typical_depth
+
+    by_path = {unknown.path: unknown for unknown in flight.unknowns}
+    chosen = (by_path["DE.contact.exponent"], by_path["DE.contact.stiffness"])
+    targets = parameter_targets(flight.model, chosen)
+    p = private_copy(flight.model.parameters)
+    depth = typical_depth(flight.model.machine.bearing("DE"))
+    for exponent in (1.0, 10.0 / 9.0, 1.5):
+        stiffness = 1.2 * float(flight.model.machine.bearing("DE").contact.stiffness)
+        P.apply_parameters(np.log([exponent, stiffness]), targets, p)
+        row = p.bearing[1]
+        assert row[L.CONTACT_EXPONENT] == pytest.approx(exponent)
+        assert row[L.CONTACT_STIFFNESS] * depth**exponent == pytest.approx(1.2 * TYPICAL_FORCE)
 
 
 def test_the_rotor_shrinks_when_the_gap_grows(flight):
