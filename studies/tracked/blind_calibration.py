@@ -1,6 +1,6 @@
 """Hidden machines, calibrated blind on two drops and scored on four others.
 
-Usage: python studies/tracked/blind_calibration.py KIND SEED [SEED ...] [--violation NAME] [--replay]
+Usage: python studies/tracked/blind_calibration.py KIND SEED [SEED ...] [--violation NAME]
 
 KIND is ``lp400`` (the paper's rotor) or ``small`` (a 10–20 kg rotor at 500 Hz). Seeds below 1000 were
 used while the estimator was made; only seeds from 1000 on are scored. One JSON file per machine,
@@ -137,36 +137,7 @@ def parameter_scores(calibration: Any, made: SyntheticDrop) -> dict[str, Any]:
     return scores
 
 
-def replay_scores(machine: Any, made: list[SyntheticDrop]) -> list[dict[str, Any]]:
-    """The paper's route on the same drops."""
-    from rotordrop.estimation.replay import replay_drop
-
-    found = []
-    for drop in made:
-        try:
-            estimate = replay_drop(machine, drop.record, tail=drop.tail).as_json()
-            truth = drop.truth
-            entry = {
-                name: {
-                    "peak_force_N": {
-                        "estimate": b["peak_force_N"]["value"],
-                        "truth": truth["peak_force_N"][name],
-                    },
-                    "peak_stress_Pa": {
-                        "estimate": b["peak_stress_Pa"]["value"],
-                        "truth": drop.truth["max_stress_MPa"][name] * 1e6,
-                    },
-                    "air_gap": {"estimate": b["air_gap_m"]["value"], "truth": drop.truth["air_gap_m"][name]},
-                }
-                for name, b in estimate["bearings"].items()
-            }
-            found.append({"bearings": entry})
-        except Exception as error:  # a failed drop is a result too
-            found.append({"error": f"{type(error).__name__}: {error}"})
-    return found
-
-
-def study(kind: str, seed: int, violation: str, with_replay: bool) -> dict[str, Any]:
+def study(kind: str, seed: int, violation: str) -> dict[str, Any]:
     """Everything about one hidden machine."""
     known, fit, scored = drops_of(kind, seed, violation)
     started = time.perf_counter()
@@ -195,8 +166,6 @@ def study(kind: str, seed: int, violation: str, with_replay: bool) -> dict[str, 
             entry = {"error": f"{type(error).__name__}: {error}"}
         entry["seconds"] = time.perf_counter() - started
         result["drops"].append(entry)
-    if with_replay:
-        result["replay"] = replay_scores(known, scored)
     return result
 
 
@@ -207,7 +176,6 @@ def main() -> None:
     parser.add_argument("seeds", type=int, nargs="+")
     parser.add_argument("--violation", default="none")
     parser.add_argument("--out", type=Path, default=HERE / "results")
-    parser.add_argument("--replay", action="store_true")
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
     for seed in arguments.seeds:
@@ -216,7 +184,7 @@ def main() -> None:
         if file.exists():
             continue
         try:
-            result = study(arguments.kind, seed, arguments.violation, arguments.replay)
+            result = study(arguments.kind, seed, arguments.violation)
         except Exception as error:  # a machine that cannot be calibrated is a result too
             result = {
                 "kind": arguments.kind,

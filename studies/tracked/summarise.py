@@ -1,12 +1,12 @@
-"""Put the raw results of blind_calibration.py into one table: errors, coverage, half-widths, per rotor kind.
+"""Put the raw results of blind_calibration.py and replay_side_by_side.py into tables.
 
 Usage: python studies/tracked/summarise.py [FOLDER]
 
-Writes ``summary.json`` and ``summary.md`` beside the raw results. Coverage is counted over
-bearings and drops; its
-Wilson interval takes machines as the independent units (the effective number of trials is the
-number of intervals
-over the design effect of clustering by machine).
+Writes ``summary.json`` and ``summary.md`` beside the raw results: errors, coverage and half-widths per rotor
+kind, the paper's route beside the tracked twin, and every machine whose structure is not what the estimator
+believes. Coverage is counted over bearings and drops; its Wilson interval takes machines as the independent
+units (the effective number of trials is the number of intervals over the design effect of clustering by
+machine).
 """
 
 from __future__ import annotations
@@ -96,7 +96,6 @@ def collect(results: list[dict[str, Any]]) -> dict[str, Any]:
         "errors": {name: spread(values) for name, values in errors.items()},
         "half_width_median": {name: float(np.median(values)) for name, values in widths.items()},
         "coverage_90": {name: clustered_coverage(values) for name, values in covered.items()},
-        "replay": _replay(results),
     }
 
 
@@ -115,18 +114,81 @@ def _add(
     covered[name][seed].append(low <= entry["truth"] <= high)
 
 
-def _replay(results: list[dict[str, Any]]) -> dict[str, Any]:
+def replayed(folder: Path, kind: str) -> dict[str, Any]:
+    """Errors of the paper's route, as far as it was run."""
     errors: dict[str, list[float]] = defaultdict(list)
-    failed = 0
-    for result in results:
-        for drop in result.get("replay", []):
+    failed: list[str] = []
+    for file in sorted((folder / "replay").glob(f"{kind}_*.json")):
+        for drop in json.loads(file.read_text())["drops"]:
             if "error" in drop:
-                failed += 1
+                failed.append(f"{file.stem}: {drop['error']}")
                 continue
             for bearing in drop["bearings"].values():
                 for name, entry in bearing.items():
-                    errors[name].append(entry["estimate"] / entry["truth"] - 1.0)
+                    absolute = name == "air_gap_m"
+                    apart = entry["estimate"] - entry["truth"]
+                    errors[name].append(apart if absolute else apart / entry["truth"])
     return {"failed": failed, "errors": {name: spread(values) for name, values in errors.items()}}
+
+
+SCALES = {"air_gap": (1e6, "µm"), "air_gap_m": (1e6, "µm"), "friction.dynamic": (1.0, "")}
+"""Factor and unit in which a quantity's error is shown; all else in per cent."""
+
+
+def shown(quantity: str, value: float) -> str:
+    """An error with its unit."""
+    scale, unit = SCALES.get(quantity, (100.0, "%"))
+    return f"{scale * value:.3g} {unit}".strip()
+
+
+def kind_table(figures: dict[str, Any]) -> list[str]:
+    """Errors, coverage and half-widths of one rotor kind."""
+    lines = [
+        "| quantity | median error | 90th percentile | worst | coverage of 90 % (Wilson) | half-width |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    for quantity, e in figures["errors"].items():
+        c = figures["coverage_90"].get(quantity)
+        cover = f"{c['coverage']:.3f} ({c['low']:.2f}–{c['high']:.2f})" if c else ""
+        width = figures["half_width_median"].get(quantity)
+        cells = [shown(quantity, e[key]) for key in ("median", "p90", "worst")]
+        wide = "" if width is None else shown(quantity, width)
+        lines.append(f"| {quantity} | {' | '.join(cells)} | {cover} | {wide} |")
+    for quantity, e in figures["replay"]["errors"].items():
+        cells = [shown(quantity, e[key]) for key in ("median", "p90", "worst")]
+        lines.append(f"| *paper's route:* {quantity} | {' | '.join(cells)} | | |")
+    return lines
+
+
+def violation_table(groups: dict[str, list[dict[str, Any]]]) -> list[str]:
+    """One line per machine whose structure is wrong: errors, coverage of the peak force, flags."""
+    lines = [
+        "| rotor | what is wrong | seed | peak force: median error | worst | peak stress: median "
+        "| peaks covered | drops flagged | covered or flagged |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for results in groups.values():
+        for result in results:
+            head = f"| {result['kind']} | {result['violation']} | {result['seed']} "
+            if "error" in result:
+                lines.append(f"{head}| {result['error']} | | | | refused | |")
+                continue
+            drops = [d for d in result["drops"] if "error" not in d]
+            refused = len(result["drops"]) - len(drops)
+            peaks = [(d, b["peak_force_N"]) for d in drops for b in d["bearings"].values()]
+            stress = [b["peak_stress_Pa"] for d in drops for b in d["bearings"].values()]
+            error = np.array([abs(p["estimate"] / p["truth"] - 1.0) for _, p in peaks])
+            of_stress = np.median([abs(p["estimate"] / p["truth"] - 1.0) for p in stress])
+            inside = [p["interval_90"][0] <= p["truth"] <= p["interval_90"][1] for _, p in peaks]
+            flagged = not result["calibration_consistent"]
+            either = [ok or flagged or not d["consistent"] for ok, (d, _) in zip(inside, peaks, strict=True)]
+            flags = sum(flagged or not d["consistent"] for d in drops) + refused
+            lines.append(
+                f"{head}| {shown('', np.median(error))} | {shown('', error.max())} | {shown('', of_stress)} "
+                f"| {sum(inside)} of {len(inside)} | {flags} of {len(result['drops'])} "
+                f"| {sum(either)} of {len(either)} |"
+            )
+    return lines
 
 
 def main() -> None:
@@ -136,39 +198,30 @@ def main() -> None:
     for file in sorted(folder.glob("*_*_*.json")):
         result = json.loads(file.read_text())
         groups[f"{result['kind']}, {result['violation']}"].append(result)
-    summary = {name: collect(results) for name, results in groups.items()}
-    (folder / "summary.json").write_text(json.dumps(summary, indent=1))
-    lines = [
-        "# Blind calibration: errors and coverage",
-        "",
-        "Air gap in metres, friction absolute, all else relative.",
-        "",
-    ]
-    for name, figures in summary.items():
+    right = {name: results for name, results in groups.items() if results[0]["violation"] == "none"}
+    wrong = {name: results for name, results in groups.items() if name not in right}
+    summary = {}
+    lines = ["# Blind calibration: errors and coverage", "", "Friction is absolute.", ""]
+    for name, results in right.items():
+        figures = collect(results)
+        figures["replay"] = replayed(folder, results[0]["kind"])
+        summary[name] = figures
         lines += [
             f"## {name}",
             "",
-            f"{figures['machines']} machines, {figures['drops']} drops, {figures['lost']} lost, "
-            f"flagged inconsistent {figures['flagged_inconsistent']}, "
-            f"{figures['seconds_per_drop_median']} s per drop, "
-            f"{figures['seconds_per_calibration_median']} s per calibration",
+            f"{figures['machines']} machines, {figures['drops']} drops, {figures['lost']} lost, flagged "
+            f"inconsistent {shown('', figures['flagged_inconsistent'])}, "
+            f"{figures['seconds_per_drop_median']:.1f} s per drop, "
+            f"{figures['seconds_per_calibration_median']:.1f} s per calibration on busy cores; the paper's "
+            f"route failed on {len(figures['replay']['failed'])} drops.",
             "",
-            "| quantity | median error | 90th percentile | worst | coverage of 90 % (Wilson) | half-width |",
-            "| --- | --- | --- | --- | --- | --- |",
+            *kind_table(figures),
+            "",
         ]
-        for quantity, e in figures["errors"].items():
-            c = figures["coverage_90"].get(quantity)
-            cover = f"{c['coverage']:.3f} ({c['low']:.2f}–{c['high']:.2f})" if c else ""
-            width = figures["half_width_median"].get(quantity)
-            lines.append(
-                f"| {quantity} | {e['median']:.3g} | {e['p90']:.3g} | {e['worst']:.3g} | {cover} | "
-                f"{'' if width is None else f'{width:.3g}'} |"
-            )
-        for quantity, e in figures["replay"]["errors"].items():
-            lines.append(
-                f"| replay: {quantity} | {e['median']:.3g} | {e['p90']:.3g} | {e['worst']:.3g} | | |"
-            )
-        lines.append("")
+    lines += ["## Wrong structure", "", *violation_table(wrong), ""]
+    for name, results in wrong.items():
+        summary[name] = collect(results)
+    (folder / "summary.json").write_text(json.dumps(summary, indent=1))
     (folder / "summary.md").write_text("\n".join(lines))
     print("\n".join(lines))
 
