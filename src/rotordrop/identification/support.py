@@ -18,16 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.estimated import IdentifiedValue, Verdict
-from rotordrop.identification.fit import (
-    Fit,
-    Progress,
-    Schedule,
-    Search,
-    completed,
-    considered_covariance,
-    search,
-    sobol_starts,
-)
+from rotordrop.identification.fit import Fit, completed, considered_covariance
 from rotordrop.identification.parameter_vector import (
     FRICTION,
     ParameterVector,
@@ -36,6 +27,7 @@ from rotordrop.identification.parameter_vector import (
     support_vector,
 )
 from rotordrop.identification.replica import Replica
+from rotordrop.identification.search import Progress, Schedule, Search, search, sobol_starts
 
 Array = NDArray[np.float64]
 
@@ -53,6 +45,9 @@ WIDENING = 2.0
 
 DIRECTIONS = 16
 """Directions of the initial state's uncertainty that are fitted along."""
+
+ALL_DIRECTIONS = 40
+"""How many of them the last fit follows; those beyond move the drop by less than the noise."""
 
 LEADING_DIRECTIONS = 8
 """How many of them while many starts run."""
@@ -143,6 +138,12 @@ class ImpactFit:
         ends = ("support.stiffness", "support.mass", "support.damping", "contact.stiffness")
         own = [unknown.path.endswith(ends) for unknown in self.vector.unknowns]
         return np.array(own + [k < LEADING_DIRECTIONS for k in range(self.directions.shape[1])])
+
+    @cached_property
+    def decisive(self) -> NDArray[np.bool_]:
+        """Stiffness and mass of the supports, shape (n,)."""
+        own = [u.path.endswith(("support.stiffness", "support.mass")) for u in self.vector.unknowns]
+        return np.array(own + [False] * self.directions.shape[1])
 
     @cached_property
     def considered(self) -> NDArray[np.bool_]:
@@ -253,18 +254,16 @@ def influential_directions(replica: Replica, count: int = DIRECTIONS) -> Directi
     )
 
 
-def impact_problem(replica: Replica, *, nuisance: ParameterVector | None = None) -> ImpactFit:
+def impact_problem(replica: Replica, *, directions: int = DIRECTIONS) -> ImpactFit:
     """The problem of the first impacts for a drop that can be run again."""
-    beside = nuisance_vector(replica.model) if nuisance is None else nuisance
-    vector = joined(support_vector(replica.model), beside) if len(beside) else support_vector(replica.model)
-    directions = influential_directions(replica)
+    found = influential_directions(replica, directions)
     return ImpactFit(
         replica=replica,
-        vector=vector,
-        directions=directions.unknowns,
-        states=directions.states,
-        unbalances=directions.unbalances,
-        remaining_directions=directions.remaining,
+        vector=joined(support_vector(replica.model), nuisance_vector(replica.model)),
+        directions=found.unknowns,
+        states=found.states,
+        unbalances=found.unbalances,
+        remaining_directions=found.remaining,
     )
 
 
@@ -315,8 +314,9 @@ def fit_support(
         [_handed_over(fit.x, coarse, fine) for fit in first.finalists[:2]],
         Schedule(
             windows=windows[COARSE_WINDOWS - 1 :],
-            kept=(1,),
+            kept=(2,),
             draws=(50,),
+            filled=False,
             few=0,
             iterations=(10, 10),
             tolerances=(1e-3, 3e-4),
@@ -351,7 +351,7 @@ def refit_with_friction(
     longest: float | None = None,
     threads: int | None = None,
 ) -> tuple[ImpactFit, Array, Array]:
-    """Fit once more, with the friction coefficient that the sweep found, and over a longer window.
+    """Fit once more with the friction that the sweep found, more of the fall, and over a longer window.
 
     Parameters
     ----------
@@ -375,8 +375,12 @@ def refit_with_friction(
     unknowns = list(problem.vector.unknowns)
     error = (friction.standard_error or 0.0) / friction.value
     unknowns[place] = replace(unknowns[place], mean=math.log(friction.value), sigma=max(error, 1e-4))
-    known = replace(problem, vector=ParameterVector(unknowns=tuple(unknowns)))
-    start = fit.x.copy()
+    known = replace(
+        impact_problem(problem.replica, directions=ALL_DIRECTIONS),
+        vector=ParameterVector(unknowns=tuple(unknowns)),
+    )
+    start = known.prior_mean.copy()
+    start[: len(fit.x)] = fit.x
     start[place] = known.prior_mean[place]
     end = min(longest or fit.window, float(problem.replica.time[-1]))
     windows = (fit.window, end) if end > fit.window else (fit.window,)

@@ -9,14 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError
-from rotordrop.identification.fit import (
-    Schedule,
-    completed,
-    considered_covariance,
-    fit_window,
-    search,
-    sobol_starts,
-)
+from rotordrop.identification.fit import completed, considered_covariance, fit_window
+from rotordrop.identification.search import Schedule, search, sobol_starts
 
 Array = NDArray[np.float64]
 RNG = np.random.default_rng(4)
@@ -35,6 +29,7 @@ class Linear:
     bounds: tuple[Array, Array] = field(default_factory=lambda: (np.full(4, -9.0), np.full(4, 9.0)))
     leading: NDArray[np.bool_] = field(default_factory=lambda: np.array([True, True, False, False]))
     considered: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(4, dtype=np.bool_))
+    decisive: NDArray[np.bool_] = field(default_factory=lambda: np.array([True, True, False, False]))
 
     def residual(self, x: Array, window: float) -> Array:
         return np.asarray((self.matrix @ x - self.right)[: int(window)])
@@ -57,6 +52,7 @@ class Wavy(Linear):
     bounds: tuple[Array, Array] = field(default_factory=lambda: (np.full(1, -6.0), np.full(1, 6.0)))
     leading: NDArray[np.bool_] = field(default_factory=lambda: np.ones(1, dtype=np.bool_))
     considered: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(1, dtype=np.bool_))
+    decisive: NDArray[np.bool_] = field(default_factory=lambda: np.ones(1, dtype=np.bool_))
 
     def residual(self, x: Array, window: float) -> Array:
         t = np.arange(0.0, window, 0.05)
