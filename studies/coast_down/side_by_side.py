@@ -54,6 +54,23 @@ def maxima_of(analysis):
     }
 
 
+def pairs(recorded, simulated):
+    """Every named line of the record beside the strongest simulated one of the same name."""
+
+    def strongest(lines, name, key):
+        same = [line for line in lines if line["label"] == name]
+        return max(same, key=lambda line: line["amplitude_zero_to_peak_um"])[key] if same else None
+
+    found = []
+    for name in dict.fromkeys(line["label"] for line in recorded if not line["label"].startswith("unnamed")):
+        sides = {
+            key: [strongest(lines, name, key) for lines in (recorded, simulated)]
+            for key in ("frequency_hz", "amplitude_zero_to_peak_um")
+        }
+        found.append({"line": name, **sides})
+    return found
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("machine", type=Path)
@@ -78,11 +95,12 @@ def main() -> None:
             "speed_hz": speed / (2.0 * math.pi),
             "air_gap_um": {name: round(1e6 * gap, 2) for name, gap in record.air_gap.items()},
             "drag": {
-                "aero_linear": float(same.speed.aero_linear),
-                "aero_quadratic": float(same.speed.aero_quadratic),
+                "linear_torque_N_m_s": float(same.speed.aero_linear),
+                "quadratic_torque_N_m_s2": float(same.speed.aero_quadratic),
                 "race_drag_coefficient": float(same.touchdown_bearings[0].race.drag_coefficient),
             },
             "pendulum_small_hz": {swing.bearing: round(swing.small, 3) for swing in swing_ranges(same)},
+            "recorded against simulated": pairs(lines_of(measured), lines_of(computed)),
             "recorded": {
                 "standstill_s": measured.speed_law.standstill.as_json(),
                 "time_constant_s": measured.speed_law.exponential.time_constant.value,

@@ -5,13 +5,16 @@ Streams the samples to disk, can be killed and resumed, and says whether 0.2 s h
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from rotordrop.cli._options import JsonOption, MachineArgument, quantity
-from rotordrop.cli._output import deliver, progress_bar, require_places
+from rotordrop.cli._output import console, deliver, progress_bar, require_places
 from rotordrop.cli.simulate import Integrator, Reduction
 from rotordrop.errors import UsageError
 
@@ -21,6 +24,7 @@ if TYPE_CHECKING:
     from rotordrop.simulation.coast_down_case import CoastDownCase
     from rotordrop.simulation.coast_down_certificate import CoastDownCertificate
     from rotordrop.simulation.coast_down_result import CoastDownResult
+    from rotordrop.spectrum.coast_down import CoastDownAnalysis
 
 STANDSTILL = "standstill"
 
@@ -69,7 +73,16 @@ def coast_down(
     ] = None,
     json_file: JsonOption = None,
 ) -> None:
-    """Simulate a coast-down to standstill: statistics, peaks with their time, whirl, energy."""
+    """Simulate a coast-down to standstill: statistics, peaks with their time, whirl, energy.
+
+    The machine needs a drag: speed.aero_linear and speed.aero_quadratic (torques as a function of speed) or
+    speed.aero_time_constant in its file, or --drag-from with a recorded coast-down whose speed shows it. The
+    linear and the quadratic part go to the air then, the dry part to the races. Only a race drag brings a
+    rotor to standstill.
+
+    With --output the samples go to disk second by second. A run that was stopped with Ctrl-C or killed goes
+    on with --resume and the same values, to the same last bit.
+    """
     from rotordrop.machine import load_machine
     from rotordrop.model.parameters import build_drop_model
     from rotordrop.report.coast_down_page import coast_down_page
@@ -95,17 +108,29 @@ def coast_down(
         integrator=integrator.value,
     )
     model = build_drop_model(described, case.reduction)
-    with progress_bar("coast-down") as progress:
+    with _resumable(output), progress_bar("coast-down") as progress:
         result = simulate_coast_down(model, case, output=output, resume=resume, progress=progress)
     assert result is not None
     certificate = _certificate(model, case, result) if certify else None
-    if report is not None:
-        _write_report(described, result, certificate, report)
     numbers: dict[str, Any] = result.as_json()
+    if report is not None:
+        analysis = _write_report(described, result, certificate, report)
+        numbers["frequencies"] = None if analysis is None else analysis.as_json()
     if certificate is not None:
         numbers["certificate"] = certificate.as_json()
     page = coast_down_page(result, described, certificate=certificate)
     deliver(numbers, json_file, lambda out: print_summary(page, out))
+
+
+@contextmanager
+def _resumable(output: Path | None) -> Iterator[None]:
+    """Say how to go on after Ctrl-C."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        if output is not None:
+            console(sys.stderr).print(f"the part of {output} done so far is kept: go on with --resume")
+        raise
 
 
 def _end(text: str) -> float | None:
@@ -131,8 +156,8 @@ def _certificate(model: Any, case: CoastDownCase, result: CoastDownResult) -> Co
 
 def _write_report(
     machine: Machine, result: CoastDownResult, certificate: CoastDownCertificate | None, report: Path
-) -> None:
-    """Write the page; with samples on disk it also has waterfalls, lines and resonances."""
+) -> CoastDownAnalysis | None:
+    """Write the page; with samples on disk it also has waterfalls, lines and resonances, which are given."""
     from rotordrop.report.coast_down_page import coast_down_page
     from rotordrop.report.page import write_page
 
@@ -141,9 +166,10 @@ def _write_report(
         with progress_bar("frequencies") as progress:
             analysis = _analysis(machine, result.path, progress)
     write_page(coast_down_page(result, machine, analysis, certificate), report)
+    return analysis
 
 
-def _analysis(machine: Machine, path: Path, progress: Progress) -> Any:
+def _analysis(machine: Machine, path: Path, progress: Progress) -> CoastDownAnalysis:
     from rotordrop.estimation.simulated_coast_down import simulated_coast_down
     from rotordrop.spectrum.coast_down import analyse_coast_down
     from rotordrop.spectrum.machine_candidates import machine_candidates

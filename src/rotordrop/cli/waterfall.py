@@ -13,6 +13,7 @@ import typer
 
 from rotordrop.cli._options import JsonOption, MachineArgument, quantity
 from rotordrop.cli._output import deliver, progress_bar, require_places
+from rotordrop.errors import UsageError
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
@@ -34,6 +35,13 @@ class Amplitude(StrEnum):
     peak_to_peak = "peak-to-peak"
 
 
+class Against(StrEnum):
+    """What goes upwards in a waterfall."""
+
+    time = "time"
+    speed = "speed"
+
+
 def waterfall(
     machine: MachineArgument,
     record: Annotated[
@@ -45,6 +53,7 @@ def waterfall(
     amplitude: Annotated[Amplitude, typer.Option(help="Amplitudes of the waterfalls.")] = (
         Amplitude.zero_to_peak
     ),
+    against: Annotated[Against, typer.Option(help="What goes upwards.")] = Against.time,
     points: Annotated[int, typer.Option(min=16, help="Samples per frame; the paper's by default.")] = 32768,
     overlap: Annotated[float, typer.Option(min=0.0, max=0.95, help="Share used again.")] = 0.5,
     highest: Annotated[
@@ -57,6 +66,15 @@ def waterfall(
         ),
     ] = 600.0,
     profile: Annotated[Path | None, typer.Option(metavar="FILE", help="Channel map of the recorder.")] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE",
+            help="Write waterfalls, envelopes, orders and speed as HDF5.",
+        ),
+    ] = None,
     report: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write the report as one HTML file.")
     ] = None,
@@ -68,12 +86,15 @@ def waterfall(
     from rotordrop.report.terminal import print_summary
     from rotordrop.report.waterfall_page import waterfall_page
     from rotordrop.spectrum.coast_down import WaterfallChoice, analyse_coast_down
+    from rotordrop.spectrum.findings_file import write_findings
     from rotordrop.spectrum.machine_candidates import machine_candidates
     from rotordrop.spectrum.waterfall import WaterfallSettings
 
-    require_places(report, json_file)
+    require_places(output, report, json_file)
     described = load_machine(machine)
     signal, simulated = _signal(described, record, profile)
+    if against is Against.speed and signal.profile is None:
+        raise UsageError(f"--against speed: {record} has no rotor speed; use --against time")
     choice = WaterfallChoice(
         components=tuple(direction.value for direction in component or tuple(Direction)),
         amplitude_kind=amplitude.value,
@@ -87,7 +108,10 @@ def waterfall(
         title=f"Frequencies of a coast-down of {described.name}",
         facts=(("machine", f"{described.name} ({machine.name})"), ("record", record.name)),
         simulated=simulated,
+        against=against.value,
     )
+    if output is not None:
+        write_findings(found, output)
     if report is not None:
         write_page(page, report)
     deliver(found.as_json(), json_file, lambda out: print_summary(page, out))

@@ -12,7 +12,7 @@ from rotordrop.measurement.events import find_drop_instant
 from rotordrop.measurement.record import Record
 from rotordrop.model.assembly import build_rotor_fe
 from rotordrop.model.statics import bearing_load_shares
-from rotordrop.spectrum.coast_down import RACES_SPUN_UP, CoastDownSignal
+from rotordrop.spectrum.coast_down import RACES_SPUN_UP, SHORTEST_LAW, CoastDownSignal
 from rotordrop.spectrum.coast_down_law import fit_drag
 from rotordrop.spectrum.machine_candidates import swing_ranges
 from rotordrop.spectrum.speed_profile import SpeedProfile, fit_speed_profile
@@ -84,7 +84,10 @@ def _speed(record: Record, off: float) -> tuple[Array | None, Array | None]:
     time, speed = record.speed_time, record.speed_readings
     if time is None or speed is None:
         time, speed = (None, None) if record.speed is None else (record.time, record.speed)
-    return (None, None) if time is None or speed is None else (time - off, speed)
+    if time is None or speed is None or np.ptp(speed) == 0.0:
+        # A speed given by hand says from where the rotor fell, not how it slowed down.
+        return None, None
+    return time - off, speed
 
 
 def _profile(time: Array | None, speed: Array | None) -> SpeedProfile | None:
@@ -109,18 +112,28 @@ def with_recorded_drag(machine: Machine, signal: CoastDownSignal) -> Machine:
         Its coast-down, long enough for a fit.
     """
     if signal.speed_time is None or signal.speed is None:
-        raise RecordError("the record has no speed, so it shows no drag; give a record with a speed channel")
+        raise RecordError(
+            "the record has no speed, so it shows no drag; give a record with a speed channel, or a drag "
+            "under [speed] in the machine file"
+        )
+    least = RACES_SPUN_UP + SHORTEST_LAW
+    known = float(signal.speed_time[-1])
+    if known < least:
+        raise RecordError(
+            f"the speed is recorded for {known:.2f} s after power-off; at least {least:g} s are needed to tell "
+            "its drag. Give a longer record, or a drag under [speed] in the machine file"
+        )
     drag = fit_drag(signal.speed_time, signal.speed, start=RACES_SPUN_UP)
-    inertia = build_rotor_fe(machine).polar_inertia
     shares = bearing_load_shares(machine)
     lever = sum(
         float(share) * 0.5 * float(bearing.bearing.pitch_diameter)
         for bearing, share in zip(machine.touchdown_bearings, shares, strict=True)
     )
-    turning = inertia + sum(float(bearing.race.inertia) for bearing in machine.touchdown_bearings)
+    races = sum(float(bearing.race.inertia) for bearing in machine.touchdown_bearings)
+    turning = build_rotor_fe(machine).polar_inertia + races
     values = {
-        "speed.aero_linear": drag.linear.value * turning / inertia,
-        "speed.aero_quadratic": drag.quadratic.value * turning / inertia,
+        "speed.aero_linear": drag.linear.value * turning,
+        "speed.aero_quadratic": drag.quadratic.value * turning,
     }
     for bearing in machine.touchdown_bearings:
         values[f"{bearing.name}.race.drag_coefficient"] = drag.constant.value * turning / lever

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from rotordrop.machine import Machine
-from rotordrop.simulation.coast_down_file import open_samples
+from rotordrop.simulation.coast_down_file import load_coast_down, open_samples
 from rotordrop.spectrum.coast_down import CoastDownSignal
 from rotordrop.spectrum.speed_profile import exact_speed_profile
 from rotordrop.spectrum.waterfall import PlanarSignal
@@ -28,7 +28,7 @@ def simulated_coast_down(path: Path, machine: Machine | None = None) -> CoastDow
         With it the planes are those of its sensors, named by the end they belong to; without it, or when
         it has none, those of the bearings.
     """
-    samples = open_samples(path)
+    result, samples = load_coast_down(path), open_samples(path)
     planes: dict[str, PlanarSignal] = {name: samples.planes[name] for name in samples.air_gap}
     sensors = () if machine is None else machine.sensors
     ends = {sensor.bearing: samples.planes.get(f"node {sensor.node}") for sensor in sensors}
@@ -47,4 +47,5 @@ def simulated_coast_down(path: Path, machine: Machine | None = None) -> CoastDow
         speed_time=time,
         speed=speed,
         recorded=False,
+        force_and_stress=tuple(maximum.as_json() for maximum in result.maxima()),
     )

@@ -11,11 +11,21 @@ from rotordrop.report.coast_down_figures import displacement_history_figure, spe
 from rotordrop.report.content import Card, Figure, KeyFigure, ReportContent, Section, Statement, Table
 from rotordrop.report.quantity import Quantity
 from rotordrop.report.waterfall_figure import order_figure, waterfall_figure
+from rotordrop.spectrum.coast_down import RACES_SPUN_UP, SHORTEST_LAW
 from rotordrop.spectrum.indentation import held_maximum
 
 if TYPE_CHECKING:
     from rotordrop.spectrum.coast_down import CoastDownAnalysis, PlaneAnalysis, SpeedLaw
+    from rotordrop.spectrum.lines import Line
 
+NO_SPEED = (
+    "The record has no speed that falls: whether a line follows it stays open, and there are no tracked "
+    "orders, no resonances and no speed law. Record the speed, or name its channel in a profile."
+)
+SHORT_SPEED = (
+    f"The speed is known for less than {RACES_SPUN_UP + SHORTEST_LAW:g} s after power-off: too short for a "
+    "speed law."
+)
 _COMPONENTS = {
     "x": "horizontal",
     "y": "vertical",
@@ -24,7 +34,12 @@ _COMPONENTS = {
 
 
 def waterfall_page(
-    analysis: CoastDownAnalysis, *, title: str, facts: tuple[tuple[str, str], ...] = (), simulated: str = ""
+    analysis: CoastDownAnalysis,
+    *,
+    title: str,
+    facts: tuple[tuple[str, str], ...] = (),
+    simulated: str = "",
+    against: str = "time",
 ) -> ReportContent:
     """Build the report on the frequencies of a coast-down.
 
@@ -38,6 +53,8 @@ def waterfall_page(
         Machine and record.
     simulated : str
         Sentence that says the record is simulated; empty for a measured one.
+    against : {"time", "speed"}
+        What goes upwards in the waterfalls.
     """
     return ReportContent(
         title=title,
@@ -46,13 +63,17 @@ def waterfall_page(
         cards=tuple(_card(name, plane) for name, plane in analysis.planes.items()),
         facts=(*facts, ("rotordrop", __version__)),
         summary=(line_table(analysis),),
-        sections=frequency_sections(analysis),
+        sections=frequency_sections(analysis, against),
     )
 
 
-def frequency_sections(analysis: CoastDownAnalysis) -> tuple[Section, ...]:
+def frequency_sections(analysis: CoastDownAnalysis, against: str = "time") -> tuple[Section, ...]:
     """Displacement, waterfalls, lines, orders with the resonances they pass, and the speed law."""
-    sections = [_displacement_section(analysis), _waterfall_section(analysis), _line_section(analysis)]
+    sections = [
+        _displacement_section(analysis),
+        _waterfall_section(analysis, against),
+        _line_section(analysis),
+    ]
     if any(plane.track is not None for plane in analysis.planes.values()):
         sections.append(_order_section(analysis))
     if analysis.speed_law is not None:
@@ -79,7 +100,12 @@ def _verdict(analysis: CoastDownAnalysis) -> tuple[Statement, ...]:
     statements.append(
         Statement(text=f"{count} lines found, {count - unnamed} named, {unnamed} without a name{why}.")
     )
-    if analysis.speed_law is not None:
+    statements += [Statement(text=text) for text in analysis.force_statements()]
+    if analysis.signal.profile is None:
+        statements.append(Statement(text=NO_SPEED, level="warning"))
+    elif analysis.speed_law is None:
+        statements.append(Statement(text=SHORT_SPEED))
+    else:
         statements.append(Statement(text=_standstill(analysis.speed_law)))
     return tuple(statements)
 
@@ -119,12 +145,10 @@ def line_table(analysis: CoastDownAnalysis) -> Table:
     """Every line with frequency or order, amplitude, width, confidence and the reason for its name."""
     rows = []
     for line in analysis.lines:
-        where = f"{line.order:.3f}X" if line.order is not None else f"{line.frequency:.2f} Hz"
-        error = line.order_error if line.order is not None else line.frequency_error
         rows.append(
             (
                 line.label,
-                f"{where} ± {error:.2g}" if error is not None and np.isfinite(error) else where,
+                _where(line),
                 Quantity(value=line.amplitude, kind="length", digits=3),
                 f"{line.ratio:.0f}",
                 "below resolution" if line.width == 0.0 else f"{line.width:.2f} Hz",
@@ -133,12 +157,20 @@ def line_table(analysis: CoastDownAnalysis) -> Table:
             )
         )
     return Table(
-        columns=("name", "where", "amplitude", "× floor", "width", "seen", "confidence"),
+        columns=("name", "where", "amplitude, zero-to-peak", "× floor", "width", "seen", "confidence"),
         rows=tuple(rows),
         caption="Lines found, strongest first",
-        note="Amplitudes are zero-to-peak, in the direction and plane where they are largest, root mean "
+        note="Amplitudes are those in the direction and plane where they are largest, root mean "
         "square over the time the line was seen.",
     )
+
+
+def _where(line: Line) -> str:
+    """Order or frequency of a line with its error."""
+    if line.order is None:
+        return f"{line.frequency:.2f} ± {line.frequency_error:.2g} Hz"
+    error = line.order_error
+    return f"{line.order:.3f}X" + (f" ± {error:.2g}" if error is not None and np.isfinite(error) else "")
 
 
 def _displacement_section(analysis: CoastDownAnalysis) -> Section:
@@ -152,14 +184,14 @@ def _displacement_section(analysis: CoastDownAnalysis) -> Section:
     return Section(heading="Displacement over the coast-down", figures=(figure,))
 
 
-def _waterfall_section(analysis: CoastDownAnalysis) -> Section:
+def _waterfall_section(analysis: CoastDownAnalysis, against: str) -> Section:
     figures = []
     for name, plane in analysis.planes.items():
         for fall in plane.waterfalls:
             lines = [line for line in analysis.lines if name in line.forward and line.named]
             figures.append(
                 Figure(
-                    chart=waterfall_figure(fall, name, lines),
+                    chart=waterfall_figure(fall, name, lines, against=against),
                     caption=f"{name}, {_COMPONENTS[fall.component]}: amplitude {fall.amplitude_kind} of "
                     f"frames of {fall.settings.points} points, Hann window, "
                     f"{100 * fall.settings.overlap:.0f} % overlap, lines "
@@ -209,17 +241,19 @@ def _order_section(analysis: CoastDownAnalysis) -> Section:
         ]
         crossed += sum(not r.certain for r in plane.resonances)
     table = Table(
-        columns=("plane", "order", "excited at", "rotor speed", "amplitude", "rise", "mode"),
+        columns=("plane", "order", "excited at", "rotor speed", "amplitude, zero-to-peak", "rise", "mode"),
         rows=tuple(rows),
         caption="Resonances passed on the way down",
     )
     if not rows:
-        none = "No order rises above its surroundings on the way down, but where it crosses a steady line"
-        left_out = (Statement(text=f"{none} ({crossed} times)."),)
+        none = "No order rises above its surroundings on the way down"
+        but = f", but where it crosses a steady line ({crossed} times)" if crossed else ""
+        left_out = (Statement(text=f"{none}{but}."),)
         return Section(heading="Orders and resonances", statements=left_out, figures=tuple(figures))
-    text = (
-        f"{crossed} more rises are left out: a steady line crosses the order there and makes part of them.",
-    )
+    text: tuple[str, ...] = ()
+    if crossed:
+        words = "a steady line crosses the order there and makes part of them"
+        text = (f"{crossed} more rises are left out: {words}.",)
     return Section(heading="Orders and resonances", text=text, figures=tuple(figures), tables=(table,))
 
 
@@ -235,8 +269,8 @@ def _law_section(analysis: CoastDownAnalysis, law: SpeedLaw) -> Section:
     values = (
         ("time constant of the exponential fit", law.exponential.time_constant),
         ("dry drag: balls and races", law.drag.constant),
-        ("linear drag: speed.aero_linear", law.drag.linear),
-        ("quadratic drag: speed.aero_quadratic", law.drag.quadratic),
+        ("linear drag, per polar inertia", law.drag.linear),
+        ("quadratic drag, per polar inertia", law.drag.quadratic),
         ("standstill", law.standstill),
     )
     rows = []

@@ -115,10 +115,16 @@ def _with_drag(parameters: KernelParameters, model: DropModel, case: CoastDownCa
         if speed.aero_time_constant is None:
             raise SimulationError(
                 f"the machine {model.machine.name!r} has no aerodynamic drag: speed.aero_linear, "
-                "speed.aero_quadratic and speed.aero_time_constant are all missing. Give one of them, or "
-                "take them from a recorded coast-down."
+                "speed.aero_quadratic and speed.aero_time_constant are all missing. Give one of them under "
+                '[speed], such as aero_time_constant = "8 s", or take the drag from the speed of a recorded '
+                "coast-down: --drag-from RECORD, in Python with_recorded_drag."
             )
         spin[L.AERO_LINEAR] = 1.0 / float(speed.aero_time_constant)
+    else:
+        # The machine file gives torques, the kernel wants them per polar inertia.
+        inertia = spin[L.POLAR_INERTIA]
+        spin[L.AERO_LINEAR] = float(speed.aero_linear or 0.0) / inertia
+        spin[L.AERO_QUADRATIC] = float(speed.aero_quadratic or 0.0) / inertia
     bearing[:, L.DRAG_SPEED] = np.minimum(bearing[:, L.DRAG_SPEED], case.stop_speed)
     return parameters._replace(spin=spin, bearing=bearing)
 

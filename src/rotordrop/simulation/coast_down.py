@@ -63,8 +63,8 @@ def simulate_coast_down(
     Parameters
     ----------
     machine : Machine or DropModel
-        The machine, or a model built before; it needs ``speed.aero_linear`` (or a time constant) and may have
-        ``speed.aero_quadratic``.
+        The machine, or a model built before; it needs ``speed.aero_linear``, ``speed.aero_quadratic`` or a
+        time constant.
     case : CoastDownCase
         Speed [rad/s], end, sampling, accuracy.
     output : Path, optional

@@ -53,9 +53,15 @@ LONGEST_BOUNCE = 0.1
 RACES_SPUN_UP = 1.0
 """Time [s] from which the speed law is fitted: before it the rotor hands spin to the races."""
 SHORTEST_LAW = 3.0
-SENSOR_NOISE = 1e-7
-"""Noise of a good sensor [m rms], added to a simulation before lines are looked for in it: without noise the
-search would find arithmetic."""
+SENSOR_NOISE = 4e-7
+"""Noise of a usual displacement sensor [m rms], added to a simulation before lines are looked for in it:
+without it the search would find arithmetic, with less than a recording has what no recording shows."""
+FORCE_OF_A_RECORD = (
+    "Force and stress are not in a record of displacement; the largest indentation above dates the largest "
+    "force only roughly, as race and support give way too. 'rotordrop estimate' finds both for the first "
+    "0.2 s; 'rotordrop coast-down --drag-from' with this record says for the whole coast-down of the machine "
+    "as described when they are largest."
+)
 LINES_OF_A_SIMULATION = 24
 _SEED = 2020
 
@@ -80,6 +86,9 @@ class CoastDownSignal:
         Speed as it was recorded or simulated [s], [rad/s].
     recorded : bool
         False for a simulation.
+    force_and_stress : tuple of dict
+        When indentation, force and stress were largest, one entry per bearing and quantity, as a simulation
+        knows it; empty for a recording, which shows displacement only.
     """
 
     planes: Mapping[str, PlanarSignal]
@@ -90,6 +99,7 @@ class CoastDownSignal:
     speed_time: Array | None
     speed: Array | None
     recorded: bool
+    force_and_stress: tuple[Mapping[str, Any], ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -153,6 +163,14 @@ class CoastDownAnalysis:
     lines: tuple[Line, ...]
     speed_law: SpeedLaw | None
 
+    def force_statements(self) -> tuple[str, ...]:
+        """What is known of when force and stress were largest, in words."""
+        if self.signal.force_and_stress:
+            return tuple(str(found["statement"]) for found in self.signal.force_and_stress)
+        if not self.signal.recorded:
+            return ()
+        return (FORCE_OF_A_RECORD,)
+
     def as_json(self) -> dict[str, Any]:
         """All findings, ready for JSON; amplitudes are zero-to-peak in m unless the name says otherwise."""
         content = {
@@ -161,6 +179,8 @@ class CoastDownAnalysis:
             "speed_law": None if self.speed_law is None else _law_json(self.speed_law),
             "lines": [line.as_json() for line in self.lines],
             "planes": {name: _plane_json(plane) for name, plane in self.planes.items()},
+            "force_and_stress": [dict(found) for found in self.signal.force_and_stress],
+            "force_and_stress_statements": list(self.force_statements()),
         }
         return {key: _finite(value) for key, value in content.items()}
 

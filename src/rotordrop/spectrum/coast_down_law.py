@@ -70,9 +70,11 @@ class DragFit:
     constant : IdentifiedValue
         Dry part [rad/s²]: friction of balls and races, which a recorded speed always contains.
     linear : IdentifiedValue
-        Laminar drag per polar inertia [1/s]; the machine file's ``aero_linear``.
+        Laminar drag per polar inertia of rotor and races [1/s]; times that inertia it is the machine file's
+        ``aero_linear``.
     quadratic : IdentifiedValue
-        Turbulent drag per polar inertia [1/rad]; the machine file's ``aero_quadratic``.
+        Turbulent drag per polar inertia of rotor and races [1/rad]; times that inertia it is the machine
+        file's ``aero_quadratic``.
     initial_speed : IdentifiedValue
         [rad/s] at ``start``.
     correlation : shape (4, 4)

@@ -163,7 +163,9 @@ def displacement_history(
         largest_later_time=later_time if np.isfinite(later) else float("nan"),
         window=window,
         noise=spread,
-        statement=_window_statement(float(largest), largest_time, later, later_time, window, spread),
+        statement=_window_statement(
+            (float(largest), largest_time), (later, later_time), air_gap, window, spread
+        ),
     )
 
 
@@ -259,9 +261,13 @@ def _block_noise(xy: Array) -> float:
 
 
 def _window_statement(
-    largest: float, time: float, later: float, later_time: float, window: float, noise: float
+    maximum: tuple[float, float], after: tuple[float, float], air_gap: float, window: float, noise: float
 ) -> str:
-    first = f"largest displacement {largest * 1e6:.1f} µm at {time:.4f} s"
+    (largest, time), (later, later_time) = maximum, after
+    first = (
+        f"largest displacement {largest * 1e6:.1f} µm ({(largest - air_gap) * 1e6:+.1f} µm beyond the air "
+        f"gap) at {time:.4f} s"
+    )
     if not np.isfinite(later):
         return f"{first}; the signal ends within {window:g} s"
     second = f"later than {window:g} s at most {later * 1e6:.1f} µm (at {later_time:.2f} s)"

@@ -3,12 +3,24 @@
 from __future__ import annotations
 
 import json
+import math
+import re
 from importlib.resources import files
 
+import h5py
+import numpy as np
 import pytest
 
 from rotordrop.cli.app import run
-from rotordrop.machine import example_machine, example_path, save_machine
+from rotordrop.errors import RecordError
+from rotordrop.estimation.recorded_coast_down import recorded_coast_down, with_recorded_drag
+from rotordrop.machine import example_machine, example_path, load_machine, save_machine
+from rotordrop.measurement.record import read_record
+from rotordrop.model.parameters import build_drop_model
+from rotordrop.simulation.case import CentredStart
+from rotordrop.simulation.checkpoint import work_folder
+from rotordrop.simulation.coast_down import simulate_coast_down
+from rotordrop.simulation.coast_down_case import CoastDownCase
 
 PAPER = str(example_path("paper"))
 
@@ -16,8 +28,24 @@ PAPER = str(example_path("paper"))
 @pytest.fixture(scope="module")
 def machine(tmp_path_factory):
     path = tmp_path_factory.mktemp("machine") / "lp400.toml"
-    save_machine(example_machine("lp400").with_values({"speed.aero_linear": 0.11}), path)
+    save_machine(example_machine("lp400").with_values({"speed.aero_time_constant": 9.0}), path)
     return str(path)
+
+
+def recorded(path, *, seconds, rate=1000.0, speed=True, unit="um", before=0.3):
+    """A plain recording: floating, fallen by 0.28 mm at 0 s, and a speed that falls with 5 s."""
+    time = np.arange(-before, seconds, 1.0 / rate)
+    dice = np.random.default_rng(4)
+    names = [sensor.name for sensor in example_machine("lp400").sensors]
+    columns = {"time [s]": time}
+    down = -270.0 * np.clip(time / 8e-3, 0.0, 1.0) ** 2
+    for name, angle in zip(names, [s.angle.value for s in example_machine("lp400").sensors], strict=True):
+        columns[f"{name} [{unit}]"] = down * np.sin(angle) + 0.3 * dice.standard_normal(time.size)
+    if speed:
+        columns["speed [Hz]"] = 60.0 * np.exp(-0.2 * np.clip(time, 0.0, None))
+    table = np.column_stack(list(columns.values()))
+    np.savetxt(path, table, delimiter=",", header=",".join(columns), comments="", fmt="%.6f")
+    return path
 
 
 @pytest.fixture(scope="module")
@@ -50,12 +78,29 @@ def test_an_unfinished_run_is_not_taken_for_another(coast, machine, capsys):
 def test_a_machine_without_drag_is_told_the_way_out(capsys):
     lp400 = str(example_path("lp400"))
     assert run(["coast-down", lp400, "--speed", "60 Hz", "--until", "0.1 s"]) == 5
-    assert "no aerodynamic drag" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert "no aerodynamic drag" in told
+    assert "aero_time_constant" in told and "--drag-from RECORD" in told
+    assert run(["coast-down", "--help"]) == 0
+    helped = " ".join(capsys.readouterr().out.split())
+    assert "speed.aero_linear" in helped and "--drag-from" in helped and "--resume" in helped
+
+
+def test_drag_from_a_recorded_coast_down_stops_the_rotor_as_recorded(tmp_path, capsys):
+    """Dry and linear drag known: the fitted drag, handed over, gives the recorded fall of speed again."""
+    record = recorded(tmp_path / "record.csv", seconds=12.0)
+    numbers = tmp_path / "c.json"
+    arguments = ["coast-down", str(example_path("lp400")), "--speed", "60 Hz", "--until", "3 s"]
+    assert run([*arguments, "--drag-from", str(record), "--json", str(numbers)]) == 0
+    speed = json.loads(numbers.read_text())["windows"]["speed"]
+    # The rotor first spins up the races; from 1 s to 3 s both fall together.
+    assert speed[-1] / speed[1] == pytest.approx(np.exp(-0.2 * 2.0), rel=0.01)
 
 
 def test_waterfall_reads_a_simulated_coast_down(coast, machine, tmp_path, capsys):
     arguments = ["waterfall", machine, str(coast["h5"]), "--points", "8192", "--component", "x"]
-    files = {"json": tmp_path / "w.json", "page": tmp_path / "w.html"}
+    files = {"json": tmp_path / "w.json", "page": tmp_path / "w.html", "h5": tmp_path / "w.h5"}
+    arguments += ["--against", "speed", "--output", str(files["h5"])]
     assert run([*arguments, "--json", str(files["json"]), "--report", str(files["page"])]) == 0
     found = json.loads(files["json"].read_text())
     assert set(found["planes"]) == {"NDE", "DE"}
@@ -64,8 +109,20 @@ def test_waterfall_reads_a_simulated_coast_down(coast, machine, tmp_path, capsys
     assert [item["component"] for item in fall] == ["x"]
     assert fall[0]["amplitude_kind"] == "zero-to-peak"
     assert fall[0]["resolution_hz"] == pytest.approx(20000 / 8192)
-    assert "zero-to-peak" in files["page"].read_text()
-    assert "held the maximum" in capsys.readouterr().out
+    page, told = files["page"].read_text(), capsys.readouterr().out
+    assert "zero-to-peak" in page and "Force and stress are not in a record" not in page
+    assert "held the maximum" in told and "the largest Hertz stress of" in told
+    kinds = [(entry["bearing"], entry["quantity"]) for entry in found["force_and_stress"]]
+    assert ("DE", "bearing force") in kinds and len(kinds) == 6
+    with h5py.File(files["h5"]) as file:
+        plane = file["planes/DE"]
+        amplitude = plane["waterfall_x/amplitude"]
+        assert amplitude.attrs["units"] == "m" and amplitude.attrs["amplitude_kind"] == "zero-to-peak"
+        mean_square = np.sqrt(np.mean(amplitude[()] ** 2, axis=0))
+        assert mean_square == pytest.approx(fall[0]["rms_over_frames_m"], rel=1e-9)
+        peak = found["planes"]["DE"]["largest_displacement_m"]
+        assert np.max(plane["displacement/largest"]) == pytest.approx(peak, rel=1e-12)
+        assert file["speed/speed"][0] == pytest.approx(2.0 * math.pi * 60.0, rel=1e-6)
 
 
 def test_critical_speeds_of_the_paper(tmp_path, capsys):
@@ -117,3 +174,101 @@ def test_waterfall_of_the_bundled_record(tmp_path, capsys):
         assert plane["waterfalls"][0]["amplitude_kind"] == "peak-to-peak"
     assert any(line["label"].startswith("pendulum") for line in found["lines"])
     assert "simulated" in capsys.readouterr().out
+
+
+LP400 = str(example_path("lp400"))
+ERRORS = {
+    "no such record": (["waterfall", LP400, "nowhere.h5"], 3, r"nowhere\.h5"),
+    "a record that is none": (["waterfall", LP400, LP400], 3, r"lp400\.toml"),
+    "a report in no folder": (["waterfall", LP400, "r.csv", "--report", "no/p.html"], 6, "no/p.html"),
+    "findings into a folder": (["waterfall", LP400, "r.csv", "--output", "."], 6, "is a folder"),
+    "a map in no folder": (["critical-speeds", LP400, "--json", "no/c.json"], 6, "create it first"),
+    "samples in no folder": (
+        ["coast-down", LP400, "--speed", "60 Hz", "--output", "no/c.h5"],
+        6,
+        "create it first",
+    ),
+    "a speed without unit": (["coast-down", LP400, "--speed", "60"], 64, "60"),
+    "a negative time": (["coast-down", LP400, "--speed", "60 Hz", "--until", "-1 s"], 5, "-1"),
+    "a frame of no overlap": (["waterfall", LP400, "r.csv", "--overlap", "1.5"], 64, "--overlap.*0.95"),
+    "a drag from nowhere": (["coast-down", LP400, "--speed", "60 Hz", "--drag-from", "no.h5"], 3, "no.h5"),
+    "an unknown suspension": (["critical-speeds", LP400, "--held", "strings"], 64, "strings"),
+}
+
+
+@pytest.mark.parametrize("case", ERRORS)
+def test_mistakes_are_named_with_the_way_out(case, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    arguments, code, words = ERRORS[case]
+    assert run(arguments) == code
+    told = capsys.readouterr().err
+    assert re.search(words, told), told
+    assert "Traceback" not in told
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_record_without_speed_says_what_is_missing(tmp_path, capsys):
+    record = str(recorded(tmp_path / "r.csv", seconds=3.0, speed=False))
+    short = ["--points", "1024", "--component", "y"]
+    assert run(["waterfall", LP400, record, *short]) == 3
+    assert 'constant = "60 Hz"' in capsys.readouterr().err
+    by_hand = tmp_path / "by_hand.toml"
+    by_hand.write_text('[speed]\nconstant = "60 Hz"\n')
+    short += ["--profile", str(by_hand)]
+    assert run(["waterfall", LP400, record, *short]) == 0
+    assert "The record has no speed that falls" in capsys.readouterr().out
+    assert run(["waterfall", LP400, record, *short, "--against", "speed"]) == 64
+    assert "has no rotor speed; use --against time" in capsys.readouterr().err
+    with pytest.raises(RecordError, match="so it shows no drag; give a record with a speed channel"):
+        lp400 = example_machine("lp400")
+        with_recorded_drag(lp400, recorded_coast_down(lp400, read_record(record, lp400, profile=by_hand)))
+
+
+def test_a_record_too_short_for_a_frame_or_a_law_says_so(tmp_path, capsys):
+    record = str(recorded(tmp_path / "r.csv", seconds=1.5))
+    page = tmp_path / "w.html"
+    assert run(["waterfall", LP400, record, "--report", str(page)]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "too short for a speed law" in told
+    assert "Force and stress are not in a record of displacement" in told
+    assert "shorter than one frame; there is no waterfall" in page.read_text()
+    assert run(["coast-down", LP400, "--speed", "60 Hz", "--drag-from", record]) == 3
+    assert re.search(r"recorded for 1\.\d+ s after power-off; at least 4 s", capsys.readouterr().err)
+
+
+def test_a_channel_without_unit_is_refused(tmp_path, capsys):
+    record = recorded(tmp_path / "r.csv", seconds=0.5)
+    record.write_text(record.read_text().replace(" [um]", ""))
+    assert run(["waterfall", LP400, str(record)]) == 3
+    assert "unit" in capsys.readouterr().err
+
+
+def test_a_run_is_resumed_with_its_own_machine_only(machine, tmp_path, capsys):
+    """Killed runs of another machine are refused by name; the right one ends as if never stopped."""
+    output = tmp_path / "c.h5"
+    described = load_machine(machine)
+    model = build_drop_model(described, "quick")
+    case = CoastDownCase(speed=2.0 * math.pi * 60.0, duration=0.4, start=CentredStart())
+    assert simulate_coast_down(model, case, output=output, windows_at_most=1) is None
+    other = tmp_path / "other.toml"
+    save_machine(described.with_values({"DE.support.stiffness": 3e8}), other)
+    again = ["--speed", "60 Hz", "--until", "0.4 s", "--output", str(output)]
+    assert run(["coast-down", machine, *again]) == 6
+    assert "add --resume to go on with it" in capsys.readouterr().err
+    assert run(["coast-down", str(other), *again, "--resume"]) == 5
+    assert "belongs to another run" in capsys.readouterr().err
+    assert run(["coast-down", machine, *again, "--resume"]) == 0
+    assert output.exists()
+    assert not work_folder(output).exists()
+    assert run(["coast-down", machine, *again, "--resume"]) == 6
+    assert "nothing to resume" in capsys.readouterr().err
+
+
+def test_ctrl_c_says_how_to_go_on(machine, tmp_path, monkeypatch, capsys):
+    def stopped(*arguments, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("rotordrop.simulation.coast_down.simulate_coast_down", stopped)
+    output = tmp_path / "c.h5"
+    assert run(["coast-down", machine, "--speed", "60 Hz", "--output", str(output)]) == 130
+    assert "go on with --resume" in " ".join(capsys.readouterr().err.split())

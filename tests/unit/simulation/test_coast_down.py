@@ -12,6 +12,8 @@ import pytest
 
 from rotordrop.errors import OutputError, SimulationError
 from rotordrop.machine import example_machine
+from rotordrop.model import layout as L
+from rotordrop.model.assembly import build_rotor_fe
 from rotordrop.model.parameters import build_drop_model
 from rotordrop.model.reduction import Reduction
 from rotordrop.simulation import _coast_loop as C
@@ -24,13 +26,16 @@ from rotordrop.simulation.coast_down_file import is_coast_down, load_coast_down,
 from rotordrop.simulation.drop import simulate_drop
 
 TURN = 2.0 * math.pi
-DRAG = {"speed.aero_linear": 0.11, "speed.aero_quadratic": 0.0}
+DECELERATION = 0.11
+"""Linear drag per polar inertia [1/s]."""
 
 
 @pytest.fixture(scope="module")
 def model():
     """The rigid rotor with attachment modes: small, so that seconds of coast-down cost little."""
-    machine = example_machine("lp400").with_values(DRAG)
+    machine = example_machine("lp400")
+    torque = DECELERATION * build_rotor_fe(machine).polar_inertia
+    machine = machine.with_values({"speed.aero_linear": torque, "speed.aero_quadratic": 0.0})
     return build_drop_model(machine, Reduction(modes=2, attachment=True))
 
 
@@ -54,8 +59,11 @@ def test_the_first_instants_are_those_of_a_drop(model):
     """The same equations as simulate_drop: only the windows, the file and the events are new."""
     case = CoastDownCase(speed=60.0 * TURN, duration=0.02, settled_scheme=False)
     coast = simulate_coast_down(model, case)
+    spin = model.parameters.spin.copy()
+    spin[L.AERO_LINEAR] = DECELERATION
     drop = simulate_drop(
-        model, DropCase(speed=60.0 * TURN, duration=0.02, spin="function of speed", output_step=1e-6)
+        replace(model, parameters=model.parameters._replace(spin=spin)),
+        DropCase(speed=60.0 * TURN, duration=0.02, spin="function of speed", output_step=1e-6),
     )
     assert coast.peak_value[:, 1] == pytest.approx([drop.peak_force(b)[0] for b in (0, 1)], rel=1e-3)
     assert coast.peak_value[:, 0] == pytest.approx(np.max(drop.indentation, axis=0), rel=1e-3)
@@ -83,7 +91,7 @@ def test_dry_drag_sets_the_time_of_standstill(model, stopped, slow):
     races = parameters.bearing
     turning = parameters.spin[0] + races[:, 11].sum()
     dry = float(np.sum(races[:, 12] * model.load_shares * 0.5 * races[:, 14])) / turning
-    linear = DRAG["speed.aero_linear"] * parameters.spin[0] / turning
+    linear = DECELERATION * parameters.spin[0] / turning
     gripped = slow.speed * parameters.spin[0] / turning
     expected = math.log1p(linear * gripped / dry) / linear
     assert stopped.standstill_time == pytest.approx(expected, rel=0.05)
@@ -221,5 +229,22 @@ def test_impossible_cases_are_refused(changes, words):
 
 
 def test_a_machine_without_drag_is_refused(slow):
-    with pytest.raises(SimulationError, match=r"has no aerodynamic drag: speed\.aero_linear"):
+    with pytest.raises(SimulationError, match=r"has no aerodynamic drag: speed\.aero_linear.*--drag-from"):
         simulate_coast_down(example_machine("lp400"), slow)
+
+
+def test_drag_is_a_torque_whichever_way_it_is_given(model):
+    """A time constant and the linear torque I_p/τ are one law; a quadratic torque slows most at speed."""
+    inertia = model.fe.polar_inertia
+    case = CoastDownCase(speed=300.0, duration=0.05)
+
+    def slowed(**values):
+        machine = example_machine("lp400").with_values({f"speed.{k}": v for k, v in values.items()})
+        result = simulate_coast_down(build_drop_model(machine, Reduction(modes=2, attachment=True)), case)
+        return result.windows.speed[-1]
+
+    linear = slowed(aero_linear=inertia / 2.0)
+    assert linear == pytest.approx(slowed(aero_time_constant=2.0), rel=1e-12)
+    # A quadratic torque of I_p/(2 s · 300 rad/s) begins as strong and fades with the speed.
+    assert 0.0 < slowed(aero_quadratic=inertia / 600.0) - linear < 0.3
+    assert slowed(aero_quadratic=inertia / 300.0) < linear - 2.0

@@ -1,0 +1,88 @@
+"""What a coast-down shows as numbers in one HDF5 file: everything that the figures of the report draw."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rotordrop.atomic_file import atomic_path
+
+if TYPE_CHECKING:
+    from rotordrop.spectrum.coast_down import CoastDownAnalysis, PlaneAnalysis, SpeedLaw
+    from rotordrop.spectrum.waterfall import Waterfall
+
+FORMAT = "rotordrop frequencies 1"
+
+
+def write_findings(analysis: CoastDownAnalysis, path: Path) -> None:
+    """Write waterfalls, displacement envelopes, tracked orders and speed; the file appears complete or not.
+
+    Every data set carries its ``units``, a waterfall its ``amplitude_kind``. Lines, resonances and statements
+    are in the JSON.
+
+    Parameters
+    ----------
+    analysis : CoastDownAnalysis
+        What was found.
+    path : Path
+        HDF5 file to write.
+    """
+    import h5py
+
+    with atomic_path(path) as temporary, h5py.File(temporary, "w") as file:
+        file.attrs["format"] = FORMAT
+        file.attrs["recorded"] = analysis.signal.recorded
+        for name, plane in analysis.planes.items():
+            _write_plane(file.create_group(f"planes/{name}"), plane)
+        time, speed = analysis.signal.speed_time, analysis.signal.speed
+        if time is not None and speed is not None:
+            _put(file, "speed/time", time, "s")
+            _put(file, "speed/speed", speed, "rad/s")
+            if analysis.speed_law is not None:
+                _write_law(file, time, analysis.speed_law)
+
+
+def _put(group: Any, name: str, values: Any, unit: str) -> None:
+    group.create_dataset(name, data=np.asarray(values)).attrs["units"] = unit
+
+
+def _write_plane(group: Any, plane: PlaneAnalysis) -> None:
+    history, track = plane.history, plane.track
+    for name, values, unit in (
+        ("time", history.time, "s"),
+        ("smallest", history.lowest, "m"),
+        ("largest", history.highest, "m"),
+        ("smallest_xy", history.lowest_xy, "m"),
+        ("largest_xy", history.highest_xy, "m"),
+        ("air_gap", history.air_gap, "m"),
+    ):
+        _put(group, f"displacement/{name}", values, unit)
+    for fall in plane.waterfalls:
+        _write_waterfall(group.create_group(f"waterfall_{fall.component}"), fall)
+    if track is not None:
+        _put(group, "orders/time", track.time, "s")
+        _put(group, "orders/speed", track.speed, "rad/s")
+        _put(group, "orders/order", track.orders, "1")
+        _put(group, "orders/major_axis", track.major_axis, "m")
+        _put(group, "orders/separable", track.separable, "1")
+        group["orders/major_axis"].attrs["amplitude_kind"] = "zero-to-peak"
+
+
+def _write_waterfall(group: Any, fall: Waterfall) -> None:
+    group.attrs["points"], group.attrs["overlap"] = fall.settings.points, fall.settings.overlap
+    _put(group, "time", fall.time, "s")
+    _put(group, "frequency", fall.frequency, "Hz")
+    _put(group, "amplitude", fall.amplitude, "m")
+    group["amplitude"].attrs["amplitude_kind"] = fall.amplitude_kind
+    if fall.speed is not None:
+        _put(group, "speed", fall.speed, "rad/s")
+
+
+def _write_law(file: Any, time: Any, law: SpeedLaw) -> None:
+    for name, fit in (("exponential_fit", law.exponential), ("drag_fit", law.drag)):
+        fitted = np.full(len(time), np.nan)
+        inside = (time >= fit.start) & (time <= fit.end)
+        fitted[inside] = fit.speed_at(time[inside])
+        _put(file, f"speed/{name}", fitted, "rad/s")
