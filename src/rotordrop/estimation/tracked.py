@@ -27,6 +27,7 @@ from rotordrop.simulation.certificate import refined_peak
 from rotordrop.tracking.calibration import (
     BLIND_SCHEDULE,
     CALIBRATED_SCHEDULE,
+    LOOSER,
     QUICK_SCHEDULE,
     Stage,
     TrackedDrops,
@@ -206,7 +207,8 @@ def track_drops(
     fine_model = build_drop_model(machine, FINE_BASIS)
     fine = [drop_problem(fine_model, item, until) for item in prepared]
     if is_calibrated(machine) and not calibrate_only:
-        return track(fine, QUICK_SCHEDULE if quick else CALIBRATED_SCHEDULE, progress=progress)
+        schedule = QUICK_SCHEDULE if quick else CALIBRATED_SCHEDULE
+        return _not_lost(track(fine, schedule, progress=progress), prepared)
     coarse_model = build_drop_model(machine, COARSE_BASIS)
     coarse = [drop_problem(coarse_model, item, until) for item in prepared]
     contact = max(_first_contact(item) for item in prepared)
@@ -215,7 +217,21 @@ def track_drops(
         transferred(one, two, drop.means) for one, two, drop in zip(coarse, fine, first.smoothed, strict=True)
     ]
     schedule = shifted(CALIBRATION_SCHEDULE if calibrate_only else FINE_SCHEDULE, contact)
-    return track(fine, schedule, references=references, progress=progress)
+    return _not_lost(track(fine, schedule, references=references, progress=progress), prepared)
+
+
+def _not_lost(tracked: TrackedDrops, prepared: Sequence[Preparation]) -> TrackedDrops:
+    """The drops, if the filter followed all of them to the end: a part of a drop says nothing of its peak."""
+    for item, problem, smoothed in zip(prepared, tracked.problems, tracked.smoothed, strict=True):
+        done, samples = smoothed.filtered.done, len(smoothed.filtered.means)
+        if done < samples:
+            raise IdentificationError(
+                f"the filter lost the drop {item.name} at {1e3 * problem.time[done]:.1f} ms of "
+                f"{1e3 * problem.time[samples - 1]:.0f} ms, even with {LOOSER[-1]:g} × the usual unknown "
+                "impulses; the machine description is too far from the machine that was recorded. Check the "
+                "sensors (planes, angles, signs), or calibrate anew with this drop."
+            )
+    return tracked
 
 
 def _first_contact(item: Preparation) -> float:
@@ -340,7 +356,10 @@ def estimate_tracked(
     prepared = [prepare(machine, r, t, n) for r, t, n in zip(records, tails, stems, strict=True)]
     tracked = track_drops(machine, prepared, quick=quick, progress=progress)
     drops = []
-    for item, problem, smoothed in zip(prepared, tracked.problems, tracked.smoothed, strict=True):
+    for item, problem, smoothed, needed in zip(
+        prepared, tracked.problems, tracked.smoothed, tracked.noise_factors, strict=True
+    ):
         factor = 1.0 if quick else best_noise_factor(problem, smoothed, FINE_SCHEDULE[-1])
+        factor = max(factor, needed) if needed > 1.0 else factor
         drops.append(tracked_drop(item, problem, smoothed, factor))
     return tuple(drops)

@@ -7,14 +7,14 @@ import numpy as np
 from rotordrop.estimation.tracked import TrackedDrop
 from rotordrop.report.cross_check import CrossCheck
 from rotordrop.report.quantity import Quantity
-from rotordrop.tracking.input_state import KNOWN_PEAK_ERROR, input_state_estimate
+from rotordrop.tracking.input_state import KNOWN_PEAK_ERROR, KNOWN_STRESS_ERROR, input_state_estimate
 
 KNOWN_MEAN_ERROR = 0.10
 """Relative error of the mean force that the cross-check is known to make [1]."""
 
 
 def twin_cross_checks(drop: TrackedDrop) -> tuple[CrossCheck, ...]:
-    """Peak and mean force of every bearing found in both ways."""
+    """Peak force, peak stress and mean force of every bearing found in both ways."""
     check = input_state_estimate(drop.problem, drop.smoothed)
     found = []
     late = drop.forces.time >= 0.15
@@ -26,6 +26,15 @@ def twin_cross_checks(drop: TrackedDrop) -> tuple[CrossCheck, ...]:
                 estimate=Quantity(value=peak.value, kind="force", interval_90=peak.interval_90),
                 check=Quantity(value=float(check.peak[b]), kind="force", digits=3),
                 accuracy=KNOWN_PEAK_ERROR,
+            )
+        )
+        stress = values["peak_stress_Pa"]
+        found.append(
+            CrossCheck(
+                name=f"{name} peak stress",
+                estimate=Quantity(value=stress.value, kind="stress", interval_90=stress.interval_90),
+                check=Quantity(value=float(check.peak_stress[b]), kind="stress", digits=3),
+                accuracy=KNOWN_STRESS_ERROR,
             )
         )
         if np.isfinite(check.mean_late[b]):

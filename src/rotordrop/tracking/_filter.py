@@ -34,6 +34,7 @@ IntArray = NDArray[np.int64]
 
 
 LARGEST_VARIANCE = 1e20
+LARGEST_DEFLECTION = 1e-3
 SIGN_WIDTH = math.sqrt(0.5 * math.pi)
 
 
@@ -242,9 +243,19 @@ def forward_pass(
         means[i] = mean
         if covariances.shape[1] > 0:
             covariances[i] = P
-        if not is_covariance(P) or not math.isfinite(np.sum(mean)):
+        if not is_covariance(P) or not is_plausible(mean, p):
             return i
     return len(times)
+
+
+@kernel
+def is_plausible(mean: Array, p: KernelParameters) -> bool:
+    """Whether the estimate is finite and no race or support has left its place."""
+    first = 2 * p.eigenvalue.shape[0]
+    good = math.isfinite(np.sum(mean))
+    for i in range(first, first + 4 * p.bearing.shape[0]):
+        good = good and abs(mean[i]) < LARGEST_DEFLECTION
+    return good
 
 
 @kernel

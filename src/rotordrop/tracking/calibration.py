@@ -10,7 +10,7 @@ machine is carried from the end of one drop to the beginning of the next, what b
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +62,8 @@ FULL_SCHEDULE: tuple[Stage, ...] = (
 """From nominal guesses to the whole 0.2 s of one drop."""
 
 REFERENCE_CONTACT = 0.0075
+LOOSER = (1.0, 8.0, 32.0)
+"""Factors on the unknown impulses with which a pass is repeated that lost the drop [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,12 +80,15 @@ class TrackedDrops:
         Mean normalised innovation squared of each drop [1].
     diverged : tuple of bool
         Drops in which the filter had to give up.
+    noise_factors : tuple of float
+        Factor on the usual unknown impulses that the last pass needed to follow each drop [1].
     """
 
     problems: tuple[DropProblem, ...]
     smoothed: tuple[Smoothed, ...]
     nis: tuple[float, ...]
     diverged: tuple[bool, ...] = field(default=())
+    noise_factors: tuple[float, ...] = field(default=())
 
 
 def shifted(schedule: Sequence[Stage], first_contact: float) -> tuple[Stage, ...]:
@@ -138,6 +143,7 @@ def track(
         smoothed=tuple(smoothed),
         nis=tuple(s.filtered.nis for s in smoothed),
         diverged=tuple(s.filtered.done < len(s.filtered.means) for s in smoothed),
+        noise_factors=tuple(s.filtered.impulse / settings.impulse for s in smoothed),
     )
 
 
@@ -152,11 +158,7 @@ def one_pass(
         if d > 0:
             mean, covariance = _handed_on(filtered[-1], problem, shared)
         samples = int(np.searchsorted(problem.time, until, side="right"))
-        result = forward(
-            problem, settings, mean=mean, covariance=covariance, reference=references[d], samples=samples
-        )
-        if result.done < samples and references[d] is not None:
-            result = forward(problem, settings, mean=mean, covariance=covariance, samples=samples)
+        result = _followed(problem, settings, mean, covariance, references[d], samples)
         if result.done < min(samples, 10):
             raise IdentificationError(
                 f"the filter lost the drop after {result.done} of {samples} samples; the machine's guesses "
@@ -174,6 +176,27 @@ def one_pass(
             score[shared] = back.score_0[shared]
             information[np.ix_(shared, shared)] = back.information_0[np.ix_(shared, shared)]
     return smoothed[::-1]
+
+
+def _followed(
+    problem: DropProblem,
+    settings: PassSettings,
+    mean: Array,
+    covariance: Array,
+    reference: Array | None,
+    samples: int,
+) -> Forward:
+    """A pass along the reference; one that loses the drop is repeated without it, then more loosely."""
+    result = forward(
+        problem, settings, mean=mean, covariance=covariance, reference=reference, samples=samples
+    )
+    for factor in LOOSER if reference is not None else LOOSER[1:]:
+        if result.done == samples:
+            break
+        looser = replace(settings, impulse=factor * settings.impulse, share=factor * settings.share)
+        again = forward(problem, looser, mean=mean, covariance=covariance, samples=samples)
+        result = max(result, again, key=lambda one: one.done)
+    return result
 
 
 def _handed_on(before: Forward, problem: DropProblem, shared: NDArray[np.int64]) -> tuple[Array, Array]:

@@ -13,8 +13,9 @@ from rotordrop.physics._compile import kernel
 from rotordrop.physics.ball_bearing_planar import largest_ball_load, planar_ball_force
 from rotordrop.simulation._loop import contact_at
 from rotordrop.tracking import _propagation as P
+from rotordrop.tracking._filter import LARGEST_DEFLECTION
 from rotordrop.tracking.problem import DropProblem, private_copy
-from rotordrop.tracking.smoother import Smoothed
+from rotordrop.tracking.smoother import Smoothed, parameter_sample
 
 Array = NDArray[np.float64]
 
@@ -23,9 +24,10 @@ N_VALUES = 4
 
 
 @kernel
-def _bearing_values(
+def bearing_values(
     dx: float, dy: float, axial: float, b: int, p: KernelParameters, work: Array, out: Array
 ) -> None:
+    """Ball force on the race in x and y and its magnitude [N] and the stress [Pa] at a deflection [m]."""
     row = p.bearing[b]
     F_x, F_y = planar_ball_force(
         dx,
@@ -90,13 +92,13 @@ def force_values(
             dy = y[r + 1] - y[h + 1]
             axial = p.bearing[b, L.AXIAL_OFFSET]
             contact_at(b, y, p, contacts[i, b])
-            _bearing_values(dx, dy, axial, b, p, work, values[i, b])
+            bearing_values(dx, dy, axial, b, p, work, values[i, b])
             for c in range(3):
                 ex = step_d if c == 0 else 0.0
                 ey = step_d if c == 1 else 0.0
                 es = step_d if c == 2 else 0.0
-                _bearing_values(dx + ex, dy + ey, axial + es, b, p, work, above)
-                _bearing_values(dx - ex, dy - ey, axial - es, b, p, work, below)
+                bearing_values(dx + ex, dy + ey, axial + es, b, p, work, above)
+                bearing_values(dx - ex, dy - ey, axial - es, b, p, work, below)
                 for v in range(4):
                     gradients[i, b, v, c] = (above[v] - below[v]) / (2.0 * step_d)
 
@@ -174,6 +176,31 @@ def force_history(problem: DropProblem, smoothed: Smoothed) -> ForceHistory:
         displacement=displacement,
         displacement_sigma=displacement_sigma,
     )
+
+
+def stress_at_force(problem: DropProblem, smoothed: Smoothed, b: int, force: Array) -> float:
+    """Largest Hertz stress [Pa] at the inner race of bearing ``b`` under a static force (2,) [N].
+
+    The preload is the one estimated shortly after the first contacts; the deflection is along the force.
+    """
+    from scipy.optimize import brentq
+
+    p = private_copy(problem.model.parameters)
+    P.apply_parameters(
+        smoothed.means[parameter_sample(smoothed)][problem.parameter_slice], problem.targets, p
+    )
+    size = float(np.hypot(force[0], force[1]))
+    along = np.asarray(force) / max(size, 1e-300)
+    work, out = np.empty((2, p.ball_cos.shape[1])), np.empty(N_VALUES)
+
+    def lacking(deflection: float) -> float:
+        bearing_values(
+            deflection * along[0], deflection * along[1], p.bearing[b, L.AXIAL_OFFSET], b, p, work, out
+        )
+        return float(out[FORCE]) - size
+
+    brentq(lacking, 0.0, LARGEST_DEFLECTION, xtol=1e-12)
+    return float(out[STRESS])
 
 
 def _standard_deviations(smoothed: Smoothed, gradients: Array) -> Array:

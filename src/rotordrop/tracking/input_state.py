@@ -1,10 +1,9 @@
 """Cross-check without any contact law: forces at the bearing nodes from the rotor's own motion.
 
 The rotor model alone (modes, gyroscopics, gravity) is driven by unknown forces at the touchdown-bearing
-nodes; their
-rates are random walks whose size follows the local force, and they are held at zero while the rotor is
-clearly inside
-the air gap. Known accuracy on simulated records: main peaks 4–7 %, single impacts up to 150 %; no waveform.
+nodes; their rates are random walks whose size follows the local force, and they are held at zero while the
+rotor is clearly inside the air gap. Known accuracy on simulated records: main peaks 4–7 %, single impacts up
+to 150 %; no waveform.
 """
 
 from __future__ import annotations
@@ -15,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.model.parameters import DropModel
+from rotordrop.tracking.forces import stress_at_force
 from rotordrop.tracking.problem import DropProblem
 from rotordrop.tracking.smoother import Smoothed
 
@@ -26,6 +26,8 @@ BASE_RATE = 3e5
 RATE_PER_FORCE = 3e3
 KNOWN_PEAK_ERROR = 0.15
 """Relative error of the largest peak that this estimate is known to make at worst [1]."""
+KNOWN_STRESS_ERROR = 0.05
+"""The same for the largest stress, which goes with the third root of the load and sees the preload [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,6 +44,8 @@ class InputEstimate:
         Its magnitude [N].
     peak : ndarray, shape (B,)
         Largest magnitude [N].
+    peak_stress : ndarray, shape (B,)
+        Largest Hertz stress that this force gives in the bearing as the twin has it [Pa].
     mean_late : ndarray, shape (B,)
         Mean magnitude of the mean force vector between 0.15 and 0.2 s [N]; NaN when the record is shorter.
     """
@@ -50,6 +54,7 @@ class InputEstimate:
     force: Array
     magnitude: Array
     peak: Array
+    peak_stress: Array
     mean_late: Array
 
 
@@ -57,7 +62,7 @@ def input_state_estimate(problem: DropProblem, smoothed: Smoothed) -> InputEstim
     """Joint estimate of motion and bearing forces from the readings, by a linear filter and smoother.
 
     The tracked twin lends gains, offsets, air gaps and the radius that gates; no contact, friction or
-    support enters.
+    support enters. The stress takes the ball bearing, its preload included, from the twin.
     """
     count = len(smoothed.means)
     radius, gaps = _radius_and_gap(problem, smoothed)
@@ -71,8 +76,15 @@ def input_state_estimate(problem: DropProblem, smoothed: Smoothed) -> InputEstim
     magnitude = np.hypot(force[..., 0], force[..., 1])
     late = time >= 0.15
     mean = np.hypot(*force[late].mean(axis=0).T) if time[-1] > 0.199 else np.full(force.shape[1], np.nan)
+    at = magnitude.argmax(axis=0)
+    stress = [stress_at_force(problem, smoothed, b, force[i, b]) for b, i in enumerate(at)]
     return InputEstimate(
-        time=time, force=force, magnitude=magnitude, peak=magnitude.max(axis=0), mean_late=mean
+        time=time,
+        force=force,
+        magnitude=magnitude,
+        peak=magnitude.max(axis=0),
+        peak_stress=np.array(stress),
+        mean_late=mean,
     )
 
 

@@ -78,10 +78,12 @@ class Forward:
 
     ``done`` is the number of samples reached; ``innovations`` and ``innovation_variances`` have one column
     per channel
-    and one for the speed, NaN where nothing was measured.
+    and one for the speed, NaN where nothing was measured; ``impulse`` is the size of the unknown impulses of
+    the pass [N s].
     """
 
     done: int
+    impulse: float
     means: Array
     covariances: Compact
     transitions: Compact
@@ -146,6 +148,7 @@ def forward(
     dt = float(problem.time[1] - problem.time[0])
     result = Forward(
         done=0,
+        impulse=settings.impulse,
         means=np.empty((count, n)),
         covariances=np.empty((count, n, n) if smoothing else (count, 0, 0), dtype=np.float32),
         transitions=np.empty((kept, s, columns), dtype=np.float32),

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rotordrop.tracking import _propagation as P
+from rotordrop.tracking._filter import is_covariance
 from rotordrop.tracking.calibration import one_pass
 from rotordrop.tracking.problem import DropProblem, private_copy
 from rotordrop.tracking.smoother import PassSettings, fastest_frequency, forward, smooth
@@ -387,3 +388,29 @@ def test_a_machine_too_far_from_the_record_is_refused(flight):
     broken = replace(flight, mean=np.full_like(flight.mean, np.inf))
     with pytest.raises(IdentificationError, match=r"lost the drop after 0 of 60 samples.*Check air gap"):
         one_pass([broken], SETTINGS, [None], 0.003)
+
+
+def test_a_race_that_leaves_its_place_ends_the_pass(flight):
+    """The filter stops where its estimate is no longer a bearing, instead of going on with any number."""
+    far = flight.mean.copy()
+    far[flight.model.layout.race.start] = 5e-3
+    assert forward(flight, SETTINGS, mean=far).done == 0
+    assert not is_covariance(-np.eye(3))
+    assert not is_covariance(np.diag([1.0, np.nan, 1.0]))
+    assert is_covariance(np.eye(3))
+
+
+def test_a_pass_that_loses_the_drop_is_repeated_more_loosely(flight, monkeypatch):
+    """First without the reference, then with larger unknown impulses; the size that followed is kept."""
+    asked = []
+
+    def giving_up(problem, settings, *, mean, covariance, reference=None, samples=None):
+        result = forward(problem, settings, mean=mean, covariance=covariance, samples=samples)
+        asked.append((settings.impulse, reference is not None))
+        return result if settings.impulse > 2.0 * SETTINGS.impulse else replace(result, done=3)
+
+    monkeypatch.setattr("rotordrop.tracking.calibration.forward", giving_up)
+    smoothed = one_pass([flight], SETTINGS, [np.tile(flight.mean, (20, 1))], 0.002)[0]
+    impulse = SETTINGS.impulse
+    assert asked == [(impulse, True), (impulse, False), (8.0 * impulse, False)]
+    assert smoothed.filtered.impulse == 8.0 * impulse

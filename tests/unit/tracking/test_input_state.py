@@ -7,9 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rotordrop.model import layout as L
 from rotordrop.model.parameters import DropModel
+from rotordrop.tracking import _propagation as P
+from rotordrop.tracking.forces import bearing_values, stress_at_force
 from rotordrop.tracking.input_state import GATE_MARGIN, input_state_estimate
-from rotordrop.tracking.problem import DropProblem
+from rotordrop.tracking.problem import DropProblem, private_copy
 from rotordrop.tracking.smoother import Smoothed
 
 DT = 5e-5
@@ -120,6 +123,21 @@ def test_the_peaks_of_known_pulses_are_found_back(pushed):
     np.testing.assert_allclose(found.peak, np.hypot(*force.transpose(2, 0, 1)).max(axis=0), rtol=0.12)
     np.testing.assert_array_equal(found.magnitude.max(axis=0), found.peak)
     assert np.all(np.isnan(found.mean_late))  # the record ends before
+
+
+def test_the_peak_stress_is_that_of_the_bearing_under_the_peak_force(pushed):
+    """The twin's own force at a deflection leads back to the twin's own stress there."""
+    problem, smoothed, _ = pushed
+    p = private_copy(problem.model.parameters)
+    P.apply_parameters(smoothed.means[0][problem.parameter_slice], problem.targets, p)
+    out = np.empty(4)
+    for b, deflection in ((0, 12e-6), (1, 25e-6)):
+        work = np.empty((2, p.ball_cos.shape[1]))
+        bearing_values(0.0, -deflection, p.bearing[b, L.AXIAL_OFFSET], b, p, work, out)
+        found = stress_at_force(problem, smoothed, b, np.array([0.0, -out[2]]))
+        assert found == pytest.approx(out[3], rel=1e-6)
+    estimate = input_state_estimate(problem, smoothed)
+    assert np.all(estimate.peak_stress > stress_at_force(problem, smoothed, 0, np.array([0.0, -100.0])))
 
 
 def test_impulses_are_those_of_the_pulses(pushed):
