@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from rotordrop.errors import RotordropError as RotordropError
     from rotordrop.estimated import Estimated as Estimated
     from rotordrop.estimated import IdentifiedValue as IdentifiedValue
+    from rotordrop.estimation import estimate_drop as estimate_drop
+    from rotordrop.estimation.calibrated import calibrate_machine as calibrate_machine
     from rotordrop.machine import Machine as Machine
     from rotordrop.machine import example_machine as example_machine
     from rotordrop.machine import load_machine as load_machine
@@ -48,7 +50,9 @@ _PUBLIC = {
     "Record": "rotordrop.measurement",
     "RotordropError": "rotordrop.errors",
     "build_drop_model": "rotordrop.model.parameters",
+    "calibrate_machine": "rotordrop.estimation.calibrated",
     "check_record": "rotordrop.measurement",
+    "estimate_drop": "rotordrop.estimation",
     "example_machine": "rotordrop.machine",
     "example_record_path": "rotordrop.measurement",
     "format_quantity": "rotordrop.units",
