@@ -66,8 +66,7 @@ class Impact:
     """One impact at one bearing, each number with its 90 % interval.
 
     Times [s] from power-off, azimuth [rad ccw from +x] of the contact normal at the peak, peak ball force
-    [N], normal
-    impulse [N s], energy dissipated in the contact [J].
+    [N], normal impulse [N s], energy dissipated in the contact [J].
     """
 
     bearing: str

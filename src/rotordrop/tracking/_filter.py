@@ -1,13 +1,10 @@
 """Forward filter and backward smoother of a drop: state, parameters and sensor errors in one.
 
 The vector estimated is ``[dynamic state (s), parameters (P), sensor gains (C), offsets (C), 1X runout
-cosine and
-sine (C, C)]``. The forward pass
-is an extended Kalman filter with analytic sensitivities of the drop model; given a reference trajectory
-(the smoothed
-one of an earlier pass) it linearises there, so that repeated passes are a Gauss–Newton solution of the
-whole problem.
-The backward pass is the modified Bryson–Frazier smoother: it needs no inverse of a covariance.
+cosine and sine (C, C)]``. The forward pass is an extended Kalman filter with analytic sensitivities of the
+drop model; given a reference trajectory (the smoothed one of an earlier pass) it linearises there, so that
+repeated passes are a Gauss–Newton solution of the whole problem. The backward pass is the modified
+Bryson–Frazier smoother: it needs no inverse of a covariance.
 """
 
 from __future__ import annotations

@@ -32,12 +32,11 @@ class ParameterTargets(NamedTuple):
     """Which kernel entries the unknown parameters set; R targets, P parameters, U unbalance planes.
 
     ``target`` (R, 4): parameter, kind, row, column; ``factor`` (R,) [1]; ``logarithmic`` (P,) flags;
-    ``step`` (P,) of the
-    finite difference by which the right-hand side is differentiated; ``drift`` (P,) standard deviation of
-    the random walk
-    of each parameter per square root of a second, ``late_drift`` the same later in a drop; ``plane_shape``
-    (U, m) mode shapes of the planes. Beyond ``lower`` and ``upper`` (P,) the model takes the bound: what
-    drifts without being seen must not make it unstable. ``mean`` (P,) is the prior mean.
+    ``step`` (P,) of the finite difference by which the right-hand side is differentiated; ``drift`` (P,)
+    standard deviation of the random walk of each parameter per square root of a second, ``late_drift`` the
+    same later in a drop; ``plane_shape`` (U, m) mode shapes of the planes. Beyond ``lower`` and ``upper``
+    (P,) the model takes the bound: what drifts without being seen must not make it unstable. ``mean`` (P,)
+    is the prior mean.
     """
 
     target: IntArray
@@ -56,10 +55,9 @@ class FilterSettings(NamedTuple):
     """Numbers of one pass: sample distance [s], steps per sample, impulse noise [N s] and its share.
 
     ``impulse`` is the standard deviation of an unknown impulse per sample at each bearing and axis,
-    ``share`` the same
-    as a fraction of the contact impulse, ``spin_noise`` that of the race spins per sample [rad/s],
-    ``speed_noise`` that
-    of the rotor speed [rad/s]. After ``learning_end`` [s] the late drift of the parameters holds.
+    ``share`` the same as a fraction of the contact impulse, ``spin_noise`` that of the race spins per
+    sample [rad/s], ``speed_noise`` that of the rotor speed [rad/s]. After ``learning_end`` [s] the late
+    drift of the parameters holds.
     """
 
     dt: float
@@ -307,15 +305,13 @@ def propagate(
         middle = k[4].copy()
         drop_jacobian_parts(now + 0.5 * h, middle, p, J, g, touching)
         gather_entries(J, entries, places, starts)
-        # at every substep: position and gap must see the same contact, or the gap looks better known than
-        # it is
+        # at every substep: position and gap must see the same contact, or the gap looks too well known
         if columns > s:
             parameter_jacobian(now + 0.5 * h, middle, theta, targets, p, k[0], k[1], work, B)
         for b in range(p.bearing.shape[0]):
             contact_at(b, middle, p, contact)
             impulses[b] += h * contact[1]
-        # F <- exp(hJ) F + what the parameters add, to third order: the second order would let light modes
-        # grow
+        # F <- exp(hJ) F + what the parameters add, to third order: at second order light modes would grow
         jacobian_product(entries, places, starts, touching, g, p, F, moved, first)
         for i in range(s):
             for j in range(columns - s):

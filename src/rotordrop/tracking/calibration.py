@@ -1,10 +1,9 @@
 """One fit of a drop model to several recorded drops of a machine, by repeated filter and smoother passes.
 
 Each pass linearises at the smoothed trajectory of the pass before: a Gauss–Newton step of the whole
-problem. The window
-grows, because a long chaotic window has no use for a start that is wrong. The drops are chained: what
-belongs to the
-machine is carried from the end of one drop to the beginning of the next, what belongs to a drop is not.
+problem. The window grows, because a long chaotic window has no use for a start that is wrong. The drops are
+chained: what belongs to the machine is carried from the end of one drop to the beginning of the next, what
+belongs to a drop is not.
 """
 
 from __future__ import annotations

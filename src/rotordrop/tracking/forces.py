@@ -71,9 +71,8 @@ def force_values(
 ) -> None:
     """Fill values (N, B, 4), their gradients (N, B, 4, 3) and contacts (N, B, 6).
 
-    Gradients are by race deflection x, y and axial offset. Values are ball force on the race x, y,
-    its magnitude [N] and inner-race stress [Pa]; contacts as in
-    `contact_at`.
+    Gradients are by race deflection x, y and axial offset. Values are ball force on the race x, y, its
+    magnitude [N] and inner-race stress [Pa]; contacts as in `contact_at`.
     """
     m = p.eigenvalue.shape[0]
     n_b = p.bearing.shape[0]

@@ -298,8 +298,7 @@ def settled_displacement(problem: DropProblem, theta: Array) -> Array:
     """Vertical displacement [m] of the resting rotor at each sensor, shape (C,), for parameter values.
 
     Gap, indentation, race and support sag under the static load shares, the line between the bearings, and
-    the bending
-    of the rotor on its touchdown bearings.
+    the bending of the rotor on its touchdown bearings.
     """
     model = problem.model
     p = _with_theta(problem, theta)

@@ -44,8 +44,7 @@ class PassSettings:
     learning_end : float
         Time [s] after which friction and race may drift faster: once a race turns with the rotor, the
         friction law near zero speed decides, which no record of positions shows, and must not rewrite what
-        the first
-        impacts said.
+        the first impacts said.
     """
 
     substeps: int = 4
@@ -77,9 +76,8 @@ class Forward:
     """What a forward pass leaves: filtered estimates and what the smoother needs; N samples, n estimated.
 
     ``done`` is the number of samples reached; ``innovations`` and ``innovation_variances`` have one column
-    per channel
-    and one for the speed, NaN where nothing was measured; ``impulse`` is the size of the unknown impulses of
-    the pass [N s].
+    per channel and one for the speed, NaN where nothing was measured; ``impulse`` is the size of the
+    unknown impulses of the pass [N s].
     """
 
     done: int
