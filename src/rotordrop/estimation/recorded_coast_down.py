@@ -120,8 +120,8 @@ def with_recorded_drag(machine: Machine, signal: CoastDownSignal) -> Machine:
     known = float(signal.speed_time[-1])
     if known < least:
         raise RecordError(
-            f"the speed is recorded for {known:.2f} s after power-off; at least {least:g} s are needed to tell "
-            "its drag. Give a longer record, or a drag under [speed] in the machine file"
+            f"the speed is recorded for {known:.2f} s after power-off; at least {least:g} s are needed to "
+            "tell its drag. Give a longer record, or a drag under [speed] in the machine file"
         )
     drag = fit_drag(signal.speed_time, signal.speed, start=RACES_SPUN_UP)
     shares = bearing_load_shares(machine)
