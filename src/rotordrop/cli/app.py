@@ -20,6 +20,9 @@ from typer.core import TyperCommand, TyperGroup
 from rotordrop._version import __version__
 from rotordrop.errors import RotordropError, UsageError
 
+ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+"""Our matrices are small: threads inside linear algebra cost more than they give, above all when others work."""
+
 INTERRUPTED = 130
 BROKEN_PIPE = 141
 
@@ -131,6 +134,8 @@ def _invoke(arguments: list[str]) -> None:
 
 def main() -> None:
     """Entry point of the command ``rotordrop``."""
+    for name in ONE_THREAD:
+        os.environ.setdefault(name, "1")
     sys.exit(run(sys.argv[1:]))
 
 
