@@ -21,7 +21,7 @@ from rotordrop._version import __version__
 from rotordrop.errors import RotordropError, UsageError
 
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-"""Our matrices are small: threads inside linear algebra cost more than they give, above all when others work."""
+"""Our matrices are small: threads inside linear algebra cost more than they give, above all on busy cores."""
 
 INTERRUPTED = 130
 BROKEN_PIPE = 141
