@@ -10,6 +10,7 @@ from rotordrop.model.modes import free_free_modes, modal_damping_matrix
 from rotordrop.model.reduction import (
     PRESETS,
     Reduction,
+    _attachment_coordinates,
     elastic_flexibility,
     reduce_rotor,
     reduction_of,
@@ -101,6 +102,15 @@ def test_more_attachments_than_modes_left_do_not_repeat_shapes(overhung):
     basis = reduce_rotor(overhung, Reduction(modes=21, attachment=True), (2, 8))
     assert basis.size == 22
     np.testing.assert_allclose(basis.shapes.T @ overhung.mass @ basis.shapes, np.eye(22), atol=1e-10)
+
+
+def test_a_direction_that_repeats_another_gives_no_shape(paper_fe):
+    """Directions are compared at unit length, so that rounding is not taken for a second one."""
+    modes = free_free_modes(paper_fe)
+    inner, eigenvalues, damping = _attachment_coordinates(paper_fe, modes, 6, (4, 4, 26))
+    assert (inner.shape[1], eigenvalues.shape, damping.shape) == (2, (2,), (2, 2))
+    once = _attachment_coordinates(paper_fe, modes, 6, (4, 26))[1]
+    np.testing.assert_allclose(eigenvalues, once, rtol=1e-9)
 
 
 def test_the_same_rotor_gives_the_same_bits(paper_fe):
