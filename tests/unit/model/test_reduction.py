@@ -107,7 +107,7 @@ def test_more_attachments_than_modes_left_do_not_repeat_shapes(overhung):
 def test_a_direction_that_repeats_another_gives_no_shape(paper_fe):
     """Directions are compared at unit length, so that rounding is not taken for a second one."""
     modes = free_free_modes(paper_fe)
-    inner, eigenvalues, damping = _attachment_coordinates(paper_fe, modes, 6, (4, 4, 26))
+    inner, eigenvalues, damping = _attachment_coordinates(paper_fe, modes, 6, (4, 26, 4))
     assert (inner.shape[1], eigenvalues.shape, damping.shape) == (2, (2,), (2, 2))
     once = _attachment_coordinates(paper_fe, modes, 6, (4, 26))[1]
     np.testing.assert_allclose(eigenvalues, once, rtol=1e-9)

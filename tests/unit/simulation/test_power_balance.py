@@ -54,6 +54,15 @@ def test_power_of_a_drop_is_balanced(quick, depths, slip):
     assert rate[quick.layout.dissipated] > 0.0
 
 
+@pytest.mark.parametrize("seed", [4, 5])
+def test_power_of_a_hard_impact_without_sliding_is_balanced(quick, seed):
+    """What the contact damps shows beside what friction takes: rims of equal speed, 0.3 m/s everywhere."""
+    _, parameters = start_of_drop(quick, DropCase(speed=SPEED))
+    state = a_state(quick, np.array(DEPTHS["both bearings"]), 1.0, seed)
+    state[quick.layout.n_coordinates : 2 * quick.layout.n_coordinates] *= 60.0
+    assert_balanced(state, parameters, quick.layout)
+
+
 def test_power_is_balanced_with_strong_unbalance_spin_up_and_support(paper):
     """Everything small made large: ω̇ terms, unbalance, unequal support damping."""
     values = {
