@@ -3,7 +3,8 @@
 Usage: python studies/tracked/degradation.py SEED [SEED ...] [--case NAME ...]
 
 Machines of the paper's rotor, calibrated blind on two drops and scored on two others, all four recorded
-in the same degraded way. One JSON file per machine and case in ``results/degradation``.
+in the same degraded way; a sensor is lost after the calibration. One JSON file per machine and case in
+``results/degradation``.
 """
 
 from __future__ import annotations
@@ -78,16 +79,19 @@ def degraded_machine(known: Machine, hidden: Machine, case: Degradation) -> Mach
             middle = gap if math.isfinite(case.gap_range[0]) else 2.5e-4
             values[f"{bearing.name}.air_gap"] = Estimated(value=middle, status="guess", range=(low, high))
         machine = machine.with_values(values)
-    if case.lost_sensor is not None:
-        kept = tuple(s for i, s in enumerate(machine.sensors) if i != case.lost_sensor)
-        machine = machine.model_copy(update={"sensors": kept})
     return machine
 
 
-def degraded_record(record: Record | None, machine: Machine, case: Degradation) -> Record | None:
-    """The record with the sensors the machine still has, and without the levitated part where asked."""
-    if record is None:
-        return None
+def with_sensors_left(machine: Machine, case: Degradation) -> Machine:
+    """The machine after a sensor was lost."""
+    kept = tuple(s for i, s in enumerate(machine.sensors) if i != case.lost_sensor)
+    return machine.model_copy(update={"sensors": kept})
+
+
+def with_signals_left(record: Record | None, machine: Machine, case: Degradation) -> Record | None:
+    """The record of the sensors the machine still has."""
+    if record is None or case.lost_sensor is None:
+        return record
     kept = [i for i in range(len(record.sensors)) if i != case.lost_sensor]
     return replace(record, signals=np.ascontiguousarray(record.signals[:, kept]), sensors=machine.sensors)
 
@@ -122,13 +126,15 @@ def study(seed: int, case: Degradation) -> dict[str, Any]:
     ]
     machine = degraded_machine(known, hidden.machine, case)
     cut: Callable[[SyntheticDrop], Record] = (lambda d: d.record) if case.levitated else without_levitation
-    records = [degraded_record(cut(drop), machine, case) for drop in made]
-    tails = [degraded_record(drop.tail, machine, case) if case.with_tail else None for drop in made]
+    records = [cut(drop) for drop in made]
+    tails = [drop.tail if case.with_tail else None for drop in made]
     started = time.perf_counter()
     calibration = calibrate_machine(machine, records[:2], tails[:2], names=["a", "b"])
     scores = []
-    for drop, record, tail in zip(made[2:], records[2:], tails[2:], strict=True):
-        tracked = estimate_tracked(calibration.machine, [record], [tail], names=[drop.truth["name"]])[0]
+    left = with_sensors_left(calibration.machine, case)
+    for drop, whole, settled in zip(made[2:], records[2:], tails[2:], strict=True):
+        record, tail = (with_signals_left(one, left, case) for one in (whole, settled))
+        tracked = estimate_tracked(left, [record], [tail], names=[drop.truth["name"]])[0]
         scores.append(drop_scores(tracked, drop))
     gaps = {
         name: {

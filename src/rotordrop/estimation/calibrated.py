@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.errors import IdentificationError, UsageError
 from rotordrop.estimated import Estimated, IdentifiedValue
 from rotordrop.estimation.tracked import INCONSISTENT_WIDENING, prepare, track_drops
 from rotordrop.estimation.tracked_values import (
@@ -23,7 +24,7 @@ from rotordrop.tracking.calibration import TrackedDrops
 from rotordrop.tracking.consistency import Check, consistency_checks
 from rotordrop.tracking.problem import DropProblem
 from rotordrop.tracking.smoother import parameter_sample
-from rotordrop.tracking.unknowns import NINETY, Unknown, typical_depth
+from rotordrop.tracking.unknowns import EXPONENTS, NINETY, Unknown, typical_depth
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -144,9 +145,9 @@ def calibrate_machine(
     mean = smoothed.means[at]
     widening = 1.0 if consistent else INCONSISTENT_WIDENING
     values = _values(problem, mean, covariance, widening)
-    source = f"calibrated on {', '.join(stems)}"
+    fitted = machine_values(at_fitted_exponents(machine, values), f"calibrated on {', '.join(stems)}")
     return Calibration(
-        machine=machine.with_values(machine_values(at_fitted_exponents(machine, values), source)),
+        machine=_possible(machine, fitted, stems),
         values=values,
         identifiability=_identifiability(problem, covariance),
         confounded=_confounded(problem, covariance),
@@ -155,6 +156,18 @@ def calibrate_machine(
         nis=dict(zip(stems, tracked.nis, strict=True)),
         tracked=tracked,
     )
+
+
+def _possible(machine: Machine, fitted: dict[str, Estimated], drops: Sequence[str]) -> Machine:
+    """The machine with the fitted values, if there can be such a machine."""
+    try:
+        return machine.with_values(fitted)
+    except UsageError as error:
+        raise IdentificationError(
+            f"the fit to {', '.join(drops)} ended at a machine that cannot be: {error}. The description is "
+            "too far from the machine, or a sensor is missing, swapped or reversed; check sensors, bearing "
+            "nodes and ranges, and that all drops are of this machine."
+        ) from error
 
 
 def _values(
@@ -205,12 +218,20 @@ def at_fitted_exponents(machine: Machine, values: dict[str, IdentifiedValue]) ->
         stiffness = values.get(f"{bearing.name}.contact.stiffness")
         if exponent is None or stiffness is None or stiffness.interval_90 is None:
             continue
+        exponent = _within(exponent, *EXPONENTS)
+        found[f"{bearing.name}.contact.exponent"] = exponent
         factor = typical_depth(bearing) ** (float(bearing.contact.exponent) - exponent.value)
         low, high = stiffness.interval_90
         found[f"{bearing.name}.contact.stiffness"] = replace(
             stiffness, value=factor * stiffness.value, interval_90=(factor * low, factor * high)
         )
     return found
+
+
+def _within(value: IdentifiedValue, lower: float, upper: float) -> IdentifiedValue:
+    interval = value.interval_90 or (value.value, value.value)
+    low, high = (min(max(end, lower), upper) for end in interval)
+    return replace(value, value=min(max(value.value, lower), upper), interval_90=(low, high))
 
 
 def machine_values(values: dict[str, IdentifiedValue], source: str) -> dict[str, Estimated]:

@@ -19,7 +19,8 @@ from rotordrop.estimation.tracked_values import (
     with_interval,
 )
 from rotordrop.machine import Machine
-from rotordrop.measurement.events import DropInstant, find_drop_instant
+from rotordrop.measurement.events import DropInstant
+from rotordrop.measurement.power_off import PowerOff, find_power_off
 from rotordrop.measurement.record import Record
 from rotordrop.model.parameters import DropModel, build_drop_model
 from rotordrop.model.reduction import Reduction
@@ -87,7 +88,7 @@ class TrackedDrop:
     ----------
     record : Record
         The recording.
-    drop_instant : DropInstant
+    drop_instant : DropInstant or PowerOff
         Power-off in record time.
     forces : ForceHistory
         Force and stress over time with standard deviations.
@@ -103,7 +104,7 @@ class TrackedDrop:
 
     name: str
     record: Record
-    drop_instant: DropInstant
+    drop_instant: DropInstant | PowerOff
     speed: float
     problem: DropProblem
     smoothed: Smoothed
@@ -130,12 +131,16 @@ class Preparation:
 
     name: str
     record: Record
-    instant: DropInstant
+    instant: DropInstant | PowerOff
     tail_level: Array | None
 
 
 def prepare(
-    machine: Machine, record: Record, tail: Record | None, name: str, instant: DropInstant | None = None
+    machine: Machine,
+    record: Record,
+    tail: Record | None,
+    name: str,
+    instant: DropInstant | PowerOff | None = None,
 ) -> Preparation:
     """Find power-off and average the settled tail of a record."""
     if tail is None and record.duration > 20.0:
@@ -143,7 +148,7 @@ def prepare(
     return Preparation(
         name=name,
         record=record,
-        instant=find_drop_instant(record, machine) if instant is None else instant,
+        instant=find_power_off(record, machine) if instant is None else instant,
         tail_level=None if tail is None else np.asarray(tail.signals).mean(axis=0) * _polarity(tail),
     )
 
@@ -234,7 +239,7 @@ def _not_lost(tracked: TrackedDrops, prepared: Sequence[Preparation]) -> Tracked
 
 
 def _first_contact(item: Preparation) -> float:
-    return max(item.instant.fall.end - item.instant.value, 0.002)
+    return max(item.instant.contact - item.instant.value, 0.002)
 
 
 def best_noise_factor(problem: DropProblem, smoothed: Smoothed, stage: Stage) -> float:

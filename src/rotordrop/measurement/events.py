@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -61,6 +61,11 @@ class DropInstant:
     levitated: LevitatedModel
     notes: tuple[str, ...] = ()
 
+    @property
+    def contact(self) -> float:
+        """End of the free fall [s]."""
+        return self.fall.end
+
     def __float__(self) -> float:
         return self.value
 
@@ -102,11 +107,34 @@ def find_drop_instant(record: Record, machine: Machine) -> DropInstant:
     RecordError
         When the rotor does not fall in the record, or the record does not begin before the fall.
     """
-    planes = sensor_planes(record.sensors)
+    record, planes = with_whole_planes(record)
     coarse = coarse_drop(record, machine, planes)
     levitated = fit_levitated(record, coarse.instant - _UNSURE, speed=coarse.speed)
     fall = find_fall(record, machine, planes, levitated, coarse)
     return _instant(fall, levitated, record)
+
+
+def with_whole_planes(record: Record) -> tuple[Record, tuple[Plane, ...]]:
+    """The record with those planes only whose sensors give x and y: a lost sensor takes its plane with it.
+
+    Raises
+    ------
+    RecordError
+        When no plane is whole.
+    """
+    whole = [i for i, sensor in enumerate(record.sensors) if _resolved(sensor.node, record)]
+    if len(whole) in (0, len(record.sensors)):
+        return record, sensor_planes(record.sensors)
+    sensors = tuple(record.sensors[i] for i in whole)
+    return replace(record, signals=record.signals[:, whole], sensors=sensors), sensor_planes(sensors)
+
+
+def _resolved(node: int, record: Record) -> bool:
+    try:
+        sensor_planes([sensor for sensor in record.sensors if sensor.node == node])
+    except RecordError:
+        return False
+    return True
 
 
 def find_fall(
@@ -180,7 +208,7 @@ def coarse_drop(record: Record, machine: Machine, planes: tuple[Plane, ...]) -> 
         )
     before = speed_time < instant
     speed = float(np.median(readings[before])) if before.any() else float(readings[0])
-    contact = _sudden(record, shape, float(machine.gravity), instant, sunk)
+    contact = first_sudden(record, shape, float(machine.gravity), instant, sunk)
     return CoarseDrop(instant=float(instant), sunk=float(record.time[sunk]), contact=contact, speed=speed)
 
 
@@ -214,7 +242,7 @@ def _refuse_without_drop(record: Record, height: Array, start: Array, gaps: Arra
     )
 
 
-def _sudden(record: Record, shape: Array, gravity: float, instant: float, sunk: int) -> float:
+def first_sudden(record: Record, shape: Array, gravity: float, instant: float, sunk: int) -> float:
     """First time after sinking at which the acceleration cannot be that of a free rotor [s]."""
     curvature = acceleration(shape, record.sampling_rate, width=_CONTACT_FILTER)
     size = np.max(np.hypot(curvature[:, :, 0], curvature[:, :, 1] + gravity), axis=1)

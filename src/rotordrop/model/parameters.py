@@ -132,8 +132,9 @@ def _spin(machine: Machine, fe: RotorFE) -> Array:
     spin[L.AERO_TIME_CONSTANT] = (
         np.inf if speed.aero_time_constant is None else float(speed.aero_time_constant)
     )
-    spin[L.AERO_LINEAR] = 0.0 if speed.aero_linear is None else float(speed.aero_linear)
-    spin[L.AERO_QUADRATIC] = 0.0 if speed.aero_quadratic is None else float(speed.aero_quadratic)
+    # The machine file gives torques, the kernel wants them per polar inertia.
+    spin[L.AERO_LINEAR] = float(speed.aero_linear or 0.0) / fe.polar_inertia
+    spin[L.AERO_QUADRATIC] = float(speed.aero_quadratic or 0.0) / fe.polar_inertia
     return spin
 
 

@@ -120,11 +120,6 @@ def _with_drag(parameters: KernelParameters, model: DropModel, case: CoastDownCa
                 "coast-down: --drag-from RECORD, in Python with_recorded_drag."
             )
         spin[L.AERO_LINEAR] = 1.0 / float(speed.aero_time_constant)
-    else:
-        # The machine file gives torques, the kernel wants them per polar inertia.
-        inertia = spin[L.POLAR_INERTIA]
-        spin[L.AERO_LINEAR] = float(speed.aero_linear or 0.0) / inertia
-        spin[L.AERO_QUADRATIC] = float(speed.aero_quadratic or 0.0) / inertia
     bearing[:, L.DRAG_SPEED] = np.minimum(bearing[:, L.DRAG_SPEED], case.stop_speed)
     return parameters._replace(spin=spin, bearing=bearing)
 

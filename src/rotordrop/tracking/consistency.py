@@ -17,6 +17,9 @@ CORRELATION_LIMIT = 0.25
 SENSOR_LIMIT = 3.5
 PARAMETER_LIMIT = 3.5
 NOISE_FACTOR_LIMIT = 8.0
+LEAST_SECOND_DIRECTION = 0.05
+"""Smallest singular value of the directions of a plane's sensors that still counts as two directions [1]."""
+
 RACE_SPIN = ("race.inertia", "race.drag_coefficient", "friction.stribeck_speed")
 """Parameters that only say when a race catches up with the rotor: they may go far without moving a force."""
 
@@ -35,6 +38,7 @@ def consistency_checks(problem: DropProblem, smoothed: Smoothed, noise_factor: f
     return (
         *_innovation_checks(problem, smoothed),
         _sensor_check(problem, smoothed),
+        _direction_check(problem, smoothed),
         _parameter_check(problem, smoothed),
         Check(
             name="process noise",
@@ -111,6 +115,21 @@ def _sensor_check(problem: DropProblem, smoothed: Smoothed) -> Check:
             f"(limit {SENSOR_LIMIT:g})"
         ),
     )
+
+
+def _direction_check(problem: DropProblem, smoothed: Smoothed) -> Check:
+    """Whether both directions are seen at every node with sensors; the rest follows from the model alone."""
+    heard = np.flatnonzero(np.isfinite(normalised_innovations(smoothed)).any(axis=0))
+    sensors = [problem.model.machine.sensors[c] for c in heard]
+    blind = []
+    for node in sorted({sensor.node for sensor in problem.model.machine.sensors}):
+        angles = np.array([float(sensor.angle) for sensor in sensors if sensor.node == node])
+        rows = np.column_stack([np.cos(angles), np.sin(angles)])
+        if len(angles) < 2 or np.linalg.svd(rows, compute_uv=False)[1] < LEAST_SECOND_DIRECTION:
+            blind.append(str(node))
+    seen = "both directions are seen at every node with sensors"
+    missing = f"only one direction or none is seen at node {', '.join(blind)}: a force across it is a guess"
+    return Check(name="directions", passed=not blind, message=missing if blind else seen)
 
 
 def _parameter_check(problem: DropProblem, smoothed: Smoothed) -> Check:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -165,7 +166,7 @@ def build_problem(
     clean = without_hum_and_runout(time, readings, omega * time, phase)
     inside = (time >= 0.0) & (time <= until)
     rows = sensor_rows(model)
-    variances = _variances(phase, rows.shape[0])
+    variances = _variances(phase, readings[inside])
     mean, covariance = _prior(model, unknowns, rows, clean[inside], omega)
     problem = DropProblem(
         model=_prepared(model, omega),
@@ -205,11 +206,25 @@ def _thinned(speed: Array, every: int = 50) -> Array:
     return thin
 
 
-def _variances(phase: LevitatedPhase, channels: int) -> Array:
-    noise = np.full(channels, USUAL_NOISE)
-    heard = np.isfinite(phase.noise)
-    noise[heard] = phase.noise[heard]
+def _variances(phase: LevitatedPhase, readings: Array) -> Array:
+    """Noise variance of each channel [m²]: from the levitated part, else from their roughness."""
+    noise = np.where(np.isfinite(phase.noise), phase.noise, rough_noise(readings))
+    noise[~np.isfinite(noise)] = USUAL_NOISE
     return np.asarray(noise**2 + NOISE_FLOOR**2)
+
+
+def rough_noise(readings: Array) -> Array:
+    """Standard deviation of white noise on smooth motion, shape (C,) [m]; NaN where too little is read.
+
+    Third differences take the motion away; their median leaves the few at contacts aside.
+    """
+    rough = np.abs(np.diff(readings, n=3, axis=0))
+    found = np.full(readings.shape[1], np.nan)
+    for c in range(readings.shape[1]):
+        known = rough[np.isfinite(rough[:, c]), c]
+        if len(known) > 50:
+            found[c] = np.median(known) / (0.6745 * math.sqrt(20.0))
+    return found
 
 
 def sensor_rows(model: DropModel) -> Array:

@@ -98,6 +98,9 @@ FARTHEST: dict[str, float] = {
 Where nothing shows them they drift, and a race that is braked a thousand times harder is no race."""
 
 GAP_SIGMA = 20e-6
+EXPONENTS = (1.0, 2.0)
+"""Contact exponents that the model follows at most [1]."""
+
 EXPONENT_SIGMA = 0.1
 """Prior standard deviation of the logarithm of the contact exponent [1]: 10/9 for a line, 3/2 for a point."""
 
@@ -276,12 +279,14 @@ def drift_of(unknown: Unknown) -> float:
     return 0.0
 
 
-def farthest(unknown: Unknown) -> float:
-    """Distance from its prior up to which the model follows an unknown, in the unit it is estimated in."""
+def bounds(unknown: Unknown) -> tuple[float, float]:
+    """Between what the model follows an unknown, in the unit it is estimated in."""
+    if unknown.path.endswith("contact.exponent"):
+        return math.log(EXPONENTS[0]), math.log(EXPONENTS[1])
     for ending, factor in FARTHEST.items():
         if unknown.path.endswith(ending):
-            return math.log(factor)
-    return math.inf
+            return unknown.mean - math.log(factor), unknown.mean + math.log(factor)
+    return -math.inf, math.inf
 
 
 def late_factor(unknown: Unknown) -> float:
@@ -365,8 +370,8 @@ def parameter_targets(model: DropModel, unknowns: tuple[Unknown, ...]) -> P.Para
         late_drift=np.array([drift_of(u) * late_factor(u) for u in unknowns]),
         step=np.array([1e-5 if u.logarithmic else max(1e-3 * u.sigma, 1e-12) for u in unknowns]),
         plane_shape=np.ascontiguousarray(shape),
-        lower=np.array([u.mean - farthest(u) for u in unknowns]),
-        upper=np.array([u.mean + farthest(u) for u in unknowns]),
+        lower=np.array([bounds(u)[0] for u in unknowns]),
+        upper=np.array([bounds(u)[1] for u in unknowns]),
         mean=np.array([u.mean for u in unknowns]),
     )
 

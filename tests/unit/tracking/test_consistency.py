@@ -32,6 +32,7 @@ def test_a_right_model_passes_every_check(impacts, impacts_smoothed):
         "innovation size",
         "innovation whiteness",
         "sensor errors",
+        "directions",
         "parameters",
         "process noise",
         "filter",

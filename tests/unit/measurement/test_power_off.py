@@ -1,0 +1,70 @@
+"""Power-off of records without a levitated part, and of records with a plane that lost a sensor."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rotordrop.errors import RecordError
+from rotordrop.machine import example_machine
+from rotordrop.measurement.events import find_drop_instant, with_whole_planes
+from rotordrop.measurement.power_off import PowerOff, find_power_off
+from rotordrop.synthesis import hidden_machine, synthesize_drop
+
+
+@pytest.fixture(scope="module")
+def drop():
+    machine = example_machine("lp400")
+    return machine, synthesize_drop(
+        hidden_machine(machine, 71), 2.0 * math.pi * 100.0, 71, duration=0.05, tail=False
+    )
+
+
+def from_time(record, start):
+    keep = record.time >= start
+    return replace(record, time=record.time[keep], signals=record.signals[keep], speed=record.speed[keep])
+
+
+@pytest.mark.parametrize("late", [0.0, 1e-3, 2.5e-3])
+def test_a_record_that_begins_with_the_fall_gives_power_off_to_its_stated_error(drop, late):
+    machine, made = drop
+    true = made.truth["t_off_in_record_s"]
+    found = find_power_off(from_time(made.record, true + late), machine)
+    assert isinstance(found, PowerOff)
+    assert abs(found.value - true) < 2.5 * found.standard_error
+    assert found.standard_error < 2e-3
+    assert "no levitated part" in found.notes[0]
+    assert 3e-3 < found.contact - true < 12e-3
+
+
+def test_a_record_with_levitation_is_read_as_before(drop):
+    machine, made = drop
+    assert find_power_off(made.record, machine).value == find_drop_instant(made.record, machine).value
+
+
+def test_a_record_that_begins_just_before_contact_is_refused(drop):
+    machine, made = drop
+    late = from_time(made.record, made.truth["t_off_in_record_s"] + 6e-3)
+    with pytest.raises(RecordError, match=r"pre-trigger|no drop in the record"):
+        find_power_off(late, machine)
+
+
+def test_a_plane_that_lost_a_sensor_is_left_out(drop):
+    _, made = drop
+    record = made.record
+    keep = [0, 2, 3]
+    three = replace(
+        record,
+        signals=np.ascontiguousarray(record.signals[:, keep]),
+        sensors=tuple(record.sensors[i] for i in keep),
+    )
+    whole, planes = with_whole_planes(three)
+    assert whole.signals.shape[1] == 2 and len(planes) == 1
+    same, both = with_whole_planes(record)
+    assert same is record and len(both) == 2
+    one = replace(three, signals=three.signals[:, :1], sensors=three.sensors[:1])
+    with pytest.raises(RecordError, match="has one sensor"):
+        with_whole_planes(one)
