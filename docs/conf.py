@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from types import GenericAlias
+from typing import Any
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
@@ -43,3 +45,12 @@ numpydoc_class_members_toctree = False
 doctest_global_setup = "import numpy as np\nnp.set_printoptions(precision=4, suppress=True)"
 
 generated_pages.write(HERE / "generated")
+
+
+def setup(app: Any) -> None:
+    """Leave names of array types out of the pages: numpydoc takes them for functions and fails."""
+
+    def is_array_type(app: Any, what: str, name: str, obj: Any, skip: bool, options: Any) -> bool | None:
+        return True if isinstance(obj, GenericAlias) else None
+
+    app.connect("autodoc-skip-member", is_array_type)
