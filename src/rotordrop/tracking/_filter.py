@@ -55,11 +55,12 @@ def scalar_update(
     S = variance
     for j in range(n):
         S += row[j] * gain[j]
+    inverse = 1.0 / S
     for i in range(n):
         spread = gain[i]
-        weight = spread / S
+        weight = spread * inverse
         for j in range(n):
-            k_j = gain[j] / S
+            k_j = gain[j] * inverse
             P[i, j] -= weight * gain[j] + spread * k_j - S * weight * k_j
     for i in range(n):
         gain[i] /= S

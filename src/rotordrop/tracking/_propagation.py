@@ -75,7 +75,18 @@ def apply_parameters(theta: Array, targets: ParameterTargets, p: KernelParameter
     values = np.empty(theta.shape[0])
     for k in range(theta.shape[0]):
         values[k] = bounded_value(k, theta[k], targets, 0.0)
-    write_values(values, targets, p)
+    powers = np.ones(targets.target.shape[0])
+    for k in range(theta.shape[0]):
+        update_powers(k, values[k], targets, powers)
+    write_values(values, powers, targets, p)
+
+
+@kernel
+def update_powers(k: int, value: float, targets: ParameterTargets, powers: Array) -> None:
+    """Factors on entries that follow parameter ``k`` as a power of a typical depth, one for each target."""
+    for i in range(targets.target.shape[0]):
+        if targets.target[i, 0] == k and targets.target[i, 1] == AT_TYPICAL_DEPTH:
+            powers[i] = targets.factor[i] ** (math.exp(targets.mean[k]) - value)
 
 
 @kernel
@@ -86,7 +97,7 @@ def bounded_value(k: int, theta: float, targets: ParameterTargets, step: float) 
 
 
 @kernel
-def write_values(values: Array, targets: ParameterTargets, p: KernelParameters) -> None:
+def write_values(values: Array, powers: Array, targets: ParameterTargets, p: KernelParameters) -> None:
     """Write parameters into the kernel arrays; logarithmic ones come as the values themselves."""
     cleared = False
     for i in range(targets.target.shape[0]):
@@ -101,8 +112,7 @@ def write_values(values: Array, targets: ParameterTargets, p: KernelParameters) 
         elif kind == SCALE_BEARING:
             p.bearing[row, column] *= value
         elif kind == AT_TYPICAL_DEPTH:
-            k = targets.target[i, 0]
-            p.bearing[row, column] *= targets.factor[i] ** (math.exp(targets.mean[k]) - values[k])
+            p.bearing[row, column] *= powers[i]
         elif kind == ON_SPIN:
             p.spin[column] = value
         elif kind == ON_MAGNET:
@@ -137,15 +147,20 @@ def parameter_jacobian(
     values = np.empty(theta.shape[0])
     for k in range(theta.shape[0]):
         values[k] = bounded_value(k, theta[k], targets, 0.0)
+    powers = np.ones(targets.target.shape[0])
+    for k in range(theta.shape[0]):
+        update_powers(k, values[k], targets, powers)
     for k in range(theta.shape[0]):
         value = values[k]
         values[k] = bounded_value(k, theta[k], targets, targets.step[k])
-        write_values(values, targets, p)
+        update_powers(k, values[k], targets, powers)
+        write_values(values, powers, targets, p)
         drop_derivative(t, y, p, other, work)
         values[k] = value
+        update_powers(k, value, targets, powers)
         for i in range(s):
             B[i, k] = (other[i] - base[i]) / targets.step[k]
-    write_values(values, targets, p)
+    write_values(values, powers, targets, p)
 
 
 @kernel

@@ -24,12 +24,13 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True, kw_only=True)
 class Stage:
-    """One stage of the schedule: window after power-off [s], unknown impulses [N s], their share, passes."""
+    """One stage: window after power-off [s], unknown impulses [N s], their share, passes, steps per 50 µs."""
 
     until: float
     impulse: float
     share: float
     passes: int
+    substeps: int = 4
 
 
 BLIND_SCHEDULE: tuple[Stage, ...] = (
@@ -49,7 +50,7 @@ CALIBRATED_SCHEDULE: tuple[Stage, ...] = (
 )
 """With a calibrated machine: what is left is the state, the sensors and the drop's own unknowns."""
 
-QUICK_SCHEDULE: tuple[Stage, ...] = (Stage(until=0.2, impulse=1e-3, share=0.01, passes=1),)
+QUICK_SCHEDULE: tuple[Stage, ...] = (Stage(until=0.2, impulse=1e-3, share=0.01, passes=1, substeps=3),)
 """With a calibrated machine: one pass, linearised at the filter's own estimate."""
 
 FULL_SCHEDULE: tuple[Stage, ...] = (
@@ -94,10 +95,7 @@ def shifted(schedule: Sequence[Stage], first_contact: float) -> tuple[Stage, ...
     """The schedule with its short windows moved to a first contact at another time [s]."""
     late = max(first_contact - REFERENCE_CONTACT, -0.004)
     return tuple(
-        Stage(until=stage.until + late, impulse=stage.impulse, share=stage.share, passes=stage.passes)
-        if stage.until < 0.1
-        else stage
-        for stage in schedule
+        replace(stage, until=stage.until + late) if stage.until < 0.1 else stage for stage in schedule
     )
 
 
@@ -129,7 +127,11 @@ def track(
     done = 0.0
     smoothed: list[Smoothed] = []
     for stage in schedule:
-        settings = PassSettings(impulse=stage.impulse * noise_factor, share=stage.share * noise_factor)
+        settings = PassSettings(
+            substeps=stage.substeps,
+            impulse=stage.impulse * noise_factor,
+            share=stage.share * noise_factor,
+        )
         for _ in range(stage.passes):
             if progress is not None:
                 progress(f"fitting the first {1e3 * stage.until:.0f} ms", done / total)
