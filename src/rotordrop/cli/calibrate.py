@@ -12,7 +12,7 @@ import typer
 
 from rotordrop.cli._options import JsonOption, MachineArgument
 from rotordrop.cli._output import deliver, progress_bar, require_places
-from rotordrop.errors import UsageError
+from rotordrop.cli._recordings import require_own_names, tails_of
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -42,21 +42,19 @@ def calibrate(
     """Calibrate a machine on recorded drops."""
     from rotordrop.estimation.calibrated import calibrate_machine, calibration_json
     from rotordrop.machine import load_machine, save_machine
+    from rotordrop.measurement.quality import check_record
+    from rotordrop.measurement.quality.finding import refuse_unusable
     from rotordrop.measurement.record import read_record
 
     require_places(output, json)
+    require_own_names(records)
     description = load_machine(machine)
-    tails = tail or []
-    if len(tails) not in (0, 1, len(records)):
-        raise UsageError(
-            f"{len(tails)} tails for {len(records)} records; expected one for all, one for each, or none. "
-            "Repeat --tail in the order of the records."
-        )
     read = [read_record(path, description, profile=profile) for path in records]
-    rests = [read_record(path, description, profile=profile) for path in tails]
-    per_drop = [None] * len(read) if not rests else rests * len(read) if len(rests) == 1 else rests
+    tails = tails_of(tail or [], len(read), lambda path: read_record(path, description, profile=profile))
+    for record, rest in zip(read, tails, strict=True):
+        refuse_unusable(check_record(record, description, rest), record.name)
     with progress_bar("calibrating") as report:
-        result = calibrate_machine(description, read, per_drop, progress=report)
+        result = calibrate_machine(description, read, tails, progress=report)
     save_machine(result.machine, output)
     deliver(calibration_json(result), json, lambda out: _summary(result, output, out))
 

@@ -14,6 +14,7 @@ import typer
 
 from rotordrop.cli._options import JsonOption, MachineArgument
 from rotordrop.cli._output import deliver, progress_bar, require_places
+from rotordrop.cli._recordings import require_own_names, tails_of
 from rotordrop.errors import UsageError
 
 if TYPE_CHECKING:
@@ -69,10 +70,13 @@ def estimate(
             "--fixed belongs to --method replay; the tracked twin uses a calibrated machine file instead."
         )
     description = load_machine(machine)
+    require_own_names(records)
+    if quick and method is Method.tracked:
+        _require_calibrated(description, machine)
     reports = _report_places(report, records)
     require_places(json, *reports)
     read = [read_record(path, description, profile=profile) for path in records]
-    tails = _tails(tail or [], len(read), lambda path: read_record(path, description, profile=profile))
+    tails = tails_of(tail or [], len(read), lambda path: read_record(path, description, profile=profile))
     findings = [check_record(r, description, t) for r, t in zip(read, tails, strict=True)]
     for record, found in zip(read, findings, strict=True):
         refuse_unusable(found, record.name)
@@ -92,16 +96,15 @@ def _report_places(report: Path | None, records: Sequence[Path]) -> list[Path]:
     return [report.with_name(f"{report.stem}_{record.stem}{report.suffix}") for record in records]
 
 
-def _tails(paths: list[Path], count: int, read: Any) -> list[Record | None]:
-    if len(paths) not in (0, 1, count):
+def _require_calibrated(description: Machine, file: Path) -> None:
+    from rotordrop.estimation.tracked import is_calibrated
+
+    if not is_calibrated(description):
         raise UsageError(
-            f"{len(paths)} tails for {count} records; expected one for all, one for each, or none. "
-            "Repeat --tail in the order of the records."
+            f"--quick needs a calibrated machine; supports and contacts of {file.name} are guesses. "
+            f"Calibrate it with 'rotordrop calibrate {file.name} RECORD... --output calibrated.toml', "
+            "or leave --quick out."
         )
-    if not paths:
-        return [None] * count
-    found = [read(path) for path in paths]
-    return found * count if len(found) == 1 else found
 
 
 def _warnings(findings: Sequence[Finding], tail: Record | None) -> list[str]:

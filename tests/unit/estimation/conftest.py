@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from rotordrop.estimated import Estimated
+from rotordrop.estimation import estimate_drop
+from rotordrop.estimation.tracked import TrackedDrop
 from rotordrop.machine import Machine, example_machine
 from rotordrop.synthesis import HiddenMachine, SyntheticDrop, hidden_machine, synthesize_drop
 
@@ -75,3 +77,35 @@ def calibrated(known: Machine, hidden: HiddenMachine) -> Machine:
             source="calibration",
         )
     return known.with_values(values)
+
+
+@pytest.fixture(scope="session")
+def informed(known: Machine, hidden: HiddenMachine) -> Machine:
+    """The machine with the true parameters of the hidden one, known to half a per cent, friction to five."""
+    values: dict[str, Estimated] = {}
+    for bearing in hidden.machine.touchdown_bearings:
+        for path in (*CALIBRATED, "air_gap", "contact.exponent"):
+            part = bearing.bearing if path == "preload" else bearing
+            for name in path.split("."):
+                part = getattr(part, name)
+            value = float(part)
+            share = 0.05 if path.startswith("friction") else 0.005
+            values[f"{bearing.name}.{path}"] = Estimated(
+                value=value,
+                status="estimated",
+                interval_90=(value * (1.0 - share), value * (1.0 + share)),
+                source="truth",
+            )
+    return known.with_values(values)
+
+
+@pytest.fixture(scope="session")
+def tracked(calibrated: Machine, synthetic: SyntheticDrop) -> TrackedDrop:
+    """The drop followed over its 0.2 s by the drop model of a calibrated machine."""
+    return estimate_drop(calibrated, synthetic.record, tail=synthetic.tail, names=["hidden_060"])
+
+
+@pytest.fixture(scope="session")
+def quick(calibrated: Machine, synthetic: SyntheticDrop) -> TrackedDrop:
+    """The same in a single pass."""
+    return estimate_drop(calibrated, synthetic.record, tail=synthetic.tail, quick=True)

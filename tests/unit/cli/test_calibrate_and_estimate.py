@@ -1,0 +1,220 @@
+"""The verbs calibrate and estimate, from files to files: what is written, refused, and left by a stop."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+from rotordrop.cli.app import INTERRUPTED, run
+from rotordrop.errors import UsageError
+from rotordrop.estimation.schema import estimate_schema
+from rotordrop.estimation.tracked import is_calibrated
+from rotordrop.machine import example_path, load_machine
+from rotordrop.measurement.examples import example_record_path
+from rotordrop.tracking.calibration import BLIND_SCHEDULE, Stage
+
+LP400 = str(example_path("lp400"))
+RECORD = str(example_record_path("lp400_drop_060"))
+TAIL = str(example_record_path("lp400_drop_060_tail"))
+USAGE = UsageError.exit_code
+SHORT = 0.03
+"""Window of the tests [s]: the verbs are tested here, the estimator elsewhere."""
+
+
+@pytest.fixture(scope="module")
+def shortened() -> Iterator[None]:
+    """The estimator with a few passes over the first impacts only."""
+    with pytest.MonkeyPatch.context() as patch:
+        module = "rotordrop.estimation.tracked"
+        patch.setattr(f"{module}.BLIND_SCHEDULE", BLIND_SCHEDULE[:4])
+        patch.setattr(
+            f"{module}.CALIBRATION_SCHEDULE", (Stage(until=SHORT, impulse=1e-3, share=0.01, passes=1),)
+        )
+        patch.setattr(f"{module}.WINDOW", SHORT)
+        yield
+
+
+@pytest.fixture(scope="module")
+def folder(shortened: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where a calibration has written its machine and its JSON."""
+    place = tmp_path_factory.mktemp("calibration")
+    arguments = ["calibrate", LP400, RECORD, "--tail", TAIL, "--output", str(place / "calibrated.toml")]
+    assert run([*arguments, "--json", str(place / "calibration.json")]) == 0
+    return place
+
+
+def words(text: str) -> str:
+    return " ".join(text.split())
+
+
+def interrupted(title: str) -> Any:
+    """A progress bar during which somebody presses Ctrl-C."""
+
+    @contextmanager
+    def bar(title: str) -> Iterator[Any]:
+        def report(stage: str, fraction: float) -> None:
+            if fraction > 0.0:
+                raise KeyboardInterrupt
+
+        yield report
+
+    return bar(title)
+
+
+def test_the_calibrated_machine_loads_with_intervals_and_provenance(folder: Path) -> None:
+    before, machine = load_machine(LP400), load_machine(folder / "calibrated.toml")
+    assert is_calibrated(machine) and not is_calibrated(before)
+    found = json.loads((folder / "calibration.json").read_text())["values"]
+    for b, bearing in enumerate(machine.touchdown_bearings):
+        for path in ("stiffness", "mass", "damping"):
+            quantity = getattr(bearing.support, path)
+            entry = found[f"{bearing.name}.support.{path}"]
+            assert quantity.status == "estimated"
+            assert float(quantity) == pytest.approx(entry["value"])
+            assert quantity.interval_90 == pytest.approx(entry["interval_90"])
+            low, high = quantity.interval_90
+            assert low < float(quantity) < high
+            assert quantity.source == "calibrated on drop_060"
+        assert float(bearing.air_gap) != float(before.touchdown_bearings[b].air_gap)
+    assert all(sensor.gain.status == "estimated" for sensor in machine.sensors)
+
+
+def test_the_calibration_says_what_the_records_determine(folder: Path) -> None:
+    found = json.loads((folder / "calibration.json").read_text())
+    verdicts = {entry["path"]: entry["verdict"] for entry in found["identifiability"]}
+    assert verdicts["NDE.support.stiffness"] == "determined"
+    assert verdicts["NDE.race.drag_coefficient"] == "the records do not determine it"
+    assert found["sentence"].endswith(".")
+    assert set(found["checks"]) == set(found["nis"]) == {"drop_060"}
+
+
+def test_quick_estimate_writes_numbers_and_report(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, page = tmp_path / "out.json", tmp_path / "report.html"
+    arguments = ["estimate", str(folder / "calibrated.toml"), RECORD, "--tail", TAIL, "--quick"]
+    assert run([*arguments, "--json", str(out), "--report", str(page)]) == 0
+    written = json.loads(out.read_text())
+    jsonschema.Draft202012Validator(estimate_schema()).validate(written)
+    assert written["method"] == "tracked"
+    for name in ("NDE", "DE"):
+        entry = written["bearings"][name]["peak_force_N"]
+        low, high = entry["interval_90"]
+        assert low < entry["value"] < high and 0.0 < entry["time_s"] < SHORT
+    html = page.read_text(encoding="utf-8")
+    assert "This record is simulated" in html and 'src="http' not in html
+    for heading in ("Impacts", "Parameters", "Consistency", "Orbit", "Hertz stress"):
+        assert f">{heading}<" in html
+    told = words(capsys.readouterr().out)
+    assert written["consistency"]["sentence"] in told
+    assert str(page) in told.replace(" ", "")
+
+
+def test_several_records_give_machine_and_drops(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    copy = tmp_path / "second.h5"
+    copy.write_bytes(Path(RECORD).read_bytes())
+    page = tmp_path / "page.html"
+    arguments = ["estimate", str(folder / "calibrated.toml"), RECORD, str(copy), "--tail", TAIL, "--quick"]
+    assert run([*arguments, "--json", "-", "--report", str(page)]) == 0
+    written = json.loads(capsys.readouterr().out)
+    jsonschema.Draft202012Validator(estimate_schema()).validate(written)
+    assert written["machine"] == load_machine(LP400).name
+    assert set(written["drops"]) == {"drop_060", "second"}
+    assert sorted(f.name for f in tmp_path.glob("*.html")) == ["page_drop_060.html", "page_second.html"]
+
+
+def test_a_stopped_calibration_leaves_no_file(
+    shortened: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("rotordrop.cli.calibrate.progress_bar", interrupted)
+    output = tmp_path / "calibrated.toml"
+    assert run(["calibrate", LP400, RECORD, "--tail", TAIL, "--output", str(output)]) == INTERRUPTED
+    assert "stopped; nothing was left half written" in words(capsys.readouterr().err)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_stopped_estimate_leaves_an_earlier_one_alone(
+    shortened: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rotordrop.cli.estimate.progress_bar", interrupted)
+    earlier = tmp_path / "estimate.json"
+    earlier.write_text("{}")
+    arguments = ["estimate", LP400, RECORD, "--json", str(earlier), "--report", str(tmp_path / "r.html")]
+    assert run(arguments) == INTERRUPTED
+    assert [file.name for file in tmp_path.iterdir()] == ["estimate.json"]
+    assert earlier.read_text() == "{}"
+
+
+def test_tails_must_fit_the_records(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    tails = ["--tail", TAIL, "--tail", TAIL, "--tail", TAIL]
+    expected = "3 tails for 2 records; expected one for all, one for each, or none."
+    second = tmp_path / "second.h5"
+    second.write_bytes(Path(RECORD).read_bytes())
+    assert run(["estimate", LP400, RECORD, str(second), *tails]) == USAGE
+    assert expected in words(capsys.readouterr().err)
+    output = tmp_path / "out.toml"
+    assert run(["calibrate", LP400, RECORD, str(second), *tails, "--output", str(output)]) == USAGE
+    assert expected in words(capsys.readouterr().err)
+    assert not output.exists()
+
+
+@pytest.mark.parametrize("option", ["--json", "--report"])
+def test_an_unwritable_place_is_refused_before_anything_is_read(
+    option: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    nowhere = tmp_path / "nowhere" / "out"
+    assert run(["estimate", LP400, str(tmp_path / "no_record.csv"), option, str(nowhere)]) != 0
+    told = words(capsys.readouterr().err)
+    assert f"the folder {nowhere.parent} does not exist; create it first" in told
+    assert "no_record" not in told
+
+
+def test_calibrate_refuses_an_unwritable_output(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["calibrate", LP400, RECORD, "--output", str(tmp_path)]) != 0
+    assert f"cannot write {tmp_path}: it is a folder; name a file in it" in words(capsys.readouterr().err)
+
+
+@pytest.mark.parametrize("verb", ["estimate", "calibrate"])
+@pytest.mark.parametrize(
+    ("profile", "message"),
+    [
+        ("", "drop_060_tail cannot be used: speed missing: the record has no shaft speed beside S_NDE_A"),
+        (
+            '[speed]\nconstant = "60 Hz"\n',
+            "drop_060_tail cannot be used: missing pre-trigger: no drop in the record",
+        ),
+    ],
+)
+def test_a_record_without_speed_or_drop_is_refused(
+    verb: str, profile: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    channels = tmp_path / "profile.toml"
+    channels.write_text(profile)
+    output = tmp_path / "out.toml"
+    arguments = [verb, LP400, TAIL, *(["--profile", str(channels)] if profile else [])]
+    assert run([*arguments, *(["--output", str(output)] if verb == "calibrate" else [])]) != 0
+    assert message in words(capsys.readouterr().err)
+    assert not output.exists()
+
+
+def test_quick_needs_a_calibrated_machine(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["estimate", LP400, RECORD, "--quick"]) == USAGE
+    told = words(capsys.readouterr().err)
+    assert "--quick needs a calibrated machine" in told and "rotordrop calibrate" in told
+
+
+@pytest.mark.parametrize("verb", ["estimate", "calibrate"])
+def test_two_records_of_one_name_are_refused(
+    verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output = ["--output", str(tmp_path / "out.toml")] if verb == "calibrate" else []
+    assert run([verb, LP400, "a/drop_060.csv", "b/drop_060.csv", *output]) == USAGE
+    assert "2 records are named 'drop_060'; expected a name of its own" in words(capsys.readouterr().err)
