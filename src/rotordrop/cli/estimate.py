@@ -147,7 +147,9 @@ def _tracked(
             }
             for check in checks
         ]
-        pages[drop.name] = tracked_page(drop, machine, findings=found, cross_checks=checks, warnings=words)
+        pages[drop.name] = tracked_page(
+            drop, machine, findings=found, cross_checks=checks, warnings=words, quick=quick
+        )
     return documents, pages
 
 

@@ -44,6 +44,7 @@ def tracked_page(
     findings: Sequence[FindingLike] = (),
     cross_checks: Sequence[CrossCheck] = (),
     warnings: Sequence[str] = (),
+    quick: bool = False,
 ) -> ReportContent:
     """Build the report on a drop that the tracked twin followed.
 
@@ -59,19 +60,30 @@ def tracked_page(
         Comparisons with the linear joint input-state estimate.
     warnings : sequence of str
         Further warnings of the estimate.
+    quick : bool
+        Whether it is the estimate of a single pass.
     """
     return ReportContent(
         title="Touchdown-bearing force and stress from a recorded drop",
         subtitle=_subtitle(drop, machine),
         simulated=simulated_notice(drop.record),
-        verdict=_verdict(drop, findings, cross_checks, warnings),
+        verdict=(*_verdict(drop, findings, cross_checks, warnings), *(QUICK_NOTICE if quick else ())),
         cards=tuple(
             headline_card(name, values, _peak_times(drop, name)) for name, values in drop.values.items()
         ),
         summary=(identified_table(drop.values),),
-        facts=_facts(drop, machine),
+        facts=_facts(drop, machine, quick),
         sections=_sections(drop, machine, findings, cross_checks),
     )
+
+
+QUICK_NOTICE = (
+    Statement(
+        text="Quick estimate: one pass over the record, without the independent cross-check and without the "
+        "search for the size of the unknown impulses. For a number that decides, leave --quick out.",
+        level="notice",
+    ),
+)
 
 
 def _subtitle(drop: TrackedDrop, machine: Machine) -> str:
@@ -105,7 +117,7 @@ def _verdict(
     )
 
 
-def _facts(drop: TrackedDrop, machine: Machine) -> tuple[tuple[str, str], ...]:
+def _facts(drop: TrackedDrop, machine: Machine, quick: bool) -> tuple[tuple[str, str], ...]:
     record, instant = drop.record, drop.drop_instant
     power_off = Quantity(value=instant.value, kind="time", interval_90=instant.interval_90)
     path = machine.source_path
@@ -114,7 +126,7 @@ def _facts(drop: TrackedDrop, machine: Machine) -> tuple[tuple[str, str], ...]:
         ("record", drop.name if record.path is None else record.path.name),
         ("SHA-256", record.sha256 or "not from a file"),
         ("power-off", f"{power_off.text} in record time (90 %: {power_off.interval_text})"),
-        ("method", "tracked twin"),
+        ("method", "tracked twin, one pass" if quick else "tracked twin"),
         ("sampling", f"{record.sampling_rate:g} Hz, {len(record.sensors)} sensors"),
         ("rotordrop", __version__),
     )

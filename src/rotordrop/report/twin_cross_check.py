@@ -32,8 +32,8 @@ def twin_cross_checks(drop: TrackedDrop) -> tuple[CrossCheck, ...]:
         found.append(
             CrossCheck(
                 name=f"{name} peak stress",
-                estimate=Quantity(value=stress.value, kind="stress", interval_90=stress.interval_90),
-                check=Quantity(value=float(check.peak_stress[b]), kind="stress", digits=3),
+                estimate=Quantity(value=stress.value, kind="pressure", interval_90=stress.interval_90),
+                check=Quantity(value=float(check.peak_stress[b]), kind="pressure", digits=3),
                 accuracy=KNOWN_STRESS_ERROR,
             )
         )

@@ -109,11 +109,25 @@ def test_quick_estimate_writes_numbers_and_report(
         assert low < entry["value"] < high and 0.0 < entry["time_s"] < SHORT
     html = page.read_text(encoding="utf-8")
     assert "This record is simulated" in html and 'src="http' not in html
+    assert "Quick estimate: one pass over the record" in html
     for heading in ("Impacts", "Parameters", "Consistency", "Orbit", "Hertz stress"):
         assert f">{heading}<" in html
     told = words(capsys.readouterr().out)
     assert written["consistency"]["sentence"] in told
     assert str(page) in told.replace(" ", "")
+
+
+def test_the_full_estimate_sets_the_cross_check_beside_it(folder: Path, tmp_path: Path) -> None:
+    out, page = tmp_path / "out.json", tmp_path / "report.html"
+    arguments = ["estimate", str(folder / "calibrated.toml"), RECORD, "--tail", TAIL]
+    assert run([*arguments, "--json", str(out), "--report", str(page)]) == 0
+    checks = {check["name"]: check for check in json.loads(out.read_text())["cross_check"]}
+    assert set(checks) == {f"{b} peak {what}" for b in ("NDE", "DE") for what in ("force", "stress")}
+    for check in checks.values():
+        assert check["cross_check"] == pytest.approx(check["estimate"], rel=check["known_relative_accuracy"])
+        assert check["agrees"]
+    html = page.read_text(encoding="utf-8")
+    assert ">Independent cross-check<" in html and "Quick estimate" not in html
 
 
 def test_several_records_give_machine_and_drops(
