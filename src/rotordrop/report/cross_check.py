@@ -58,8 +58,8 @@ def cross_check_table(checks: Sequence[CrossCheck]) -> Table:
             for check in checks
         ),
         caption="Independent cross-check",
-        note="The cross-check knows the rotor only: no contact, friction or support parameter enters it. It takes "
-        "sensor errors and air gaps from the estimate, and for the stress the preload.",
+        note="The cross-check knows the rotor only: no contact, friction or support parameter enters it. "
+        "It takes sensor errors and air gaps from the estimate, and for the stress the preload.",
     )
 
 
