@@ -6,7 +6,14 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 Status = Literal["given", "guess", "estimated", "default", "inferred"]
-Verdict = Literal["determined", "at its bound", "the record does not determine it", "prior"]
+Verdict = Literal[
+    "determined",
+    "at its bound",
+    "the record does not determine it",
+    "known from the calibration",
+    "the model does not fit the record",
+    "prior",
+]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,7 +76,7 @@ class IdentifiedValue:
     ----------
     value : float
         The identified value in SI units; ``float(x)`` gives it too.
-    status : {"determined", "at its bound", "the record does not determine it", "prior"}
+    status : Verdict
         What the record says about the value.
     standard_error : float, optional
         Standard error, in the unit of the value.

@@ -10,33 +10,38 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.errors import IdentificationError
+from rotordrop.errors import IdentificationError, RecordError
 from rotordrop.estimated import IdentifiedValue
+from rotordrop.estimation.tracked_impacts import Impact as Impact
+from rotordrop.estimation.tracked_impacts import tracked_impacts
 from rotordrop.estimation.tracked_values import (
-    MODEL_FORCE_SIGMA,
     force_values,
+    holding_cross_check,
     parameter_values,
-    with_interval,
+    without_interval,
 )
+from rotordrop.identification.first_reach import reach_at_first_contact
 from rotordrop.machine import Machine
 from rotordrop.measurement.events import DropInstant
 from rotordrop.measurement.power_off import PowerOff, find_power_off
 from rotordrop.measurement.record import Record
 from rotordrop.model.parameters import DropModel, build_drop_model
 from rotordrop.model.reduction import Reduction
-from rotordrop.simulation.certificate import refined_peak
 from rotordrop.tracking.calibration import (
     BLIND_SCHEDULE,
     CALIBRATED_SCHEDULE,
     LOOSER,
+    PATIENT_SCHEDULE,
     QUICK_SCHEDULE,
     Stage,
     TrackedDrops,
+    beside_the_record,
     shifted,
     track,
 )
 from rotordrop.tracking.consistency import Check, consistency_checks
 from rotordrop.tracking.forces import ForceHistory, force_history
+from rotordrop.tracking.input_state import InputEstimate, input_state_estimate
 from rotordrop.tracking.problem import DropProblem, build_problem
 from rotordrop.tracking.smoother import PassSettings, Smoothed, forward
 from rotordrop.tracking.transfer import transferred
@@ -59,25 +64,11 @@ NOISE_WINDOW = 0.06
 """Part of the drop on which the size of the unknown impulses is judged [s]."""
 
 INCONSISTENT_WIDENING = 2.0
-"""Factor on intervals when the model is not consistent with the record [1]."""
+"""Factor on intervals when the model is not consistent with the record [1]; those of force and stress grow
+further until they hold the cross-check as well."""
 
-
-@dataclass(frozen=True, kw_only=True)
-class Impact:
-    """One impact at one bearing, each number with its 90 % interval.
-
-    Times [s] from power-off, azimuth [rad ccw from +x] of the contact normal at the peak, peak ball force
-    [N], normal impulse [N s], energy dissipated in the contact [J].
-    """
-
-    bearing: str
-    start: float
-    end: float
-    azimuth: float
-    peak_time: float
-    peak_force: IdentifiedValue
-    impulse: IdentifiedValue
-    dissipated_energy: IdentifiedValue
+UNSURE_GAP = 12e-6
+"""Prior standard deviation [m] from which the reach at the first contact is the better start of a gap."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,6 +91,8 @@ class TrackedDrop:
         Consistency of model and record.
     consistent : bool
         Whether all checks passed.
+    cross_check : InputEstimate or None
+        The estimate without contact law, made here when the model is not consistent with the record.
     """
 
     name: str
@@ -116,13 +109,31 @@ class TrackedDrop:
     consistent: bool
     noise_factor: float
     nis: float
+    cross_check: InputEstimate | None = None
 
     def sentence(self) -> str:
         """The verdict on model and record."""
         if self.consistent:
             return "The model is consistent with the record."
         failed = "; ".join(check.message for check in self.checks if not check.passed)
-        return f"The model is not consistent with the record: {failed}. Intervals are widened."
+        return f"The model is not consistent with the record: {failed}. {self._consequence()}"
+
+    def _consequence(self) -> str:
+        if self.cross_check is not None:
+            return (
+                "Intervals are widened until they hold the independent cross-check too; the single numbers "
+                "are not to be relied on."
+            )
+        if _only_directions(self.checks):
+            return (
+                f"Intervals are {INCONSISTENT_WIDENING:g} × as wide; no independent cross-check is possible."
+            )
+        return "No intervals are given: without a cross-check the errors are not known."
+
+    @property
+    def can_be_cross_checked(self) -> bool:
+        """Whether the sensors see enough for the estimate without contact law."""
+        return _sees_all_directions(self.checks)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -168,14 +179,14 @@ def _polarity(record: Record) -> Array:
 
 
 def drop_problem(model: DropModel, prepared: Preparation, until: float = WINDOW) -> DropProblem:
-    """Estimation problem of a prepared record."""
+    """Estimation problem of a prepared record; without a tail the gaps start where the first forces act."""
     record = prepared.record
     if record.speed is None:
         raise IdentificationError(
             f"the record {prepared.name} has no rotor speed; expected one. Map it with a profile."
         )
     near = record.time < prepared.instant.value + until + 0.01
-    return build_problem(
+    problem = build_problem(
         model,
         np.asarray(record.time[near] - prepared.instant.value),
         np.asarray(record.signals[near]) * _polarity(record),
@@ -183,6 +194,31 @@ def drop_problem(model: DropModel, prepared: Preparation, until: float = WINDOW)
         tail_level=prepared.tail_level,
         until=until,
     )
+    if prepared.tail_level is None:
+        _start_gaps(problem, prepared)
+    return problem
+
+
+def _start_gaps(problem: DropProblem, prepared: Preparation) -> None:
+    """Let unsure air gaps begin at the reach of the first contact; their prior uncertainty stays.
+
+    From a gap that is tens of micrometres off, the first impacts come at the wrong time and the filter may
+    settle at a wrong machine.
+    """
+    gaps = [
+        problem.n_dynamic + [u.path for u in problem.unknowns].index(f"{name}.air_gap")
+        for name in problem.model.bearing_names
+    ]
+    unsure = problem.covariance[gaps, gaps] > UNSURE_GAP**2
+    if not unsure.any() or not isinstance(prepared.instant, DropInstant):
+        return
+    try:
+        reached = reach_at_first_contact(prepared.record, problem.model, prepared.instant)
+    except (IdentificationError, RecordError):  # too few sensors for it: the prior has to do
+        return
+    for entry, found, moved in zip(gaps, reached, unsure & np.isfinite(reached), strict=True):
+        if moved:
+            problem.mean[entry] = found
 
 
 def is_calibrated(machine: Machine) -> bool:
@@ -208,6 +244,7 @@ def track_drops(
     calibrated machine needs the finer one only (with ``quick``, a single pass of it).
     """
     until = BLIND_SCHEDULE[-1].until + 0.01 if calibrate_only else WINDOW
+    prepared = _tail_first(prepared)
     fine_model = build_drop_model(machine, FINE_BASIS)
     fine = [drop_problem(fine_model, item, until) for item in prepared]
     if is_calibrated(machine) and not calibrate_only:
@@ -216,12 +253,28 @@ def track_drops(
     coarse_model = build_drop_model(machine, COARSE_BASIS)
     coarse = [drop_problem(coarse_model, item, until) for item in prepared]
     contact = max(_first_contact(item) for item in prepared)
-    first = track(coarse, shifted(BLIND_SCHEDULE, contact), progress=progress)
+    first = _from_guesses(coarse, contact, progress)
     references = [
         transferred(one, two, drop.means) for one, two, drop in zip(coarse, fine, first.smoothed, strict=True)
     ]
     schedule = shifted(CALIBRATION_SCHEDULE if calibrate_only else FINE_SCHEDULE, contact)
     return _not_lost(track(fine, schedule, references=references, progress=progress), prepared)
+
+
+def _from_guesses(coarse: Sequence[DropProblem], contact: float, progress: Progress | None) -> TrackedDrops:
+    """First fit of a machine of which only guesses are known; a failed one is repeated more patiently."""
+    found = track(coarse, shifted(BLIND_SCHEDULE, contact), progress=progress)
+    if not beside_the_record(found):
+        return found
+    again = track(coarse, shifted(PATIENT_SCHEDULE, contact), progress=progress)
+    return min(found, again, key=lambda fit: (any(fit.diverged), max(fit.noise_factors), max(fit.nis)))
+
+
+def _tail_first(prepared: Sequence[Preparation]) -> list[Preparation]:
+    """The drops with a known tail on the first of them, from which the machine is handed on to the others."""
+    known = next((item.tail_level for item in prepared if item.tail_level is not None), None)
+    first = prepared[0] if prepared[0].tail_level is not None else replace(prepared[0], tail_level=known)
+    return [first, *prepared[1:]]
 
 
 def _not_lost(tracked: TrackedDrops, prepared: Sequence[Preparation]) -> TrackedDrops:
@@ -277,11 +330,19 @@ def tracked_drop(
     consistent = all(check.passed for check in checks)
     widening = 1.0 if consistent else INCONSISTENT_WIDENING
     forces = force_history(problem, smoothed)
+    cross_check = None
+    if not consistent and _sees_all_directions(checks):
+        cross_check = input_state_estimate(problem, smoothed)
+    unknown_errors = not consistent and cross_check is None and not _only_directions(checks)
     values: dict[str, dict[str, IdentifiedValue]] = {}
     peak_times: dict[str, float] = {}
     for b, name in enumerate(problem.model.bearing_names):
         values[name] = parameter_values(problem, smoothed, name, widening)
         peak_values, peak_times[name] = force_values(forces, b, widening)
+        if cross_check is not None:
+            peak_values = holding_cross_check(peak_values, forces, cross_check, b)
+        elif unknown_errors:
+            peak_values = {field: without_interval(value) for field, value in peak_values.items()}
         values[name].update(peak_values)
     return TrackedDrop(
         name=prepared.name,
@@ -293,43 +354,21 @@ def tracked_drop(
         forces=forces,
         values=values,
         peak_times=peak_times,
-        impacts=_impacts(problem, forces, widening),
+        impacts=tracked_impacts(problem, forces, widening, cross_check, unknown_errors),
         checks=checks,
         consistent=consistent,
         noise_factor=noise_factor,
         nis=smoothed.filtered.nis,
+        cross_check=cross_check,
     )
 
 
-def _impacts(problem: DropProblem, forces: ForceHistory, widening: float) -> tuple[Impact, ...]:
-    found: list[Impact] = []
-    for b, name in enumerate(problem.model.bearing_names):
-        touching = forces.indentation[:, b] > 0.0
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], touching.astype(int), [0]])))
-        for first, last in zip(edges[0::2], edges[1::2], strict=True):
-            found.append(_impact(forces, b, name, int(first), int(last), widening))
-    return tuple(sorted(found, key=lambda impact: impact.start))
+def _sees_all_directions(checks: Sequence[Check]) -> bool:
+    return all(check.passed for check in checks if check.name == "directions")
 
 
-def _impact(forces: ForceHistory, b: int, name: str, first: int, last: int, widening: float) -> Impact:
-    window = slice(max(first - 1, 0), min(last + 2, len(forces.time)))
-    peak, moment = refined_peak(forces.time[window], forces.magnitude[window, b])
-    at = window.start + int(np.argmax(forces.magnitude[window, b]))
-    relative = math.hypot(float(forces.magnitude_sigma[at, b]) / max(peak, 1e-9), MODEL_FORCE_SIGMA)
-    dt = float(forces.time[1] - forces.time[0])
-    impulse = dt * float(np.sum(forces.contact_force[first:last, b]))
-    lost = dt * float(np.sum(forces.contact_power[first:last, b]))
-    middle = first + int(np.argmax(forces.contact_force[first:last, b]))
-    return Impact(
-        bearing=name,
-        start=float(forces.time[first]),
-        end=float(forces.time[last - 1]),
-        azimuth=float(forces.azimuth[middle, b]),
-        peak_time=moment,
-        peak_force=with_interval(peak, relative * peak, widening, "N"),
-        impulse=with_interval(impulse, relative * impulse, widening, "N s"),
-        dissipated_energy=with_interval(lost, 2.0 * relative * abs(lost), widening, "J"),
-    )
+def _only_directions(checks: Sequence[Check]) -> bool:
+    return {check.name for check in checks if not check.passed} <= {"directions"}
 
 
 def estimate_tracked(

@@ -7,15 +7,22 @@ import numpy as np
 from rotordrop.estimation.tracked import TrackedDrop
 from rotordrop.report.cross_check import CrossCheck
 from rotordrop.report.quantity import Quantity
-from rotordrop.tracking.input_state import KNOWN_PEAK_ERROR, KNOWN_STRESS_ERROR, input_state_estimate
-
-KNOWN_MEAN_ERROR = 0.10
-"""Relative error of the mean force that the cross-check is known to make [1]."""
+from rotordrop.tracking.input_state import (
+    KNOWN_MEAN_ERROR,
+    KNOWN_PEAK_ERROR,
+    KNOWN_STRESS_ERROR,
+    input_state_estimate,
+)
 
 
 def twin_cross_checks(drop: TrackedDrop) -> tuple[CrossCheck, ...]:
-    """Peak force, peak stress and mean force of every bearing found in both ways."""
-    check = input_state_estimate(drop.problem, drop.smoothed)
+    """Peak force, peak stress and mean force of every bearing found in both ways.
+
+    Empty where the sensors do not see both directions in two planes: no cross-check is possible then.
+    """
+    if not drop.can_be_cross_checked:
+        return ()
+    check = drop.cross_check or input_state_estimate(drop.problem, drop.smoothed)
     found = []
     late = drop.forces.time >= 0.15
     for b, (name, values) in enumerate(drop.values.items()):

@@ -24,13 +24,18 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True, kw_only=True)
 class Stage:
-    """One stage: window after power-off [s], unknown impulses [N s], their share, passes, steps per 50 µs."""
+    """One stage: window after power-off [s], unknown impulses [N s], their share, passes, steps per 50 µs.
+
+    ``noise`` is a factor on the noise of the sensors: above 1, readings pull the estimate only part of the
+    way, and the next pass linearises nearer to them.
+    """
 
     until: float
     impulse: float
     share: float
     passes: int
     substeps: int = 4
+    noise: float = 1.0
 
 
 BLIND_SCHEDULE: tuple[Stage, ...] = (
@@ -43,6 +48,31 @@ BLIND_SCHEDULE: tuple[Stage, ...] = (
     Stage(until=0.060, impulse=2e-3, share=0.02, passes=2),
 )
 """From nominal guesses: windows for a first contact at about 7 ms; they are shifted when it comes later."""
+
+PATIENT_SCHEDULE: tuple[Stage, ...] = (
+    Stage(until=0.012, impulse=3e-3, share=0.03, passes=3, noise=20.0),
+    *(
+        Stage(until=until, impulse=3e-3, share=0.03, passes=1, noise=noise)
+        for until in (
+            0.012,
+            0.014,
+            0.016,
+            0.018,
+            0.020,
+            0.023,
+            0.026,
+            0.030,
+            0.035,
+            0.040,
+            0.045,
+            0.052,
+            0.060,
+        )
+        for noise in (5.0, 1.0)
+    ),
+    Stage(until=0.060, impulse=2e-3, share=0.02, passes=2),
+)
+"""From nominal guesses when `BLIND_SCHEDULE` ends beside the record: smaller windows, approached softly."""
 
 CALIBRATED_SCHEDULE: tuple[Stage, ...] = (
     Stage(until=0.02, impulse=1e-3, share=0.01, passes=1),
@@ -62,6 +92,8 @@ FULL_SCHEDULE: tuple[Stage, ...] = (
 """From nominal guesses to the whole 0.2 s of one drop."""
 
 REFERENCE_CONTACT = 0.0075
+FITTING_NIS = 1.25
+"""Mean normalised innovation squared up to which a model fits its record [1]."""
 LOOSER = (1.0, 8.0, 32.0)
 """Factors on the unknown impulses with which a pass is repeated that lost the drop [1]."""
 
@@ -136,7 +168,7 @@ def track(
             if progress is not None:
                 progress(f"fitting the first {1e3 * stage.until:.0f} ms", done / total)
             smoothed = []  # a pass fills hundreds of megabytes: the one before must be gone by then
-            smoothed = one_pass(problems, settings, trajectories, stage.until)
+            smoothed = one_pass(_softened(problems, stage), settings, trajectories, stage.until)
             trajectories = [s.means for s in smoothed]
             done += stage.until
     return TrackedDrops(
@@ -146,6 +178,17 @@ def track(
         diverged=tuple(s.filtered.done < len(s.filtered.means) for s in smoothed),
         noise_factors=tuple(s.filtered.impulse / settings.impulse for s in smoothed),
     )
+
+
+def _softened(problems: Sequence[DropProblem], stage: Stage) -> Sequence[DropProblem]:
+    if stage.noise == 1.0:
+        return problems
+    return [replace(problem, variances=problem.variances * stage.noise**2) for problem in problems]
+
+
+def beside_the_record(tracked: TrackedDrops) -> bool:
+    """Whether innovations or unknown impulses of a drop are larger than a fitting model leaves."""
+    return any(tracked.diverged) or max(tracked.noise_factors) > 1.0 or max(tracked.nis) > FITTING_NIS
 
 
 def one_pass(

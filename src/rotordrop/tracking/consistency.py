@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.tracking.calibration import FITTING_NIS
 from rotordrop.tracking.problem import DropProblem
 from rotordrop.tracking.smoother import Smoothed, parameter_sample
 
 Array = NDArray[np.float64]
 
-NIS_RANGE = (0.6, 1.25)
+NIS_RANGE = (0.6, FITTING_NIS)
 CORRELATION_LIMIT = 0.25
 SENSOR_LIMIT = 3.5
 PARAMETER_LIMIT = 3.5

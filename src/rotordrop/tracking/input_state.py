@@ -28,6 +28,8 @@ KNOWN_PEAK_ERROR = 0.15
 """Relative error of the largest peak that this estimate is known to make at worst [1]."""
 KNOWN_STRESS_ERROR = 0.05
 """The same for the largest stress, which goes with the third root of the load and sees the preload [1]."""
+KNOWN_MEAN_ERROR = 0.10
+"""The same for the late mean force vector [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,7 +64,8 @@ def input_state_estimate(problem: DropProblem, smoothed: Smoothed) -> InputEstim
     """Joint estimate of motion and bearing forces from the readings, by a linear filter and smoother.
 
     The tracked twin lends gains, offsets, air gaps and the radius that gates; no contact, friction or
-    support enters. The stress takes the ball bearing, its preload included, from the twin.
+    support enters. The stress takes the ball bearing, its preload included, from the twin. Both directions
+    must be seen in two planes: with less, the rotor model alone does not bound the forces.
     """
     count = len(smoothed.means)
     radius, gaps = _radius_and_gap(problem, smoothed)
@@ -177,7 +180,8 @@ def _smooth_forces(problem: DropProblem, readings: Array, gate: NDArray[np.bool_
         S = H @ P @ H.T + R
         K = np.linalg.solve(S, H @ P).T
         x = x + K @ (z - H @ x)
-        P = P - K @ S @ K.T
+        left = np.eye(size) - K @ H
+        P = left @ P @ left.T + (K * np.diag(R)) @ K.T  # Joseph form: stays positive with a channel missing
         P = 0.5 * (P + P.T)
         filtered[i], P_filtered[i] = x, P
     return _rauch(A, gravity, predicted, filtered, P_predicted, P_filtered)[:, n : n + k].reshape(

@@ -39,6 +39,8 @@ class Unknown:
         Whether all drops of a machine share it.
     targets : tuple
         Kernel entries it sets: (kind, row, column, factor).
+    calibrated : bool
+        Whether its prior is an estimate made before, not a guess.
     """
 
     path: str
@@ -48,6 +50,7 @@ class Unknown:
     scope: Scope
     targets: tuple[tuple[int, int, int, float], ...]
     unit: str = ""
+    calibrated: bool = False
 
     def value_of(self, theta: float) -> float:
         """SI value of an estimated number."""
@@ -142,6 +145,7 @@ def bearing_unknowns(bearing: TouchdownBearing, row: int) -> Iterator[Unknown]:
             scope="machine",
             targets=tuple((P.ON_BEARING, row, column, factor) for column, factor in columns),
             unit=unit,
+            calibrated=quantity.status == "estimated",
         )
 
     support, contact, friction, race = bearing.support, bearing.contact, bearing.friction, bearing.race
@@ -153,6 +157,7 @@ def bearing_unknowns(bearing: TouchdownBearing, row: int) -> Iterator[Unknown]:
         scope="machine",
         targets=((P.ON_BEARING, row, L.AIR_GAP, 1.0),),
         unit="m",
+        calibrated=bearing.air_gap.status == "estimated",
     )
     sideways = float(support.stiffness_horizontal) / float(support.stiffness)
     yield relative(
@@ -226,6 +231,7 @@ def _exponent(bearing: TouchdownBearing, row: int) -> Unknown:
             (P.AT_TYPICAL_DEPTH, row, L.CONTACT_STIFFNESS, typical_depth(bearing)),
         ),
         unit="1",
+        calibrated=quantity.status == "estimated",
     )
 
 
@@ -239,6 +245,7 @@ def _bearing_damping(bearing: TouchdownBearing, row: int) -> Unknown:
         scope="machine",
         targets=((P.ON_BEARING, row, L.BEARING_DAMPING, math.nan),),
         unit="s",
+        calibrated=bearing.damping_time.status == "estimated",
     )
 
 
@@ -260,6 +267,7 @@ def _axial_offset(bearing: TouchdownBearing, row: int) -> Unknown:
         scope="machine",
         targets=((P.ON_BEARING, row, L.AXIAL_OFFSET, 1.0),),
         unit="m",
+        calibrated=bearing.bearing.preload.status == "estimated",
     )
 
 
