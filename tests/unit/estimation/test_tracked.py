@@ -29,7 +29,7 @@ from rotordrop.estimation.tracked import (
 from rotordrop.estimation.tracked_values import MODEL_FORCE_SIGMA, MODEL_STRESS_SIGMA
 from rotordrop.machine import Machine, example_machine
 from rotordrop.measurement.examples import example_record_path
-from rotordrop.measurement.record import read_record
+from rotordrop.measurement.record import Record, read_record
 from rotordrop.model.parameters import build_drop_model
 from rotordrop.synthesis import SyntheticDrop, hidden_machine, synthesize_drop
 from rotordrop.synthesis.score import score_estimate
@@ -180,10 +180,28 @@ def test_a_gap_in_the_record_and_a_lost_channel_are_lived_with(
     signals[:, 1] = np.nan
     worse = replace(record, signals=signals)
     drop = followed(calibrated, prepare(calibrated, worse, synthetic.tail, "worse", quick.drop_instant))
+    assert not drop.can_be_cross_checked and "no independent cross-check is possible" in drop.sentence()
     assert_right(drop, calibrated, synthetic, factor=2.0)
     gap = (drop.forces.time > 0.0605) & (drop.forces.time < 0.0615)
     assert np.mean(drop.forces.displacement_sigma[gap]) > 1.5 * np.mean(quick.forces.displacement_sigma[gap])
     assert math.isfinite(drop.nis)
+
+
+def test_a_machine_that_lost_a_sensor_is_still_estimated(
+    calibrated: Machine, quick: TrackedDrop, synthetic: SyntheticDrop
+) -> None:
+    def without(record: Record) -> Record:
+        return replace(record, signals=np.delete(record.signals, 1, axis=1), sensors=left)
+
+    left = tuple(sensor for i, sensor in enumerate(calibrated.sensors) if i != 1)
+    drop = estimate_drop(
+        calibrated.model_copy(update={"sensors": left}),
+        without(synthetic.record),
+        tail=without(synthetic.tail),
+    )
+    assert drop.drop_instant.value == pytest.approx(quick.drop_instant.value, abs=2e-4)
+    assert not drop.can_be_cross_checked and not drop.consistent, drop.sentence()
+    assert_right(drop, calibrated, synthetic, factor=2.0)
 
 
 def test_without_tail_and_levitated_part_less_is_known(
