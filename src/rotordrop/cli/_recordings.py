@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -21,6 +22,22 @@ def require_own_names(records: Sequence[Path]) -> None:
             f"{count} records are named {name!r}; expected a name of its own for each, because results are "
             "listed by it. Rename the files, or give each record once."
         )
+
+
+def require_own_content(paths: Sequence[Path]) -> None:
+    """Refuse the same recording given twice: one drop would count as two, its errors would look smaller."""
+    seen: dict[str, Path] = {}
+    for path in paths:
+        if not path.is_file():
+            continue  # the reader says what is wrong with it
+        with path.open("rb") as stream:
+            digest = hashlib.file_digest(stream, "sha256").hexdigest()
+        if digest in seen:
+            raise UsageError(
+                f"{seen[digest]} and {path} are the same recording (equal content); expected another drop in "
+                "each. Leave one of them out."
+            )
+        seen[digest] = path
 
 
 def tails_of(paths: list[Path], count: int, read: Callable[[Path], Record]) -> list[Record | None]:

@@ -12,7 +12,7 @@ import typer
 
 from rotordrop.cli._options import JsonOption, MachineArgument
 from rotordrop.cli._output import deliver, progress_bar, require_places
-from rotordrop.cli._recordings import require_own_names, tails_of
+from rotordrop.cli._recordings import require_own_content, require_own_names, tails_of
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -48,6 +48,7 @@ def calibrate(
 
     require_places(output, json)
     require_own_names(records)
+    require_own_content(records)
     description = load_machine(machine)
     read = [read_record(path, description, profile=profile) for path in records]
     tails = tails_of(tail or [], len(read), lambda path: read_record(path, description, profile=profile))

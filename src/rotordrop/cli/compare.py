@@ -105,8 +105,9 @@ def _compared(documents: Mapping[str, dict[str, Any]]) -> list[ComparedDrop]:
 
 def _ranked(drops: list[ComparedDrop], scatter: Mapping[str, float] | None) -> dict[str, Any]:
     from rotordrop.report.compare_page import rankings
+    from rotordrop.report.compared_drop import left_out
 
-    tree: dict[str, Any] = {}
+    tree: dict[str, Any] = {"left_out": left_out(drops)}
     for (bearing, key), ranking in rankings(drops, list(drops[0].numbers), scatter or {}).items():
         condition = ranking.worst_condition
         tree.setdefault(bearing, {})[key] = {

@@ -14,7 +14,7 @@ import typer
 
 from rotordrop.cli._options import JsonOption, MachineArgument
 from rotordrop.cli._output import deliver, progress_bar, require_places
-from rotordrop.cli._recordings import require_own_names, tails_of
+from rotordrop.cli._recordings import require_own_content, require_own_names, tails_of
 from rotordrop.errors import UsageError
 
 if TYPE_CHECKING:
@@ -71,6 +71,7 @@ def estimate(
         )
     description = load_machine(machine)
     require_own_names(records)
+    require_own_content(records)
     if quick and method is Method.tracked:
         _require_calibrated(description, machine)
     reports = _report_places(report, records)

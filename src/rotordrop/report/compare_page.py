@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from rotordrop._version import __version__
 from rotordrop.errors import UsageError
-from rotordrop.report.compared_drop import NUMBERS, ComparedDrop
+from rotordrop.report.compared_drop import NUMBERS, ComparedDrop, left_out
 from rotordrop.report.comparison import comparison_figure
 from rotordrop.report.content import Cell, Figure, ReportContent, Section, Statement, Table
 from rotordrop.report.first_contact import first_contacts_figure
@@ -85,13 +85,20 @@ def _simulated(drops: Sequence[ComparedDrop]) -> str:
 def rankings(
     drops: Sequence[ComparedDrop], bearings: Sequence[str], drop_scatter: Mapping[str, float]
 ) -> dict[tuple[str, str], Ranking]:
-    """Rank the drops by peak force and peak stress at every bearing, where every drop states its error."""
+    """Rank the drops by peak force and peak stress at every bearing, where every drop states its error.
+
+    Estimates that do not fit their record, and second estimates of one recording, take no part.
+    """
     found = {}
+    excluded = left_out(drops)
+    ranked = [drop for drop in drops if drop.name not in excluded]
+    if len(ranked) < 2:
+        return {}
     for bearing in bearings:
         for key in RANKED:
-            severities = [_severity(drop, bearing, key) for drop in drops]
+            severities = [_severity(drop, bearing, key) for drop in ranked]
             known = [severity for severity in severities if severity is not None]
-            if len(known) == len(drops):
+            if len(known) == len(ranked):
                 found[bearing, key] = rank_drops(known, drop_scatter=drop_scatter.get(key))
     return found
 
@@ -112,11 +119,17 @@ def _verdict(
 ) -> tuple[Statement, ...]:
     names = {key: name for key, name, _ in NUMBERS}
     ranked = rankings(drops, bearings, drop_scatter)
-    statements = []
+    excluded = left_out(drops)
+    statements = [
+        Statement(text=f"{name} is left out of the ranking: {why}{_reach(drops, name)}.", level="bad")
+        for name, why in excluded.items()
+    ]
     for bearing in bearings:
         for key in RANKED:
             if (bearing, key) in ranked:
                 text = f"{bearing}, {names[key]}: {ranked[bearing, key].statement}."
+            elif len(drops) - len(excluded) < 2:
+                text = f"{bearing}, {names[key]}: fewer than two drops are left to rank."
             else:
                 text = (
                     f"{bearing}, {names[key]}: not every drop states an interval, so the order of the "
@@ -131,11 +144,22 @@ def _verdict(
     return tuple(statements)
 
 
+def _reach(drops: Sequence[ComparedDrop], name: str) -> str:
+    """Between what the peak force of a drop may lie, for the statement that leaves it out."""
+    parts = []
+    for bearing, numbers in next(drop for drop in drops if drop.name == name).numbers.items():
+        peak = numbers.get("peak_force_N")
+        if peak is not None and peak.interval_90 is not None:
+            parts.append(f"{bearing} {peak.interval_text}")
+    return f"; its peak force may be {', '.join(parts)}" if parts else ""
+
+
 def _number_table(drops: Sequence[ComparedDrop], bearing: str) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for drop in drops:
         speed = Quantity(value=drop.speed, kind="speed", digits=3)
-        rows.append((drop.name, speed, *(_number(drop, bearing, key, kind) for key, _, kind in NUMBERS)))
+        name = drop.name if drop.consistent else f"{drop.name} (not consistent with its record)"
+        rows.append((name, speed, *(_number(drop, bearing, key, kind) for key, _, kind in NUMBERS)))
     return Table(
         columns=("drop", "speed", *(name for _, name, _ in NUMBERS)),
         rows=tuple(rows),

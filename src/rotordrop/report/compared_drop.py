@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -35,6 +35,12 @@ class ComparedDrop:
         By bearing and name of the number in an estimate file (``"peak_force_N"``, …), with intervals.
     warnings : tuple of str
         What the estimate warns of.
+    consistent : bool
+        Whether the estimate's own checks found the model consistent with the record.
+    method : str
+        How it was estimated.
+    record : str
+        SHA-256 of the recording, to know a drop that is given twice.
     simulated : bool
         Whether the record is known to be simulated.
     boxes : tuple of StressBox
@@ -47,6 +53,9 @@ class ComparedDrop:
     speed: float
     numbers: Mapping[str, Mapping[str, Quantity]]
     warnings: tuple[str, ...] = ()
+    consistent: bool = True
+    method: str = ""
+    record: str = ""
     simulated: bool = False
     boxes: tuple[StressBox, ...] = field(default=())
     first_contact: OverlaidDrop | None = None
@@ -71,8 +80,37 @@ class ComparedDrop:
             speed=2 * math.pi * float(turns["value"] if isinstance(turns, Mapping) else turns),
             numbers={bearing: _numbers(values) for bearing, values in document["bearings"].items()},
             warnings=tuple(str(warning) for warning in document.get("warnings", ())),
+            consistent=bool(document.get("consistency", {}).get("consistent", True)),
+            method=str(document.get("method", "")),
+            record=str(document.get("record_sha256") or ""),
             simulated=simulated,
         )
+
+
+def left_out(drops: Sequence[ComparedDrop]) -> dict[str, str]:
+    """Drops that a ranking must leave out, by name, and why.
+
+    Raises
+    ------
+    UsageError
+        If one recording was estimated twice in the same way.
+    """
+    reasons: dict[str, str] = {}
+    first: dict[str, ComparedDrop] = {}
+    for drop in drops:
+        twin = first.setdefault(drop.record, drop) if drop.record else drop
+        if twin is not drop and twin.method == drop.method:
+            raise UsageError(
+                f"{twin.name} and {drop.name} are estimates of the same recording; expected another drop in "
+                "each. Leave one of them out."
+            )
+        if twin is not drop:
+            reasons[drop.name] = (
+                f"the same recording as {twin.name}, estimated by {drop.method or 'another way'}"
+            )
+        elif not drop.consistent:
+            reasons[drop.name] = "its model is not consistent with its record"
+    return reasons
 
 
 def _numbers(values: Mapping[str, Any]) -> dict[str, Quantity]:

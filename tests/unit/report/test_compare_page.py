@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.testing import assert_allclose
 
 from rotordrop.errors import UsageError
 from rotordrop.report.compare_page import compare_page, rankings
-from rotordrop.report.compared_drop import ComparedDrop
+from rotordrop.report.compared_drop import ComparedDrop, left_out
 from rotordrop.report.comparison import comparison_figure
 from rotordrop.report.quantity import Quantity
 from rotordrop.severity.ranking import DropSeverity, rank_drops
@@ -30,6 +31,11 @@ def drop(name: str, speed: float, nde: float, de: float, half: float | None = 15
         },
     }
     return ComparedDrop.of_document(name, document, simulated=name == "a")
+
+
+def marked(name: str, *, consistent: bool = True, method: str = "tracked", record: str = "") -> ComparedDrop:
+    one = drop(name, 150, 9000, 9000)
+    return replace(one, consistent=consistent, method=method, record=record)
 
 
 DROPS = (drop("a", 60, 3300, 3600), drop("b", 100, 3100, 3300), drop("c", 210, 2500, 4200))
@@ -110,3 +116,42 @@ def test_a_document_of_another_kind_is_refused_with_its_entries() -> None:
         UsageError, match=r"truth: the document has the entries name, fs; expected 'speed_Hz'"
     ):
         ComparedDrop.of_document("truth", {"name": "drop_060", "fs": 20000})
+
+
+def test_an_estimate_beside_its_record_is_shown_but_takes_no_part_in_the_ranking() -> None:
+    drops = (*DROPS, marked("lost", consistent=False))
+    ranked = rankings(drops, ("NDE", "DE"), {})
+    assert ranked["DE", "peak_force_N"].names == ("c", "a", "b")
+    content = compare_page(drops)
+    first = content.verdict[0]
+    assert first.level == "bad"
+    assert first.text.startswith("lost is left out of the ranking: its model is not consistent with")
+    assert "NDE 8\u202f850 to 9\u202f150 N" in first.text
+    assert content.summary[0].rows[3][0] == "lost (not consistent with its record)"
+
+
+def test_fewer_than_two_drops_left_are_not_ranked() -> None:
+    content = compare_page((DROPS[0], marked("lost", consistent=False)))
+    assert rankings((DROPS[0], marked("lost", consistent=False)), ("NDE", "DE"), {}) == {}
+    assert any("fewer than two drops are left to rank" in statement.text for statement in content.verdict)
+
+
+def test_one_recording_estimated_twice_is_refused_or_counts_once() -> None:
+    one, same = marked("one", record="4f"), marked("same", record="4f")
+    with pytest.raises(UsageError, match="one and same are estimates of the same recording; expected"):
+        compare_page((one, same))
+    other = replace(same, method="replay")
+    assert left_out((one, other, DROPS[0])) == {"same": "the same recording as one, estimated by replay"}
+    assert left_out((marked("x"), marked("y"))) == {}
+
+
+def test_consistency_and_recording_are_read_from_the_estimate() -> None:
+    document = {
+        "speed_Hz": 60.0,
+        "method": "tracked",
+        "record_sha256": "4f",
+        "consistency": {"consistent": False},
+        "bearings": {},
+    }
+    found = ComparedDrop.of_document("x", document)
+    assert (found.consistent, found.method, found.record) == (False, "tracked", "4f")
