@@ -4,7 +4,8 @@ Usage: python studies/tracked/lone_drops.py KIND SEED [SEED ...]
 
 The first thing a newcomer does, and the hardest case for the fit: nothing but the guesses of the machine
 file, one recording, perhaps no tail. Every machine is recorded at two speeds; every recording is estimated by
-itself, twice. Seeds from 4001 on are used nowhere else.
+itself, twice. Seeds 4001 to 4006 set the width of the interval of a lone drop's air gap; those from 4101 on are
+scored and used nowhere else.
 """
 
 from __future__ import annotations

@@ -13,8 +13,8 @@ from rotordrop.errors import IdentificationError, UsageError
 from rotordrop.estimated import Estimated, IdentifiedValue
 from rotordrop.estimation.tracked import INCONSISTENT_WIDENING, prepare, track_drops
 from rotordrop.estimation.tracked_values import (
-    MODEL_GAP_SIGMA,
     identified,
+    model_error,
     parameter_widening,
     preload_value,
 )
@@ -144,7 +144,7 @@ def calibrate_machine(
     covariance = smoothed.covariance(at)
     mean = smoothed.means[at]
     widening = 1.0 if consistent else INCONSISTENT_WIDENING
-    values = _values(problem, mean, covariance, widening)
+    values = _values(problem, mean, covariance, widening, len(stems))
     fitted = machine_values(at_fitted_exponents(machine, values), f"calibrated on {', '.join(stems)}")
     return Calibration(
         machine=_possible(machine, fitted, stems),
@@ -171,7 +171,7 @@ def _possible(machine: Machine, fitted: dict[str, Estimated], drops: Sequence[st
 
 
 def _values(
-    problem: DropProblem, mean: Array, covariance: Array, widening: float
+    problem: DropProblem, mean: Array, covariance: Array, widening: float, drops: int
 ) -> dict[str, IdentifiedValue]:
     sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     values: dict[str, IdentifiedValue] = {}
@@ -180,7 +180,7 @@ def _values(
             continue
         i = problem.n_dynamic + k
         owner, _, path = unknown.path.partition(".")
-        error = math.hypot(float(sigma[i]), MODEL_GAP_SIGMA) if path == "air_gap" else float(sigma[i])
+        error = model_error(unknown, float(sigma[i]), drops)
         wide = parameter_widening(unknown, error, widening)
         if path == "axial_offset":
             values[f"{owner}.preload"] = preload_value(problem, owner, unknown, float(mean[i]), error, wide)

@@ -15,6 +15,7 @@ from rotordrop.estimated import IdentifiedValue
 from rotordrop.estimation.tracked_impacts import Impact as Impact
 from rotordrop.estimation.tracked_impacts import tracked_impacts
 from rotordrop.estimation.tracked_values import (
+    UNSURE_GAP,
     force_values,
     holding_cross_check,
     parameter_values,
@@ -66,9 +67,6 @@ NOISE_WINDOW = 0.06
 INCONSISTENT_WIDENING = 2.0
 """Factor on intervals when the model is not consistent with the record [1]; those of force and stress grow
 further until they hold the cross-check as well."""
-
-UNSURE_GAP = 12e-6
-"""Prior standard deviation [m] from which the reach at the first contact is the better start of a gap."""
 
 
 @dataclass(frozen=True, kw_only=True)

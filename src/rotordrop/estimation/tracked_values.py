@@ -28,6 +28,11 @@ MODEL_MEAN_STRESS_SIGMA = 0.04
 """The same for the mean stress: preload sets it, known only through the ball stiffness [1]."""
 MODEL_GAP_SIGMA = 2.5e-6
 """Standard deviation of an air gap by what confounds it with gains and offsets beyond the fit [m]."""
+LONE_GAP_SIGMA = 4e-6
+"""The same for a gap that was only guessed before a lone drop [m]: one drop seldom touches all round, and
+near the bottom gap and sensor offset are hard to tell apart."""
+UNSURE_GAP = 12e-6
+"""Prior standard deviation from which an air gap counts as guessed [m]."""
 PARAMETER_WIDENING = 1.5
 """Factor on standard errors of parameters for what the linearised fit leaves out [1]."""
 MODEL_MEAN_FORCE_SIGMA = 0.01
@@ -148,6 +153,14 @@ def identified(unknown: Unknown, theta: float, sigma: float, widening: float = 1
     )
 
 
+def model_error(unknown: Unknown, sigma: float, drops: int = 1) -> float:
+    """Standard error of a parameter with what the fit to a number of drops leaves out of it."""
+    if not unknown.path.endswith(".air_gap"):
+        return sigma
+    lone = drops == 1 and unknown.sigma > UNSURE_GAP
+    return math.hypot(sigma, LONE_GAP_SIGMA if lone else MODEL_GAP_SIGMA)
+
+
 def parameter_widening(unknown: Unknown, sigma: float, widening: float = 1.0) -> float:
     """Factor on a parameter's standard error [1]; the widened error stays within that of the prior."""
     return max(1.0, min(PARAMETER_WIDENING * widening, unknown.sigma / max(sigma, 1e-300)))
@@ -165,7 +178,7 @@ def parameter_values(
         owner, _, path = unknown.path.partition(".")
         if owner != name:
             continue
-        error = math.hypot(float(s), MODEL_GAP_SIGMA) if path == "air_gap" else float(s)
+        error = model_error(unknown, float(s))
         wide = parameter_widening(unknown, error, widening)
         if path in _FIELDS:
             values[_FIELDS[path]] = identified(unknown, float(t), error, wide)

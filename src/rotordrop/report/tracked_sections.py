@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.estimation.tracked import INCONSISTENT_WIDENING, TrackedDrop
 from rotordrop.estimation.tracked_values import (
     MODEL_FORCE_SIGMA,
-    MODEL_GAP_SIGMA,
     MODEL_STRESS_SIGMA,
     identified,
+    model_error,
     parameter_widening,
     preload_value,
 )
@@ -196,7 +194,7 @@ PRIOR_NOTE = (
 def _row(drop: TrackedDrop, unknown: Unknown, mean: float, sigma: float) -> ParameterRow:
     """One unknown; the axial offset is shown as the preload it stands for."""
     name = unknown.path
-    error = math.hypot(sigma, MODEL_GAP_SIGMA) if name.endswith(".air_gap") else sigma
+    error = model_error(unknown, sigma)
     wide = parameter_widening(unknown, error, widening(drop))
     if unknown.path.endswith(".axial_offset"):
         owner = unknown.path.removesuffix(".axial_offset")
