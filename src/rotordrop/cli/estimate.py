@@ -108,13 +108,14 @@ def _require_calibrated(description: Machine, file: Path) -> None:
         )
 
 
-def _warnings(findings: Sequence[Finding], tail: Record | None) -> list[str]:
+def _warnings(findings: Sequence[Finding], tail: Record | None, notes: Sequence[str] = ()) -> list[str]:
+    """Collect what record, tail and method warn of, each said once; the notes are those of the method."""
     words = [finding.message for finding in findings if finding.severity == "warning"]
     if tail is None:
         words.append(
             "no settled tail: the air gap rests on its prior and on the contacts; give one with --tail"
         )
-    return words
+    return list(dict.fromkeys((*words, *notes)))
 
 
 def _tracked(
@@ -135,7 +136,7 @@ def _tracked(
     documents, pages = {}, {}
     for drop, found, tail in zip(drops, findings, tails, strict=True):
         checks = () if quick else twin_cross_checks(drop)
-        words = _warnings(found, tail)
+        words = _warnings(found, tail, drop.drop_instant.notes)
         documents[drop.name] = tracked_document(drop, machine, words)
         documents[drop.name]["simulated_record"] = bool(simulated_notice(drop.record))
         documents[drop.name]["cross_check"] = [
@@ -164,12 +165,15 @@ def _replayed(
 ) -> tuple[dict[str, dict[str, Any]], dict[str, ReportContent]]:
     from rotordrop.estimation.replay import replay_document, replay_drop
     from rotordrop.report.replay_page import replay_page
+    from rotordrop.report.simulated_record import simulated_notice
 
     documents, pages = {}, {}
     for record, tail, found in zip(records, tails, findings, strict=True):
         drop = replay_drop(machine, record, tail=tail, fixed=fixed, progress=progress)
+        words = _warnings(found, tail, (*drop.warnings, *drop.drop_instant.notes))
         documents[record.name] = replay_document(drop)
-        pages[record.name] = replay_page(drop, machine, findings=found)
+        documents[record.name] |= {"warnings": words, "simulated_record": bool(simulated_notice(record))}
+        pages[record.name] = replay_page(drop, machine, findings=found, warnings=words)
     return documents, pages
 
 

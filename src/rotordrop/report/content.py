@@ -14,7 +14,7 @@ Level: TypeAlias = Literal["good", "notice", "warning", "bad"]
 Cell: TypeAlias = str | Quantity
 
 SIMULATED_RECORD = (
-    "This record is simulated: it comes from another program with a realistic measuring chain, "
+    "This record is simulated: it comes from a program with a model of the measuring chain, "
     "not from a machine."
 )
 """What every report on a bundled record says."""

@@ -114,7 +114,7 @@ def impact_figure(impacts: Sequence[Impact], *, force: str = CONTACT_FORCE) -> g
     latest = max(impact.time.value for impact in impacts)
     for column, bearing in enumerate(bearings, start=1):
         _add_impacts(figure, [impact for impact in impacts if impact.bearing == bearing], column, latest)
-    figure.update_xaxes(title_text=axis_title("azimuth from +x, −90° at the bottom", "°"), dtick=30)
+    figure.update_xaxes(title_text=axis_title("azimuth from +x, −90° at the bottom", "°"), tick0=0, dtick=45)
     figure.update_yaxes(title_text=axis_title(f"peak {force}", "N"), col=1)
     figure.update_yaxes(rangemode="tozero")
     figure.update_layout(

@@ -44,7 +44,13 @@ OPEN_LOOP = (
 )
 
 
-def replay_page(drop: ReplayDrop, machine: Machine, *, findings: Sequence[FindingLike] = ()) -> ReportContent:
+def replay_page(
+    drop: ReplayDrop,
+    machine: Machine,
+    *,
+    findings: Sequence[FindingLike] = (),
+    warnings: Sequence[str] | None = None,
+) -> ReportContent:
     """Build the report on a drop replayed by the paper's route (Neisi 2020, Fig. 4).
 
     Parameters
@@ -55,13 +61,15 @@ def replay_page(drop: ReplayDrop, machine: Machine, *, findings: Sequence[Findin
         The machine it was made with.
     findings : sequence of Finding
         What the plausibility checks found in the record.
+    warnings : sequence of str, optional
+        What to warn of; what the drop itself warns of by default.
     """
     speed = Quantity(value=drop.speed.initial, kind="speed", digits=4)
     return ReportContent(
         title="Touchdown-bearing force and stress by replay of a recorded drop",
         subtitle=f"{machine.name}, {drop.name}, from {speed.text}",
         simulated=simulated_notice(drop.record),
-        verdict=_verdict(drop, findings),
+        verdict=_verdict(drop, findings, drop.warnings if warnings is None else warnings),
         cards=tuple(
             headline_card(name, values, {"peak_force_N": drop.peak_times[name]})
             for name, values in drop.values.items()
@@ -72,13 +80,15 @@ def replay_page(drop: ReplayDrop, machine: Machine, *, findings: Sequence[Findin
     )
 
 
-def _verdict(drop: ReplayDrop, findings: Sequence[FindingLike]) -> tuple[Statement, ...]:
-    told = [finding for finding in findings if finding.message not in drop.warnings]
+def _verdict(
+    drop: ReplayDrop, findings: Sequence[FindingLike], words: Sequence[str]
+) -> tuple[Statement, ...]:
+    told = [finding for finding in findings if finding.message not in words]
     serious = [statement for statement in quality_statements(told) if statement.level in ("bad", "warning")]
     limits = [
         static_limit_statement(name, values["peak_stress_Pa"].value) for name, values in drop.values.items()
     ]
-    warnings = (Statement(text=warning, level="warning") for warning in drop.warnings)
+    warnings = (Statement(text=warning, level="warning") for warning in words)
     return (Statement(text=OPEN_LOOP), *warnings, *serious, *limits)
 
 
