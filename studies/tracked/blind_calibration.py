@@ -58,6 +58,22 @@ def drops_of(kind: str, seed: int, violation: str) -> tuple[Any, list[SyntheticD
     return known, made[0], made[1]
 
 
+def holds(entry: dict[str, Any]) -> bool:
+    """Whether the interval of a scored number holds the truth; one that is not given holds nothing."""
+    if entry["interval_90"] is None:
+        return False
+    low, high = entry["interval_90"]
+    return bool(low <= entry["truth"] <= high)
+
+
+def half_width(entry: dict[str, Any]) -> float:
+    """Half the width of the interval [unit of the number]; infinite where none is given."""
+    if entry["interval_90"] is None:
+        return math.inf
+    low, high = entry["interval_90"]
+    return 0.5 * float(high - low)
+
+
 def drop_scores(drop: TrackedDrop, made: SyntheticDrop) -> dict[str, Any]:
     """Estimate, truth and interval of everything that is scored in one drop."""
     truth = made.truth

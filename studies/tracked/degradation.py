@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from blind_calibration import HERE, drop_scores
+from blind_calibration import HERE, drop_scores, half_width, holds
 
 from rotordrop.estimated import Estimated
 from rotordrop.estimation.calibrated import calibrate_machine
@@ -169,8 +169,8 @@ def summary(folder: Path) -> str:
         stress = [b["peak_stress_Pa"] for b in bearings]
         gap = [g for r in results for g in r.get("air_gap_m", {}).values()]
         error = np.array([abs(p["estimate"] / p["truth"] - 1.0) for p in peak])
-        inside = np.mean([p["interval_90"][0] <= p["truth"] <= p["interval_90"][1] for p in peak])
-        half = np.median([0.5 * (p["interval_90"][1] - p["interval_90"][0]) / p["estimate"] for p in peak])
+        inside = np.mean([holds(p) for p in peak])
+        half = np.median([half_width(p) / p["estimate"] for p in peak])
         of_stress = np.median([abs(p["estimate"] / p["truth"] - 1.0) for p in stress])
         of_gap = np.median([abs(g["estimate"] - g["truth"]) for g in gap])
         good = np.mean([d["consistent"] for d in drops])

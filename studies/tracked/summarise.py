@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from blind_calibration import half_width, holds
 
 HERE = Path(__file__).parent
 FORCES = ("peak_force_N", "peak_stress_Pa", "mean_force_0p15_0p2_N", "mean_stress_Pa")
@@ -107,11 +108,10 @@ def _add(
     widths: dict[str, list[float]],
     covered: dict[str, dict[int, list[bool]]],
 ) -> None:
-    low, high = entry["interval_90"]
     absolute = name in ("air_gap", "friction.dynamic")
     errors[name].append((entry["estimate"] - entry["truth"]) / (1.0 if absolute else entry["truth"]))
-    widths[name].append(0.5 * (high - low) / (1.0 if absolute else abs(entry["estimate"])))
-    covered[name][seed].append(low <= entry["truth"] <= high)
+    widths[name].append(half_width(entry) / (1.0 if absolute else abs(entry["estimate"])))
+    covered[name][seed].append(holds(entry))
 
 
 def replayed(folder: Path, kind: str) -> dict[str, Any]:
@@ -179,7 +179,7 @@ def violation_table(groups: dict[str, list[dict[str, Any]]]) -> list[str]:
             stress = [b["peak_stress_Pa"] for d in drops for b in d["bearings"].values()]
             error = np.array([abs(p["estimate"] / p["truth"] - 1.0) for _, p in peaks])
             of_stress = np.median([abs(p["estimate"] / p["truth"] - 1.0) for p in stress])
-            inside = [p["interval_90"][0] <= p["truth"] <= p["interval_90"][1] for _, p in peaks]
+            inside = [holds(p) for _, p in peaks]
             flagged = not result["calibration_consistent"]
             either = [ok or flagged or not d["consistent"] for ok, (d, _) in zip(inside, peaks, strict=True)]
             flags = sum(flagged or not d["consistent"] for d in drops) + refused
