@@ -63,16 +63,21 @@ def calibrate(
 def _summary(result: Calibration, output: Path, out: Console) -> None:
     from rich.table import Table
 
+    from rotordrop.report.estimate_numbers import kind_of_unit
+    from rotordrop.report.quantity import Quantity
+
     table = Table("parameter", "estimate", "90 % interval", "verdict", box=None)
     verdicts = {
         entry.path.replace("axial_offset", "preload"): entry.verdict for entry in result.identifiability
     }
     for path, value in result.values.items():
-        low, high = value.interval_90 or (value.value, value.value)
+        shown = Quantity(
+            value=value.value, kind=kind_of_unit(value.unit, path), interval_90=value.interval_90
+        )
         table.add_row(
             path,
-            _text(value.value, value.unit),
-            f"{_text(low, value.unit)} … {_text(high, value.unit)}",
+            shown.text,
+            shown.interval_text,
             verdicts.get(path, "determined"),
         )
     out.print(table)
@@ -86,7 +91,3 @@ def _summary(result: Calibration, output: Path, out: Console) -> None:
                 out.print(f"{name}: {check.message}")
     out.print(result.sentence())
     out.print(f"Calibrated machine: {output}")
-
-
-def _text(value: float, unit: str) -> str:
-    return f"{value:.4g}" if unit in ("", "1") else f"{value:.4g} {unit}"

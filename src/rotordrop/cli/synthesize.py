@@ -106,8 +106,8 @@ def _listed(choice: str | None, known: dict[str, Any]) -> bool:
 
 
 def _name(speed: float, index: int, speeds: list[float]) -> str:
-    """Name by speed, numbered where a speed comes more than once."""
-    names = [f"drop_{round(value / 6.283185307179586):03d}" for value in speeds]
+    """Name by speed, numbered where a speed comes more than once; no bundled recording is named so."""
+    names = [f"synthetic_{round(value / 6.283185307179586):03d}Hz" for value in speeds]
     stem = names[index]
     return stem if names.count(stem) == 1 else f"{stem}_{names[: index + 1].count(stem)}"
 

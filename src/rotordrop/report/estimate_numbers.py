@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from pathlib import Path
 
 from rotordrop.estimated import IdentifiedValue
 from rotordrop.report.content import Card, Cell, KeyFigure, Table
@@ -26,6 +27,11 @@ IDENTIFIED = (
     ("friction.static", "static friction coefficient", "dimensionless"),
     ("friction.dynamic", "dynamic friction coefficient", "dimensionless"),
 )
+MEANS = (
+    "A mean force is the mean of the magnitude; the magnitude of the mean force would be smaller where its "
+    "direction changes. The mean Hertz stress covers 0 to 200 ms, or what the record has of them."
+)
+"""What the mean numbers of an estimate are means of."""
 KIND_OF_UNIT = {
     "m": "length",
     "N/m": "stiffness",
@@ -76,23 +82,39 @@ def headline_card(bearing: str, values: Values, peak_times: Mapping[str, float])
     return Card(title=f"{bearing} touchdown bearing", figures=tuple(figures))
 
 
-def identified_table(bearings: Mapping[str, Values]) -> Table:
-    """Identified values of every bearing side by side, each with its interval and verdict."""
+def identified_table(bearings: Mapping[str, Values], *, taken_over: str = "") -> Table:
+    """Identified values of every bearing side by side, each with its interval and verdict.
+
+    Parameters
+    ----------
+    bearings : mapping
+        Identified values of every bearing.
+    taken_over : str
+        File from which supports and friction were taken over; empty when they were identified.
+    """
     rows: list[tuple[Cell, ...]] = []
     for field, label, kind in IDENTIFIED:
         if any(field in values for values in bearings.values()):
             cells: list[Cell] = []
             for values in bearings.values():
                 value = values.get(field)
-                cells += [Quantity.of(value, kind), value.status if value is not None else "not estimated"]
+                cells += [Quantity.of(value, kind), _status(field, value, taken_over)]
             rows.append((label, *cells))
     columns = [text for bearing in bearings for text in (bearing, f"{bearing}: verdict")]
     return Table(
         columns=("identified", *columns),
         rows=tuple(rows),
         caption="Identified values",
-        note="Below a value: its 90 % interval, or the limits the record itself sets.",
+        note=f"Below a value: its 90 % interval, or the limits the record itself sets. {MEANS}",
     )
+
+
+def _status(field: str, value: IdentifiedValue | None, taken_over: str) -> str:
+    if value is None:
+        return "not estimated"
+    if taken_over and value.status == "prior" and field.startswith(("support.", "friction.")):
+        return f"taken over from {Path(taken_over).name}"
+    return value.status
 
 
 def half_width(value: IdentifiedValue) -> float:

@@ -74,7 +74,7 @@ def replay_page(
             headline_card(name, values, {"peak_force_N": drop.peak_times[name]})
             for name, values in drop.values.items()
         ),
-        summary=(identified_table(drop.values),),
+        summary=(identified_table(drop.values, taken_over=drop.fixed),),
         facts=_facts(drop, machine),
         sections=_sections(drop, machine, findings),
     )

@@ -22,7 +22,7 @@ def folder(tmp_path_factory):
 
 def test_drops_of_the_same_speed_are_numbered(folder):
     names = sorted(file.name for file in folder.iterdir())
-    records = [f"drop_060_{i}{kind}.csv" for i in (1, 2) for kind in ("", "_tail")]
+    records = [f"synthetic_060Hz_{i}{kind}.csv" for i in (1, 2) for kind in ("", "_tail")]
     assert names == sorted([*records, "truth"])
     assert len(list((folder / "truth").glob("*.json"))) == 2
 
@@ -32,7 +32,7 @@ def test_the_summary_says_that_nothing_was_measured(tmp_path, capsys):
     assert run(["synthesize", LP400, *arguments, "--output", str(tmp_path)]) == 0
     out = capsys.readouterr().out
     assert "Simulated recordings of LP-400 gas turbine, low-pressure rotor (not measured)" in out
-    assert f"written: {tmp_path / 'drop_100.h5'}" in out.replace("\n", "")
+    assert f"written: {tmp_path / 'synthetic_100Hz.h5'}" in out.replace("\n", "")
     truth = json.loads((tmp_path / "truth" / "drop_100.json").read_text())
     assert truth["violations"]["contact_exponent"] == 1.5
     assert truth["contact"][0]["n"] == 1.5
@@ -43,8 +43,8 @@ def test_a_fault_is_in_the_record_and_named_in_the_truth(tmp_path, folder):
     assert (
         run(["synthesize", LP400, *arguments, "--output", str(tmp_path), "--json", str(tmp_path / "j")]) == 0
     )
-    assert json.loads((tmp_path / "truth" / "drop_060.json").read_text())["fault"] == "dead channel"
-    rows = (tmp_path / "drop_060.csv").read_text().splitlines()
+    assert json.loads((tmp_path / "truth" / "synthetic_060Hz.json").read_text())["fault"] == "dead channel"
+    rows = (tmp_path / "synthetic_060Hz.csv").read_text().splitlines()
     last = {row.split(";")[4] for row in rows if row[:1] in "-0123456789"}
     assert len(last) == 1
     assert json.loads((tmp_path / "j").read_text())["origin"] == "simulated, not measured"
@@ -70,12 +70,12 @@ def test_lists_are_printed(tmp_path, capsys):
 
 
 def test_a_score_is_a_table_with_units_and_a_sentence(folder, tmp_path, capsys):
-    truth = json.loads((folder / "truth" / "drop_060_1.json").read_text())
+    truth = json.loads((folder / "truth" / "synthetic_060Hz_1.json").read_text())
     peak = truth["peak_force_N"]["NDE"]
     fields = {"peak_force_N": {"value": 1.02 * peak, "interval_90": [0.9 * peak, 1.1 * peak]}}
     estimate = tmp_path / "estimate.json"
     estimate.write_text(json.dumps({"speed_Hz": 60.0, "bearings": {"NDE": fields}}))
-    assert run(["score", str(estimate), str(folder / "truth" / "drop_060_1.json")]) == 0
+    assert run(["score", str(estimate), str(folder / "truth" / "synthetic_060Hz_1.json")]) == 0
     out = capsys.readouterr().out
     assert "NDE peak bearing force" in out
     assert "(+2 %)" in out
@@ -86,7 +86,7 @@ def test_a_score_is_a_table_with_units_and_a_sentence(folder, tmp_path, capsys):
 def test_a_score_of_the_wrong_file_says_which_one_is_wanted(folder, tmp_path, capsys):
     wrong = tmp_path / "wrong.json"
     wrong.write_text("{}")
-    assert run(["score", str(wrong), str(folder / "truth" / "drop_060_1.json")]) == 64
+    assert run(["score", str(wrong), str(folder / "truth" / "synthetic_060Hz_1.json")]) == 64
     assert "expected the JSON of 'rotordrop estimate'" in capsys.readouterr().err
     assert run(["score", str(wrong), str(wrong)]) == 64
     assert "is no truth file: it has no 'air_gap_m'" in capsys.readouterr().err

@@ -17,6 +17,7 @@ from rotordrop.identification.first_contact import FirstContact
 from rotordrop.identification.friction import FrictionSweep
 from rotordrop.machine import example_machine
 from rotordrop.report.agreement_tables import contact_time_table, window_table
+from rotordrop.report.estimate_numbers import identified_table
 from rotordrop.report.friction_sweep import friction_sweep_figure
 from rotordrop.report.page import render_page
 from rotordrop.report.quantity import Quantity
@@ -212,3 +213,11 @@ def test_the_page_is_complete(drop: ReplayDrop) -> None:
     for figure in ("Figs 7 and 8", "Fig. 10", "Fig. 12", "Fig. 13", "Fig. 14", "Fig. 15", "Fig. 16"):
         assert figure in html
     assert len(html.encode()) < 6_000_000
+
+
+def test_values_of_an_earlier_estimate_are_not_called_a_prior() -> None:
+    prior = IdentifiedValue(value=2e7, status="prior", unit="N/m")
+    values = {"support.stiffness_N_per_m": prior, "equivalent_stiffness_N_per_m": prior}
+    verdicts = {row[0]: row[2] for row in identified_table({"DE": values}, taken_over="a/drop_1.json").rows}
+    assert verdicts["support stiffness"] == "taken over from drop_1.json"
+    assert verdicts["equivalent stiffness, bearing and support"] == "prior"

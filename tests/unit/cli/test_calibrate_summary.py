@@ -1,0 +1,33 @@
+"""The table of a calibration shows every number in the unit of the report."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+from rich.console import Console
+
+from rotordrop.cli.calibrate import _summary
+from rotordrop.estimated import IdentifiedValue
+
+
+def test_a_calibrated_gap_and_stiffness_are_shown_in_display_units() -> None:
+    result: Any = SimpleNamespace(
+        values={
+            "DE.air_gap": IdentifiedValue(value=281e-6, interval_90=(270e-6, 292e-6), unit="m"),
+            "DE.support.stiffness": IdentifiedValue(value=2.5e7, interval_90=(2.0e7, 3.0e7), unit="N/m"),
+        },
+        identifiability=(),
+        confounded=(),
+        checks={},
+        sentence=lambda: "done",
+    )
+    out = Console(file=io.StringIO(), width=160)
+    _summary(result, Path("out.toml"), out)
+    text = out.file.getvalue()  # type: ignore[attr-defined]
+    assert "281 µm" in text
+    assert "25.0 N/µm" in text
+    assert "e-0" not in text
+    assert "e+0" not in text
