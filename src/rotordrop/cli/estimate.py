@@ -118,6 +118,12 @@ def _warnings(findings: Sequence[Finding], tail: Record | None, notes: Sequence[
     return list(dict.fromkeys((*words, *notes)))
 
 
+COUNTED_TWICE = (
+    "the machine was calibrated on a drop named {}: if it is this one, its readings count twice and the "
+    "intervals are too narrow; use the machine file from before the calibration for it"
+)
+
+
 def _tracked(
     machine: Machine,
     records: list[Record],
@@ -126,6 +132,7 @@ def _tracked(
     quick: bool,
     progress: Any,
 ) -> tuple[dict[str, dict[str, Any]], dict[str, ReportContent]]:
+    from rotordrop.estimation.calibrated import calibrated_on
     from rotordrop.estimation.document import tracked_document
     from rotordrop.estimation.tracked import estimate_tracked
     from rotordrop.report.estimate_page import tracked_page
@@ -135,8 +142,10 @@ def _tracked(
     drops = estimate_tracked(machine, records, tails, quick=quick, progress=progress)
     documents, pages = {}, {}
     for drop, found, tail in zip(drops, findings, tails, strict=True):
-        checks = () if quick else twin_cross_checks(drop)
+        checks = () if quick and drop.cross_check is None else twin_cross_checks(drop)
         words = _warnings(found, tail, drop.drop_instant.notes)
+        if drop.name in calibrated_on(machine):
+            words.append(COUNTED_TWICE.format(drop.name))
         documents[drop.name] = tracked_document(drop, machine, words)
         documents[drop.name]["simulated_record"] = bool(simulated_notice(drop.record))
         documents[drop.name]["cross_check"] = [

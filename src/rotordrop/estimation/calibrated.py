@@ -32,6 +32,9 @@ Progress = Callable[[str, float], None]
 CONFOUNDED = 0.9
 """Correlation from which two parameters are reported as confounded [1]."""
 
+CALIBRATED_ON = "calibrated on "
+"""How the source of a calibrated value begins; the names of the drops follow."""
+
 SEPARATED_BY: dict[frozenset[str], str] = {
     frozenset({"support.stiffness", "support.mass"}): (
         "a hammer test of the touchdown-bearing housing gives support frequency and stiffness"
@@ -105,6 +108,13 @@ class Calibration:
         return f"{text}; the model is not consistent with {', '.join(bad)}: intervals are doubled."
 
 
+def calibrated_on(machine: Machine) -> frozenset[str]:
+    """Names of the drops that the supports of a machine were calibrated on; empty where they were not."""
+    sources = [bearing.support.stiffness.source or "" for bearing in machine.touchdown_bearings]
+    told = [source.removeprefix(CALIBRATED_ON) for source in sources if source.startswith(CALIBRATED_ON)]
+    return frozenset(name for names in told for name in names.split(", "))
+
+
 def calibrate_machine(
     machine: Machine,
     records: Sequence[Record],
@@ -145,7 +155,7 @@ def calibrate_machine(
     mean = smoothed.means[at]
     widening = 1.0 if consistent else INCONSISTENT_WIDENING
     values = _values(problem, mean, covariance, widening, len(stems))
-    fitted = machine_values(at_fitted_exponents(machine, values), f"calibrated on {', '.join(stems)}")
+    fitted = machine_values(at_fitted_exponents(machine, values), f"{CALIBRATED_ON}{', '.join(stems)}")
     return Calibration(
         machine=_possible(machine, fitted, stems),
         values=values,

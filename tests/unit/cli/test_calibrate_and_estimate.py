@@ -13,6 +13,7 @@ import pytest
 
 from rotordrop.cli.app import INTERRUPTED, run
 from rotordrop.errors import UsageError
+from rotordrop.estimation.calibrated import calibrated_on
 from rotordrop.estimation.schema import estimate_schema
 from rotordrop.estimation.tracked import is_calibrated
 from rotordrop.machine import example_path, load_machine
@@ -70,6 +71,7 @@ def interrupted(title: str) -> Any:
 def test_the_calibrated_machine_loads_with_intervals_and_provenance(folder: Path) -> None:
     before, machine = load_machine(LP400), load_machine(folder / "calibrated.toml")
     assert is_calibrated(machine) and not is_calibrated(before)
+    assert calibrated_on(machine) == {"drop_060"} and not calibrated_on(before)
     found = json.loads((folder / "calibration.json").read_text())["values"]
     for b, bearing in enumerate(machine.touchdown_bearings):
         for path in ("stiffness", "mass", "damping"):
@@ -103,6 +105,8 @@ def test_quick_estimate_writes_numbers_and_report(
     written = json.loads(out.read_text())
     jsonschema.Draft202012Validator(estimate_schema()).validate(written)
     assert written["method"] == "tracked"
+    twice = [warning for warning in written["warnings"] if "its readings count twice" in warning]
+    assert len(twice) == 1 and "calibrated on a drop named drop_060" in twice[0]
     for name in ("NDE", "DE"):
         entry = written["bearings"][name]["peak_force_N"]
         low, high = entry["interval_90"]
