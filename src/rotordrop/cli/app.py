@@ -6,13 +6,15 @@ Exit codes: 0 done, 2 machine file, 3 recording, 4 identification, 5 simulation,
 
 from __future__ import annotations
 
+import atexit
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from difflib import get_close_matches
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -136,7 +138,37 @@ def main() -> None:
     """Entry point of the command ``rotordrop``."""
     for name in ONE_THREAD:
         os.environ.setdefault(name, "1")
-    sys.exit(run(sys.argv[1:]))
+    pressed: list[int] = []
+
+    def interrupt(number: int, _frame: object) -> None:
+        pressed.append(number)
+        raise KeyboardInterrupt
+
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, interrupt)
+    try:
+        code = run(sys.argv[1:])
+    except Exception:
+        if not pressed:  # numba turns a KeyboardInterrupt while it compiles into a RuntimeError
+            raise
+        code = _fail("stopped; nothing was left half written", INTERRUPTED)
+    if code == INTERRUPTED:
+        _leave_interrupted()
+    sys.exit(code)
+
+
+def _leave_interrupted() -> NoReturn:
+    """End with 130 whatever was interrupted.
+
+    Python remembers a KeyboardInterrupt that passed through an ``exec``, as in imports that build
+    classes, and then kills itself with SIGINT although it was caught. So what is registered for the
+    end runs here.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    atexit._run_exitfuncs()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(INTERRUPTED)
 
 
 def _fail(message: str, code: int) -> int:

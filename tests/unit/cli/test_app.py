@@ -171,6 +171,30 @@ def test_ctrl_c_in_the_real_command_ends_with_130():
     assert signal.SIGINT.name not in done.stderr
 
 
+@pytest.mark.skipif(os.name != "posix", reason="signals as on POSIX")
+@pytest.mark.parametrize(
+    "fault",
+    [
+        "raise KeyboardInterrupt",
+        "import os, signal\ntry:\n os.kill(os.getpid(), signal.SIGINT)\nfinally:\n"
+        " raise RuntimeError('not compiled')",
+    ],
+)
+def test_ctrl_c_inside_generated_code_ends_with_130(fault):
+    """Python kills itself with SIGINT after an interrupt inside an exec, even one that was caught."""
+    program = (
+        "import sys\n"
+        "from rotordrop.cli import app\n"
+        f"app.load_verb = lambda name: exec({fault!r})\n"
+        "app.verbs = lambda: {'wait': 'Wait'}\n"
+        "sys.argv = ['rotordrop', 'wait']\n"
+        "app.main()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 130
+    assert done.stderr.strip() == "rotordrop: stopped; nothing was left half written"
+
+
 @pytest.mark.parametrize(("text", "value"), [("280 um", 280e-6), ("0.28 mm", 280e-6), (280e-6, 280e-6)])
 def test_a_quantity_on_the_command_line_arrives_in_si(text, value):
     assert quantity("length")(text) == pytest.approx(value)

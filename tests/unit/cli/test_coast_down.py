@@ -272,3 +272,9 @@ def test_ctrl_c_says_how_to_go_on(machine, tmp_path, monkeypatch, capsys):
     output = tmp_path / "c.h5"
     assert run(["coast-down", machine, "--speed", "60 Hz", "--output", str(output)]) == 130
     assert "go on with --resume" in " ".join(capsys.readouterr().err.split())
+
+
+def test_a_coast_down_runs_on_the_machine_that_init_writes(tmp_path):
+    target = str(tmp_path / "machine.toml")
+    assert run(["init", target]) == 0
+    assert run(["coast-down", target, "--speed", "60 Hz", "--until", "0.02 s"]) == 0
