@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import h5py
 import jsonschema
 import pytest
 
@@ -48,6 +49,15 @@ def folder(shortened: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
     arguments = ["calibrate", LP400, RECORD, "--tail", TAIL, "--output", str(place / "calibrated.toml")]
     assert run([*arguments, "--json", str(place / "calibration.json")]) == 0
     return place
+
+
+def another_drop(place: Path) -> Path:
+    """A file that reads like the bundled record and is not the same."""
+    copy = place / "second.h5"
+    copy.write_bytes(Path(RECORD).read_bytes())
+    with h5py.File(copy, "r+") as file:
+        file.attrs["remark"] = "another drop"
+    return copy
 
 
 def words(text: str) -> str:
@@ -137,8 +147,7 @@ def test_the_full_estimate_sets_the_cross_check_beside_it(folder: Path, tmp_path
 def test_several_records_give_machine_and_drops(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    copy = tmp_path / "second.h5"
-    copy.write_bytes(Path(RECORD).read_bytes())
+    copy = another_drop(tmp_path)
     page = tmp_path / "page.html"
     arguments = ["estimate", str(folder / "calibrated.toml"), RECORD, str(copy), "--tail", TAIL, "--quick"]
     assert run([*arguments, "--json", "-", "--report", str(page)]) == 0
@@ -174,8 +183,7 @@ def test_a_stopped_estimate_leaves_an_earlier_one_alone(
 def test_tails_must_fit_the_records(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     tails = ["--tail", TAIL, "--tail", TAIL, "--tail", TAIL]
     expected = "3 tails for 2 records; expected one for all, one for each, or none."
-    second = tmp_path / "second.h5"
-    second.write_bytes(Path(RECORD).read_bytes())
+    second = another_drop(tmp_path)
     assert run(["estimate", LP400, RECORD, str(second), *tails]) == USAGE
     assert expected in words(capsys.readouterr().err)
     output = tmp_path / "out.toml"
@@ -230,6 +238,18 @@ def test_quick_needs_a_calibrated_machine(capsys: pytest.CaptureFixture[str]) ->
 
 
 @pytest.mark.parametrize("verb", ["estimate", "calibrate"])
+@pytest.mark.parametrize("verb", ["estimate", "calibrate"])
+def test_one_recording_under_two_names_is_refused(
+    verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    copy, output = tmp_path / "copy.h5", tmp_path / "out.toml"
+    copy.write_bytes(Path(RECORD).read_bytes())
+    place = ["--output" if verb == "calibrate" else "--json", str(output)]
+    assert run([verb, LP400, RECORD, str(copy), *place]) == USAGE
+    assert "are the same recording (equal content)" in words(capsys.readouterr().err)
+    assert not output.exists()
+
+
 def test_two_records_of_one_name_are_refused(
     verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
