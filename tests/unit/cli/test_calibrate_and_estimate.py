@@ -238,7 +238,6 @@ def test_quick_needs_a_calibrated_machine(capsys: pytest.CaptureFixture[str]) ->
 
 
 @pytest.mark.parametrize("verb", ["estimate", "calibrate"])
-@pytest.mark.parametrize("verb", ["estimate", "calibrate"])
 def test_one_recording_under_two_names_is_refused(
     verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -250,6 +249,7 @@ def test_one_recording_under_two_names_is_refused(
     assert not output.exists()
 
 
+@pytest.mark.parametrize("verb", ["estimate", "calibrate"])
 def test_two_records_of_one_name_are_refused(
     verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
