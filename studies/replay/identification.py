@@ -1,6 +1,6 @@
 """Supports and air gap from synthetic records, everything else known.
 
-    python studies/replay/identification.py [--first 1100] [--count 12]
+    python studies/replay/identification.py [--first 1120] [--count 12]
 
 Sensors with ordinary noise, hum, runout and 16 bits, but without zero and gain errors. One file for all
 seeds in ``results``; it is written anew after every record.
@@ -119,7 +119,7 @@ def summary(records: list[dict[str, Any]]) -> dict[str, Any]:
 def main() -> None:
     """Run the seeds named on the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--first", type=int, default=1100)
+    parser.add_argument("--first", type=int, default=1120)
     parser.add_argument("--count", type=int, default=12)
     options = parser.parse_args()
     records: list[dict[str, Any]] = []

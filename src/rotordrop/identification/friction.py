@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rotordrop.estimated import IdentifiedValue
 from rotordrop.identification.parameter_vector import FRICTION
-from rotordrop.identification.support import WIDENING, ImpactFit
+from rotordrop.identification.support import ImpactFit
 
 Array = NDArray[np.float64]
 
@@ -30,6 +30,9 @@ START_SPREAD = 1e-6
 
 TENFOLD = 33e-3
 """Time in which small differences grow tenfold [s]."""
+
+SCATTER_WIDENING = 2.0
+"""Factor on the scatter of the best coefficient between draws [1]."""
 
 NINETY = 1.6448536269514722
 
@@ -160,7 +163,7 @@ def _lowest(coefficients: Array, values: Array) -> float:
 def _value(problem: ImpactFit, best: Array, coefficients: Array) -> IdentifiedValue:
     value = float(best[0])
     grid = float(coefficients[1] - coefficients[0]) / np.sqrt(12.0)
-    error = WIDENING * float(np.hypot(np.std(best, ddof=1), 0.1 * grid)) if len(best) > 2 else grid
+    error = SCATTER_WIDENING * float(np.hypot(np.std(best, ddof=1), 0.1 * grid)) if len(best) > 2 else grid
     low, high = float(coefficients[0]), float(coefficients[-1])
     unknown = problem.vector.unknowns[problem.vector.place(FRICTION)]
     at_bound = value in (low, high)
