@@ -96,20 +96,19 @@ def left_out(drops: Sequence[ComparedDrop]) -> dict[str, str]:
         If one recording was estimated twice in the same way.
     """
     reasons: dict[str, str] = {}
-    first: dict[str, ComparedDrop] = {}
-    for drop in drops:
-        twin = first.setdefault(drop.record, drop) if drop.record else drop
+    counted: dict[str, ComparedDrop] = {}
+    for drop in sorted(drops, key=lambda one: not one.consistent):
+        twin = counted.setdefault(drop.record, drop) if drop.record else drop
         if twin is not drop and twin.method == drop.method:
             raise UsageError(
                 f"{twin.name} and {drop.name} are estimates of the same recording; expected another drop in "
                 "each. Leave one of them out."
             )
-        if twin is not drop:
-            reasons[drop.name] = (
-                f"the same recording as {twin.name}, estimated by {drop.method or 'another way'}"
-            )
-        elif not drop.consistent:
+        if not drop.consistent:
             reasons[drop.name] = "its model is not consistent with its record"
+        elif twin is not drop:
+            way = drop.method or "another way"
+            reasons[drop.name] = f"the same recording as {twin.name}, estimated by {way}"
     return reasons
 
 

@@ -143,6 +143,8 @@ def test_one_recording_estimated_twice_is_refused_or_counts_once() -> None:
     other = replace(same, method="replay")
     assert left_out((one, other, DROPS[0])) == {"same": "the same recording as one, estimated by replay"}
     assert left_out((marked("x"), marked("y"))) == {}
+    lost = replace(one, consistent=False)
+    assert set(left_out((lost, other, DROPS[0]))) == {"one"}
 
 
 def test_consistency_and_recording_are_read_from_the_estimate() -> None:
