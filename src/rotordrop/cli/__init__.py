@@ -3,3 +3,8 @@
 A verb ``coast-down`` is the function ``coast_down`` in ``coast_down.py``; the first line of that file is what
 ``rotordrop --help`` shows. Files whose name begins with an underscore are shared by the verbs.
 """
+
+INTERRUPTED = 130
+"""Exit code after Ctrl-C."""
+
+STOPPED = "stopped; nothing was left half written"

@@ -20,12 +20,14 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from rotordrop._version import __version__
+from rotordrop.cli import INTERRUPTED as INTERRUPTED
+from rotordrop.cli import STOPPED
+from rotordrop.cli._interruption import interruptions_kept
 from rotordrop.errors import RotordropError, UsageError
 
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """Our matrices are small: threads inside linear algebra cost more than they give, above all on busy cores."""
 
-INTERRUPTED = 130
 BROKEN_PIPE = 141
 
 _ORDER = (
@@ -122,7 +124,7 @@ def run(arguments: Sequence[str]) -> int:
     except _CallError as error:
         return _fail(_call_message(error), UsageError.exit_code)
     except (KeyboardInterrupt, typer.Abort):
-        return _fail("stopped; nothing was left half written", INTERRUPTED)
+        return _fail(STOPPED, INTERRUPTED)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return BROKEN_PIPE
@@ -138,20 +140,13 @@ def main() -> None:
     """Entry point of the command ``rotordrop``."""
     for name in ONE_THREAD:
         os.environ.setdefault(name, "1")
-    pressed: list[int] = []
-
-    def interrupt(number: int, _frame: object) -> None:
-        pressed.append(number)
-        raise KeyboardInterrupt
-
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, interrupt)
-    try:
-        code = run(sys.argv[1:])
-    except Exception:
-        if not pressed:  # numba turns a KeyboardInterrupt while it compiles into a RuntimeError
-            raise
-        code = _fail("stopped; nothing was left half written", INTERRUPTED)
+    with interruptions_kept() as was_pressed:
+        try:
+            code = run(sys.argv[1:])
+        except Exception:
+            if not was_pressed():  # the compiler turns an interrupt into an error of its own
+                raise
+            code = _fail(STOPPED, INTERRUPTED)
     if code == INTERRUPTED:
         _leave_interrupted()
     sys.exit(code)

@@ -195,6 +195,66 @@ def test_ctrl_c_inside_generated_code_ends_with_130(fault):
     assert done.stderr.strip() == "rotordrop: stopped; nothing was left half written"
 
 
+@pytest.mark.skipif(os.name != "posix", reason="signals as on POSIX")
+@pytest.mark.parametrize("then", ["raise RuntimeError('no compiled object yet')", "while True: pass"])
+def test_ctrl_c_that_foreign_code_ignores_ends_with_130(then):
+    """The compiler calls back into Python; an interrupt is ignored there, what follows fails or goes on."""
+    fault = (
+        "import ctypes, os, signal\n"
+        "callback = ctypes.CFUNCTYPE(None)(lambda: os.kill(os.getpid(), signal.SIGINT))\n"
+        f"callback()\n{then}"
+    )
+    program = (
+        "import sys\n"
+        "from rotordrop.cli import app\n"
+        f"app.load_verb = lambda name: exec({fault!r}, {{}})\n"
+        "app.verbs = lambda: {'wait': 'Wait'}\n"
+        "sys.argv = ['rotordrop', 'wait']\n"
+        "app.main()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=20)
+    assert done.returncode == 130
+    assert done.stderr.strip() == "rotordrop: stopped; nothing was left half written"
+
+
+def test_ctrl_c_while_the_command_itself_is_loaded_ends_with_130():
+    program = (
+        "import sys\n"
+        "class Interrupted:\n"
+        "    def find_spec(self, name, *rest):\n"
+        "        if name == 'typer':\n"
+        "            raise KeyboardInterrupt\n"
+        "sys.meta_path.insert(0, Interrupted())\n"
+        "from rotordrop.__main__ import main\n"
+        "main()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=20)
+    assert done.returncode == 130
+    assert done.stderr == "rotordrop: stopped; nothing was left half written\n"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals as on POSIX")
+@pytest.mark.parametrize("seconds", [2.0, 5.0, 8.0])
+def test_ctrl_c_while_a_cold_cache_is_compiled_ends_with_130(tmp_path, seconds):
+    machine = str(tmp_path / "machine.toml")
+    assert command_line.run(["init", machine]) == 0
+    output = tmp_path / "drop.h5"
+    process = subprocess.Popen(
+        [sys.executable, "-m", "rotordrop", "simulate", machine, "--speed=60 Hz", "--output", str(output)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "NUMBA_DISABLE_JIT": "0"},
+    )
+    with pytest.raises(subprocess.TimeoutExpired):
+        process.wait(timeout=seconds)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=20)
+    assert (process.returncode, out) == (130, "")
+    assert err.strip() == "rotordrop: stopped; nothing was left half written"
+    assert [path.name for path in tmp_path.iterdir() if path.suffix != ".toml"] == ["cache"]
+
+
 @pytest.mark.parametrize(("text", "value"), [("280 um", 280e-6), ("0.28 mm", 280e-6), (280e-6, 280e-6)])
 def test_a_quantity_on_the_command_line_arrives_in_si(text, value):
     assert quantity("length")(text) == pytest.approx(value)
