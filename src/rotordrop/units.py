@@ -58,7 +58,9 @@ KINDS: dict[str, Kind] = {
     "rotational_stiffness": Kind(unit="N m", example="10 N m/rad", scales=((1.0, "N m/rad"),)),
     "rotational_drag": Kind(unit="N m s", example="1e-4 N m s", scales=((1.0, "N m s"),)),
     "quadratic_drag": Kind(unit="N m s^2", example="1e-6 N m s^2", scales=((1.0, "N m s²"),)),
-    "contact_stiffness": Kind(unit="N/m^n", example="1.05e9 N/m^1.11", scales=((1.0, "N/m^n"),)),
+    "contact_stiffness": Kind(
+        unit="N/m^n", example="1.05e9 N/m^1.11", scales=((1e9, "GN/mⁿ"), (1e6, "MN/mⁿ"), (1.0, "N/mⁿ"))
+    ),
     "contact_damping": Kind(unit="s/m", example="0.1 s/m", scales=((1.0, "s/m"),)),
     "voltage": Kind(unit="V", example="5 V", scales=_metric("V", "k", "", "m", "µ")),
     "voltage_sensitivity": Kind(unit="V/m", example="8 mV/um", scales=((1e3, "mV/µm"),)),

@@ -5,6 +5,7 @@ Reads truth files of 'rotordrop synthesize' and those that come with the supplie
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -92,9 +93,9 @@ def _cells(where: str, path: str, entry: dict[str, Any]) -> tuple[str, ...]:
     absolute = format_quantity(entry["error"], kind, digits=2)
     error = absolute
     if relative is not None and path != "drop_instant_s":
-        error = f"{absolute} ({100.0 * relative:+.2g} %)"
+        error = f"{absolute} ({percent(relative, sign=True)})"
     held = {True: "holds", False: "misses", None: ""}[entry.get("covered")]
-    width = f" (± {100.0 * entry['half_width']:.2g} %)" if "half_width" in entry else ""
+    width = f" (± {percent(entry['half_width'])})" if "half_width" in entry else ""
     return (
         f"{where}{words}",
         format_quantity(entry["estimate"], kind, digits=4),
@@ -107,4 +108,19 @@ def _cells(where: str, path: str, entry: dict[str, Any]) -> tuple[str, ...]:
 def _impact_line(name: str, impacts: dict[str, Any]) -> str:
     median = impacts["median_absolute_error"]
     text = f"{name}: {impacts['found']} of {impacts['true_impacts']} impacts above 500 N found"
-    return text if median is None else f"{text}, median error of their peaks {100.0 * median:.2g} %"
+    return text if median is None else f"{text}, median error of their peaks {percent(median)}"
+
+
+def percent(share: float, *, sign: bool = False) -> str:
+    """Write a share [1] in percent with two digits that count, never with a power of ten.
+
+    Examples
+    --------
+    >>> percent(1.53), percent(0.0231, sign=True)
+    ('153 %', '+2.3 %')
+    """
+    number = 100.0 * share
+    if not math.isfinite(number):
+        return "– %"
+    places = 0 if number == 0.0 else min(max(0, 1 - math.floor(math.log10(abs(number)))), 3)
+    return f"{number:{'+' if sign else ''}.{places}f} %"

@@ -47,5 +47,6 @@ def simulated_coast_down(path: Path, machine: Machine | None = None) -> CoastDow
         speed_time=time,
         speed=speed,
         recorded=False,
+        standstill=result.standstill_time,
         force_and_stress=tuple(maximum.as_json() for maximum in result.maxima()),
     )

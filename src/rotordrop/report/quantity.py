@@ -20,7 +20,7 @@ DISPLAY: dict[str, tuple[float, str]] = {
     "impulse": (1.0, "N s"),
     "energy": (1.0, "J"),
     "inertia": (1e-6, "kg mm²"),
-    "contact_stiffness": (1e9, "× 10⁹ N/m^n"),
+    "contact_stiffness": (1e9, "GN/mⁿ"),
     "short_time": (1e-6, "µs"),
     "voltage_sensitivity": (1e3, "mV/µm"),
     "share": (1e-2, "%"),
@@ -175,6 +175,20 @@ def written(value: float, places: int | None) -> str:
         if text.startswith("-0") and not text.strip(f"-0.{THIN_SPACE}")
         else text.replace("-", "−")
     )
+
+
+def with_error(value: float, error: float | None, unit: str) -> str:
+    """Write a number with its standard error, both to two digits of the error; without one to three places.
+
+    Examples
+    --------
+    >>> with_error(28.7613, 0.0113, "Hz")
+    '28.761 ± 0.011 Hz'
+    """
+    if error is None or not math.isfinite(error) or error <= 0.0:
+        return f"{written(value, 3)} {unit}"
+    places = min(12, max(0, 1 - _magnitude(error)))
+    return f"{written(value, places)} ± {written(error, places)} {unit}"
 
 
 def _superscript(number: int) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from rotordrop._version import __version__
 from rotordrop.report.coast_down_figures import displacement_history_figure, speed_law_figure
 from rotordrop.report.content import Card, Figure, KeyFigure, ReportContent, Section, Statement, Table
-from rotordrop.report.quantity import Quantity
+from rotordrop.report.quantity import Quantity, with_error
 from rotordrop.report.waterfall_figure import order_figure, waterfall_figure
 from rotordrop.spectrum.coast_down import RACES_SPUN_UP, SHORTEST_LAW
 from rotordrop.spectrum.indentation import held_maximum
@@ -113,8 +113,11 @@ def _verdict(analysis: CoastDownAnalysis) -> tuple[Statement, ...]:
 def _standstill(law: SpeedLaw) -> str:
     stop = law.standstill
     if stop.status != "determined":
-        return f"When the rotor stopped is open: {stop.status}."
-    low, high = stop.interval_90 or (stop.value, stop.value)
+        turned = stop.value if stop.lower is None else stop.lower
+        return f"When the rotor stopped is open: {stop.status}. It turned until {turned:.1f} s at least."
+    if stop.interval_90 is None:
+        return f"The rotor stopped {stop.value:.2f} s after power-off."
+    low, high = stop.interval_90
     return f"The rotor stopped {stop.value:.1f} s after power-off (90 %: {low:.1f} to {high:.1f} s)."
 
 
@@ -161,16 +164,17 @@ def line_table(analysis: CoastDownAnalysis) -> Table:
         rows=tuple(rows),
         caption="Lines found, strongest first",
         note="Amplitudes are those in the direction and plane where they are largest, root mean "
-        "square over the time the line was seen.",
+        "square over the time the line was seen. ± is one standard error, never less than what a line "
+        "seen that long can be told apart by: one over that time (for an order, one over the turns in it), "
+        "divided by √12. X is the order, the multiple of the rotor's speed.",
     )
 
 
 def _where(line: Line) -> str:
     """Order or frequency of a line with its error."""
     if line.order is None:
-        return f"{line.frequency:.2f} ± {line.frequency_error:.2g} Hz"
-    error = line.order_error
-    return f"{line.order:.3f}X" + (f" ± {error:.2g}" if error is not None and np.isfinite(error) else "")
+        return with_error(line.frequency, line.frequency_error, "Hz")
+    return with_error(line.order, line.order_error, "X")
 
 
 def _displacement_section(analysis: CoastDownAnalysis) -> Section:

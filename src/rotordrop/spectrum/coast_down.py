@@ -86,6 +86,8 @@ class CoastDownSignal:
         Speed as it was recorded or simulated [s], [rad/s].
     recorded : bool
         False for a simulation.
+    standstill : float or None
+        When the rotor stopped [s], where that is known and need not be found, as in a simulation.
     force_and_stress : tuple of dict
         When indentation, force and stress were largest, one entry per bearing and quantity, as a simulation
         knows it; empty for a recording, which shows displacement only.
@@ -99,6 +101,7 @@ class CoastDownSignal:
     speed_time: Array | None
     speed: Array | None
     recorded: bool
+    standstill: float | None = None
     force_and_stress: tuple[Mapping[str, Any], ...] = ()
 
 
@@ -298,10 +301,13 @@ def _speed_law(signal: CoastDownSignal) -> SpeedLaw | None:
     time, speed = signal.speed_time, signal.speed
     if time is None or speed is None or time[-1] < RACES_SPUN_UP + SHORTEST_LAW:
         return None
+    stopped = signal.standstill
     return SpeedLaw(
         exponential=fit_exponential(time, speed, start=RACES_SPUN_UP),
         drag=fit_drag(time, speed, start=RACES_SPUN_UP),
-        standstill=find_standstill(time, speed),
+        standstill=find_standstill(time, speed)
+        if stopped is None
+        else IdentifiedValue(value=stopped, lower=stopped, upper=stopped, unit="s"),
     )
 
 

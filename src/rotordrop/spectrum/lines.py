@@ -37,9 +37,11 @@ class Line:
         Probability that line and name are right [1].
     reason : str
     frequency, frequency_error : float
-        Mean frequency over the time it was seen [Hz], weighted by power.
+        Mean frequency over the time it was seen [Hz], weighted by power, and its standard error: never less
+        than the resolution of that time, which is one over it, divided by √12.
     order, order_error : float or None
-        Multiple of the rotor speed [1]; None for a steady line.
+        Multiple of the rotor speed [1], and its standard error, with the turns in place of the time; None for
+        a steady line.
     drift : tuple of float
         Lowest and highest frequency of a steady line over its time [Hz].
     width : float
@@ -112,6 +114,9 @@ class Line:
             ],
         }
 
+
+EVEN = 1.0 / math.sqrt(12.0)
+"""Standard deviation of what may lie anywhere in an interval, over the length of the interval [1]."""
 
 SWING_ERROR = 0.05
 """How well the frequency of a wandering swing is known at any time [Hz]."""
@@ -308,6 +313,10 @@ def _evidence(found: FoundLine, plane: str, bands: tuple[float, float]) -> LineE
 
 
 def _line(found: FoundLine, plane: str, name: Name) -> Line:
+    least = EVEN / max(found.last_seen - found.first_seen, 1e-9)
+    order_error = found.order_error
+    if found.order is not None and order_error is not None:
+        order_error = max(order_error, least * found.order / found.frequency)
     return Line(
         kind=found.kind,
         label=name.label,
@@ -315,9 +324,9 @@ def _line(found: FoundLine, plane: str, name: Name) -> Line:
         confidence=name.confidence * found.existence,
         reason=name.reason,
         frequency=found.frequency,
-        frequency_error=found.frequency_error,
+        frequency_error=max(found.frequency_error, least),
         order=found.order,
-        order_error=found.order_error,
+        order_error=order_error,
         drift=found.drift,
         width=found.width,
         amplitude=float(found.amplitude.max()),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from dataclasses import replace
 from importlib.resources import files
 
 import h5py
@@ -14,13 +15,16 @@ import pytest
 from rotordrop.cli.app import run
 from rotordrop.errors import RecordError
 from rotordrop.estimation.recorded_coast_down import recorded_coast_down, with_recorded_drag
+from rotordrop.estimation.simulated_coast_down import simulated_coast_down
 from rotordrop.machine import example_machine, example_path, load_machine, save_machine
 from rotordrop.measurement.record import read_record
 from rotordrop.model.parameters import build_drop_model
+from rotordrop.report.waterfall_page import waterfall_page
 from rotordrop.simulation.case import CentredStart
 from rotordrop.simulation.checkpoint import work_folder
 from rotordrop.simulation.coast_down import simulate_coast_down
 from rotordrop.simulation.coast_down_case import CoastDownCase
+from rotordrop.spectrum.coast_down import analyse_coast_down
 
 PAPER = str(example_path("paper"))
 
@@ -114,6 +118,13 @@ def test_waterfall_reads_a_simulated_coast_down(coast, machine, tmp_path, capsys
     assert "held the maximum" in told and "the largest Hertz stress of" in told
     kinds = [(entry["bearing"], entry["quantity"]) for entry in found["force_and_stress"]]
     assert ("DE", "bearing force") in kinds and len(kinds) == 6
+    for line in found["lines"]:
+        seen = line["last_seen_s"] - line["first_seen_s"]
+        known = line["frequency_error_hz"]  # null where it is open
+        assert known is None or known >= 0.288 / seen, "no line is known better than the time it was seen"
+        turns = seen * line["frequency_hz"] / (line["order"] or 1.0)
+        assert line["order_error"] is None or line["order_error"] >= 0.288 / turns
+    assert found["lines"] and not re.search(r"± \S*e-", told)
     with h5py.File(files["h5"]) as file:
         plane = file["planes/DE"]
         amplitude = plane["waterfall_x/amplitude"]
@@ -123,6 +134,29 @@ def test_waterfall_reads_a_simulated_coast_down(coast, machine, tmp_path, capsys
         peak = found["planes"]["DE"]["largest_displacement_m"]
         assert np.max(plane["displacement/largest"]) == pytest.approx(peak, rel=1e-12)
         assert file["speed/speed"][0] == pytest.approx(2.0 * math.pi * 60.0, rel=1e-6)
+
+
+def test_a_simulated_coast_down_knows_when_it_stopped(coast, tmp_path):
+    assert simulated_coast_down(coast["h5"]).standstill is None
+    path = tmp_path / "stopped.h5"
+    path.write_bytes(coast["h5"].read_bytes())
+    with h5py.File(path, "r+") as file:
+        file.attrs["standstill_time"] = 2.34
+    assert simulated_coast_down(path).standstill == 2.34
+
+
+@pytest.mark.parametrize(
+    ("standstill", "sentence"),
+    [
+        (12.34, "The rotor stopped 12.34 s after power-off."),
+        (None, r"When the rotor stopped is open: the record does not determine it. It turned until 5.0 s at"),
+    ],
+)
+def test_the_page_says_when_the_rotor_stopped(standstill, sentence, tmp_path):
+    machine = example_machine("lp400")
+    signal = recorded_coast_down(machine, read_record(recorded(tmp_path / "r.csv", seconds=5.0), machine))
+    page = waterfall_page(analyse_coast_down(replace(signal, standstill=standstill), ()), title="stop")
+    assert sentence in " ".join(statement.text for statement in page.verdict)
 
 
 def test_critical_speeds_of_the_paper(tmp_path, capsys):

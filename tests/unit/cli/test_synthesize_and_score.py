@@ -7,6 +7,7 @@ import json
 import pytest
 
 from rotordrop.cli.app import run
+from rotordrop.cli.score import percent
 from rotordrop.machine import example_path
 
 LP400 = str(example_path("lp400"))
@@ -78,9 +79,17 @@ def test_a_score_is_a_table_with_units_and_a_sentence(folder, tmp_path, capsys):
     assert run(["score", str(estimate), str(folder / "truth" / "synthetic_060Hz_1.json")]) == 0
     out = capsys.readouterr().out
     assert "NDE peak bearing force" in out
-    assert "(+2 %)" in out
+    assert "(+2.0 %)" in out
     assert "holds (± 10 %)" in out
     assert "1 of 1 intervals of 90 % hold the true value." in out
+
+
+@pytest.mark.parametrize(
+    ("share", "sign", "text"),
+    [(1.53, False, "153 %"), (0.0231, True, "+2.3 %"), (-25.4, True, "-2540 %"), (0.0, False, "0 %")],
+)
+def test_a_percentage_is_a_plain_number(share, sign, text):
+    assert percent(share, sign=sign) == text
 
 
 def test_a_score_of_the_wrong_file_says_which_one_is_wanted(folder, tmp_path, capsys):

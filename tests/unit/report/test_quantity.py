@@ -7,7 +7,7 @@ import math
 import pytest
 
 from rotordrop.estimated import IdentifiedValue
-from rotordrop.report.quantity import Quantity, written
+from rotordrop.report.quantity import Quantity, with_error, written
 
 THIN = "\u202f"
 
@@ -22,7 +22,7 @@ THIN = "\u202f"
         (2 * math.pi * 60, "speed", f"60.00 Hz (3{THIN}600 rpm)"),
         (-math.pi / 2, "angle", "−90.00°"),
         (8.18e-3, "time", "8.180 ms"),
-        (3.78e9, "contact_stiffness", "3.780 × 10⁹ N/m^n"),
+        (3.78e9, "contact_stiffness", "3.780 GN/mⁿ"),
         (0.1, "dimensionless", "0.1000"),
         (1316, "count", f"1{THIN}316"),
         (0.948, "share", "94.80 %"),
@@ -67,3 +67,16 @@ def test_a_standard_error_alone_is_named_as_one() -> None:
 )
 def test_written_numbers(value: float, places: int, text: str) -> None:
     assert written(value, places) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "text"),
+    [
+        (28.7613, 0.0113, "28.761 ± 0.011 Hz"),
+        (59.13, 0.314, "59.13 ± 0.31 Hz"),
+        (59.13, None, "59.130 Hz"),
+        (59.13, math.inf, "59.130 Hz"),
+    ],
+)
+def test_a_number_has_the_digits_of_its_error(value: float, error: float | None, text: str) -> None:
+    assert with_error(value, error, "Hz") == text
