@@ -107,6 +107,9 @@ EXPONENTS = (1.0, 2.0)
 EXPONENT_SIGMA = 0.1
 """Prior standard deviation of the logarithm of the contact exponent [1]: 10/9 for a line, 3/2 for a point."""
 
+LEAST_EXPONENT_SIGMA = 0.01
+"""The same of an exponent that was calibrated [1]: no drop says more of it."""
+
 TYPICAL_FORCE = 1500.0
 """Contact force at whose indentation the stiffness keeps its meaning when the exponent differs [N]."""
 
@@ -223,7 +226,7 @@ def _exponent(bearing: TouchdownBearing, row: int) -> Unknown:
     return Unknown(
         path=f"{bearing.name}.contact.exponent",
         mean=math.log(float(quantity)),
-        sigma=EXPONENT_SIGMA if known is None else math.log(known[1] / known[0]) / (2.0 * NINETY),
+        sigma=EXPONENT_SIGMA if known is None else _known_sigma(known),
         logarithmic=True,
         scope="machine",
         targets=(
@@ -233,6 +236,11 @@ def _exponent(bearing: TouchdownBearing, row: int) -> Unknown:
         unit="1",
         calibrated=quantity.status == "estimated",
     )
+
+
+def _known_sigma(interval: tuple[float, float]) -> float:
+    """Prior standard deviation [1] of the logarithm; an interval that ends at a bound may have no width."""
+    return max(math.log(interval[1] / interval[0]) / (2.0 * NINETY), LEAST_EXPONENT_SIGMA)
 
 
 def _bearing_damping(bearing: TouchdownBearing, row: int) -> Unknown:

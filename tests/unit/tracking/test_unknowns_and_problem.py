@@ -28,6 +28,7 @@ from rotordrop.tracking.sensors import levitated_phase, without_hum_and_runout
 from rotordrop.tracking.transfer import transferred
 from rotordrop.tracking.unknowns import (
     GAP_SIGMA,
+    LEAST_EXPONENT_SIGMA,
     NINETY,
     RELATIVE_PRIOR,
     aero_time_constant,
@@ -391,3 +392,12 @@ def test_a_transferred_trajectory_keeps_the_motion_of_every_node(lp400, prepared
 def test_a_trajectory_carried_to_the_same_basis_is_the_same(flight, random):
     means = flight.mean + 1e-5 * random.standard_normal((3, len(flight.mean)))
     np.testing.assert_allclose(transferred(flight, flight, means), means, rtol=1e-9, atol=1e-16)
+
+
+def test_an_exponent_calibrated_at_its_bound_is_not_taken_for_exact(lp400: Machine) -> None:
+    bound = Estimated(value=1.0, status="estimated", interval_90=(1.0, 1.0))
+    unknowns = all_unknowns(
+        build_drop_model(lp400.with_values({"NDE.contact.exponent": bound}), Reduction(modes=4))
+    )
+    sigma = next(u.sigma for u in unknowns if u.path == "NDE.contact.exponent")
+    assert sigma == LEAST_EXPONENT_SIGMA
