@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -107,6 +108,11 @@ def impact_table(impacts: Sequence[Impact], *, force: str = CONTACT_FORCE, liste
     )
 
 
+def tick_spacing(span: float) -> float:
+    """Distance of azimuth ticks [°] for azimuths that span an angle [rad]: three labels at least."""
+    return next((step for step in (15.0, 30.0, 45.0) if math.degrees(span) <= 6.0 * step), 90.0)
+
+
 def impact_figure(impacts: Sequence[Impact], *, force: str = CONTACT_FORCE) -> go.Figure:
     """Draw the peak force of every impact over its azimuth, the earlier the darker, with known intervals."""
     bearings = list(dict.fromkeys(impact.bearing for impact in impacts))
@@ -114,7 +120,8 @@ def impact_figure(impacts: Sequence[Impact], *, force: str = CONTACT_FORCE) -> g
     latest = max(impact.time.value for impact in impacts)
     for column, bearing in enumerate(bearings, start=1):
         _add_impacts(figure, [impact for impact in impacts if impact.bearing == bearing], column, latest)
-    figure.update_xaxes(title_text=axis_title("azimuth from +x, −90° at the bottom", "°"), tick0=0, dtick=45)
+    figure.update_xaxes(title_text=axis_title("azimuth from +x, −90° at the bottom", "°"))
+    figure.update_xaxes(tick0=0, dtick=tick_spacing(np.ptp([impact.azimuth.value for impact in impacts])))
     figure.update_yaxes(title_text=axis_title(f"peak {force}", "N"), col=1)
     figure.update_yaxes(rangemode="tozero")
     figure.update_layout(

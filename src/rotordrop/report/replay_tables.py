@@ -20,8 +20,8 @@ def first_contact_table(contacts: Mapping[str, FirstContact]) -> Table:
     rows = tuple(
         (
             name,
-            Quantity(value=contact.start, kind="time", standard_error=contact.timing_error),
-            Quantity(value=contact.end, kind="time", standard_error=contact.timing_error),
+            Quantity(value=contact.start, kind="time", digits=4),
+            Quantity(value=contact.end, kind="time", digits=4),
             Quantity(value=contact.duration, kind="time", digits=3),
             Quantity(value=contact.indentation, kind="length", digits=3),
             Quantity(value=contact.mass, kind="mass"),
@@ -42,15 +42,23 @@ def first_contact_table(contacts: Mapping[str, FirstContact]) -> Table:
             "t₂",
             "T",
             "beyond the gap",
-            "equivalent mass",
+            "mass",
             "stiffness, eq. (17)",
-            "stiffness, gravity-corrected",
+            "gravity-corrected",
         ),
         rows=rows,
         caption="First contact (Neisi 2020, Table 3)",
-        note="Eq. (17) takes the contact for half a period; gravity lengthens it, and one contact can be "
-        "two. Both values serve as a start of the search only.",
+        note=f"{_timing(contacts)}Eq. (17) takes the contact for half a period; gravity lengthens it, and "
+        "one contact can be two. Both stiffnesses serve as a start of the search only.",
     )
+
+
+def _timing(contacts: Mapping[str, FirstContact]) -> str:
+    """Standard error of the contact times, the largest of all bearings."""
+    if not contacts:
+        return ""
+    error = Quantity(value=max(contact.timing_error for contact in contacts.values()), kind="time", digits=2)
+    return f"Standard error of t₁ and t₂: {error.text} or less. "
 
 
 def support_table(values: Mapping[str, IdentifiedValue]) -> Table:

@@ -170,7 +170,9 @@ def test_both_limits_of_the_gap_are_drawn_beside_the_measurement(drop: ReplayDro
 
 
 def test_table_3_has_the_paper_s_value_and_the_corrected_one() -> None:
-    row = first_contact_table({"NDE": CONTACT}).rows[0]
+    table = first_contact_table({"NDE": CONTACT})
+    assert table.note.startswith("Standard error of t₁ and t₂: ")
+    row = table.rows[0]
     texts = [cell.text if isinstance(cell, Quantity) else cell for cell in row]
     assert texts == [
         "NDE",

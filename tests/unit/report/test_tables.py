@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from rotordrop.report.content import Table
 from rotordrop.report.cross_check import CrossCheck, cross_check_statements, cross_check_table
-from rotordrop.report.impacts import impact_figure, impact_table, impacts_of
+from rotordrop.report.impacts import impact_figure, impact_table, impacts_of, tick_spacing
 from rotordrop.report.parameters import ParameterRow, parameter_figure, parameter_table
 from rotordrop.report.quantity import Quantity
 from rotordrop.report.record_quality import record_quality_section
@@ -61,6 +61,12 @@ def test_impacts_are_drawn_at_their_azimuth_with_their_interval(drop_result: Dro
     assert_allclose(drawn.data[0].error_y.arrayminus, [44.0])
     assert not drawn.data[1].error_y.visible
     assert_allclose(drawn.data[1].x, [-95.0, -110.0])
+    assert drawn.layout.xaxis.dtick == tick_spacing(np.deg2rad(20.0)) == 15.0
+
+
+@pytest.mark.parametrize(("span", "spacing"), [(0.0, 15.0), (90.0, 15.0), (91.0, 30.0), (300.0, 90.0)])
+def test_azimuth_has_a_few_labels_whatever_it_spans(span: float, spacing: float) -> None:
+    assert tick_spacing(np.deg2rad(span)) == spacing
 
 
 def row(name: str, prior: float, estimate: float, interval: tuple[float, float] | None) -> ParameterRow:
