@@ -10,7 +10,7 @@ from rotordrop._version import __version__
 from rotordrop.report.coast_down_figures import coast_down_speed_figure, statistics_figure
 from rotordrop.report.content import Card, Figure, KeyFigure, ReportContent, Section, Statement, Table
 from rotordrop.report.machine_sections import machine_sections
-from rotordrop.report.quantity import Quantity
+from rotordrop.report.quantity import Quantity, written
 from rotordrop.report.waterfall_page import frequency_sections
 from rotordrop.simulation.coast_down_result import QUANTITIES, CoastDownResult
 
@@ -45,7 +45,7 @@ def coast_down_page(
         title=f"Simulated coast-down of {result.machine_name}",
         subtitle=f"from {speed.text}, {end.text} after power-off",
         simulated="Everything on this page is computed from the machine description; nothing was measured.",
-        verdict=(*_verdict(result), *_certified(certificate)),
+        verdict=(*_verdict(result), *_settled(analysis), *_certified(certificate)),
         cards=tuple(_card(result, index) for index in range(len(result.bearing_names))),
         facts=_facts(result),
         summary=(maxima_table(result),),
@@ -71,9 +71,10 @@ def _verdict(result: CoastDownResult) -> tuple[Statement, ...]:
                 level="good",
             )
         )
+    missing, scale = _joules(result.energy_residual), _joules(abs(result.energy_scale))
     statements.append(
         Statement(
-            text=f"Energy balanced to {result.energy_residual:.2g} J of {abs(result.energy_scale):.4g} J "
+            text=f"Energy balanced to {missing} of {scale} "
             "over the whole coast-down. After about 50 ms a drop is chaotic: compare "
             "statistics, not histories.",
         )
@@ -89,6 +90,18 @@ def _verdict(result: CoastDownResult) -> tuple[Statement, ...]:
             )
         )
     return tuple(statements)
+
+
+def _settled(analysis: CoastDownAnalysis | None) -> tuple[Statement, ...]:
+    """When each plane came to lie in its bearing for good."""
+    planes = {} if analysis is None else analysis.planes
+    return tuple(
+        Statement(
+            text=f"{name} plane: {plane.settling.statement}",
+            level="good" if plane.settling.settled else "notice",
+        )
+        for name, plane in planes.items()
+    )
 
 
 def _certified(certificate: CoastDownCertificate | None) -> tuple[Statement, ...]:
@@ -151,7 +164,10 @@ def _facts(result: CoastDownResult) -> tuple[tuple[str, str], ...]:
         ("machine", result.machine_name),
         ("rotor basis", result.reduction),
         ("tolerance", f"{result.tolerance:g}"),
-        ("Runge–Kutta steps", f"{result.steps} taken, {result.rejected_steps} rejected"),
+        (
+            "Runge–Kutta steps",
+            f"{written(result.steps, 0)} taken, {written(result.rejected_steps, 0)} rejected",
+        ),
         ("rotordrop", __version__),
     ]
     if result.path is not None:
@@ -174,3 +190,7 @@ def _speed_section(result: CoastDownResult) -> Section:
         caption="Speed of rotor and races at the end of every second; dashed: standstill.",
     )
     return Section(heading="Speed", figures=(figure,))
+
+
+def _joules(energy: float) -> str:
+    return Quantity(value=energy, kind="energy", digits=3).text

@@ -25,6 +25,9 @@ LEAST_DISTANCE = 0.03
 COMPONENT_TITLES = {"x": "horizontal, x", "y": "vertical, y", "full": "full spectrum of x + jy"}
 TURN = 2.0 * math.pi
 
+TITLE_SHIFT = 40
+"""Room above a waterfall [px] for the frequencies of the lines, below its title."""
+
 
 def waterfall_figure(
     fall: Waterfall, plane: str, lines: Sequence[Line] = (), *, against: str = "time"
@@ -108,7 +111,10 @@ def order_figure(track: OrderTrack, plane: str) -> go.Figure:
             )
         )
     figure.update_xaxes(title_text=axis_title("rotor speed", "Hz"))
-    figure.update_yaxes(title_text=axis_title("amplitude, zero-to-peak", "µm"), type="log")
+    # Without the powers the axis would show "100µ" beside its unit µm.
+    figure.update_yaxes(
+        title_text=axis_title("amplitude, zero-to-peak", "µm"), type="log", exponentformat="power", dtick=1
+    )
     return fit_legend(figure)
 
 
@@ -137,8 +143,10 @@ def _colour_bar(shown: Array, kind: str) -> dict[str, object]:
 
 def _mark_lines(figure: go.Figure, fall: Waterfall, lines: Sequence[Line]) -> None:
     lowest, highest = float(fall.frequency[0]), float(fall.frequency[-1])
-    figure.update_annotations(yshift=26)
-    figure.update_layout(margin_t=figure.layout.margin.t + 26, height=figure.layout.height + 26)
+    figure.update_annotations(yshift=TITLE_SHIFT)
+    figure.update_layout(
+        margin_t=figure.layout.margin.t + TITLE_SHIFT, height=figure.layout.height + TITLE_SHIFT
+    )
     marked: list[float] = []
     for line in sorted(lines, key=lambda line: -line.amplitude):
         if line.kind != "steady" or not lowest <= line.frequency <= highest:

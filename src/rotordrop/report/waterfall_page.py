@@ -9,9 +9,9 @@ import numpy as np
 from rotordrop._version import __version__
 from rotordrop.report.coast_down_figures import displacement_history_figure, speed_law_figure
 from rotordrop.report.content import Card, Figure, KeyFigure, ReportContent, Section, Statement, Table
-from rotordrop.report.quantity import Quantity, with_error
+from rotordrop.report.quantity import Quantity, with_error, written
 from rotordrop.report.waterfall_figure import order_figure, waterfall_figure
-from rotordrop.spectrum.coast_down import RACES_SPUN_UP, SHORTEST_LAW
+from rotordrop.spectrum.coast_down import RACES_SPUN_UP, SENSOR_NOISE, SHORTEST_LAW
 from rotordrop.spectrum.indentation import held_maximum
 
 if TYPE_CHECKING:
@@ -26,6 +26,8 @@ SHORT_SPEED = (
     f"The speed is known for less than {RACES_SPUN_UP + SHORTEST_LAW:g} s after power-off: too short for a "
     "speed law."
 )
+AS_READ = f" The simulated motion was given the noise of a usual sensor, {1e6 * SENSOR_NOISE:g} µm rms."
+NO_BREAK = "\u00a0"
 _COMPONENTS = {
     "x": "horizontal",
     "y": "vertical",
@@ -95,7 +97,8 @@ def _verdict(analysis: CoastDownAnalysis) -> tuple[Statement, ...]:
             )
         )
     unnamed = sum(not line.named for line in analysis.lines)
-    why = ": nothing in the machine description or the mains explains them well enough" if unnamed else ""
+    which = "it" if unnamed == 1 else "them"
+    why = f": nothing in the machine description or the mains explains {which} well enough" if unnamed else ""
     count = len(analysis.lines)
     statements.append(
         Statement(text=f"{count} lines found, {count - unnamed} named, {unnamed} without a name{why}.")
@@ -155,8 +158,8 @@ def line_table(analysis: CoastDownAnalysis) -> Table:
                 Quantity(value=line.amplitude, kind="length", digits=3),
                 f"{line.ratio:.0f}",
                 "below resolution" if line.width == 0.0 else f"{line.width:.2f} Hz",
-                f"{line.first_seen:.0f} to {line.last_seen:.0f} s",
-                Quantity(value=line.confidence, kind="probability"),
+                f"{line.first_seen:.0f} to {line.last_seen:.0f} s".replace(" ", NO_BREAK),
+                Quantity(value=line.confidence if line.named else np.nan, kind="probability"),
             )
         )
     return Table(
@@ -173,8 +176,8 @@ def line_table(analysis: CoastDownAnalysis) -> Table:
 def _where(line: Line) -> str:
     """Order or frequency of a line with its error."""
     if line.order is None:
-        return with_error(line.frequency, line.frequency_error, "Hz")
-    return with_error(line.order, line.order_error, "X")
+        return with_error(line.frequency, line.frequency_error, "Hz").replace(" ", NO_BREAK)
+    return with_error(line.order, line.order_error, "X").replace(" ", NO_BREAK)
 
 
 def _displacement_section(analysis: CoastDownAnalysis) -> Section:
@@ -227,7 +230,8 @@ def _order_section(analysis: CoastDownAnalysis) -> Section:
             Figure(
                 chart=order_figure(plane.track, name),
                 caption=f"{name}: amplitude of the orders, zero-to-peak, tracked in the angle the rotor "
-                "really turned through. Gaps: a steady line lies too close to tell it from the order.",
+                "really turned through. Gaps: a steady line lies too close to tell it from the order."
+                + ("" if analysis.signal.recorded else AS_READ),
             )
         )
         rows += [
@@ -261,6 +265,32 @@ def _order_section(analysis: CoastDownAnalysis) -> Section:
     return Section(heading="Orders and resonances", text=text, figures=tuple(figures), tables=(table,))
 
 
+def _law_rows(law: SpeedLaw) -> list[tuple[str, ...]]:
+    """Time constant, what each drag takes from the speed per second, and standstill, with their intervals."""
+    drag, turn = law.drag, 2.0 * np.pi
+    speed = drag.initial_speed.value
+    at = f"slowing at {speed / turn:.1f} Hz"
+    values = (
+        ("time constant of the exponential fit", law.exponential.time_constant, 1.0, "s"),
+        (f"dry drag (balls and races): {at}", drag.constant, 1.0 / turn, "Hz/s"),
+        (f"linear drag: {at}", drag.linear, speed / turn, "Hz/s"),
+        (f"quadratic drag: {at}", drag.quadratic, speed**2 / turn, "Hz/s"),
+        ("standstill", law.standstill, 1.0, "s"),
+    )
+    rows: list[tuple[str, ...]] = []
+    for label, value, scale, unit in values:
+        number, interval = value.value * scale, value.interval_90
+        if interval is None:
+            rows.append((label, f"{written(number, 2)} {unit}", "–", value.status))
+            continue
+        low, high = (limit * scale for limit in interval)
+        half = max(0.5 * (high - low), 1e-4)
+        places = max(0, 1 - int(np.floor(np.log10(half))))
+        limits = f"{written(low, places)} to {written(high, places)} {unit}"
+        rows.append((label, f"{written(number, places)} {unit}", limits, value.status))
+    return rows
+
+
 def _law_section(analysis: CoastDownAnalysis, law: SpeedLaw) -> Section:
     time, speed = analysis.signal.speed_time, analysis.signal.speed
     assert time is not None and speed is not None
@@ -270,20 +300,10 @@ def _law_section(analysis: CoastDownAnalysis, law: SpeedLaw) -> Section:
         caption="Speed with the exponential fit of the paper and a fit of dry, linear and quadratic drag; "
         "below what each leaves over.",
     )
-    values = (
-        ("time constant of the exponential fit", law.exponential.time_constant),
-        ("dry drag: balls and races", law.drag.constant),
-        ("linear drag, per polar inertia", law.drag.linear),
-        ("quadratic drag, per polar inertia", law.drag.quadratic),
-        ("standstill", law.standstill),
-    )
-    rows = []
-    for label, value in values:
-        low, high = value.interval_90 or (np.nan, np.nan)
-        interval = f"{low:.4g} to {high:.4g}" if np.isfinite(low) else "–"
-        rows.append((label, f"{value.value:.4g} {value.unit}", interval, value.status))
     table = Table(
-        columns=("quantity", "value", "90 % interval", "verdict"), rows=tuple(rows), caption="Speed law"
+        columns=("quantity", "value", "90 % interval", "verdict"),
+        rows=tuple(_law_rows(law)),
+        caption="Speed law",
     )
     text = (law.exponential.statement, law.drag.statement)
     return Section(heading="Speed law", text=text, figures=(figure,), tables=(table,))

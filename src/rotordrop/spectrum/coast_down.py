@@ -54,7 +54,7 @@ RACES_SPUN_UP = 1.0
 """Time [s] from which the speed law is fitted: before it the rotor hands spin to the races."""
 SHORTEST_LAW = 3.0
 SENSOR_NOISE = 4e-7
-"""Noise of a usual displacement sensor [m rms], added to a simulation before lines are looked for in it:
+"""Noise of a usual displacement sensor [m rms], added to a simulation before lines and orders are looked for:
 without it the search would find arithmetic, with less than a recording has what no recording shows."""
 FORCE_OF_A_RECORD = (
     "Force and stress are not in a record of displacement; the largest indentation above dates the largest "
@@ -212,8 +212,9 @@ def analyse_coast_down(
         raise RecordError("coast-down: no plane given; at least one displacement (x, y) is needed")
     choice, tell = choice or WaterfallChoice(), progress or (lambda stage, fraction: None)
     tell("lines", 0.05)
+    read = signal.planes if signal.recorded else _as_read_by_a_sensor(signal.planes)
     lines = find_lines(
-        signal.planes if signal.recorded else _as_read_by_a_sensor(signal.planes),
+        read,
         signal.sampling_rate,
         signal.profile,
         start_time=signal.start_time,
@@ -225,7 +226,7 @@ def analyse_coast_down(
     planes = {}
     for number, name in enumerate(signal.planes):
         tell(f"orders and waterfall, {name}", 0.5 + 0.4 * number / len(signal.planes))
-        planes[name] = _plane(signal, name, lines, candidates, choice)
+        planes[name] = _plane(signal, name, read[name], lines, candidates, choice)
     tell("speed", 0.95)
     return CoastDownAnalysis(signal=signal, planes=planes, lines=lines, speed_law=_speed_law(signal))
 
@@ -251,6 +252,7 @@ def _as_read_by_a_sensor(planes: Mapping[str, PlanarSignal]) -> dict[str, Array]
 def _plane(
     signal: CoastDownSignal,
     name: str,
+    read: PlanarSignal,
     lines: Sequence[Line],
     candidates: Sequence[Candidate],
     choice: WaterfallChoice,
@@ -259,10 +261,11 @@ def _plane(
     track = None
     resonances: tuple[PassedResonance, ...] = ()
     if signal.profile is not None:
-        steady = [line.path for line in lines if line.kind == "steady" and name in line.forward]
-        track = track_orders(
-            moved, rate, signal.profile, orders=ORDERS, start_time=start, steady_lines=steady
-        )
+        # Where an order crosses another line, a sum or difference included, the sum of both is no resonance.
+        others = [
+            line.path for line in lines if line.kind in ("steady", "combination") and name in line.forward
+        ]
+        track = track_orders(read, rate, signal.profile, orders=ORDERS, start_time=start, steady_lines=others)
         modes = [candidate for candidate in candidates if not candidate.family.startswith("mains")]
         resonances = find_resonances(track, name, candidates=modes)
     return PlaneAnalysis(

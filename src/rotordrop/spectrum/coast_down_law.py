@@ -21,6 +21,8 @@ Model = Callable[[Array], Array]
 QUANTILE_90 = 1.6448536269514722
 MOST_VALUES = 2000
 LONGEST_STEP = 0.02
+CLOSE_ENOUGH = 1e-4
+"""Residual over the highest speed [1] below which a law holds even where the speed has less noise."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -166,7 +168,7 @@ def fit_exponential(
         residual_rms=rms,
         residual_largest=float(np.abs(residual).max()),
         noise=noise,
-        statement=_law_statement("one time constant", rms, noise),
+        statement=_law_statement("One time constant", rms, noise, float(omega.max())),
     )
 
 
@@ -216,7 +218,7 @@ def fit_drag(time: ArrayLike, speed: ArrayLike, *, start: float, end: float | No
         end=float(t[-1]),
         residual_rms=rms,
         noise=noise,
-        statement=_law_statement("dry, linear and quadratic drag", rms, noise),
+        statement=_law_statement("Dry, linear and quadratic drag", rms, noise, float(omega.max())),
     )
 
 
@@ -416,9 +418,9 @@ def _drag_solution(parameters: Array, time: Array) -> Array:
     return result
 
 
-def _law_statement(law: str, rms: float, noise: float) -> str:
+def _law_statement(law: str, rms: float, noise: float, highest: float) -> str:
     hertz = 2.0 * math.pi
-    text = f"{law}: residual {rms / hertz:.3g} Hz rms, noise of the recording {noise / hertz:.3g} Hz"
-    if rms > 1.5 * noise:
-        return f"{text}; the recorded speed does not follow this law"
-    return f"{text}; the recorded speed follows this law"
+    text = f"{law}: residual {rms / hertz:.2g} Hz rms, noise of the speed {noise / hertz:.2g} Hz"
+    if rms > max(1.5 * noise, CLOSE_ENOUGH * highest):
+        return f"{text}; the speed does not follow this law."
+    return f"{text}; the speed follows this law."

@@ -7,6 +7,7 @@ import math
 import re
 from dataclasses import replace
 from importlib.resources import files
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -25,6 +26,7 @@ from rotordrop.simulation.checkpoint import work_folder
 from rotordrop.simulation.coast_down import simulate_coast_down
 from rotordrop.simulation.coast_down_case import CoastDownCase
 from rotordrop.spectrum.coast_down import analyse_coast_down
+from rotordrop.spectrum.frequency_path import FrequencyPath
 
 PAPER = str(example_path("paper"))
 
@@ -124,7 +126,7 @@ def test_waterfall_reads_a_simulated_coast_down(coast, machine, tmp_path, capsys
         assert known is None or known >= 0.288 / seen, "no line is known better than the time it was seen"
         turns = seen * line["frequency_hz"] / (line["order"] or 1.0)
         assert line["order_error"] is None or line["order_error"] >= 0.288 / turns
-    assert found["lines"] and not re.search(r"± \S*e-", told)
+    assert found["lines"] and not re.search(r"±\s\S*e-", told)
     with h5py.File(files["h5"]) as file:
         plane = file["planes/DE"]
         amplitude = plane["waterfall_x/amplitude"]
@@ -157,6 +159,32 @@ def test_the_page_says_when_the_rotor_stopped(standstill, sentence, tmp_path):
     signal = recorded_coast_down(machine, read_record(recorded(tmp_path / "r.csv", seconds=5.0), machine))
     page = waterfall_page(analyse_coast_down(replace(signal, standstill=standstill), ()), title="stop")
     assert sentence in " ".join(statement.text for statement in page.verdict)
+    law = next(section for section in page.sections if section.heading == "Speed law").tables[0]
+    cells = [str(cell) for row in law.rows for cell in row]
+    assert sum("Hz/s" in cell for cell in cells) == 6
+    assert not any(re.search(r"\de[-+]|rad", cell) for cell in cells)
+
+
+def test_orders_of_a_simulation_are_those_a_sensor_would_show(tmp_path):
+    machine = example_machine("lp400")
+    signal = recorded_coast_down(machine, read_record(recorded(tmp_path / "r.csv", seconds=5.0), machine))
+    still = {name: np.zeros(np.shape(plane)) for name, plane in signal.planes.items()}
+    found = analyse_coast_down(replace(signal, planes=still, recorded=False), ())
+    typical = np.median(found.planes["DE"].track.major_axis)
+    assert 1e-9 < typical < 4e-7, "the noise of the sensor, spread over all orders"
+
+
+def test_an_order_is_kept_apart_from_sums_and_differences_too(tmp_path, monkeypatch):
+    machine = example_machine("lp400")
+    signal = recorded_coast_down(machine, read_record(recorded(tmp_path / "r.csv", seconds=5.0), machine))
+    time = np.linspace(0.0, 5.0, 101)
+    crossing = FrequencyPath(time=time, frequency=np.interp(time, signal.speed_time, signal.speed) / math.tau)
+    line = SimpleNamespace(kind="combination", forward={"DE": 1e-6}, path=crossing)
+    monkeypatch.setattr("rotordrop.spectrum.coast_down.find_lines", lambda *planes, **how: (line,))
+    orders = analyse_coast_down(signal, ()).planes
+    first = list(orders["DE"].track.orders).index(1.0)
+    assert not orders["DE"].track.separable[:, first].any()
+    assert orders["NDE"].track.separable[:, first].any()
 
 
 def test_critical_speeds_of_the_paper(tmp_path, capsys):
@@ -185,6 +213,7 @@ def test_the_page_of_a_coast_down_states_maxima_and_certificate(machine, tmp_pat
         "Second by second",
         "Largest Hertz stress",
         "Friction law",
+        "Energy balanced to",
     ):
         assert expected in text
     certificate = json.loads(numbers.read_text())["certificate"]
