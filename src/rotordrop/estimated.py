@@ -12,6 +12,7 @@ Verdict = Literal[
     "the record does not determine it",
     "known from the calibration",
     "the model does not fit the record",
+    "of the cross-check: the model does not fit the record",
     "prior",
 ]
 

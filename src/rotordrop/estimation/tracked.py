@@ -15,11 +15,12 @@ from rotordrop.estimated import IdentifiedValue
 from rotordrop.estimation.tracked_impacts import Impact as Impact
 from rotordrop.estimation.tracked_impacts import tracked_impacts
 from rotordrop.estimation.tracked_values import (
+    INCONSISTENT,
     UNSURE_GAP,
     force_values,
-    holding_cross_check,
+    is_beside,
     parameter_values,
-    without_interval,
+    with_cross_check,
 )
 from rotordrop.identification.first_reach import reach_at_first_contact
 from rotordrop.machine import Machine
@@ -119,14 +120,10 @@ class TrackedDrop:
     def _consequence(self) -> str:
         if self.cross_check is not None:
             return (
-                "Intervals are widened until they hold the independent cross-check too; the single numbers "
-                "are not to be relied on."
+                "Intervals are widened until they hold the independent cross-check too, and what is further "
+                "from it than a factor of two gives way to it; the single numbers are not to be relied on."
             )
-        if _only_directions(self.checks):
-            return (
-                f"Intervals are {INCONSISTENT_WIDENING:g} × as wide; no independent cross-check is possible."
-            )
-        return "No intervals are given: without a cross-check the errors are not known."
+        return f"Intervals are {INCONSISTENT_WIDENING:g} × as wide; no independent cross-check is possible."
 
     @property
     def can_be_cross_checked(self) -> bool:
@@ -331,16 +328,18 @@ def tracked_drop(
     cross_check = None
     if not consistent and _sees_all_directions(checks):
         cross_check = input_state_estimate(problem, smoothed)
-    unknown_errors = not consistent and cross_check is None and not _only_directions(checks)
+    if cross_check is None:
+        _refuse_unchecked(prepared.name, checks)
     values: dict[str, dict[str, IdentifiedValue]] = {}
     peak_times: dict[str, float] = {}
     for b, name in enumerate(problem.model.bearing_names):
         values[name] = parameter_values(problem, smoothed, name, widening)
         peak_values, peak_times[name] = force_values(forces, b, widening)
         if cross_check is not None:
-            peak_values = holding_cross_check(peak_values, forces, cross_check, b)
-        elif unknown_errors:
-            peak_values = {field: without_interval(value) for field, value in peak_values.items()}
+            values[name] = {f: replace(value, status=INCONSISTENT) for f, value in values[name].items()}
+            if is_beside(peak_values["peak_force_N"], cross_check, b):
+                peak_times[name] = float(cross_check.time[cross_check.magnitude[:, b].argmax()])
+            peak_values = with_cross_check(peak_values, forces, cross_check, b)
         values[name].update(peak_values)
     return TrackedDrop(
         name=prepared.name,
@@ -352,7 +351,7 @@ def tracked_drop(
         forces=forces,
         values=values,
         peak_times=peak_times,
-        impacts=tracked_impacts(problem, forces, widening, cross_check, unknown_errors),
+        impacts=tracked_impacts(problem, forces, widening, cross_check),
         checks=checks,
         consistent=consistent,
         noise_factor=noise_factor,
@@ -365,8 +364,16 @@ def _sees_all_directions(checks: Sequence[Check]) -> bool:
     return all(check.passed for check in checks if check.name == "directions")
 
 
-def _only_directions(checks: Sequence[Check]) -> bool:
-    return {check.name for check in checks if not check.passed} <= {"directions"}
+def _refuse_unchecked(name: str, checks: Sequence[Check]) -> None:
+    """Refuse a drop that the model does not fit and that nothing else can check: its errors have no limit."""
+    failed = [check for check in checks if not check.passed]
+    if {check.name for check in failed} <= {"directions"}:
+        return
+    raise IdentificationError(
+        f"the model does not fit the record {name} ({'; '.join(check.message for check in failed)}), and "
+        "nothing can check its force; expected a model that fits, or both directions in two planes. "
+        "Calibrate on drops with all sensors, leave --quick out, or leave this drop out."
+    )
 
 
 def estimate_tracked(

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotordrop.estimated import IdentifiedValue
-from rotordrop.estimation.tracked_values import MODEL_FORCE_SIGMA, holding, with_interval, without_interval
+from rotordrop.estimation.tracked_values import MODEL_FORCE_SIGMA, holding, with_interval
 from rotordrop.simulation.certificate import refined_peak
 from rotordrop.tracking.forces import ForceHistory
 from rotordrop.tracking.input_state import KNOWN_PEAK_ERROR, InputEstimate
@@ -38,11 +38,10 @@ def tracked_impacts(
     forces: ForceHistory,
     widening: float,
     cross_check: InputEstimate | None,
-    unknown_errors: bool,
 ) -> tuple[Impact, ...]:
     """Every impact at every bearing, in the order of their beginning.
 
-    With a cross-check their intervals are widened until they hold it; with unknown errors they have none.
+    With a cross-check their intervals are widened until they hold it.
     """
     found: list[Impact] = []
     for b, name in enumerate(problem.model.bearing_names):
@@ -52,7 +51,7 @@ def tracked_impacts(
             impact = _impact(forces, b, name, int(first), int(last), widening)
             if cross_check is not None:
                 impact = _impact_holding(impact, cross_check, b)
-            found.append(_impact_without_intervals(impact) if unknown_errors else impact)
+            found.append(impact)
     return tuple(sorted(found, key=lambda impact: impact.start))
 
 
@@ -88,13 +87,4 @@ def _impact_holding(impact: Impact, cross_check: InputEstimate, b: int) -> Impac
         peak_force=holding(impact.peak_force, ratio, KNOWN_PEAK_ERROR),
         impulse=holding(impact.impulse, ratio, KNOWN_PEAK_ERROR),
         dissipated_energy=holding(impact.dissipated_energy, ratio, 2.0 * KNOWN_PEAK_ERROR),
-    )
-
-
-def _impact_without_intervals(impact: Impact) -> Impact:
-    return replace(
-        impact,
-        peak_force=without_interval(impact.peak_force),
-        impulse=without_interval(impact.impulse),
-        dissipated_energy=without_interval(impact.dissipated_energy),
     )

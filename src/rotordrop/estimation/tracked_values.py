@@ -75,6 +75,10 @@ def force_values(forces: ForceHistory, b: int, widening: float) -> tuple[dict[st
 
 INCONSISTENT: Verdict = "the model does not fit the record"
 """Status of a number whose interval had to be widened to hold the cross-check."""
+OF_CROSS_CHECK: Verdict = "of the cross-check: the model does not fit the record"
+"""Status of a number that the cross-check gave in place of the twin."""
+FACTOR_APART = 2.0
+"""Factor between twin and cross-check from which the twin cannot have followed the drop [1]."""
 
 
 def holding(value: IdentifiedValue, ratio: float, accuracy: float) -> IdentifiedValue:
@@ -90,19 +94,22 @@ def holding(value: IdentifiedValue, ratio: float, accuracy: float) -> Identified
     )
 
 
-def without_interval(value: IdentifiedValue) -> IdentifiedValue:
-    """The value without any claim on its error, because the model does not fit and nothing checks it."""
-    return replace(value, interval_90=None, standard_error=None, status=INCONSISTENT)
+def is_beside(peak: IdentifiedValue, check: InputEstimate, b: int) -> bool:
+    """Whether a peak is so far from the cross-check that the twin cannot have followed the drop."""
+    return not 1.0 / FACTOR_APART <= float(check.peak[b]) / peak.value <= FACTOR_APART
 
 
-def holding_cross_check(
+def with_cross_check(
     values: dict[str, IdentifiedValue], forces: ForceHistory, check: InputEstimate, b: int
 ) -> dict[str, IdentifiedValue]:
-    """Force and stress of a bearing with intervals that also hold what the cross-check finds.
+    """Force and stress of a bearing where model and record disagree.
 
-    Where model and record disagree, the error of the twin's own numbers is not known: up to 340 % where a
-    support is stiffer in one direction than the model allows, with innovations 14 % too large.
+    The error of the twin's own numbers is not known then: up to 340 % where a support is stiffer in one
+    direction than the model allows, with innovations 14 % too large. Intervals are widened until they hold
+    the cross-check; a twin further from it than a factor of two gives way to it.
     """
+    if is_beside(values["peak_force_N"], check, b):
+        return _of_cross_check(check, b)
     ratios = {
         "peak_force_N": (float(check.peak[b]) / values["peak_force_N"].value, KNOWN_PEAK_ERROR),
         "peak_stress_Pa": (float(check.peak_stress[b]) / values["peak_stress_Pa"].value, KNOWN_STRESS_ERROR),
@@ -114,6 +121,26 @@ def holding_cross_check(
         ratios["mean_force_0p15_0p2_N"] = (ratio, KNOWN_MEAN_ERROR)
     return {
         name: holding(value, *ratios[name]) if name in ratios else value for name, value in values.items()
+    }
+
+
+def _of_cross_check(check: InputEstimate, b: int) -> dict[str, IdentifiedValue]:
+    """What the cross-check knows, with twice the error it is known to make on drops that the model fits."""
+    found = {
+        "peak_force_N": (float(check.peak[b]), KNOWN_PEAK_ERROR, "N"),
+        "peak_stress_Pa": (float(check.peak_stress[b]), KNOWN_STRESS_ERROR, "Pa"),
+        "mean_force_0p15_0p2_N": (float(check.mean_magnitude_late[b]), KNOWN_MEAN_ERROR, "N"),
+    }
+    return {
+        name: IdentifiedValue(
+            value=value,
+            status=OF_CROSS_CHECK,
+            interval_90=((1.0 - 2.0 * error) * value, (1.0 + 2.0 * error) * value),
+            standard_error=2.0 * error * value / NINETY,
+            unit=unit,
+        )
+        for name, (value, error, unit) in found.items()
+        if math.isfinite(value)
     }
 
 

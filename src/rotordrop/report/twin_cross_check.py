@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from rotordrop.estimation.tracked import TrackedDrop
+from rotordrop.estimation.tracked_values import force_values
 from rotordrop.report.cross_check import CrossCheck
 from rotordrop.report.quantity import Quantity
+from rotordrop.report.tracked_sections import widening
 from rotordrop.tracking.input_state import (
     KNOWN_MEAN_ERROR,
     KNOWN_PEAK_ERROR,
@@ -25,7 +27,8 @@ def twin_cross_checks(drop: TrackedDrop) -> tuple[CrossCheck, ...]:
     check = drop.cross_check or input_state_estimate(drop.problem, drop.smoothed)
     found = []
     late = drop.forces.time >= 0.15
-    for b, (name, values) in enumerate(drop.values.items()):
+    for b, name in enumerate(drop.values):
+        values, _ = force_values(drop.forces, b, widening(drop))
         peak = values["peak_force_N"]
         found.append(
             CrossCheck(

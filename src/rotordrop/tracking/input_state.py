@@ -49,7 +49,9 @@ class InputEstimate:
     peak_stress : ndarray, shape (B,)
         Largest Hertz stress that this force gives in the bearing as the twin has it [Pa].
     mean_late : ndarray, shape (B,)
-        Mean magnitude of the mean force vector between 0.15 and 0.2 s [N]; NaN when the record is shorter.
+        Magnitude of the mean force vector between 0.15 and 0.2 s [N]; NaN when the record is shorter.
+    mean_magnitude_late : ndarray, shape (B,)
+        Mean magnitude of the force in the same time [N]; NaN when the record is shorter.
     """
 
     time: Array
@@ -58,6 +60,7 @@ class InputEstimate:
     peak: Array
     peak_stress: Array
     mean_late: Array
+    mean_magnitude_late: Array
 
 
 def input_state_estimate(problem: DropProblem, smoothed: Smoothed) -> InputEstimate:
@@ -78,7 +81,8 @@ def input_state_estimate(problem: DropProblem, smoothed: Smoothed) -> InputEstim
     time = problem.time[:count]
     magnitude = np.hypot(force[..., 0], force[..., 1])
     late = time >= 0.15
-    mean = np.hypot(*force[late].mean(axis=0).T) if time[-1] > 0.199 else np.full(force.shape[1], np.nan)
+    unknown = np.full(force.shape[1], np.nan)
+    whole = time[-1] > 0.199
     at = magnitude.argmax(axis=0)
     stress = [stress_at_force(problem, smoothed, b, force[i, b]) for b, i in enumerate(at)]
     return InputEstimate(
@@ -87,7 +91,8 @@ def input_state_estimate(problem: DropProblem, smoothed: Smoothed) -> InputEstim
         magnitude=magnitude,
         peak=magnitude.max(axis=0),
         peak_stress=np.array(stress),
-        mean_late=mean,
+        mean_late=np.hypot(*force[late].mean(axis=0).T) if whole else unknown,
+        mean_magnitude_late=magnitude[late].mean(axis=0) if whole else unknown,
     )
 
 

@@ -26,7 +26,15 @@ from rotordrop.estimation.tracked import (
     track_drops,
     tracked_drop,
 )
-from rotordrop.estimation.tracked_values import MODEL_FORCE_SIGMA, MODEL_STRESS_SIGMA
+from rotordrop.estimation.tracked_values import (
+    INCONSISTENT,
+    MODEL_FORCE_SIGMA,
+    MODEL_STRESS_SIGMA,
+    OF_CROSS_CHECK,
+    is_beside,
+    with_cross_check,
+    with_interval,
+)
 from rotordrop.machine import Machine, example_machine
 from rotordrop.measurement.examples import example_record_path
 from rotordrop.measurement.record import Record, read_record
@@ -34,7 +42,8 @@ from rotordrop.model.parameters import build_drop_model
 from rotordrop.synthesis import SyntheticDrop, hidden_machine, synthesize_drop
 from rotordrop.synthesis.score import score_estimate
 from rotordrop.tracking.calibration import TrackedDrops, beside_the_record
-from rotordrop.tracking.input_state import KNOWN_PEAK_ERROR
+from rotordrop.tracking.consistency import Check
+from rotordrop.tracking.input_state import KNOWN_PEAK_ERROR, input_state_estimate
 
 BEARINGS = ("NDE", "DE")
 SPEED = 2.0 * math.pi * 60.0
@@ -235,7 +244,8 @@ def test_sensor_planes_elsewhere_than_stated_are_flagged_and_intervals_widened(
     assert drop.cross_check is not None
     for b, name in enumerate(BEARINGS):
         peak = drop.values[name]["peak_force_N"]
-        assert peak.status == "the model does not fit the record"
+        assert peak.status in (INCONSISTENT, OF_CROSS_CHECK)
+        assert drop.values[name]["support.stiffness_N_per_m"].status == INCONSISTENT
         assert peak.interval_90 is not None
         low, high = peak.interval_90
         assert low <= (1.0 - KNOWN_PEAK_ERROR) * drop.cross_check.peak[b]
@@ -305,3 +315,36 @@ def test_a_fit_beside_the_record_is_noticed(nis: float, factor: float, diverged:
         problems=(), smoothed=(), nis=(0.9, nis), diverged=(False, diverged), noise_factors=(1.0, factor)
     )
     assert beside_the_record(fit) == beside
+
+
+def test_a_twin_far_from_the_cross_check_gives_way_to_it(tracked: TrackedDrop) -> None:
+    check = input_state_estimate(tracked.problem, tracked.smoothed)
+    own = tracked.values["NDE"]
+    assert not is_beside(own["peak_force_N"], check, 0)
+    kept = with_cross_check(own, tracked.forces, check, 0)
+    assert kept["peak_force_N"].value == own["peak_force_N"].value
+
+    wild = own | {"peak_force_N": with_interval(2.1 * float(check.peak[0]), 10.0, unit="N")}
+    assert is_beside(wild["peak_force_N"], check, 0)
+    given = with_cross_check(wild, tracked.forces, check, 0)
+    assert given["peak_force_N"].value == check.peak[0]
+    assert given["peak_force_N"].status == OF_CROSS_CHECK
+    low, high = given["peak_force_N"].interval_90 or (math.nan, math.nan)
+    assert (low, high) == pytest.approx((0.7 * check.peak[0], 1.3 * check.peak[0]))
+    assert low < own["peak_force_N"].value < high
+    assert "mean_stress_Pa" not in given
+    mean = given["mean_force_0p15_0p2_N"].value
+    assert mean == pytest.approx(own["mean_force_0p15_0p2_N"].value, rel=0.1)
+
+
+def test_a_drop_that_nothing_can_check_is_refused(
+    quick: TrackedDrop, calibrated: Machine, synthetic: SyntheticDrop, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    failed = (
+        Check(name="directions", passed=False, message="one direction"),
+        Check(name="innovation size", passed=False, message="innovations 9 × expected"),
+    )
+    monkeypatch.setattr("rotordrop.estimation.tracked.consistency_checks", lambda *_: failed)
+    item = prepare(calibrated, synthetic.record, synthetic.tail, "blind", quick.drop_instant)
+    with pytest.raises(IdentificationError, match=r"record blind .*nothing can check its force"):
+        tracked_drop(item, quick.problem, quick.smoothed, 1.0)
