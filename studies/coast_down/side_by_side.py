@@ -1,13 +1,14 @@
 """Simulated against recorded coast-down of the same machine: lines, amplitudes, maxima, standstill.
 
-The machine keeps its first guesses but for what the record shows directly: air gaps (settled radius less
-sag), drag (fitted to the speed).
+Drag is fitted to the recorded speed. Air gaps are those of the machine where they were calibrated, else the
+settled radius of the record less the sag; all else is as the machine file has it.
 """
 
 from __future__ import annotations
 
 import argparse
 import math
+import re
 import sys
 import tempfile
 from pathlib import Path
@@ -54,15 +55,21 @@ def maxima_of(analysis):
     }
 
 
+def kind_of(label):
+    """Name of a line without the bearing, which pendulums of nearly equal bearings leave open."""
+    return re.sub(r"pendulum \w+( or pendulum \w+)*", "pendulum", label)
+
+
 def pairs(recorded, simulated):
-    """Every named line of the record beside the strongest simulated one of the same name."""
+    """Every named line of the record beside the strongest simulated one of the same kind."""
 
     def strongest(lines, name, key):
-        same = [line for line in lines if line["label"] == name]
+        same = [line for line in lines if kind_of(line["label"]) == name]
         return max(same, key=lambda line: line["amplitude_zero_to_peak_um"])[key] if same else None
 
     found = []
-    for name in dict.fromkeys(line["label"] for line in recorded if not line["label"].startswith("unnamed")):
+    named = [line["label"] for line in recorded if not line["label"].startswith("unnamed")]
+    for name in dict.fromkeys(map(kind_of, named)):
         sides = {
             key: [strongest(lines, name, key) for lines in (recorded, simulated)]
             for key in ("frequency_hz", "amplitude_zero_to_peak_um")
@@ -79,7 +86,8 @@ def main() -> None:
     machine = load_machine(options.machine)
     record = recorded_coast_down(machine, read_record(options.record, machine))
     same = with_recorded_drag(machine, record)
-    same = same.with_values({f"{name}.air_gap": gap for name, gap in record.air_gap.items()})
+    guessed = [b.name for b in machine.touchdown_bearings if b.air_gap.status != "estimated"]
+    same = same.with_values({f"{name}.air_gap": record.air_gap[name] for name in guessed})
     speed = float(record.profile.speed_at(0.0))
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "c.h5"
