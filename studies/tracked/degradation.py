@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from blind_calibration import HERE, drop_scores, half_width, holds
 
+from rotordrop.errors import RotordropError
 from rotordrop.estimated import Estimated
 from rotordrop.estimation.calibrated import calibrate_machine
 from rotordrop.estimation.tracked import estimate_tracked
@@ -134,8 +135,12 @@ def study(seed: int, case: Degradation) -> dict[str, Any]:
     left = with_sensors_left(calibration.machine, case)
     for drop, whole, settled in zip(made[2:], records[2:], tails[2:], strict=True):
         record, tail = (with_signals_left(one, left, case) for one in (whole, settled))
-        tracked = estimate_tracked(left, [record], [tail], names=[drop.truth["name"]])[0]
-        scores.append(drop_scores(tracked, drop))
+        try:
+            tracked = estimate_tracked(left, [record], [tail], names=[drop.truth["name"]])[0]
+        except RotordropError as error:  # a refused drop is a result too
+            scores.append({"error": str(error)})
+        else:
+            scores.append(drop_scores(tracked, drop))
     gaps = {
         name: {
             "estimate": calibration.values[f"{name}.air_gap"].value,
@@ -160,7 +165,9 @@ def summary(folder: Path) -> str:
         if not results:
             continue
         lost = [r["error"] for r in results if "error" in r]
-        drops = [d for r in results for d in r.get("drops", [])]
+        every = [d for r in results for d in r.get("drops", [])]
+        drops = [d for d in every if "error" not in d]
+        lost += ["a drop was refused"] * (len(every) - len(drops))
         if not drops:
             lines.append(f"| {label} | 0 | {'; '.join(lost)} | | | | | | |")
             continue
@@ -175,7 +182,7 @@ def summary(folder: Path) -> str:
         of_gap = np.median([abs(g["estimate"] - g["truth"]) for g in gap])
         good = np.mean([d["consistent"] for d in drops])
         lines.append(
-            f"| {label} | {len(drops)} | {100 * np.median(error):.2f} % | {100 * error.max():.1f} % "
+            f"| {label} | {len(every)} | {100 * np.median(error):.2f} % | {100 * error.max():.1f} % "
             f"| {100 * inside:.0f} % | {100 * half:.1f} % | {100 * of_stress:.2f} % | {1e6 * of_gap:.1f} µm "
             f"| {100 * good:.0f} % |" + (f" lost: {'; '.join(lost)}" if lost else "")
         )
