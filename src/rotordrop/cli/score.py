@@ -116,6 +116,7 @@ def percent(share: float, *, sign: bool = False) -> str:
 
     Examples
     --------
+    >>> from rotordrop.cli.score import percent
     >>> percent(1.53), percent(0.0231, sign=True)
     ('153 %', '+2.3 %')
     """

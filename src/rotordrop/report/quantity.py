@@ -182,6 +182,7 @@ def with_error(value: float, error: float | None, unit: str) -> str:
 
     Examples
     --------
+    >>> from rotordrop.report.quantity import with_error
     >>> with_error(28.7613, 0.0113, "Hz")
     '28.761 ± 0.011 Hz'
     """
