@@ -28,10 +28,11 @@ def require_own_content(paths: Sequence[Path]) -> None:
     """Refuse the same recording given twice: one drop would count as two, its errors would look smaller."""
     seen: dict[str, Path] = {}
     for path in paths:
-        if not path.is_file():
+        try:
+            with path.open("rb") as stream:
+                digest = hashlib.file_digest(stream, "sha256").hexdigest()
+        except OSError:
             continue  # the reader says what is wrong with it
-        with path.open("rb") as stream:
-            digest = hashlib.file_digest(stream, "sha256").hexdigest()
         if digest in seen:
             raise UsageError(
                 f"{seen[digest]} and {path} are the same recording (equal content); expected another drop in "

@@ -107,7 +107,7 @@ def _ranked(drops: list[ComparedDrop], scatter: Mapping[str, float] | None) -> d
     from rotordrop.report.compare_page import rankings
     from rotordrop.report.compared_drop import left_out
 
-    tree: dict[str, Any] = {"left_out": left_out(drops)}
+    tree: dict[str, Any] = {}
     for (bearing, key), ranking in rankings(drops, list(drops[0].numbers), scatter or {}).items():
         condition = ranking.worst_condition
         tree.setdefault(bearing, {})[key] = {
@@ -117,4 +117,4 @@ def _ranked(drops: list[ComparedDrop], scatter: Mapping[str, float] | None) -> d
             "probability_worst_condition": None if condition is None else list(condition),
             "statement": ranking.statement,
         }
-    return tree
+    return {"left_out": left_out(drops), "bearings": tree}

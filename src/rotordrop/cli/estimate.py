@@ -134,7 +134,7 @@ def _tracked(
 ) -> tuple[dict[str, dict[str, Any]], dict[str, ReportContent]]:
     from rotordrop.estimation.calibrated import calibrated_on
     from rotordrop.estimation.document import tracked_document
-    from rotordrop.estimation.tracked import estimate_tracked
+    from rotordrop.estimation.tracked import estimate_tracked, settled_tail
     from rotordrop.report.estimate_page import tracked_page
     from rotordrop.report.simulated_record import simulated_notice
     from rotordrop.report.twin_cross_check import twin_cross_checks
@@ -143,7 +143,7 @@ def _tracked(
     documents, pages = {}, {}
     for drop, found, tail in zip(drops, findings, tails, strict=True):
         checks = () if quick and drop.cross_check is None else twin_cross_checks(drop)
-        words = _warnings(found, tail, drop.drop_instant.notes)
+        words = _warnings(found, settled_tail(drop.record, tail), drop.drop_instant.notes)
         if drop.name in calibrated_on(machine):
             words.append(COUNTED_TWICE.format(drop.name))
         documents[drop.name] = tracked_document(drop, machine, words)

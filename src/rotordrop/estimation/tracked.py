@@ -65,6 +65,12 @@ NOISE_FACTORS = (0.5, 1.0, 2.0, 4.0, 8.0)
 NOISE_WINDOW = 0.06
 """Part of the drop on which the size of the unknown impulses is judged [s]."""
 
+LONG_RECORD, TAIL_SPAN = 20.0, 2.0
+"""Length of a record that may hold its own settled tail, and of that tail [s]."""
+
+STANDING = 3.0
+"""Speed below which the rotor counts as standing [rad/s], half a turn per second."""
+
 INCONSISTENT_WIDENING = 2.0
 """Factor on intervals when the model is not consistent with the record [1]; those of force and stress grow
 further until they hold the cross-check as well."""
@@ -120,8 +126,9 @@ class TrackedDrop:
     def _consequence(self) -> str:
         if self.cross_check is not None:
             return (
-                "Intervals are widened until they hold the independent cross-check too, and what is further "
-                "from it than a factor of two gives way to it; the single numbers are not to be relied on."
+                "Intervals are widened until they hold the independent cross-check too, and a peak force "
+                "further from it than a factor of two gives way to it; the single numbers are not to be "
+                "relied on."
             )
         return f"Intervals are {INCONSISTENT_WIDENING:g} × as wide; no independent cross-check is possible."
 
@@ -149,14 +156,22 @@ def prepare(
     instant: DropInstant | PowerOff | None = None,
 ) -> Preparation:
     """Find power-off and average the settled tail of a record."""
-    if tail is None and record.duration > 20.0:
-        tail = _last_seconds(record, 2.0)
+    tail = settled_tail(record, tail)
     return Preparation(
         name=name,
         record=record,
         instant=find_power_off(record, machine) if instant is None else instant,
         tail_level=None if tail is None else np.asarray(tail.signals).mean(axis=0) * _polarity(tail),
     )
+
+
+def settled_tail(record: Record, tail: Record | None) -> Record | None:
+    """The tail given, or the last seconds of a record until standstill; None where there is neither."""
+    if tail is not None or record.duration < LONG_RECORD or record.speed is None:
+        return tail
+    last = _last_seconds(record, TAIL_SPAN)
+    assert last.speed is not None
+    return last if np.nanmax(np.abs(last.speed)) < STANDING else None
 
 
 def _last_seconds(record: Record, span: float) -> Record:
@@ -372,7 +387,7 @@ def _refuse_unchecked(name: str, checks: Sequence[Check]) -> None:
     raise IdentificationError(
         f"the model does not fit the record {name} ({'; '.join(check.message for check in failed)}), and "
         "nothing can check its force; expected a model that fits, or both directions in two planes. "
-        "Calibrate on drops with all sensors, leave --quick out, or leave this drop out."
+        "Calibrate on drops with all sensors, estimate without --quick, or leave this drop out."
     )
 
 

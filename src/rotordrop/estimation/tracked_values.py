@@ -42,10 +42,11 @@ INDEPENDENT_SPANS = 50.0
 
 
 def with_interval(value: float, sigma: float, widening: float = 1.0, unit: str = "") -> IdentifiedValue:
-    """A value with a symmetric 90 % interval."""
+    """A magnitude with a symmetric 90 % interval, which does not go below zero."""
     half = NINETY * sigma * widening
+    low = max(value - half, 0.0) if value >= 0.0 else value - half
     return IdentifiedValue(
-        value=value, standard_error=sigma * widening, interval_90=(value - half, value + half), unit=unit
+        value=value, standard_error=sigma * widening, interval_90=(low, value + half), unit=unit
     )
 
 
@@ -84,8 +85,10 @@ FACTOR_APART = 2.0
 def holding(value: IdentifiedValue, ratio: float, accuracy: float) -> IdentifiedValue:
     """The value with an interval that also holds ``ratio`` times it, within a relative accuracy [1]."""
     low, high = value.interval_90 or (value.value, value.value)
-    other = value.value * ratio
+    other = value.value * ratio if math.isfinite(ratio) else value.value
     low, high = min(low, other - accuracy * abs(other)), max(high, other + accuracy * abs(other))
+    if value.value >= 0.0:
+        low = max(low, 0.0)
     return replace(
         value,
         interval_90=(low, high),
@@ -96,7 +99,10 @@ def holding(value: IdentifiedValue, ratio: float, accuracy: float) -> Identified
 
 def is_beside(peak: IdentifiedValue, check: InputEstimate, b: int) -> bool:
     """Whether a peak is so far from the cross-check that the twin cannot have followed the drop."""
-    return not 1.0 / FACTOR_APART <= float(check.peak[b]) / peak.value <= FACTOR_APART
+    found = float(check.peak[b])
+    if not (math.isfinite(found) and found > 0.0 and peak.value > 0.0):
+        return False  # no impact, or no cross-check: nothing to give way to
+    return not 1.0 / FACTOR_APART <= found / peak.value <= FACTOR_APART
 
 
 def with_cross_check(
@@ -110,9 +116,10 @@ def with_cross_check(
     """
     if is_beside(values["peak_force_N"], check, b):
         return _of_cross_check(check, b)
+    peak, stress = (max(values[field].value, 1e-9) for field in ("peak_force_N", "peak_stress_Pa"))
     ratios = {
-        "peak_force_N": (float(check.peak[b]) / values["peak_force_N"].value, KNOWN_PEAK_ERROR),
-        "peak_stress_Pa": (float(check.peak_stress[b]) / values["peak_stress_Pa"].value, KNOWN_STRESS_ERROR),
+        "peak_force_N": (float(check.peak[b]) / peak, KNOWN_PEAK_ERROR),
+        "peak_stress_Pa": (float(check.peak_stress[b]) / stress, KNOWN_STRESS_ERROR),
     }
     ratios["mean_stress_Pa"] = ratios["peak_stress_Pa"]
     if "mean_force_0p15_0p2_N" in values and np.isfinite(check.mean_late[b]):

@@ -75,12 +75,19 @@ class ComparedDrop:
                 "and 'bearings'. Give a file written by 'rotordrop estimate --json'."
             )
         turns = document["speed_Hz"]
+        consistency = document.get("consistency") or {}
+        consistent = consistency.get("consistent", True) if isinstance(consistency, Mapping) else consistency
+        if not isinstance(consistent, bool):
+            raise UsageError(
+                f"{name}: 'consistency.consistent' is {consistent!r}; expected true or false. Give a file as "
+                "'rotordrop estimate --json' wrote it."
+            )
         return cls(
             name=name,
             speed=2 * math.pi * float(turns["value"] if isinstance(turns, Mapping) else turns),
             numbers={bearing: _numbers(values) for bearing, values in document["bearings"].items()},
-            warnings=tuple(str(warning) for warning in document.get("warnings", ())),
-            consistent=bool(document.get("consistency", {}).get("consistent", True)),
+            warnings=tuple(str(warning) for warning in document.get("warnings") or ()),
+            consistent=consistent,
             method=str(document.get("method", "")),
             record=str(document.get("record_sha256") or ""),
             simulated=simulated,
@@ -97,11 +104,13 @@ def left_out(drops: Sequence[ComparedDrop]) -> dict[str, str]:
     """
     reasons: dict[str, str] = {}
     counted: dict[str, ComparedDrop] = {}
+    seen: dict[tuple[str, str], ComparedDrop] = {}
     for drop in sorted(drops, key=lambda one: not one.consistent):
         twin = counted.setdefault(drop.record, drop) if drop.record else drop
-        if twin is not drop and twin.method == drop.method:
+        same = seen.setdefault((drop.record, drop.method), drop) if drop.record else drop
+        if same is not drop:
             raise UsageError(
-                f"{twin.name} and {drop.name} are estimates of the same recording; expected another drop in "
+                f"{same.name} and {drop.name} are estimates of the same recording; expected another drop in "
                 "each. Leave one of them out."
             )
         if not drop.consistent:

@@ -23,6 +23,7 @@ from rotordrop.estimation.tracked import (
     drop_problem,
     estimate_tracked,
     prepare,
+    settled_tail,
     track_drops,
     tracked_drop,
 )
@@ -31,6 +32,7 @@ from rotordrop.estimation.tracked_values import (
     MODEL_FORCE_SIGMA,
     MODEL_STRESS_SIGMA,
     OF_CROSS_CHECK,
+    holding,
     is_beside,
     with_cross_check,
     with_interval,
@@ -348,3 +350,28 @@ def test_a_drop_that_nothing_can_check_is_refused(
     item = prepare(calibrated, synthetic.record, synthetic.tail, "blind", quick.drop_instant)
     with pytest.raises(IdentificationError, match=r"record blind .*nothing can check its force"):
         tracked_drop(item, quick.problem, quick.smoothed, 1.0)
+
+
+def test_a_record_until_standstill_holds_its_own_tail(synthetic: SyntheticDrop) -> None:
+    time = np.arange(0.0, 25.0, 1e-3)
+    signals = np.ones((len(time), synthetic.record.signals.shape[1]))
+    standing = replace(synthetic.record, time=time, signals=signals, speed=np.where(time < 21.0, 300.0, 0.1))
+    own = settled_tail(standing, None)
+    assert own is not None and own.time[0] == pytest.approx(time[-1] - 2.0)
+    assert settled_tail(standing, synthetic.tail) is synthetic.tail
+    assert settled_tail(replace(standing, speed=np.full(len(time), 20.0)), None) is None
+    assert settled_tail(synthetic.record, None) is None
+
+
+def test_a_magnitude_has_no_interval_below_zero() -> None:
+    assert with_interval(100.0, 200.0).interval_90 == pytest.approx((0.0, 100.0 + NINETY * 200.0))
+    assert with_interval(-5.0, 1.0).interval_90 == pytest.approx((-5.0 - NINETY, -5.0 + NINETY))
+    held = holding(with_interval(100.0, 10.0), 3.0, 0.15).interval_90
+    assert held == pytest.approx((100.0 - NINETY * 10.0, 345.0))
+
+
+def test_nothing_gives_way_to_a_cross_check_that_found_nothing(tracked: TrackedDrop) -> None:
+    check = input_state_estimate(tracked.problem, tracked.smoothed)
+    peak = tracked.values["NDE"]["peak_force_N"]
+    assert not is_beside(peak, replace(check, peak=np.full(2, math.nan)), 0)
+    assert not is_beside(with_interval(0.0, 1.0), check, 0)

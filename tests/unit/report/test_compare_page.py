@@ -147,6 +147,27 @@ def test_one_recording_estimated_twice_is_refused_or_counts_once() -> None:
     assert set(left_out((lost, other, DROPS[0]))) == {"one"}
 
 
+def test_a_third_estimate_of_one_recording_in_the_same_way_is_refused_too() -> None:
+    one = marked("one", record="4f")
+    second = marked("second", record="4f", method="replay", consistent=False)
+    third = replace(second, name="third")
+    with pytest.raises(UsageError, match="second and third are estimates of the same recording"):
+        left_out((one, second, third))
+
+
+@pytest.mark.parametrize("consistency", [None, {}, {"consistent": True}])
+def test_an_estimate_that_says_nothing_of_consistency_counts(consistency: Any) -> None:
+    document = {"speed_Hz": 60.0, "bearings": {}, "consistency": consistency, "warnings": None}
+    assert ComparedDrop.of_document("x", document).consistent
+
+
+@pytest.mark.parametrize("consistency", ["false", {"consistent": "false"}])
+def test_consistency_must_be_true_or_false(consistency: Any) -> None:
+    document = {"speed_Hz": 60.0, "bearings": {}, "consistency": consistency}
+    with pytest.raises(UsageError, match=r"x: 'consistency\.consistent' is 'false'; expected"):
+        ComparedDrop.of_document("x", document)
+
+
 def test_consistency_and_recording_are_read_from_the_estimate() -> None:
     document = {
         "speed_Hz": 60.0,
