@@ -18,10 +18,10 @@ from rotordrop.estimation.tracked_values import (
     INCONSISTENT,
     UNSURE_GAP,
     force_values,
-    is_beside,
     parameter_values,
     with_cross_check,
 )
+from rotordrop.identification.air_gap import STANDSTILL
 from rotordrop.identification.first_reach import reach_at_first_contact
 from rotordrop.machine import Machine
 from rotordrop.measurement.events import DropInstant
@@ -41,7 +41,7 @@ from rotordrop.tracking.calibration import (
     shifted,
     track,
 )
-from rotordrop.tracking.consistency import Check, consistency_checks
+from rotordrop.tracking.consistency import DIRECTIONS, Check, consistency_checks
 from rotordrop.tracking.forces import ForceHistory, force_history
 from rotordrop.tracking.input_state import InputEstimate, input_state_estimate
 from rotordrop.tracking.problem import DropProblem, build_problem
@@ -67,9 +67,6 @@ NOISE_WINDOW = 0.06
 
 LONG_RECORD, TAIL_SPAN = 20.0, 2.0
 """Length of a record that may hold its own settled tail, and of that tail [s]."""
-
-STANDING = 3.0
-"""Speed below which the rotor counts as standing [rad/s], half a turn per second."""
 
 INCONSISTENT_WIDENING = 2.0
 """Factor on intervals when the model is not consistent with the record [1]; those of force and stress grow
@@ -171,7 +168,7 @@ def settled_tail(record: Record, tail: Record | None) -> Record | None:
         return tail
     last = _last_seconds(record, TAIL_SPAN)
     assert last.speed is not None
-    return last if np.nanmax(np.abs(last.speed)) < STANDING else None
+    return last if np.nanmax(np.abs(last.speed)) < STANDSTILL else None
 
 
 def _last_seconds(record: Record, span: float) -> Record:
@@ -348,14 +345,12 @@ def tracked_drop(
     values: dict[str, dict[str, IdentifiedValue]] = {}
     peak_times: dict[str, float] = {}
     for b, name in enumerate(problem.model.bearing_names):
-        values[name] = parameter_values(problem, smoothed, name, widening)
-        peak_values, peak_times[name] = force_values(forces, b, widening)
+        found = parameter_values(problem, smoothed, name, widening)
+        loads, peak_times[name] = force_values(forces, b, widening)
         if cross_check is not None:
-            values[name] = {f: replace(value, status=INCONSISTENT) for f, value in values[name].items()}
-            if is_beside(peak_values["peak_force_N"], cross_check, b):
-                peak_times[name] = float(cross_check.time[cross_check.magnitude[:, b].argmax()])
-            peak_values = with_cross_check(peak_values, forces, cross_check, b)
-        values[name].update(peak_values)
+            found = {field: replace(value, status=INCONSISTENT) for field, value in found.items()}
+            loads, peak_times[name] = with_cross_check(loads, peak_times[name], forces, cross_check, b)
+        values[name] = found | loads
     return TrackedDrop(
         name=prepared.name,
         record=prepared.record,
@@ -376,13 +371,13 @@ def tracked_drop(
 
 
 def _sees_all_directions(checks: Sequence[Check]) -> bool:
-    return all(check.passed for check in checks if check.name == "directions")
+    return all(check.passed for check in checks if check.name == DIRECTIONS)
 
 
 def _refuse_unchecked(name: str, checks: Sequence[Check]) -> None:
     """Refuse a drop that the model does not fit and that nothing else can check: its errors have no limit."""
     failed = [check for check in checks if not check.passed]
-    if {check.name for check in failed} <= {"directions"}:
+    if {check.name for check in failed} <= {DIRECTIONS}:
         return
     raise IdentificationError(
         f"the model does not fit the record {name} ({'; '.join(check.message for check in failed)}), and "

@@ -106,16 +106,16 @@ def is_beside(peak: IdentifiedValue, check: InputEstimate, b: int) -> bool:
 
 
 def with_cross_check(
-    values: dict[str, IdentifiedValue], forces: ForceHistory, check: InputEstimate, b: int
-) -> dict[str, IdentifiedValue]:
-    """Force and stress of a bearing where model and record disagree.
+    values: dict[str, IdentifiedValue], moment: float, forces: ForceHistory, check: InputEstimate, b: int
+) -> tuple[dict[str, IdentifiedValue], float]:
+    """Force and stress of a bearing, and when its peak was [s], where model and record disagree.
 
     The error of the twin's own numbers is not known then: up to 340 % where a support is stiffer in one
     direction than the model allows, with innovations 14 % too large. Intervals are widened until they hold
     the cross-check; a twin further from it than a factor of two gives way to it.
     """
     if is_beside(values["peak_force_N"], check, b):
-        return _of_cross_check(check, b)
+        return _of_cross_check(check, b), float(check.time[check.magnitude[:, b].argmax()])
     peak, stress = (max(values[field].value, 1e-9) for field in ("peak_force_N", "peak_stress_Pa"))
     ratios = {
         "peak_force_N": (float(check.peak[b]) / peak, KNOWN_PEAK_ERROR),
@@ -126,9 +126,10 @@ def with_cross_check(
         vector = forces.force[forces.time >= 0.15, b].mean(axis=0)
         ratio = float(check.mean_late[b] / max(np.hypot(*vector), 1e-9))
         ratios["mean_force_0p15_0p2_N"] = (ratio, KNOWN_MEAN_ERROR)
-    return {
+    held = {
         name: holding(value, *ratios[name]) if name in ratios else value for name, value in values.items()
     }
+    return held, moment
 
 
 def _of_cross_check(check: InputEstimate, b: int) -> dict[str, IdentifiedValue]:

@@ -67,7 +67,7 @@ def tracked_page(
         title="Touchdown-bearing force and stress from a recorded drop",
         subtitle=_subtitle(drop, machine),
         simulated=simulated_notice(drop.record),
-        verdict=(*_verdict(drop, findings, cross_checks, warnings), *(QUICK_NOTICE if quick else ())),
+        verdict=(*_verdict(drop, findings, cross_checks, warnings), *(_quick_notice(drop) if quick else ())),
         cards=tuple(
             headline_card(name, values, _peak_times(drop, name)) for name, values in drop.values.items()
         ),
@@ -77,13 +77,14 @@ def tracked_page(
     )
 
 
-QUICK_NOTICE = (
-    Statement(
-        text="Quick estimate: one pass over the record, without the independent cross-check and without the "
-        "search for the size of the unknown impulses. For a number that decides, leave --quick out.",
-        level="notice",
-    ),
-)
+def _quick_notice(drop: TrackedDrop) -> tuple[Statement, ...]:
+    """What a single pass leaves out; the cross-check only where model and record agree."""
+    unchecked = "without the independent cross-check and " if drop.cross_check is None else ""
+    text = (
+        f"Quick estimate: one pass over the record, {unchecked}without the search for the size of the "
+        "unknown impulses. For a number that decides, leave --quick out."
+    )
+    return (Statement(text=text, level="notice"),)
 
 
 def _subtitle(drop: TrackedDrop, machine: Machine) -> str:

@@ -83,14 +83,6 @@ CALIBRATED_SCHEDULE: tuple[Stage, ...] = (
 QUICK_SCHEDULE: tuple[Stage, ...] = (Stage(until=0.2, impulse=1e-3, share=0.01, passes=1, substeps=3),)
 """With a calibrated machine: one pass, linearised at the filter's own estimate."""
 
-FULL_SCHEDULE: tuple[Stage, ...] = (
-    *BLIND_SCHEDULE,
-    Stage(until=0.1, impulse=2e-3, share=0.02, passes=1),
-    Stage(until=0.15, impulse=2e-3, share=0.02, passes=1),
-    Stage(until=0.2, impulse=2e-3, share=0.02, passes=2),
-)
-"""From nominal guesses to the whole 0.2 s of one drop."""
-
 REFERENCE_CONTACT = 0.0075
 FITTING_NIS = 1.25
 """Mean normalised innovation squared up to which a model fits its record [1]."""

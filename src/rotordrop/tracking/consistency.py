@@ -14,6 +14,8 @@ from rotordrop.tracking.smoother import Smoothed, parameter_sample
 Array = NDArray[np.float64]
 
 NIS_RANGE = (0.6, FITTING_NIS)
+DIRECTIONS = "directions"
+"""Name of the check without which nothing can cross-check an estimate."""
 CORRELATION_LIMIT = 0.25
 SENSOR_LIMIT = 3.5
 PARAMETER_LIMIT = 3.5
@@ -130,7 +132,7 @@ def _direction_check(problem: DropProblem, smoothed: Smoothed) -> Check:
             blind.append(str(node))
     seen = "both directions are seen at every node with sensors"
     missing = f"only one direction or none is seen at node {', '.join(blind)}: a force across it is a guess"
-    return Check(name="directions", passed=not blind, message=missing if blind else seen)
+    return Check(name=DIRECTIONS, passed=not blind, message=missing if blind else seen)
 
 
 def _parameter_check(problem: DropProblem, smoothed: Smoothed) -> Check:

@@ -166,6 +166,7 @@ def _smooth_forces(problem: DropProblem, readings: Array, gate: NDArray[np.bool_
     P[: 2 * m, : 2 * m] = np.diag(start[: 2 * m])
     velocity = model.layout.velocity_of(slice(0, 2 * m))
     P[2 * m : n, 2 * m : n] = np.diag(start[velocity])
+    identity = np.eye(size)
     hold = np.zeros((k, size))
     hold[:, n : n + k] = np.eye(k)
     predicted, filtered = np.empty((count, size)), np.empty((count, size))
@@ -185,7 +186,7 @@ def _smooth_forces(problem: DropProblem, readings: Array, gate: NDArray[np.bool_
         S = H @ P @ H.T + R
         K = np.linalg.solve(S, H @ P).T
         x = x + K @ (z - H @ x)
-        left = np.eye(size) - K @ H
+        left = identity - K @ H
         P = left @ P @ left.T + (K * np.diag(R)) @ K.T  # Joseph form: stays positive with a channel missing
         P = 0.5 * (P + P.T)
         filtered[i], P_filtered[i] = x, P

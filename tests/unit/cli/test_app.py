@@ -171,6 +171,19 @@ def test_ctrl_c_in_the_real_command_ends_with_130():
     assert signal.SIGINT.name not in done.stderr
 
 
+def command_in_which(fault):
+    """The command, ended, after a verb of it ran a piece of generated code."""
+    program = (
+        "import sys\n"
+        "from rotordrop.cli import app\n"
+        f"app.load_verb = lambda name: exec({fault!r}, {{}})\n"
+        "app.verbs = lambda: {'wait': 'Wait'}\n"
+        "sys.argv = ['rotordrop', 'wait']\n"
+        "app.main()\n"
+    )
+    return subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+
+
 @pytest.mark.skipif(os.name != "posix", reason="signals as on POSIX")
 @pytest.mark.parametrize(
     "fault",
@@ -182,15 +195,7 @@ def test_ctrl_c_in_the_real_command_ends_with_130():
 )
 def test_ctrl_c_inside_generated_code_ends_with_130(fault):
     """Python kills itself with SIGINT after an interrupt inside an exec, even one that was caught."""
-    program = (
-        "import sys\n"
-        "from rotordrop.cli import app\n"
-        f"app.load_verb = lambda name: exec({fault!r})\n"
-        "app.verbs = lambda: {'wait': 'Wait'}\n"
-        "sys.argv = ['rotordrop', 'wait']\n"
-        "app.main()\n"
-    )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+    done = command_in_which(fault)
     assert done.returncode == 130
     assert done.stderr.strip() == "rotordrop: stopped; nothing was left half written"
 
@@ -204,15 +209,7 @@ def test_ctrl_c_that_foreign_code_ignores_ends_with_130(then):
         "callback = ctypes.CFUNCTYPE(None)(lambda: os.kill(os.getpid(), signal.SIGINT))\n"
         f"callback()\n{then}"
     )
-    program = (
-        "import sys\n"
-        "from rotordrop.cli import app\n"
-        f"app.load_verb = lambda name: exec({fault!r}, {{}})\n"
-        "app.verbs = lambda: {'wait': 'Wait'}\n"
-        "sys.argv = ['rotordrop', 'wait']\n"
-        "app.main()\n"
-    )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=20)
+    done = command_in_which(fault)
     assert done.returncode == 130
     assert done.stderr.strip() == "rotordrop: stopped; nothing was left half written"
 

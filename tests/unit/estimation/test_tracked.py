@@ -323,12 +323,14 @@ def test_a_twin_far_from_the_cross_check_gives_way_to_it(tracked: TrackedDrop) -
     check = input_state_estimate(tracked.problem, tracked.smoothed)
     own = tracked.values["NDE"]
     assert not is_beside(own["peak_force_N"], check, 0)
-    kept = with_cross_check(own, tracked.forces, check, 0)
+    kept, moment = with_cross_check(own, 0.5, tracked.forces, check, 0)
+    assert moment == 0.5
     assert kept["peak_force_N"].value == own["peak_force_N"].value
 
     wild = own | {"peak_force_N": with_interval(2.1 * float(check.peak[0]), 10.0, unit="N")}
     assert is_beside(wild["peak_force_N"], check, 0)
-    given = with_cross_check(wild, tracked.forces, check, 0)
+    given, moment = with_cross_check(wild, 0.5, tracked.forces, check, 0)
+    assert moment == check.time[check.magnitude[:, 0].argmax()]
     assert given["peak_force_N"].value == check.peak[0]
     assert given["peak_force_N"].status == OF_CROSS_CHECK
     low, high = given["peak_force_N"].interval_90 or (math.nan, math.nan)
@@ -359,7 +361,7 @@ def test_a_record_until_standstill_holds_its_own_tail(synthetic: SyntheticDrop) 
     own = settled_tail(standing, None)
     assert own is not None and own.time[0] == pytest.approx(time[-1] - 2.0)
     assert settled_tail(standing, synthetic.tail) is synthetic.tail
-    assert settled_tail(replace(standing, speed=np.full(len(time), 20.0)), None) is None
+    assert settled_tail(replace(standing, speed=np.full(len(time), 5.0)), None) is None
     assert settled_tail(synthetic.record, None) is None
 
 

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from rotordrop.estimated import IdentifiedValue
 from rotordrop.report.content import Table
 from rotordrop.report.cross_check import CrossCheck, cross_check_statements, cross_check_table
 from rotordrop.report.impacts import impact_figure, impact_table, impacts_of, tick_spacing
@@ -15,6 +18,7 @@ from rotordrop.report.parameters import ParameterRow, parameter_figure, paramete
 from rotordrop.report.quantity import Quantity
 from rotordrop.report.record_quality import record_quality_section
 from rotordrop.report.stress_box import stress_box, stress_box_figure, stress_table, thinned
+from rotordrop.report.waterfall_page import _law_rows
 from rotordrop.severity.statistics import stress_statistics
 from rotordrop.simulation.result import DropResult
 
@@ -67,6 +71,25 @@ def test_impacts_are_drawn_at_their_azimuth_with_their_interval(drop_result: Dro
 @pytest.mark.parametrize(("span", "spacing"), [(0.0, 15.0), (90.0, 15.0), (91.0, 30.0), (300.0, 90.0)])
 def test_azimuth_has_a_few_labels_whatever_it_spans(span: float, spacing: float) -> None:
     assert tick_spacing(np.deg2rad(span)) == spacing
+
+
+def test_a_drag_is_shown_as_the_slowing_it_causes_in_hertz_per_second() -> None:
+    """At 60 Hz: dry 2π rad/s² is 1 Hz/s, linear 0.1 /s is 6 Hz/s, quadratic 1e-3 /rad is 2π·3.6 Hz/s."""
+    turn = 2.0 * np.pi
+    drag = SimpleNamespace(
+        initial_speed=IdentifiedValue(value=60.0 * turn),
+        constant=IdentifiedValue(value=turn, interval_90=(0.9 * turn, 1.1 * turn)),
+        linear=IdentifiedValue(value=0.1, interval_90=(0.09, 0.11)),
+        quadratic=IdentifiedValue(value=1e-3, interval_90=(0.9e-3, 1.1e-3)),
+    )
+    exponential = SimpleNamespace(time_constant=IdentifiedValue(value=9.0))
+    law: Any = SimpleNamespace(exponential=exponential, drag=drag, standstill=IdentifiedValue(value=50.0))
+    found = [row[1:3] for row in _law_rows(law)[1:4]]
+    assert found == [
+        ("1.00 Hz/s", "0.90 to 1.10 Hz/s"),
+        ("6.00 Hz/s", "5.40 to 6.60 Hz/s"),
+        ("22.6 Hz/s", "20.4 to 24.9 Hz/s"),
+    ]
 
 
 def row(name: str, prior: float, estimate: float, interval: tuple[float, float] | None) -> ParameterRow:
