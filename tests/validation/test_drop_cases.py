@@ -64,7 +64,7 @@ def undamped(inputs: Inputs) -> dict[str, float]:
         speed=2.0 * math.pi * inputs["speed_hz"],
         duration=inputs["duration_s"],
         tolerance=inputs["tolerance"],
-        spin="constant",
+        spin="coasting",
     )
     result = simulate_drop(model, case)
     assert len(result.contacts) > 10

@@ -33,6 +33,7 @@ class Spin(StrEnum):
 
     dynamic = "dynamic"
     prescribed = "prescribed"
+    coasting = "coasting"
     constant = "constant"
 
 
@@ -92,7 +93,9 @@ def simulate(
             parser=quantity("time"), metavar="TIME", help="Levitated: its decay.", show_default="2 ms"
         ),
     ] = 2e-3,
-    spin: Annotated[Spin, typer.Option(help="What makes the speed fall.")] = Spin.dynamic,
+    spin: Annotated[
+        Spin, typer.Option(help="What brakes: drag and friction; a drag profile; friction alone; nothing.")
+    ] = Spin.dynamic,
     reduction: Annotated[Reduction, typer.Option(help="Modes of the rotor.")] = Reduction.accurate,
     tolerance: Annotated[float, typer.Option(min=1e-12, max=1e-3, help="Accuracy of a step.")] = 1e-6,
     integrator: Annotated[Integrator, typer.Option(help="Runge–Kutta pair.")] = Integrator.tsit5,

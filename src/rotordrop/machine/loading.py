@@ -137,7 +137,11 @@ def _with_shaft_table(
 def _located(
     error: ValidationError, positions: TomlPositions, file: Path | None, table: tuple[Path, list[int]] | None
 ) -> MachineFileError:
-    found = [_one_error(entry, positions, file, table) for entry in error.errors()]
+    entries = error.errors()
+    # A list that loses an entry to an error inside it is then called too short; that error is the cause.
+    inside = {entry["loc"][:depth] for entry in entries for depth in range(len(entry["loc"]))}
+    causes = [entry for entry in entries if entry["type"] != "too_short" or entry["loc"] not in inside]
+    found = [_one_error(entry, positions, file, table) for entry in causes]
     found.sort(key=lambda refusal: (refusal.line or 0, refusal.column or 0))
     first = found[0]
     others = "".join(f"\n{text}" for text in dict.fromkeys(map(str, found[1:])) if text != str(first))

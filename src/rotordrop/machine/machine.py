@@ -71,6 +71,7 @@ class Machine(Description):
         for key in ("unbalances", "touchdown_bearings", "ambs", "sensors"):
             place_on_nodes(getattr(self, key), nodes, key)
         self._check_names()
+        self._check_bearing_nodes()
         if self.sensors:
             check_sensors_resolve_motion(self.sensors, nodes)
 
@@ -98,6 +99,19 @@ class Machine(Description):
                     f"there are {', '.join(sorted(names))}",
                     ("sensors", index, "bearing"),
                 )
+
+    def _check_bearing_nodes(self) -> None:
+        """Refuse two touchdown bearings at one node: the weight cannot be shared out between them."""
+        first: dict[int, str] = {}
+        for index, bearing in enumerate(self.touchdown_bearings):
+            if bearing.node in first:
+                raise Misfit(
+                    f"touchdown bearing {bearing.name} sits at node {bearing.node}, where "
+                    f"{first[bearing.node]} sits already; give it another node, or describe the two rows as "
+                    "one bearing",
+                    ("touchdown_bearings", index, "node" if bearing.position is None else "position"),
+                )
+            first[bearing.node] = bearing.name
 
     def left_out(self) -> dict[str, Any]:
         """Share out the balance grade, complete the AMBs, assign the sensors to bearings."""

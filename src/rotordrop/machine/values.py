@@ -17,6 +17,12 @@ from rotordrop.units import KINDS, format_quantity, parse_quantity, si_unit
 LEFT_OUT = Estimated(value=math.nan, status="default", source="follows from other values")
 """Stands for a value that was left out and follows from its neighbours."""
 
+SMALLEST, LARGEST = 1e-20, 1e20
+"""Magnitudes [SI] no machine has beyond; far inside what squares and fourth powers can be taken of."""
+
+MOST_TURNS = 2e3 * math.pi
+"""Largest angle [rad]; beyond it nothing is left of the angle within a turn."""
+
 KIND_MARK = "x-quantity"
 """Marks a physical value in the schema of a description, with its kind."""
 
@@ -132,6 +138,11 @@ class Physical:
             raise UsageError(
                 f"{raw!r} is not a finite number; write for example {KINDS[self.kind].example!r}"
             )
+        if number and not SMALLEST <= abs(number) <= LARGEST:
+            raise UsageError(
+                f"{raw!r} is no {self.kind.replace('_', ' ')} that a machine has; write for example "
+                f"{KINDS[self.kind].example!r}"
+            )
         if self.above is not None and not number > self.above:
             limit = "positive" if self.above == 0 else f"greater than {self.text(self.above)}"
             raise UsageError(f"{self.text(number)} is not allowed here; {spoken(self.kind)} must be {limit}")
@@ -198,7 +209,7 @@ Mass = Annotated[Estimated, Physical("mass", least=0.0)]
 PositiveMass = Annotated[Estimated, Physical("mass", above=0.0)]
 Inertia = Annotated[Estimated, Physical("inertia", least=0.0)]
 PositiveInertia = Annotated[Estimated, Physical("inertia", above=0.0)]
-Angle = Annotated[Estimated, Physical("angle")]
+Angle = Annotated[Estimated, Physical("angle", least=-MOST_TURNS, most=MOST_TURNS)]
 ContactAngle = Annotated[Estimated, Physical("angle", least=0.0, most=math.radians(60.0))]
 Time = Annotated[Estimated, Physical("time", least=0.0)]
 PositiveTime = Annotated[Estimated, Physical("time", above=0.0)]

@@ -12,7 +12,7 @@ from rotordrop.errors import SimulationError
 from rotordrop.model.reduction import Reduction
 
 Array = NDArray[np.float64]
-SpinMode: TypeAlias = Literal["dynamic", "prescribed", "function of speed", "constant"]
+SpinMode: TypeAlias = Literal["dynamic", "prescribed", "function of speed", "coasting", "constant"]
 IntegratorName: TypeAlias = Literal["tsit5", "dp5"]
 
 
@@ -94,9 +94,9 @@ class DropCase:
         Basis of the rotor; ignored when a ready model is simulated.
     start : Start
         How the drop starts.
-    spin : {"dynamic", "prescribed", "function of speed", "constant"}
-        Aerodynamic deceleration in time plus friction; the measured profile as it is; drag as a function of
-        speed plus friction; neither.
+    spin : {"dynamic", "prescribed", "function of speed", "coasting", "constant"}
+        What changes the speed: aerodynamic deceleration in time plus friction; the measured profile as it is,
+        friction or not; drag as a function of speed plus friction; friction alone; nothing at all.
     integrator : {"tsit5", "dp5"}
         Runge–Kutta pair.
     largest_step : float

@@ -20,7 +20,8 @@ _SPIN_MODES = {
     "dynamic": aerodynamics.EXPONENTIAL_IN_TIME,
     "prescribed": aerodynamics.PRESCRIBED_SPEED,
     "function of speed": aerodynamics.FUNCTION_OF_SPEED,
-    "constant": aerodynamics.OFF,
+    "coasting": aerodynamics.OFF,
+    "constant": aerodynamics.PRESCRIBED_SPEED,
 }
 
 
@@ -44,6 +45,8 @@ def start_of_drop(model: DropModel, case: DropCase) -> tuple[Array, KernelParame
 def _with_spin(parameters: KernelParameters, case: DropCase) -> KernelParameters:
     spin = parameters.spin.copy()
     spin[L.INITIAL_SPEED] = case.speed
+    if case.spin == "constant":
+        spin[L.AERO_TIME_CONSTANT] = np.inf  # a prescribed profile that never falls
     flags = parameters.flags.copy()
     flags[L.SPIN_MODE] = _SPIN_MODES[case.spin]
     return parameters._replace(spin=spin, flags=flags)

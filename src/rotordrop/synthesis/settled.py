@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import SimulationError
 from rotordrop.model import layout as L
+from rotordrop.model.layout import KernelParameters
 from rotordrop.model.parameters import DropModel
 from rotordrop.physics.pendulum import small_frequency
+from rotordrop.simulation._histories import stored_energy
 from rotordrop.simulation._rhs import drop_derivative
 from rotordrop.simulation._sensitivity import drop_jacobian
 from rotordrop.simulation.levitation import rigid_amplitudes
@@ -41,31 +43,63 @@ class Swing:
 def settled_coordinates(model: DropModel) -> Array:
     """Coordinates (modal amplitudes, races, supports), shape (n_q,), of the rotor at rest in its bearings.
 
-    Newton's iteration on the equations of motion at standstill; the rotor lies straight down.
+    The lowest energy near the rotor lying straight down, by Newton steps damped until the energy falls.
     """
-    layout = model.layout
-    state = layout.zeros()
-    state[layout.modal_y] = _guess(model)
+    n_q = model.layout.n_coordinates
     parameters = model.parameters._replace(flags=np.zeros(L.N_FLAGS, dtype=np.int64))
-    n_q, rows = layout.n_coordinates, slice(layout.n_coordinates, 2 * layout.n_coordinates)
-    size = layout.rotor_angle + 1
-    jacobian, change, work = (
-        np.zeros((size, size)),
-        layout.zeros(),
-        np.empty((2, parameters.ball_cos.shape[1])),
-    )
+    mass = coordinate_masses(model)
+    state = model.layout.zeros()
+    state[model.layout.modal_y] = _guess(model)
+    # Damping by mass holds a step back by the energy it costs, so that no step needs a limit of its own: not
+    # that of a heavy rotor, which sags far, nor one that nothing holds, as of a rotor just off its race.
+    least = float(np.max(np.abs(parameters.gravity))) / float(np.max(np.abs(state[:n_q])))
+    rounding = 1e-12 * _energy(state, parameters)
+    damping, energy = 0.0, _energy(state, parameters)
     for _ in range(MOST_ITERATIONS):
-        drop_derivative(0.0, state, parameters, change, work)
-        drop_jacobian(0.0, state, parameters, jacobian)
-        step = np.linalg.solve(jacobian[rows, :n_q], -change[rows])
+        force, stiffness = _force_and_stiffness(model, parameters, mass, state)
+        step = np.linalg.lstsq(stiffness + damping * np.diag(mass), force, rcond=None)[0]
+        trial = state.copy()
+        trial[:n_q] += step
+        if _energy(trial, parameters) > energy + abs(rounding):
+            damping = max(4.0 * damping, least)
+            continue
+        state, energy = trial, _energy(trial, parameters)
         moved = float(np.max(np.abs(step)))
-        state[:n_q] += step * min(1.0, 2e-6 / max(moved, 1e-30))
-        if moved < SMALLEST_CHANGE or moved < 1e-12 * float(np.max(np.abs(state[:n_q]))):
+        if damping == 0.0 and moved < max(SMALLEST_CHANGE, 1e-12 * float(np.max(np.abs(state[:n_q])))):
             return state[:n_q]
+        damping = 0.1 * damping if damping > 0.01 * least else 0.0
     raise SimulationError(
         f"no position of rest was found for the rotor of {model.machine.name!r} in {MOST_ITERATIONS} "
-        "iterations; check contact and support stiffness"
+        f"iterations; the last step still moved it by {moved:.3g} √kg m. Check that its touchdown bearings "
+        "carry it (rotordrop check shows the load shares)"
     )
+
+
+def coordinate_masses(model: DropModel) -> Array:
+    """Mass behind each coordinate, shape (n_q,): 1 for modal amplitudes, [kg] for races and supports."""
+    layout, bearing = model.layout, model.parameters.bearing
+    mass = np.ones(layout.n_coordinates)
+    mass[layout.race] = np.repeat(bearing[:, L.RACE_MASS], 2)
+    mass[layout.support] = bearing[:, [L.SUPPORT_MASS_X, L.SUPPORT_MASS_Y]].ravel()
+    return mass
+
+
+def _energy(state: Array, parameters: KernelParameters) -> float:
+    return float(stored_energy(state, parameters, False))
+
+
+def _force_and_stiffness(
+    model: DropModel, parameters: KernelParameters, mass: Array, state: Array
+) -> tuple[Array, Array]:
+    """Force left over (n_q,) and tangent stiffness (n_q, n_q) of a state at standstill."""
+    layout = model.layout
+    n_q, size = layout.n_coordinates, layout.rotor_angle + 1
+    change, work = layout.zeros(), np.empty((2, parameters.ball_cos.shape[1]))
+    jacobian = np.zeros((size, size))
+    drop_derivative(0.0, state, parameters, change, work)
+    drop_jacobian(0.0, state, parameters, jacobian)
+    rows = slice(n_q, 2 * n_q)
+    return mass * change[rows], -mass[:, None] * jacobian[rows, :n_q]
 
 
 def _guess(model: DropModel) -> Array:

@@ -30,7 +30,7 @@ def test_released_straight_rotor_falls_as_galileo_says(model: DropModel) -> None
 def test_fall_agrees_with_the_compiled_drop_to_the_first_contact(model: DropModel) -> None:
     force = np.array([[5.0, 40.0], [-8.0, 90.0]])
     start = LevitatedStart(rotor_angle=0.7, remanent_force=force, remanence_time_constant=1.8e-3)
-    case = DropCase(speed=SPEED, duration=5e-3, tolerance=1e-10, start=start, spin="constant")
+    case = DropCase(speed=SPEED, duration=5e-3, tolerance=1e-10, start=start, spin="coasting")
     result = simulate_drop(model, case)
     initial, parameters = start_of_drop(model, case)
     nodes = tuple(unbalance.node for unbalance in model.machine.unbalances)

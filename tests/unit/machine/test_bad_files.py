@@ -116,6 +116,12 @@ BAD = [
     ('name = "DE"', 'name = "NDE"', "the name 'NDE' is used twice", '"NDE"'),
     ('name = "DE"', 'name = "D E"', "'D E' is not a name; write one word without dots", '"D E"'),
     ('name = "DE"', 'name = "speed"', "a touchdown bearing cannot be called 'speed'", '"speed"'),
+    ('position = "0.7 m"', "node = 2", "DE sits at node 2, where NDE sits already; give it another", "2"),
+    # magnitudes no arithmetic survives
+    ('"60 mm"', '"1e-300 mm"', "'1e-300 mm' is no length that a machine has; write for ex", '"1e-300 mm"'),
+    ('"60 mm"', '"1e300 mm"', "'1e300 mm' is no length that a machine has; write for ex", '"1e300 mm"'),
+    ('"5 kg"', '"1e300 kg"', "'1e300 kg' is no mass that a machine has", '"1e300 kg"'),
+    ('preload = "heavy"', 'first_ball_angle = "1e20 deg"', "is not allowed here; at most", '"1e20 deg"'),
     # sensors
     ('"135 deg"', '"45 deg"', "resolve only 3 of the 4 rigid motions: in the plane at 100 mm", '"45 deg"'),
     ('"135 deg"', '"225 deg"', "resolve only 3 of the 4 rigid motions", '"225 deg"'),
@@ -123,6 +129,19 @@ BAD = [
     ('name = "B"', 'name = "A"', "the name 'A' is used twice", '"A"'),
     ('name = "B"', 'name = "B"\nbearing = "XE"', "belongs to touchdown bearing 'XE', .* DE, NDE", '"XE"'),
 ]
+
+
+def test_an_error_inside_a_bearing_is_told_alone(changed):
+    with pytest.raises(MachineFileError, match=r"air_gap: '250 g' is not a length") as refused:
+        loads_machine(changed((GAP, 'air_gap = "250 g"')))
+    assert "at least one entry is needed" not in str(refused.value)
+
+
+def test_a_machine_without_touchdown_bearings_is_refused(small_text):
+    head, _, rest = small_text.partition("[[touchdown_bearings]]")
+    sensors = rest[rest.index("[[sensors]]") :]
+    with pytest.raises(MachineFileError, match="a list does not fit; at least one entry is needed"):
+        loads_machine("touchdown_bearings = []\n" + head + sensors)
 
 
 @pytest.mark.parametrize(("old", "new", "told", "at"), BAD, ids=[new[:40] for _, new, _, _ in BAD])

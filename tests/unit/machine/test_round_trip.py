@@ -47,7 +47,7 @@ PATHS = {
 @st.composite
 def known(draw, limits):
     """A value with any of what can be known about it."""
-    numbers = st.floats(*limits, allow_nan=False)
+    numbers = st.floats(*limits, allow_nan=False).filter(lambda number: number == 0.0 or abs(number) > 1e-18)
     low, value, high = sorted(draw(st.tuples(numbers, numbers, numbers)))
     return Estimated(
         value=value,

@@ -180,7 +180,7 @@ def test_work_and_dissipation_do_not_steer_the_steps(quick):
 
 def test_the_first_contact_is_found_between_the_steps(quick):
     """A fall from rest reaches the gap after √(2 c/g)."""
-    result = simulate_drop(quick, DropCase(speed=0.0, duration=0.009, spin="constant", output_step=1e-3))
+    result = simulate_drop(quick, DropCase(speed=0.0, duration=0.009, spin="coasting", output_step=1e-3))
     gaps = np.array([float(b.air_gap) for b in quick.machine.touchdown_bearings])
     first = [result.contacts.of_bearing(b).start[0] for b in range(2)]
     expected = np.sqrt(2.0 * gaps / 9.81)

@@ -76,6 +76,15 @@ def test_turning_the_start_under_gravity_does_not_turn_the_drop(quick, skewed_st
     assert np.max(np.abs(two.displacement - turned(one.displacement, np.pi / 2))) > 1e-4
 
 
+@pytest.mark.parametrize(("spin", "kept"), [("constant", True), ("coasting", False), ("prescribed", False)])
+def test_only_a_constant_speed_is_held_through_contacts(quick, spin, kept):
+    result = simulate_drop(quick, DropCase(speed=SPEED, duration=0.02, spin=spin))
+    assert np.max(result.contact_force) > 1000.0
+    assert np.max(result.race_speed) > 0.1 * SPEED
+    held = np.max(np.abs(result.speed / SPEED - 1.0)) < 1e-13
+    assert held == kept
+
+
 def test_mirroring_speed_place_and_unbalance_mirrors_the_drop(paper, skewed_start):
     mirror = np.array([-1.0, 1.0])
     phases = {f"unbalance.{i}.phase": 0.6 + i for i in range(len(paper.unbalances))}
@@ -196,7 +205,7 @@ def test_at_rest_the_bearings_carry_the_weight(paper, quick):
     state = quick.layout.zeros()
     state[: quick.layout.n_coordinates] = settled_coordinates(quick)
     case = DropCase(
-        speed=0.0, duration=0.005, start=StateStart(state=state), spin="constant", tolerance=1e-10
+        speed=0.0, duration=0.005, start=StateStart(state=state), spin="coasting", tolerance=1e-10
     )
     result = simulate_drop(quick, case)
     weight = paper.rotor.mass * float(paper.gravity)
@@ -210,7 +219,7 @@ def test_a_heavily_damped_drop_settles_there(paper, quick):
     columns = {L.FRICTION_STATIC: 0.0, L.FRICTION_DYNAMIC: 0.0, L.CONTACT_DAMPING: 3.0}
     model = with_columns(quick, columns | {L.SUPPORT_DAMPING_X: 1e5, L.SUPPORT_DAMPING_Y: 1e5})
     model = with_parameters(model, damping=np.full_like(quick.parameters.damping, 50.0))
-    result = simulate_drop(model, DropCase(speed=0.0, duration=0.4, spin="constant", output_step=1e-4))
+    result = simulate_drop(model, DropCase(speed=0.0, duration=0.4, spin="coasting", output_step=1e-4))
     rest = settled_coordinates(model)
     assert np.sum(result.contact_force[-1]) == pytest.approx(paper.rotor.mass * 9.81, rel=1e-3)
     shape = model.parameters.bearing_shape
@@ -220,7 +229,7 @@ def test_a_heavily_damped_drop_settles_there(paper, quick):
 def contact_on_race(model: DropModel, azimuth: float, speed: float, velocity=(0.0, 0.0), depth=20e-6):
     """Force [N] of the rotor on each race when it stands at a depth in a direction, races at rest."""
     layout = model.layout
-    case = DropCase(speed=speed, spin="constant")
+    case = DropCase(speed=speed, spin="coasting")
     _, p = start_of_drop(model, case)
     away = np.array([np.cos(azimuth), np.sin(azimuth)])
     nodes = [b.node for b in model.machine.touchdown_bearings]
@@ -281,7 +290,7 @@ def test_no_contact_force_is_negative_or_acts_without_indentation(drop):
 
 
 def test_free_fall_is_a_parabola(quick):
-    result = simulate_drop(quick, DropCase(speed=0.0, duration=0.005, start=CentredStart(), spin="constant"))
+    result = simulate_drop(quick, DropCase(speed=0.0, duration=0.005, start=CentredStart(), spin="coasting"))
     expected = -0.5 * 9.81 * result.time**2
     assert result.displacement[:, :, 1] == pytest.approx(np.column_stack([expected, expected]), abs=1e-12)
 
@@ -289,7 +298,7 @@ def test_free_fall_is_a_parabola(quick):
 def test_the_race_that_is_dragged_takes_the_momentum_the_rotor_loses(quick):
     """Angular momentum: what friction takes from the rotor drives the races."""
     model = with_columns(quick, {L.DRAG_COEFFICIENT: 0.0})
-    result = simulate_drop(model, DropCase(speed=SPEED, duration=0.02, spin="constant", tolerance=1e-8))
+    result = simulate_drop(model, DropCase(speed=SPEED, duration=0.02, spin="coasting", tolerance=1e-8))
     p = model.parameters
     ratio = p.bearing[:, L.ROTOR_RADIUS] / p.bearing[:, L.BORE_RADIUS]
     gained = (result.race_speed[-1] * p.bearing[:, L.RACE_INERTIA]) @ ratio

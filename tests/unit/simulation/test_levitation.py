@@ -24,7 +24,7 @@ def levitated():
 def test_while_the_magnets_hold_the_rotor_keeps_its_orbit(levitated):
     """The closed-form orbit and sag solve the equations of motion: nothing else happens for two turns."""
     start = LevitatedStart(rotor_angle=0.4, delay=1.0, offset=np.array([[3e-6, -8e-6], [5e-6, 2e-6]]))
-    case = DropCase(speed=SPEED, duration=2 / 150, tolerance=1e-10, start=start, spin="constant")
+    case = DropCase(speed=SPEED, duration=2 / 150, tolerance=1e-10, start=start, spin="coasting")
     result = simulate_drop(levitated, case)
     static, _ = levitated_static(levitated, start.offset)
     orbit = levitated_orbit(levitated, SPEED)
@@ -80,12 +80,12 @@ def test_remanent_force_delays_the_fall_by_its_impulse(levitated):
     """Upwards F e^(-t/τ) takes away F τ of momentum, however it is spread over the magnets."""
     force = np.array([[0.0, 60.0], [0.0, 90.0]])
     start = LevitatedStart(remanent_force=force, remanence_time_constant=4e-4)
-    case = DropCase(speed=0.0, duration=0.005, start=start, spin="constant", tolerance=1e-9)
+    case = DropCase(speed=0.0, duration=0.005, start=start, spin="coasting", tolerance=1e-9)
     with_lift, without = (
         simulate_drop(levitated, case),
         simulate_drop(
             levitated,
-            DropCase(speed=0.0, duration=0.005, start=LevitatedStart(), spin="constant", tolerance=1e-9),
+            DropCase(speed=0.0, duration=0.005, start=LevitatedStart(), spin="coasting", tolerance=1e-9),
         ),
     )
     layout = levitated.layout
@@ -99,7 +99,7 @@ def test_remanent_force_delays_the_fall_by_its_impulse(levitated):
 
 def test_a_delay_holds_the_rotor_first(levitated):
     start = LevitatedStart(delay=0.003)
-    result = simulate_drop(levitated, DropCase(speed=0.0, duration=0.006, start=start, spin="constant"))
+    result = simulate_drop(levitated, DropCase(speed=0.0, duration=0.006, start=start, spin="coasting"))
     fallen = result.displacement[:, :, 1] - result.displacement[0, :, 1]
     assert np.max(np.abs(fallen[:300])) < 1e-9
     assert np.mean(fallen[-1]) == pytest.approx(-0.5 * 9.81 * 0.003**2, rel=0.1)
