@@ -27,6 +27,9 @@ ABOUT = {
     "metamorphic": "a property that must hold without a number from outside",
 }
 
+ROUNDING = 1e-11
+"""Deviation, over the number, that is arithmetic: another processor has another, so it prints as 0."""
+
 
 def computations() -> dict[str, Compute]:
     """The function that computes each case, from the ``CASES`` of every test module."""
@@ -51,7 +54,7 @@ def case_section(case: Case, computed: Mapping[str, float]) -> list[str]:
 def row(entry: Expected, value: float) -> str:
     """One line of a table."""
     mark = "" if entry.holds(value) else " **outside**"
-    deviation, tolerance = (_in_terms(entry, x) for x in (entry.deviation(value), entry.tolerance))
+    deviation, tolerance = (_in_terms(entry, x) for x in (_beyond_rounding(entry, value), entry.tolerance))
     name = entry.name.replace("|", "\\|")
     return f"| {name} | {entry.value:.6g} | {value:.6g} | {entry.unit} | {deviation}{mark} | {tolerance} |"
 
@@ -118,6 +121,11 @@ def page() -> str:
             if case.category == category:
                 lines += case_section(case, computed[case.id])
     return "\n".join(lines).rstrip() + "\n"
+
+
+def _beyond_rounding(entry: Expected, value: float) -> float:
+    deviation = entry.deviation(value)
+    return 0.0 if deviation < ROUNDING * (1.0 if entry.relative else abs(entry.value)) else deviation
 
 
 def _in_terms(entry: Expected, value: float) -> str:

@@ -55,6 +55,13 @@ def test_a_number_outside_its_tolerance_is_marked() -> None:
     assert script.row(entry, 100.5) == "| force | 100 | 100.5 | N | 0.5 % | 1 % |"
 
 
+def test_what_is_arithmetic_is_no_deviation() -> None:
+    entry = Expected(name="mode", value=20.5, unit="Hz", tolerance=1e-4, relative=True, source=None)
+    exact = script.row(entry, 20.5)
+    assert script.row(entry, 20.5 * (1.0 + 3e-15)) == exact
+    assert script.row(entry, 20.5 * (1.0 + 3e-11)) == exact.replace("| 0 % |", "| 3e-09 % |")
+
+
 def test_the_summary_counts_cases_and_numbers() -> None:
     case: Case = load_case("R18")
     (line,) = script.summary([case], {"R18": {e.name: e.value * (1 + 5e-5) for e in case.expected}})[2:-1]

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError
 from rotordrop.identification.free_fall import kernel_state
+from rotordrop.identification.initial_state import covariance_root
 from rotordrop.identification.parameter_vector import with_bearing
 from rotordrop.identification.replica import drop_parameters
 from rotordrop.identification.support import WIDENING, ImpactFit
@@ -205,7 +206,7 @@ def _keeping(
 ) -> tuple[list[Candidate], int]:
     """Candidates whose first impacts stay near the record, and how many did not."""
     random = np.random.Generator(np.random.Philox(7))
-    root = _square_root(covariance)
+    root = covariance_root(covariance)
     complement = problem.remaining_directions
     points, falls = [], []
     for _ in range(CANDIDATES * count):
@@ -231,12 +232,6 @@ def _keeping(
             "the fit is no basis for an interval. Give better guesses for supports and contact."
         )
     return kept, tried - len(kept)
-
-
-def _square_root(covariance: Array) -> Array:
-    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
-    return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
 def _allowance(problem: ImpactFit, covariance: Array, count: int) -> float:

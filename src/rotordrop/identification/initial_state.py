@@ -123,9 +123,19 @@ class InitialState:
 
     def square_root(self) -> Array:
         """Matrix L with L Lᵀ the covariance, shape (n, n); a draw is ``mean + L @ standard_normal``."""
-        scale = np.sqrt(np.maximum(np.diag(self.covariance), 1e-300))
-        values, vectors = np.linalg.eigh(self.covariance / np.outer(scale, scale))
-        return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
+        return covariance_root(self.covariance)
+
+
+def covariance_root(covariance: Array) -> Array:
+    """Matrix L with L Lᵀ the covariance, shape (n, n): symmetric once each unknown has unit variance.
+
+    Of all square roots this one is determined by the covariance alone. Eigenvectors as columns would not be:
+    those of equal eigenvalues are arbitrary in their subspace, so draws would differ from one linear algebra
+    library to the next. Unlike a triangular root it needs no variance in every direction.
+    """
+    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    return np.asarray(scale[:, None] * ((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T))
 
 
 def settled_along(rest: SettledRest, sensing: Sensing) -> Array:

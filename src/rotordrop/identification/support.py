@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.estimated import IdentifiedValue, Verdict
+from rotordrop.identification.directions import DIRECTIONS, influential_directions
 from rotordrop.identification.fit import Fit, completed, considered_covariance
 from rotordrop.identification.parameter_vector import (
     FRICTION,
@@ -46,9 +47,6 @@ stiffness, mass and damping held the truth on 12 machines, with 3.2, 83 % on 12 
 
 SWEEP_WIDENING = 2.0
 """The same for the draws with which friction is swept: wider ones leave the neighbourhood of the fit [1]."""
-
-DIRECTIONS = 16
-"""Directions of the initial state's uncertainty that are fitted along."""
 
 ALL_DIRECTIONS = 40
 """How many of them the last fit follows: with 16, what is left biases stiff supports by two percent."""
@@ -89,8 +87,8 @@ class ImpactFit:
         What these directions change in the state at the start of the simulation.
     unbalances : ndarray, shape (2, m, K)
         What they change in the modal unbalance.
-    remaining_directions : ndarray, shape (u, u - K)
-        Directions of the fall's unknowns that matter too little to be fitted along.
+    remaining_directions : ndarray, shape (u, u)
+        Square root of what is left of the covariance: it matters too little to be fitted along.
     """
 
     replica: Replica
@@ -206,56 +204,6 @@ class SupportFit:
     covariance: Array
     values: dict[str, IdentifiedValue]
     correlations: dict[str, float]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Directions:
-    """Directions of the fall's unknowns, one standard deviation each, that which matters most first.
-
-    Attributes
-    ----------
-    unknowns : ndarray, shape (u, K)
-        Change of the unknowns of the fall.
-    states : ndarray, shape (n, K)
-        Change of the state at the start of the simulation.
-    unbalances : ndarray, shape (2, m, K)
-        Change of the modal unbalance.
-    remaining : ndarray, shape (u, u - K)
-        The other directions.
-    """
-
-    unknowns: Array
-    states: Array
-    unbalances: Array
-    remaining: Array
-
-
-def influential_directions(replica: Replica, count: int = DIRECTIONS) -> Directions:
-    """Directions of the fall's unknowns that move the drop most."""
-    initial, layout = replica.initial, replica.model.layout
-    root = initial.square_root()
-    starts = [replica.start_state(initial.mean + column) for column in root.T]
-    base = replica.start_state(initial.mean)
-    changes = np.column_stack([state - base[0] for state, _ in starts])
-    unbalances = np.stack([unbalance - base[1] for _, unbalance in starts], axis=-1)
-    p, speed = replica.model.parameters, initial.fall.speed
-    reach = np.max(np.abs(p.bearing_shape), axis=0)[:, None]
-    effects = []
-    for place in (layout.modal_x, layout.modal_y):
-        rate = layout.velocity_of(place)
-        effects += [p.bearing_shape @ changes[place] / 1e-6, p.bearing_shape @ changes[rate] / 3e-4]
-        effects += [(reach * changes[place])[2:5] / 1e-6, (reach * changes[rate])[2:5] / 1e-3]
-    answer = speed**2 / np.maximum(np.abs(p.eigenvalue - speed**2), 0.2 * speed**2)
-    effects += [(reach * answer[:, None] * part)[:5] / 1e-6 for part in unbalances]
-    effects += [root[initial.unknowns.gain] / 5e-3, root[initial.unknowns.rest] / 5e-6]
-    _, _, turned = np.linalg.svd(np.vstack(effects), full_matrices=True)
-    leading, others = turned[:count].T, turned[count:].T
-    return Directions(
-        unknowns=root @ leading,
-        states=changes @ leading,
-        unbalances=unbalances @ leading,
-        remaining=root @ others,
-    )
 
 
 def impact_problem(replica: Replica, *, directions: int = DIRECTIONS) -> ImpactFit:

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import IdentificationError
+from rotordrop.identification.directions import influential_directions
 from rotordrop.identification.fit import completed, fit_window
 from rotordrop.identification.friction import orbit_disagreement, orbit_distance, sweep_friction
+from rotordrop.identification.initial_state import InitialState
 from rotordrop.identification.parameter_vector import (
     FRICTION,
     friction_vector,
@@ -21,7 +23,6 @@ from rotordrop.identification.support import (
     ImpactFit,
     fit_support,
     identified_values,
-    influential_directions,
     refit_with_friction,
     widened_covariance,
 )
@@ -158,10 +159,31 @@ def test_directions_and_the_rest_hold_the_whole_covariance(replica: Replica) -> 
     scale = np.sqrt(np.diag(replica.initial.covariance))
     product = (whole @ whole.T) / np.outer(scale, scale)
     assert product == pytest.approx(replica.initial.covariance / np.outer(scale, scale), abs=1e-8)
-    reach = np.abs(replica.model.parameters.bearing_shape @ directions.states[replica.model.layout.modal_y])
-    left = np.array([replica.start_state(replica.initial.mean + d)[0] for d in directions.remaining.T])
-    beyond = replica.model.parameters.bearing_shape @ (left - replica.state).T[replica.model.layout.modal_y]
-    assert np.abs(beyond).max() < 0.25 * reach.max()
+
+
+def test_what_the_directions_leave_moves_the_bearings_little(replica: Replica) -> None:
+    directions = influential_directions(replica)
+    place, shape = replica.model.layout.modal_y, replica.model.parameters.bearing_shape
+    followed = shape @ directions.states[place]
+    step = 1e-3
+    left = [replica.start_state(replica.initial.mean + step * d)[0] for d in directions.remaining.T]
+    beyond = shape @ (np.array(left) - replica.state).T[place] / step
+    # standard deviations: unlike the largest column they do not depend on how the rest is cut into columns
+    assert np.all(np.linalg.norm(beyond, axis=1) < 0.05 * np.linalg.norm(followed, axis=1))
+
+
+def test_directions_are_those_of_the_covariance_not_of_its_square_root(
+    replica: Replica, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    expected, root = influential_directions(replica), replica.initial.square_root()
+    turn, _ = np.linalg.qr(np.random.default_rng(1).standard_normal(root.shape))
+    monkeypatch.setattr(InitialState, "square_root", lambda state: root @ turn)
+    found = influential_directions(replica)
+    scale = np.sqrt(np.diag(replica.initial.covariance))[:, None]
+    assert found.remaining / scale == pytest.approx(expected.remaining / scale, abs=1e-6)
+    assert found.unknowns / scale == pytest.approx(expected.unknowns / scale, abs=1e-6)
+    reach = np.abs(expected.states).max(axis=0)
+    assert found.states / reach == pytest.approx(expected.states / reach, abs=1e-6)
 
 
 def test_friction_sweep_finds_the_coefficient(problem: ImpactFit, contacts: np.ndarray) -> None:
