@@ -6,6 +6,9 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 Status = Literal["given", "guess", "estimated", "default", "inferred"]
+NINETY = 1.6448536269514722
+"""Half width of a 90 % interval in standard deviations of a normal distribution [1]."""
+
 Verdict = Literal[
     "determined",
     "at its bound",

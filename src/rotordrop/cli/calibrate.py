@@ -63,17 +63,13 @@ def calibrate(
 def _summary(result: Calibration, output: Path, out: Console) -> None:
     from rich.table import Table
 
-    from rotordrop.report.estimate_numbers import kind_of_unit
+    from rotordrop.model.parameter_table import row_of
     from rotordrop.report.quantity import Quantity
 
     table = Table("parameter", "estimate", "90 % interval", "verdict", box=None)
-    verdicts = {
-        entry.path.replace("axial_offset", "preload"): entry.verdict for entry in result.identifiability
-    }
+    verdicts = {entry.path: entry.verdict for entry in result.identifiability}
     for path, value in result.values.items():
-        shown = Quantity(
-            value=value.value, kind=kind_of_unit(value.unit, path), interval_90=value.interval_90
-        )
+        shown = Quantity(value=value.value, kind=row_of(path).display_kind, interval_90=value.interval_90)
         table.add_row(
             path,
             shown.text,

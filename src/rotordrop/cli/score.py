@@ -17,25 +17,16 @@ from rotordrop.cli._output import deliver
 if TYPE_CHECKING:
     from rich.console import Console
 
-_KINDS = {
-    "air_gap_m": ("air gap", "length"),
-    "support.stiffness_N_per_m": ("support stiffness", "stiffness"),
-    "support.damping_N_s_per_m": ("support damping", "damping"),
-    "support.mass_kg": ("support mass", "mass"),
-    "friction.dynamic": ("dynamic friction", "dimensionless"),
-    "friction.static": ("static friction", "dimensionless"),
-    "contact.stiffness_N_per_m_n": ("contact stiffness", "contact_stiffness"),
-    "contact.damping_s_per_m": ("contact damping", "contact_damping"),
-    "damping_time_s": ("damping time of the balls", "time"),
-    "preload_N": ("preload", "force"),
-    "race.inertia_kg_m2": ("race inertia", "inertia"),
-    "peak_force_N": ("peak bearing force", "force"),
-    "mean_force_0p15_0p2_N": ("mean force, 150 to 200 ms", "force"),
-    "peak_stress_Pa": ("peak Hertz stress", "pressure"),
-    "mean_stress_Pa": ("mean Hertz stress", "pressure"),
-    "drop_instant_s": ("drop instant", "time"),
-    "speed_Hz": ("speed", "frequency"),
-}
+_OF_THE_DROP = {"drop_instant_s": ("drop instant", "time"), "speed_Hz": ("speed", "frequency")}
+
+
+def _words_and_kind(path: str) -> tuple[str, str]:
+    """Name for people and kind of quantity of a scored field."""
+    from rotordrop.model.parameter_table import LOADS, published
+
+    scored = {field: (row.label, row.kind) for field, row in published().items()}
+    scored |= {load.field: (load.label, load.kind) for load in LOADS}
+    return (scored | _OF_THE_DROP)[path]
 
 
 def score(
@@ -88,7 +79,7 @@ def _table(scores: dict[str, Any]) -> Any:
 def _cells(where: str, path: str, entry: dict[str, Any]) -> tuple[str, ...]:
     from rotordrop.units import format_quantity
 
-    words, kind = _KINDS.get(path, (path, "dimensionless"))
+    words, kind = _words_and_kind(path)
     relative = entry.get("relative_error")
     absolute = format_quantity(entry["error"], kind, digits=2)
     error = absolute

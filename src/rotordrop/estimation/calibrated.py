@@ -10,21 +10,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError, UsageError
-from rotordrop.estimated import Estimated, IdentifiedValue
+from rotordrop.estimated import NINETY, Estimated, IdentifiedValue
 from rotordrop.estimation.tracked import INCONSISTENT_WIDENING, prepare, track_drops
 from rotordrop.estimation.tracked_values import (
     identified,
     model_error,
     parameter_widening,
-    preload_value,
 )
 from rotordrop.machine import Machine
 from rotordrop.measurement.record import Record
+from rotordrop.model.parameter import Parameter
+from rotordrop.model.parameter_table import parameter, rows, separating_measurement
+from rotordrop.model.unknowns import Unknown, typical_depth
 from rotordrop.tracking.calibration import TrackedDrops
 from rotordrop.tracking.consistency import Check, consistency_checks
 from rotordrop.tracking.problem import DropProblem
 from rotordrop.tracking.smoother import parameter_sample
-from rotordrop.tracking.unknowns import EXPONENTS, NINETY, Unknown, typical_depth
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -34,17 +35,6 @@ CONFOUNDED = 0.9
 
 CALIBRATED_ON = "calibrated on "
 """How the source of a calibrated value begins; the names of the drops follow."""
-
-SEPARATED_BY: dict[frozenset[str], str] = {
-    frozenset({"support.stiffness", "support.mass"}): (
-        "a hammer test of the touchdown-bearing housing gives support frequency and stiffness"
-    ),
-    frozenset({"air_gap", "offset"}): "a lift test of the rotor in its magnets gives the diametral clearance",
-    frozenset({"friction.dynamic", "race.inertia"}): "a speed sensor on the inner race gives its spin-up",
-    frozenset(
-        {"contact.stiffness", "air_gap"}
-    ): "a static push with a known force gives the contact stiffness",
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,7 +145,8 @@ def calibrate_machine(
     mean = smoothed.means[at]
     widening = 1.0 if consistent else INCONSISTENT_WIDENING
     values = _values(problem, mean, covariance, widening, len(stems))
-    fitted = machine_values(at_fitted_exponents(machine, values), f"{CALIBRATED_ON}{', '.join(stems)}")
+    names = [bearing.name for bearing in machine.touchdown_bearings]
+    fitted = machine_values(names, at_fitted_exponents(machine, values), f"{CALIBRATED_ON}{', '.join(stems)}")
     return Calibration(
         machine=_possible(machine, fitted, stems),
         values=values,
@@ -189,13 +180,9 @@ def _values(
         if unknown.scope != "machine":
             continue
         i = problem.n_dynamic + k
-        owner, _, path = unknown.path.partition(".")
         error = model_error(unknown, float(sigma[i]), drops)
         wide = parameter_widening(unknown, error, widening)
-        if path == "axial_offset":
-            values[f"{owner}.preload"] = preload_value(problem, owner, unknown, float(mean[i]), error, wide)
-        else:
-            values[unknown.path] = identified(unknown, float(mean[i]), error, wide)
+        values[unknown.path] = identified(unknown, float(mean[i]), error, wide)
     first = problem.n_dynamic + len(problem.unknowns)
     for c, sensor in enumerate(problem.model.machine.sensors):
         gain, offset = first + c, first + problem.n_channels + c
@@ -228,7 +215,7 @@ def at_fitted_exponents(machine: Machine, values: dict[str, IdentifiedValue]) ->
         stiffness = values.get(f"{bearing.name}.contact.stiffness")
         if exponent is None or stiffness is None or stiffness.interval_90 is None:
             continue
-        exponent = _within(exponent, *EXPONENTS)
+        exponent = _within_limits(exponent, parameter("contact.exponent"))
         found[f"{bearing.name}.contact.exponent"] = exponent
         factor = typical_depth(bearing) ** (float(bearing.contact.exponent) - exponent.value)
         low, high = stiffness.interval_90
@@ -238,35 +225,37 @@ def at_fitted_exponents(machine: Machine, values: dict[str, IdentifiedValue]) ->
     return found
 
 
-def _within(value: IdentifiedValue, lower: float, upper: float) -> IdentifiedValue:
+def _within_limits(value: IdentifiedValue, row: Parameter) -> IdentifiedValue:
     interval = value.interval_90 or (value.value, value.value)
-    low, high = (min(max(end, lower), upper) for end in interval)
-    return replace(value, value=min(max(value.value, lower), upper), interval_90=(low, high))
+    low, middle, high = (row.within(number) for number in (interval[0], value.value, interval[1]))
+    return replace(value, value=middle, interval_90=(low, high))
 
 
-def machine_values(values: dict[str, IdentifiedValue], source: str) -> dict[str, Estimated]:
+def machine_values(
+    bearings: Sequence[str], values: dict[str, IdentifiedValue], source: str
+) -> dict[str, Estimated]:
     """Calibrated values as entries of a machine description, the horizontal support with them."""
-    entries: dict[str, Estimated] = {}
-    for path, value in values.items():
-        if path.endswith("support.anisotropy"):
-            continue
-        entries[path] = Estimated(
+    entries = {
+        path: Estimated(
             value=value.value,
             status="estimated",
             interval_90=value.interval_90,
             source=source,
             unit=value.unit,
         )
-    for path, value in values.items():
-        if path.endswith("support.anisotropy"):
-            stem = path.removesuffix("support.anisotropy")
-            vertical = entries[f"{stem}support.stiffness"]
-            low, high = vertical.interval_90 or (vertical.value, vertical.value)
-            entries[f"{stem}support.stiffness_horizontal"] = replace(
-                vertical,
-                value=vertical.value * value.value,
-                interval_90=(low * value.value, high * value.value),
-            )
+        for path, value in values.items()
+    }
+    for name in bearings:
+        ratio = entries.pop(parameter("support.anisotropy").path_of(name), None)
+        if ratio is None:
+            continue
+        vertical = entries[parameter("support.stiffness").path_of(name)]
+        low, high = vertical.interval_90 or (vertical.value, vertical.value)
+        entries[f"{name}.support.stiffness_horizontal"] = replace(
+            vertical,
+            value=vertical.value * ratio.value,
+            interval_90=(low * ratio.value, high * ratio.value),
+        )
     return entries
 
 
@@ -293,9 +282,8 @@ def _verdict(unknown: Unknown, sigma: float) -> str:
 
 def _confounded(problem: DropProblem, covariance: Array) -> tuple[Confounded, ...]:
     start, n_p = problem.n_dynamic, len(problem.unknowns)
-    labels = [u.path for u in problem.unknowns]
-    labels += [f"sensors.{s.name}.gain" for s in problem.model.machine.sensors]
-    labels += [f"sensors.{s.name}.offset" for s in problem.model.machine.sensors]
+    known = [(u.parameter, u.owner) for u in problem.unknowns]
+    known += [(row, s.name) for row in rows("sensor") for s in problem.model.machine.sensors]
     count = n_p + 2 * problem.n_channels
     block = covariance[start : start + count, start : start + count]
     sigma = np.sqrt(np.maximum(np.diag(block), 1e-300))
@@ -303,21 +291,13 @@ def _confounded(problem: DropProblem, covariance: Array) -> tuple[Confounded, ..
     pairs = [(i, j) for i in range(count) for j in range(i) if abs(correlation[i, j]) > CONFOUNDED]
     return tuple(
         Confounded(
-            first=labels[j],
-            second=labels[i],
+            first=known[j][0].path_of(known[j][1]),
+            second=known[i][0].path_of(known[i][1]),
             correlation=float(correlation[i, j]),
-            way_out=_way_out(labels[j], labels[i]),
+            way_out=separating_measurement(known[j][0], known[i][0]),
         )
         for i, j in sorted(pairs, key=lambda pair: -abs(correlation[pair]))
     )
-
-
-def _way_out(first: str, second: str) -> str:
-    for pair, text in SEPARATED_BY.items():
-        one, two = tuple(pair)
-        if (first.endswith(one) and second.endswith(two)) or (first.endswith(two) and second.endswith(one)):
-            return text
-    return "more drops at other speeds, or a measurement of one of the two"
 
 
 def calibration_json(calibration: Calibration) -> dict[str, object]:

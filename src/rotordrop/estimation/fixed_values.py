@@ -10,24 +10,9 @@ from typing import Any
 from rotordrop.errors import UsageError
 from rotordrop.estimated import Estimated
 from rotordrop.machine import Machine
+from rotordrop.model.parameter_table import rows
 
 Document = Mapping[str, Any]
-
-NEEDED = {
-    "support.stiffness": "support.stiffness_N_per_m",
-    "support.mass": "support.mass_kg",
-    "support.damping": "support.damping_N_s_per_m",
-    "friction.dynamic": "friction.dynamic",
-}
-WELCOME = {
-    "friction.static": "friction.static",
-    "contact.stiffness": "contact.stiffness_N_per_m_n",
-    "contact.damping": "contact.damping_s_per_m",
-    "race.inertia": "race.inertia_kg_m2",
-    "damping_time": "damping_time_s",
-    "preload": "preload_N",
-}
-"""Values that are taken over where the estimate has them: they were found together with the supports."""
 
 
 def read_fixed(fixed: str | Path | Document) -> tuple[Document, str]:
@@ -83,13 +68,13 @@ def machine_with_fixed(machine: Machine, document: Document, place: str) -> Mach
                 f"{place} has no touchdown bearing {bearing.name!r}; it has "
                 f"{', '.join(document['bearings'])}. Use an estimate of the same machine."
             )
-        for path, field in {**NEEDED, **WELCOME}.items():
-            found = _at(entry, field)
+        for row in (row for row in rows("bearing") if row.taken_over != "no"):
+            found = _at(entry, row.field)
             if found is not None:
-                values[f"{bearing.name}.{path}"] = _estimated(found, f"estimate {place}")
-            elif path in NEEDED:
+                values[row.path_of(bearing.name)] = _estimated(found, f"estimate {place}")
+            elif row.taken_over == "needed":
                 raise UsageError(
-                    f"{place} has no {field!r} for {bearing.name!r}; it has {', '.join(entry)}. Give an "
+                    f"{place} has no {row.field!r} for {bearing.name!r}; it has {', '.join(entry)}. Give an "
                     "estimate that identified supports and friction."
                 )
     return machine.with_values(values)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.estimated import NINETY
 from rotordrop.identification.air_gap import AirGap, SettledRest, find_rest, identify_air_gap
 from rotordrop.identification.first_contact import FirstContact, identify_first_contacts
 from rotordrop.identification.initial_state import InitialState, fit_initial_state
@@ -132,6 +133,6 @@ def _refined(instant: DropInstant, initial: InitialState) -> DropInstant:
         instant,
         value=initial.drop_instant,
         standard_error=error,
-        interval_90=(initial.drop_instant - 1.645 * error, initial.drop_instant + 1.645 * error),
+        interval_90=(initial.drop_instant - NINETY * error, initial.drop_instant + NINETY * error),
         method=f"{instant.method}; refined by the fit of the initial state",
     )

@@ -37,7 +37,6 @@ from rotordrop.estimation.uncertainty import (
 )
 from rotordrop.identification.air_gap import AirGap, identify_air_gap
 from rotordrop.identification.friction import FrictionSweep, sweep_friction
-from rotordrop.identification.parameter_vector import FRICTION
 from rotordrop.identification.replica import build_replica
 from rotordrop.identification.support import (
     LONGEST_WINDOW,
@@ -50,6 +49,7 @@ from rotordrop.identification.support import (
 )
 from rotordrop.machine import Machine
 from rotordrop.measurement.record import Record
+from rotordrop.model.parameter import Step
 from rotordrop.model.parameters import build_drop_model
 from rotordrop.simulation.result import DropResult
 
@@ -297,10 +297,12 @@ def _agreement(time: Array, measured: Array, middle: Replayed, gap: AirGap, draw
 def _identified_machine(machine: Machine, impacts: Impacts, gap: AirGap) -> Machine:
     """The machine with air gaps, supports, friction and contact as identified."""
     values: dict[str, Estimated] = {}
-    for path, value in impacts.values.items():
-        if path.endswith("axial_offset") or path == FRICTION:
+    vector = impacts.problem.vector
+    for unknown in vector.unknowns:
+        if unknown.parameter.path == "preload" or unknown.parameter.step is Step.SWEEP:
             continue
-        values[path] = Estimated(value=value.value, status="estimated", interval_90=value.interval_90)
+        value = impacts.values[unknown.path]
+        values[unknown.path] = Estimated(value=value.value, status="estimated", interval_90=value.interval_90)
     for b, bearing in enumerate(machine.touchdown_bearings):
         values[f"{bearing.name}.air_gap"] = Estimated(
             value=float(gap.value[b]), status="estimated", standard_error=float(gap.standard_error[b])

@@ -4,36 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.estimated import IdentifiedValue
+from rotordrop.estimated import NINETY, IdentifiedValue
 from rotordrop.estimation.tracked_values import MODEL_FORCE_SIGMA, MODEL_MEAN_FORCE_SIGMA, MODEL_STRESS_SIGMA
 from rotordrop.estimation.uncertainty import FEWEST_DRAWS, Draws, drop_numbers, interval
 from rotordrop.identification.air_gap import AirGap
 from rotordrop.identification.first_contact import FirstContact
 from rotordrop.identification.friction import FrictionSweep
 from rotordrop.machine import Machine, TouchdownBearing
-from rotordrop.physics.ball_bearing import bearing_constants
+from rotordrop.model.parameter import Step
+from rotordrop.model.parameter_table import rows
 from rotordrop.simulation.certificate import refined_peak
 from rotordrop.simulation.result import DropResult
-from rotordrop.tracking.unknowns import preload_of_offset
 
 Array = NDArray[np.float64]
 Values = dict[str, IdentifiedValue]
 
-NINETY = 1.6448536269514722
-FIELDS = {
-    "support.stiffness": "support.stiffness_N_per_m",
-    "support.damping": "support.damping_N_s_per_m",
-    "support.mass": "support.mass_kg",
-    "contact.stiffness": "contact.stiffness_N_per_m_n",
-    "contact.damping": "contact.damping_s_per_m",
-    "race.inertia": "race.inertia_kg_m2",
-    "damping_time": "damping_time_s",
-}
 MODEL_SIGMA = {
     "peak_force_N": MODEL_FORCE_SIGMA,
     "mean_force_0p15_0p2_N": MODEL_MEAN_FORCE_SIGMA,
@@ -80,9 +69,9 @@ def replay_values(
                 unit="N/m",
             ),
         }
-        for path, field in FIELDS.items():
-            values[field] = fitted[f"{bearing.name}.{path}"]
-        values["preload_N"] = _preload(bearing, fitted[f"{bearing.name}.axial_offset"])
+        for row in rows("bearing"):
+            if row.step is Step.IMPACTS:
+                values[row.field] = fitted[row.path_of(bearing.name)]
         values |= _friction(bearing, friction)
         values |= _loads(simulated, draws, b)
         found[bearing.name] = values
@@ -103,25 +92,6 @@ def _air_gap(gap: AirGap, b: int) -> IdentifiedValue:
         lower=float(gap.lower[b]),
         upper=float(gap.upper[b]),
         unit="m",
-    )
-
-
-def _preload(bearing: TouchdownBearing, offset: IdentifiedValue) -> IdentifiedValue:
-    """Preload [N] of the fitted axial offset of the rows."""
-    constants = bearing_constants(bearing.bearing)
-
-    def preload(axial: float) -> float:
-        return preload_of_offset(constants, axial)
-
-    low, high = offset.interval_90 or (offset.value, offset.value)
-    return replace(
-        offset,
-        value=preload(offset.value),
-        standard_error=(preload(high) - preload(low)) / (2.0 * NINETY),
-        interval_90=(preload(low), preload(high)),
-        start=None if offset.start is None else preload(offset.start),
-        bounds=None if offset.bounds is None else (preload(offset.bounds[0]), preload(offset.bounds[1])),
-        unit="N",
     )
 
 

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from rotordrop.model.parameter_table import LOADS, published
+from rotordrop.units import si_unit
+
 _NUMBER = {"type": "number"}
 _VALUE: dict[str, Any] = {
     "type": "object",
@@ -27,29 +30,28 @@ _VALUE: dict[str, Any] = {
     },
     "required": ["value"],
 }
-_OBJECT = {"type": "object", "additionalProperties": {"$ref": "#/$defs/value"}}
+_REFERENCE = {"$ref": "#/$defs/value"}
+
+
+def _values() -> dict[str, Any]:
+    """Parameters and loads of a bearing: a field with a point in it is one of a group."""
+    properties: dict[str, Any] = {}
+    described = {field: f"{row.label} [{row.unit}]" for field, row in published().items()}
+    described |= {load.field: f"{load.label} [{si_unit(load.kind)}]" for load in LOADS}
+    for path, text in described.items():
+        group, _, leaf = path.rpartition(".")
+        at = properties
+        if group:
+            empty = {"type": "object", "properties": {}, "additionalProperties": False}
+            at = properties.setdefault(group, empty)["properties"]
+        at[leaf] = {**_REFERENCE, "description": text}
+    return properties
+
+
 _BEARING: dict[str, Any] = {
     "type": "object",
     "properties": {
-        **{
-            name: {"$ref": "#/$defs/value"}
-            for name in (
-                "air_gap_m",
-                "equivalent_stiffness_N_per_m",
-                "peak_force_N",
-                "mean_force_0p15_0p2_N",
-                "peak_stress_Pa",
-                "mean_stress_Pa",
-                "preload_N",
-            )
-        },
-        "support": {
-            **_OBJECT,
-            "description": "stiffness_N_per_m, damping_N_s_per_m, mass_kg",
-        },
-        "friction": {**_OBJECT, "description": "static, dynamic"},
-        "contact": _OBJECT,
-        "race": _OBJECT,
+        **_values(),
         "stress_statistics_Pa": {"type": "object"},
         "impacts": {"type": "array", "items": {"type": "object"}},
     },

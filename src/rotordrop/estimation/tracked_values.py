@@ -7,7 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from rotordrop.estimated import IdentifiedValue, Verdict
+from rotordrop.estimated import NINETY, IdentifiedValue, Verdict
+from rotordrop.model.parameter_table import parameter
+from rotordrop.model.unknowns import Unknown
 from rotordrop.physics.ball_bearing import bearing_constants
 from rotordrop.simulation.certificate import refined_peak
 from rotordrop.tracking.forces import ForceHistory
@@ -19,7 +21,6 @@ from rotordrop.tracking.input_state import (
 )
 from rotordrop.tracking.problem import DropProblem
 from rotordrop.tracking.smoother import Smoothed, parameter_sample
-from rotordrop.tracking.unknowns import NINETY, Unknown, preload_of_offset
 
 MODEL_FORCE_SIGMA = 0.01
 """Relative standard deviation of a force peak by what every model here leaves out (basis, sampling) [1]."""
@@ -152,17 +153,6 @@ def _of_cross_check(check: InputEstimate, b: int) -> dict[str, IdentifiedValue]:
     }
 
 
-_FIELDS = {
-    "air_gap": "air_gap_m",
-    "support.stiffness": "support.stiffness_N_per_m",
-    "support.damping": "support.damping_N_s_per_m",
-    "support.mass": "support.mass_kg",
-    "contact.stiffness": "contact.stiffness_N_per_m_n",
-    "contact.damping": "contact.damping_s_per_m",
-    "friction.dynamic": "friction.dynamic",
-    "race.inertia": "race.inertia_kg_m2",
-    "damping_time": "damping_time_s",
-}
 NOT_DETERMINED: dict[bool, Verdict] = {
     False: "the record does not determine it",
     True: "known from the calibration",
@@ -175,13 +165,11 @@ DETERMINED_SHARE = 0.7
 def identified(unknown: Unknown, theta: float, sigma: float, widening: float = 1.0) -> IdentifiedValue:
     """An estimated parameter as a value with interval, start and verdict."""
     half = NINETY * sigma * widening
-    value = unknown.value_of(theta)
-    error = sigma * widening * (value if unknown.logarithmic else 1.0)
     determined = sigma * widening < DETERMINED_SHARE * unknown.sigma
     return IdentifiedValue(
-        value=value,
+        value=unknown.value_of(theta),
         status="determined" if determined else NOT_DETERMINED[unknown.calibrated],
-        standard_error=error,
+        standard_error=unknown.standard_error(theta, sigma * widening),
         interval_90=(unknown.value_of(theta - half), unknown.value_of(theta + half)),
         start=unknown.value_of(unknown.mean),
         unit=unknown.unit,
@@ -190,7 +178,7 @@ def identified(unknown: Unknown, theta: float, sigma: float, widening: float = 1
 
 def model_error(unknown: Unknown, sigma: float, drops: int = 1) -> float:
     """Standard error of a parameter with what the fit to a number of drops leaves out of it."""
-    if not unknown.path.endswith(".air_gap"):
+    if unknown.parameter is not parameter("air_gap"):
         return sigma
     lone = drops == 1 and unknown.sigma > UNSURE_GAP
     return math.hypot(sigma, LONE_GAP_SIGMA if lone else MODEL_GAP_SIGMA)
@@ -210,36 +198,14 @@ def parameter_values(
     sigma = np.sqrt(np.maximum(np.diag(smoothed.covariance(at))[problem.parameter_slice], 0.0))
     values = {}
     for unknown, t, s in zip(problem.unknowns, theta, sigma, strict=True):
-        owner, _, path = unknown.path.partition(".")
-        if owner != name:
+        if unknown.scope != "machine" or unknown.owner != name:
             continue
         error = model_error(unknown, float(s))
         wide = parameter_widening(unknown, error, widening)
-        if path in _FIELDS:
-            values[_FIELDS[path]] = identified(unknown, float(t), error, wide)
-        elif path == "axial_offset":
-            values["preload_N"] = preload_value(problem, name, unknown, float(t), error, wide)
+        values[unknown.parameter.field] = identified(unknown, float(t), error, wide)
     values["friction.static"] = _static_friction(problem, name, values["friction.dynamic"])
     values["equivalent_stiffness_N_per_m"] = _equivalent_stiffness(problem, name, values)
     return values
-
-
-def preload_value(
-    problem: DropProblem, name: str, unknown: Unknown, theta: float, sigma: float, widening: float = 1.0
-) -> IdentifiedValue:
-    """Preload [N] from the estimated axial offset of the rows."""
-    constants = bearing_constants(problem.model.machine.bearing(name).bearing)
-    half = NINETY * sigma * widening
-    low, value, high = (preload_of_offset(constants, theta + d) for d in (-half, 0.0, half))
-    base = identified(unknown, theta, sigma, widening)
-    return replace(
-        base,
-        value=value,
-        standard_error=(high - low) / (2.0 * NINETY),
-        interval_90=(low, high),
-        start=preload_of_offset(constants, unknown.mean),
-        unit="N",
-    )
 
 
 def _static_friction(problem: DropProblem, name: str, dynamic: IdentifiedValue) -> IdentifiedValue:

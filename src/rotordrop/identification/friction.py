@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.estimated import IdentifiedValue
-from rotordrop.identification.parameter_vector import FRICTION
+from rotordrop.estimated import NINETY, IdentifiedValue
 from rotordrop.identification.support import ImpactFit
 
 Array = NDArray[np.float64]
@@ -33,8 +32,6 @@ TENFOLD = 33e-3
 
 SCATTER_WIDENING = 2.0
 """Factor on the scatter of the best coefficient between draws [1]."""
-
-NINETY = 1.6448536269514722
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,7 +111,7 @@ def sweep_friction(
     Source: Neisi 2020, section 5.2. Differs from the paper: a number in place of the eye, and the dynamic
     coefficient leads (sliding drops hardly see the static one).
     """
-    place = problem.vector.place(FRICTION)
+    place = problem.vector.friction
     end = contact + HORIZON
     count = problem.replica.until(end)
     time = problem.replica.time[:count]
@@ -165,7 +162,7 @@ def _value(problem: ImpactFit, best: Array, coefficients: Array) -> IdentifiedVa
     grid = float(coefficients[1] - coefficients[0]) / np.sqrt(12.0)
     error = SCATTER_WIDENING * float(np.hypot(np.std(best, ddof=1), 0.1 * grid)) if len(best) > 2 else grid
     low, high = float(coefficients[0]), float(coefficients[-1])
-    unknown = problem.vector.unknowns[problem.vector.place(FRICTION)]
+    unknown = problem.vector.unknowns[problem.vector.friction]
     at_bound = value in (low, high)
     wide = error > 0.7 * (high - low) / np.sqrt(12.0)
     return IdentifiedValue(

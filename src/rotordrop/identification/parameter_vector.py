@@ -2,32 +2,19 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.model import layout as L
 from rotordrop.model.layout import KernelParameters
+from rotordrop.model.parameter import Role, Step
 from rotordrop.model.parameters import DropModel
-from rotordrop.tracking.unknowns import Unknown, bearing_unknowns
+from rotordrop.model.unknowns import Unknown, bearing_unknowns
 
 Array = NDArray[np.float64]
-
-SUPPORT = ("support.stiffness", "support.mass", "support.damping")
-FRICTION = "friction.dynamic"
-NUISANCE = (
-    "contact.stiffness",
-    "contact.damping",
-    FRICTION,
-    "race.inertia",
-    "damping_time",
-    "axial_offset",
-)
-"""What the fit of the support takes from the machine file and marginalises: contact stiffness and λ,
-friction, race inertia, bearing damping, preload (as the axial offset of the rows it sets)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,6 +51,11 @@ class ParameterVector:
         """Index of a parameter."""
         return self.paths.index(path)
 
+    @property
+    def friction(self) -> int:
+        """Index of the friction that the sweep finds, one for all bearings."""
+        return next(k for k, unknown in enumerate(self.unknowns) if unknown.parameter.step is Step.SWEEP)
+
     def value(self, theta: Array, path: str) -> float:
         """SI value of a parameter."""
         place = self.place(path)
@@ -72,9 +64,9 @@ class ParameterVector:
     def set(self, theta: Array, bearing: Array) -> None:
         """Write the values into rows of bearing parameters, shape (B, columns), in place."""
         for unknown, number in zip(self.unknowns, theta, strict=True):
-            value = unknown.value_of(float(number))
-            for _, row, column, factor in unknown.targets:
-                bearing[row, column] = factor * value
+            value = unknown.kernel_value(float(number))
+            for target in unknown.targets:
+                bearing[target.row, target.entry.column] = target.factor * value
 
 
 def with_bearing(parameters: KernelParameters, bearing: Array) -> KernelParameters:
@@ -84,21 +76,15 @@ def with_bearing(parameters: KernelParameters, bearing: Array) -> KernelParamete
 
 
 def support_vector(model: DropModel) -> ParameterVector:
-    """Stiffness, mass and damping of every support."""
-    return ParameterVector(unknowns=tuple(_chosen(model, SUPPORT)))
+    """What is sought in the first impacts: stiffness, mass and damping of every support."""
+    return ParameterVector(unknowns=tuple(u for u in _of_impacts(model) if u.parameter.role is Role.SOUGHT))
 
 
 def nuisance_vector(model: DropModel) -> ParameterVector:
-    """What is not sought but not known exactly either; friction is one unknown for all bearings."""
-    chosen = list(_chosen(model, NUISANCE))
-    frictions = [unknown for unknown in chosen if unknown.path.endswith(FRICTION)]
-    others = [unknown for unknown in chosen if not unknown.path.endswith(FRICTION)]
+    """What is not sought there but not known exactly either; friction is one unknown for all bearings."""
+    others = (u for u in _of_impacts(model) if u.parameter.role is not Role.SOUGHT)
+    frictions = [u for u in _unknowns(model) if u.parameter.step is Step.SWEEP]
     return ParameterVector(unknowns=(*others, _shared(frictions)))
-
-
-def friction_vector(model: DropModel) -> ParameterVector:
-    """Dynamic friction of all bearings as one unknown; the static one follows at its ratio."""
-    return ParameterVector(unknowns=(_shared(list(_chosen(model, (FRICTION,)))),))
 
 
 def joined(*vectors: ParameterVector) -> ParameterVector:
@@ -106,30 +92,15 @@ def joined(*vectors: ParameterVector) -> ParameterVector:
     return ParameterVector(unknowns=tuple(unknown for vector in vectors for unknown in vector.unknowns))
 
 
-def _chosen(model: DropModel, wanted: tuple[str, ...]) -> Iterable[Unknown]:
-    for row, bearing in enumerate(model.machine.touchdown_bearings):
-        for unknown in bearing_unknowns(bearing, row):
-            if unknown.path.removeprefix(f"{bearing.name}.") in wanted:
-                yield _resolved(model, unknown)
+def _unknowns(model: DropModel) -> Iterator[Unknown]:
+    for index in range(len(model.machine.touchdown_bearings)):
+        yield from bearing_unknowns(model, index)
 
 
-def _resolved(model: DropModel, unknown: Unknown) -> Unknown:
-    """Bearing damping counts by its time constant: put the stiffness it multiplies in as factor."""
-    targets = []
-    for kind, row, column, factor in unknown.targets:
-        if math.isnan(factor):
-            factor = float(model.parameters.bearing[row, column]) / unknown.value_of(unknown.mean)
-        targets.append((kind, row, column, factor))
-    return _changed(unknown, targets=tuple(targets))
+def _of_impacts(model: DropModel) -> Iterator[Unknown]:
+    return (unknown for unknown in _unknowns(model) if unknown.parameter.step is Step.IMPACTS)
 
 
 def _shared(unknowns: list[Unknown]) -> Unknown:
-    first = unknowns[0]
     targets = tuple(target for unknown in unknowns for target in unknown.targets)
-    return _changed(first, path=FRICTION, targets=targets)
-
-
-def _changed(unknown: Unknown, **changes: object) -> Unknown:
-    from dataclasses import replace
-
-    return replace(unknown, **changes)  # type: ignore[arg-type]
+    return replace(unknowns[0], owner="", targets=targets)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError
+from rotordrop.estimated import NINETY, Estimated
 from rotordrop.machine.sensor import Sensor
 from rotordrop.measurement.axes import along_sensors, sensor_directions
 from rotordrop.measurement.record import Record
@@ -138,14 +139,11 @@ def _from_bearings(directions: Array, z_sensor: Array, z_bearing: Array) -> Arra
     return np.asarray(weights[:, :, None] * directions[:, None, :])
 
 
-def _sigma(quantity: object, default: float) -> float:
+def _sigma(quantity: Estimated, default: float) -> float:
     """Standard deviation of a sensor's value: what the machine file says of it, else the default."""
-    from rotordrop.estimated import Estimated
-
-    assert isinstance(quantity, Estimated)
     if quantity.standard_error is not None:
         return max(quantity.standard_error, 1e-12)
     limits = quantity.interval_90 or (quantity.range if quantity.status == "guess" else None)
     if limits is not None:
-        return max((limits[1] - limits[0]) / 3.29, 1e-12)
+        return max((limits[1] - limits[0]) / (2.0 * NINETY), 1e-12)
     return default

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.estimated import IdentifiedValue
+from rotordrop.estimated import NINETY, IdentifiedValue
 from rotordrop.measurement.record import Record
 from rotordrop.measurement.speed import SpeedAtDrop, require_speed, speed_at_drop
 
@@ -24,8 +24,6 @@ LONGEST = 2.0
 
 SEPARABLE = 0.6
 """Shortest record after the drop from which friction and air can be told apart [s]."""
-
-NINETY = 1.6448536269514722
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,11 +17,10 @@ from os import cpu_count
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.estimated import IdentifiedValue, Verdict
+from rotordrop.estimated import NINETY, IdentifiedValue, Verdict
 from rotordrop.identification.directions import DIRECTIONS, influential_directions
 from rotordrop.identification.fit import Fit, completed, considered_covariance
 from rotordrop.identification.parameter_vector import (
-    FRICTION,
     ParameterVector,
     joined,
     nuisance_vector,
@@ -29,6 +28,7 @@ from rotordrop.identification.parameter_vector import (
 )
 from rotordrop.identification.replica import Replica
 from rotordrop.identification.search import Progress, Schedule, Search, search, sobol_starts
+from rotordrop.model.parameter import Role
 
 Array = NDArray[np.float64]
 
@@ -57,18 +57,12 @@ LEADING_DIRECTIONS = 8
 MODEL_NOISE = 0.1e-6
 """What the reduced rotor leaves out, beside the sensor noise [m]."""
 
-CONSIDERED = ("axial_offset", "race.inertia", "contact.damping")
-"""Parameters that are not fitted, though their uncertainty is carried: a fit would move them to hide what
-the model lacks, and the mean stress would follow."""
-
 STEP = 1e-4
 BOUND_FACTOR = np.log(6.0)
 """The search may leave the prior mean by this much, in logarithms, on both sides."""
 
 UNDETERMINED = 0.7
 """Posterior over prior standard deviation above which the record does not determine a value [1]."""
-
-NINETY = 1.6448536269514722
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -137,20 +131,23 @@ class ImpactFit:
     @cached_property
     def leading(self) -> NDArray[np.bool_]:
         """Unknowns that the first window tells apart: supports, contact stiffness, first directions."""
-        ends = ("support.stiffness", "support.mass", "support.damping", "contact.stiffness")
-        own = [unknown.path.endswith(ends) for unknown in self.vector.unknowns]
+        own = [unknown.parameter.leading for unknown in self.vector.unknowns]
         return np.array(own + [k < LEADING_DIRECTIONS for k in range(self.directions.shape[1])])
 
     @cached_property
     def decisive(self) -> NDArray[np.bool_]:
         """Stiffness and mass of the supports, shape (n,)."""
-        own = [u.path.endswith(("support.stiffness", "support.mass")) for u in self.vector.unknowns]
+        own = [unknown.parameter.decisive for unknown in self.vector.unknowns]
         return np.array(own + [False] * self.directions.shape[1])
 
     @cached_property
     def considered(self) -> NDArray[np.bool_]:
-        """Unknowns that keep their prior: what a record tells little of, such as the preload."""
-        own = [unknown.path.endswith(CONSIDERED) for unknown in self.vector.unknowns]
+        """Unknowns that keep their prior though their uncertainty is carried.
+
+        A fit would move what a record tells little of to hide what the model lacks, and the mean stress
+        would follow.
+        """
+        own = [unknown.parameter.role is Role.CONSIDERED for unknown in self.vector.unknowns]
         return np.array(own + [False] * self.directions.shape[1])
 
     def split(self, x: Array) -> tuple[Array, Array]:
@@ -323,7 +320,7 @@ def refit_with_friction(
     x, covariance : ndarray, shapes (n,), (n, n)
         Best unknowns and their widened covariance.
     """
-    place = problem.vector.place(FRICTION)
+    place = problem.vector.friction
     unknowns = list(problem.vector.unknowns)
     error = (friction.standard_error or 0.0) / friction.value
     unknowns[place] = replace(unknowns[place], mean=math.log(friction.value), sigma=max(error, 1e-4))
@@ -383,7 +380,7 @@ def identified_values(
         values[unknown.path] = IdentifiedValue(
             value=value,
             status="prior" if given else _verdict(at_bound, error, unknown.sigma),
-            standard_error=value * error if unknown.logarithmic else error,
+            standard_error=unknown.standard_error(mean, error),
             interval_90=(unknown.value_of(mean - NINETY * error), unknown.value_of(mean + NINETY * error)),
             start=unknown.value_of(unknown.mean),
             bounds=(unknown.value_of(float(low[k])), unknown.value_of(float(high[k]))),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotordrop.errors import RecordError
+from rotordrop.estimated import NINETY
 from rotordrop.measurement.axes import Plane, along_sensors, planar_of, sensor_planes
 from rotordrop.measurement.fall import Fall, fit_fall
 from rotordrop.measurement.preprocess import LevitatedModel, acceleration, fit_levitated
@@ -169,7 +170,7 @@ def _instant(fall: Fall, levitated: LevitatedModel, record: Record) -> DropInsta
     return DropInstant(
         value=fall.instant,
         standard_error=error,
-        interval_90=(fall.instant - 1.645 * error, fall.instant + 1.645 * error),
+        interval_90=(fall.instant - NINETY * error, fall.instant + NINETY * error),
         method=f"{fall.method}; {error / step:.2g} of a sample",
         fall=fall,
         levitated=levitated,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.estimated import NINETY
 from rotordrop.measurement.axes import Plane, sensor_directions
 from rotordrop.measurement.preprocess import LevitatedModel
 from rotordrop.measurement.recording import Array
@@ -286,4 +287,4 @@ def _gain_error(sensor: Sensor) -> float:
     if gain.standard_error is not None:
         return max(gain.standard_error, 1e-4)
     limits = gain.interval_90 or gain.range
-    return 0.01 if limits is None else max((limits[1] - limits[0]) / 3.29, 1e-4)
+    return 0.01 if limits is None else max((limits[1] - limits[0]) / (2.0 * NINETY), 1e-4)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotordrop.errors import RecordError
+from rotordrop.estimated import NINETY
 from rotordrop.measurement.axes import along_sensors, planar_of
 from rotordrop.measurement.events import (
     FALLEN_SHARE,
@@ -145,7 +146,7 @@ def power_off_of_fall(record: Record, machine: Machine) -> PowerOff:
     return PowerOff(
         value=instant,
         standard_error=error,
-        interval_90=(instant - 1.645 * error, instant + 1.645 * error),
+        interval_90=(instant - NINETY * error, instant + NINETY * error),
         contact=contact,
         method="fall with remanent lift, the rotor at rest vertically when it began",
         notes=(

@@ -159,6 +159,17 @@ def row_approach(F: ArrayLike, ZK: ArrayLike, A_0: ArrayLike, alpha_0: ArrayLike
     return s[()]
 
 
+def preload_of_offset(constants: BearingConstants, axial_offset: float) -> float:
+    """Axial force of one row [N] whose grooves are offset by a distance [m] with the race centred.
+
+    Source: Neisi 2020, eqs. (3)–(6), for an axial displacement; the inverse of what the preload sets.
+    """
+    distance = math.hypot(constants.radial_offset, axial_offset)
+    approach = max(distance - constants.groove_distance, 0.0)
+    load = constants.ball_stiffness * approach**1.5
+    return float(len(constants.ball_angles) * load * axial_offset / distance)
+
+
 def bearing_constants(bearing: BallBearingDescription) -> BearingConstants:
     """Constants of a touchdown bearing: groove offsets, contact stiffness, stress coefficients, preload.
 

@@ -7,54 +7,18 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from rotordrop.estimated import IdentifiedValue
+from rotordrop.model.parameter import Parameter, Role
+from rotordrop.model.parameter_table import LOADS, published
 from rotordrop.report.content import Card, Cell, KeyFigure, Table
 from rotordrop.report.quantity import Quantity
 
 Values = Mapping[str, IdentifiedValue]
 
-HEADLINE = (
-    ("peak_force_N", "Peak bearing force", "force"),
-    ("peak_stress_Pa", "Peak Hertz stress", "pressure"),
-    ("mean_force_0p15_0p2_N", "Mean force, 150 to 200 ms", "force"),
-    ("mean_stress_Pa", "Mean Hertz stress", "pressure"),
-)
-IDENTIFIED = (
-    ("air_gap_m", "air gap", "length"),
-    ("equivalent_stiffness_N_per_m", "equivalent stiffness, bearing and support", "stiffness"),
-    ("support.stiffness_N_per_m", "support stiffness", "stiffness"),
-    ("support.damping_N_s_per_m", "support damping", "damping"),
-    ("support.mass_kg", "support mass", "mass"),
-    ("friction.static", "static friction coefficient", "dimensionless"),
-    ("friction.dynamic", "dynamic friction coefficient", "dimensionless"),
-)
 MEANS = (
     "A mean force is the mean of the magnitude; the magnitude of the mean force would be smaller where its "
     "direction changes. The mean Hertz stress covers 0 to 200 ms, or what the record has of them."
 )
 """What the mean numbers of an estimate are means of."""
-KIND_OF_UNIT = {
-    "m": "length",
-    "N/m": "stiffness",
-    "kg": "mass",
-    "N s/m": "damping",
-    "N/m^n": "contact_stiffness",
-    "s/m": "contact_damping",
-    "kg m^2": "inertia",
-    "m/s": "velocity",
-    "s": "duration",
-    "kg m": "unbalance",
-    "N": "force",
-    "Pa": "pressure",
-    "rad": "angle",
-    "rad/s": "speed",
-}
-
-
-def kind_of_unit(unit: str, path: str = "") -> str:
-    """Kind in which a report shows a parameter by its SI unit and path; no unit counts as a pure number."""
-    if path.endswith("damping_time"):
-        return "short_time"
-    return KIND_OF_UNIT.get(unit, "dimensionless")
 
 
 def headline_card(bearing: str, values: Values, peak_times: Mapping[str, float]) -> Card:
@@ -70,15 +34,15 @@ def headline_card(bearing: str, values: Values, peak_times: Mapping[str, float])
         Time [s] of the peaks by field name.
     """
     figures = []
-    for field, label, kind in HEADLINE:
-        if field not in values:
+    for load in LOADS:
+        if load.field not in values:
             continue
-        value = Quantity.of(values[field], kind)
+        value = Quantity.of(values[load.field], load.kind)
         note = "" if value.interval_90 or not value.status else f"no interval: {value.status}"
-        if field in peak_times:
-            moment = Quantity(value=peak_times[field], kind="time", digits=3).text
+        if load.field in peak_times:
+            moment = Quantity(value=peak_times[load.field], kind="time", digits=3).text
             note = f"at {moment}{f'; {note}' if note else ''}"
-        figures.append(KeyFigure(label=label, value=value, note=note))
+        figures.append(KeyFigure(label=f"{load.label[0].upper()}{load.label[1:]}", value=value, note=note))
     return Card(title=f"{bearing} touchdown bearing", figures=tuple(figures))
 
 
@@ -93,13 +57,14 @@ def identified_table(bearings: Mapping[str, Values], *, taken_over: str = "") ->
         File from which supports and friction were taken over; empty when they were identified.
     """
     rows: list[tuple[Cell, ...]] = []
-    for field, label, kind in IDENTIFIED:
-        if any(field in values for values in bearings.values()):
+    for row in published().values():
+        sought = row.role in (Role.SOUGHT, Role.DERIVED)
+        if sought and any(row.field in values for values in bearings.values()):
             cells: list[Cell] = []
             for values in bearings.values():
-                value = values.get(field)
-                cells += [Quantity.of(value, kind), _status(field, value, taken_over)]
-            rows.append((label, *cells))
+                value = values.get(row.field)
+                cells += [Quantity.of(value, row.display_kind), _status(row, value, taken_over)]
+            rows.append((row.label, *cells))
     columns = [text for bearing in bearings for text in (bearing, f"{bearing}: verdict")]
     return Table(
         columns=("identified", *columns),
@@ -109,10 +74,10 @@ def identified_table(bearings: Mapping[str, Values], *, taken_over: str = "") ->
     )
 
 
-def _status(field: str, value: IdentifiedValue | None, taken_over: str) -> str:
+def _status(row: Parameter, value: IdentifiedValue | None, taken_over: str) -> str:
     if value is None:
         return "not estimated"
-    if taken_over and value.status == "prior" and field.startswith(("support.", "friction.")):
+    if taken_over and value.status == "prior" and row.taken_over != "no":
         return f"taken over from {Path(taken_over).name}"
     return value.status
 

@@ -8,6 +8,7 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
+from rotordrop.estimated import NINETY
 from rotordrop.report.history import History
 from rotordrop.report.style import (
     LIMIT,
@@ -29,8 +30,6 @@ EXPECTED = "90 % expected by the filter"
 LIMIT_LINE = {"color": LIMIT, "width": 1.2, "dash": "dash"}
 SHOWN_SHARE = 0.995
 """Share of the innovations inside the drawn range [1]; the first ones, before anything is known, are huge."""
-NORMAL_90 = 1.6448536269514722
-"""Half width of the 90 % interval of a normal distribution in standard deviations."""
 
 
 def innovations_figure(
@@ -57,7 +56,7 @@ def innovations_figure(
         line = {"color": "#6b7785", "width": 0.8}
         add_history(figure, history, MICRO, "µm", row=row, column=column, legend=legend, line=line)
         if standard_deviation is not None:
-            half = NORMAL_90 * standard_deviation[:, index]
+            half = NINETY * standard_deviation[:, index]
             for sign in (1.0, -1.0):
                 limit = History(label=EXPECTED, time=time, values=sign * half)
                 shown = legend and sign > 0.0
@@ -131,7 +130,7 @@ def whiteness_figure(innovations: Array, channels: Sequence[str], sample_interva
                 hovertemplate=f"%{{x:.2f}} ms: %{{y:.3f}}<extra>{plain(channel)}</extra>",
             )
         )
-    half = NORMAL_90 / np.sqrt(len(innovations))
+    half = NINETY / np.sqrt(len(innovations))
     for value in (-half, half):
         figure.add_hline(
             y=value,

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 from rotordrop.estimated import IdentifiedValue
 from rotordrop.identification.first_contact import FirstContact
+from rotordrop.model.parameter_table import row_of
 from rotordrop.report.content import Table
-from rotordrop.report.estimate_numbers import kind_of_unit
 from rotordrop.report.parameters import ParameterRow, parameter_table
 from rotordrop.report.quantity import Quantity
 
@@ -65,7 +65,7 @@ def support_table(values: Mapping[str, IdentifiedValue]) -> Table:
     """State the supports with start, interval and verdict (Neisi 2020, Table 4)."""
     rows = []
     for path, value in values.items():
-        kind = kind_of_unit(value.unit, path)
+        kind = row_of(path).display_kind
         rows.append(
             ParameterRow(
                 name=path,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.estimated import NINETY
 from rotordrop.estimation.tracked import INCONSISTENT_WIDENING, TrackedDrop
 from rotordrop.estimation.tracked_values import (
     MODEL_FORCE_SIGMA,
@@ -12,16 +13,15 @@ from rotordrop.estimation.tracked_values import (
     identified,
     model_error,
     parameter_widening,
-    preload_value,
 )
 from rotordrop.machine import Machine
+from rotordrop.model.unknowns import Unknown
 from rotordrop.report.content import Figure, Section, Statement, Table
-from rotordrop.report.estimate_numbers import kind_of_unit
 from rotordrop.report.first_contact import FirstContact
 from rotordrop.report.force import Peak
 from rotordrop.report.history import AirGap, Band, BearingHistories, BearingMotions, History, Motion
 from rotordrop.report.impacts import Impact
-from rotordrop.report.innovations import NORMAL_90, innovations_figure, nis_figure, whiteness_figure
+from rotordrop.report.innovations import innovations_figure, nis_figure, whiteness_figure
 from rotordrop.report.measured_motion import measured_at_bearings
 from rotordrop.report.parameters import ParameterRow, parameter_figure, parameter_table
 from rotordrop.report.quantity import Quantity
@@ -29,7 +29,6 @@ from rotordrop.report.stress_box import StressBox, stress_box
 from rotordrop.simulation.certificate import refined_peak
 from rotordrop.tracking.consistency import NIS_RANGE, normalised_innovations
 from rotordrop.tracking.smoother import parameter_sample
-from rotordrop.tracking.unknowns import Unknown
 
 Array = NDArray[np.float64]
 
@@ -93,7 +92,7 @@ def _banded(
 ) -> tuple[BearingHistories, ...]:
     """Histories with bands as wide as the stated intervals: what every model leaves out belongs to them."""
     time = drop.forces.time
-    half = NORMAL_90 * widening(drop) * np.hypot(sigma, model_share * values)
+    half = NINETY * widening(drop) * np.hypot(sigma, model_share * values)
     return tuple(
         BearingHistories(
             bearing=name,
@@ -192,21 +191,13 @@ PRIOR_NOTE = (
 
 
 def _row(drop: TrackedDrop, unknown: Unknown, mean: float, sigma: float) -> ParameterRow:
-    """One unknown; the axial offset is shown as the preload it stands for."""
-    name = unknown.path
     error = model_error(unknown, sigma)
     wide = parameter_widening(unknown, error, widening(drop))
-    if unknown.path.endswith(".axial_offset"):
-        owner = unknown.path.removesuffix(".axial_offset")
-        name = f"{owner}.preload"
-        prior = preload_value(drop.problem, owner, unknown, unknown.mean, unknown.sigma)
-        estimate = preload_value(drop.problem, owner, unknown, mean, error, wide)
-    else:
-        prior = identified(unknown, unknown.mean, unknown.sigma)
-        estimate = identified(unknown, mean, error, wide)
-    kind = kind_of_unit(estimate.unit, name)
+    prior = identified(unknown, unknown.mean, unknown.sigma)
+    estimate = identified(unknown, mean, error, wide)
+    kind = unknown.parameter.display_kind
     return ParameterRow(
-        name=name,
+        name=unknown.path,
         prior=Quantity.of(prior, kind),
         estimate=Quantity.of(estimate, kind),
         verdict=estimate.status,
@@ -218,9 +209,7 @@ def sensor_table(drop: TrackedDrop) -> Table:
     problem, sensors = drop.problem, drop.problem.model.machine.sensors
     first, count = problem.n_dynamic + len(problem.unknowns), problem.n_channels
     mean = drop.smoothed.means[-1]
-    half = (
-        NORMAL_90 * widening(drop) * np.sqrt(np.diag(drop.smoothed.covariance(len(drop.smoothed.means) - 1)))
-    )
+    half = NINETY * widening(drop) * np.sqrt(np.diag(drop.smoothed.covariance(len(drop.smoothed.means) - 1)))
 
     def quantity(index: int, kind: str) -> Quantity:
         value, spread = float(mean[index]), float(half[index])

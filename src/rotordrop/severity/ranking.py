@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from rotordrop.errors import UsageError
+from rotordrop.estimated import NINETY
 
 Array = NDArray[np.float64]
 
-QUANTILE_90 = 1.6448536269514722
 CLEAR = 0.9
 """Probability from which one drop is called the worst."""
 
@@ -44,7 +44,7 @@ class DropSeverity:
         low, high = interval_90
         if not low <= high:
             raise UsageError(f"drop {name!r}: interval from {low:g} to {high:g} is upside down")
-        return cls(name=name, value=value, standard_error=(high - low) / (2.0 * QUANTILE_90))
+        return cls(name=name, value=value, standard_error=(high - low) / (2.0 * NINETY))
 
 
 @dataclass(frozen=True, kw_only=True)

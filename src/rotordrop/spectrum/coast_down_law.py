@@ -13,12 +13,11 @@ from scipy.optimize import least_squares
 from scipy.special import ndtr
 
 from rotordrop.errors import RecordError
-from rotordrop.estimated import IdentifiedValue, Verdict
+from rotordrop.estimated import NINETY, IdentifiedValue, Verdict
 
 Array = NDArray[np.float64]
 Model = Callable[[Array], Array]
 
-QUANTILE_90 = 1.6448536269514722
 MOST_VALUES = 2000
 LONGEST_STEP = 0.02
 CLOSE_ENOUGH = 1e-4
@@ -266,13 +265,13 @@ def find_standstill(time: ArrayLike, speed: ArrayLike, *, share: float = 0.05) -
     fit = _fit(model, omega, scale, lower=np.array([1e-3 * span, 1e-3 / span, 0.0]), upper=upper)
     error = float(fit.error[0])
     value = float(t[0]) + float(fit.parameters[0])
-    determined = value + QUANTILE_90 * error < t[-1] and error < 0.2 * fit.parameters[0]
+    determined = value + NINETY * error < t[-1] and error < 0.2 * fit.parameters[0]
     status: Verdict = "determined" if determined else "the record does not determine it"
     return IdentifiedValue(
         value=value if determined else float(t[-1]),
         status=status,
         standard_error=error if determined else None,
-        interval_90=(value - QUANTILE_90 * error, value + QUANTILE_90 * error) if determined else None,
+        interval_90=(value - NINETY * error, value + NINETY * error) if determined else None,
         lower=last_seen,
         unit="s",
     )
@@ -343,7 +342,7 @@ def _values(fit: _Fit, start: Array, units: tuple[str, ...], bound: Array) -> li
                 value=value,
                 status=status,
                 standard_error=error,
-                interval_90=(max(value - QUANTILE_90 * error, float(bound[k])), value + QUANTILE_90 * error),
+                interval_90=(max(value - NINETY * error, float(bound[k])), value + NINETY * error),
                 start=float(start[k]),
                 bounds=(float(bound[k]), math.inf),
                 unit=unit,

@@ -10,6 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.model.parameter import Step
+from rotordrop.model.parameter_table import rows
+from rotordrop.model.parameters import static_bearing_stiffness
+from rotordrop.model.statics import bearing_load_shares
+from rotordrop.physics.ball_bearing import bearing_constants
 from rotordrop.simulation.certificate import refined_peak
 from rotordrop.simulation.result import DropResult
 from rotordrop.synthesis.event import DropConditions, HiddenMachine
@@ -127,16 +132,12 @@ def machine_truth(machine: Machine) -> dict[str, Any]:
     bearings = machine.touchdown_bearings
     first = bearings[0].friction
     constant = machine.speed.aero_time_constant
+    described = (row for row in rows("bearing") if len(row.truth) == 1 and row.step is not Step.FIRST_CONTACT)
     return {
-        "air_gap_m": {b.name: float(b.air_gap) for b in bearings},
-        "support_stiffness": {b.name: float(b.support.stiffness) for b in bearings},
-        "support_damping": {b.name: float(b.support.damping) for b in bearings},
-        "support_mass": {b.name: float(b.support.mass) for b in bearings},
+        **{row.truth[0]: {b.name: float(row.described(b)) for b in bearings} for row in described},
+        "equivalent_stiffness": _equivalent_stiffness(machine),
         "friction_dynamic": float(first.dynamic),
         "friction_static": float(first.static),
-        "contact_K": {b.name: float(b.contact.stiffness) for b in bearings},
-        "preload_N": {b.name: float(b.bearing.preload) for b in bearings},
-        "ring_Ip": {b.name: float(b.race.inertia) for b in bearings},
         "tau_aero": None if constant is None else float(constant),
         "contact": [_contact(b) for b in bearings],
         "support": [_support(b) for b in bearings],
@@ -152,6 +153,16 @@ def machine_truth(machine: Machine) -> dict[str, Any]:
             "C": [float(a.damping) for a in machine.ambs],
         },
     }
+
+
+def _equivalent_stiffness(machine: Machine) -> dict[str, float]:
+    """Support and bearing in series [N/m], the bearing by its tangent at the static load."""
+    found = {}
+    for bearing, load in zip(machine.touchdown_bearings, bearing_load_shares(machine), strict=True):
+        tangent = static_bearing_stiffness(bearing_constants(bearing.bearing), float(load))
+        support = float(bearing.support.stiffness)
+        found[bearing.name] = support * tangent / (support + tangent)
+    return found
 
 
 def _contact(b: TouchdownBearing) -> dict[str, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import UsageError
+from rotordrop.model.parameter_table import LOADS, published
 
 Array = NDArray[np.float64]
 
@@ -48,47 +49,23 @@ class Truth:
 
     def of_bearing(self, bearing: str) -> dict[str, float]:
         """True values of one bearing (SI) by path in an estimate, such as ``"support.mass_kg"``."""
-        found = {}
-        for path, (key, factor) in _FIELDS.items():
-            value = self.values.get(key)
-            if isinstance(value, Mapping):
-                value = value.get(bearing)
-            if value is not None:
-                found[path] = factor * float(value)
-        index = self.bearing_names.index(bearing)
-        for path, (group, key) in _LISTED.items():
-            rows = self.values.get(group)
-            if rows is not None:
-                found[path] = float(rows[index][key])
-        return found
+        found = {row.field: self._of_bearing(bearing, row.truth) for row in published().values() if row.truth}
+        found |= {load.field: self._of_bearing(bearing, (load.truth,), load.truth_unit) for load in LOADS}
+        return {path: value for path, value in found.items() if value is not None}
+
+    def _of_bearing(self, bearing: str, place: tuple[str, ...], unit: float = 1.0) -> float | None:
+        """A value of one bearing [SI]; None where this truth does not have it."""
+        value = self.values.get(place[0])
+        if isinstance(value, Mapping):
+            value = value.get(bearing)
+        elif isinstance(value, Sequence):
+            value = value[self.bearing_names.index(bearing)].get(place[1])
+        return None if value is None else unit * float(value)
 
     def impacts(self, bearing: str) -> Array:
         """Start [s], end [s] and peak force [N] of every contact of a bearing, shape (R, 3)."""
         rows = self.values.get("contact_intervals_0_0p25_s", {}).get(bearing, [])
         return np.asarray(rows, dtype=np.float64).reshape(-1, 3)
-
-
-_FIELDS: dict[str, tuple[str, float]] = {
-    "air_gap_m": ("air_gap_m", 1.0),
-    "support.stiffness_N_per_m": ("support_stiffness", 1.0),
-    "support.damping_N_s_per_m": ("support_damping", 1.0),
-    "support.mass_kg": ("support_mass", 1.0),
-    "friction.dynamic": ("friction_dynamic", 1.0),
-    "friction.static": ("friction_static", 1.0),
-    "contact.stiffness_N_per_m_n": ("contact_K", 1.0),
-    "preload_N": ("preload_N", 1.0),
-    "race.inertia_kg_m2": ("ring_Ip", 1.0),
-    "peak_force_N": ("peak_force_N", 1.0),
-    "mean_force_0p15_0p2_N": ("mean_force_0p15_0p2_N", 1.0),
-    "peak_stress_Pa": ("max_stress_MPa", 1e6),
-    "mean_stress_Pa": ("mean_stress_MPa", 1e6),
-}
-
-
-_LISTED = {
-    "contact.damping_s_per_m": ("contact", "lam"),
-    "damping_time_s": ("bearing", "Cb_over_Kb"),
-}
 
 
 def read_truth(path: str | Path) -> Truth:

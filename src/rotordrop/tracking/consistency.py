@@ -23,9 +23,6 @@ NOISE_FACTOR_LIMIT = 8.0
 LEAST_SECOND_DIRECTION = 0.05
 """Smallest singular value of the directions of a plane's sensors that still counts as two directions [1]."""
 
-RACE_SPIN = ("race.inertia", "race.drag_coefficient", "friction.stribeck_speed")
-"""Parameters that only say when a race catches up with the rotor: they may go far without moving a force."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Check:
@@ -139,7 +136,7 @@ def _parameter_check(problem: DropProblem, smoothed: Smoothed) -> Check:
     theta = smoothed.means[parameter_sample(smoothed)][problem.parameter_slice]
     departure = np.array(
         [
-            0.0 if u.path.endswith(RACE_SPIN) else (t - u.mean) / u.sigma
+            0.0 if u.parameter.spin_up_only else (t - u.mean) / u.sigma
             for t, u in zip(theta, problem.unknowns, strict=True)
         ]
     )

@@ -9,16 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError
-from rotordrop.estimated import Estimated
+from rotordrop.estimated import NINETY, Estimated
 from rotordrop.model import layout as L
 from rotordrop.model.parameters import DropModel, static_deflection
 from rotordrop.model.statics import levitated_sag, settled_sag
+from rotordrop.model.unknowns import Unknown, all_unknowns
 from rotordrop.physics import aerodynamics
 from rotordrop.physics.ball_bearing import bearing_constants
 from rotordrop.tracking import _filter as F
 from rotordrop.tracking import _propagation as P
 from rotordrop.tracking.sensors import LevitatedPhase, levitated_phase, without_hum_and_runout
-from rotordrop.tracking.unknowns import NINETY, Unknown, all_unknowns, parameter_targets
+from rotordrop.tracking.unknowns import parameter_targets
 
 Array = NDArray[np.float64]
 
@@ -110,7 +111,7 @@ class DropProblem:
             rows[axis, layout.race.start + 2 * b + axis] = 1.0
             rows[axis, layout.support.start + 2 * b + axis] = -1.0
         for k, unknown in enumerate(self.unknowns):
-            if unknown.path == f"{name}.axial_offset":
+            if unknown.path == f"{name}.preload":
                 rows[2, self.n_dynamic + k] = 1.0
         rows[3, layout.modal_x] = self.model.parameters.bearing_shape[b]
         rows[4, layout.modal_y] = self.model.parameters.bearing_shape[b]

@@ -13,8 +13,6 @@ from rotordrop.identification.fit import completed, fit_window
 from rotordrop.identification.friction import orbit_disagreement, orbit_distance, sweep_friction
 from rotordrop.identification.initial_state import InitialState
 from rotordrop.identification.parameter_vector import (
-    FRICTION,
-    friction_vector,
     nuisance_vector,
     support_vector,
 )
@@ -63,7 +61,7 @@ def test_supports_return_to_what_was_put_in(problem: ImpactFit, contacts: np.nda
 
 def test_preload_keeps_its_prior(problem: ImpactFit, contacts: np.ndarray) -> None:
     fit = fit_window(problem, problem.prior_mean, float(contacts.max()) + 3e-3, iterations=2)
-    place = problem.vector.place("NDE.axial_offset")
+    place = problem.vector.place("NDE.preload")
     assert fit.x[place] == problem.prior_mean[place]
     assert fit.covariance[place, place] == pytest.approx(problem.prior_sigma[place] ** 2)
 
@@ -146,9 +144,11 @@ def test_prior_means_reproduce_the_machine(model: DropModel) -> None:
 
 
 def test_friction_is_one_unknown_with_a_fixed_ratio(model: DropModel) -> None:
-    vector = friction_vector(model)
+    vector = nuisance_vector(model)
     rows = model.parameters.bearing.copy()
-    vector.set(np.log([0.08]), rows)
+    theta = vector.mean.copy()
+    theta[vector.friction] = np.log(0.08)
+    vector.set(theta, rows)
     assert rows[:, L.FRICTION_DYNAMIC] == pytest.approx([0.08, 0.08])
     assert rows[:, L.FRICTION_STATIC] == pytest.approx([0.104, 0.104])
 
@@ -228,7 +228,7 @@ def test_refit_takes_the_friction_of_the_sweep(problem: ImpactFit, contacts: np.
         problem, start.x, float(contacts.min()), coefficients=np.array([0.09, 0.1, 0.11]), draws=[start.x]
     )
     known, x, covariance = refit_with_friction(problem, start, swept.value, threads=2)
-    place = known.vector.place(FRICTION)
+    place = known.vector.friction
     error = (swept.value.standard_error or 0.0) / swept.value.value
     assert known.prior_mean[place] == pytest.approx(np.log(swept.value.value))
     assert x[place] == pytest.approx(np.log(swept.value.value), abs=2.0 * error)

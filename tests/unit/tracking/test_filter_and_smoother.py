@@ -196,7 +196,7 @@ def test_the_watched_rows_are_deflection_offset_and_displacement(flight):
     estimate[layout.modal_y] = 1e-5
     shape = flight.model.parameters.bearing_shape[1]
     np.testing.assert_allclose(rows @ estimate, [3e-6, -5e-6, 0.0, 0.0, 1e-5 * shape.sum()], atol=1e-18)
-    offset = [u.path for u in flight.unknowns].index(f"{name}.axial_offset")
+    offset = [u.path for u in flight.unknowns].index(f"{name}.preload")
     assert rows[2, flight.n_dynamic + offset] == 1.0
     np.testing.assert_array_equal(flight.watched[5:], rows)
 

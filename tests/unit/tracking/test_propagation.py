@@ -15,7 +15,6 @@ from rotordrop.tracking import _propagation as P
 from rotordrop.tracking._filter import soften_friction
 from rotordrop.tracking.problem import DropProblem, private_copy
 from rotordrop.tracking.smoother import PassSettings
-from rotordrop.tracking.unknowns import Unknown
 
 DT = 50e-6
 ANGLES = np.array([-1.3, -1.8])
@@ -187,7 +186,7 @@ def test_process_noise_is_an_impulse_between_rotor_and_race(flight):
     np.testing.assert_allclose(covariance, expected, rtol=1e-12, atol=1e-30)
 
 
-def single(flight: DropProblem, unknown: Unknown):
+def single(flight: DropProblem, unknown):
     """Kernel arrays before and after only this unknown is moved, and the value it was moved to."""
     from rotordrop.tracking.unknowns import parameter_targets
 
@@ -196,7 +195,7 @@ def single(flight: DropProblem, unknown: Unknown):
     before, after = private_copy(flight.model.parameters), private_copy(flight.model.parameters)
     P.apply_parameters(np.array([unknown.mean]), targets, before)
     P.apply_parameters(np.array([moved]), targets, after)
-    return before, after, unknown.value_of(moved)
+    return before, after, unknown.kernel_value(moved)
 
 
 COLUMNS = {
@@ -213,7 +212,7 @@ COLUMNS = {
     "race.inertia": {L.RACE_INERTIA},
     "race.drag_coefficient": {L.DRAG_COEFFICIENT},
     "damping_time": {L.BEARING_DAMPING},
-    "axial_offset": {L.AXIAL_OFFSET},
+    "preload": {L.AXIAL_OFFSET},
 }
 
 
@@ -229,7 +228,7 @@ def test_every_parameter_of_a_bearing_sets_its_own_entries_and_no_others(flight)
     names = flight.model.bearing_names
     seen = set()
     for unknown in flight.unknowns:
-        name, _, path = unknown.path.partition(".")
+        name, path = unknown.owner, unknown.parameter.path
         if unknown.scope != "machine":
             continue
         before, after, value = single(flight, unknown)
@@ -240,14 +239,15 @@ def test_every_parameter_of_a_bearing_sets_its_own_entries_and_no_others(flight)
             np.testing.assert_array_equal(getattr(before, part), getattr(after, part))
         seen.add(path)
         first = min(COLUMNS[path]) if path != "support.anisotropy" else None
-        if path in ("air_gap", "contact.stiffness", "race.inertia", "axial_offset"):
+        if path in ("air_gap", "contact.stiffness", "race.inertia", "preload"):
             assert after.bearing[row, first] == pytest.approx(value)
     assert seen == set(COLUMNS)
 
 
 def test_another_exponent_keeps_the_force_at_a_typical_indentation(flight):
     """Whatever stiffness is estimated beside it; below that indentation a higher exponent is softer."""
-    from rotordrop.tracking.unknowns import TYPICAL_FORCE, parameter_targets, typical_depth
+    from rotordrop.model.unknowns import TYPICAL_FORCE, typical_depth
+    from rotordrop.tracking.unknowns import parameter_targets
 
     by_path = {unknown.path: unknown for unknown in flight.unknowns}
     chosen = (by_path["DE.contact.exponent"], by_path["DE.contact.stiffness"])

@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import IdentificationError
-from rotordrop.estimated import Estimated
+from rotordrop.estimated import NINETY, Estimated
 from rotordrop.estimation.tracked import COARSE_BASIS, drop_problem, prepare
 from rotordrop.machine import Machine
+from rotordrop.model.parameter_table import parameter
 from rotordrop.model.parameters import build_drop_model
 from rotordrop.model.reduction import Reduction
-from rotordrop.physics.ball_bearing import bearing_constants
+from rotordrop.model.unknowns import aero_time_constant, all_unknowns, prior_sigma
+from rotordrop.physics.ball_bearing import bearing_constants, preload_of_offset
 from rotordrop.tracking.problem import (
     GAIN_SIGMA,
     NOISE_FLOOR,
@@ -26,18 +28,6 @@ from rotordrop.tracking.problem import (
 )
 from rotordrop.tracking.sensors import levitated_phase, without_hum_and_runout
 from rotordrop.tracking.transfer import transferred
-from rotordrop.tracking.unknowns import (
-    GAP_SIGMA,
-    LEAST_EXPONENT_SIGMA,
-    NINETY,
-    RELATIVE_PRIOR,
-    aero_time_constant,
-    all_unknowns,
-    drift_of,
-    late_factor,
-    preload_of_offset,
-    relative_sigma,
-)
 
 
 def unknown_of(machine: Machine, path: str):
@@ -67,7 +57,7 @@ def unknown_of(machine: Machine, path: str):
     ],
 )
 def test_the_prior_comes_from_interval_range_error_or_status(quantity, expected):
-    assert relative_sigma(quantity, "support.stiffness") == pytest.approx(expected)
+    assert prior_sigma(parameter("support.stiffness"), quantity) == pytest.approx(expected)
 
 
 def test_the_machine_file_sets_the_priors(lp400):
@@ -78,18 +68,22 @@ def test_the_machine_file_sets_the_priors(lp400):
     assert (gap.mean, gap.logarithmic) == (pytest.approx(250e-6), False)
     assert gap.sigma == pytest.approx(150e-6 / (2 * NINETY))
     damping = unknown_of(lp400, "NDE.contact.damping")  # a plain value
-    assert damping.sigma == RELATIVE_PRIOR["contact.damping"][1]
+    assert damping.sigma == parameter("contact.damping").given_sigma
 
 
 def test_a_gap_that_is_only_given_may_still_be_wrong(lp400):
-    assert unknown_of(lp400.with_values({"NDE.air_gap": 260e-6}), "NDE.air_gap").sigma == GAP_SIGMA
+    assert (
+        unknown_of(lp400.with_values({"NDE.air_gap": 260e-6}), "NDE.air_gap").sigma
+        == parameter("air_gap").given_sigma
+    )
 
 
 def test_the_preload_is_estimated_by_the_axial_offset_it_belongs_to(lp400):
-    unknown = unknown_of(lp400, "NDE.axial_offset")
+    unknown = unknown_of(lp400, "NDE.preload")
     bearing = lp400.bearing("NDE").bearing
     constants = bearing_constants(bearing)
     assert preload_of_offset(constants, unknown.mean) == pytest.approx(float(bearing.preload), rel=1e-6)
+    assert unknown.value_of(unknown.mean) == pytest.approx(float(bearing.preload), rel=1e-6)
     spread = math.log(760 / 370) / (2 * NINETY) * 530
     ends = [preload_of_offset(constants, unknown.mean + s * 1e-3 * unknown.sigma) for s in (-1.0, 1.0)]
     assert (ends[1] - ends[0]) / 2e-3 == pytest.approx(spread, rel=0.01)
@@ -119,10 +113,11 @@ def test_friction_drifts_and_late_in_a_drop_faster(flight):
     by_path = {u.path: (u, i) for i, u in enumerate(flight.unknowns)}
     friction, i = by_path["NDE.friction.dynamic"]
     stiffness, k = by_path["NDE.support.stiffness"]
-    assert drift_of(friction) > 0.0 and late_factor(friction) > 1.0
-    assert flight.targets.late_drift[i] == late_factor(friction) * flight.targets.drift[i]
-    assert flight.targets.late_drift[k] == flight.targets.drift[k] == drift_of(stiffness) > 0.0
-    assert drift_of(by_path["NDE.axial_offset"][0]) == 0.0
+    factor = friction.parameter.late_drift_factor
+    assert flight.targets.drift[i] == friction.parameter.drift > 0.0 and factor > 1.0
+    assert flight.targets.late_drift[i] == factor * flight.targets.drift[i]
+    assert flight.targets.late_drift[k] == flight.targets.drift[k] == stiffness.parameter.drift > 0.0
+    assert by_path["NDE.preload"][0].parameter.drift == 0.0
 
 
 def test_the_aerodynamic_constant_has_a_start_even_when_nobody_knows_it(lp400):
@@ -400,4 +395,4 @@ def test_an_exponent_calibrated_at_its_bound_is_not_taken_for_exact(lp400: Machi
         build_drop_model(lp400.with_values({"NDE.contact.exponent": bound}), Reduction(modes=4))
     )
     sigma = next(u.sigma for u in unknowns if u.path == "NDE.contact.exponent")
-    assert sigma == LEAST_EXPONENT_SIGMA
+    assert sigma == parameter("contact.exponent").least_sigma
