@@ -1,16 +1,27 @@
-"""Files appear complete or not at all: written beside their place, synced, then renamed."""
+"""Files appear complete or not at all: written beside their place, synced, then renamed.
+
+A device, a pipe or a link that stands at the place is kept: what was written goes through it.
+"""
 
 from __future__ import annotations
 
 import json
 import os
-import secrets
+import re
+import stat
+import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from rotordrop.errors import OutputError
+
+_LONGEST_STEM = 40
+"""Characters of a file name that its temporary name keeps: file systems end names at 255 bytes."""
+
+_PART = re.compile(r"\.(?P<stem>.*)\.(?P<system>[0-9a-f]{8})-(?P<process>\d+)-[0-9a-f]{8}\.part(\..*)?")
 
 
 @contextmanager
@@ -18,7 +29,9 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Give a temporary path to write to; it takes the place of `path` when the block ends well.
 
     When the block is left by an exception, Ctrl-C included, the temporary file is removed and whatever stood
-    at `path` before stands there still.
+    at `path` before stands there still. A symbolic link stays one and its target is replaced; what is written
+    for a device or a pipe is copied into it; a file that is replaced hands on its permissions. What killed
+    runs of this computer left behind for the same place is removed.
 
     Parameters
     ----------
@@ -28,32 +41,129 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     Yields
     ------
     Path
-        Temporary path in the same folder, with the same suffix.
+        Temporary path in the same folder, with the same suffix (elsewhere for a device or a pipe).
     """
-    target = Path(path)
-    require_place(target)
-    temporary = target.with_name(f".{target.stem}.{secrets.token_hex(4)}.part{target.suffix}")
+    require_place(path)
+    target = Path(os.path.realpath(path))
+    if target.exists() and not target.is_file():
+        with _through(target) as temporary:
+            yield temporary
+        return
+    _clear_after_killed_runs(target)
+    temporary = _temporary_beside(target)
     try:
         yield temporary
         if not temporary.exists():
             raise OutputError(f"nothing was written for {target}")
+        _keep_permissions(target, temporary)
         _sync(temporary)
         temporary.replace(target)
     except OSError as error:
         if error.filename not in (None, str(temporary), temporary):
             raise
-        raise OutputError(
-            f"cannot write {target}: {error.strerror or error}; choose another place"
-        ) from error
+        raise _cannot_write(target, error) from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):  # a disk that has become read-only must not hide what went wrong
+            temporary.unlink(missing_ok=True)
     _sync_folder(target.parent)
 
 
-def write_text(path: str | os.PathLike[str], text: str) -> None:
-    """Write a text file in UTF-8, complete or not at all."""
+@contextmanager
+def _through(target: Path) -> Iterator[Path]:
+    """Write for a device or a pipe: collected in a temporary file first, then copied into it."""
+    import shutil
+    import tempfile
+
+    with tempfile.TemporaryDirectory() as folder:
+        temporary = Path(folder) / target.name
+        yield temporary
+        try:
+            with temporary.open("rb") as content, target.open("wb") as stream:
+                shutil.copyfileobj(content, stream)
+        except OSError as error:
+            raise _cannot_write(target, error) from error
+
+
+def _temporary_beside(target: Path) -> Path:
+    stem = target.stem[:_LONGEST_STEM]
+    mark = f"{_system()}-{os.getpid()}-{os.urandom(4).hex()}"
+    return target.with_name(f".{stem}.{mark}.part{target.suffix[:_LONGEST_STEM]}")
+
+
+@lru_cache(maxsize=1)
+def _system() -> str:
+    """Mark of the computer and of the process numbers that count on it (a container has its own)."""
+    import platform
+
+    marks = [platform.node()]
+    with suppress(OSError):
+        marks.append(Path("/etc/machine-id").read_text(encoding="ascii").strip())
+    with suppress(OSError):
+        marks.append(str(os.stat("/proc/self/ns/pid").st_ino))  # noqa: PTH116 - pathlib follows no such link
+    return f"{zlib.crc32('/'.join(marks).encode()):08x}"
+
+
+def _clear_after_killed_runs(target: Path) -> None:
+    """Remove what processes of this computer that no longer run left behind for the same file."""
+    if os.name != "posix":
+        return  # elsewhere there is no harmless way to ask whether a process runs
+    stem = target.stem[:_LONGEST_STEM]
+    with suppress(OSError):
+        for name in os.listdir(target.parent):  # noqa: PTH208 - names are matched before paths are made
+            left = _PART.fullmatch(name)
+            if left and left["stem"] == stem and left["system"] == _system() and not _runs(left["process"]):
+                (target.parent / name).unlink(missing_ok=True)
+
+
+def _runs(process: str) -> bool:
+    try:
+        os.kill(int(process), 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True
+    return True
+
+
+def _keep_permissions(target: Path, temporary: Path) -> None:
+    """Give the new file mode, and where allowed owner and group, of the one it replaces."""
+    with suppress(OSError):
+        old = target.stat()
+        if (old.st_uid, old.st_gid) != (temporary.stat().st_uid, temporary.stat().st_gid):
+            with suppress(OSError):
+                os.chown(temporary, old.st_uid, old.st_gid)
+        temporary.chmod(stat.S_IMODE(old.st_mode))
+
+
+def _cannot_write(target: Path, error: OSError) -> OutputError:
+    return OutputError(f"cannot write {target}: {error.strerror or error}; choose another place")
+
+
+@contextmanager
+def new_hdf5(path: str | os.PathLike[str], *, track_order: bool = False) -> Iterator[Any]:
+    """Give an empty HDF5 file (``h5py.File``) that appears at `path`, complete or not at all.
+
+    It is put together in memory: a disk that becomes full while the HDF5 library writes leaves it in a state
+    that ends the interpreter.
+    """
+    import h5py
+
     with atomic_path(path) as temporary:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
+        memory = {"driver": "core", "backing_store": False}
+        with h5py.File(temporary.name, "w", track_order=track_order, **memory) as file:
+            yield file
+            file.flush()
+            image = file.id.get_file_image()
+        temporary.write_bytes(image)
+
+
+def write_text(path: str | os.PathLike[str], text: str) -> None:
+    """Write a text file in UTF-8, complete or not at all.
+
+    What is no character, as in file names of another encoding, becomes a question mark.
+    """
+    with atomic_path(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", errors="replace", newline="\n")
 
 
 def write_json(path: str | os.PathLike[str], content: Any) -> None:
@@ -70,13 +180,21 @@ def write_json(path: str | os.PathLike[str], content: Any) -> None:
 
 def require_place(path: str | os.PathLike[str]) -> None:
     """Refuse a place where no file can be written, before a long computation rather than after it."""
-    target = Path(path)
-    if target.is_dir():
-        raise OutputError(f"cannot write {target}: it is a folder; name a file in it")
+    target = Path(os.path.realpath(path))
+    try:
+        mode = target.stat().st_mode
+    except FileNotFoundError:
+        mode = None
+    except OSError as error:
+        raise _cannot_write(Path(path), error) from error
+    if mode is not None and stat.S_ISDIR(mode):
+        raise OutputError(f"cannot write {path}: it is a folder; name a file in it")
+    if mode is not None and not stat.S_ISREG(mode):
+        return
     if not target.parent.is_dir():
-        raise OutputError(
-            f"cannot write {target}: the folder {target.parent} does not exist; create it first"
-        )
+        raise OutputError(f"cannot write {path}: the folder {target.parent} does not exist; create it first")
+    if not os.access(target.parent, os.W_OK | os.X_OK):
+        raise OutputError(f"cannot write {path}: the folder {target.parent} is read-only; choose another")
 
 
 def _sync(path: Path) -> None:

@@ -116,8 +116,19 @@ _FAMILIAR = tuple(
     "N s/m,V,mV,mV/um,kg/m^3,kg m^2,g mm,m/s,mm/s,m/s^2,degC".split(",")
 )
 
-_NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?")
-_COMMA = re.compile(r"[+-]?\d+,\d+")
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+")
+
+_LONGEST = 400
+"""Characters that a number with its unit may have."""
+
+_LONGEST_UNIT = 60
+
+_EXPONENT = r"(?:\^|\*\*) ?(?:[+-]?[0-9]{1,2}(?:\.[0-9]{1,20})?|\([0-9]{1,2}/[0-9]{1,2}\))"
+_FACTOR = rf"\(*(?:[^\W\d]\w*|%)(?: ?{_EXPONENT})?\)*"
+_UNIT = re.compile(rf"(?:1 ?/ ?)?{_FACTOR}(?: ?[*/ ] ?{_FACTOR})*")
+"""Names with small exponents, multiplied and divided. Anything else, such as ``m**9**9``, the unit library
+would begin to compute."""
 
 
 @lru_cache(maxsize=1)
@@ -205,6 +216,8 @@ def _kind(kind: str) -> Kind:
 def _split(text: object, kind: str, wanted: Kind) -> tuple[float, str]:
     if isinstance(text, bool) or not isinstance(text, str | int | float):
         raise UsageError(f"{text!r} is not {_spoken(kind)}; write a number with a unit, {wanted.example!r}")
+    if len(str(text)) > _LONGEST:
+        raise UsageError(f"{_shown(text)} is no number with a unit; write for example {wanted.example!r}")
     written = str(text).strip().replace("−", "-").replace("·", " ")
     comma = _COMMA.match(written)
     if comma:
@@ -216,7 +229,19 @@ def _split(text: object, kind: str, wanted: Kind) -> tuple[float, str]:
     number = float(match.group())
     if not math.isfinite(number):
         raise UsageError(f"{text!r} is too large to be {_spoken(kind)}")
-    return number, _plain_unit(written[match.end() :].strip())
+    unit = _plain_unit(written[match.end() :].strip())
+    if kind in ("speed", "frequency") and _PER_MINUTE.fullmatch(unit):
+        unit = "rpm"
+    return number, unit
+
+
+_PER_MINUTE = re.compile(r"1\s*/\s*min|min\s*(?:\^|\*\*)?\s*-\s*1|min⁻¹")
+"""How DIN writes revolutions per minute."""
+
+
+def _shown(text: object) -> str:
+    written = str(text)
+    return repr(written if len(written) <= _LONGEST_UNIT else f"{written[:_LONGEST_UNIT]}…")
 
 
 def _plain_unit(unit: str) -> str:
@@ -229,9 +254,10 @@ def _plain_unit(unit: str) -> str:
 
 
 def _unit(unit: str, text: object, kind: str) -> Any:
-    if not re.fullmatch(r"[\w\s%*/^().+-]*", unit):
+    if unit and (len(unit) > _LONGEST_UNIT or not _UNIT.fullmatch(" ".join(unit.split()))):
         raise UsageError(
-            f"{text!r}: cannot read {unit!r} as a unit; write for example {_kind(kind).example!r}"
+            f"{_shown(text)}: {_shown(unit)} is not a unit known here; "
+            f"write for example {_kind(kind).example!r}"
         )
     try:
         return _registry().parse_units(unit)

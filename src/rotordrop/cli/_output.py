@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from rotordrop.atomic_file import require_place, write_json, write_text
-from rotordrop.errors import OutputError
+from rotordrop.errors import OutputError, UsageError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -19,6 +20,8 @@ STANDARD_OUTPUT = Path("-")
 _PLAIN_WIDTH = 110
 
 Progress = Callable[[str, float], None]
+
+_inputs: list[Path] = []
 
 
 def console(stream: TextIO | None = None) -> Console:
@@ -51,7 +54,8 @@ def deliver(content: Any, json_file: Path | None, summarise: Callable[[Console],
         Prints the summary on the console it is given.
     """
     if json_file == STANDARD_OUTPUT:
-        sys.stdout.write(json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+        whole = (sys.stdout.encoding or "utf-8").lower().replace("-", "") == "utf8"
+        sys.stdout.write(json.dumps(content, indent=2, ensure_ascii=not whole, allow_nan=False) + "\n")
         return
     if json_file is not None:
         write_json(json_file, content)
@@ -61,11 +65,50 @@ def deliver(content: Any, json_file: Path | None, summarise: Callable[[Console],
         out.print(f"JSON: {json_file}")
 
 
+def read_by_this_command(files: Iterable[Path]) -> None:
+    """Tell which files the command reads; `require_places` keeps its outputs away from them."""
+    _inputs[:] = [*files, *(beside for file in files for beside in _read_beside(file))]
+
+
+def _read_beside(file: Path) -> list[Path]:
+    """Files that are read because another one names them: the shaft table of a machine, COMTRADE samples."""
+    if file.suffix.lower() == ".cfg":
+        return [file.with_suffix(suffix) for suffix in (".dat", ".DAT")]
+    if file.suffix.lower() != ".toml" or not file.is_file():
+        return []
+    import tomllib
+
+    try:
+        rotor = tomllib.loads(file.read_text(encoding="utf-8-sig")).get("rotor")
+        return [file.parent / str(rotor["shaft_table"])] if isinstance(rotor, dict) else []
+    except (OSError, ValueError, RecursionError, KeyError):
+        return []  # whoever reads the file says what is wrong with it
+
+
 def require_places(*files: Path | None) -> None:
-    """Refuse output files that cannot be written before anything is computed for them."""
+    """Refuse outputs that cannot be written, or would replace an input or another output, before any work."""
+    places: dict[object, Path] = {}
     for file in files:
-        if file is not None and file != STANDARD_OUTPUT:
-            require_place(file)
+        if file is None or file == STANDARD_OUTPUT:
+            continue
+        require_place(file)
+        if file.exists() and not file.is_file():
+            continue  # a device or a pipe takes more than one
+        for read in _inputs:
+            if _identity(read) == _identity(file):
+                raise UsageError(f"{file} is read by this command and would be replaced; name another file")
+        if _identity(file) in places:
+            raise UsageError(f"{places[_identity(file)]} and {file} are one file; give each output its own")
+        places[_identity(file)] = file
+
+
+def _identity(file: Path) -> object:
+    """What two names of one file have in common, also where it does not exist yet."""
+    try:
+        found = file.stat()
+    except (OSError, ValueError):
+        return os.path.normcase(os.path.realpath(file))
+    return found.st_dev, found.st_ino
 
 
 def deliver_text(text: str, file: Path | None, *, overwrite: bool) -> None:

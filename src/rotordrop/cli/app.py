@@ -7,11 +7,13 @@ Exit codes: 0 done, 2 machine file, 3 recording, 4 identification, 5 simulation,
 from __future__ import annotations
 
 import atexit
+import errno
 import os
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from difflib import get_close_matches
+from functools import wraps
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
@@ -23,12 +25,21 @@ from rotordrop._version import __version__
 from rotordrop.cli import INTERRUPTED as INTERRUPTED
 from rotordrop.cli import STOPPED
 from rotordrop.cli._interruption import interruptions_kept
-from rotordrop.errors import RotordropError, UsageError
+from rotordrop.cli._streams import open_streams, printable
+from rotordrop.errors import OutputError, RotordropError, UsageError
 
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """Our matrices are small: threads inside linear algebra cost more than they give, above all on busy cores."""
 
 BROKEN_PIPE = 141
+
+_OUTPUTS = ("json", "json_file", "report", "output")
+"""Parameters of the verbs that name files to write; other paths are read."""
+
+_NEITHER = ("target", "folder")
+"""Parameters that name a folder to fill, or a file that is never replaced unasked."""
+
+_NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO, errno.EBADF)
 
 _ORDER = (
     "init",
@@ -61,10 +72,31 @@ def load_verb(name: str) -> TyperCommand:
     """Import the file of a verb and make its function a command."""
     module = import_module(f"rotordrop.cli.{name.replace('-', '_')}")
     single = typer.Typer(add_completion=False, rich_markup_mode=None)
-    single.command(name)(getattr(module, name.replace("-", "_")))
+    single.command(name)(_with_files_apart(getattr(module, name.replace("-", "_"))))
     command = typer.main.get_command(single)
     assert isinstance(command, TyperCommand)
     return command
+
+
+def _with_files_apart(verb: Callable[..., None]) -> Callable[..., None]:
+    """Make a verb refuse to write over what it reads, and two outputs of one name, before it begins."""
+
+    @wraps(verb)
+    def called(**values: Any) -> None:
+        from rotordrop.cli._output import read_by_this_command, require_places
+
+        read = [
+            path
+            for name, value in values.items()
+            if name not in (*_OUTPUTS, *_NEITHER)
+            for path in (value if isinstance(value, list) else [value])
+            if isinstance(path, Path)
+        ]
+        read_by_this_command(read)
+        require_places(*(values[name] for name in _OUTPUTS if name in values))
+        verb(**values)
+
+    return called
 
 
 class VerbTable(TyperGroup):
@@ -126,8 +158,19 @@ def run(arguments: Sequence[str]) -> int:
     except (KeyboardInterrupt, typer.Abort):
         return _fail(STOPPED, INTERRUPTED)
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _discard_standard_output()
         return BROKEN_PIPE
+    except MemoryError:
+        return _fail("there is not enough memory for this; free some, or give a shorter record", 1)
+    except OSError as error:
+        if error.errno not in _NO_ROOM or error.filename is not None:
+            raise
+        _discard_standard_output()
+        return _fail(f"cannot write the output: {error.strerror}", OutputError.exit_code)
+
+
+def _discard_standard_output() -> None:
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _invoke(arguments: list[str]) -> None:
@@ -140,6 +183,7 @@ def main() -> None:
     """Entry point of the command ``rotordrop``."""
     for name in ONE_THREAD:
         os.environ.setdefault(name, "1")
+    open_streams()
     with interruptions_kept() as was_pressed:
         try:
             code = run(sys.argv[1:])
@@ -167,7 +211,7 @@ def _leave_interrupted() -> NoReturn:
 
 
 def _fail(message: str, code: int) -> int:
-    typer.echo(f"rotordrop: {message}", err=True)
+    typer.echo(f"rotordrop: {printable(message)}", err=True)
     return code
 
 

@@ -28,6 +28,10 @@ _EXPECTED = {
     "too_short": "at least one entry is needed",
     "missing_argument": "expected two entries",
 }
+_LARGEST_FILE = 16 * 2**20
+_DEEPEST = 40
+"""Brackets or parts of a key inside one another that a machine file can need."""
+
 _SYNTAX_PLACE = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)")
 
 
@@ -46,14 +50,23 @@ def load_machine(path: str | os.PathLike[str]) -> Machine:
     """
     file = Path(path)
     try:
-        text = file.read_text(encoding="utf-8-sig")
+        with file.open("rb") as stream:
+            content = stream.read(_LARGEST_FILE + 1)
     except OSError as error:
         raise MachineFileError(f"cannot read the machine file: {error.strerror}", file=file) from error
+    if len(content) > _LARGEST_FILE:
+        raise MachineFileError(f"more than {_LARGEST_FILE} bytes are no machine file", file=file)
+    try:
+        text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
+        start = content.rfind(b"\n", 0, error.start) + 1
         raise MachineFileError(
-            f"byte {error.start} is not UTF-8 text; save the machine file as UTF-8", file=file
+            f"the byte 0x{content[error.start]:02x} is not UTF-8 text; save the machine file as UTF-8",
+            file=file,
+            line=content.count(b"\n", 0, error.start) + 1,
+            column=len(content[start : error.start].decode("utf-8", "replace")) + 1,
         ) from error
-    return _loaded(text, file)
+    return _loaded(text.replace("\r\n", "\n"), file)
 
 
 def loads_machine(text: str, folder: str | os.PathLike[str] = ".") -> Machine:
@@ -75,10 +88,30 @@ def _loaded(text: str, file: Path | None, folder: Path | None = None) -> Machine
 
 
 def _parsed(text: str, file: Path | None) -> dict[str, Any]:
+    _refuse_depth(text, file)
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise _syntax_error(text, str(error), file) from None
+    except (ValueError, RecursionError) as error:
+        longest = max(text.splitlines(), key=len)
+        raise MachineFileError(
+            f"this cannot be a value of a machine: {str(error).partition(';')[0]}",
+            file=file,
+            line=text.splitlines().index(longest) + 1,
+            column=1,
+        ) from None
+
+
+def _refuse_depth(text: str, file: Path | None) -> None:
+    """Refuse keys and lists nested so deep that only a damaged or hostile file has them."""
+    for number, line in enumerate(text.splitlines(), start=1):
+        key = re.match(r"[\s\[]*([\w\s.-]*)", line)
+        depth = max(line.count("[") - line.count("]"), line.count("{"), key.group(1).count(".") if key else 0)
+        if depth > _DEEPEST:
+            raise MachineFileError(
+                f"{depth} levels inside one another; a machine file has a handful", file=file, line=number
+            )
 
 
 def _syntax_error(text: str, message: str, file: Path | None) -> MachineFileError:
@@ -130,7 +163,14 @@ def _with_shaft_table(
             column=place[1],
         )
     path = folder / named
-    rotor.update(read_shaft_table(path))
+    try:
+        rotor.update(read_shaft_table(path))
+    except MachineFileError as error:
+        if error.line is not None:
+            raise
+        raise MachineFileError(
+            f"shaft_table = {named!r}: {error.message}", file=file, line=place[0], column=place[1]
+        ) from error
     return path, [section.pop(SECTION_LINE) for section in rotor["sections"]]
 
 

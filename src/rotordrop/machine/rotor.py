@@ -95,7 +95,7 @@ class SectionByLength(Section):
     """A shaft section given by its length, cut into equal elements."""
 
     length: PositiveLength
-    elements: Annotated[int, Strict(), Field(ge=1, description="Number of equal elements")] = 1
+    elements: Annotated[int, Strict(), Field(ge=1, le=10_000, description="Number of equal elements")] = 1
 
 
 class SectionByNodes(Section):

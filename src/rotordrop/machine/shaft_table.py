@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from rotordrop.errors import MachineFileError, UsageError
 from rotordrop.estimated import Estimated
@@ -104,17 +104,25 @@ class _Table:
 
 def _text(path: Path) -> str:
     try:
+        if path.exists() and not path.is_file():
+            raise MachineFileError("the shaft table is no plain file; name a CSV file", file=path)
         return path.read_text(encoding="utf-8-sig")
-    except OSError as error:
+    except (OSError, ValueError) as error:
+        if isinstance(error, UnicodeDecodeError):
+            _refuse_encoding(path, error)
+        reason = error.strerror if isinstance(error, OSError) else str(error)
         raise MachineFileError(
-            f"cannot read the shaft table: {error.strerror}; the path counts from the folder of "
-            "the machine file",
+            f"cannot read the shaft table: {reason}; the path counts from the folder of the machine file",
             file=path,
         ) from error
-    except UnicodeDecodeError as error:
-        raise MachineFileError(
-            "the shaft table is not UTF-8 text; save it as CSV UTF-8", file=path
-        ) from error
+
+
+def _refuse_encoding(path: Path, error: UnicodeDecodeError) -> NoReturn:
+    raise MachineFileError(
+        "the shaft table is not UTF-8 text; save it as CSV UTF-8",
+        file=path,
+        line=error.object.count(b"\n", 0, error.start) + 1,
+    ) from error
 
 
 def _separator(heading: str) -> str:

@@ -122,18 +122,31 @@ class Physical:
         low, high = self.number(written[0]), self.number(written[1])
         if low > high:
             raise UsageError(f"{key} = {written!r} runs backwards; write the lower value first")
+        if low == high and key == "range":
+            raise UsageError(f"{key} = {written!r} has no width; write the lowest and the highest value")
+        for number, text in zip((low, high), written, strict=True):
+            self._check(number, text, key)
         return low, high
 
     def _admissible(self, value: Estimated, raw: Any) -> Estimated:
         self._check(value.value, raw)
-        if value.range is not None and not value.range[0] <= value.value <= value.range[1]:
+        for name, pair in (("range", value.range), ("interval", value.interval_90)):
+            if pair is not None and not pair[0] <= value.value <= pair[1]:
+                raise UsageError(
+                    f"{self.text(value.value)} lies outside its own {name}, {self.text(pair[0])} to "
+                    f"{self.text(pair[1])}; change one of them"
+                )
+        if value.standard_error is not None and not 0.0 <= value.standard_error < math.inf:
+            raise UsageError(f"standard_error = {value.standard_error:g} must be zero or positive")
+        lower, upper = value.lower, value.upper
+        if lower is not None and upper is not None and lower > upper:
             raise UsageError(
-                f"{self.text(value.value)} lies outside its own range, {self.text(value.range[0])} to "
-                f"{self.text(value.range[1])}; change one of them"
+                f"lower = {self.text(lower)} lies above upper = {self.text(upper)}; exchange the two"
             )
         return value
 
-    def _check(self, number: float, raw: Any) -> None:
+    def _check(self, number: float, raw: Any, what: str = "") -> None:
+        name = f"{what} reaches to {self.text(number)}, which" if what else self.text(number)
         if not math.isfinite(number):
             raise UsageError(
                 f"{raw!r} is not a finite number; write for example {KINDS[self.kind].example!r}"
@@ -145,12 +158,12 @@ class Physical:
             )
         if self.above is not None and not number > self.above:
             limit = "positive" if self.above == 0 else f"greater than {self.text(self.above)}"
-            raise UsageError(f"{self.text(number)} is not allowed here; {spoken(self.kind)} must be {limit}")
+            raise UsageError(f"{name} is not allowed here; {spoken(self.kind)} must be {limit}")
         if self.least is not None and number < self.least:
             limit = "negative" if self.least == 0 else f"below {self.text(self.least)}"
-            raise UsageError(f"{self.text(number)} is not allowed here; it must not be {limit}")
+            raise UsageError(f"{name} is not allowed here; it must not be {limit}")
         if self.most is not None and number > self.most:
-            raise UsageError(f"{self.text(number)} is not allowed here; at most {self.text(self.most)}")
+            raise UsageError(f"{name} is not allowed here; at most {self.text(self.most)}")
 
     def text(self, number: float) -> str:
         """Write a number the way an engineer reads it."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.atomic_file import atomic_path
+from rotordrop.atomic_file import new_hdf5
 from rotordrop.errors import SimulationError
 from rotordrop.simulation.checkpoint import part_path
 from rotordrop.simulation.coast_down_result import CoastDownResult, WindowStatistics
@@ -65,9 +65,7 @@ class Frame:
 
 def write_part(path: Path, samples: Mapping[str, NDArray[Any]], contact_log: Array) -> None:
     """Write the samples and the ended contacts of one window, complete or not at all."""
-    import h5py
-
-    with atomic_path(path) as temporary, h5py.File(temporary, "w") as file:
+    with new_hdf5(path) as file:
         for name, values in samples.items():
             file.create_dataset(name, data=values)
         file.create_dataset(CONTACT_LOG, data=contact_log)
@@ -75,9 +73,7 @@ def write_part(path: Path, samples: Mapping[str, NDArray[Any]], contact_log: Arr
 
 def write_coast_down(result: CoastDownResult, frame: Frame, folder: Path, parts: int, output: Path) -> None:
     """Join the parts of a run to one file with its statistics; the file appears complete or not at all."""
-    import h5py
-
-    with atomic_path(output) as temporary, h5py.File(temporary, "w") as file:
+    with new_hdf5(output) as file:
         file.attrs["format"] = FORMAT
         _write_head(file, result, frame)
         _join(file, [part_path(folder, number) for number in range(parts)])

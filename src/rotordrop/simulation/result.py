@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.atomic_file import atomic_path
+from rotordrop.atomic_file import new_hdf5
 from rotordrop.errors import SimulationError
 from rotordrop.simulation.certificate import Certificate, refined_peak
 
@@ -147,8 +147,8 @@ class DropResult:
 
     def save(self, path: str | Path) -> None:
         """Write an HDF5 file that opens as NetCDF4; nothing is left behind when writing fails."""
-        with atomic_path(Path(path)) as temporary:
-            _write(self, temporary)
+        with new_hdf5(path, track_order=True) as file:
+            _write(self, file)
 
 
 HISTORIES: tuple[tuple[str, tuple[str, ...], str, str], ...] = (
@@ -176,35 +176,34 @@ def _scale(file: Any, name: str, values: Any) -> None:
     file[name].make_scale(name)
 
 
-def _write(result: DropResult, path: Path) -> None:
+def _write(result: DropResult, file: Any) -> None:
     import h5py
 
-    with h5py.File(path, "w", track_order=True) as file:
-        file.attrs["format"] = _FORMAT
-        file.attrs["Conventions"] = "CF-1.8"
-        for name in _TEXTS + _NUMBERS:
-            value = getattr(result, name)
-            file.attrs[name] = value if isinstance(value, str) else float(value)
-        text = h5py.string_dtype()
-        _scale(file, "time", result.time)
-        file["time"].attrs["units"] = "s"
-        _scale(file, "bearing", np.array(result.bearing_names, dtype=text))
-        _scale(file, "axis", np.array(["x", "y"], dtype=text))
-        _scale(file, "state_name", np.array(result.state_names, dtype=text))
-        _scale(file, "contact", np.arange(len(result.contacts), dtype=np.int64))
-        _scale(file, "coordinate", np.arange(result.shapes.shape[0], dtype=np.int64))
-        _scale(file, "mode", np.arange(result.shapes.shape[1], dtype=np.int64))
-        for name, axes, unit, words in HISTORIES:
-            _dataset(file, name, getattr(result, name), axes, unit, words)
-        _dataset(file, "shapes", result.shapes, ("coordinate", "mode"), "1", "mode shapes of a plane")
-        for item in fields(ContactLog):
-            _dataset(
-                file, f"contact_{item.name}", getattr(result.contacts, item.name), ("contact",), "", item.name
-            )
-        for item in fields(Certificate):
-            value = getattr(result.certificate, item.name)
-            if value is not None:
-                file.attrs[f"certificate_{item.name}"] = value
+    file.attrs["format"] = _FORMAT
+    file.attrs["Conventions"] = "CF-1.8"
+    for name in _TEXTS + _NUMBERS:
+        value = getattr(result, name)
+        file.attrs[name] = value if isinstance(value, str) else float(value)
+    text = h5py.string_dtype()
+    _scale(file, "time", result.time)
+    file["time"].attrs["units"] = "s"
+    _scale(file, "bearing", np.array(result.bearing_names, dtype=text))
+    _scale(file, "axis", np.array(["x", "y"], dtype=text))
+    _scale(file, "state_name", np.array(result.state_names, dtype=text))
+    _scale(file, "contact", np.arange(len(result.contacts), dtype=np.int64))
+    _scale(file, "coordinate", np.arange(result.shapes.shape[0], dtype=np.int64))
+    _scale(file, "mode", np.arange(result.shapes.shape[1], dtype=np.int64))
+    for name, axes, unit, words in HISTORIES:
+        _dataset(file, name, getattr(result, name), axes, unit, words)
+    _dataset(file, "shapes", result.shapes, ("coordinate", "mode"), "1", "mode shapes of a plane")
+    for item in fields(ContactLog):
+        _dataset(
+            file, f"contact_{item.name}", getattr(result.contacts, item.name), ("contact",), "", item.name
+        )
+    for item in fields(Certificate):
+        value = getattr(result.certificate, item.name)
+        if value is not None:
+            file.attrs[f"certificate_{item.name}"] = value
 
 
 def _dataset(file: Any, name: str, values: Any, axes: tuple[str, ...], unit: str, words: str) -> None:

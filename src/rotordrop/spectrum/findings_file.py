@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotordrop.atomic_file import atomic_path
+from rotordrop.atomic_file import new_hdf5
 
 if TYPE_CHECKING:
     from rotordrop.spectrum.coast_down import CoastDownAnalysis, PlaneAnalysis, SpeedLaw
@@ -29,9 +29,7 @@ def write_findings(analysis: CoastDownAnalysis, path: Path) -> None:
     path : Path
         HDF5 file to write.
     """
-    import h5py
-
-    with atomic_path(path) as temporary, h5py.File(temporary, "w") as file:
+    with new_hdf5(path) as file:
         file.attrs["format"] = FORMAT
         file.attrs["recorded"] = analysis.signal.recorded
         for name, plane in analysis.planes.items():

@@ -1,5 +1,6 @@
 """Every refusal of a machine file says where, what was found and what to do."""
 
+import os
 import re
 
 import pytest
@@ -213,7 +214,7 @@ def test_a_missing_file_is_named(tmp_path):
 def test_a_file_in_another_encoding_is_refused(tmp_path, small_text):
     file = tmp_path / "machine.toml"
     file.write_bytes(small_text.replace("small", "größe").encode("latin-1"))
-    with pytest.raises(MachineFileError, match="byte 11 is not UTF-8 text; save the machine file as UTF-8"):
+    with pytest.raises(MachineFileError, match=r"toml:2:11: the byte 0xf6 is not UTF-8 text; save the mach"):
         load_machine(file)
 
 
@@ -221,3 +222,55 @@ def test_a_byte_order_mark_does_no_harm(tmp_path, small_text):
     file = tmp_path / "machine.toml"
     file.write_bytes(b"\xef\xbb\xbf" + small_text.encode())
     assert load_machine(file) == loads_machine(small_text)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("air_gap = ", 'air_gap = {guess = "0.2 mm", range = ["0.2 mm", "0.2 mm"]}\n#', "has no width"),
+        ("air_gap = ", 'air_gap = {guess = "0.2 mm", range = ["-1 mm", "1 mm"]}\n#', "range reaches to -1"),
+        (
+            "air_gap = ",
+            'air_gap = {value = "0.2 mm", interval = ["0.3 mm", "0.4 mm"]}\n#',
+            "lies outside its own interval, 300 µm to 400 µm",
+        ),
+        ("air_gap = ", 'air_gap = {value = "0.2 mm", standard_error = "-1 um"}\n#', "must be zero or positi"),
+        (
+            "air_gap = ",
+            'air_gap = {value = "0.2 mm", lower = "0.3 mm", upper = "0.1 mm"}\n#',
+            "lower = 300 µm lies above upper = 100 µm",
+        ),
+        ("air_gap = ", 'air_gap = "1e-300 mm"\n#', "'1e-300 mm' is no length that a machine has"),
+        ("air_gap = ", 'air_gap = "0.2 m**9**9**9**9"\n#', "is not a unit known here"),
+        ("air_gap = ", "air_gap = " + 5000 * "9" + "\n#", "this cannot be a value of a machine"),
+        ("air_gap = ", "air_gap = " + 5000 * "[" + "\n#", "5000 levels inside one another"),
+        ("air_gap = ", "air_gap = " + 3000 * "{a=" + "\n#", "3000 levels inside one another"),
+        ("air_gap = ", 20_000 * "a." + "b = 1\n#", "20000 levels inside one another"),
+    ],
+)
+def test_nonsense_is_refused_with_its_line(tmp_path, small_text, old, new, told):
+    file = tmp_path / "machine.toml"
+    file.write_text(small_text.replace(old, new, 1), encoding="utf-8")
+    line = small_text[: small_text.index(old)].count("\n") + 1
+    with pytest.raises(MachineFileError) as caught:
+        load_machine(file)
+    assert told in str(caught.value)
+    assert caught.value.line == line
+
+
+@pytest.mark.parametrize("table", ["a\\u0000b", "/dev/zero", "pipe"])
+def test_a_shaft_table_that_is_no_file_is_refused_with_the_line(tmp_path, small_text, table):
+    if table == "pipe":
+        os.mkfifo(tmp_path / "pipe")
+    text = small_text.replace("[rotor]", f'[rotor]\nshaft_table = "{table}"', 1)
+    head, tail = text.index("[[rotor.sections]]"), text.index("[[rotor.discs]]")
+    file = tmp_path / "machine.toml"
+    file.write_text(text[:head] + text[tail:], encoding="utf-8")
+    with pytest.raises(MachineFileError, match=r"shaft table") as caught:
+        load_machine(file)
+    assert "shaft_table" in file.read_text().splitlines()[caught.value.line - 1]
+
+
+def test_an_endless_machine_file_is_refused(tmp_path):
+    with pytest.raises(MachineFileError, match=r"more than 16777216 bytes are no machine file"):
+        load_machine("/dev/zero")

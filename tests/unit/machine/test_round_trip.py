@@ -52,7 +52,7 @@ def known(draw, limits):
     return Estimated(
         value=value,
         status=draw(st.sampled_from(["given", "guess", "estimated", "default", "inferred"])),
-        range=draw(st.sampled_from([None, (low, high)])),
+        range=draw(st.sampled_from([None, (low, high) if low < high else None])),
         interval_90=draw(st.sampled_from([None, (low, high)])),
         standard_error=draw(st.sampled_from([None, high])),
         lower=draw(st.sampled_from([None, low])),

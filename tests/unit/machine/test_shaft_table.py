@@ -103,7 +103,7 @@ def test_positions_must_increase(load):
 def test_a_missing_table_is_named(load, tmp_path, small_text):
     text = small_text.replace("[rotor]", '[rotor]\nshaft_table = "nowhere.csv"', 1)
     head, tail = text.index("[[rotor.sections]]"), text.index("[[rotor.discs]]")
-    with pytest.raises(MachineFileError, match=r"nowhere\.csv: cannot read the shaft table: No such file"):
+    with pytest.raises(MachineFileError, match=r"'nowhere\.csv': cannot read the shaft table: No such file"):
         loads_machine(text[:head] + text[tail:], tmp_path)
 
 

@@ -182,6 +182,12 @@ class TestClock:
         assert [one.kind for one in found] == ["wrong sampling rate"]
         assert "header says 25000 Hz, the time column 20000 Hz" in found[0].message
 
+    @pytest.mark.parametrize("rate", [float("nan"), 0.0, float("inf")])
+    def test_a_rate_that_is_none(self, drop, machine, rate):
+        found = check_record(replace(drop, sampling_rate=rate), machine)
+        assert [finding.kind for finding in found] == ["wrong sampling rate"]
+        assert f"the sampling rate is {rate:g} Hz" in found[0].message
+
     def test_slow_sampling(self, drop):
         slow = replace(drop, time=drop.time * 20, sampling_rate=1000.0)
         assert [one.kind for one in check_clock(slow)] == ["slow sampling"]

@@ -26,6 +26,15 @@ _RATE_KEYS = re.compile(r"^(fs|sampl\w*[ _-]*(rate|frequency)|abtast(rate|freque
 def check_clock(record: Record, *, drop: bool = True) -> list[Finding]:
     """Find backward, jittered or wrong clocks and gaps in them."""
     steps = np.diff(record.time)
+    if not 0.0 < record.sampling_rate < np.inf:
+        return [
+            Finding(
+                kind="wrong sampling rate",
+                message=f"the sampling rate is {record.sampling_rate:g} Hz",
+                remedy="give the true rate with the record",
+                severity="stop",
+            )
+        ]
     usual = float(np.median(steps))
     findings = _backward(record, steps)
     if findings:

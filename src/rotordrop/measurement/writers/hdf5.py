@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from rotordrop.atomic_file import atomic_path
+from rotordrop.atomic_file import new_hdf5
 from rotordrop.errors import OutputError
 from rotordrop.measurement.recording import Channel, Recording
 
@@ -28,9 +28,7 @@ def write_hdf5(recording: Recording, path: str | Path, *, step: float | None = N
         Quantisation of the channels in their unit; they are then stored as 16-bit integers with a scale, as
         recorders do. Without it nothing is rounded.
     """
-    import h5py
-
-    with atomic_path(path) as temporary, h5py.File(temporary, "w") as file:
+    with new_hdf5(path) as file:
         for key, value in recording.metadata.items():
             file.attrs[key] = value
         for key, texts in (("notes", recording.notes), ("warnings", recording.warnings)):

@@ -1,0 +1,127 @@
+"""No command writes over what it reads, or twice to one place; any terminal can be printed to."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from inspect import signature
+from pathlib import Path
+from typing import get_args
+
+import pytest
+
+from rotordrop.cli import app
+from rotordrop.cli._streams import printable
+from rotordrop.cli.app import run
+from rotordrop.errors import UsageError
+from rotordrop.machine import example_machine, example_path, save_machine
+
+SMALL = example_path("small")
+
+
+@pytest.fixture
+def machine(tmp_path: Path) -> Path:
+    save_machine(example_machine("small"), tmp_path / "m.toml")
+    return tmp_path / "m.toml"
+
+
+@pytest.mark.parametrize("option", ["--json", "--report"])
+@pytest.mark.parametrize("way", ["same name", "other spelling", "link", "hard link"])
+def test_an_input_is_never_replaced(machine, option, way, capsys):
+    named = machine
+    if way == "other spelling":
+        named = machine.parent / "." / ".." / machine.parent.name / machine.name
+    if way == "link":
+        named = machine.parent / "link.json"
+        named.symlink_to(machine)
+    if way == "hard link":
+        named = machine.parent / "hard.json"
+        os.link(machine, named)
+    before = machine.read_bytes()
+    assert run(["check", str(machine), option, str(named)]) == UsageError.exit_code
+    assert "is read by this command and would be replaced; name another" in _told(capsys)
+    assert machine.read_bytes() == before
+
+
+def test_the_shaft_table_of_a_machine_is_an_input_too(tmp_path, capsys):
+    lp400 = example_path("lp400")
+    for file in lp400.parent.glob("lp400*"):
+        shutil.copy(file, tmp_path)
+    table = next(tmp_path.glob("*.csv"))
+    before = table.read_bytes()
+    arguments = ["check", str(tmp_path / lp400.name), "--json", str(table)]
+    assert run(arguments) == UsageError.exit_code
+    assert f"{table.name} is read by this command" in _told(capsys)
+    assert table.read_bytes() == before
+
+
+def test_two_outputs_need_two_files(machine, capsys):
+    both = str(machine.parent / "o.x")
+    assert run(["check", str(machine), "--json", both, "--report", both]) == UsageError.exit_code
+    assert "are one file; give each output its own" in _told(capsys)
+    assert run(["check", str(machine), "--json", os.devnull, "--report", os.devnull]) == 0
+
+
+@pytest.mark.parametrize("verb", list(app.verbs()))
+def test_every_path_of_every_command_is_known_as_read_or_written(verb):
+    module = __import__(f"rotordrop.cli.{verb.replace('-', '_')}", fromlist=["_"])
+    function = getattr(module, verb.replace("-", "_"))
+    for name, parameter in signature(function, eval_str=True).parameters.items():
+        written = str(parameter.default) + str(parameter.annotation)
+        if "Path" in str(get_args(parameter.annotation)[:1]) and "rite" in written:
+            assert name in (*app._OUTPUTS, *app._NEITHER), f"{verb} writes {name}: is it kept apart?"
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252", "utf-8"])
+@pytest.mark.parametrize("arguments", [[], ["--json", "-"]])
+def test_any_encoding_of_the_terminal_will_do(machine, encoding, arguments):
+    done = _called(["check", str(machine), *arguments], encoding)
+    assert done.returncode == 0, done.stderr
+    assert b"Traceback" not in done.stderr
+    assert len(done.stdout) > 500
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
+def test_a_full_standard_output_is_a_sentence(machine):
+    with open("/dev/full", "w") as full:
+        done = _called(["check", str(machine)], "utf-8", stdout=full)
+    assert done.returncode == 6
+    assert done.stderr.decode() == "rotordrop: cannot write the output: No space left on device\n"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a shell closes the streams")
+@pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&- <&-"])
+def test_closed_streams_do_no_harm(machine, closed):
+    out = machine.parent / "out.json"
+    line = f"exec '{sys.executable}' -m rotordrop check '{machine}' --json '{out}' {closed}"
+    done = subprocess.run(["sh", "-c", line], capture_output=True, check=False, env=os.environ)
+    assert done.returncode == 0
+    assert b"Traceback" not in done.stderr
+    assert out.stat().st_size > 500
+
+
+def test_a_name_from_a_file_cannot_command_the_terminal(tmp_path, capsys):
+    bad = "\x1b]0;owned\x07 \x1b[31m \u202e"
+    (tmp_path / "m.toml").write_text(f'name = "x"\n"{bad}" = 1\n', encoding="utf-8")
+    shown = printable(bad)
+    assert not set("\x1b\x07\u202e") & set(shown)
+    assert run(["check", str(tmp_path / f"{bad}.toml")]) == 2
+    assert "\x1b" not in _told(capsys)
+
+
+def _told(capsys: pytest.CaptureFixture[str]) -> str:
+    return " ".join(capsys.readouterr().err.split())
+
+
+def _called(
+    arguments: list[str], encoding: str, stdout: object = subprocess.PIPE
+) -> subprocess.CompletedProcess:
+    return subprocess.run(
+        [sys.executable, "-m", "rotordrop", *arguments],
+        stdout=stdout,
+        stderr=subprocess.PIPE,
+        check=False,
+        env=os.environ | {"PYTHONIOENCODING": encoding},
+    )
