@@ -192,7 +192,9 @@ def require_place(path: str | os.PathLike[str]) -> None:
     if mode is not None and not stat.S_ISREG(mode):
         return
     if not target.parent.is_dir():
-        raise OutputError(f"cannot write {path}: the folder {target.parent} does not exist; create it first")
+        raise OutputError(
+            f"cannot write {path}: the folder {Path(path).parent} does not exist; create it first"
+        )
     if not os.access(target.parent, os.W_OK | os.X_OK):
         raise OutputError(f"cannot write {path}: the folder {target.parent} is read-only; choose another")
 

@@ -1,8 +1,8 @@
-"""HDF5: scaled datasets, each with its own clock in attributes; refuses whatever points outside the file."""
+"""HDF5: scaled datasets, each with its own clock in attributes."""
 
 from __future__ import annotations
 
-import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +11,7 @@ import numpy as np
 from rotordrop.errors import RecordError
 from rotordrop.measurement.profile import Profile
 from rotordrop.measurement.recording import Array, Channel, Recording, known_unit
-
-LARGEST = 4 * 2**30
-"""Largest size of one dataset when unpacked [byte]."""
-
-_STEEPEST_PACKING = 1100
-"""More bytes per stored byte than gzip can reach mean a made-up shape."""
+from rotordrop.measurement.unpacking import Item, unpack
 
 _TIME_NAMES = ("time", "t")
 
@@ -40,95 +35,14 @@ def read_hdf5(path: Path, profile: Profile) -> Recording:
         When the file is damaged or truncated, points to other files, holds virtual datasets, or claims shapes
         that its bytes cannot fill.
     """
-    import h5py
-
-    try:
-        with h5py.File(path, "r") as file:
-            return _recording(file, profile, path)
-    except (OSError, KeyError, RuntimeError, ValueError, TypeError) as error:
-        raise RecordError(
-            f"{path} is no intact HDF5 file ({_first_line(error)}; it has {path.stat().st_size} bytes); "
-            "copy or export it again"
-        ) from error
-
-
-def _recording(file: Any, profile: Profile, path: Path) -> Recording:
-    datasets = _safe_datasets(file, path)
-    entries = {str(key): _text(value) for key, value in file.attrs.items()}
-    times = {name: item for name, item in datasets.items() if _is_time(name)}
-    channels = tuple(
-        _channel(name, item, times, profile, path) for name, item in datasets.items() if name not in times
-    )
+    content = unpack(path, "hdf5")
+    times = {item.name: item for item in content.items if _is_time(item.name)}
+    channels = tuple(_channel(item, times, profile, path) for item in content.items if item.name not in times)
     if not channels:
         raise RecordError(f"{path} holds no one-dimensional numeric dataset; export the channels one by one")
-    notes, warnings = (_texts(file, key) for key in ("notes", "warnings"))
+    entries = {key: str(value) for key, value in content.attributes.items()}
+    notes, warnings = (_lines(entries.get(key)) for key in ("notes", "warnings"))
     return Recording(channels=channels, metadata=entries, notes=notes, warnings=warnings)
-
-
-def _first_line(error: Exception) -> str:
-    return str(error).splitlines()[0]
-
-
-def _safe_datasets(file: Any, path: Path) -> dict[str, Any]:
-    """Collect the datasets, having refused everything that is dangerous or not really there."""
-    found: dict[str, Any] = {}
-    seen: set[Any] = set()
-
-    def visit(group: Any, prefix: str) -> None:
-        import h5py
-
-        for key in group:
-            name = f"{prefix}{key}"
-            link = group.get(key, getlink=True)
-            if not isinstance(link, h5py.HardLink):
-                raise RecordError(
-                    f"{path}: {name!r} is a {type(link).__name__} (to {_target(link)!r}), not data of this "
-                    "file; "
-                    "store the data itself"
-                )
-            item = group[key]
-            if isinstance(item, h5py.Group):
-                address = h5py.h5o.get_info(item.id).addr
-                if address not in seen:
-                    seen.add(address)
-                    visit(item, f"{name}/")
-            elif isinstance(item, h5py.Dataset) and item.dtype.kind in "iuf" and item.ndim == 1:
-                _refuse_unsafe(name, item, path)
-                found[name] = item
-
-    visit(file, "")
-    return found
-
-
-def _target(link: Any) -> str:
-    return ":".join(str(part) for part in (getattr(link, "filename", None), link.path) if part)
-
-
-def _refuse_unsafe(name: str, item: Any, path: Path) -> None:
-    """Refuse data that lie in other files, or shapes that the stored bytes cannot fill."""
-    if item.is_virtual:
-        raise RecordError(f"{path}: {name!r} is a virtual dataset over other files; store the data itself")
-    if item.external:
-        raise RecordError(
-            f"{path}: the data of {name!r} lie in the file {item.external[0][0]!r}; store the data itself"
-        )
-    size, stored = item.size * item.dtype.itemsize, item.id.get_storage_size()
-    if size > LARGEST or (item.chunks and size > _STEEPEST_PACKING * max(stored, 1)):
-        raise RecordError(
-            f"{path}: {name!r} claims {item.size} samples ({size} bytes) but {stored} bytes are stored; "
-            "the file is damaged or made to exhaust memory"
-        )
-    if item.chunks:
-        expected, present = math.ceil(item.size / item.chunks[0]), item.id.get_num_chunks()
-        if present < expected:
-            raise RecordError(
-                f"{path}: of {name!r} only {present} of {expected} blocks were written; the recording was "
-                "cut off"
-            )
-    elif stored < size or (item.id.get_offset() or 0) + stored > path.stat().st_size:
-        raise RecordError(
-            f"{path}: {name!r} claims {size} bytes but {stored} are stored; the recording was cut off"
-        )
 
 
 def _is_time(name: str) -> bool:
@@ -136,55 +50,55 @@ def _is_time(name: str) -> bool:
     return last in _TIME_NAMES or last.endswith("_time")
 
 
-def _channel(name: str, item: Any, times: dict[str, Any], profile: Profile, path: Path) -> Channel:
-    attributes = {str(key).lower(): value for key, value in item.attrs.items()}
-    try:
-        raw = np.asarray(item[()], dtype=np.float64)
-    except OSError as error:
-        raise RecordError(
-            f"{path}: {name!r} cannot be unpacked ({_first_line(error)}); copy the file again"
-        ) from error
-    values = raw * float(attributes.get("scale", 1.0)) + float(attributes.get("offset", 0.0))
-    unit = profile.units.get(name, _text(attributes.get("unit", attributes.get("units", ""))))
+def _channel(item: Item, times: dict[str, Item], profile: Profile, path: Path) -> Channel:
+    attributes = {key.lower(): value for key, value in item.attributes.items()}
+    scale, offset = (_number(attributes, names, item.name, path) for names in (("scale",), ("offset",)))
+    values = item.values.astype(np.float64)
+    values *= 1.0 if scale is None else scale
+    values += 0.0 if offset is None else offset
+    unit = profile.units.get(item.name, str(attributes.get("unit", attributes.get("units", ""))))
     return Channel(
-        name=name.rsplit("/", 1)[-1],
-        label=name,
+        name=item.name.rsplit("/", 1)[-1],
+        label=item.name,
         unit=known_unit(unit) or unit,
         values=values,
-        time=_time(name, attributes, len(raw), times, path),
+        time=_time(item, attributes, times, path),
     )
 
 
-def _time(name: str, attributes: dict[str, Any], count: int, times: dict[str, Any], path: Path) -> Array:
-    step = attributes.get("dt_s", attributes.get("dt"))
-    rate = attributes.get("fs_hz", attributes.get("fs"))
-    start = float(attributes.get("t0_s", attributes.get("t0", 0.0)))
+def _number(attributes: Mapping[str, Any], names: tuple[str, ...], dataset: str, path: Path) -> float | None:
+    """Give the first of the named attributes as a number, or None where there is none of them."""
+    value = next((attributes[name] for name in names if name in attributes), None)
+    try:
+        return None if value is None else float(value)
+    except (TypeError, ValueError):
+        raise RecordError(
+            f"{path}: attribute {names[0]!r} of {dataset!r} is {value!r:.60}, not a number; export it again"
+        ) from None
+
+
+def _time(item: Item, attributes: Mapping[str, Any], times: dict[str, Item], path: Path) -> Array:
+    name, count = item.name, len(item.values)
+    step = _number(attributes, ("dt_s", "dt"), name, path)
+    rate = _number(attributes, ("fs_hz", "fs"), name, path)
+    start = _number(attributes, ("t0_s", "t0"), name, path) or 0.0
     index = np.arange(count, dtype=np.float64)
-    if rate is not None and float(rate) > 0:
-        return start + index / float(rate)
-    if step is not None and float(step) > 0:
-        return start + index * float(step)
+    if rate is not None and rate > 0:
+        return start + index / rate
+    if step is not None and step > 0:
+        return start + index * step
     folder = name.rpartition("/")[0]
-    if "time" in attributes:
-        named = f"{folder}/{_text(attributes['time'])}".lstrip("/")
-        if named in times and times[named].size == count:
-            return np.asarray(times[named][()], dtype=np.float64)
-    for candidate, item in times.items():
-        if candidate.rpartition("/")[0] in (folder, "") and item.size == count:
-            return np.asarray(item[()], dtype=np.float64)
+    named = f"{folder}/{attributes.get('time', '')}".lstrip("/")
+    if named in times and len(times[named].values) == count:
+        return times[named].values.astype(np.float64)
+    for candidate, found in times.items():
+        if candidate.rpartition("/")[0] in (folder, "") and len(found.values) == count:
+            return found.values.astype(np.float64)
     raise RecordError(
         f"{path}: {name!r} has neither an attribute 'fs_hz' or 'dt_s' nor a dataset 'time' of {count} "
-        "samples "
-        "beside it; add one"
+        "samples beside it; add one"
     )
 
 
-def _text(value: Any) -> str:
-    if isinstance(value, bytes):
-        return value.decode("utf-8", "replace")
-    return str(value)
-
-
-def _texts(file: Any, key: str) -> tuple[str, ...]:
-    value = file.attrs.get(key)
-    return () if value is None else tuple(line for line in _text(value).split("\n") if line)
+def _lines(text: str | None) -> tuple[str, ...]:
+    return tuple(line for line in (text or "").split("\n") if line)

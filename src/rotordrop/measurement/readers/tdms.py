@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import struct
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from rotordrop.errors import RecordError
 from rotordrop.measurement.profile import Profile
-from rotordrop.measurement.readers import needs_extra
 from rotordrop.measurement.recording import Array, Channel, Recording, known_unit, split_unit
-
-_LEAD_IN = 28
-_UNFINISHED = 2**64 - 1
+from rotordrop.measurement.unpacking import Item, unpack
 
 
 def read_tdms(path: Path, profile: Profile) -> Recording:
@@ -32,77 +27,37 @@ def read_tdms(path: Path, profile: Profile) -> Recording:
     RecordError
         When segments are missing or the channels hold another number of bytes than the segments declare.
     """
-    try:
-        from nptdms import TdmsFile
-    except ImportError as error:
-        raise needs_extra("npTDMS", path, error) from error
-
-    declared = _raw_bytes(path)
-    try:
-        file: Any = TdmsFile.read(path)
-    except Exception as error:
-        raise RecordError(f"{path} cannot be read as a TDMS file: {error}; copy the file again") from error
-    series = [channel for group in file.groups() for channel in group.channels() if len(channel)]
-    numeric = [channel for channel in series if channel.dtype.kind in "iuf"]
-    _compare(series, numeric, declared, path)
-    if not numeric:
+    content = unpack(path, "tdms")
+    if not content.items:
         raise RecordError(f"{path} holds no numeric channel")
-    channels = tuple(_channel(channel, profile, path) for channel in numeric)
-    return Recording(channels=channels, metadata={key: str(value) for key, value in file.properties.items()})
-
-
-def _raw_bytes(path: Path) -> int:
-    """Walk the segments and add up the bytes of samples they declare."""
-    size, at, raw = path.stat().st_size, 0, 0
-    with path.open("rb") as stream:
-        while at < size:
-            stream.seek(at)
-            lead = stream.read(_LEAD_IN)
-            if len(lead) < _LEAD_IN or lead[:4] != b"TDSm":
-                raise RecordError(f"{path}: no TDMS segment at byte {at} of {size}; the file is damaged")
-            length, offset = struct.unpack_from("<QQ", lead, 12)
-            if length == _UNFINISHED or at + _LEAD_IN + length > size:
-                told = "no length" if length == _UNFINISHED else f"{length} bytes"
-                raise RecordError(
-                    f"{path} is truncated: the segment at byte {at} declares {told} and "
-                    f"{size - at - _LEAD_IN} "
-                    "bytes are present; copy the file again, or let the recorder close it"
-                )
-            if offset > length:
-                raise RecordError(f"{path}: the segment at byte {at} places its samples outside itself")
-            raw += length - offset
-            at += _LEAD_IN + length
-    return raw
-
-
-def _compare(series: list[Any], numeric: list[Any], declared: int, path: Path) -> None:
-    present = sum(channel.raw_data.nbytes for channel in numeric)
-    if len(series) == len(numeric) and present != declared:
-        raise RecordError(
-            f"{path}: the segments declare {declared} bytes of samples and the channels hold {present}; "
-            "the file is damaged, copy it again"
-        )
-
-
-def _channel(channel: Any, profile: Profile, path: Path) -> Channel:
-    properties = channel.properties
-    name, _, unit = split_unit(channel.name)
-    unit = str(properties.get("unit_string", properties.get("NI_UnitDescription", unit)))
-    label = f"{channel.group_name}/{channel.name}"
-    unit = profile.units.get(label, profile.units.get(channel.name, unit))
-    return Channel(
-        name=name,
-        label=channel.name,
-        unit=known_unit(unit) or unit,
-        values=np.asarray(channel[:], dtype=np.float64),
-        time=_time(properties, len(channel), label, path),
+    channels = tuple(_channel(item, profile, path) for item in content.items)
+    return Recording(
+        channels=channels, metadata={key: str(value) for key, value in content.attributes.items()}
     )
 
 
-def _time(properties: Any, count: int, label: str, path: Path) -> Array:
-    step = float(properties.get("wf_increment", 0.0))
-    if step <= 0:
+def _channel(item: Item, profile: Profile, path: Path) -> Channel:
+    own = item.name.removeprefix(f"{item.attributes['group']}/")
+    name, _, unit = split_unit(own)
+    unit = str(item.attributes.get("unit_string", item.attributes.get("NI_UnitDescription", unit)))
+    unit = profile.units.get(item.name, profile.units.get(own, unit))
+    return Channel(
+        name=name,
+        label=own,
+        unit=known_unit(unit) or unit,
+        values=item.values.astype(np.float64),
+        time=_time(item, path),
+    )
+
+
+def _time(item: Item, path: Path) -> Array:
+    try:
+        step = float(item.attributes.get("wf_increment", 0.0))
+        start = float(item.attributes.get("wf_start_offset", 0.0))
+    except ValueError:
+        step, start = 0.0, 0.0
+    if not 0.0 < step < np.inf:
         raise RecordError(
-            f"{path}: channel {label!r} has no waveform property 'wf_increment' and so no clock"
+            f"{path}: channel {item.name!r} has no waveform property 'wf_increment' and so no clock"
         )
-    return float(properties.get("wf_start_offset", 0.0)) + step * np.arange(count, dtype=np.float64)
+    return start + step * np.arange(len(item.values), dtype=np.float64)
