@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rotordrop.errors import UsageError
 from rotordrop.estimated import Estimated
 from rotordrop.machine.description import Description
-from rotordrop.machine.provenance import physical_of
+from rotordrop.machine.provenance import kind_of, physical_of
 
 if TYPE_CHECKING:
     from rotordrop.machine.machine import Machine
@@ -35,6 +35,23 @@ def changed_machine_parts(machine: Machine, values: Mapping[str, float | Estimat
         except ValueError as error:
             raise UsageError(_refusal(error, values)) from error
     return parts
+
+
+def kind_of_path(machine: Machine, path: str) -> str:
+    """Kind of quantity of a value by path, one of `rotordrop.units.KINDS`.
+
+    Raises
+    ------
+    UsageError
+        If the machine has no such value.
+    """
+    *keys, last = _resolved(machine, path)
+    part: Any = machine
+    for key in keys:
+        part = _step(part, key, path)
+    kind = kind_of(type(part), last)
+    assert kind is not None, path
+    return kind
 
 
 def _refusal(error: ValueError, values: Mapping[str, float | Estimated]) -> str:

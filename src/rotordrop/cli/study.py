@@ -1,0 +1,116 @@
+"""Compute many drops, an ensemble or a sweep, and show how they are spread.
+
+A study is one folder: it can be killed, resumed, and worked on by several processes at once.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rotordrop.cli._options import JsonOption
+from rotordrop.cli._output import console, deliver, progress_bar, require_places
+from rotordrop.errors import UsageError
+
+if TYPE_CHECKING:
+    from rotordrop.cli._output import Progress
+    from rotordrop.study.plan import Study
+    from rotordrop.study.run import Report
+
+
+class Action(StrEnum):
+    """What to do with a study."""
+
+    run = "run"
+    show = "show"
+
+
+def study(
+    action: Annotated[
+        Action,
+        typer.Argument(metavar="ACTION", help="run: compute what is missing; show: show what is there."),
+    ],
+    place: Annotated[
+        Path,
+        typer.Argument(metavar="STUDY", help="Study file (.toml) or the folder of a study that has begun."),
+    ],
+    folder: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Folder of the study; the name of its file by default."),
+    ] = None,
+    threads: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="Threads; all cores by default.")
+    ] = None,
+    claim: Annotated[
+        bool,
+        typer.Option(
+            "--claim", help="Help with a study that others work on: stop when nothing is left to claim."
+        ),
+    ] = False,
+    dask: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS", help='Dask scheduler, "tcp://…", or "local" for a cluster made here.'
+        ),
+    ] = None,
+    by: Annotated[
+        list[str] | None,
+        typer.Option(metavar="VALUE", help='Map the results against a varied value, "speed"; repeat it.'),
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Write all drops as HDF5 (NetCDF4).")
+    ] = None,
+    report: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write the report as one HTML file.")
+    ] = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Compute many drops and show how force, stress and whirl are spread."""
+    from rotordrop.report.page import write_page
+    from rotordrop.report.study_page import study_numbers, study_page
+    from rotordrop.report.terminal import print_summary
+    from rotordrop.study.run import run_study
+    from rotordrop.study.summary import load_results, save_results
+
+    require_places(output, report, json_file)
+    if action is Action.show:
+        results = load_results(place)
+    else:
+        planned, home = _opened(place, folder)
+        with progress_bar(planned.name) as bar:
+            results = run_study(
+                planned, home, threads=threads, dask=dask, wait_for_others=not claim, report=_shown(bar)
+            )
+    if not len(results):
+        console().print(f"{place}: no drop is finished yet")
+        return
+    page = study_page(results, by or ())
+    if output is not None:
+        save_results(results, output)
+    if report is not None:
+        write_page(page, report)
+    deliver(study_numbers(results, by or ()), json_file, lambda out: print_summary(page, out))
+
+
+def _opened(place: Path, folder: Path | None) -> tuple[Study, Path]:
+    from rotordrop.study.folder import study_of
+    from rotordrop.study.plan import load_study
+
+    if place.is_dir():
+        if folder is not None:
+            raise UsageError(f"{place} is the folder of a study already; leave out --folder {folder}")
+        return study_of(place), place
+    return load_study(place), folder or place.with_suffix("")
+
+
+def _shown(bar: Progress) -> Report:
+    def show(progress: object) -> None:
+        from rotordrop.study.run import StudyProgress
+
+        assert isinstance(progress, StudyProgress)
+        bar(f"{progress.drops} of {progress.of} drops, {progress.rate:.1f}/s", progress.drops / progress.of)
+
+    return show

@@ -1,0 +1,268 @@
+"""Work on a study: claim a shard, compute its drops, publish it; on threads, in many processes, on Dask."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import FIRST_EXCEPTION, Executor, ThreadPoolExecutor, wait
+from dataclasses import dataclass
+from os import cpu_count
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from rotordrop.errors import RotordropError, UsageError
+from rotordrop.model.parameters import DropModel, build_drop_model
+from rotordrop.simulation.drop import simulate_drop
+from rotordrop.study.folder import Claim, Shard, StudyFolder, claimed, open_folder, publish, study_of, tidy
+from rotordrop.study.plan import Study
+from rotordrop.study.quantities import columns_of, row_of
+from rotordrop.study.summary import StudyResults, load_results, shards_needed
+
+LOOK_EVERY = 0.5
+"""Pause between two looks at the folder [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyProgress:
+    """How far a study is.
+
+    Attributes
+    ----------
+    drops, of : int
+        Finished drops and drops in all.
+    rate : float
+        Drops finished per second since this run began [1/s].
+    left : float
+        Time left at that rate [s]; infinite before the first shard.
+    """
+
+    drops: int
+    of: int
+    rate: float
+    left: float
+
+
+Report = Callable[[StudyProgress], None]
+
+
+def run_study(
+    study: Study,
+    folder: str | Path,
+    *,
+    threads: int | None = None,
+    dask: str | Literal["local"] | None = None,
+    wait_for_others: bool = True,
+    report: Report | None = None,
+) -> StudyResults:
+    """Compute all drops of a study that are not computed yet, and give its results.
+
+    Parameters
+    ----------
+    study : Study
+        What to compute.
+    folder : path
+        Its folder; made when it does not exist, continued when it holds the same study.
+    threads : int, optional
+        Threads of this process; all cores by default.
+    dask : str, optional
+        Address of a Dask scheduler whose workers see the folder, or ``"local"`` for one made here (needs the
+        extra ``rotordrop[cluster]``).
+    wait_for_others : bool
+        Whether to wait for shards that other processes work on (and to take over those whose worker died).
+    report : callable, optional
+        Called with a `StudyProgress` about twice a second.
+
+    Returns
+    -------
+    StudyResults
+        All finished drops, in order.
+
+    Notes
+    -----
+    Several processes may run the same study in the same folder at once, on one computer or many. The numbers
+    do not depend on who computed what.
+    """
+    place = open_folder(study, folder)
+    wanted = _missing(study, place)
+    if dask is not None:
+        _on_dask(place, wanted, dask, study, report)
+    else:
+        _on_threads(place, wanted, threads or cpu_count() or 1, study, report)
+    if wait_for_others:
+        _wait_for_others(study, place, report)
+    tidy(place)
+    return load_results(place.path)
+
+
+def _missing(study: Study, place: StudyFolder) -> list[int]:
+    finished = set(place.finished())
+    return [shard for shard in range(study.shards) if shard not in finished]
+
+
+def compute_shard(
+    study: Study,
+    model: DropModel,
+    shard: int,
+    claim: Claim | None = None,
+    stop: threading.Event | None = None,
+) -> Shard | None:
+    """Compute the drops of one shard, in order; None when ``stop`` was set before the end.
+
+    A drop that fails is a result: its numbers are missing and its reason is kept.
+    """
+    drops = study.drops_of(shard)
+    varied = study.values(drops.start, drops.stop)
+    numbers = np.full((len(drops), len(columns_of(study.machine))), np.nan)
+    reasons = []
+    for row in range(len(drops)):
+        if stop is not None and stop.is_set():
+            return None
+        numbers[row], reason = _one_drop(
+            study, model, dict(zip(study.varied, varied[row].tolist(), strict=True))
+        )
+        reasons.append(reason)
+        if claim is not None:
+            claim.alive()
+    return Shard(first=drops.start, varied=varied, numbers=numbers, reasons=tuple(reasons))
+
+
+def _one_drop(study: Study, model: DropModel, values: dict[str, float]) -> tuple[Any, str]:
+    nothing = np.nan
+    try:
+        drawn = model.with_values(study.machine_values(values))
+        result = simulate_drop(drawn, study.case(values))
+        if not result.finished:
+            return nothing, result.outcome
+        return row_of(drawn.machine, result), ""
+    except RotordropError as error:
+        return nothing, str(error)
+
+
+def work_on(folder: str | Path, shard: int) -> bool:
+    """Compute and publish one shard of the study in a folder, unless another one does; for Dask workers."""
+    study, model = _opened(str(folder))
+    return _work(study, model, StudyFolder(Path(folder)), shard, None)
+
+
+_OPEN: dict[str, tuple[Study, DropModel]] = {}
+"""Studies that this process has opened: a worker builds the model of a study once."""
+
+
+def _opened(folder: str) -> tuple[Study, DropModel]:
+    if folder not in _OPEN:
+        study = study_of(folder)
+        _OPEN[folder] = (study, build_drop_model(study.machine, study.reduction))
+    return _OPEN[folder]
+
+
+def _work(
+    study: Study, model: DropModel, place: StudyFolder, shard: int, stop: threading.Event | None
+) -> bool:
+    if place.shard_path(shard).exists():
+        return False
+    with claimed(place, shard) as claim:
+        if claim is None or place.shard_path(shard).exists():
+            return False
+        found = compute_shard(study, model, shard, claim, stop)
+        if found is None:
+            return False
+        publish(place, study, shard, found)
+        return True
+
+
+def _on_threads(
+    place: StudyFolder, wanted: list[int], threads: int, study: Study, report: Report | None
+) -> None:
+    if not wanted:
+        return
+    model = build_drop_model(study.machine, study.reduction)
+    stop = threading.Event()
+    with ThreadPoolExecutor(max_workers=threads) as pool:
+        try:
+            _drive(pool, wanted, lambda shard: _work(study, model, place, shard, stop), study, place, report)
+        except BaseException:
+            stop.set()  # the drops that run now end, nothing new begins; finished shards are on disk
+            raise
+
+
+def _on_dask(
+    place: StudyFolder, wanted: list[int], address: str, study: Study, report: Report | None
+) -> None:
+    try:
+        from distributed import Client, LocalCluster
+    except ImportError as error:
+        raise UsageError(
+            "a Dask cluster needs the extra 'cluster'; install it with: pip install 'rotordrop[cluster]'"
+        ) from error
+    path = str(place.path.resolve())
+    if address != "local":
+        with Client(address) as client:
+            _drive(client.get_executor(pure=False), wanted, _Task(path), study, place, report)
+        return
+    with (
+        LocalCluster(n_workers=cpu_count() or 1, threads_per_worker=1, dashboard_address=None) as cluster,
+        Client(cluster) as client,
+    ):
+        _drive(client.get_executor(pure=False), wanted, _Task(path), study, place, report)
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What a Dask worker calls; it can be sent to another process."""
+
+    folder: str
+
+    def __call__(self, shard: int) -> bool:
+        return work_on(self.folder, shard)
+
+
+def _drive(
+    pool: Executor,
+    wanted: list[int],
+    work: Callable[[int], bool],
+    study: Study,
+    place: StudyFolder,
+    report: Report | None,
+) -> None:
+    """Hand out the shards in order and look at the folder until all is done or enough is known."""
+    began, before = time.monotonic(), _drops(study, place)
+    running = {pool.submit(work, shard) for shard in wanted}
+    try:
+        while running:
+            done, running = wait(running, timeout=LOOK_EVERY, return_when=FIRST_EXCEPTION)
+            for one in done:
+                one.result()
+            _tell(study, place, report, began, before)
+            if shards_needed(study, place) is not None:
+                break
+    finally:
+        for one in running:
+            one.cancel()
+
+
+def _drops(study: Study, place: StudyFolder) -> int:
+    return sum(len(study.drops_of(shard)) for shard in place.finished())
+
+
+def _tell(study: Study, place: StudyFolder, report: Report | None, began: float, before: int) -> None:
+    if report is None:
+        return
+    drops = _drops(study, place)
+    rate = (drops - before) / max(time.monotonic() - began, 1e-9)
+    left = (study.drops - drops) / rate if rate > 0.0 else np.inf
+    report(StudyProgress(drops=drops, of=study.drops, rate=rate, left=float(left)))
+
+
+def _wait_for_others(study: Study, place: StudyFolder, report: Report | None) -> None:
+    """Wait for shards that others work on; take over those whose worker has gone."""
+    began, before = time.monotonic(), _drops(study, place)
+    while missing := _missing(study, place):
+        if shards_needed(study, place) is not None:
+            return
+        worked = [work_on(place.path, shard) for shard in missing]
+        _tell(study, place, report, began, before)
+        if not any(worked):
+            time.sleep(LOOK_EVERY)

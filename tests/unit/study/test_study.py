@@ -1,0 +1,310 @@
+"""A study gives the same numbers however it is computed, and loses nothing when it is killed."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rotordrop import DropCase, example_machine, simulate_drop
+from rotordrop.errors import OutputError, UsageError
+from rotordrop.model.parameters import build_drop_model
+from rotordrop.study.folder import StudyFolder, claimed, open_folder, read_shard, study_of
+from rotordrop.study.plan import Study, load_study, read_study
+from rotordrop.study.quantities import columns_of
+from rotordrop.study.run import _one_drop, compute_shard, run_study, work_on
+from rotordrop.study.summary import load_results, save_results, shards_needed
+
+MACHINE = example_machine("lp400")
+TABLE = {
+    "drops": 12,
+    "shard": 5,
+    "duration": "10 ms",
+    "reduction": "quick",
+    "seed": 3,
+    "vary": {
+        "speed": {"uniform": ["60 Hz", "200 Hz"]},
+        "*.friction.dynamic": {"uniform": [0.05, 0.2]},
+        "NDE.support.stiffness": {"log_uniform": ["5e7 N/m", "2e8 N/m"]},
+    },
+}
+
+
+def study_with(**changes) -> Study:
+    return read_study({**TABLE, **changes}, MACHINE)
+
+
+@pytest.fixture(scope="module")
+def serial(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("serial") / "study"
+    return folder, run_study(study_with(), folder, threads=1)
+
+
+def same_shards(one, other):
+    files = sorted(file.name for file in (one / "shards").iterdir())
+    assert files == sorted(file.name for file in (other / "shards").iterdir())
+    for name in files:
+        assert (one / "shards" / name).read_bytes() == (other / "shards" / name).read_bytes()
+
+
+def test_threads_and_order_change_no_bit(serial, tmp_path):
+    run_study(study_with(), tmp_path / "threads", threads=3)
+    same_shards(serial[0], tmp_path / "threads")
+    open_folder(study_with(), tmp_path / "backwards")
+    for shard in (2, 0, 1):
+        assert work_on(tmp_path / "backwards", shard)
+    same_shards(serial[0], tmp_path / "backwards")
+
+
+def test_the_size_of_a_shard_changes_no_number(serial, tmp_path):
+    other = run_study(study_with(shard=12), tmp_path / "one", threads=1)
+    for name, values in serial[1].numbers.items():
+        np.testing.assert_array_equal(values, other.numbers[name])
+
+
+@pytest.mark.parametrize("design", ["random", "latin hypercube", "sobol", "grid"])
+def test_values_of_a_drop_do_not_depend_on_where_a_draw_begins(design):
+    vary = dict(TABLE["vary"])
+    if design == "grid":
+        vary["speed"] = {"grid": ["60 Hz", "100 Hz", "150 Hz"]}
+    study = study_with(design=design, vary=vary, drops=64)
+    whole = study.values(0, 64)
+    np.testing.assert_array_equal(study.values(17, 23), whole[17:23])
+    assert len(np.unique(whole[:, 0])) == 64
+
+
+def test_a_grid_visits_every_cell_alike():
+    vary = {"speed": {"grid": ["60 Hz", "100 Hz"]}, "*.friction.dynamic": {"grid": [0.1, 0.2, 0.3]}}
+    study = study_with(design="grid", vary=vary, drops=12)
+    cells, counts = np.unique(study.values(0, 12)[:, :2], axis=0, return_counts=True)
+    assert len(cells) == 6
+    assert set(counts) == {2}
+
+
+def test_order_of_the_file_changes_no_number():
+    backwards = dict(reversed(list(TABLE["vary"].items())))
+    assert study_with(vary=backwards).digest == study_with().digest
+    np.testing.assert_array_equal(study_with(vary=backwards).values(0, 3), study_with().values(0, 3))
+
+
+def test_numbers_are_those_of_the_drop_simulated_alone(serial):
+    study, results = study_with(), serial[1]
+    values = {name: float(column[4]) for name, column in results.varied.items()}
+    machine = MACHINE.with_values(study.machine_values(values))
+    assert float(machine.touchdown_bearings[0].friction.dynamic) == values["*.friction.dynamic"]
+    assert float(machine.touchdown_bearings[1].friction.dynamic) == values["*.friction.dynamic"]
+    result = simulate_drop(machine, study.case(values))
+    for b, name in enumerate(("NDE", "DE")):
+        assert results.numbers[f"{name}.peak_force"][4] == pytest.approx(result.peak_force(b)[0], rel=1e-9)
+        mine = result.contacts.bearing == b
+        assert results.numbers[f"{name}.contacts"][4] == np.count_nonzero(mine)
+        assert results.numbers[f"{name}.impulse"][4] == pytest.approx(result.contacts.impulse[mine].sum())
+        assert results.numbers[f"{name}.peak_stress"][4] == pytest.approx(result.max_stress[:, b].max())
+    assert results.numbers["final_speed"][4] == pytest.approx(result.speed[-1])
+
+
+def test_a_folder_tells_its_study_and_refuses_another(serial):
+    folder = serial[0]
+    assert study_of(folder).digest == study_with().digest
+    with pytest.raises(UsageError, match=r"holds another study .*name another folder"):
+        run_study(study_with(seed=4), folder)
+    with pytest.raises(UsageError, match=r"is not a study folder"):
+        load_results(folder / "shards")
+
+
+def test_a_changed_machine_file_is_noticed(serial, tmp_path):
+    open_folder(study_with(), tmp_path / "study")
+    file = tmp_path / "study" / "machine.toml"
+    file.write_text(file.read_text().replace('"LP-400', '"LP-401', 1))
+    with pytest.raises(UsageError, match="plan and machine file do not belong together"):
+        study_of(tmp_path / "study")
+
+
+def test_a_drop_that_fails_is_a_result_with_its_reason(monkeypatch):
+    study = study_with()
+    model = build_drop_model(MACHINE, "quick")
+    numbers, reason = _one_drop(replace(study, tolerance=1e-3), model, values_of(study) | {"speed": np.inf})
+    assert np.isnan(numbers)
+    assert "speed is inf" in reason
+    done = compute_shard(study_with(vary={"speed": {"choices": ["60 Hz"]}}), model, 0)
+    assert done.reasons == ("",) * 5
+
+
+def values_of(study: Study) -> dict[str, float]:
+    return dict(zip(study.varied, study.values(0, 1)[0].tolist(), strict=True))
+
+
+def test_failed_drops_are_counted_with_their_reason(serial, tmp_path):
+    vary = {"speed": {"uniform": ["60 Hz", "61 Hz"]}, "NDE.air_gap": {"choices": ["250 um", "100 m"]}}
+    results = run_study(study_with(vary=vary, drops=8), tmp_path / "study", threads=1)
+    failed = np.array([bool(reason) for reason in results.reasons])
+    np.testing.assert_array_equal(failed, results.varied["NDE.air_gap"] > 1.0)
+    assert 0 < failed.sum() == sum(results.failed.values()) < 8
+    assert np.isnan(results.numbers["NDE.peak_force"][failed]).all()
+    assert np.isfinite(results.numbers["NDE.peak_force"][~failed]).all()
+    assert results.exceedance("NDE.peak_force", 0.0).drops == 8 - failed.sum()
+
+
+def test_a_damaged_shard_is_named(serial, tmp_path):
+    run_study(study_with(drops=5), tmp_path / "study", threads=1)
+    file = tmp_path / "study" / "shards" / "000000.npy"
+    whole = file.read_bytes()
+    for damaged in (whole[:-10], b"", serial[0].joinpath("shards", "000001.npy").read_bytes()):
+        file.write_bytes(damaged)
+        with pytest.raises(OutputError, match=r"000000\.npy .*delete it"):
+            load_results(tmp_path / "study")
+
+
+def test_two_never_claim_one_shard(tmp_path):
+    folder = open_folder(study_with(), tmp_path / "study")
+    with claimed(folder, 0) as mine:
+        assert mine is not None
+        with claimed(folder, 0) as other:
+            assert other is None
+    with claimed(folder, 0) as again:
+        assert again is not None
+
+
+def test_a_claim_of_a_dead_process_is_taken_over(tmp_path):
+    folder = open_folder(study_with(), tmp_path / "study")
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    with claimed(folder, 0):
+        file = folder.claims / "000000.json"
+        owner = json.loads(file.read_text())
+        file.write_text(json.dumps(owner | {"process": dead.pid}))
+        with claimed(folder, 0) as taken:
+            assert taken is not None
+    assert not list(folder.claims.glob("*.stale"))
+
+
+def test_a_claim_from_elsewhere_lapses_with_its_lease(tmp_path):
+    folder = open_folder(study_with(), tmp_path / "study")
+    file = folder.claims / "000000.json"
+    file.write_text(json.dumps({"host": "elsewhere", "process": 1, "since": 0.0}))
+    with claimed(folder, 0) as taken:
+        assert taken is None
+    os.utime(file, (time.time() - 3600.0,) * 2)
+    with claimed(folder, 0) as taken:
+        assert taken is not None
+
+
+PROGRAM = """
+import sys
+from rotordrop.study.folder import study_of
+from rotordrop.study.run import run_study
+run_study(study_of(sys.argv[1]), sys.argv[1], threads=2)
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals as on POSIX")
+def test_killed_runs_lose_no_finished_shard_and_change_no_bit(serial, tmp_path):
+    study = study_with(drops=60, shard=2)
+    expected = run_study(study, tmp_path / "whole", threads=2)
+    open_folder(study, tmp_path / "killed")
+    place = StudyFolder(tmp_path / "killed")
+    finished: set[int] = set()
+    for _ in range(4):
+        child = subprocess.Popen([sys.executable, "-c", PROGRAM, str(place.path)])
+        goal = len(finished) + 3
+        while child.poll() is None and len(place.finished()) < goal:
+            time.sleep(0.01)
+        child.send_signal(signal.SIGKILL)
+        child.wait()
+        assert finished <= set(place.finished())
+        finished = set(place.finished())
+        for shard in finished:
+            read_shard(place, study, shard)
+    resumed = run_study(study, place.path, threads=2)
+    same_shards(tmp_path / "whole", place.path)
+    np.testing.assert_array_equal(resumed.drop, expected.drop)
+    assert not list(place.claims.iterdir())
+
+
+def test_two_processes_share_one_study(serial, tmp_path):
+    study = study_with(drops=40, shard=2)
+    run_study(study, tmp_path / "alone", threads=1)
+    open_folder(study, tmp_path / "shared")
+    command = [sys.executable, "-c", PROGRAM, str(tmp_path / "shared")]
+    for child in [subprocess.Popen(command) for _ in range(2)]:
+        assert child.wait() == 0
+    same_shards(tmp_path / "alone", tmp_path / "shared")
+
+
+def test_a_study_ends_when_its_quantile_is_known_whatever_was_finished_first(tmp_path):
+    until = {"column": "DE.peak_stress", "quantile": 0.5, "within": 0.01}
+    study = study_with(drops=60, shard=3, until=until)
+    results = run_study(study, tmp_path / "study", threads=2)
+    needed = shards_needed(study, StudyFolder(tmp_path / "study"))
+    assert needed is not None and needed < study.shards
+    assert len(results) == 3 * needed
+    found = results.quantile("DE.peak_stress", 0.5)
+    assert 0.5 * (found.upper - found.lower) <= 0.01 * found.value
+    fewer = results.numbers["DE.peak_stress"][: 3 * (needed - 1)]
+    from rotordrop.study.summary import quantile
+
+    before = quantile(fewer, 0.5)
+    assert not 0.5 * (before.upper - before.lower) <= 0.01 * before.value
+
+
+def test_results_are_written_with_units(serial, tmp_path):
+    import h5py
+
+    save_results(serial[1], tmp_path / "results.h5")
+    with h5py.File(tmp_path / "results.h5") as file:
+        assert len(file["drop"]) == 12
+        assert file["NDE.peak_force"].attrs["units"] == "N"
+        np.testing.assert_array_equal(file["NDE.peak_force"][()], serial[1].numbers["NDE.peak_force"])
+    first = (tmp_path / "results.h5").read_bytes()
+    save_results(serial[1], tmp_path / "again.h5")
+    assert (tmp_path / "again.h5").read_bytes() == first
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"drop": 3}, r"unknown key 'drop'; did you mean 'drops'"),
+        ({"drops": 0}, r"drops = 0; expected a whole number above zero"),
+        ({"drops": 1.5}, r"drops = 1.5; expected a whole number"),
+        ({"design": "latin"}, r"design = 'latin'; expected one of random"),
+        ({"vary": {}}, r"has no speed"),
+        ({"vary": {"speed": {"uniform": ["60", "70 Hz"]}}}, r"speed: '60' has no unit"),
+        ({"vary": {"speed": {"uniform": ["70 Hz", "60 Hz"]}}}, r"runs from 439.823 to 376.991"),
+        ({"vary": {"speed": {"even": ["70 Hz", "60 Hz"]}}}, r"expected one of uniform"),
+        ({"speed": "60 Hz", "vary": {"NDE.gap": {"uniform": ["1 um", "2 um"]}}}, r"'gap' is not known"),
+        ({"speed": "60 Hz", "vary": {"NDE.air_gap": {"normal": ["1 um", "0 um"]}}}, r"deviation of 0"),
+        ({"design": "grid"}, r"'grid' with 0 values varied by 'grid'"),
+        ({"start": "floating"}, r"start = 'floating'; expected \"levitated\""),
+        ({"tolerance": 0.5}, r"tolerance = 0.5; expected a number up to 1e-3"),
+        ({"until": {"quantile": 0.9}}, r"until = .*expected \{column"),
+    ],
+)
+def test_a_wrong_study_says_what_was_expected(changes, message):
+    with pytest.raises(UsageError, match=message):
+        study_with(**changes)
+
+
+def test_a_study_file_names_itself_and_finds_its_machine(tmp_path):
+    from rotordrop import save_machine
+
+    save_machine(MACHINE, tmp_path / "machine.toml")
+    file = tmp_path / "study.toml"
+    file.write_text('machine = "machine.toml"\ndrops = 4\nspeed = "3600 rpm"\n')
+    study = load_study(file)
+    assert study.case(values_of(study)).speed == pytest.approx(DropCase(speed=2 * np.pi * 60).speed)
+    file.write_text('machine = "machine.toml"\ndrops = 4\nspeed = "3600"\n')
+    with pytest.raises(UsageError, match=r"study\.toml: speed: '3600' has no unit"):
+        load_study(file)
+
+
+def test_every_column_has_a_unit_and_a_meaning():
+    names = [q.name for q in columns_of(MACHINE)]
+    assert len(set(names)) == len(names)
+    assert all(q.unit and q.meaning for q in columns_of(MACHINE))
