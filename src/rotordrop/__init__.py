@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from rotordrop.simulation.drop import simulate_drop as simulate_drop
     from rotordrop.simulation.result import DropResult as DropResult
     from rotordrop.simulation.result import load_result as load_result
+    from rotordrop.study import load_study as load_study
+    from rotordrop.study import run_study as run_study
     from rotordrop.synthesis import score_estimate as score_estimate
     from rotordrop.synthesis import synthesize_drop as synthesize_drop
     from rotordrop.units import format_quantity as format_quantity
@@ -58,9 +60,11 @@ _PUBLIC = {
     "format_quantity": "rotordrop.units",
     "load_machine": "rotordrop.machine",
     "load_result": "rotordrop.simulation.result",
+    "load_study": "rotordrop.study",
     "machine_schema": "rotordrop.machine",
     "parse_quantity": "rotordrop.units",
     "read_record": "rotordrop.measurement",
+    "run_study": "rotordrop.study",
     "save_machine": "rotordrop.machine",
     "score_estimate": "rotordrop.synthesis",
     "simulate_drop": "rotordrop.simulation.drop",

@@ -52,6 +52,7 @@ _ORDER = (
     "calibrate",
     "compare",
     "waterfall",
+    "study",
     "synthesize",
     "score",
 )

@@ -1,4 +1,4 @@
-"""Compute many drops, an ensemble or a sweep, and show how they are spread.
+"""Compute many drops and show how force and stress are spread.
 
 A study is one folder: it can be killed, resumed, and worked on by several processes at once.
 """

@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -231,7 +232,7 @@ def test_ctrl_c_while_the_command_itself_is_loaded_ends_with_130():
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals as on POSIX")
-@pytest.mark.parametrize("seconds", [2.0, 5.0, 8.0])
+@pytest.mark.parametrize("seconds", [0.5, 5.0, 8.0])
 def test_ctrl_c_while_a_cold_cache_is_compiled_ends_with_130(tmp_path, seconds):
     machine = str(tmp_path / "machine.toml")
     assert command_line.run(["init", machine]) == 0
@@ -243,10 +244,13 @@ def test_ctrl_c_while_a_cold_cache_is_compiled_ends_with_130(tmp_path, seconds):
         text=True,
         env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "NUMBA_DISABLE_JIT": "0"},
     )
+    while not (tmp_path / "cache").exists():  # busy computers take their time to begin
+        assert process.poll() is None
+        time.sleep(0.02)
     with pytest.raises(subprocess.TimeoutExpired):
         process.wait(timeout=seconds)
     process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=20)
+    out, err = process.communicate(timeout=60)
     assert (process.returncode, out) == (130, "")
     assert err.strip() == "rotordrop: stopped; nothing was left half written"
     assert [path.name for path in tmp_path.iterdir() if path.suffix != ".toml"] == ["cache"]

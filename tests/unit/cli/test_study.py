@@ -1,0 +1,54 @@
+"""The verb ``study``: run, help, show."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from rotordrop import example_machine, save_machine
+from rotordrop.cli.app import run
+
+
+@pytest.fixture(scope="module")
+def study_file(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("study")
+    save_machine(example_machine("lp400"), folder / "machine.toml")
+    file = folder / "speeds.toml"
+    file.write_text(
+        'machine = "machine.toml"\ndrops = 12\nshard = 5\nduration = "10 ms"\nreduction = "quick"\n'
+        'vary.speed = {uniform = ["60 Hz", "200 Hz"]}\n'
+    )
+    return file
+
+
+def test_a_study_runs_shows_and_helps(study_file, tmp_path, capsys):
+    numbers, page, drops = tmp_path / "s.json", tmp_path / "s.html", tmp_path / "s.h5"
+    call = ["study", "run", str(study_file), "--by", "speed", "--threads", "1"]
+    assert run([*call, "--json", str(numbers), "--report", str(page), "--output", str(drops)]) == 0
+    said = capsys.readouterr().out
+    assert "12 simulated drops" in said
+    content = json.loads(numbers.read_text())
+    assert content["drops"] == 12
+    cells = content["maps"]["speed"]["NDE.peak_force"]
+    assert cells[0]["from"] >= 60 * 6.283
+    low, high = content["quantiles"]["NDE.peak_force"]["0.5"]["interval_90"]
+    assert 1000.0 < low < content["quantiles"]["NDE.peak_force"]["0.5"]["value"] < high < 6000.0
+    assert "Against speed" in page.read_text()
+    folder = study_file.with_suffix("")
+    before = (folder / "shards" / "000000.npy").read_bytes()
+    again = tmp_path / "again.json"
+    assert run(["study", "run", str(folder), "--claim", "--by", "speed", "--json", str(again)]) == 0
+    assert json.loads(again.read_text()) == content
+    assert (folder / "shards" / "000000.npy").read_bytes() == before
+    assert run(["study", "show", str(folder)]) == 0
+
+
+def test_what_cannot_be_done_is_said(study_file, tmp_path, capsys):
+    assert run(["study", "show", str(tmp_path)]) == 64
+    assert "is not a study folder" in capsys.readouterr().err
+    study_file.with_suffix("").mkdir(exist_ok=True)
+    assert run(["study", "run", str(study_file), "--by", "spead", "--threads", "1"]) == 64
+    assert "did you mean 'speed'" in capsys.readouterr().err
+    assert run(["study", "run", str(tmp_path), "--folder", "x"]) == 64
+    assert "leave out --folder" in capsys.readouterr().err
