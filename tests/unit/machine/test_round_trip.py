@@ -54,7 +54,7 @@ def known(draw, limits):
         status=draw(st.sampled_from(["given", "guess", "estimated", "default", "inferred"])),
         range=draw(st.sampled_from([None, (low, high) if low < high else None])),
         interval_90=draw(st.sampled_from([None, (low, high)])),
-        standard_error=draw(st.sampled_from([None, high])),
+        standard_error=draw(st.sampled_from([None, abs(high)])),
         lower=draw(st.sampled_from([None, low])),
         upper=draw(st.sampled_from([None, high])),
         source=draw(st.none() | st.text(st.characters(exclude_categories=["Cs"]), max_size=20)),
