@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rotordrop.errors import IdentificationError
+from rotordrop.estimated import Estimated
 from rotordrop.identification.modal_expansion import expansion_matrix
-from rotordrop.identification.sensing import Sensing, build_sensing
+from rotordrop.identification.sensing import GAIN_SIGMA, OFFSET_SIGMA, Sensing, build_sensing
 from rotordrop.machine import Machine, Sensor
 from rotordrop.model.parameters import DropModel
 
@@ -50,6 +53,25 @@ def test_line_through_the_bearings_goes_back_to_the_sensors(
 ) -> None:
     along, at_bearings = straight_rotor(model, truth.sensors)
     assert np.einsum("sbc,bc->s", sensing.from_bearings, at_bearings) == pytest.approx(along, abs=1e-15)
+
+
+def test_what_the_file_says_of_a_sensor_is_its_uncertainty(model: DropModel, truth: Machine) -> None:
+    """A guess lies in its range, an estimate in its interval; the range of a known value is not its error."""
+    half = 1.6448536269514722
+    gains = (
+        Estimated(value=1.0, status="guess", range=(0.94, 1.06)),
+        Estimated(value=1.0, status="estimated", interval_90=(0.97, 1.03)),
+        Estimated(value=1.0, status="estimated", standard_error=0.004),
+        Estimated(value=1.0, status="given", range=(0.94, 1.06)),
+    )
+    sensors = tuple(
+        sensor.model_copy(update={"gain": gain, "offset": replace(gain, value=0.0)})
+        for sensor, gain in zip(truth.sensors, gains, strict=True)
+    )
+    sensing = build_sensing(model, sensors)
+    expected = [0.06 / half, 0.03 / half, 0.004]
+    assert sensing.gain_sigma == pytest.approx([*expected, GAIN_SIGMA], rel=1e-3)
+    assert sensing.offset_sigma == pytest.approx([*expected, OFFSET_SIGMA], rel=1e-3)
 
 
 def test_sensors_in_one_plane_are_refused_with_their_names(model: DropModel, truth: Machine) -> None:

@@ -30,7 +30,7 @@ def as_matlab(record, path, *, packed=True, time=False):
     scipy.io.savemat(path, content, do_compression=packed)
 
 
-def as_tdms(record, path):
+def as_tdms(record, path, *, without=()):
     nptdms = pytest.importorskip("nptdms")
 
     def channel(group, name, values, unit, start, step):
@@ -40,6 +40,7 @@ def as_tdms(record, path):
             "wf_start_time": np.datetime64("2019-10-16"),
             "unit_string": unit,
         }
+        properties = {key: value for key, value in properties.items() if key not in without}
         return nptdms.ChannelObject(group, name, values, properties=properties)
 
     objects = [
@@ -227,6 +228,16 @@ def test_tdms_that_was_never_closed_is_refused(short, machine, tmp_path):
     content[12:20] = b"\xff" * 8
     path.write_bytes(content)
     with pytest.raises(RecordError, match=r"the segment at byte 0 declares no length"):
+        read_record(path, machine)
+
+
+def test_a_tdms_channel_without_clock_is_refused_by_name(short, machine, tmp_path):
+    path = tmp_path / "drop.tdms"
+    as_tdms(short, path, without=("wf_increment",))
+    with pytest.raises(
+        RecordError,
+        match=r"channel 'Displacement/S_\w+' has no waveform property 'wf_increment'",
+    ):
         read_record(path, machine)
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from tests.unit.spectrum.synthetic import CoastDown
 
 from rotordrop.errors import RecordError
+from rotordrop.spectrum._found_line import FoundLine, path_range
 from rotordrop.spectrum.candidates import (
     Candidate,
     mains_candidates,
@@ -215,3 +217,36 @@ def test_medians_leave_out_what_is_unknown():
     values = np.random.default_rng(0).random((9, 50, 2))
     values[values < 0.4] = np.nan
     assert median_of_known(values) == pytest.approx(np.nanmedian(values, axis=0), nan_ok=True)
+
+
+def test_a_brief_line_has_a_frequency_only_while_it_is_there() -> None:
+    """Frames beside it see no line; a line of the whole signal keeps its frequency to both ends."""
+    time = np.linspace(0.0, 40.0, 401)
+    line = FoundLine(
+        kind="steady",
+        frequency=92.0,
+        frequency_error=0.1,
+        order=None,
+        order_error=None,
+        drift=(0.0, 0.0),
+        width=0.5,
+        amplitude=np.zeros(2),
+        forward=np.zeros(1),
+        backward=np.zeros(1),
+        floor=1e-8,
+        ratio=30.0,
+        first_seen=5.0,
+        last_seen=8.0,
+        existence=1.0,
+        time=time,
+        phase=np.zeros(401),
+        path=np.full(401, 92.0),
+        taken=np.zeros((401, 2)),
+        brief=True,
+    )
+    at = np.array([3.9, 4.1, 6.0, 8.9, 9.1])
+    assert line.frequency_at(at) == pytest.approx([np.inf, 92.0, 92.0, 92.0, np.inf])
+    assert replace(line, brief=False).frequency_at(at) == pytest.approx(np.full(5, 92.0))
+    unit = np.ones((3, 5))
+    low, high = path_range(line, np.array([2.0, 6.5, 20.0]), np.full(3, 1.0), unit)
+    assert low == pytest.approx([np.inf, 92.0, np.inf]) and high == pytest.approx([np.inf, 92.0, np.inf])

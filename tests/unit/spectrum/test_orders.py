@@ -79,6 +79,19 @@ def test_a_strong_steady_line_is_explained_instead_of_leaking():
     assert np.abs(np.abs(unknown.amplitude[:, 0, 0]) / amplitude(unknown.time) - 1.0).max() > 1.0
 
 
+def test_a_steady_line_on_an_order_counts_with_it():
+    """Where the two cannot be told apart both are the order's amplitude, and the track says so."""
+    down = CoastDown(duration=20.0, first_speed=30.0, time_constant=1e9, noise=0.05e-6)
+    down.xy += 5e-6 * np.column_stack([np.cos(down.angle), np.sin(down.angle)])
+    down.xy += 3e-6 * np.cos(TURN * 30.0 * down.time)[:, None]
+    lines = [steady_path(30.0)]
+    track = track_orders(down.xy, down.sampling_rate, down.exact(), orders=(1.0,), steady_lines=lines)
+    assert not track.separable.any()
+    assert np.abs(track.amplitude[:, 0, 0]) == pytest.approx(np.full(len(track.time), 8e-6), rel=0.01)
+    assert np.abs(track.amplitude[:, 0, 1]) == pytest.approx(np.full(len(track.time), 34e-12**0.5), rel=0.01)
+    assert np.all(track.standard_error < 0.05e-6)
+
+
 def test_a_wandering_steady_line_is_followed_by_its_path():
     down, amplitude = chirp(noise=0.0)
     frequency = 29.3 - 0.6 * np.exp(-down.time / 5.0)

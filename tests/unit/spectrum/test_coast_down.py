@@ -1,0 +1,86 @@
+"""A coast-down taken apart: what its document says is what was put in."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from tests.unit.spectrum.synthetic import TURN, CoastDown
+
+from rotordrop.spectrum.candidates import order_candidates
+from rotordrop.spectrum.coast_down import CoastDownAnalysis, CoastDownSignal, analyse_coast_down
+
+AMPLITUDES = {0.5: 1.5e-6, 1.0: 6e-6, 1.5: 2e-6, 2.0: 4e-6, 2.5: 3e-6, 3.0: 2.5e-6}
+TIME_CONSTANT = 15.0
+
+
+@pytest.fixture(scope="module")
+def analysis() -> CoastDownAnalysis:
+    down = CoastDown(sampling_rate=1000.0, duration=25.0, time_constant=TIME_CONSTANT, noise=0.1e-6)
+    for order, amplitude in AMPLITUDES.items():
+        down.add_order(order, amplitude)
+    speed = down.speed[::50]
+    signal = CoastDownSignal(
+        planes={"DE": down.xy},
+        air_gap={"DE": 285e-6},
+        sampling_rate=down.sampling_rate,
+        start_time=0.0,
+        profile=down.exact(),
+        speed_time=down.time[::50],
+        speed=speed,
+        recorded=True,
+    )
+    return analyse_coast_down(signal, order_candidates())
+
+
+def test_every_order_to_three_is_followed_halves_included(analysis: CoastDownAnalysis) -> None:
+    track = analysis.planes["DE"].track
+    assert track is not None
+    assert track.orders == pytest.approx(list(AMPLITUDES))
+    for order, amplitude in AMPLITUDES.items():
+        read = track.major_axis[:, track.of(order)]
+        assert np.median(read) == pytest.approx(amplitude, rel=0.02), order
+
+
+def test_the_document_holds_the_numbers_put_in(analysis: CoastDownAnalysis) -> None:
+    found = json.loads(json.dumps(analysis.as_json(), allow_nan=False))
+    assert found["recorded"] is True and found["sampling_rate_hz"] == 1000.0
+    law = found["speed_law"]
+    assert law["time_constant_s"]["value"] == pytest.approx(TIME_CONSTANT, rel=1e-4)
+    assert law["linear_1_s"]["value"] == pytest.approx(1.0 / TIME_CONSTANT, rel=1e-2)
+    plane = found["planes"]["DE"]
+    largest = float(np.max(np.hypot(*analysis.signal.planes["DE"][:].T)))
+    assert plane["largest_displacement_m"] == pytest.approx(largest, rel=1e-12)
+    assert plane["largest_indentation_m"] == pytest.approx(largest - 285e-6, abs=1e-15)
+    orders, track = plane["orders"], analysis.planes["DE"].track
+    assert track is not None
+    assert np.shape(orders["major_axis_zero_to_peak_m"]) == (len(orders["time_s"]), len(AMPLITUDES))
+    expected = 60.0 * np.exp(-np.array(orders["time_s"]) / TIME_CONSTANT)
+    assert orders["speed_hz"] == pytest.approx(expected, rel=1e-4)
+    lines = {round(line["order"], 3) for line in found["lines"] if line["order"] is not None}
+    assert lines == set(AMPLITUDES)
+    for fall in plane["waterfalls"]:
+        assert len(fall["frequency_hz"]) == len(fall["rms_over_frames_m"])
+        assert fall["resolution_hz"] == pytest.approx(1000.0 / fall["points"])
+
+
+def test_without_speed_nothing_is_said_of_orders() -> None:
+    down = CoastDown(sampling_rate=1000.0, duration=10.0, noise=0.1e-6)
+    down.xy[:, 0] += 5e-6 * np.cos(TURN * 40.0 * down.time)
+    signal = CoastDownSignal(
+        planes={"DE": down.xy},
+        air_gap={"DE": 285e-6},
+        sampling_rate=1000.0,
+        start_time=0.0,
+        profile=None,
+        speed_time=None,
+        speed=None,
+        recorded=True,
+    )
+    found = analyse_coast_down(signal, ())
+    written = found.as_json()
+    assert found.planes["DE"].track is None and "orders" not in written["planes"]["DE"]
+    assert written["speed_law"] is None
+    (line,) = found.lines
+    assert line.frequency == pytest.approx(40.0, abs=0.02)
