@@ -53,6 +53,7 @@ _ORDER = (
     "compare",
     "waterfall",
     "study",
+    "log",
     "synthesize",
     "score",
 )

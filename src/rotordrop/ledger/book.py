@@ -1,0 +1,321 @@
+"""Drops of a machine and a set of touchdown bearings: added, listed, counted against an allowance."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from rotordrop.errors import UsageError
+from rotordrop.ledger._store import Session, transaction
+
+QUANTITIES: Mapping[str, str] = {
+    "peak_force_N": "N",
+    "peak_stress_Pa": "Pa",
+    "mean_force_0p15_0p2_N": "N",
+    "mean_stress_Pa": "Pa",
+}
+"""Numbers of an estimate that are logged, by their name in its document, with their units."""
+
+STATEMENT = (
+    "This is bookkeeping: it counts drops against an allowance that somebody agreed on. It is no verdict on "
+    "the state of a bearing."
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Severity:
+    """One number of a drop at one bearing with its 90 % interval [unit]; no value where only a range is."""
+
+    bearing: str
+    quantity: str
+    unit: str
+    value: float | None
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoggedDrop:
+    """One drop of the log.
+
+    Attributes
+    ----------
+    machine, bearing_set : str
+        Which machine, and which set of touchdown bearings it had.
+    record, sha256 : str
+        The recording and the digest of its file.
+    recorded, added : str
+        When it happened, and when it was logged (ISO 8601); ``recorded`` may be empty.
+    speed : float
+        Speed at power-off [rad/s].
+    duration : float or None
+        How long the rotor was in its touchdown bearings [s].
+    cause : str
+        Why levitation was lost.
+    method, verdict, version, fingerprint : str
+        How the severity was estimated, what the estimate says of itself, by which version, and the numeric
+        fingerprint of the computer's arithmetic.
+    simulated : bool
+        Whether the recording is simulated.
+    severity : tuple of Severity
+        Force and stress per bearing.
+    """
+
+    machine: str
+    bearing_set: str
+    record: str
+    sha256: str
+    recorded: str = ""
+    added: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
+    speed: float
+    duration: float | None = None
+    cause: str = ""
+    method: str
+    verdict: str
+    simulated: bool = False
+    version: str = ""
+    fingerprint: str = ""
+    severity: tuple[Severity, ...] = ()
+
+
+COLUMNS = tuple(item.name for item in fields(LoggedDrop) if item.name != "severity")
+"""What a log keeps of a drop beside its severity."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class UsedShare:
+    """How much of an allowance is used; None where nothing is allowed or known.
+
+    Attributes
+    ----------
+    drops, allowed_drops : int, int or None
+        Drops logged and allowed.
+    seconds, allowed_seconds : float or None
+        Time in the touchdown bearings logged and allowed [s].
+    untimed : int
+        Drops whose duration is not known: they count as drops, not as seconds.
+    source : str
+        Who allowed it; by API 617 and ISO 14839-5 it is a matter of agreement.
+    """
+
+    machine: str
+    bearing_set: str
+    drops: int
+    allowed_drops: int | None
+    seconds: float
+    allowed_seconds: float | None
+    untimed: int
+    source: str
+
+    def sentence(self) -> str:
+        """The share in words."""
+        who = f"{self.machine}, bearings {self.bearing_set}"
+        if self.allowed_drops is None and self.allowed_seconds is None:
+            return f"{who}: {self.drops} drops; no limit given"
+        parts = []
+        if self.allowed_drops is not None:
+            share = self.drops / self.allowed_drops
+            parts.append(f"{self.drops} of {self.allowed_drops} drops ({100 * share:.3g} %)")
+        if self.allowed_seconds is not None:
+            share = self.seconds / self.allowed_seconds
+            untimed = f", {self.untimed} drops without duration left out" if self.untimed else ""
+            parts.append(f"{self.seconds:.4g} s of {self.allowed_seconds:g} s ({100 * share:.3g} %{untimed})")
+        return f"{who}: {'; '.join(parts)}, allowed by {self.source}"
+
+
+def add_drop(where: str | Path, drop: LoggedDrop) -> int:
+    """Add a drop to a log and give its number.
+
+    Raises
+    ------
+    UsageError
+        If this recording is in the log already.
+    """
+    values = [getattr(drop, name) for name in COLUMNS]
+    with transaction(where, writing=True) as log:
+        key = (drop.machine, drop.bearing_set, drop.sha256)
+        there = log.run("SELECT id FROM drops WHERE machine = ? AND bearing_set = ? AND sha256 = ?", key)
+        if there:
+            raise UsageError(
+                f"{drop.record} is in the log already, as drop {there[0][0]} of {drop.machine} with bearings "
+                f"{drop.bearing_set}; a recording counts once. Remove that entry first to replace it"
+            )
+        number = int(
+            log.run(
+                f"INSERT INTO drops ({', '.join(COLUMNS)}) VALUES ({', '.join('?' * len(values))}) "
+                "RETURNING id",
+                values,
+            )[0][0]
+        )
+        for one in drop.severity:
+            log.run(
+                "INSERT INTO severity VALUES (?, ?, ?, ?, ?, ?, ?)",
+                (number, one.bearing, one.quantity, one.unit, one.value, one.lower, one.upper),
+            )
+    return number
+
+
+def remove_drop(where: str | Path, number: int) -> None:
+    """Take a drop out of a log by its number."""
+    with transaction(where, writing=True) as log:
+        if not log.run("SELECT id FROM drops WHERE id = ?", (number,)):
+            raise UsageError(f"the log has no drop {number}; 'rotordrop log show' lists them")
+        log.run("DELETE FROM severity WHERE drop_id = ?", (number,))
+        log.run("DELETE FROM drops WHERE id = ?", (number,))
+
+
+def logged_drops(
+    where: str | Path, *, machine: str | None = None, bearing_set: str | None = None
+) -> dict[int, LoggedDrop]:
+    """Drops of a log by number, in the order they happened."""
+    wanted = [(name, value) for name, value in (("machine", machine), ("bearing_set", bearing_set)) if value]
+    condition = " AND ".join(f"{name} = ?" for name, _ in wanted)
+    with transaction(where, writing=False) as log:
+        rows = log.run(
+            f"SELECT id, {', '.join(COLUMNS)} FROM drops {'WHERE ' + condition if wanted else ''} "
+            "ORDER BY CASE WHEN recorded = '' THEN added ELSE recorded END, id",
+            [value for _, value in wanted],
+        )
+        severities = log.run(
+            "SELECT drop_id, bearing, quantity, unit, value, lower, upper FROM severity "
+            "ORDER BY drop_id, bearing, quantity"
+        )
+    found: dict[int, list[Severity]] = {}
+    for number, bearing, quantity, unit, value, lower, upper in severities:
+        one = Severity(bearing=bearing, quantity=quantity, unit=unit, value=value, lower=lower, upper=upper)
+        found.setdefault(number, []).append(one)
+    return {row[0]: _drop(row, found.get(row[0], ())) for row in rows}
+
+
+def _drop(row: Sequence[Any], severity: Sequence[Severity]) -> LoggedDrop:
+    values = dict(zip(COLUMNS, row[1:], strict=True))
+    values["simulated"] = bool(values["simulated"])
+    return LoggedDrop(**values, severity=tuple(severity))
+
+
+def allow(
+    where: str | Path,
+    machine: str,
+    bearing_set: str,
+    *,
+    drops: int | None = None,
+    seconds: float | None = None,
+    source: str,
+) -> None:
+    """State how many drops or how many seconds a set of touchdown bearings may take, and who says so."""
+    if drops is None and seconds is None:
+        raise UsageError("an allowance needs a number of drops or of seconds")
+    if (drops is not None and drops < 1) or (seconds is not None and not seconds > 0.0):
+        raise UsageError(f"allowed are {drops} drops and {seconds} s; expected numbers above zero")
+    if not source.strip():
+        raise UsageError("an allowance needs its source: who agreed on it, in which document")
+    with transaction(where, writing=True) as log:
+        log.run("DELETE FROM allowances WHERE machine = ? AND bearing_set = ?", (machine, bearing_set))
+        values = (machine, bearing_set, drops, seconds, source)
+        log.run("INSERT INTO allowances VALUES (?, ?, ?, ?, ?)", values)
+
+
+def used_shares(where: str | Path) -> tuple[UsedShare, ...]:
+    """How much every machine and set of bearings has used of what it is allowed."""
+    with transaction(where, writing=False) as log:
+        return tuple(_used(log, machine, bearings) for machine, bearings in _pairs(log))
+
+
+def _pairs(log: Session) -> list[tuple[str, str]]:
+    rows = log.run(
+        "SELECT machine, bearing_set FROM drops UNION SELECT machine, bearing_set FROM allowances "
+        "ORDER BY 1, 2"
+    )
+    return [(machine, bearings) for machine, bearings in rows]
+
+
+def _used(log: Session, machine: str, bearings: str) -> UsedShare:
+    key = (machine, bearings)
+    durations = [
+        row[0] for row in log.run("SELECT duration FROM drops WHERE machine = ? AND bearing_set = ?", key)
+    ]
+    known = [one for one in durations if one is not None]
+    allowed = log.run(
+        "SELECT drops, seconds, source FROM allowances WHERE machine = ? AND bearing_set = ?", key
+    )
+    drops, seconds, source = allowed[0] if allowed else (None, None, "")
+    return UsedShare(
+        machine=machine,
+        bearing_set=bearings,
+        drops=len(durations),
+        allowed_drops=drops,
+        seconds=math.fsum(known),
+        allowed_seconds=seconds,
+        untimed=len(durations) - len(known),
+        source=source,
+    )
+
+
+def drop_of_estimate(document: Mapping[str, Any], bearing_set: str, **known: Any) -> LoggedDrop:
+    """A drop as the document of its estimate tells it.
+
+    Parameters
+    ----------
+    document : mapping
+        One estimate, as ``rotordrop estimate --json`` writes it.
+    bearing_set : str
+        Which set of touchdown bearings the machine had.
+    known : optional
+        ``recorded``, ``duration`` [s], ``cause``: what the estimate does not know.
+
+    Raises
+    ------
+    UsageError
+        If the document is no estimate of one drop.
+    """
+    if "drops" in document:
+        raise UsageError(
+            f"the file holds the estimates of {', '.join(document['drops'])}; log one after the other: "
+            "estimate them one by one"
+        )
+    missing = [
+        key for key in ("machine", "record", "record_sha256", "speed_Hz", "bearings") if key not in document
+    ]
+    if missing:
+        raise UsageError(
+            f"the file has no {missing[0]!r}; expected the JSON that 'rotordrop estimate --json' writes"
+        )
+    return LoggedDrop(
+        machine=document["machine"],
+        bearing_set=bearing_set,
+        record=document["record"],
+        sha256=document["record_sha256"] or "",
+        speed=2.0 * math.pi * document["speed_Hz"],
+        method=document.get("method", ""),
+        verdict=str(document.get("verdict", "")),
+        simulated=bool(document.get("simulated_record")),
+        version=document.get("rotordrop_version", ""),
+        fingerprint=str(document.get("fingerprint", "")),
+        severity=tuple(_severities(document["bearings"])),
+        **known,
+    )
+
+
+def _severities(bearings: Mapping[str, Any]) -> list[Severity]:
+    found = []
+    for name, numbers in bearings.items():
+        for quantity, unit in QUANTITIES.items():
+            entry = numbers.get(quantity)
+            if not entry or not entry.get("interval_90"):
+                continue  # a number without an interval is no evidence
+            lower, upper = entry["interval_90"]
+            found.append(
+                Severity(
+                    bearing=name,
+                    quantity=quantity,
+                    unit=unit,
+                    value=entry.get("value"),
+                    lower=lower,
+                    upper=upper,
+                )
+            )
+    return found

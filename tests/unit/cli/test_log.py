@@ -1,0 +1,70 @@
+"""The verb ``log``: add, show, allow, export, remove."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+
+import pytest
+
+from rotordrop.cli.app import run
+
+
+@pytest.fixture
+def estimate(tmp_path):
+    numbers = {"value": 3300.0, "interval_90": [3200.0, 3400.0]}
+    document = {
+        "machine": "LP-400",
+        "record": "drop.h5",
+        "record_sha256": "c" * 64,
+        "speed_Hz": 60.0,
+        "bearings": {"NDE": {"peak_force_N": numbers}, "DE": {"peak_force_N": numbers}},
+    }
+    file = tmp_path / "estimate.json"
+    file.write_text(json.dumps(document))
+    return str(file)
+
+
+def test_a_log_from_the_command_line(tmp_path, estimate, capsys):
+    log, numbers = str(tmp_path / "drops.db"), tmp_path / "log.json"
+    call = ["log", "add", log, estimate, "--bearings", "2026", "--recorded", "2026-03-14", "--duration"]
+    assert run([*call, "51.6 s", "--cause", "converter fault"]) == 0
+    said = capsys.readouterr().out
+    assert "drop 1: drop.h5 at 60 Hz was logged" in said
+    assert "3200 to 3400 N" in said
+    allowed = ["--machine", "LP-400", "--bearings", "2026", "--drops", "10", "--source", "contract 17"]
+    assert run(["log", "allow", log, *allowed, "--json", str(numbers)]) == 0
+    content = json.loads(numbers.read_text())
+    assert content["used"][0]["sentence"] == (
+        "LP-400, bearings 2026: 1 of 10 drops (10 %), allowed by contract 17"
+    )
+    assert content["drops"]["1"]["duration"] == 51.6
+    assert "no verdict on the state of a bearing" in content["statement"]
+    capsys.readouterr()
+    assert run(["log", "export", log]) == 0
+    rows = list(csv.DictReader(io.StringIO(capsys.readouterr().out)))
+    assert [(row["bearing"], row["lower"], row["upper"]) for row in rows] == [
+        ("DE", "3200.0", "3400.0"),
+        ("NDE", "3200.0", "3400.0"),
+    ]
+    assert run(["log", "remove", log, "1"]) == 0
+    assert "drop 1 was removed" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        (["show", "{log}"], 64, "is not there; 'rotordrop log add' makes a log"),
+        (["add", "{log}"], 64, "nothing to add"),
+        (["add", "{log}", "{log}"], 3, "cannot read the estimate"),
+        (["add", "{log}", "{estimate}", "--recorded", "14.3.2026"], 64, "'14.3.2026' is not a date"),
+        (["remove", "{log}", "first"], 64, "'first' is not the number of a drop"),
+        (["allow", "{log}", "--drops", "3", "--source", "x"], 64, "name it with --machine"),
+    ],
+)
+def test_a_wrong_call_says_what_was_expected(tmp_path, estimate, capsys, arguments, code, message):
+    names = {"log": str(tmp_path / "drops.db"), "estimate": estimate}
+    assert run(["log", *(argument.format(**names) for argument in arguments)]) == code
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "drops.db").exists()
