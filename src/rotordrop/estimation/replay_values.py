@@ -70,7 +70,7 @@ def replay_values(
             ),
         }
         for row in rows("bearing"):
-            if row.step is Step.IMPACTS:
+            if row.step is Step.IMPACTS and row.path_of(bearing.name) in fitted:
                 values[row.field] = fitted[row.path_of(bearing.name)]
         values |= _friction(bearing, friction)
         values |= _loads(simulated, draws, b)

@@ -206,7 +206,7 @@ def kernel_state(fall: FreeFall, state: Array, angle: float) -> tuple[Array, Arr
     """
     layout = fall.model.layout
     m = fall.n_modes
-    whole = layout.zeros()
+    whole = fall.model.at_rest()
     whole[layout.modal_x] = state[:m]
     whole[layout.modal_y] = state[m : 2 * m]
     whole[layout.velocity_of(layout.modal_x)] = state[2 * m : 3 * m]

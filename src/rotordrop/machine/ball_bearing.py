@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from difflib import get_close_matches
 from typing import Annotated, Any, ClassVar, Literal
@@ -10,6 +11,7 @@ from pydantic import Field, Strict
 
 from rotordrop.estimated import Estimated
 from rotordrop.machine.catalog import BallComplement, CatalogueBearing, PreloadClass, find_bearing
+from rotordrop.machine.clearance import CLASSES, ClearanceClass, clearance_range
 from rotordrop.machine.description import Description, Misfit, Text
 from rotordrop.machine.values import (
     Angle,
@@ -17,6 +19,7 @@ from rotordrop.machine.values import (
     ContactAngle,
     Density,
     Force,
+    NonNegativeLength,
     Number,
     PoissonRatio,
     PositiveForce,
@@ -44,11 +47,16 @@ _BALL_MATERIALS: dict[BallMaterial, dict[str, tuple[float, str]]] = {
 
 _CONFORMITY = 0.53
 _NEEDED = ("ball_diameter", "ball_count", "pitch_diameter", "contact_angle")
+_ROWS = {1: "single", 2: "X"}
+_CLEARANCE = ("clearance", "clearance_class")
 _PRELOAD_CLASSES = ("light", "medium", "heavy")
 
 
 class BallBearing(Description):
-    """An angular-contact ball bearing, usually a preloaded pair.
+    """A ball bearing: an angular-contact pair under preload, or one or two rows with radial clearance.
+
+    A row of deep grooves has no contact angle of its own: the clearance leaves it one, and the load zone.
+    Where a pair has a contact angle and a clearance, the clearance is the play its rows were mounted with.
 
     Attributes
     ----------
@@ -70,8 +78,14 @@ class BallBearing(Description):
         Axial preload force F_V of each row [N].
     preload_class : {"light", "medium", "heavy"}, optional
         Preload class of the catalogue, where the preload was given so.
+    clearance : Estimated, optional
+        Radial internal clearance, from one extreme position of the inner ring to the opposite one [m].
+    clearance_class : {"C2", "CN", "C3", "C4", "C5"}, optional
+        Clearance class of ISO 5753, where the clearance was given so.
+    bore_diameter : Estimated, optional
+        Bore of the inner ring [m], which a clearance class counts from.
     arrangement : {"X", "O", "tandem", "single"}
-        Arrangement of the rows.
+        Arrangement of the rows; ``rows = 1`` writes "single", ``rows = 2`` "X".
     first_ball_angle : Estimated
         Angle of the first ball from +y, positive with the spin [rad].
     second_row_offset : Estimated
@@ -105,6 +119,11 @@ class BallBearing(Description):
     ball_density: Density = follows("from the ball material")
     preload: Force = follows("that of the preload class")
     preload_class: PreloadClass | None = Field(default=None, description='Written as preload = "light"')
+    clearance: NonNegativeLength | None = Field(
+        default=None, description="Radial internal clearance, across the diameter; or a class of ISO 5753"
+    )
+    clearance_class: ClearanceClass | None = Field(default=None, description='Written as clearance = "C3"')
+    bore_diameter: PositiveLength | None = Field(default=None, description="Bore of the inner ring")
     arrangement: Literal["X", "O", "tandem", "single"] = Field(
         default="X", description="Two rows face to face, as in Neisi 2020"
     )
@@ -116,11 +135,14 @@ class BallBearing(Description):
         default=None, description="Static load rating of one row"
     )
 
-    displaces: ClassVar[Mapping[str, tuple[str, ...]]] = {"preload": ("preload_class",)}
+    displaces: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "preload": ("preload_class",),
+        "clearance": ("clearance_class",),
+    }
 
     @classmethod
     def rewritten(cls, raw: dict[str, Any]) -> dict[str, Any]:
-        """Read ``preload = "light"`` and a conformity common to both races."""
+        """Read ``preload = "light"``, ``clearance = "C3"``, ``rows = 1``, one conformity for both races."""
         preload = raw.get("preload")
         if preload in _PRELOAD_CLASSES:
             raw["preload_class"] = raw.pop("preload")
@@ -129,6 +151,14 @@ class BallBearing(Description):
             hint = f"did you mean {close[0]!r}?" if close else f"classes are {', '.join(_PRELOAD_CLASSES)}"
             told = f'{preload!r} is no preload class; {hint} Else give a force, "100 N"'
             raise Misfit(told, ("preload",))
+        clearance = raw.get("clearance")
+        if clearance in CLASSES:
+            raw["clearance_class"] = raw.pop("clearance")
+        elif isinstance(clearance, str) and not any(unit in clearance for unit in ("m", "in", "thou")):
+            told = f"{clearance!r} is neither a length nor a clearance class ({', '.join(CLASSES)})"
+            raise Misfit(f'{told}; write for example "C3" or "40 um"', ("clearance",))
+        if "rows" in raw:
+            raw["arrangement"] = _arrangement(raw.pop("rows"), raw.get("arrangement"))
         if "conformity" in raw:
             both = raw.pop("conformity")
             raw = {"conformity_inner": both, "conformity_outer": both} | raw
@@ -137,12 +167,13 @@ class BallBearing(Description):
     @classmethod
     def known_keys(cls) -> tuple[str, ...]:
         """Keys to suggest for a mistyped one."""
-        return (*(name for name in cls.model_fields if name != "preload_class"), "conformity")
+        hidden = ("preload_class", "clearance_class")
+        return (*(name for name in cls.model_fields if name not in hidden), "conformity", "rows")
 
     def check(self) -> None:
         """Refuse a bearing that is not described, or balls that do not fit."""
         catalogued = self.catalogue_entry()
-        missing = [name for name in _NEEDED if name not in self.model_fields_set]
+        missing = [name for name in self._needed() if name not in self.model_fields_set]
         if catalogued is None and missing:
             raise Misfit(
                 f"the bearing has no {', '.join(repr(name) for name in missing)}; give its 'designation' or "
@@ -150,8 +181,17 @@ class BallBearing(Description):
             )
         if self.preload_class is not None:
             self._check_preload_class(catalogued)
-        elif catalogued is None and "preload" not in self.model_fields_set:
-            raise Misfit("the bearing has no 'preload'; write for example preload = \"100 N\"")
+        elif catalogued is None and "preload" not in self.model_fields_set and not self._has_clearance():
+            raise Misfit(
+                'the bearing has no \'preload\'; write for example preload = "100 N", or clearance = "12 um"'
+            )
+
+    def _has_clearance(self) -> bool:
+        return not self.model_fields_set.isdisjoint(_CLEARANCE)
+
+    def _needed(self) -> tuple[str, ...]:
+        """What a bearing outside the catalogue must say of itself; a clearance leaves it a contact angle."""
+        return _NEEDED[:-1] if self._has_clearance() else _NEEDED
 
     def _check_preload_class(self, catalogued: CatalogueBearing | None) -> None:
         if "preload" in self.model_fields_set:
@@ -169,7 +209,10 @@ class BallBearing(Description):
         """Find the bearing in the catalogue; a bearing described by its geometry need not be there."""
         if self.designation is None:
             return None
-        described = all(name in self.model_fields_set for name in (*_NEEDED, "preload"))
+        known = self.model_fields_set
+        described = all(name in known for name in self._needed()) and (
+            "preload" in known or self._has_clearance()
+        )
         try:
             return find_bearing(self.designation)
         except LookupError as error:
@@ -194,9 +237,48 @@ class BallBearing(Description):
             material = self.ball_material
         for name, (value, unit) in _BALL_MATERIALS[material].items():
             values[name] = Estimated(value=value, status="default", source=f"balls of {material}", unit=unit)
+        if self._has_clearance():
+            values |= self._of_clearance(entry)
         given = values | {name: getattr(self, name) for name in self.model_fields_set}
         self._check_fill(given)
+        if self._has_clearance():
+            _check_play(given)
         return {name: value for name, value in values.items() if name not in self.model_fields_set}
+
+    def _of_clearance(self, entry: CatalogueBearing | None) -> dict[str, Any]:
+        """Clearance of a class, and what goes without saying beside one: no preload, no contact angle."""
+        why = "a bearing with clearance has none unless it is given"
+        values: dict[str, Any] = {}
+        if "preload" not in self.model_fields_set and self.preload_class is None:
+            values["preload"] = Estimated(value=0.0, status="default", source=why, unit="N")
+        if entry is None and "contact_angle" not in self.model_fields_set:
+            why = "deep grooves: the angle under load follows from the clearance"
+            values["contact_angle"] = Estimated(value=0.0, status="default", source=why, unit="rad")
+        if self.clearance_class is not None:
+            values["clearance"] = self._clearance_of_class(entry)
+        return values
+
+    def _clearance_of_class(self, entry: CatalogueBearing | None) -> Estimated:
+        group = self.clearance_class
+        if group is None or "clearance" in self.model_fields_set:
+            raise Misfit("the clearance is given both as a length and as a class; keep one", ("clearance",))
+        bore = self.bore_diameter.value if self.bore_diameter else entry.bore if entry else None
+        if bore is None:
+            raise Misfit(
+                f'clearance = "{group}" depends on the bore of the bearing; add for example bore_diameter = '
+                '"80 mm", or give the clearance as a length',
+                ("clearance",),
+            )
+        bounds = clearance_range(group, bore)
+        if bounds is None:
+            raise Misfit(
+                f"the classes of clearance are known for bores of 6 to 200 mm, not for {1e3 * bore:.4g} mm; "
+                "give the clearance as a length",
+                ("clearance",),
+            )
+        why = f"middle of {group} for a bore of {1e3 * bore:.4g} mm, ISO 5753-1"
+        middle = 0.5 * (bounds[0] + bounds[1])
+        return Estimated(value=middle, status="inferred", range=bounds, source=why, unit="m")
 
     def _from_catalogue(self, entry: CatalogueBearing) -> dict[str, Any]:
         complement = entry.complement
@@ -231,6 +313,44 @@ class BallBearing(Description):
         if entry is not None and name in ("ball_count", "ball_material"):
             return entry.complement.basis if name == "ball_count" else f"{entry.maker} catalogue"
         return super().reason(name)
+
+
+def _arrangement(rows: Any, arrangement: Any) -> Any:
+    if rows not in _ROWS or isinstance(rows, bool):
+        raise Misfit(
+            f"rows = {rows!r} is neither 1 nor 2; write rows = 1, or the arrangement of two rows", ("rows",)
+        )
+    if arrangement is None:
+        return _ROWS[rows]
+    if (arrangement == "single") != (rows == 1):
+        raise Misfit(f"rows = {rows} does not go with arrangement = {arrangement!r}; keep one", ("rows",))
+    return arrangement
+
+
+def _check_play(values: dict[str, Any]) -> None:
+    """Refuse a clearance that the grooves or the other values leave no room for."""
+    play, preload = values["clearance"].value, values["preload"].value
+    angle, ball = values["contact_angle"].value, values["ball_diameter"].value
+    if angle > 0.0 and values.get("arrangement") in ("single", "tandem"):
+        raise Misfit(
+            f"contact angle {math.degrees(angle):.4g}° and clearance say the same of rows that face one way; "
+            "keep one of them",
+            ("clearance",),
+        )
+    if angle > 0.0 and preload > 0.0 and play > 0.0:
+        raise Misfit(
+            f"a pair with a contact angle has a preload ({preload:.4g} N) or a clearance "
+            f"({1e6 * play:.4g} µm), not both; set one of them to zero",
+            ("clearance",),
+        )
+    grooves = (values["conformity_inner"].value + values["conformity_outer"].value - 1.0) * ball
+    most = 2.0 * grooves * (1.0 - math.cos(angle)) if angle > 0.0 else grooves
+    if play > most:
+        raise Misfit(
+            f"a clearance of {1e6 * play:.4g} µm is more than the {1e6 * most:.4g} µm that these grooves "
+            f"{f'leave at {math.degrees(angle):.4g}°' if angle > 0.0 else 'allow'}; check it",
+            ("clearance",),
+        )
 
 
 def _inferred(entry: CatalogueBearing, complement: BallComplement) -> dict[str, Any]:

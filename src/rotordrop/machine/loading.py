@@ -20,7 +20,7 @@ from rotordrop.units import KINDS
 
 _UNION_TAGS = {"by_length", "by_nodes"}
 _DECIMAL_COMMA = re.compile(r"=\s*([+-]?\d+),(\d+)(?!\s*\])")
-_ALIASES = {"preload_class": "preload", "grade_mm_s": "grade"}
+_ALIASES = {"preload_class": "preload", "clearance_class": "clearance", "grade_mm_s": "grade"}
 _EXPECTED = {
     "tuple_type": "expected a list, [[…]] for a list of tables",
     "model_type": "expected a table, {…} or [header]",

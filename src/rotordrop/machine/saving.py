@@ -82,6 +82,8 @@ def _shorthand(part: Description, content: dict[str, Any]) -> dict[str, Any]:
         content = {"grade": grade} | {key: value for key, value in content.items() if key != "grade_mm_s"}
     if isinstance(part, BallBearing) and "preload_class" in content:
         content["preload"] = content.pop("preload_class")
+    if isinstance(part, BallBearing) and "clearance_class" in content:
+        content["clearance"] = content.pop("clearance_class")
     return content
 
 

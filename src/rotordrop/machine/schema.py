@@ -6,6 +6,7 @@ import re
 from typing import Any
 
 from rotordrop.estimated import Estimated
+from rotordrop.machine.clearance import CLASSES
 from rotordrop.machine.description import Description
 from rotordrop.machine.machine import Machine
 from rotordrop.machine.provenance import kind_of
@@ -156,6 +157,12 @@ def _add_shorthand(parts: dict[str, Any]) -> None:
         "description": bearing["preload"]["description"],
         "anyOf": [{"enum": ["light", "medium", "heavy"]}, {KIND_MARK: "force"}],
     }
+    del bearing["clearance_class"]
+    bearing["clearance"] = {
+        "description": bearing["clearance"]["description"],
+        "anyOf": [{"enum": list(CLASSES)}, {KIND_MARK: "length"}],
+    }
+    bearing["rows"] = {"description": "Rows of balls, 1 or 2, where no arrangement is given", "enum": [1, 2]}
     bearing["conformity"] = {"description": "Conformity of both races", KIND_MARK: "dimensionless"}
     for name in ("Disc", "Unbalance", "TouchdownBearing", "ActiveMagneticBearing", "Sensor"):
         part = parts[name]

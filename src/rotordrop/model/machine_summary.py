@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from rotordrop.model.assembly import RotorFE, build_rotor_fe
 from rotordrop.model.modes import N_RIGID, free_free_modes, modes_on_springs
-from rotordrop.model.parameters import static_deflection
+from rotordrop.model.parameters import loose_race_seat, static_deflection
 from rotordrop.model.statics import bearing_load_shares, levitated_sag
 from rotordrop.physics.ball_bearing import BearingConstants, bearing_constants
+from rotordrop.physics.ball_bearing_response import bearing_response
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine, TouchdownBearing
@@ -37,6 +38,10 @@ class BearingSummary:
         Stiffness, preload and geometry of the ball bearing.
     preload_stress : float
         Hertz stress of a ball on the inner race from the preload alone [Pa].
+    ball_load : float
+        Largest load of a ball with the rotor at rest [N].
+    loaded_balls : int
+        Balls that carry a load then, of all rows [1].
     deflection : float
         Deflection of the race against the outer ring under the load [m].
     tangent_stiffness : float
@@ -51,6 +56,8 @@ class BearingSummary:
     load: float
     constants: BearingConstants
     preload_stress: float
+    ball_load: float
+    loaded_balls: int
     deflection: float
     tangent_stiffness: float
     support_frequency: float
@@ -107,12 +114,16 @@ def summarise_machine(machine: Machine) -> MachineSummary:
 def _bearing(bearing: TouchdownBearing, load: float) -> BearingSummary:
     constants = bearing_constants(bearing.bearing)
     deflection, tangent = static_deflection(constants, abs(load))
+    seat = (0.0, -deflection) if constants.preloaded else loose_race_seat(constants, abs(load))
+    balls = bearing_response(constants, [*seat, 0.0, 0.0, 0.0]).ball_loads
     support = bearing.support
     return BearingSummary(
         name=bearing.name,
         load=load,
         constants=constants,
         preload_stress=constants.stress_coefficient_inner * math.cbrt(constants.preload_ball_load),
+        ball_load=float(np.max(balls)),
+        loaded_balls=int(np.count_nonzero(balls)),
         deflection=deflection,
         tangent_stiffness=tangent,
         support_frequency=math.sqrt(float(support.stiffness) / float(support.mass)) / (2.0 * math.pi),

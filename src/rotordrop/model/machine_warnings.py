@@ -84,15 +84,18 @@ def _limiting_speed(bearing: TouchdownBearing, omega: float) -> Iterator[Machine
 
 
 def _centrifugal(bearing: TouchdownBearing, rest: BearingSummary, omega: float) -> Iterator[MachineWarning]:
-    force, preload = float(ball_centrifugal_force(bearing.bearing, omega)), rest.constants.preload_ball_load
-    if force <= CENTRIFUGAL_SHARE * preload:
+    force = float(ball_centrifugal_force(bearing.bearing, omega))
+    preloaded = rest.constants.preloaded
+    carried = rest.constants.preload_ball_load if preloaded else rest.ball_load
+    if force <= CENTRIFUGAL_SHARE * carried:
         return
     speed, thrown = format_quantity(omega, "speed"), format_quantity(force, "force")
     text = (
-        f"at {speed} of the race each ball is thrown outwards with {thrown}, not small against its "
-        f"preload of {format_quantity(preload, 'force')}; the drop model leaves this out"
+        f"at {speed} of the race each ball is thrown outwards with {thrown}, not small against "
+        f"{'its preload of' if preloaded else 'the load of the lowest ball at rest,'} "
+        f"{format_quantity(carried, 'force')}; the drop model leaves this out"
     )
-    yield _warning("ball centrifugal force", bearing.name, force, preload, text)
+    yield _warning("ball centrifugal force", bearing.name, force, carried, text)
 
 
 def _resonance(rest: BearingSummary, summary: MachineSummary) -> Iterator[MachineWarning]:
@@ -121,20 +124,24 @@ def _heat(bearing: TouchdownBearing, rest: BearingSummary, omega: float) -> Iter
         duration=HEAT_WINDOW,
     )
     warming, growth = growth_of_race(0.5 * sliding + rolling, float(race.mass), radius)
-    approach = (rest.constants.preload_ball_load / rest.constants.ball_stiffness) ** (2.0 / 3.0)
-    if growth <= GROWTH_SHARE * approach:
+    constants = rest.constants
+    approach = (constants.preload_ball_load / constants.ball_stiffness) ** (2.0 / 3.0)
+    room = approach if constants.preloaded else constants.radial_play
+    if growth <= GROWTH_SHARE * room:
         return
     speed, grown, pressed = (
         format_quantity(omega, "speed"),
         format_quantity(growth, "length", 2),
-        format_quantity(approach, "length", 2),
+        format_quantity(room, "length", 2),
     )
+    against = f"the {pressed} a preloaded ball is pressed in, so that the preload rises"
+    if not constants.preloaded:
+        against = f"its radial play of {pressed}, which closes"
     text = (
         f"after a drop at {speed} friction heats the race by about {warming:.2g} K in {HEAT_WINDOW:g} s; "
-        f"it grows by {grown}, not small against the {pressed} a preloaded ball is pressed in, so that the "
-        "preload rises; the drop model has no heat in it"
+        f"it grows by {grown}, not small against {against}; the drop model has no heat in it"
     )
-    yield _warning("frictional heat", bearing.name, growth, approach, text)
+    yield _warning("frictional heat", bearing.name, growth, room, text)
 
 
 def _lifted(rest: BearingSummary) -> Iterator[MachineWarning]:

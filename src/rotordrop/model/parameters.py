@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +18,13 @@ from rotordrop.model.reduction import Reduction, RotorBasis, reduce_rotor
 from rotordrop.model.statics import bearing_load_shares
 from rotordrop.physics import aerodynamics
 from rotordrop.physics.ball_bearing import BearingConstants, bearing_constants
-from rotordrop.physics.ball_bearing_planar import planar_ball_gradient
+from rotordrop.physics.ball_bearing_planar import planar_ball_energy, planar_ball_gradient
 
 Array = NDArray[np.float64]
 LANES = 8
+
+LEAST_DAMPING = 1e-9
+"""Share of a loaded ball's stiffness [1] added to what holds a loose race, sideways perhaps nothing."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,6 +45,19 @@ class DropModel:
         """
         machine = self.machine.with_values(values)
         return replace(self, machine=machine, parameters=_with_machine(self, machine))
+
+    def at_rest(self) -> Array:
+        """State, shape (n,), of a centred rotor with all at rest; loose races lie on their lowest balls."""
+        state = self.layout.zeros()
+        p = self.parameters.bearing
+        for b, bearing in enumerate(self.machine.touchdown_bearings):
+            weight = p[b, L.RACE_WEIGHT]
+            if weight > 0.0:
+                seat = loose_race_seat(bearing_constants(bearing.bearing), weight)
+                sag = weight / p[b, L.SUPPORT_STIFFNESS_Y]
+                state[self.layout.race][2 * b : 2 * b + 2] = seat[0], seat[1] - sag
+                state[self.layout.support][2 * b + 1] = -sag
+        return state
 
     @property
     def bearing_names(self) -> tuple[str, ...]:
@@ -98,7 +115,7 @@ def _kernel_parameters(machine: Machine, fe: RotorFE, basis: RotorBasis, shares:
         unbalance_cos=unbalance_cos,
         unbalance_sin=unbalance_sin,
         bearing_shape=_rows(basis, [b.node for b in bearings]),
-        bearing=np.array([bearing_row(b, w) for b, w in zip(bearings, shares, strict=True)]),
+        bearing=_bearing_rows(machine, shares),
         ball_cos=ball_cos,
         ball_sin=ball_sin,
         ball_weight=ball_weight,
@@ -115,7 +132,7 @@ def _with_machine(model: DropModel, machine: Machine) -> KernelParameters:
     unbalance_cos, unbalance_sin = _unbalance(machine, model.basis)
     spin = _spin(machine, model.fe)
     return model.parameters._replace(
-        bearing=np.array([bearing_row(b, w) for b, w in zip(bearings, model.load_shares, strict=True)]),
+        bearing=_bearing_rows(machine, model.load_shares),
         ball_cos=ball_cos,
         ball_sin=ball_sin,
         ball_weight=ball_weight,
@@ -176,6 +193,15 @@ def _merged_angles(constants: BearingConstants) -> tuple[Array, Array]:
     return both, np.ones(len(both))
 
 
+def _bearing_rows(machine: Machine, shares: Array) -> Array:
+    rows = np.array([bearing_row(b, w) for b, w in zip(machine.touchdown_bearings, shares, strict=True)])
+    for row, bearing in zip(rows, machine.touchdown_bearings, strict=True):
+        # Preloaded balls give way to the weight of the race by nanometres; loose ones let it fall.
+        if not bearing_constants(bearing.bearing).preloaded:
+            row[L.RACE_WEIGHT] = row[L.RACE_MASS] * float(machine.gravity)
+    return rows
+
+
 def bearing_row(bearing: TouchdownBearing, static_load: float) -> Array:
     """One row of `KernelParameters.bearing` [SI], with the bearing damping from the tangent stiffness at a
     load [N].
@@ -216,16 +242,9 @@ def bearing_row(bearing: TouchdownBearing, static_load: float) -> Array:
 
 def static_deflection(constants: BearingConstants, load: float) -> tuple[float, float]:
     """Downward deflection [m] of the race under a vertical load [N], and tangent stiffness there [N/m]."""
-    cosine, sine, weight = (array[0] for array in _ball_arrays([constants]))
-    geometry = (
-        constants.radial_offset,
-        constants.axial_offset,
-        constants.groove_distance,
-        constants.ball_stiffness,
-        cosine,
-        sine,
-        weight,
-    )
+    geometry = _ball_geometry(constants)
+    if not constants.preloaded:
+        return _loose_deflection(constants, geometry, load)
     dy = 0.0
     for _ in range(50):
         _, force, _, _, stiffness = planar_ball_gradient(0.0, dy, *geometry)
@@ -234,6 +253,59 @@ def static_deflection(constants: BearingConstants, load: float) -> tuple[float, 
         if abs(step) < 1e-18:
             break
     return -dy, float(planar_ball_gradient(0.0, dy, *geometry)[4])
+
+
+def loose_race_seat(constants: BearingConstants, load: float) -> tuple[float, float]:
+    """Where a race without preload comes to rest on its balls under a downward load [N]: x and y [m].
+
+    The lowest energy; the race rolls sideways into the gap of its lowest balls wherever the first one stands.
+    """
+    return _loose_seat(constants, _ball_geometry(constants), load)
+
+
+def _loose_deflection(
+    constants: BearingConstants, geometry: tuple[Any, ...], load: float
+) -> tuple[float, float]:
+    if load == 0.0:
+        return constants.radial_play, 0.0
+    dx, dy = _loose_seat(constants, geometry, load)
+    _, _, k_xx, k_xy, k_yy = planar_ball_gradient(dx, dy, *geometry)
+    # The race is free to give way sideways; on a single ball nothing holds it there, and nothing couples.
+    aside = k_xy * k_xy / k_xx if k_xx > LEAST_DAMPING * k_yy else 0.0
+    return -dy, float(k_yy - aside)
+
+
+def _loose_seat(constants: BearingConstants, geometry: tuple[Any, ...], load: float) -> tuple[float, float]:
+    """Newton steps on the convex energy of the balls and the load, damped until it falls."""
+    single = (abs(load) / constants.ball_stiffness) ** (2.0 / 3.0)
+    # Deep enough for the two lowest balls of any bearing (three balls: twice the play) to be loaded at once.
+    at = np.array([0.0, -math.copysign(2.0 * constants.radial_play + 4.0 * single, load)])
+
+    def energy_at(place: Array) -> float:
+        return float(planar_ball_energy(place[0], place[1], *geometry)) + load * float(place[1])
+
+    # The spring of one loaded ball: the size of stiffness a step is damped with.
+    spring = 1.5 * abs(load) / single
+    damping, energy = LEAST_DAMPING, energy_at(at)
+    for _ in range(200):
+        f_x, f_y, k_xx, k_xy, k_yy = planar_ball_gradient(at[0], at[1], *geometry)
+        left = np.array([-f_x, -load - f_y])
+        if np.hypot(*left) <= 1e-13 * abs(load):
+            break
+        tangent = np.array([[k_xx, k_xy], [k_xy, k_yy]]) + damping * spring * np.eye(2)
+        trial = at + np.linalg.solve(tangent, left)
+        if energy_at(trial) <= energy + 1e-13 * abs(load * at[1]):
+            at, energy, damping = trial, energy_at(trial), max(0.1 * damping, LEAST_DAMPING)
+        else:
+            damping = max(4.0 * damping, 1e-3)
+    return float(at[0]), float(at[1])
+
+
+def _ball_geometry(constants: BearingConstants) -> tuple[Any, ...]:
+    """What the planar kernels take after the displacement."""
+    cosine, sine, weight = (array[0] for array in _ball_arrays([constants]))
+    offsets = (constants.radial_offset, constants.axial_offset, constants.groove_distance)
+    return (*offsets, constants.ball_stiffness, cosine, sine, weight)
 
 
 def static_bearing_stiffness(constants: BearingConstants, load: float) -> float:

@@ -101,7 +101,7 @@ def _of_bearing(bearing: TouchdownBearing, load: float) -> EquivalentStiffness:
         simple=simple_radial_stiffness(
             float(ball.ball_diameter),
             constants.row_count * constants.ball_count,
-            constants.contact_angle,
+            constants.radial_contact_angle,
             load,
             materials,
         ),

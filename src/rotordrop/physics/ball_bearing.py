@@ -39,9 +39,10 @@ class BearingConstants:
     groove_distance : float
         Distance of the groove centres A₀ of an unloaded row [m].
     contact_angle : float
-        Nominal contact angle α₀ [rad].
+        Nominal contact angle α₀ [rad]; of deep grooves the free contact angle ``acos(1 − P_d / (2 A₀))``.
     radial_offset, axial_offset : float
-        ``A₀ cos α₀`` and ``A₀ sin α₀ + preload_approach`` [m].
+        ``A₀ cos α₀`` and ``A₀ sin α₀ + preload_approach`` [m]; without preload that of deep grooves is
+        zero, as under a radial load, and that of a pair with play is smaller by its axial half.
     pitch_radius : float
         ``D_pw / 2`` [m], the arm of the tilt in kinematics and in moment.
     inner_stiffness, outer_stiffness, ball_stiffness : float
@@ -79,6 +80,38 @@ class BearingConstants:
     preload: float
     preload_approach: float
     preload_ball_load: float
+
+    @property
+    def preloaded(self) -> bool:
+        """Whether the balls are loaded without any load on the bearing. Source: definition."""
+        return self.preload_ball_load > 0.0
+
+    @property
+    def radial_play(self) -> float:
+        """Way of the race from the centre until the first ball touches, straight towards it [m].
+
+        Half the clearance of deep grooves, ``√(A₀² − axial_offset²) − radial_offset``. Source: definition.
+        """
+        if self.preloaded:
+            return 0.0
+        A_0, axial = self.groove_distance, self.axial_offset
+        return max(math.sqrt(max(A_0**2 - axial**2, 0.0)) - self.radial_offset, 0.0)
+
+    @property
+    def axial_play(self) -> float:
+        """Way of the race of one row from one axial end to the other, ``2 A₀ sin α₀`` [m].
+
+        Source: Harris, Rolling Bearing Analysis, free endplay of a bearing with radial clearance.
+        """
+        return 2.0 * self.groove_distance * math.sin(self.contact_angle)
+
+    @property
+    def radial_contact_angle(self) -> float:
+        """Contact angle at which a radial load meets the balls [rad]: that of the first touch.
+
+        Source: definition.
+        """
+        return self.contact_angle if self.preloaded else math.asin(self.axial_offset / self.groove_distance)
 
     @property
     def row_count(self) -> int:
@@ -177,20 +210,23 @@ def bearing_constants(bearing: BallBearingDescription) -> BearingConstants:
     Source: Neisi 2020, eqs. (2)–(7), in the algebraic form ``δ = A − A₀``.
     """
     D_w, D_pw = float(bearing.ball_diameter), float(bearing.pitch_diameter)
-    alpha = float(bearing.contact_angle)
     f_i, f_o = float(bearing.conformity_inner), float(bearing.conformity_outer)
+    Z, A_0, F_V = int(bearing.ball_count), (f_i + f_o - 1.0) * D_w, float(bearing.preload)
+    alpha, radial_play = _angle_and_play(bearing, A_0)
     eta = compliance(
         float(bearing.ring_youngs_modulus),
         float(bearing.ring_poisson_ratio),
         float(bearing.ball_youngs_modulus),
         float(bearing.ball_poisson_ratio),
     )
-    inner = race_contact(D_w, D_pw, f_i, alpha, eta, inner=True)
-    outer = race_contact(D_w, D_pw, f_o, alpha, eta, inner=False)
+    radial = A_0 * math.cos(alpha)
+    # The load of a loose bearing meets the balls at the angle of the first touch, in deep grooves at none.
+    touching = alpha if F_V > 0.0 or radial_play == 0.0 else math.acos(min((radial + radial_play) / A_0, 1.0))
+    inner = race_contact(D_w, D_pw, f_i, touching, eta, inner=True)
+    outer = race_contact(D_w, D_pw, f_o, touching, eta, inner=False)
     K = float(contacts_in_series(inner.stiffness, outer.stiffness))
-    Z, A_0, F_V = int(bearing.ball_count), (f_i + f_o - 1.0) * D_w, float(bearing.preload)
     s = float(row_approach(F_V, Z * K, A_0, alpha))
-    radial, axial = A_0 * math.cos(alpha), A_0 * math.sin(alpha) + s
+    axial = A_0 * math.sin(touching) + s
     return BearingConstants(
         groove_distance=A_0,
         contact_angle=alpha,
@@ -209,6 +245,26 @@ def bearing_constants(bearing: BallBearingDescription) -> BearingConstants:
         preload_approach=s,
         preload_ball_load=F_V * math.hypot(radial, axial) / (Z * axial) if F_V > 0.0 else 0.0,
     )
+
+
+def _angle_and_play(bearing: BallBearingDescription, A_0: float) -> tuple[float, float]:
+    """Free contact angle [rad] and the radial way [m] of the centred race to its first ball."""
+    alpha = float(bearing.contact_angle)
+    if bearing.clearance is None:
+        return alpha, 0.0
+    half = 0.5 * float(bearing.clearance)
+    if alpha == 0.0:
+        return free_contact_angle(2.0 * half, A_0), half
+    return alpha, half
+
+
+def free_contact_angle(P_d: float, A_0: float) -> float:
+    """Contact angle [rad] of a row of deep grooves pushed to its axial end without load.
+
+    ``α₀ = acos(1 − P_d / (2 A₀))`` from the radial clearance P_d, across the diameter [m], and the distance
+    of the groove centres A₀ [m]. Source: Harris, Rolling Bearing Analysis, free contact angle.
+    """
+    return math.acos(1.0 - 0.5 * P_d / A_0)
 
 
 def axial_rigidity(constants: BearingConstants) -> float:

@@ -75,6 +75,11 @@ class BallBearingDescription(Protocol):
         ...
 
     @property
+    def clearance(self) -> SupportsFloat | None:
+        """Radial internal clearance P_d, across the diameter [m]; None where the contact angle is given."""
+        ...
+
+    @property
     def arrangement(self) -> Arrangement:
         """Arrangement of the rows."""
         ...
@@ -112,6 +117,9 @@ class BallBearingGeometry:
         Density of the balls [kg/m³].
     preload : float
         Axial preload of each row [N].
+    clearance : float, optional
+        Radial internal clearance P_d, across the diameter [m]. Rows of deep grooves (α₀ = 0) get their free
+        contact angle from it; in an X or O pair with a contact angle it is the play of the mounted pair.
     arrangement : str
         "X" (face to face), "O" (back to back), "tandem" or "single".
     first_ball_angle : float
@@ -136,6 +144,7 @@ class BallBearingGeometry:
     ball_poisson_ratio: float = 0.26
     ball_density: float = 3200.0
     preload: float = 0.0
+    clearance: float | None = None
     arrangement: Arrangement = "X"
     first_ball_angle: float = 0.0
     second_row_offset: float = 0.0

@@ -13,6 +13,7 @@ from rotordrop.report.quantity import Quantity
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
+    from rotordrop.machine.ball_bearing import BallBearing
     from rotordrop.model.machine_summary import BearingSummary, MachineSummary
     from rotordrop.model.machine_warnings import MachineWarning
 
@@ -50,8 +51,7 @@ def _card(machine: Machine, rest: BearingSummary) -> Card:
         figures=(
             KeyFigure(label="share of the weight", value=Quantity(value=rest.load, kind="force")),
             KeyFigure(label="air gap", value=Quantity.of(bearing.air_gap, "length")),
-            KeyFigure(label="preload of a row", value=Quantity.of(bearing.bearing.preload, "force")),
-            KeyFigure(label="stress by preload", value=Quantity(value=rest.preload_stress, kind="pressure")),
+            *_seat_of_the_balls(bearing.bearing, rest),
             KeyFigure(
                 label="tangent stiffness at rest",
                 value=Quantity(value=rest.tangent_stiffness, kind="stiffness"),
@@ -63,6 +63,30 @@ def _card(machine: Machine, rest: BearingSummary) -> Card:
             KeyFigure(
                 label="support by itself", value=Quantity(value=rest.support_frequency, kind="frequency")
             ),
+        ),
+    )
+
+
+def _seat_of_the_balls(balls: BallBearing, rest: BearingSummary) -> tuple[KeyFigure, ...]:
+    """What holds the balls without a load: the preload, or else the play they have and how they lie."""
+    if rest.constants.preloaded:
+        return (
+            KeyFigure(label="preload of a row", value=Quantity.of(balls.preload, "force")),
+            KeyFigure(label="stress by preload", value=Quantity(value=rest.preload_stress, kind="pressure")),
+        )
+    play = Quantity(value=2.0 * rest.constants.radial_play, kind="length")
+    return (
+        KeyFigure(
+            label="radial clearance",
+            value=play if balls.clearance is None else Quantity.of(balls.clearance, "length"),
+        ),
+        KeyFigure(
+            label="free contact angle", value=Quantity(value=rest.constants.contact_angle, kind="angle")
+        ),
+        KeyFigure(
+            label="largest ball load at rest",
+            value=Quantity(value=rest.ball_load, kind="force"),
+            note=f"on {rest.loaded_balls} balls",
         ),
     )
 

@@ -145,7 +145,7 @@ def stress_statistics(
         above_three_sigma=int(np.sum(values > limit)),
         three_sigma_limit=limit,
         preload_stress=preload_stress,
-        preload_share=None if preload_stress is None else preload_stress / mean,
+        preload_share=None if preload_stress is None or mean == 0.0 else preload_stress / mean,
     )
 
 

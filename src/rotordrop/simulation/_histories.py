@@ -105,6 +105,7 @@ def stored_energy(y: Array, p: KernelParameters, with_rotor_spin: bool) -> float
             p.ball_sin[b],
             p.ball_weight[b],
         )
+        energy += row[L.RACE_WEIGHT] * y[r + 1]
         energy += 0.5 * row[L.RACE_MASS] * (y[n_q + r] ** 2 + y[n_q + r + 1] ** 2)
         energy += (
             0.5 * row[L.SUPPORT_MASS_X] * y[n_q + h] ** 2 + 0.5 * row[L.SUPPORT_MASS_Y] * y[n_q + h + 1] ** 2

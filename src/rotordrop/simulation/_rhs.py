@@ -234,7 +234,7 @@ def bearing_accelerations(
             ax[k] -= shape[k] * contact_x
             ay[k] -= shape[k] * contact_y
     dy[n_q + r] = (contact_x - F_x) / row[L.RACE_MASS]
-    dy[n_q + r + 1] = (contact_y - F_y) / row[L.RACE_MASS]
+    dy[n_q + r + 1] = (contact_y - F_y - row[L.RACE_WEIGHT]) / row[L.RACE_MASS]
     dy[n_q + h] = (F_x - row[L.SUPPORT_DAMPING_X] * sx - row[L.SUPPORT_STIFFNESS_X] * y[h]) / row[
         L.SUPPORT_MASS_X
     ]

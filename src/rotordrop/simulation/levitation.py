@@ -33,7 +33,7 @@ def start_of_drop(model: DropModel, case: DropCase) -> tuple[Array, KernelParame
     start = case.start
     if isinstance(start, StateStart):
         return _given_state(model, start), parameters
-    state = model.layout.zeros()
+    state = model.at_rest()
     state[model.layout.rotor_speed] = case.speed
     if isinstance(start, CentredStart):
         return state, parameters

@@ -11,6 +11,7 @@ from rotordrop.errors import SimulationError
 from rotordrop.model import layout as L
 from rotordrop.model.layout import KernelParameters
 from rotordrop.model.parameters import DropModel
+from rotordrop.physics.ball_bearing import bearing_constants
 from rotordrop.physics.pendulum import small_frequency
 from rotordrop.simulation._histories import stored_energy
 from rotordrop.simulation._rhs import drop_derivative
@@ -21,6 +22,8 @@ Array = NDArray[np.float64]
 
 MOST_ITERATIONS = 100
 SMALLEST_CHANGE = 1e-15
+LEAST_DAMPING = 1e-6
+"""Damping of the steps that is always there [weight over gap], for a direction in which nothing holds."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,16 +51,16 @@ def settled_coordinates(model: DropModel) -> Array:
     n_q = model.layout.n_coordinates
     parameters = model.parameters._replace(flags=np.zeros(L.N_FLAGS, dtype=np.int64))
     mass = coordinate_masses(model)
-    state = model.layout.zeros()
+    state = model.at_rest()
     state[model.layout.modal_y] = _guess(model)
     # Damping by mass holds a step back by the energy it costs, so that no step needs a limit of its own: not
     # that of a heavy rotor, which sags far, nor one that nothing holds, as of a rotor just off its race.
     least = float(np.max(np.abs(parameters.gravity))) / float(np.max(np.abs(state[:n_q])))
     rounding = 1e-12 * _energy(state, parameters)
-    damping, energy = 0.0, _energy(state, parameters)
+    damping, energy = LEAST_DAMPING * least, _energy(state, parameters)
     for _ in range(MOST_ITERATIONS):
         force, stiffness = _force_and_stiffness(model, parameters, mass, state)
-        step = np.linalg.lstsq(stiffness + damping * np.diag(mass), force, rcond=None)[0]
+        step = np.linalg.solve(stiffness + damping * np.diag(mass), force)
         trial = state.copy()
         trial[:n_q] += step
         if _energy(trial, parameters) > energy + abs(rounding):
@@ -65,9 +68,11 @@ def settled_coordinates(model: DropModel) -> Array:
             continue
         state, energy = trial, _energy(trial, parameters)
         moved = float(np.max(np.abs(step)))
-        if damping == 0.0 and moved < max(SMALLEST_CHANGE, 1e-12 * float(np.max(np.abs(state[:n_q])))):
+        if damping <= LEAST_DAMPING * least and moved < max(
+            SMALLEST_CHANGE, 1e-12 * float(np.max(np.abs(state[:n_q])))
+        ):
             return state[:n_q]
-        damping = 0.1 * damping if damping > 0.01 * least else 0.0
+        damping = max(0.1 * damping, LEAST_DAMPING * least)
     raise SimulationError(
         f"no position of rest was found for the rotor of {model.machine.name!r} in {MOST_ITERATIONS} "
         f"iterations; the last step still moved it by {moved:.3g} √kg m. Check that its touchdown bearings "
@@ -103,10 +108,12 @@ def _force_and_stiffness(
 
 
 def _guess(model: DropModel) -> Array:
-    """Straight rotor, pressed into the contacts by its weight."""
+    """Straight rotor, pressed into the contacts by its weight, loose races at the end of their play."""
     p = model.parameters.bearing
     depth = (model.load_shares / p[:, L.CONTACT_STIFFNESS]) ** (1.0 / p[:, L.CONTACT_EXPONENT])
-    down = p[:, L.AIR_GAP] + depth
+    constants = [bearing_constants(bearing.bearing) for bearing in model.machine.touchdown_bearings]
+    play = np.array([c.radial_play for c in constants])
+    down = p[:, L.AIR_GAP] + depth + play
     nodes = [bearing.node for bearing in model.machine.touchdown_bearings]
     positions = np.asarray(model.fe.node_positions)[np.array(nodes) - 1]
     return rigid_amplitudes(model, positions, -down[:, None])[:, 0]

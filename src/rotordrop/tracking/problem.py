@@ -248,6 +248,7 @@ def _prior(
     s, n_p, n_c = layout.size - 2, len(unknowns), rows.shape[0]
     mean = np.zeros(s + n_p + 4 * n_c)
     sigma = np.zeros_like(mean)
+    mean[:s] = model.at_rest()[:s]
     _rotor_prior(model, rows, readings, mean, sigma)
     for part in (layout.race, layout.support):
         sigma[part] = 0.1e-6

@@ -118,6 +118,34 @@ BAD = [
     ('name = "DE"', 'name = "D E"', "'D E' is not a name; write one word without dots", '"D E"'),
     ('name = "DE"', 'name = "speed"', "a touchdown bearing cannot be called 'speed'", '"speed"'),
     ('position = "0.7 m"', "node = 2", "DE sits at node 2, where NDE sits already; give it another", "2"),
+    # clearance
+    ('preload = "heavy"', 'clearance = "C7"', "'C7' is neither a length nor a clearance class", '"C7"'),
+    (
+        'preload = "heavy"',
+        'clearance = "C3", preload = "heavy"',
+        "has a preload .* or a clearance .* not both",
+        None,
+    ),
+    (
+        'preload = "heavy"',
+        'clearance = "190 um"',
+        "is more than the .* that these grooves leave at 25°",
+        '"190 um"',
+    ),
+    (
+        'preload = "heavy"',
+        'clearance = "9 um", rows = 1',
+        "say the same of rows that face one way",
+        '"9 um"',
+    ),
+    ('preload = "heavy"', "rows = 3", "rows = 3 is neither 1 nor 2", "3"),
+    ('preload = "heavy"', 'rows = 1, arrangement = "O"', "rows = 1 does not go with arrangement = 'O'", "1"),
+    (
+        'designation = "XCB71914-E", preload = "heavy"',
+        'ball_diameter = "8 mm", ball_count = 12, pitch_diameter = "85 mm", clearance = "C3"',
+        "depends on the bore of the bearing; add for example bore_diameter",
+        '"C3"',
+    ),
     # magnitudes no arithmetic survives
     ('"60 mm"', '"1e-300 mm"', "'1e-300 mm' is no length that a machine has; write for ex", '"1e-300 mm"'),
     ('"60 mm"', '"1e300 mm"', "'1e300 mm' is no length that a machine has; write for ex", '"1e300 mm"'),

@@ -6,6 +6,7 @@ import tomllib
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.scaled_machines import scaled_machine
 
 from rotordrop.errors import OutputError
 from rotordrop.estimated import Estimated
@@ -167,3 +168,17 @@ def test_nothing_is_left_where_saving_is_impossible(tmp_path):
     with pytest.raises(OutputError, match=r"the folder .* does not exist"):
         save_machine(example_machine("paper"), tmp_path / "nowhere" / "machine.toml")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "clearance",
+    ['"C3", bore_diameter = "80 mm"', '"38 um"', '{ guess = "38 um", range = ["25 um", "51 um"] }'],
+)
+def test_a_clearance_comes_back_as_class_or_length(clearance):
+    bearing = (
+        f'{{ rows = 1, ball_diameter = "13.494 mm", ball_count = 14, pitch_diameter = "102.5 mm", '
+        f"clearance = {clearance} }}"
+    )
+    machine = scaled_machine(60.0, bearing=bearing)
+    assert loads_machine(machine_text(machine)) == machine
+    assert float(machine.touchdown_bearings[0].bearing.clearance) == pytest.approx(38e-6)
