@@ -134,7 +134,7 @@ def bearing_unknowns(model: DropModel, index: int) -> Iterator[Unknown]:
     bearing = model.machine.touchdown_bearings[index]
     for row in rows("bearing"):
         if row.path == "preload" and float(row.described(bearing)) == 0.0:
-            continue  # loose rows: no preload to find, and the air gap takes up what their play is not known by
+            continue  # loose: nothing to find, and the air gap takes up an error of the play
         if row.path == "preload":
             yield _preload(row, bearing, index)
         elif row.path == "support.anisotropy":
