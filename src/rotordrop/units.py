@@ -177,6 +177,12 @@ def parse_quantity(text: object, kind: str) -> float:
     return _convert(number, unit, text, kind, wanted)
 
 
+def split_quantity(text: str) -> tuple[float, str]:
+    """Give number and unit of a text such as ``"10 V"``, nothing converted."""
+    number, unit = _split(text, "length", Kind(unit="", example="10 V", scales=()))
+    return number, unit
+
+
 def si_unit(kind: str) -> str:
     """Name the SI unit in which `parse_quantity` gives a kind, for display."""
     return "Hz" if kind == "frequency" else _kind(kind).unit

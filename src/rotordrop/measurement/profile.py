@@ -70,6 +70,8 @@ class Profile(_Section):
         Unit of all displacement channels that name none.
     sensitivity : str, optional
         Volts per length of all channels, for example ``"8 mV/um"``.
+    full_scale : str, optional
+        What full scale stands for where a file only knows shares of it (WAV), for example ``"10 V"``.
     text, time, speed
         See `TextLayout`, `Clock`, `SpeedSource`.
     """
@@ -79,6 +81,7 @@ class Profile(_Section):
     units: dict[str, str] = Field(default_factory=dict)
     unit: str | None = None
     sensitivity: str | None = None
+    full_scale: str | None = None
     text: TextLayout = TextLayout()
     time: Clock = Clock()
     speed: SpeedSource = SpeedSource()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -16,10 +15,10 @@ _UNITS = {
     "mil": "mil", "mils": "mil", "in": "in", "inch": "in",
     "v": "V", "volt": "V", "mv": "mV",
     "hz": "Hz", "rpm": "rpm", "1/min": "rpm", "u/min": "rpm", "r/min": "rpm", "min-1": "rpm",
+    "min^-1": "rpm", "min⁻¹": "rpm", "/min": "rpm",
     "rad/s": "rad/s", "s": "s", "sec": "s", "ms": "ms", "us": "us", "µs": "us", "μs": "us", "min": "min",
 }  # fmt: skip
-_BRACKETS = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\])]*)[\])]\s*$")
-_SUFFIX = re.compile(r"^(?P<name>.+)_(?P<unit>[A-Za-zµμ]+)$")
+_LONGEST_NAME = 200
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,13 +91,16 @@ def split_unit(written: str) -> tuple[str, str, str]:
     unit : str
         The unit, empty when there is none.
     """
-    written = written.strip()
-    bracketed = _BRACKETS.match(written)
-    if bracketed:
-        unit = bracketed["unit"].strip()
-        return bracketed["name"], bracketed["name"], known_unit(unit) or unit
-    suffixed = _SUFFIX.match(written)
-    unit_of_suffix = known_unit(suffixed["unit"]) if suffixed else None
-    if suffixed and unit_of_suffix:
-        return suffixed["name"], written, unit_of_suffix
+    written = " ".join(written[:_LONGEST_NAME].split())
+    if written.endswith((")", "]")):
+        name, mark, unit = written[:-1].rpartition("[" if written[-1] == "]" else "(")
+        if mark:
+            name, unit = name.strip(), unit.strip()
+            return name, name, known_unit(unit) or unit
+    name, mark, unit = written.rpartition("/")
+    if mark and name.strip() and (name[-1] == " " or unit[:1] == " ") and known_unit(unit):
+        return name.strip(), name.strip(), known_unit(unit) or ""
+    name, mark, unit = written.rpartition("_")
+    if name and mark and unit.isalpha() and known_unit(unit):
+        return name, written, known_unit(unit) or ""
     return written, written, ""

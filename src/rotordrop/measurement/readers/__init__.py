@@ -23,6 +23,7 @@ GROUP = "rotordrop.readers"
 
 _DELIMITED = "rotordrop.measurement.readers.delimited:read_delimited"
 _HDF5 = "rotordrop.measurement.readers.hdf5:read_hdf5"
+_COMTRADE = "rotordrop.measurement.readers.comtrade:read_comtrade"
 _UFF = "rotordrop.measurement.readers.uff:read_uff"
 _SUPPLIED = {
     "csv": _DELIMITED,
@@ -30,12 +31,22 @@ _SUPPLIED = {
     "tsv": _DELIMITED,
     "asc": _DELIMITED,
     "dat": _DELIMITED,
+    "log": _DELIMITED,
+    "prn": _DELIMITED,
     "h5": _HDF5,
     "hdf5": _HDF5,
     "mat": "rotordrop.measurement.readers.matlab:read_matlab",
     "tdms": "rotordrop.measurement.readers.tdms:read_tdms",
     "uff": _UFF,
     "unv": _UFF,
+    "wav": "rotordrop.measurement.readers.wav:read_wav",
+    "npy": "rotordrop.measurement.readers.numpy_files:read_npy",
+    "npz": "rotordrop.measurement.readers.numpy_files:read_npz",
+    "cfg": _COMTRADE,
+    "comtrade": _COMTRADE,
+    "xlsx": "rotordrop.measurement.readers.excel:read_excel",
+    "xlsm": "rotordrop.measurement.readers.excel:read_excel",
+    "gz": "rotordrop.measurement.readers.packed:read_gzip",
 }
 
 
@@ -47,10 +58,17 @@ def read_recording(path: Path, profile: Profile) -> Recording:
     RecordError
         When there is no such file or no reader for it.
     """
-    if not path.is_file():
-        what = "is a folder" if path.is_dir() else "does not exist"
+    try:
+        there = path.is_file()
+    except OSError as error:
+        raise RecordError(f"cannot read the recording {path}: {error.strerror}; check the path") from error
+    if not there:
+        what = "is a folder" if path.is_dir() else "is no file" if path.exists() else "does not exist"
         raise RecordError(f"the recording {path} {what}; check the path")
-    return find_reader(profile.format or path.suffix.lstrip(".").lower(), path)(path, profile)
+    name = profile.format if profile.format and path.suffix != ".gz" else path.suffix.lstrip(".").lower()
+    if name == "dat" and any(path.with_suffix(suffix).is_file() for suffix in (".cfg", ".CFG")):
+        name = "comtrade"
+    return find_reader(name, path)(path, profile)
 
 
 def find_reader(name: str, path: Path) -> Reader:
@@ -72,12 +90,4 @@ def known_formats() -> tuple[str, ...]:
     return tuple(sorted({*_SUPPLIED, *(entry.name for entry in entry_points(group=GROUP))}))
 
 
-def needs_extra(package: str, path: Path, error: ImportError) -> RecordError:
-    """Say which package a format needs and how to get it."""
-    return RecordError(
-        f"{path}: reading {path.suffix} files needs the package {package}; install it with "
-        f"pip install 'rotordrop[io]' ({error})"
-    )
-
-
-__all__ = ["GROUP", "Reader", "find_reader", "known_formats", "needs_extra", "read_recording"]
+__all__ = ["GROUP", "Reader", "find_reader", "known_formats", "read_recording"]

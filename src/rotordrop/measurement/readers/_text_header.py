@@ -75,7 +75,9 @@ def _collect(line: str, separator: str, entries: dict[str, str]) -> None:
     """Add the entries of a line: ``key: value;key: value`` or ``key;value;unit``."""
     plain = line.strip().lstrip("#%/!* ").strip()
     fields = [field.strip().strip('"').strip() for field in plain.split(separator)]
-    pairs = [field.split(":", 1) for field in fields if re.match(r"[^:]{2,40}:\s*\S", field)]
+    pairs = [
+        re.split("[:=]", field, maxsplit=1) for field in fields if re.match(r"[^:=]{2,40}[:=]\s*\S", field)
+    ]
     if plain and pairs and not re.fullmatch(r"[\d:.\-T ]+", fields[0]):
         entries.update((key.strip(), value.strip()) for key, value in pairs if not re.search(r"\d$", key))
     if line.lstrip().startswith("#"):

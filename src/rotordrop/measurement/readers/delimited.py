@@ -15,13 +15,16 @@ from rotordrop.measurement.readers._text_layout import (
     Layout,
     fields_of,
     find_layout,
-    is_timestamp,
+    is_number,
     name_and_unit_rows,
+    plain_number,
     read_lines,
+    stamp_parts,
 )
 from rotordrop.measurement.recording import Array, Channel, Recording, known_unit, split_unit
 from rotordrop.units import parse_quantity
 
+_LONGEST_HEADER_LINE = 500
 _TIME_NAMES = re.compile(r"(time|zeit|t|temps|tempo|tiempo|timestamp|x_value)\b", re.IGNORECASE)
 
 
@@ -41,23 +44,33 @@ def read_delimited(path: Path, profile: Profile) -> Recording:
         With the line, when a line has another number of columns or something that is no number.
     """
     lines, complete, encoding = read_lines(path, profile.text)
+    return recording_of_lines(lines, complete, f"text in {encoding}", path, profile)
+
+
+def recording_of_lines(
+    lines: list[str], complete: bool, origin: str, path: Path, profile: Profile
+) -> Recording:
+    """Make a recording of lines of text, whose `origin` is a word for the report."""
     layout = find_layout(lines, path, profile.text)
     header_lines = lines[: layout.first]
     labels, unused = _column_labels(header_lines, layout, profile, path)
-    header = read_header(unused, layout.separator)
-    body, warnings = _intact_rows(lines, complete, layout, path)
-    table, absolute = _numbers(body, layout, labels, path)
+    header = read_header([line[:_LONGEST_HEADER_LINE] for line in unused], layout.separator)
+    rows, notes, warnings = _intact_rows(lines, complete, layout, path)
     columns = [split_unit(label) for label in labels]
-    time, used, notes = _clock(table, columns, absolute, header, profile, path)
+    table = _numbers(rows, layout, labels, path)
+    stamped = _stamped_seconds(rows, layout, path)
+    time, used, words = _clock(table, columns, stamped, layout, header, profile, path)
     channels = tuple(
-        Channel(name=name, label=label, unit=profile.units.get(label, unit), values=table[:, i], time=time)
+        Channel(name=name, label=label, unit=profile.units.get(label, unit), values=table[i], time=time)
         for i, (name, label, unit) in enumerate(columns)
-        if i != used
+        if i in table and i not in used
     )
+    texts = [labels[i] for i, kind in enumerate(layout.kinds) if kind == "text"]
+    notes += [f"left out, no numbers: {', '.join(texts)}"] if texts else []
     return Recording(
         channels=channels,
         metadata=header.entries,
-        notes=(f"text in {encoding}, {_spoken(layout)}", *notes),
+        notes=(f"{origin}, {_spoken(layout)}", *notes, *words),
         warnings=tuple(warnings),
         sensitivity=header.sensitivity,
         voltage_offset=header.voltage_offset,
@@ -80,9 +93,12 @@ def _column_labels(
             raise RecordError(
                 f"{path} has {layout.columns} columns and the profile names {len(profile.text.names)}"
             )
+        rows = [fields_of(line, layout.separator) for line in header]
+        _refuse_damaged_start(header, rows, (None, None), layout, path)
         return list(profile.text.names), header
     rows = [fields_of(line.lstrip("# "), layout.separator) for line in header]
     names, units = name_and_unit_rows(rows, layout.columns)
+    _refuse_damaged_start(header, rows, (names, units), layout, path)
     if names is None:
         last = f"the line above the numbers reads {header[-1][:60]!r}" if header else "there is no header"
         raise RecordError(
@@ -96,128 +112,181 @@ def _column_labels(
     return [f"{name} [{unit}]" if known_unit(unit) else name for name, unit in pairs], unused
 
 
-def _intact_rows(lines: list[str], complete: bool, layout: Layout, path: Path) -> tuple[list[str], list[str]]:
-    """Take the data lines, refuse a wrong column count, leave out a last line that was cut."""
-    body = lines[layout.first :]
-    warnings: list[str] = []
-    wrong = [i for i, line in enumerate(body) if _count(line, layout) != layout.columns]
+def _refuse_damaged_start(
+    header: list[str],
+    rows: list[list[str]],
+    named: tuple[list[str] | None, list[str] | None],
+    layout: Layout,
+    path: Path,
+) -> None:
+    """Refuse rows that stand where the samples begin and are none: left out, the record would start later."""
+    last = max((i for i, row in enumerate(rows) if row in named and row), default=-1)
+    damaged = [i for i in range(last + 1, len(rows)) if _was_a_row(header[i], rows[i], layout)]
+    if damaged:
+        raise RecordError(
+            f"{path}, line {damaged[0] + 1} is damaged ({header[damaged[0]][:60]!r}; {len(damaged)} such "
+            "lines before the first intact row); repair the line or export again"
+        )
+
+
+def _was_a_row(line: str, fields: list[str], layout: Layout) -> bool:
+    """Whether a line that is no row begins like one: no comment, no word in front, numbers among the rest."""
+    if not line.strip() or line.lstrip()[0] in "#%!*" or re.match(r'\s*"?[^\W\d_]{2}', line):
+        return False
+    numbers = sum(is_number(field, layout.decimal) for field in fields)
+    return 2 * abs(len(fields) - layout.columns) <= layout.columns and numbers > 0
+
+
+def _intact_rows(
+    lines: list[str], complete: bool, layout: Layout, path: Path
+) -> tuple[list[list[str]], list[str], list[str]]:
+    """Take the data rows, refuse a wrong column count, leave out a last row that was cut."""
+    body = [fields_of(line, layout.separator) for line in lines[layout.first :]]
+    wrong = [i for i, row in enumerate(body) if len(row) != layout.columns]
     if wrong and wrong != [len(body) - 1]:
         line = layout.first + wrong[0] + 1
         raise RecordError(
-            f"{path}, line {line}: {_count(body[wrong[0]], layout)} columns where {layout.columns} are "
-            "expected "
-            f"({body[wrong[0]][:60]!r}; {len(wrong)} such lines); repair the line or export again"
+            f"{path}, line {line}: {len(body[wrong[0]])} columns where {layout.columns} are expected "
+            f"({lines[line - 1][:60]!r}; {len(wrong)} such lines); repair the line or export again"
         )
+    last = layout.first + len(body)
     if wrong:
-        warnings.append(
-            f"the file ends within line {layout.first + len(body)}, after {_count(body[-1], layout)} of "
-            f"{layout.columns} columns: the file is truncated, {len(body) - 1} complete rows are used"
+        words = (
+            f"the file ends within line {last}, after {len(body[-1])} of {layout.columns} columns: the file "
+            f"is truncated, {len(body) - 1} complete rows are used"
         )
-        body = body[:-1]
-    elif not complete and len(body) > 1:
-        warnings.append(
-            f"the last line ({layout.first + len(body)}) has no line end and may be truncated: it is left "
-            "out, "
-            f"{len(body) - 1} complete rows are used"
-        )
-        body = body[:-1]
-    return body, warnings
+        return body[:-1], [], [words]
+    if complete or len(body) < 3:
+        return body, [], []
+    same = {_decimals(row[-1], layout.decimal) for row in body[-50:-1]}
+    if same == {_decimals(body[-1][-1], layout.decimal)}:
+        return body, [], []  # a recorder that writes no last line end
+    words = f"the last line ({last}) has no line end and may be truncated: it is left out, "
+    words += f"{len(body) - 1} complete rows are used"
+    return (body[:-1], [], [words]) if len(same) == 1 else (body[:-1], [words], [])
 
 
-def _count(line: str, layout: Layout) -> int:
-    return len(line.split()) if layout.separator == " " else line.count(layout.separator) + 1
+def _decimals(field: str, decimal: str) -> int | str:
+    """Digits behind the decimal sign, or the field itself where it has none."""
+    return len(field.rpartition(decimal)[2]) if decimal in field else field
 
 
-def _numbers(body: list[str], layout: Layout, labels: list[str], path: Path) -> tuple[Array, bool]:
-    """Turn the rows into numbers; a date in the first column becomes seconds from the first row."""
-    absolute = is_timestamp(fields_of(body[0], layout.separator)[0])
-    tokens = layout.separator.join(body)
-    if layout.decimal == ",":
-        tokens = tokens.replace(",", ".")
-    flat = tokens.replace('"', "").split(None if layout.separator == " " else layout.separator)
-    if absolute:
-        seconds = _seconds(flat[:: layout.columns], layout, path)
-        flat[:: layout.columns] = ["0"] * len(body)
-    try:
-        table = np.array(flat, dtype=np.float64).reshape(len(body), layout.columns)
-    except ValueError:
-        table = _with_missing(flat, layout, labels, path).reshape(len(body), layout.columns)
-    if absolute:
-        table[:, 0] = seconds
-    return table, absolute
+def _numbers(rows: list[list[str]], layout: Layout, labels: list[str], path: Path) -> dict[int, Array]:
+    """Turn the columns of numbers into arrays, missing samples into NaN."""
+    found: dict[int, Array] = {}
+    for i, kind in enumerate(layout.kinds):
+        if kind == "number":
+            fields = [row[i] for row in rows]
+            if _ONLY_NUMBERS.fullmatch("".join(fields)) and layout.decimal == ".":
+                try:
+                    found[i] = np.array(fields, dtype=np.float64)
+                    continue
+                except ValueError:
+                    pass  # looked at one by one
+            found[i] = _one_by_one(fields, i, layout, labels, path)
+    return found
 
 
-def _seconds(stamps: list[str], layout: Layout, path: Path) -> Array:
-    texts = [stamp.strip().removesuffix("Z").replace(" ", "T") for stamp in stamps]
-    try:
-        instants = np.array(texts, dtype="datetime64[ns]")
-    except ValueError as error:
-        wrong = next((i for i, text in enumerate(texts) if not is_timestamp(text)), 0)
-        raise RecordError(
-            f"{path}, line {layout.first + wrong + 1}: {stamps[wrong]!r} is not a date and time"
-        ) from error
-    return np.asarray((instants - instants[0]) / np.timedelta64(1, "s"), dtype=np.float64)
+_ONLY_NUMBERS = re.compile(r"[0-9.eE+-]*")
+"""Python reads ``1_000`` and digits of any script as numbers; no recorder writes them."""
 
 
-def _with_missing(flat: list[str], layout: Layout, labels: list[str], path: Path) -> Array:
-    """Convert number by number, missing samples to NaN; refuse the first thing that is no number."""
-    values = np.empty(len(flat))
-    for i, token in enumerate(flat):
-        try:
-            values[i] = float(token)
-        except ValueError:
-            if token.strip().lower() not in BLANKS:
-                row, column = divmod(i, layout.columns)
-                raise RecordError(
-                    f"{path}, line {layout.first + row + 1}, column {labels[column]!r}: {token.strip()!r} is "
-                    "not a number; repair the line or export again"
-                ) from None
-            values[i] = np.nan
+def _one_by_one(fields: list[str], column: int, layout: Layout, labels: list[str], path: Path) -> Array:
+    values = np.full(len(fields), np.nan)
+    for i, field in enumerate(fields):
+        if is_number(field, layout.decimal):
+            values[i] = float(plain_number(field, layout.decimal))
+        elif field.lower() not in BLANKS:
+            raise RecordError(
+                f"{path}, line {layout.first + i + 1}, column {labels[column]!r}: {field[:40]!r} is not a "
+                "number; repair the line or export again"
+            )
     return values
 
 
+def _stamped_seconds(rows: list[list[str]], layout: Layout, path: Path) -> Array | None:
+    """Seconds from the first row by the columns of dates and times, None where there is none."""
+    stamped = [i for i, kind in enumerate(layout.kinds) if kind == "time"]
+    if not stamped:
+        return None
+    seconds, nanoseconds = np.zeros((2, len(rows)), dtype=np.int64)
+    dated = False
+    for k, row in enumerate(rows):
+        for i in stamped:
+            parts = stamp_parts(row[i])
+            if parts is None:
+                raise RecordError(
+                    f"{path}, line {layout.first + k + 1}: {row[i][:40]!r} is not a date or time; repair it"
+                )
+            dated = dated or parts[0] >= 10 * _DAY
+            seconds[k] += parts[0]
+            nanoseconds[k] += parts[1]
+    if not dated:  # the time of day begins again at midnight
+        seconds[1:] += _DAY * np.cumsum(np.diff(seconds) < -_DAY // 2)
+    return np.asarray((seconds - seconds[0]) + 1e-9 * (nanoseconds - nanoseconds[0]), dtype=np.float64)
+
+
+_DAY = 86_400
+
+
 def _clock(
-    table: Array,
+    table: dict[int, Array],
     columns: list[tuple[str, str, str]],
-    absolute: bool,
+    stamped: Array | None,
+    layout: Layout,
     header: Header,
     profile: Profile,
     path: Path,
-) -> tuple[Array, int | None, list[str]]:
-    """Find the time of every row: a time column, or start and step, with the column that is no channel."""
-    at = _time_column(columns, absolute, profile, path)
+) -> tuple[Array, tuple[int, ...], list[str]]:
+    """Find the time of every row: a time column, or start and step, with the columns that are no channels."""
+    at = _time_column(columns, table, stamped is not None, profile, path)
     if at is not None:
-        unit = "s" if absolute else profile.time.unit or columns[at][2] or "s"
-        seconds = table[:, at] * parse_quantity(f"1 {unit}", "time")
-        notes = [] if absolute or columns[at][2] or profile.time.unit else ["time column taken in seconds"]
-        return seconds, at, notes
+        unit = profile.time.unit or columns[at][2] or "s"
+        notes = [] if columns[at][2] or profile.time.unit else ["time column taken in seconds"]
+        return table[at] * parse_quantity(f"1 {unit}", "time"), (at,), notes
     step = parse_quantity(profile.time.step, "time") if profile.time.step else header.step
+    if stamped is not None and not (step and stamped[-1] - stamped[0] < 0.5 * step * len(stamped)):
+        return stamped, (), []
     if step is None or step <= 0:
         raise RecordError(
             f"{path} has no time column among {', '.join(label for _, label, _ in columns)} and no sampling "
             'interval; name it in the profile, time.channel = "..." or time.step = "50 us"'
         )
-    counted = len(table) > 1 and bool(np.all(np.diff(table[:, 0]) == 1.0))
-    index = table[:, 0] if counted else np.arange(len(table), dtype=np.float64)
+    counter = next(iter(table))
+    counted = _is_counter(table[counter], columns[counter][0])
+    index = table[counter] if counted else np.arange(len(table[counter]), dtype=np.float64)
     start, notes = _first_time(step, header, profile)
-    return start + step * index, 0 if counted else None, notes
+    return start + step * index, (counter,) if counted else (), notes
+
+
+_COUNTERS = re.compile(
+    r"(sample|index|idx|channel|point|punkt|scan|count|row|zeile|nr|no|n|i|#)\b", re.IGNORECASE
+)
+
+
+def _is_counter(values: Array, name: str) -> bool:
+    """Whether a column counts the samples; where samples are missing it steps by more, and so tells it."""
+    if len(values) < 2 or not np.all(values == np.round(values)):
+        return False
+    ones = float(np.mean(np.diff(values) == 1.0))
+    return ones == 1.0 or ones > (0.5 if _COUNTERS.match(name) else 0.9)
 
 
 def _time_column(
-    columns: list[tuple[str, str, str]], absolute: bool, profile: Profile, path: Path
+    columns: list[tuple[str, str, str]], table: dict[int, Array], stamped: bool, profile: Profile, path: Path
 ) -> int | None:
-    if absolute:
-        return 0
     if profile.time.channel is not None:
         for i, column in enumerate(columns):
-            if profile.time.channel in column[:2]:
+            if profile.time.channel in column[:2] and i in table:
                 return i
         raise RecordError(
             f"{path} has no time column {profile.time.channel!r}; its columns are "
             f"{', '.join(label for _, label, _ in columns)}"
         )
+    if stamped:
+        return None
     for i, (name, _, unit) in enumerate(columns):
-        if _TIME_NAMES.match(name) and unit in ("", "s", "ms", "us", "min"):
+        if i in table and _TIME_NAMES.match(name) and unit in ("", "s", "ms", "us", "min"):
             return i
     return None
 

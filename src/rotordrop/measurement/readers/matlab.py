@@ -12,6 +12,7 @@ from rotordrop.errors import RecordError
 from rotordrop.measurement.profile import Profile
 from rotordrop.measurement.recording import Array, Channel, Recording, known_unit, split_unit
 from rotordrop.measurement.unpacking import unpack
+from rotordrop.units import parse_quantity
 
 _RATES = ("fs", "fs_hz", "samplerate", "sampling_rate")
 _STEPS = ("dt", "dt_s", "step")
@@ -41,19 +42,25 @@ def read_matlab(path: Path, profile: Profile) -> Recording:
         When the declared length of a variable is not present in the file, or no channels are found.
     """
     content = unpack(path, "matlab")
-    variables: dict[str, Any] = {**content.attributes, **{item.name: item.values for item in content.items}}
+    found = {item.name: item.values for item in content.items}
+    return recording_of_variables({**content.attributes, **found}, path, profile)
+
+
+def recording_of_variables(variables: dict[str, Any], path: Path, profile: Profile) -> Recording:
+    """Make a recording of named arrays, numbers, texts and lists of texts."""
     names = next((_names(value) for value in variables.values() if _names(value)), [])
     channels: list[Channel] = []
-    for item in content.items:
-        folder, _, last = item.name.rpartition(".")
-        if last.lower() not in _TIMES:
+    for key, value in variables.items():
+        folder, _, last = key.rpartition(".")
+        samples = isinstance(value, np.ndarray) and value.dtype.kind in "iuf" and value.size > 1
+        if samples and value.ndim in (1, 2) and last.lower() not in _TIMES and last != profile.time.channel:
             channels += _channels_of(
-                item.name, item.values, names, lambda n, f=folder: _clock(variables, f, n), profile, variables
+                key, value, names, lambda n, f=folder: _clock(variables, f, n, profile), profile, variables
             )
     if not channels:
         raise RecordError(
             f"{path}: found no samples with a clock among {', '.join(variables) or 'no variables'}; a vector "
-            "'t', or 'fs' and 't0', must stand beside the channels"
+            "'t', or 'fs' and 't0', must stand beside the channels, or time.step in the profile"
         )
     entries = {key: str(value) for key, value in variables.items() if isinstance(value, str | int | float)}
     return Recording(channels=tuple(channels), metadata=entries)
@@ -95,10 +102,14 @@ def _channels_of(
     ]
 
 
-def _clock(variables: dict[str, Any], folder: str, count: int) -> Array | None:
-    """Find the clock of samples in the same structure, then at the top of the file."""
+def _clock(variables: dict[str, Any], folder: str, count: int, profile: Profile) -> Array | None:
+    """Find the clock of samples: in the profile, in the same structure, then at the top of the file."""
+    if profile.time.step is not None:
+        first = parse_quantity(profile.time.start or "0 s", "time")
+        return first + parse_quantity(profile.time.step, "time") * np.arange(count, dtype=np.float64)
+    times = _TIMES if profile.time.channel is None else (profile.time.channel,)
     for prefix in dict.fromkeys((f"{folder}." if folder else "", "")):
-        for name in _TIMES:
+        for name in times:
             value = _get(variables, prefix, name)
             if isinstance(value, np.ndarray) and value.shape == (count,):
                 return np.asarray(value, dtype=np.float64)

@@ -1,0 +1,46 @@
+"""Recordings packed by gzip: unpacked within bounds, then read by the reader of what is inside."""
+
+from __future__ import annotations
+
+import gzip
+import tempfile
+import zlib
+from pathlib import Path
+
+from rotordrop.errors import RecordError
+from rotordrop.measurement.profile import Profile
+from rotordrop.measurement.recording import Recording
+from rotordrop.measurement.unpacking import refuse_bomb
+
+_BLOCK = 2**20
+
+
+def read_gzip(path: Path, profile: Profile) -> Recording:
+    """Read ``drop.csv.gz`` and the like.
+
+    Raises
+    ------
+    RecordError
+        When the file is cut off or its checksum does not fit, or unpacks to far more than a recording.
+    """
+    from rotordrop.measurement.readers import read_recording
+
+    with tempfile.TemporaryDirectory() as folder:
+        inside = Path(folder) / path.stem
+        _unpack(path, inside)
+        try:
+            return read_recording(inside, profile)
+        except RecordError as error:
+            raise RecordError(str(error).replace(str(inside), str(path))) from error
+
+
+def _unpack(path: Path, inside: Path) -> None:
+    size, written = path.stat().st_size, 0
+    try:
+        with gzip.open(path, "rb") as packed, inside.open("wb") as stream:
+            while block := packed.read(_BLOCK):
+                written += len(block)
+                refuse_bomb(written // 8, size, path)
+                stream.write(block)
+    except (EOFError, gzip.BadGzipFile, zlib.error) as error:
+        raise RecordError(f"{path} cannot be unpacked: {error}; copy it again") from error
