@@ -27,13 +27,13 @@ from numpy.typing import NDArray
 from rotordrop.estimation.recorded_fall import recorded_fall
 from rotordrop.estimation.uncertainty import best_candidate, seen_at_bearings, whole_drop
 from rotordrop.identification.air_gap import SettledRest, find_rest, static_sag
+from rotordrop.identification.evidence import read_evidence
 from rotordrop.identification.initial_state import InitialState, fit_initial_state
 from rotordrop.identification.modal_expansion import ExpandedState, expand_initial_state
 from rotordrop.identification.replica import build_replica
 from rotordrop.identification.sensing import build_sensing
 from rotordrop.identification.support import impact_problem
 from rotordrop.machine import Machine
-from rotordrop.measurement.events import find_drop_instant
 from rotordrop.measurement.record import Record
 from rotordrop.model.parameters import DropModel
 from rotordrop.simulation.case import DropCase, StateStart
@@ -64,10 +64,9 @@ def by_fit(
     machine: Machine, model: DropModel, record: Record, rest: SettledRest
 ) -> tuple[InitialState, DropResult, Array]:
     """Replay from the fit over the fall, and its orbit at the bearings as the sensors would show it."""
-    instant, sensing = find_drop_instant(record, machine), build_sensing(model, record.sensors)
+    evidence, sensing = read_evidence(model, record), build_sensing(model, record.sensors)
     gaps = rest.radius - static_sag(model).total
-    speed = 2.0 * np.pi * instant.levitated.frequency
-    initial = fit_initial_state(record, rest, instant, gaps, model, sensing, speed=speed)
+    initial = fit_initial_state(evidence, rest, gaps, model, sensing)
     problem = impact_problem(build_replica(record, rest, initial, model, until=EARLY))
     central = best_candidate(problem, problem.prior_mean)
     result = whole_drop(problem, central, duration=DURATION, tolerance=TOLERANCE)

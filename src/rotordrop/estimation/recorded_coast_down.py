@@ -81,13 +81,9 @@ def _window(settled: float, known: float) -> float:
 
 
 def _speed(record: Record, off: float) -> tuple[Array | None, Array | None]:
-    time, speed = record.speed_time, record.speed_readings
-    if time is None or speed is None:
-        time, speed = (None, None) if record.speed is None else (record.time, record.speed)
-    if time is None or speed is None or np.ptp(speed) == 0.0:
-        # A speed given by hand says from where the rotor fell, not how it slowed down.
-        return None, None
-    return time - off, speed
+    # A speed given by hand says from where the rotor fell, not how it slowed down.
+    measured = record.measured_speed
+    return (None, None) if measured is None else (measured[0] - off, measured[1])
 
 
 def _profile(time: Array | None, speed: Array | None) -> SpeedProfile | None:

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from rotordrop.estimated import NINETY
 from rotordrop.identification.air_gap import AirGap, SettledRest, find_rest, identify_air_gap
+from rotordrop.identification.evidence import read_evidence
 from rotordrop.identification.first_contact import FirstContact, identify_first_contacts
 from rotordrop.identification.initial_state import InitialState, fit_initial_state
 from rotordrop.identification.modal_expansion import ExpandedState, expand_initial_state
 from rotordrop.identification.sensing import build_sensing
-from rotordrop.identification.speed import SpeedFit, identify_speed
+from rotordrop.identification.speed import SpeedFit
 from rotordrop.machine import Machine
 from rotordrop.measurement.events import DropInstant, find_drop_instant
 from rotordrop.measurement.record import Record
@@ -87,13 +88,14 @@ def recorded_fall(machine: Machine, record: Record, tail: Record | None) -> Reco
         If a step finds nothing to work on; says which and why.
     """
     instant = find_drop_instant(record, machine)
-    speed = identify_speed(record, instant.value, turning=2.0 * np.pi * instant.levitated.frequency)
+    evidence = read_evidence(build_drop_model(machine), record, power_off=instant)
+    speed = evidence.speed
     slowed = {"speed.aero_time_constant": min(speed.aero_time_constant.value, 1e6)}
     model = build_drop_model(machine.with_values(slowed))
     sensing = build_sensing(model, record.sensors)
     rest = find_rest(record, tail, sensing)
     gap = identify_air_gap(rest, model, sensing)
-    initial = fit_initial_state(record, rest, instant, gap.value, model, sensing, speed=speed.initial)
+    initial = fit_initial_state(evidence, rest, gap.value, model, sensing)
     from_rest = initial.deviation_of(record) + initial.settled
     return RecordedFall(
         record=record,

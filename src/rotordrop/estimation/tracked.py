@@ -22,10 +22,12 @@ from rotordrop.estimation.tracked_values import (
     with_cross_check,
 )
 from rotordrop.identification.air_gap import STANDSTILL
+from rotordrop.identification.evidence import Evidence, read_evidence
 from rotordrop.identification.first_reach import reach_at_first_contact
 from rotordrop.machine import Machine
+from rotordrop.measurement.axes import sensor_polarity
 from rotordrop.measurement.events import DropInstant
-from rotordrop.measurement.power_off import PowerOff, find_power_off
+from rotordrop.measurement.power_off import PowerOff
 from rotordrop.measurement.record import Record
 from rotordrop.model.parameters import DropModel, build_drop_model
 from rotordrop.model.reduction import Reduction
@@ -44,7 +46,7 @@ from rotordrop.tracking.calibration import (
 from rotordrop.tracking.consistency import DIRECTIONS, Check, consistency_checks
 from rotordrop.tracking.forces import ForceHistory, force_history
 from rotordrop.tracking.input_state import InputEstimate, input_state_estimate
-from rotordrop.tracking.problem import DropProblem, build_problem
+from rotordrop.tracking.problem import DropProblem, RecordedDrop, build_problem
 from rotordrop.tracking.smoother import PassSettings, Smoothed, forward
 from rotordrop.tracking.transfer import transferred
 
@@ -140,9 +142,18 @@ class Preparation:
     """A record made ready: power-off found, tail averaged."""
 
     name: str
-    record: Record
-    instant: DropInstant | PowerOff
+    evidence: Evidence
     tail_level: Array | None
+
+    @property
+    def record(self) -> Record:
+        """The recording."""
+        return self.evidence.record
+
+    @property
+    def instant(self) -> DropInstant | PowerOff:
+        """Power-off in record time."""
+        return self.evidence.power_off
 
 
 def prepare(
@@ -154,17 +165,22 @@ def prepare(
 ) -> Preparation:
     """Find power-off and average the settled tail of a record."""
     tail = settled_tail(record, tail)
+    if record.speed_readings is None:
+        raise IdentificationError(
+            f"the record {name} has no rotor speed; expected one. Map it with a profile."
+        )
+    model = build_drop_model(machine, COARSE_BASIS)
+    polarity = sensor_polarity(record.sensors)
     return Preparation(
         name=name,
-        record=record,
-        instant=find_power_off(record, machine) if instant is None else instant,
-        tail_level=None if tail is None else np.asarray(tail.signals).mean(axis=0) * _polarity(tail),
+        evidence=read_evidence(model, record, power_off=instant),
+        tail_level=None if tail is None else np.asarray(tail.signals).mean(axis=0) * polarity,
     )
 
 
 def settled_tail(record: Record, tail: Record | None) -> Record | None:
     """The tail given, or the last seconds of a record until standstill; None where there is neither."""
-    if tail is not None or record.duration < LONG_RECORD or record.speed is None:
+    if tail is not None or record.duration < LONG_RECORD or record.measured_speed is None:
         return tail
     last = _last_seconds(record, TAIL_SPAN)
     assert last.speed is not None
@@ -181,29 +197,27 @@ def _last_seconds(record: Record, span: float) -> Record:
     )
 
 
-def _polarity(record: Record) -> Array:
-    return np.array([float(sensor.polarity) for sensor in record.sensors])
-
-
 def drop_problem(model: DropModel, prepared: Preparation, until: float = WINDOW) -> DropProblem:
     """Estimation problem of a prepared record; without a tail the gaps start where the first forces act."""
-    record = prepared.record
-    if record.speed is None:
-        raise IdentificationError(
-            f"the record {prepared.name} has no rotor speed; expected one. Map it with a profile."
-        )
-    near = record.time < prepared.instant.value + until + 0.01
-    problem = build_problem(
-        model,
-        np.asarray(record.time[near] - prepared.instant.value),
-        np.asarray(record.signals[near]) * _polarity(record),
-        np.asarray(record.speed[near]),
-        tail_level=prepared.tail_level,
-        until=until,
-    )
+    problem = build_problem(model, recorded_drop(prepared, until), until=until)
     if prepared.tail_level is None:
         _start_gaps(problem, prepared)
     return problem
+
+
+def recorded_drop(prepared: Preparation, until: float = WINDOW) -> RecordedDrop:
+    """What the record says, as the filter takes it."""
+    evidence = prepared.evidence
+    readings = evidence.readings(until)
+    return RecordedDrop(
+        time=evidence.time[: len(readings)],
+        readings=readings,
+        noise=evidence.noise(until),
+        initial_speed=evidence.speed.initial,
+        initial_speed_error=evidence.speed.initial_error,
+        speed=evidence.measured_speed(until),
+        tail_level=prepared.tail_level,
+    )
 
 
 def _start_gaps(problem: DropProblem, prepared: Preparation) -> None:

@@ -142,9 +142,9 @@ def find_rest(record: Record, tail: Record | None, sensing: Sensing) -> SettledR
 
 def _settled_samples(record: Record) -> NDArray[np.bool_]:
     """Samples after the shaft came to rest, for good."""
-    if record.speed is None:
+    if record.speed is None or record.speed_by_hand:
         raise IdentificationError(
-            f"{record.name} has no shaft speed, so it cannot be seen where the rotor stands still. "
+            f"{record.name} has no measured shaft speed, so it cannot be seen where the rotor stands still. "
             "Give the settled tail as a record of its own (--tail)."
         )
     turning = np.flatnonzero(np.abs(record.speed) > STANDSTILL)

@@ -113,7 +113,7 @@ def _unbalance_sigma(machine: Machine, nodes: tuple[int, ...], mass: float) -> A
 
 
 @dataclass(frozen=True, kw_only=True)
-class Evidence:
+class FallReadings:
     """What is compared: deviations from rest, and the orbit before the drop, along the sensors."""
 
     time: Array
@@ -131,12 +131,12 @@ class FallFit:
         self,
         fall: FreeFall,
         sensing: Sensing,
-        evidence: Evidence,
+        readings: FallReadings,
         settled: Array,
         model: DropModel,
         instant_error: float,
     ) -> None:
-        self.fall, self.sensing, self.evidence, self.settled = fall, sensing, evidence, settled
+        self.fall, self.sensing, self.readings, self.settled = fall, sensing, readings, settled
         self.unknowns = Unknowns(
             n_states=fall.size,
             n_sensors=len(sensing.names),
@@ -188,7 +188,7 @@ class FallFit:
     def solve(self) -> tuple[Array, Array, float]:
         """Estimate, covariance and mean square of the weighted residual of the samples."""
         current = self.prior_mean.copy()
-        count = self.evidence.deviation.size
+        count = self.readings.deviation.size
         for _ in range(ITERATIONS):
             residual, jacobian = self._linearised(current)
             scale = 1.0 / np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
@@ -217,7 +217,7 @@ class FallFit:
         )
 
     def _samples(self, current: Array) -> tuple[Array, Array]:
-        u, e, fall = self.unknowns, self.evidence, self.fall
+        u, e, fall = self.unknowns, self.readings, self.fall
         states, decay = current[u.states], float(np.exp(current[u.decay]))
         since = e.time - 1e-3 * current[u.shift]
         step, count = float(e.time[1] - e.time[0]), len(e.time)
@@ -240,7 +240,7 @@ class FallFit:
         return residual.ravel(), jacobian.reshape(-1, u.size)
 
     def _orbit(self, current: Array) -> tuple[Array, Array]:
-        u, e = self.unknowns, self.evidence
+        u, e = self.unknowns, self.readings
         states, gain, speed = current[u.states], current[u.gain], self.fall.speed
         runout = current[u.runout].reshape(2, -1)
         place, rate = self.place_rows @ states, self.velocity_rows @ states

@@ -16,14 +16,15 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError
 from rotordrop.identification.air_gap import SettledRest
-from rotordrop.identification.fall_fit import Evidence, FallFit, Unknowns, unbalance_nodes
+from rotordrop.identification.evidence import Evidence
+from rotordrop.identification.fall_fit import FallFit, FallReadings, Unknowns, unbalance_nodes
 from rotordrop.identification.free_fall import FreeFall, build_free_fall
 from rotordrop.identification.sensing import Sensing, displacements_along
 from rotordrop.machine.sensor import Sensor
 from rotordrop.measurement.axes import along_sensors
-from rotordrop.measurement.events import DropInstant
-from rotordrop.measurement.preprocess import LevitatedModel
+from rotordrop.measurement.levitated import LevitatedModel
 from rotordrop.measurement.record import Record
+from rotordrop.measurement.speed import RotorAngle
 from rotordrop.model.parameters import DropModel
 
 Array = NDArray[np.float64]
@@ -50,6 +51,8 @@ class InitialState:
         Displacements along the sensors at rest [m], from which deviations count.
     levitated : LevitatedModel
         Readings before the drop: hum and 2X runout are taken off with it.
+    angle : RotorAngle
+        Rotor angle over the record.
     unknowns : Unknowns
         Where each unknown is in `mean`.
     mean, covariance : ndarray, shapes (n,), (n, n)
@@ -75,6 +78,7 @@ class InitialState:
     sensors: tuple[Sensor, ...]
     rest_along: Array
     levitated: LevitatedModel
+    angle: RotorAngle
     unknowns: Unknowns
     mean: Array
     covariance: Array
@@ -119,7 +123,7 @@ class InitialState:
 
     def deviation_of(self, record: Record) -> Array:
         """Displacements along the sensors from rest, hum and 2X runout taken off [m], shape (N, S)."""
-        return deviations(record, self.rest_along, self.levitated, self.drop_instant)
+        return deviations(record, self.rest_along, self.levitated, self.angle)
 
     def square_root(self) -> Array:
         """Matrix L with L Lᵀ the covariance, shape (n, n); a draw is ``mean + L @ standard_normal``."""
@@ -167,43 +171,39 @@ def end_of_fall(time: Array, place: Array, gaps: Array) -> float:
 
 
 def fit_initial_state(
-    record: Record,
-    rest: SettledRest,
-    drop: DropInstant,
-    gaps: Array,
-    model: DropModel,
-    sensing: Sensing,
-    *,
-    speed: float,
+    evidence: Evidence, rest: SettledRest, gaps: Array, model: DropModel, sensing: Sensing
 ) -> InitialState:
     """Initial state by a fit over the fall, with covariance.
 
     Parameters
     ----------
-    record : Record
-        Readings from before power-off to the first contact at least.
+    evidence : Evidence
+        Readings from before power-off to the first contact at least, power-off and the levitated motion.
     rest : SettledRest
         Rest position; displacements count from it, so that zero errors of the sensors drop out.
-    drop : DropInstant
-        Power-off, and the levitated motion before it.
     gaps : ndarray, shape (B,)
         Air gaps [m], to see where the fall ends.
     model, sensing
         The rotor and what the sensors see of it.
-    speed : float
-        Rotor speed [rad/s].
 
     Raises
     ------
     IdentificationError
-        If the rotor never comes near the air gap, or the fall has too few samples.
+        If the record begins with the fall, the rotor never comes near the air gap, or the fall has too few
+        samples.
 
     Notes
     -----
     Source: own method after Neisi 2020, section 3.1. Differs from the paper: the paper expands the state at
     one instant in the rigid modes.
     """
-    time = record.time - drop.value
+    record, levitated = evidence.record, evidence.levitated
+    if levitated is None:
+        raise IdentificationError(
+            f"{record.name} begins with the fall; expected the levitated rotor before it. Record with "
+            "pre-trigger."
+        )
+    time = evidence.time
     along = displacements_along(record)
     shifted = along - rest.along + settled_along(rest, sensing)
     end = end_of_fall(time, sensing.at_bearings(shifted), gaps)
@@ -214,9 +214,10 @@ def fit_initial_state(
             f"{1e3 * end:.3g} ms; at "
             f"least {FEWEST_SAMPLES} are needed for the initial state. Sample faster, or check the air gap."
         )
-    fall = build_free_fall(model, speed, unbalance_nodes(model.machine))
-    evidence = _evidence(record, rest, drop, inside)
-    problem = FallFit(fall, sensing, evidence, settled_along(rest, sensing), model, drop.standard_error)
+    fall = build_free_fall(model, evidence.speed.initial, unbalance_nodes(model.machine))
+    readings = _fall_readings(evidence, levitated, rest, inside)
+    known_to = evidence.power_off.standard_error
+    problem = FallFit(fall, sensing, readings, settled_along(rest, sensing), model, known_to)
     mean, covariance, misfit = problem.solve()
     shift = 1e-3 * mean[problem.unknowns.shift]
     return InitialState(
@@ -224,15 +225,16 @@ def fit_initial_state(
         sensing=sensing,
         sensors=record.sensors,
         rest_along=rest.along,
-        levitated=drop.levitated,
+        levitated=levitated,
+        angle=evidence.angle,
         unknowns=problem.unknowns,
         mean=mean,
         covariance=covariance * max(misfit, 1.0),
         settled=problem.settled,
-        drop_instant=drop.value + float(shift),
+        drop_instant=evidence.power_off.value + float(shift),
         drop_instant_error=float(1e-3 * np.sqrt(covariance[problem.unknowns.shift, problem.unknowns.shift])),
         end=end - float(shift),
-        noise=evidence.noise,
+        noise=readings.noise,
         misfit=misfit,
         samples=int(inside.sum()),
         notes=_notes(model, misfit),
@@ -254,28 +256,28 @@ def _notes(model: DropModel, misfit: float) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def deviations(record: Record, rest: Array, levitated: LevitatedModel, power_off: float) -> Array:
+def deviations(record: Record, rest: Array, levitated: LevitatedModel, angle: RotorAngle) -> Array:
     """Displacements along the sensors from rest (S,), hum and 2X runout taken off [m], shape (N, S).
 
     A levitated rotor on its orbit shows no 2X of its own: what is there is runout and turns on with the
     shaft.
     """
-    waves = 2.0 * np.pi * np.asarray(levitated.tones)[1:]
-    own = np.exp(1j * waves * power_off)[:, None] * levitated.amplitudes[1:]
-    since = np.exp(1j * np.outer(record.time - power_off, waves))
     gain = np.array([float(sensor.gain) for sensor in record.sensors])
-    return np.asarray(displacements_along(record) - (since @ own).real * gain - rest)
+    disturbance = levitated.disturbance(record.time, angle) * gain
+    return np.asarray(displacements_along(record) - disturbance - rest)
 
 
-def _evidence(record: Record, rest: SettledRest, drop: DropInstant, inside: NDArray[np.bool_]) -> Evidence:
-    levitated = drop.levitated
+def _fall_readings(
+    evidence: Evidence, levitated: LevitatedModel, rest: SettledRest, inside: NDArray[np.bool_]
+) -> FallReadings:
+    record = evidence.record
     turning = 2.0 * np.pi * levitated.tones[0]
-    turned = np.exp(1j * turning * drop.value) * levitated.amplitudes[0]
+    turned = np.exp(1j * turning * evidence.power_off.value) * levitated.amplitudes[0]
     gain = np.array([float(sensor.gain) for sensor in record.sensors])
     orbit = along_sensors((levitated.mean + turned.real)[None, :], record.sensors)[0]
-    return Evidence(
-        time=record.time[inside] - drop.value,
-        deviation=deviations(record, rest.along, levitated, drop.value)[inside],
+    return FallReadings(
+        time=evidence.time[inside],
+        deviation=deviations(record, rest.along, levitated, evidence.angle)[inside],
         noise=np.maximum(levitated.noise * gain, 1e-9),
         orbit=orbit - rest.along,
         orbit_velocity=(1j * turning * turned).real * gain,

@@ -51,8 +51,12 @@ class Plane:
 def sensor_directions(sensors: Sequence[Sensor]) -> Array:
     """Unit vectors (x, y) along which the sensors read positive, shape (S, 2)."""
     angles = np.array([float(sensor.angle) for sensor in sensors])
-    polarity = np.array([sensor.polarity for sensor in sensors], dtype=np.float64)
-    return np.asarray(polarity[:, None] * np.column_stack([np.cos(angles), np.sin(angles)]))
+    return np.asarray(sensor_polarity(sensors)[:, None] * np.column_stack([np.cos(angles), np.sin(angles)]))
+
+
+def sensor_polarity(sensors: Sequence[Sensor]) -> Array:
+    """Sign of each sensor's reading in the direction of its angle, shape (S,): 1 or -1."""
+    return np.array([sensor.polarity for sensor in sensors], dtype=np.float64)
 
 
 def along_sensors(signals: Array, sensors: Sequence[Sensor]) -> Array:

@@ -11,7 +11,8 @@ from rotordrop.errors import RecordError
 from rotordrop.estimated import NINETY
 from rotordrop.measurement.axes import Plane, along_sensors, planar_of, sensor_planes
 from rotordrop.measurement.fall import Fall, fit_fall
-from rotordrop.measurement.preprocess import LevitatedModel, acceleration, fit_levitated
+from rotordrop.measurement.levitated import LevitatedModel, fit_levitated
+from rotordrop.measurement.preprocess import acceleration
 from rotordrop.measurement.recording import Array
 from rotordrop.measurement.release import free_rotor
 from rotordrop.measurement.speed import require_speed
@@ -49,7 +50,7 @@ class DropInstant:
     fall : Fall
         The fit behind it, with remanent lift and misfit.
     levitated : LevitatedModel
-        Readings before the drop.
+        Readings of all sensors before the drop.
     notes : tuple of str
         What to know about this value.
     """
@@ -108,10 +109,10 @@ def find_drop_instant(record: Record, machine: Machine) -> DropInstant:
     RecordError
         When the rotor does not fall in the record, or the record does not begin before the fall.
     """
-    record, planes = with_whole_planes(record)
-    coarse = coarse_drop(record, machine, planes)
+    whole, planes = with_whole_planes(record)
+    coarse = coarse_drop(whole, machine, planes)
     levitated = fit_levitated(record, coarse.instant - _UNSURE, speed=coarse.speed)
-    fall = find_fall(record, machine, planes, levitated, coarse)
+    fall = find_fall(whole, machine, planes, levitated.of_channels(_columns(whole, record)), coarse)
     return _instant(fall, levitated, record)
 
 
@@ -128,6 +129,11 @@ def with_whole_planes(record: Record) -> tuple[Record, tuple[Plane, ...]]:
         return record, sensor_planes(record.sensors)
     sensors = tuple(record.sensors[i] for i in whole)
     return replace(record, signals=record.signals[:, whole], sensors=sensors), sensor_planes(sensors)
+
+
+def _columns(part: Record, record: Record) -> list[int]:
+    """Columns of a record that a record with some of its sensors holds."""
+    return [record.sensors.index(sensor) for sensor in part.sensors]
 
 
 def _resolved(node: int, record: Record) -> bool:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rotordrop.estimated import NINETY
 from rotordrop.measurement.axes import Plane, sensor_directions
-from rotordrop.measurement.preprocess import LevitatedModel
+from rotordrop.measurement.levitated import LevitatedModel
 from rotordrop.measurement.recording import Array
 from rotordrop.measurement.release import (
     ComplexArray,

@@ -21,6 +21,9 @@ from rotordrop.measurement.speed import readings_of_held_signal
 from rotordrop.measurement.writers import recording_of, write_hdf5
 from rotordrop.units import format_quantity, parse_quantity
 
+SPEED_SOURCE, BY_HAND = "speed_source", "given by hand"
+"""Header entry of a saved record whose speed nobody measured."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Record:
@@ -40,6 +43,9 @@ class Record:
         Shaft speed [rad/s], between the readings by straight lines.
     speed_time, speed_readings : array, shape (K,), optional
         When the speed was read [s] and what was read [rad/s].
+    speed_by_hand : bool
+        Whether somebody gave the speed: it then holds until the magnetic bearings let go, and nothing is
+        known of it afterwards.
     path : Path, optional
         Where the record comes from.
     sha256 : str
@@ -59,6 +65,7 @@ class Record:
     speed: Array | None = None
     speed_time: Array | None = None
     speed_readings: Array | None = None
+    speed_by_hand: bool = False
     path: Path | None = None
     sha256: str = ""
     metadata: Mapping[str, str] = field(default_factory=dict)
@@ -80,6 +87,18 @@ class Record:
     def channel_names(self) -> tuple[str, ...]:
         """Names of the columns of `signals`, as the machine names its sensors."""
         return tuple(sensor.name for sensor in self.sensors)
+
+    @property
+    def measured_speed(self) -> tuple[Array, Array] | None:
+        """When the speed was read [s] and what was read [rad/s]; None without readings or given by hand.
+
+        A column that repeats one speed to the last digit over a drop was not measured either.
+        """
+        if self.speed_by_hand or self.speed_time is None or self.speed_readings is None:
+            return None
+        if np.ptp(self.speed_readings) == 0.0 and self.speed_readings[0] != 0.0:
+            return None
+        return self.speed_time, self.speed_readings
 
     @property
     def name(self) -> str:
@@ -177,6 +196,7 @@ def record_of(
         speed=speed,
         speed_time=speed_time,
         speed_readings=speed_readings,
+        speed_by_hand=profile.speed.constant is not None or recording.metadata.get(SPEED_SOURCE) == BY_HAND,
         path=path,
         sha256=sha256,
         metadata=recording.metadata,
@@ -244,6 +264,8 @@ def save_record(record: Record, path: str | Path) -> None:
     metadata = dict(record.metadata)
     if record.path is not None:
         metadata |= {"source": record.path.name, "source_sha256": record.sha256}
+    if record.speed_by_hand:
+        metadata[SPEED_SOURCE] = BY_HAND
     recording = recording_of(
         record.time,
         record.signals,

@@ -92,22 +92,24 @@ def settled_tail(record: Record, machine: Machine) -> SettledTail:
 
 def _standstill_begins(record: Record) -> float:
     """Time of the last speed reading above standstill [s]; the begin of a record without speed."""
-    if record.speed_readings is None or record.speed_time is None:
+    measured = record.measured_speed
+    if measured is None:
         return float(record.time[0])
-    turning = np.flatnonzero(np.abs(record.speed_readings) > STANDSTILL)
+    speed_time, readings = measured
+    turning = np.flatnonzero(np.abs(readings) > STANDSTILL)
     if not len(turning):
         return float(record.time[0])
     last = int(turning[-1])
-    left = float(record.time[-1] - record.speed_time[last])
+    left = float(record.time[-1] - speed_time[last])
     if left < _SHORTEST:
-        speed = format_quantity(float(abs(record.speed_readings[last])), "speed")
+        speed = format_quantity(float(abs(readings[last])), "speed")
         raise RecordError(
             f"{record.name} does not reach standstill: the shaft still turns at {speed} at "
-            f"{record.speed_time[last]:.6g} s and the record ends at {record.time[-1]:.6g} s; give the "
+            f"{speed_time[last]:.6g} s and the record ends at {record.time[-1]:.6g} s; give the "
             "readings at "
             "standstill as a tail (--tail)"
         )
-    return float(record.speed_time[last])
+    return float(speed_time[last])
 
 
 def _swing(path: Array) -> Array:

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from rotordrop.measurement.record import Record
 
 
+BY_HAND_ERROR = 5e-3
+"""Relative standard error of a speed given by hand [1]: a name plate or a display says no more."""
+
 _FEW = 5
 _AFTER = 0.2
 
@@ -41,6 +44,89 @@ class SpeedAtDrop:
     slope: float
     scatter: float
     readings: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class RotorAngle:
+    """Angle of the rotor over a whole record, from the measured speed.
+
+    Up to power-off the rotor turns evenly. Afterwards the angle is the integral of the readings, shifted so
+    that they begin with the speed before; without readings it is known the less the more friction may have
+    taken.
+
+    Attributes
+    ----------
+    power_off : float
+        End of the even turning, in record time [s].
+    turning : float
+        Speed until then [rad/s].
+    knots : array, shape (K,)
+        Times from power-off on between which the speed changes evenly [s]; the first is power-off.
+    speed : array, shape (K,)
+        Speed there [rad/s].
+    slowing_error : float
+        Standard deviation of the deceleration after power-off where no speed was read [rad/s²].
+    """
+
+    power_off: float
+    turning: float
+    knots: Array
+    speed: Array
+    slowing_error: float = 0.0
+
+    def at(self, time: Array) -> tuple[Array, Array]:
+        """Angle [rad] at record times (N,), ``turning · time`` before power-off, and its deviation."""
+        steps = np.diff(self.knots)
+        turned = np.concatenate([[0.0], np.cumsum(0.5 * steps * (self.speed[1:] + self.speed[:-1]))])
+        slope = np.append(np.diff(self.speed) / steps, 0.0)
+        k = np.clip(np.searchsorted(self.knots, time, side="right") - 1, 0, len(self.knots) - 1)
+        since = time - self.knots[k]
+        after = turned[k] + since * (self.speed[k] + 0.5 * since * slope[k])
+        angle = self.turning * self.power_off + np.where(
+            time < self.power_off, self.turning * (time - self.power_off), after
+        )
+        free = np.maximum(time - self.power_off, 0.0)
+        return angle, 0.5 * self.slowing_error * free**2
+
+
+def rotor_angle(
+    record: Record, power_off: float, turning: float, *, strongest_slowing: float = 0.0
+) -> RotorAngle:
+    """Angle of the rotor over a record.
+
+    Parameters
+    ----------
+    record : Record
+        The record.
+    power_off : float
+        Power-off in record time [s].
+    turning : float
+        Speed before it, without sign [rad/s].
+    strongest_slowing : float
+        Deceleration that the friction of the touchdown bearings reaches at most [rad/s²]; used where no speed
+        was read after power-off: anything from none to that is taken as equally likely.
+    """
+    measured = record.measured_speed
+    later = measured is not None and np.flatnonzero((measured[0] > power_off) & np.isfinite(measured[1]))
+    if measured is None or not np.any(later):
+        slowing = 0.5 * strongest_slowing
+        end = max(float(record.time[-1]), power_off + 1e-3)
+        return RotorAngle(
+            power_off=power_off,
+            turning=turning,
+            knots=np.array([power_off, end]),
+            speed=np.array([turning, turning - slowing * (end - power_off)]),
+            slowing_error=strongest_slowing / float(np.sqrt(12.0)),
+        )
+    time, readings = measured
+    clean = np.abs(_without_outliers(readings[later]))
+    begin = abs(speed_at_drop(record, power_off).value)
+    return RotorAngle(
+        power_off=power_off,
+        turning=turning,
+        knots=np.concatenate([[power_off], time[later]]),
+        speed=np.concatenate([[turning], turning + clean - begin]),
+    )
 
 
 def readings_of_held_signal(time: Array, values: Array) -> tuple[Array, Array]:
@@ -95,6 +181,10 @@ def speed_at_drop(record: Record, drop: float, *, span: float = 0.5) -> SpeedAtD
         When the record has no speed near the drop.
     """
     time, readings = require_speed(record)
+    if record.speed_by_hand:
+        value = float(np.median(readings))
+        error = BY_HAND_ERROR * abs(value)
+        return SpeedAtDrop(value=value, standard_error=error, slope=0.0, scatter=0.0, readings=0)
     good = np.isfinite(readings)
     before = good & (time <= drop) & (time >= drop - span)
     after = good & (time > drop) & (time <= drop + _AFTER)

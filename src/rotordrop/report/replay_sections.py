@@ -111,7 +111,7 @@ def agreement_section(drop: ReplayDrop) -> Section:
 def replay_speed_section(drop: ReplayDrop) -> Section:
     """Recorded and simulated speed with the time constants found."""
     histories = [History(label="simulated", time=drop.simulated.time, values=drop.simulated.speed)]
-    if drop.record.speed is not None:
+    if drop.record.speed is not None and drop.record.measured_speed is not None:
         time = drop.record.time - drop.drop_instant.value
         inside = (time >= 0.0) & (time <= drop.simulated.time[-1])
         measured = History(

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.errors import IdentificationError
 from rotordrop.estimated import NINETY, Estimated
 from rotordrop.model import layout as L
 from rotordrop.model.parameters import DropModel, static_deflection
@@ -18,7 +17,6 @@ from rotordrop.physics import aerodynamics
 from rotordrop.physics.ball_bearing import bearing_constants
 from rotordrop.tracking import _filter as F
 from rotordrop.tracking import _propagation as P
-from rotordrop.tracking.sensors import LevitatedPhase, levitated_phase, without_hum_and_runout
 from rotordrop.tracking.unknowns import parameter_targets
 
 Array = NDArray[np.float64]
@@ -32,6 +30,10 @@ BENDING_POSITION_SIGMA = 1.5e-6
 BENDING_VELOCITY_SIGMA = 1.5e-3
 SPEED_SIGMA = 0.5
 SPEED_READING_SIGMA = 1.0
+SPEED_SPACING = 2.5e-3
+"""Time between speed readings that count as independent [s]."""
+FIRST_READINGS = 0.49e-3
+"""Time after power-off whose mean reading says where the rotor is [s]."""
 NOISE_FLOOR = 0.1e-6
 USUAL_NOISE = 1e-6
 TAIL_VERTICAL_SIGMA = 0.7e-6
@@ -39,6 +41,35 @@ TAIL_HORIZONTAL_SIGMA = 25e-6
 SMOOTHED_FRICTION_SPEED = 0.15
 """Sliding speed [m/s] below which the filter smooths friction: the spin of a race is not known better, so the
 mean of the friction law over what is possible is what a linearisation may use."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordedDrop:
+    """What a record says of a drop, as the filter takes it; N samples, C channels.
+
+    Attributes
+    ----------
+    time : ndarray, shape (N,)
+        Time from power-off [s], evenly spaced.
+    readings : ndarray, shape (N, C)
+        Readings in the positive direction of each sensor [m], hum and 2X runout taken off; NaN where missing.
+    noise : ndarray, shape (C,)
+        Standard deviation of the noise [m]; NaN where the record does not say.
+    initial_speed, initial_speed_error : float
+        Rotor speed at power-off and its standard error [rad/s].
+    speed : ndarray, shape (N,)
+        Measured rotor speed [rad/s], NaN where nobody measured it.
+    tail_level : ndarray, shape (C,), or None
+        Mean readings of the settled tail in the positive direction of each sensor [m].
+    """
+
+    time: Array
+    readings: Array
+    noise: Array
+    initial_speed: float
+    initial_speed_error: float
+    speed: Array
+    tail_level: Array | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,7 +103,6 @@ class DropProblem:
     speed_variance: float
     mean: Array
     covariance: Array
-    levitated: LevitatedPhase
 
     @property
     def n_dynamic(self) -> int:
@@ -125,11 +155,8 @@ class DropProblem:
 
 def build_problem(
     model: DropModel,
-    time: Array,
-    readings: Array,
-    speed: Array,
+    drop: RecordedDrop,
     *,
-    tail_level: Array | None,
     until: float = 0.2,
     unknowns: tuple[Unknown, ...] | None = None,
 ) -> DropProblem:
@@ -139,52 +166,33 @@ def build_problem(
     ----------
     model : DropModel
         Drop model of the machine; its sensors define the channels.
-    time : ndarray, shape (N,)
-        Time from power-off [s], evenly spaced, with the levitated phase at negative times.
-    readings : ndarray, shape (N, C)
-        Readings [m], one column for each sensor of the machine, polarity removed.
-    speed : ndarray, shape (N,)
-        Rotor speed [rad/s]; NaN where unknown.
-    tail_level : ndarray, shape (C,), or None
-        Mean readings of the settled tail [m].
+    drop : RecordedDrop
+        What the record says.
     until : float
         End of the window [s].
     unknowns : tuple of Unknown, optional
         The parameters to estimate; all by default.
     """
     unknowns = all_unknowns(model) if unknowns is None else unknowns
-    known = np.isfinite(speed)
-    if not np.any(known):
-        raise IdentificationError(
-            "the record has no rotor speed; expected a speed channel or a given speed in Hz."
-        )
-    omega = (
-        float(np.median(speed[known & (time < 0.005)]))
-        if np.any(known & (time < 0.005))
-        else float(speed[known][0])
-    )
-    phase = levitated_phase(time, readings, omega)
-    clean = without_hum_and_runout(time, readings, omega * time, phase)
-    inside = (time >= 0.0) & (time <= until)
+    inside = (drop.time >= 0.0) & (drop.time <= until)
+    readings = drop.readings[inside]
     rows = sensor_rows(model)
-    variances = _variances(phase, readings[inside])
-    mean, covariance = _prior(model, unknowns, rows, clean[inside], omega)
+    mean, covariance = _prior(model, unknowns, rows, readings, drop)
     problem = DropProblem(
-        model=_prepared(model, omega),
+        model=_prepared(model, drop.initial_speed),
         unknowns=unknowns,
         targets=parameter_targets(model, unknowns),
-        time=time[inside],
-        readings=clean[inside],
-        speed=_thinned(speed[inside]),
+        time=drop.time[inside],
+        readings=readings,
+        speed=_thinned(drop.time[inside], drop.speed[inside]),
         sensor_rows=rows,
-        variances=variances,
+        variances=_variances(drop.noise, readings),
         speed_variance=SPEED_READING_SIGMA**2,
         mean=mean,
         covariance=covariance,
-        levitated=phase,
     )
-    if tail_level is not None:
-        apply_tail(problem, tail_level, problem.mean, problem.covariance)
+    if drop.tail_level is not None:
+        apply_tail(problem, drop.tail_level, problem.mean, problem.covariance)
     return problem
 
 
@@ -200,16 +208,17 @@ def _prepared(model: DropModel, omega: float) -> DropModel:
     return replace(model, parameters=p._replace(spin=spin, flags=flags, bearing=bearing))
 
 
-def _thinned(speed: Array, every: int = 50) -> Array:
+def _thinned(time: Array, speed: Array) -> Array:
     """Speed as a measurement now and then: its error is not white, so not every sample counts."""
     thin = np.full_like(speed, np.nan)
+    every = max(1, round(SPEED_SPACING / float(time[1] - time[0])))
     thin[::every] = speed[::every]
     return thin
 
 
-def _variances(phase: LevitatedPhase, readings: Array) -> Array:
+def _variances(noise: Array, readings: Array) -> Array:
     """Noise variance of each channel [m²]: from the levitated part, else from their roughness."""
-    noise = np.where(np.isfinite(phase.noise), phase.noise, rough_noise(readings))
+    noise = np.where(np.isfinite(noise), noise, rough_noise(readings))
     noise[~np.isfinite(noise)] = USUAL_NOISE
     return np.asarray(noise**2 + NOISE_FLOOR**2)
 
@@ -241,7 +250,7 @@ def sensor_rows(model: DropModel) -> Array:
 
 
 def _prior(
-    model: DropModel, unknowns: tuple[Unknown, ...], rows: Array, readings: Array, omega: float
+    model: DropModel, unknowns: tuple[Unknown, ...], rows: Array, readings: Array, drop: RecordedDrop
 ) -> tuple[Array, Array]:
     """Prior mean and covariance of the whole estimate at power-off."""
     layout = model.layout
@@ -249,13 +258,13 @@ def _prior(
     mean = np.zeros(s + n_p + 4 * n_c)
     sigma = np.zeros_like(mean)
     mean[:s] = model.at_rest()[:s]
-    _rotor_prior(model, rows, readings, mean, sigma)
+    _rotor_prior(model, rows, _first_level(drop.time[drop.time >= 0.0], readings), mean, sigma)
     for part in (layout.race, layout.support):
         sigma[part] = 0.1e-6
         sigma[layout.velocity_of(part)] = 1e-4
     sigma[layout.race_spin] = 0.3
-    mean[layout.rotor_speed] = omega
-    sigma[layout.rotor_speed] = SPEED_SIGMA
+    mean[layout.rotor_speed] = drop.initial_speed
+    sigma[layout.rotor_speed] = math.hypot(SPEED_SIGMA, drop.initial_speed_error)
     for i, unknown in enumerate(unknowns):
         mean[s + i], sigma[s + i] = unknown.mean, unknown.sigma
     for c, sensor in enumerate(model.machine.sensors):
@@ -273,7 +282,7 @@ def _sensor_sigma(quantity: Estimated, default: float) -> float:
     return default if quantity.standard_error is None else quantity.standard_error
 
 
-def _rotor_prior(model: DropModel, rows: Array, readings: Array, mean: Array, sigma: Array) -> None:
+def _rotor_prior(model: DropModel, rows: Array, level: Array, mean: Array, sigma: Array) -> None:
     layout, basis = model.layout, model.basis
     weight = np.sqrt(model.fe.total_mass)
     frequency = np.sqrt(np.maximum(basis.eigenvalues, 0.0))
@@ -285,7 +294,7 @@ def _rotor_prior(model: DropModel, rows: Array, readings: Array, mean: Array, si
     amplitude[: basis.n_rigid] = 0.0
     mean[layout.modal_y] = amplitude
     rigid = slice(0, basis.n_rigid)
-    observed = _first_level(readings) - rows[:, : mean.size][:, layout.modal_y] @ amplitude
+    observed = level - rows[:, : mean.size][:, layout.modal_y] @ amplitude
     design = np.hstack([rows[:, layout.modal_x][:, rigid], rows[:, layout.modal_y][:, rigid]])
     seen = np.isfinite(observed)
     fitted, *_ = np.linalg.lstsq(design[seen], observed[seen], rcond=None)
@@ -300,9 +309,9 @@ def _rotor_prior(model: DropModel, rows: Array, readings: Array, mean: Array, si
         sigma[layout.velocity_of(part)] = velocity
 
 
-def _first_level(readings: Array, samples: int = 10) -> Array:
+def _first_level(time: Array, readings: Array) -> Array:
     """Mean of the first readings of every channel [m]; NaN where there is none."""
-    first = readings[:samples]
+    first = readings[time[: len(readings)] < time[0] + FIRST_READINGS]
     known = np.isfinite(first)
     if known.all():
         return np.asarray(first.mean(axis=0))

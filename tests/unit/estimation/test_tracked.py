@@ -39,6 +39,7 @@ from rotordrop.estimation.tracked_values import (
 )
 from rotordrop.machine import Machine, example_machine
 from rotordrop.measurement.examples import example_record_path
+from rotordrop.measurement.power_off import PowerOff
 from rotordrop.measurement.record import Record, read_record
 from rotordrop.model.parameters import build_drop_model
 from rotordrop.synthesis import SyntheticDrop, hidden_machine, synthesize_drop
@@ -226,8 +227,18 @@ def test_without_tail_and_levitated_part_less_is_known(
         signals=record.signals[kept],
         speed=None if record.speed is None else record.speed[kept],
     )
-    drop = followed(calibrated, prepare(calibrated, cut, None, "cut", quick.drop_instant))
-    assert drop.problem.levitated.samples == 0
+    known = quick.drop_instant
+    instant = PowerOff(
+        value=known.value,
+        standard_error=known.standard_error,
+        interval_90=known.interval_90,
+        contact=known.contact,
+        method="given",
+        notes=(),
+    )
+    item = prepare(calibrated, cut, None, "cut", instant)
+    assert item.evidence.levitated is None
+    drop = followed(calibrated, item)
     assert_right(drop, calibrated, synthetic, factor=2.0)
     offsets = slice(drop.problem.n_dynamic + len(drop.problem.unknowns) + 4, None)
     variance = [np.diag(one.smoothed.covariance(0))[offsets][:4] for one in (drop, quick)]
@@ -262,10 +273,9 @@ def test_sensor_planes_elsewhere_than_stated_are_flagged_and_intervals_widened(
 
 
 def test_a_record_without_speed_is_refused(calibrated: Machine, synthetic: SyntheticDrop) -> None:
-    item = prepare(calibrated, synthetic.record, None, "mute")
-    mute = replace(item, record=replace(synthetic.record, speed=None))
+    mute = replace(synthetic.record, speed=None, speed_time=None, speed_readings=None)
     with pytest.raises(IdentificationError, match="the record mute has no rotor speed; expected one"):
-        drop_problem(build_drop_model(calibrated, "quick"), mute)
+        prepare(calibrated, mute, None, "mute")
 
 
 def test_as_many_tails_as_records_are_needed(calibrated: Machine, synthetic: SyntheticDrop) -> None:

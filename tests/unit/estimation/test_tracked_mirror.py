@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from rotordrop.estimation.tracked import COARSE_BASIS, prepare
+from rotordrop.estimation.tracked import COARSE_BASIS, prepare, recorded_drop
 from rotordrop.machine import Machine
 from rotordrop.model.parameters import build_drop_model
 from rotordrop.synthesis import SyntheticDrop
@@ -30,20 +31,10 @@ def mirrored(machine: Machine) -> Machine:
 
 
 def first_impacts(machine: Machine, drop: SyntheticDrop, spin: float) -> ForceHistory:
-    """Forces over the first impacts, without the levitated part."""
-    item = prepare(machine, drop.record, drop.tail, "drop")
-    assert drop.record.speed is not None
-    time = drop.record.time - item.instant.value
-    inside = (time >= 0.0) & (time <= UNTIL)
-    polarity = np.array([float(sensor.polarity) for sensor in machine.sensors])
-    problem = build_problem(
-        build_drop_model(machine, COARSE_BASIS),
-        time[inside],
-        (drop.record.signals * polarity)[inside],
-        spin * drop.record.speed[inside],
-        tail_level=item.tail_level,
-        until=UNTIL,
-    )
+    """Forces over the first impacts."""
+    seen = recorded_drop(prepare(machine, drop.record, drop.tail, "drop"), UNTIL)
+    turned = replace(seen, initial_speed=spin * seen.initial_speed, speed=spin * seen.speed)
+    problem = build_problem(build_drop_model(machine, COARSE_BASIS), turned, until=UNTIL)
     smoothed = smooth(forward(problem, PassSettings(impulse=3e-3, share=0.03)), watched=problem.watched)
     return force_history(problem, smoothed)
 

@@ -10,6 +10,7 @@ import pytest
 
 from rotordrop.estimated import Estimated
 from rotordrop.identification.air_gap import SettledRest, find_rest, identify_air_gap
+from rotordrop.identification.evidence import Evidence, read_evidence
 from rotordrop.identification.initial_state import InitialState, fit_initial_state
 from rotordrop.identification.replica import Replica, build_replica
 from rotordrop.identification.sensing import Sensing, build_sensing
@@ -61,16 +62,19 @@ def instant(drop: SyntheticDrop, truth: Machine) -> DropInstant:
 
 
 @pytest.fixture(scope="session")
+def evidence(drop: SyntheticDrop, model: DropModel, instant: DropInstant) -> Evidence:
+    return read_evidence(model, drop.record, power_off=instant)
+
+
+@pytest.fixture(scope="session")
 def rest(drop: SyntheticDrop, sensing: Sensing) -> SettledRest:
     return find_rest(drop.record, drop.tail, sensing)
 
 
 @pytest.fixture(scope="session")
-def initial(
-    drop: SyntheticDrop, rest: SettledRest, instant: DropInstant, model: DropModel, sensing: Sensing
-) -> InitialState:
+def initial(rest: SettledRest, evidence: Evidence, model: DropModel, sensing: Sensing) -> InitialState:
     gaps = identify_air_gap(rest, model, sensing).value
-    return fit_initial_state(drop.record, rest, instant, gaps, model, sensing, speed=SPEED)
+    return fit_initial_state(evidence, rest, gaps, model, sensing)
 
 
 @pytest.fixture(scope="session")

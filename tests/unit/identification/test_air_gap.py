@@ -80,7 +80,7 @@ def test_record_that_ends_while_the_shaft_turns_is_refused(drop: SyntheticDrop, 
 
 
 def test_record_without_speed_is_refused(drop: SyntheticDrop, sensing: Sensing) -> None:
-    with pytest.raises(IdentificationError, match=r"has no shaft speed.*--tail"):
+    with pytest.raises(IdentificationError, match=r"has no measured shaft speed.*--tail"):
         find_rest(replace(drop.record, speed=None), None, sensing)
 
 

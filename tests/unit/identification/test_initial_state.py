@@ -9,11 +9,11 @@ import pytest
 
 from rotordrop.errors import IdentificationError
 from rotordrop.identification.air_gap import SettledRest
+from rotordrop.identification.evidence import Evidence
 from rotordrop.identification.initial_state import InitialState, end_of_fall, fit_initial_state, settled_along
 from rotordrop.identification.modal_expansion import expand_initial_state
 from rotordrop.identification.replica import transferred
 from rotordrop.identification.sensing import Sensing, displacements_along
-from rotordrop.measurement.events import DropInstant
 from rotordrop.model.parameters import DropModel, build_drop_model
 from rotordrop.synthesis import SyntheticDrop
 
@@ -113,9 +113,9 @@ def test_rotor_that_never_reaches_the_gap_is_refused() -> None:
 
 
 def test_fall_with_too_few_samples_is_refused(
-    drop: SyntheticDrop, rest: SettledRest, instant: DropInstant, model: DropModel, sensing: Sensing
+    rest: SettledRest, evidence: Evidence, model: DropModel, sensing: Sensing
 ) -> None:
-    record = drop.record
+    record = evidence.record
     coarse = replace(record, time=record.time[::16], signals=record.signals[::16], sampling_rate=1250.0)
     with pytest.raises(IdentificationError, match=r"\d samples between power-off and the first contact"):
-        fit_initial_state(coarse, rest, instant, np.array([25e-5, 25e-5]), model, sensing, speed=628.0)
+        fit_initial_state(replace(evidence, record=coarse), rest, np.array([25e-5, 25e-5]), model, sensing)

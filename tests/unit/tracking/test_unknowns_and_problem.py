@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rotordrop.errors import IdentificationError
 from rotordrop.estimated import NINETY, Estimated
-from rotordrop.estimation.tracked import COARSE_BASIS, drop_problem, prepare
+from rotordrop.estimation.tracked import COARSE_BASIS, drop_problem, prepare, recorded_drop
 from rotordrop.machine import Machine
+from rotordrop.measurement.record import read_record
 from rotordrop.model.parameter_table import parameter
 from rotordrop.model.parameters import build_drop_model
 from rotordrop.model.reduction import Reduction
@@ -23,10 +25,8 @@ from rotordrop.tracking.problem import (
     OFFSET_SIGMA,
     TAIL_VERTICAL_SIGMA,
     apply_tail,
-    build_problem,
     settled_displacement,
 )
-from rotordrop.tracking.sensors import levitated_phase, without_hum_and_runout
 from rotordrop.tracking.transfer import transferred
 
 
@@ -163,17 +163,15 @@ def test_the_rotor_starts_where_the_sensors_see_it_with_its_computed_sag(flight)
 
 
 def test_a_record_without_speed_is_refused(model, prepared):
-    record = prepared.record
+    mute = replace(prepared.record, speed=None, speed_time=None, speed_readings=None)
     with pytest.raises(IdentificationError, match=r"the record drop_060 has no rotor speed.*profile"):
-        drop_problem(model, replace(prepared, record=replace(record, speed=None)))
-    n = 100
-    with pytest.raises(IdentificationError, match="no rotor speed; expected a speed channel"):
-        build_problem(model, np.arange(n) * 5e-5, np.zeros((n, 4)), np.full(n, np.nan), tail_level=None)
+        prepare(model.machine, mute, None, "drop_060")
 
 
-def test_the_noise_of_the_levitated_part_is_that_of_the_channels(flight):
-    np.testing.assert_allclose(flight.variances, flight.levitated.noise**2 + NOISE_FLOOR**2)
-    assert np.all((flight.levitated.noise > 0.2e-6) & (flight.levitated.noise < 1e-6))
+def test_the_noise_of_the_levitated_part_is_that_of_the_channels(flight, prepared):
+    noise = prepared.evidence.noise(0.003)
+    np.testing.assert_allclose(flight.variances, noise**2 + NOISE_FLOOR**2)
+    assert np.all((noise > 0.2e-6) & (noise < 1e-6))
 
 
 # the settled tail
@@ -251,7 +249,11 @@ def test_a_single_sensor_in_a_plane_cannot_tell_height_from_aside(lp400, prepare
     record = prepared.record
     prepared = replace(
         prepared,
-        record=replace(record, signals=record.signals[:, :3].copy(), sensors=three.sensors),
+        evidence=replace(
+            prepared.evidence,
+            record=replace(record, signals=record.signals[:, :3].copy(), sensors=three.sensors),
+            levitated=prepared.evidence.levitated.of_channels(range(3)),
+        ),
         tail_level=None,
     )
     problem = drop_problem(build_drop_model(three, COARSE_BASIS), prepared, until=0.003)
@@ -284,78 +286,37 @@ def test_a_tail_at_the_end_of_a_long_record_is_found(lp400, prepared):
     assert short.tail_level is None
 
 
-# the levitated phase
+# what the record says
 
 
-def levitated_readings(random, omega):
-    time = np.arange(-0.25, 0.05, 5e-5)
-    level = np.array([3e-6, -7e-6])
-    once = np.array([5e-6 * np.exp(0.4j), 2e-6 * np.exp(-2.0j)])
-    twice = np.array([0.8e-6 * np.exp(1.2j), 1.5e-6])
-    hum = np.array([1.1e-6 * np.exp(-0.7j), 0.4e-6j])
-    turn = np.exp(1j * omega * time)[:, None]
-    clean = level + (once * turn).real
-    errors = (twice * turn**2).real + (hum * np.exp(2j * np.pi * 50.0 * time)[:, None]).real
-    noise = np.array([0.3e-6, 0.6e-6]) * random.standard_normal((len(time), 2))
-    return time, clean, errors, noise, (level, once, twice, hum)
+@pytest.fixture(scope="module")
+def fast(lp400):
+    """A short drop at 150 Hz and what it says."""
+    path = Path(__file__).parents[1] / "measurement" / "recordings" / "drop_150_short.h5"
+    return prepare(lp400, read_record(path, lp400), None, "fast")
 
 
-def test_level_orbit_runout_hum_and_noise_are_found(random):
-    omega = 2 * np.pi * 66.0
-    time, clean, errors, noise, (level, once, twice, hum) = levitated_readings(random, omega)
-    readings = clean + errors + noise
-    readings[time >= 0.0] += 1e-3  # what comes after power-off is not looked at
-    found = levitated_phase(time, readings, omega)
-    assert found.samples == np.count_nonzero(time < -0.5e-3)
-    tolerance = 4.0 * noise.std() * math.sqrt(2.0 / found.samples)
-    np.testing.assert_allclose(found.level, level, atol=tolerance)
-    for name, expected in (("synchronous", once), ("twice", twice), ("hum", hum)):
-        np.testing.assert_allclose(getattr(found, name), expected, atol=tolerance, err_msg=name)
-    np.testing.assert_allclose(found.noise, [0.3e-6, 0.6e-6], rtol=0.05)
+def test_hum_at_60_hz_is_no_noise_of_the_twin(lp400, fast):
+    """1.5 µm of it once stayed in the readings and counted as 1.1 µm of noise."""
+    record = fast.record
+    hum = 1.5e-6 * np.cos(2.0 * np.pi * 60.0 * record.time[:, None] + np.arange(4))
+    noisy = replace(record, signals=record.signals + hum)
+    found, plain = (recorded_drop(prepare(lp400, one, None, "fast"), 0.1) for one in (noisy, record))
+    np.testing.assert_allclose(found.noise, plain.noise, rtol=0.02)
+    assert np.abs(found.readings - plain.readings).max() < 0.25e-6
 
 
-def test_hum_and_2x_are_removed_and_the_orbit_stays(random):
-    omega = 2 * np.pi * 66.0
-    time, clean, errors, noise, _ = levitated_readings(random, omega)
-    found = levitated_phase(time, clean + errors + noise, omega)
-    left = without_hum_and_runout(time, clean + errors, omega * time, found)
-    assert np.abs(left - clean).max() < 0.15e-6
-    assert np.abs(errors).max() > 1e-6
-
-
-def test_hum_next_to_the_rotor_speed_is_left_to_it(random):
-    omega = 2 * np.pi * 50.5
-    time, clean, errors, noise, _ = levitated_readings(random, omega)
-    found = levitated_phase(time, clean + errors + noise, omega)
-    assert np.all(found.hum == 0.0)
-
-
-def test_without_a_levitated_part_nothing_is_claimed(random):
-    omega = 2 * np.pi * 66.0
-    time, clean, errors, noise, _ = levitated_readings(random, omega)
-    readings = clean + errors + noise
-    late = time >= -0.01
-    found = levitated_phase(time[late], readings[late], omega)
-    assert found.samples == 0
-    assert np.all(np.isnan(found.noise))
-    assert without_hum_and_runout(time[late], readings[late], omega * time[late], found) is readings[
-        late
-    ] or (
-        np.array_equal(
-            without_hum_and_runout(time[late], readings[late], omega * time[late], found), readings[late]
-        )
+def test_a_speed_given_by_hand_is_no_reading_after_power_off(lp400, fast):
+    nominal = replace(
+        fast.record,
+        speed=np.full(len(fast.record.time), 2.0 * np.pi * 150.2),
+        speed_time=fast.record.time[[0, -1]],
+        speed_readings=np.full(2, 2.0 * np.pi * 150.2),
+        speed_by_hand=True,
     )
-
-
-def test_missing_readings_before_power_off_do_not_spoil_the_fit(random):
-    omega = 2 * np.pi * 66.0
-    time, clean, errors, noise, (level, once, _, _) = levitated_readings(random, omega)
-    readings = clean + errors + noise
-    readings[100:400, 0] = np.nan
-    found = levitated_phase(time, readings, omega)
-    np.testing.assert_allclose(found.level, level, atol=0.05e-6)
-    np.testing.assert_allclose(found.synchronous, once, atol=0.06e-6)
-    np.testing.assert_allclose(found.noise, [0.3e-6, 0.6e-6], rtol=0.06)
+    found, plain = (recorded_drop(prepare(lp400, one, None, "fast"), 0.1) for one in (nominal, fast.record))
+    assert np.all(np.isnan(found.speed)) and np.any(np.isfinite(plain.speed))
+    assert found.initial_speed == pytest.approx(plain.initial_speed, abs=0.1)  # the orbit says it
 
 
 # from one basis to another

@@ -15,7 +15,7 @@ import numpy as np
 from rotordrop.errors import RecordError
 from rotordrop.measurement.axes import sensor_planes
 from rotordrop.measurement.events import coarse_drop
-from rotordrop.measurement.preprocess import LevitatedModel, fit_levitated
+from rotordrop.measurement.levitated import LevitatedModel, fit_levitated
 from rotordrop.measurement.quality.arrangement import check_planes, fall_of
 from rotordrop.measurement.quality.channels import check_channels
 from rotordrop.measurement.quality.clock import check_blocks, check_clock

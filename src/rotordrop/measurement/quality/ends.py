@@ -18,7 +18,7 @@ from rotordrop.estimated import Estimated
 from rotordrop.measurement.axes import Plane
 from rotordrop.measurement.events import CoarseDrop, find_fall
 from rotordrop.measurement.fall import Fall
-from rotordrop.measurement.preprocess import LevitatedModel
+from rotordrop.measurement.levitated import LevitatedModel
 from rotordrop.measurement.quality.finding import Finding
 
 if TYPE_CHECKING:

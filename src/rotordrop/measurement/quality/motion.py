@@ -10,7 +10,7 @@ import numpy as np
 from rotordrop.errors import RecordError
 from rotordrop.measurement.axes import Plane
 from rotordrop.measurement.events import FALLEN_SHARE, gap_of
-from rotordrop.measurement.preprocess import LevitatedModel
+from rotordrop.measurement.levitated import LevitatedModel
 from rotordrop.measurement.quality.finding import Finding
 from rotordrop.measurement.recording import Array
 from rotordrop.units import format_quantity
@@ -222,13 +222,12 @@ def check_length(record: Record, drop: float, has_tail: bool) -> list[Finding]:
                 time=float(record.time[-1]),
             )
         )
-    turning = record.speed is not None and abs(float(record.speed[-1])) > 2 * np.pi
-    if turning and not has_tail:
-        assert record.speed is not None
+    measured = record.measured_speed
+    if measured is not None and abs(float(measured[1][-1])) > 2 * np.pi and not has_tail:
         findings.append(
             Finding(
                 kind="record ends before standstill",
-                message=f"the shaft still turns at {format_quantity(abs(float(record.speed[-1])), 'speed')} "
+                message=f"the shaft still turns at {format_quantity(abs(float(measured[1][-1])), 'speed')} "
                 "at "
                 f"{record.time[-1]:.6g} s",
                 remedy="give the readings at standstill with --tail: the air gap is found from them",
