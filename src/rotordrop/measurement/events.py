@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotordrop.errors import RecordError
 from rotordrop.estimated import NINETY
@@ -24,6 +25,10 @@ if TYPE_CHECKING:
 
 FALLEN_SHARE = 0.35
 """A rotor that sank by this share of the air gap has been dropped."""
+
+NEAREST_CONTACT = 0.6
+"""A rotor closer than this to where it levitated, in nominal air gaps, touches nothing: what shakes it there
+is its own bending after the release."""
 
 MODEL_ERROR = 1.5e-5
 """Standard uncertainty of the drop instant by what the release model leaves out [s]."""
@@ -215,8 +220,15 @@ def coarse_drop(record: Record, machine: Machine, planes: tuple[Plane, ...]) -> 
         )
     before = speed_time < instant
     speed = float(np.median(readings[before])) if before.any() else float(readings[0])
-    contact = first_sudden(record, shape, float(machine.gravity), instant, sunk)
+    far = np.hypot(*np.moveaxis(shape - np.mean(shape[:first], axis=0), -1, 0)) > NEAREST_CONTACT * gaps
+    contact = first_sudden(record, shape, float(machine.gravity), instant, max(sunk, _first(far)))
     return CoarseDrop(instant=float(instant), sunk=float(record.time[sunk]), contact=contact, speed=speed)
+
+
+def _first(far: NDArray[np.bool_]) -> int:
+    """First sample at which any plane (N, P) is far, or the last one."""
+    at = np.flatnonzero(far.any(axis=1))
+    return int(at[0]) if len(at) else len(far) - 1
 
 
 def gap_of(machine: Machine, plane: Plane) -> float:

@@ -41,6 +41,9 @@ _GOOD = 2.0
 _STILL_FREE = 4.0
 """Mean square over the noise up to which the newest samples count as free fall."""
 
+_STARTS = (0.0, -0.7, 0.6, -1.4, 1.2)
+"""Where the search for the release begins, from the first guess [ms]; the later ones only when needed."""
+
 _LEAD = 5e-3
 """Levitated samples kept before the earliest release [s]."""
 
@@ -175,23 +178,63 @@ def fit_fall(
         First guess of the release, a time that is surely in free fall, and the latest end of it [s].
     """
     origin, surely, latest = window
-    problem = _problem(record, rotor, levitated, planes, (origin, min(surely, latest)))
-    best = _from_several_starts(problem)
+
+    def until(end: float) -> _Problem:
+        return _problem(record, rotor, levitated, planes, (origin, end))
+
+    first = until(min(surely, latest))
+    # A short window has several minima: the lost lift begins a little earlier or later, and a turning force
+    # with another phase takes up the rest. One that is wrong shows when the window grows, so every start
+    # grows by itself, and the one that describes the longest fall at noise level is the release.
+    grown = None
+    for offset in _STARTS:
+        found = _grown(first, _search(first, np.array([offset, np.log(REMANENT_TIME[0])])), until, latest)
+        if grown is None or found.rank > grown.rank:
+            grown = found
+        if grown.is_whole(latest):
+            break
+    assert grown is not None
+    gain = np.array([float(sensor.gain) for sensor in record.sensors])
+    return _fall(grown.problem, grown.best, levitated, gain)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Grown:
+    """A search whose window has grown as far as the readings fall freely."""
+
+    problem: _Problem
+    best: tuple[Array, float, Array]
+
+    @property
+    def misfit(self) -> float:
+        """Mean square of the residual over the noise, priors included."""
+        return 2.0 * self.best[1] / self.problem.deviation.size
+
+    @property
+    def rank(self) -> tuple[bool, float, float]:
+        """Better is larger: at noise level, over a longer fall, with less residual."""
+        good = self.misfit <= _GOOD
+        return good, float(self.problem.time[-1]) if good else 0.0, -self.misfit
+
+    def is_whole(self, latest: float) -> bool:
+        """Whether everything up to the latest end is explained at noise level."""
+        return self.misfit <= _GOOD and float(self.problem.time[-1]) + _GROWTH > latest
+
+
+def _grown(
+    problem: _Problem,
+    best: tuple[Array, float, Array],
+    until: Callable[[float], _Problem],
+    latest: float,
+) -> _Grown:
+    """Lengthen the window while its newest samples are those of a free fall."""
     while problem.time[-1] + _GROWTH <= latest:
-        longer = _problem(record, rotor, levitated, planes, (origin, float(problem.time[-1]) + _GROWTH))
+        longer = until(float(problem.time[-1]) + _GROWTH)
         found = _search(longer, best[0])
         if longer.newest_misfit(found[0]) > _STILL_FREE:
             break
         problem, best = longer, found
-    return _fall(problem, best, levitated, np.array([float(sensor.gain) for sensor in record.sensors]))
-
-
-def _from_several_starts(problem: _Problem) -> tuple[Array, float, Array]:
-    """Search from the first guess; from earlier and later ones too when that does not end at noise level."""
-    found = [_search(problem, np.array([0.0, np.log(REMANENT_TIME[0])]))]
-    if 2.0 * found[0][1] > _GOOD * problem.deviation.size:
-        found += [_search(problem, np.array([offset, np.log(REMANENT_TIME[0])])) for offset in (-0.7, 0.6)]
-    return min(found, key=lambda one: one[1])
+    return _Grown(problem=problem, best=best)
 
 
 def _search(problem: _Problem, start: Array) -> tuple[Array, float, Array]:

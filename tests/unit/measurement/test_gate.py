@@ -8,6 +8,7 @@ import pytest
 from rotordrop.errors import RecordError
 from rotordrop.measurement import check_record, refuse_unusable
 from rotordrop.measurement.quality.clock import check_clock
+from rotordrop.synthesis import hidden_machine, synthesize_drop
 
 HZ = 2 * np.pi
 
@@ -303,6 +304,27 @@ class TestArrangement:
         assert "S_NDE_A and S_NDE_B exchanged, S_NDE_A inverted" in found.message or (
             "S_NDE_A and S_NDE_B exchanged, S_NDE_B inverted" in found.message
         )
+
+    def test_sensors_at_other_angles_than_described(self, drop, machine, edited):
+        """Turned by 40°: no exchange explains it, and neither does a free rotor before the first contact."""
+
+        def change(signals):
+            c, s = np.cos(np.radians(40.0)), np.sin(np.radians(40.0))
+            a, b = signals[:, 0], signals[:, 1]
+            return np.column_stack([c * a + s * b, c * b - s * a, signals[:, 2], signals[:, 3]])
+
+        found = only(edited(drop, change), machine)
+        assert (found.kind, found.severity) == ("leaning fall", "stop")
+        assert "leans 39° from straight down; no exchange or inversion explains it" in found.message
+
+    def test_a_fall_that_strong_friction_turns_aside_is_no_wiring_fault(self, machine):
+        """Friction 0.28 at 200 Hz was refused as swapped axes: the most dangerous drops got no number."""
+        rough = {f"{name}.friction.{kind}": 0.28 for name in ("NDE", "DE") for kind in ("dynamic", "static")}
+        hidden = hidden_machine(machine.with_values(rough), 1, drawn=False)
+        made = synthesize_drop(hidden, 200.0 * HZ, 1, duration=0.1, name="rough")
+        found = check_record(made.record, machine, made.tail)
+        assert "stop" not in {one.severity for one in found}
+        assert any("leans" in one.message and one.severity == "warning" for one in found)
 
     def test_ends_swapped(self, drop, fast_drop, machine, edited):
         for record in (drop, fast_drop):

@@ -16,10 +16,10 @@ from rotordrop.errors import RecordError
 from rotordrop.measurement.axes import sensor_planes
 from rotordrop.measurement.events import coarse_drop
 from rotordrop.measurement.levitated import LevitatedModel, fit_levitated
-from rotordrop.measurement.quality.arrangement import check_planes, fall_of
+from rotordrop.measurement.quality.arrangement import LEANING, check_planes, fall_of
 from rotordrop.measurement.quality.channels import check_channels
 from rotordrop.measurement.quality.clock import check_blocks, check_clock
-from rotordrop.measurement.quality.ends import check_ends
+from rotordrop.measurement.quality.ends import UNDECIDED_ENDS, check_ends
 from rotordrop.measurement.quality.finding import Finding, Severity, ranked, refuse_unusable, stops
 from rotordrop.measurement.quality.motion import (
     check_length,
@@ -109,10 +109,17 @@ def _check_motion(record: Record, machine: Machine, tail: Record | None) -> list
         return [no_drop(error, record)]
     findings += check_levitated(levitated, record)
     findings += check_length(record, coarse.instant, tail is not None)
-    findings += check_ends(record, machine, planes, levitated, coarse)
+    findings = _not_both(findings, check_ends(record, machine, planes, levitated, coarse))
     if tail is not None and not stops(findings):
         findings += check_tail(tail, machine, planes, levitated.mean)
     return findings
+
+
+def _not_both(findings: list[Finding], of_ends: list[Finding]) -> list[Finding]:
+    """A fall that leans stops only when it fits no free rotor before the first contact either."""
+    if any(found.kind == UNDECIDED_ENDS for found in of_ends):
+        findings = [replace(f, severity="stop") if f.kind == LEANING else f for f in findings]
+    return findings + of_ends
 
 
 def _levitated(record: Record, end: float) -> LevitatedModel | None:

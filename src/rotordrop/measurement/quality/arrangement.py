@@ -28,6 +28,9 @@ MOST_TILT = 30.0
 CLEAR_ORBIT = 3.0
 """Forward over backward part of the orbit above which its sense is clear."""
 
+LEANING = "leaning fall"
+"""Kind of the finding of a fall that leans for no reason of wiring."""
+
 _AFTER_FALL = 0.06
 _SMALLEST_ORBIT = 3e-7
 
@@ -160,17 +163,33 @@ def _plane_finding(
     seen = f"the fall changes {own} and so leans {tilt:.0f}° from straight down"
     if verdict == "backward":
         seen = f"the fall changes {own}, but the levitated orbit at node {plane.node} runs against the spin"
+    if not fitting:
+        return _unexplained(seen, names)
     simplest = [change for change in fitting if _effort(change) == min(map(_effort, fitting))]
     causes = " or ".join(change.words(plane.names) for change in simplest)
-    swapped = bool(simplest) and all(change.order != tuple(sorted(change.order)) for change in simplest)
+    swapped = all(change.order != tuple(sorted(change.order)) for change in simplest)
     return Finding(
-        kind="swapped axes" if swapped or not simplest else "inverted polarity",
-        message=f"{seen}; it fits with {causes}"
-        if causes
-        else f"{seen}; no exchange or inversion explains it",
+        kind="swapped axes" if swapped else "inverted polarity",
+        message=f"{seen}; it fits with {causes}",
         remedy="correct the polarity or the angles in the machine file, or the channel map in the profile",
         severity="stop",
         channel=_named_channels(plane, simplest) or names,
+    )
+
+
+def _unexplained(seen: str, names: str) -> Finding:
+    """A fall that leans for no reason of wiring: strong friction drives a rotor up the side of its bearing.
+
+    Just the most dangerous drops look so; they must not be refused. Sensors turned to other angles show in
+    the fall before the first contact.
+    """
+    return Finding(
+        kind=LEANING,
+        message=f"{seen}; no exchange or inversion explains it",
+        remedy="strong friction drives a rotor sideways like this; make sure that the angles in the machine "
+        "file are right",
+        severity="warning",
+        channel=names,
     )
 
 

@@ -9,7 +9,7 @@ off by less than about a third hides behind the remanent lift and is not found h
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import combinations, product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
 GOOD_FIT = 2.0
 """Mean square of the residual over the noise up to which the arrangement counts as confirmed."""
+
+UNDECIDED_ENDS = "ends"
+"""Kind of the finding that the fall does not say which end is which."""
 
 _BETTER = 3.0
 _NEAR_CONTACT = 6e-4
@@ -58,7 +61,7 @@ def check_ends(
     coarse: CoarseDrop,
 ) -> list[Finding]:
     """Compare the fall with the rotor model: as described, ends exchanged, channels crossed, gain wrong."""
-    if len({amb.node for amb in machine.ambs}) < 2 or len(planes) != 2:
+    if len({amb.node for amb in machine.ambs}) < 2 or len(planes) < 2:
         return [_undecided("it takes two AMB planes in the machine file and two sensor planes")]
     own = find_fall(record, machine, planes, levitated, coarse)
     if own.misfit <= GOOD_FIT and own.end >= coarse.contact - _NEAR_CONTACT:
@@ -127,13 +130,13 @@ def _decide(mine: float, cases: list[_Case], falls: list[Fall | None]) -> Findin
 
 
 def _other_cases(record: Record, planes: tuple[Plane, ...], levitated: LevitatedModel) -> list[_Case]:
-    first, second = planes
     cases = []
-    if len(first.columns) == len(second.columns):
-        pairs = list(zip(first.columns, second.columns, strict=True))
-        cases.append(_exchanged(record, levitated, pairs, "swapped ends"))
-    for pair in product(first.columns, second.columns):
-        cases.append(_exchanged(record, levitated, [pair], "swapped channels"))
+    for first, second in combinations(planes, 2):
+        if len(first.columns) == len(second.columns):
+            pairs = list(zip(first.columns, second.columns, strict=True))
+            cases.append(_exchanged(record, levitated, pairs, "swapped ends"))
+        for pair in product(first.columns, second.columns):
+            cases.append(_exchanged(record, levitated, [pair], "swapped channels"))
     free = tuple(
         sensor.model_copy(update={"gain": Estimated(value=float(sensor.gain), range=_ANY_GAIN)})
         for sensor in record.sensors
@@ -164,7 +167,7 @@ def _exchanged(record: Record, levitated: LevitatedModel, pairs: list[tuple[int,
 
 def _undecided(why: str) -> Finding:
     return Finding(
-        kind="ends",
+        kind=UNDECIDED_ENDS,
         message=f"whether the two ends are exchanged cannot be decided: {why}",
         remedy="make sure by moving one end by hand; check rotor model, sensor nodes and AMB nodes",
         severity="note",
