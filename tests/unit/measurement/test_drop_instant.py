@@ -171,7 +171,7 @@ def test_the_coarse_search_needs_the_speed(drop, machine):
 
 
 def test_a_rotor_that_rings_strongly_is_released_when_it_was():
-    """An orbit that bends the rotor: power-off came 0.94 ms early, stated to 0.1 ms, with a lift of 1.4 kN left."""
+    """An orbit that bends the rotor: power-off came 0.94 ms early, with a lift of 1.4 kN left."""
     machine = example_machine("lp400")
     made = synthesize_drop(
         hidden_machine(machine, 11), 120.0 * 2.0 * np.pi, 110, duration=0.05, tail=False, name="ringing"

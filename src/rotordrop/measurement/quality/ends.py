@@ -38,6 +38,12 @@ _NEAR_CONTACT = 6e-4
 _POSSIBLE_LIFT = (-0.15, 0.8)
 """Remanent over static lift that a magnetic bearing can have at power-off."""
 
+_POSSIBLE_SIDEWAYS = 0.25
+"""Horizontal force over static lift that a magnetic bearing can have at power-off [1]."""
+
+TURNED = "turned sensors"
+"""Kind of the finding that the rotor falls aside before it touches anything."""
+
 _ANY_GAIN = (0.2, 1.8)
 _WRONG_GAIN = 0.08
 
@@ -86,7 +92,7 @@ def _implausible_lift(fall: Fall, machine: Machine) -> list[Finding]:
     share = fall.remanent_force[:, 1] / fall.rotor.lift
     worst = int(np.argmax(np.abs(share - np.mean(_POSSIBLE_LIFT))))
     if _POSSIBLE_LIFT[0] <= share[worst] <= _POSSIBLE_LIFT[1]:
-        return []
+        return _implausible_sideways(fall, machine)
     return [
         Finding(
             kind="wrong gain",
@@ -94,6 +100,24 @@ def _implausible_lift(fall: Fall, machine: Machine) -> list[Finding]:
             f"AMB {machine.ambs[worst].name}, {share[worst]:.0%} of its static lift: the rotor seems to "
             f"fall too {'fast' if share[worst] < 0 else 'slowly'} there",
             remedy="check sensitivity and gain of the sensors at that end, and the sampling rate",
+            severity="warning",
+        )
+    ]
+
+
+def _implausible_sideways(fall: Fall, machine: Machine) -> list[Finding]:
+    """A fall that leads aside before anything is touched: the sensors look in other directions."""
+    share = fall.remanent_force[:, 0] / fall.rotor.lift
+    worst = int(np.argmax(np.abs(share)))
+    if abs(share[worst]) <= _POSSIBLE_SIDEWAYS:
+        return []
+    return [
+        Finding(
+            kind=TURNED,
+            message=f"the fall fits only with {fall.remanent_force[worst, 0]:.3g} N sideways at AMB "
+            f"{machine.ambs[worst].name}, {abs(share[worst]):.0%} of its static lift: the rotor seems to fall "
+            "aside there before it touches anything",
+            remedy="check the angles of the sensors at that end",
             severity="warning",
         )
     ]
