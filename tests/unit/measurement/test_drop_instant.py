@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import RecordError
-from rotordrop.measurement import EarlyForces, find_drop_instant, first_contacts
 from rotordrop.machine import example_machine
-from rotordrop.measurement import find_drop_instant, first_contacts
+from rotordrop.measurement import EarlyForces, find_drop_instant, first_contacts
 from rotordrop.measurement.axes import sensor_planes
 from rotordrop.measurement.events import coarse_drop
 from rotordrop.measurement.release import GRID, free_rotor, response_at, tabulate_response

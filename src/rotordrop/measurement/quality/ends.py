@@ -115,8 +115,8 @@ def _implausible_sideways(fall: Fall, machine: Machine) -> list[Finding]:
         Finding(
             kind=TURNED,
             message=f"the fall fits only with {fall.remanent_force[worst, 0]:.3g} N sideways at AMB "
-            f"{machine.ambs[worst].name}, {abs(share[worst]):.0%} of its static lift: the rotor seems to fall "
-            "aside there before it touches anything",
+            f"{machine.ambs[worst].name}, {abs(share[worst]):.0%} of its static lift: the rotor seems to "
+            "fall aside there before it touches anything",
             remedy="check the angles of the sensors at that end",
             severity="warning",
         )
