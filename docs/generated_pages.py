@@ -1,4 +1,4 @@
-"""Write the pages of the documentation that follow from the sources: equations, packages, commands."""
+"""Write the pages that follow from the sources: equations, parameters, packages, commands."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import tomllib
 from pathlib import Path
 
 import equation_index
+import parameter_page
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "src" / "rotordrop"
@@ -18,6 +19,7 @@ def write(folder: Path) -> None:
     pages = {"equations.md": equation_index.index_page(), "commands.md": command_page()}
     pages |= {f"api_{name}.md": package_page(name) for name in packages()}
     pages["api.md"] = api_page()
+    pages["parameters.md"] = parameter_page.parameter_page()
     for name, text in pages.items():
         file = folder / name
         if not file.exists() or file.read_text(encoding="utf-8") != text:

@@ -21,6 +21,7 @@ from rotordrop.machine import Machine
 from rotordrop.measurement.record import Record
 from rotordrop.model.parameter import Parameter
 from rotordrop.model.parameter_table import parameter, rows, separating_measurement
+from rotordrop.model.statics import bearing_load_shares
 from rotordrop.model.unknowns import Unknown, typical_depth
 from rotordrop.tracking.calibration import TrackedDrops
 from rotordrop.tracking.consistency import Check, consistency_checks
@@ -217,7 +218,8 @@ def at_fitted_exponents(machine: Machine, values: dict[str, IdentifiedValue]) ->
             continue
         exponent = _within_limits(exponent, parameter("contact.exponent"))
         found[f"{bearing.name}.contact.exponent"] = exponent
-        factor = typical_depth(bearing) ** (float(bearing.contact.exponent) - exponent.value)
+        depth = typical_depth(bearing, float(np.mean(bearing_load_shares(machine))))
+        factor = depth ** (float(bearing.contact.exponent) - exponent.value)
         low, high = stiffness.interval_90
         found[f"{bearing.name}.contact.stiffness"] = replace(
             stiffness, value=factor * stiffness.value, interval_90=(factor * low, factor * high)

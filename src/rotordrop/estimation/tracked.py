@@ -239,7 +239,7 @@ def _start_gaps(problem: DropProblem, prepared: Preparation) -> None:
         return
     for entry, found, moved in zip(gaps, reached, unsure & np.isfinite(reached), strict=True):
         if moved:
-            problem.mean[entry] = found
+            problem.mean[entry] = problem.start[entry] = found
 
 
 def is_calibrated(machine: Machine) -> bool:

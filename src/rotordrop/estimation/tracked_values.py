@@ -171,7 +171,7 @@ def identified(unknown: Unknown, theta: float, sigma: float, widening: float = 1
         status="determined" if determined else NOT_DETERMINED[unknown.calibrated],
         standard_error=unknown.standard_error(theta, sigma * widening),
         interval_90=(unknown.value_of(theta - half), unknown.value_of(theta + half)),
-        start=unknown.value_of(unknown.mean),
+        start=unknown.value_of(unknown.begin),
         unit=unknown.unit,
     )
 
@@ -203,7 +203,8 @@ def parameter_values(
         error = model_error(unknown, float(s))
         wide = parameter_widening(unknown, error, widening)
         values[unknown.parameter.field] = identified(unknown, float(t), error, wide)
-    values["friction.static"] = _static_friction(problem, name, values["friction.dynamic"])
+    if "friction.dynamic" in values:  # a bearing described without friction has none to find
+        values["friction.static"] = _static_friction(problem, name, values["friction.dynamic"])
     values["equivalent_stiffness_N_per_m"] = _equivalent_stiffness(problem, name, values)
     return values
 

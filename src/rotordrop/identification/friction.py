@@ -170,7 +170,7 @@ def _value(problem: ImpactFit, best: Array, coefficients: Array) -> IdentifiedVa
         status="at its bound" if at_bound else "the record does not determine it" if wide else "determined",
         standard_error=error,
         interval_90=(max(value - NINETY * error, 0.0), value + NINETY * error),
-        start=unknown.value_of(unknown.mean),
+        start=unknown.value_of(unknown.begin),
         bounds=(low, high),
         unit="1",
     )

@@ -8,23 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError
-from rotordrop.estimated import NINETY, Estimated
 from rotordrop.machine.sensor import Sensor
 from rotordrop.measurement.axes import along_sensors, sensor_directions
 from rotordrop.measurement.record import Record
+from rotordrop.model.parameter_table import parameter
 from rotordrop.model.parameters import DropModel
 from rotordrop.model.statics import settled_sag
+from rotordrop.model.unknowns import sensor_prior, smallest_gap
 
 Array = NDArray[np.float64]
 
 WEAKEST_DIRECTION = 0.05
 """Smallest ratio of singular values with which four rigid motions count as resolved [1]."""
-
-GAIN_SIGMA = 0.01
-"""Standard deviation of a sensor's gain where the machine file says nothing [1]."""
-
-OFFSET_SIGMA = 10e-6
-"""Standard deviation of a sensor's zero where the machine file says nothing [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,8 +86,8 @@ def build_sensing(model: DropModel, sensors: tuple[Sensor, ...]) -> Sensing:
         to_bearings=to_bearings,
         from_bearings=_from_bearings(directions, z_sensor, z_bearing),
         settled_bend=directions[:, 1] * bend,
-        gain_sigma=np.array([_sigma(sensor.gain, GAIN_SIGMA) for sensor in sensors]),
-        offset_sigma=np.array([_sigma(sensor.offset, OFFSET_SIGMA) for sensor in sensors]),
+        gain_sigma=_sigmas("gain", sensors, model),
+        offset_sigma=_sigmas("offset", sensors, model),
     )
 
 
@@ -139,11 +134,6 @@ def _from_bearings(directions: Array, z_sensor: Array, z_bearing: Array) -> Arra
     return np.asarray(weights[:, :, None] * directions[:, None, :])
 
 
-def _sigma(quantity: Estimated, default: float) -> float:
-    """Standard deviation of a sensor's value: what the machine file says of it, else the default."""
-    if quantity.standard_error is not None:
-        return max(quantity.standard_error, 1e-12)
-    limits = quantity.interval_90 or (quantity.range if quantity.status == "guess" else None)
-    if limits is not None:
-        return max((limits[1] - limits[0]) / (2.0 * NINETY), 1e-12)
-    return default
+def _sigmas(path: str, sensors: tuple[Sensor, ...], model: DropModel) -> Array:
+    row, gap = parameter(path, "sensor"), smallest_gap(model.machine)
+    return np.array([sensor_prior(row, row.described(sensor), gap).sigma for sensor in sensors])

@@ -98,6 +98,15 @@ class ImpactFit:
         return np.concatenate([self.vector.mean, np.zeros(self.directions.shape[1])])
 
     @cached_property
+    def guess(self) -> Array:
+        """Where the search begins, shape (n,): what is sought at the guesses of the machine file."""
+        begin = self.prior_mean.copy()
+        for k, unknown in enumerate(self.vector.unknowns):
+            if unknown.parameter.role is Role.SOUGHT:
+                begin[k] = unknown.begin
+        return begin
+
+    @cached_property
     def prior_sigma(self) -> Array:
         """Prior standard deviation of the unknowns, shape (n,)."""
         return np.concatenate([self.vector.sigma, np.ones(self.directions.shape[1])])
@@ -253,7 +262,7 @@ def fit_support(
     spread[:supports] = NINETY * coarse.prior_sigma[:supports]
     first = search(
         coarse,
-        sobol_starts(coarse.prior_mean, spread, starts),
+        [coarse.guess, *sobol_starts(coarse.prior_mean, spread, starts)[1:]],
         Schedule(windows=windows[:COARSE_WINDOWS]),
         threads=threads,
         progress=lambda text, share: report(text, 0.5 * share),
@@ -323,7 +332,8 @@ def refit_with_friction(
     place = problem.vector.friction
     unknowns = list(problem.vector.unknowns)
     error = (friction.standard_error or 0.0) / friction.value
-    unknowns[place] = replace(unknowns[place], mean=math.log(friction.value), sigma=max(error, 1e-4))
+    found = math.log(friction.value)
+    unknowns[place] = replace(unknowns[place], mean=found, start=found, sigma=max(error, 1e-4))
     known = replace(
         impact_problem(problem.replica, directions=ALL_DIRECTIONS),
         vector=ParameterVector(unknowns=tuple(unknowns)),
@@ -382,7 +392,7 @@ def identified_values(
             status="prior" if given else _verdict(at_bound, error, unknown.sigma),
             standard_error=unknown.standard_error(mean, error),
             interval_90=(unknown.value_of(mean - NINETY * error), unknown.value_of(mean + NINETY * error)),
-            start=unknown.value_of(unknown.mean),
+            start=unknown.value_of(unknown.begin),
             bounds=(unknown.value_of(float(low[k])), unknown.value_of(float(high[k]))),
             unit=unknown.unit,
         )

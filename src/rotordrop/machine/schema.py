@@ -99,6 +99,9 @@ def _drop_null(node: dict[str, Any]) -> None:
             node.update(node.pop("anyOf")[0])
 
 
+RANGE = "Holds the value with 90 % probability; the guess need not be its middle"
+
+
 def _number(kind: str) -> dict[str, Any]:
     if not KINDS[kind].unit:
         return {"type": ["number", "string"], "examples": [float(KINDS[kind].example)]}
@@ -110,8 +113,8 @@ def _value(kind: str) -> dict[str, Any]:
     number = {"$ref": f"#/$defs/{kind}_number"}
     pair = {"type": "array", "items": number, "minItems": 2, "maxItems": 2}
     guess: dict[str, Any] = {
-        "guess": number,
-        "range": pair,
+        "guess": {"description": "Where a search begins, and what a simulation takes", "allOf": [number]},
+        "range": {**pair, "description": RANGE},
         "lower": number,
         "upper": number,
         "source": _TEXT,

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rotordrop.machine.plausibility import doubts
 from rotordrop.model.machine_summary import BearingSummary, MachineSummary
+from rotordrop.model.parameter_table import rows
+from rotordrop.model.unknowns import prior
 from rotordrop.physics.ball_bearing import ball_centrifugal_force
 from rotordrop.physics.thermal import friction_heat, growth_of_race
 from rotordrop.units import format_quantity
@@ -27,6 +30,9 @@ HEAT_WINDOW = 0.2
 GROWTH_SHARE = 0.1
 """Thermal growth of the race over the elastic approach of a preloaded ball from which heat counts."""
 
+ASIDE = 0.5
+"""Distance of a guess from the middle of its range from which it is mentioned, in standard deviations [1]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class MachineWarning:
@@ -36,7 +42,7 @@ class MachineWarning:
     ----------
     kind : str
         "limiting speed", "ball centrifugal force", "support resonance", "frictional heat", "load direction",
-        or one of the doubts about the description itself.
+        "guess", or one of the doubts about the description itself.
     bearing : str
         Name of the touchdown bearing.
     value, limit : float
@@ -71,6 +77,7 @@ def machine_warnings(
     for bearing, rest in zip(machine.touchdown_bearings, summary.bearings, strict=True):
         found += [*_limiting_speed(bearing, omega), *_centrifugal(bearing, rest, omega)]
         found += [*_resonance(rest, summary), *_heat(bearing, rest, omega), *_lifted(rest)]
+        found += _guesses_aside(bearing)
     return tuple(found)
 
 
@@ -142,6 +149,28 @@ def _heat(bearing: TouchdownBearing, rest: BearingSummary, omega: float) -> Iter
         f"it grows by {grown}, not small against {against}; the drop model has no heat in it"
     )
     yield _warning("frictional heat", bearing.name, growth, room, text)
+
+
+def _guesses_aside(bearing: TouchdownBearing) -> Iterator[MachineWarning]:
+    """Guesses that do not lie in the middle of their range, which an estimate takes for its centre."""
+    for row in rows("bearing"):
+        if not row.entries or row.path == "support.anisotropy":
+            continue
+        quantity = row.described(bearing)
+        if quantity.status != "guess" or quantity.range is None:
+            continue
+        known = prior(row, quantity)
+        if abs(known.start - known.mean) < ASIDE * known.sigma:
+            continue
+        middle = math.exp(known.mean) if row.logarithmic else known.mean
+        guess, centre, low, high = (
+            format_quantity(value, row.kind) for value in (float(quantity), middle, *quantity.range)
+        )
+        text = (
+            f"{row.label}: the guess {guess} is not the middle of its range, {low} to {high}; an estimate "
+            f"takes the range for the 90 % interval about {centre}, and the guess for where to begin"
+        )
+        yield _warning("guess", bearing.name, float(quantity), middle, text)
 
 
 def _lifted(rest: BearingSummary) -> Iterator[MachineWarning]:

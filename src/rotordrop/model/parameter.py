@@ -17,11 +17,15 @@ Owner = Literal["bearing", "sensor", "unbalance", "magnet", "drop"]
 
 
 class Role(Enum):
-    """What the identification does with a parameter; the values are the words of the documentation."""
+    """What the identification does with a parameter.
+
+    Nuisances are fitted beside what is sought; considered ones keep their prior in the replay. The errors of
+    both enter the intervals.
+    """
 
     SOUGHT = "sought"
-    NUISANCE = "nuisance: fitted beside what is sought, its error enters the intervals"
-    CONSIDERED = "considered: kept at its prior in the replay, its error enters the intervals"
+    NUISANCE = "nuisance"
+    CONSIDERED = "considered"
     DERIVED = "follows from other parameters"
 
 
@@ -40,7 +44,6 @@ class Rule(Enum):
 
     VALUE = "the value itself"
     RATIO = "value times the ratio that entry and value have in the machine description"
-    PER_VALUE = "value times entry over value, where the description gives no such ratio (bearing damping)"
     SCALE = "the entry times the value, after all others"
     AT_TYPICAL_DEPTH = "the entry changed so that the force at a typical indentation stays, after all others"
 
@@ -75,8 +78,10 @@ class Parameter:
     role : Role
         What the identification does with it.
     guess_sigma, given_sigma : float
-        Prior standard deviation of a guess without a range and of a given value: of the logarithm [1], or
-        in the SI unit.
+        Prior standard deviation of a guess without a range and of a given value: of the logarithm, or as a
+        share of ``scale`` [1].
+    scale : str
+        What it is a share of, where it is not that of a logarithm.
     least_sigma : float
         Prior standard deviation that an interval in the machine file cannot go below.
     lower, upper : float, optional
@@ -85,7 +90,7 @@ class Parameter:
         Factor on its prior value up to which the model follows it [1]: what no record shows drifts, and a
         race that is braked a thousand times harder is no race.
     drift : float
-        Random walk per square root of a second, in the measure it is estimated in. It keeps what the model
+        Random walk per square root of a second, in the measure or share of the prior. It keeps what the model
         gets wrong late in a drop from spoiling what the first impacts say.
     late_drift_factor : float
         Factor on the drift late in a drop [1], when creep decides between rotor and race.
@@ -117,6 +122,7 @@ class Parameter:
     role: Role = Role.NUISANCE
     guess_sigma: float = 0.0
     given_sigma: float = 0.0
+    scale: str = ""
     least_sigma: float = 1e-4
     lower: float | None = None
     upper: float | None = None

@@ -28,10 +28,12 @@ TABLE: tuple[Parameter, ...] = (
         kind="length",
         logarithmic=False,
         role=Role.SOUGHT,
-        guess_sigma=20e-6,
-        given_sigma=20e-6,
+        guess_sigma=0.08,
+        given_sigma=0.08,
+        scale="air gap",
         least_sigma=1e-12,
-        drift=8e-6,
+        lower=0.0,
+        drift=0.032,
         entries=_bearing(L.AIR_GAP),
         step=Step.TAIL,
         field="air_gap_m",
@@ -232,7 +234,7 @@ TABLE: tuple[Parameter, ...] = (
         guess_sigma=0.5,
         given_sigma=0.5,
         drift=0.2,
-        entries=(Entry(array="bearing", column=L.BEARING_DAMPING, rule=Rule.PER_VALUE),),
+        entries=(Entry(array="bearing", column=L.BEARING_DAMPING, rule=Rule.RATIO),),
         step=Step.IMPACTS,
         field="damping_time_s",
         truth=("bearing", "Cb_over_Kb"),
@@ -260,6 +262,7 @@ TABLE: tuple[Parameter, ...] = (
         logarithmic=False,
         guess_sigma=0.01,
         given_sigma=0.01,
+        scale="one",
         least_sigma=1e-12,
     ),
     Parameter(
@@ -268,8 +271,9 @@ TABLE: tuple[Parameter, ...] = (
         label="offset",
         kind="length",
         logarithmic=False,
-        guess_sigma=10e-6,
-        given_sigma=10e-6,
+        guess_sigma=0.04,
+        given_sigma=0.04,
+        scale="smallest air gap",
         least_sigma=1e-12,
     ),
     *(
@@ -279,6 +283,8 @@ TABLE: tuple[Parameter, ...] = (
             label=f"unbalance, {part} part",
             kind="unbalance",
             logarithmic=False,
+            guess_sigma=1.0,
+            scale="amount described",
             entries=(Entry(array="unbalance", column=column),),
         )
         for column, part in enumerate(("cosine", "sine"))
@@ -290,7 +296,8 @@ TABLE: tuple[Parameter, ...] = (
             label=f"remanent force, {axis}",
             kind="force",
             logarithmic=False,
-            guess_sigma=60.0,
+            guess_sigma=0.2,
+            scale="weight a magnet carries",
             entries=(Entry(array="magnet", column=column),),
         )
         for column, axis in ((L.REMANENT_X, "x"), (L.REMANENT_Y, "y"))

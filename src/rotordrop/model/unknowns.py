@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal
+
+import numpy as np
 
 from rotordrop.estimated import NINETY, Estimated
 from rotordrop.machine import Machine, TouchdownBearing
@@ -17,8 +19,12 @@ from rotordrop.physics.ball_bearing import bearing_constants, preload_of_offset
 
 Scope = Literal["machine", "drop"]
 
-TYPICAL_FORCE = 1500.0
-"""Contact force at whose indentation the stiffness keeps its meaning when the exponent differs [N]."""
+TYPICAL_LOADS = 5.0
+"""Contact force at whose indentation the stiffness keeps its meaning when the exponent differs, over the mean
+static load of a bearing [1]: impacts that say something of the contact have it and more."""
+
+CENTRED = 1e-6
+"""Distance of value and middle of its range, in standard deviations, below which they are one [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,6 +50,8 @@ class Unknown:
         Prior mean and standard deviation, of the logarithm where the parameter is logarithmic.
     targets : tuple of Target
         Kernel entries it sets.
+    start : float, optional
+        Where a search begins, in the measure of the mean: the value of the machine file.
     calibrated : bool
         Whether its prior is an estimate made before, not a guess.
     published : callable, optional
@@ -56,6 +64,7 @@ class Unknown:
     mean: float
     sigma: float
     targets: tuple[Target, ...]
+    start: float | None = None
     calibrated: bool = False
     published: Callable[[float], float] | None = None
 
@@ -80,6 +89,17 @@ class Unknown:
         return "machine" if self.parameter.owner == "bearing" else "drop"
 
     @property
+    def drift(self) -> float:
+        """Random walk per square root of a second, in the measure it is estimated in."""
+        row = self.parameter
+        return row.drift if row.logarithmic else row.drift * abs(self.begin)
+
+    @property
+    def begin(self) -> float:
+        """Where a search begins, in the measure it is estimated in."""
+        return self.mean if self.start is None else self.start
+
+    @property
     def bounds(self) -> tuple[float, float]:
         """Between what the model follows it, in the measure it is estimated in."""
         row = self.parameter
@@ -92,8 +112,8 @@ class Unknown:
         return low, high
 
     def kernel_value(self, theta: float) -> float:
-        """What is written into the kernel for an estimated number."""
-        return math.exp(theta) if self.logarithmic else theta
+        """What is written into the kernel for an estimated number: within the limits of its row."""
+        return self.parameter.within(math.exp(theta) if self.logarithmic else theta)
 
     def value_of(self, theta: float) -> float:
         """Published SI value of an estimated number."""
@@ -107,8 +127,30 @@ class Unknown:
         return sigma * self.kernel_value(theta) if self.logarithmic else sigma
 
 
-def prior_sigma(row: Parameter, quantity: Estimated) -> float:
-    """Prior standard deviation of what the machine file says, of the logarithm where the row is logarithmic.
+@dataclass(frozen=True, kw_only=True)
+class Prior:
+    """What is known of a parameter before a record is read, in the measure it is estimated in.
+
+    Attributes
+    ----------
+    mean, sigma : float
+        Normal distribution, of the logarithm where the parameter is logarithmic.
+    start : float
+        The value of the machine file, where a search begins.
+    """
+
+    mean: float
+    sigma: float
+    start: float
+
+
+def prior(
+    row: Parameter, quantity: Estimated, scale: float = 1.0, *, logarithmic: bool | None = None
+) -> Prior:
+    """Prior of a parameter from what the machine file says of it.
+
+    A range, or the interval of an estimate, is the 90 % interval of the prior: its centre is the middle of
+    the range (of its logarithms), wherever in it the guess lies. Without either, the value is the centre.
 
     Parameters
     ----------
@@ -116,65 +158,86 @@ def prior_sigma(row: Parameter, quantity: Estimated) -> float:
         Row of the parameter.
     quantity : Estimated
         The value with what is known about it.
+    scale : float
+        What the standard deviations of the row are shares of, where it is not logarithmic.
+    logarithmic : bool, optional
+        Measure of the distribution; that of the row by default.
     """
-    logarithmic = row.logarithmic or row.path == "preload"
+    log = row.logarithmic if logarithmic is None else logarithmic
     value = float(quantity)
-    for interval in (quantity.interval_90, quantity.range):
-        if interval is not None and (interval[0] > 0.0 or not logarithmic):
-            low, high = interval
-            width = math.log(high / low) if logarithmic else high - low
-            return max(width / (2.0 * NINETY), row.least_sigma)
-    if quantity.standard_error is not None and (value > 0.0 or not logarithmic):
-        return quantity.standard_error / value if logarithmic else quantity.standard_error
-    return row.given_sigma if quantity.status == "given" else row.guess_sigma
+    start = math.log(value) if log else value
+    known = quantity.interval_90 or quantity.range
+    if known is not None and (known[0] > 0.0 or not log):
+        low, high = (math.log(end) if log else end for end in known)
+        sigma = max((high - low) / (2.0 * NINETY), row.least_sigma)
+        middle = 0.5 * (low + high)
+        centred = abs(middle - start) < CENTRED * sigma
+        return Prior(mean=start if centred else middle, sigma=sigma, start=start)
+    if known is not None and known[1] > value:
+        # From zero on a logarithm has no lower limit; the upper one is left above by one in twenty.
+        return Prior(mean=start, sigma=(math.log(known[1]) - start) / NINETY, start=start)
+    if quantity.standard_error is not None:
+        error = quantity.standard_error / value if log else quantity.standard_error
+        return Prior(mean=start, sigma=max(error, row.least_sigma), start=start)
+    usual = row.given_sigma if quantity.status == "given" else row.guess_sigma
+    return Prior(mean=start, sigma=usual * (1.0 if log else scale), start=start)
 
 
 def bearing_unknowns(model: DropModel, index: int) -> Iterator[Unknown]:
-    """Unknown parameters of one touchdown bearing of a model."""
+    """Unknown parameters of one touchdown bearing of a model.
+
+    What the machine does not have, such as the preload of a bearing with clearance, is no unknown.
+    """
     bearing = model.machine.touchdown_bearings[index]
     for row in rows("bearing"):
-        if row.path == "preload" and float(row.described(bearing)) == 0.0:
-            continue  # loose: nothing to find, and the air gap takes up an error of the play
+        if not row.entries or float(row.described(bearing)) == 0.0:
+            continue  # for a loose bearing, the air gap takes up an error of the play
         if row.path == "preload":
             yield _preload(row, bearing, index)
         elif row.path == "support.anisotropy":
             yield _anisotropy(row, bearing, index)
-        elif row.entries:
-            yield _unknown(model, row, row.described(bearing), index)
+        else:
+            yield _unknown(model, row, index)
 
 
-def _unknown(model: DropModel, row: Parameter, quantity: Estimated, index: int) -> Unknown:
+def _unknown(model: DropModel, row: Parameter, index: int) -> Unknown:
     bearing = model.machine.touchdown_bearings[index]
-    value = float(quantity)
-    mean = math.log(value) if row.logarithmic else value
+    quantity = row.described(bearing)
+    known = prior(row, quantity, scale=float(quantity))
     return Unknown(
         parameter=row,
         owner=bearing.name,
-        mean=mean,
-        sigma=prior_sigma(row, quantity),
+        mean=known.mean,
+        sigma=known.sigma,
+        start=known.start,
         targets=tuple(
-            Target(entry=entry, row=index, factor=_factor(model, entry, index, value, mean))
+            Target(entry=entry, row=index, factor=_factor(model, entry, index, float(quantity)))
             for entry in row.entries
         ),
         calibrated=quantity.status == "estimated",
     )
 
 
-def _factor(model: DropModel, entry: Entry, index: int, value: float, mean: float) -> float:
-    described = float(model.parameters.bearing[index, entry.column])
+def _factor(model: DropModel, entry: Entry, index: int, value: float) -> float:
     if entry.rule is Rule.RATIO:
-        return described / value
-    if entry.rule is Rule.PER_VALUE:
-        return described / math.exp(mean)
+        return float(model.parameters.bearing[index, entry.column]) / value
     if entry.rule is Rule.AT_TYPICAL_DEPTH:
-        return typical_depth(model.machine.touchdown_bearings[index])
+        return typical_depth(model.machine.touchdown_bearings[index], float(np.mean(model.load_shares)))
     return 1.0
 
 
-def typical_depth(bearing: TouchdownBearing) -> float:
-    """Indentation at the typical contact force [m]."""
+def typical_depth(bearing: TouchdownBearing, load: float) -> float:
+    """Indentation [m] by which the contact stiffness keeps its meaning when the exponent differs.
+
+    Parameters
+    ----------
+    bearing : TouchdownBearing
+        Gives the contact law.
+    load : float
+        Share of the weight of one bearing, in the mean [N].
+    """
     contact = bearing.contact
-    return float((TYPICAL_FORCE / float(contact.stiffness)) ** (1.0 / float(contact.exponent)))
+    return float((TYPICAL_LOADS * load / float(contact.stiffness)) ** (1.0 / float(contact.exponent)))
 
 
 def _anisotropy(row: Parameter, bearing: TouchdownBearing, index: int) -> Unknown:
@@ -188,30 +251,57 @@ def _anisotropy(row: Parameter, bearing: TouchdownBearing, index: int) -> Unknow
         parameter=row,
         owner=bearing.name,
         mean=0.0,
-        sigma=prior_sigma(row, described),
+        sigma=prior(row, described).sigma,
         targets=tuple(Target(entry=entry, row=index) for entry in row.entries),
         published=ratio,
     )
 
 
 def _preload(row: Parameter, bearing: TouchdownBearing, index: int) -> Unknown:
-    """Preload, estimated by the axial offset of the rows, which is what the ball forces depend on."""
-    constants = bearing_constants(bearing.bearing)
+    """Preload, estimated by the axial offset of the rows, which is what the ball forces depend on.
+
+    The ends of the 90 % interval are those of the preload; between them the prior is normal in the offset.
+    """
     quantity = row.described(bearing)
-    step = 1e-4
-    slope = (
-        preload_of_offset(constants, constants.axial_offset * (1 + step))
-        - preload_of_offset(constants, constants.axial_offset * (1 - step))
-    ) / (2 * step * constants.axial_offset)
+    known = prior(row, quantity, logarithmic=True)
+    constants = bearing_constants(bearing.bearing)
+    low, high = (
+        bearing_constants(bearing.bearing.changed(preload=Estimated(value=math.exp(end)))).axial_offset
+        for end in (known.mean - NINETY * known.sigma, known.mean + NINETY * known.sigma)
+    )
+    stated = quantity.interval_90 or quantity.range
     return Unknown(
         parameter=row,
         owner=bearing.name,
-        mean=constants.axial_offset,
-        sigma=float(quantity) * prior_sigma(row, quantity) / slope,
+        mean=constants.axial_offset if stated is None else 0.5 * (low + high),
+        sigma=(high - low) / (2.0 * NINETY),
+        start=constants.axial_offset,
         targets=tuple(Target(entry=entry, row=index) for entry in row.entries),
         calibrated=quantity.status == "estimated",
         published=partial(preload_of_offset, constants),
     )
+
+
+def sensor_prior(row: Parameter, quantity: Estimated, smallest_gap: float) -> Prior:
+    """Prior of gain or offset of a sensor.
+
+    Parameters
+    ----------
+    row : Parameter
+        Row of the gain or the offset.
+    quantity : Estimated
+        The value with what is known about it; the range of a default says what is thinkable, not usual.
+    smallest_gap : float
+        Smallest air gap of the machine [m], of which an unknown offset is a share.
+    """
+    if quantity.status == "default":
+        quantity = replace(quantity, range=None)
+    return prior(row, quantity, scale=smallest_gap if row.kind == "length" else 1.0)
+
+
+def smallest_gap(machine: Machine) -> float:
+    """Smallest air gap of a machine as described [m]."""
+    return min(float(bearing.air_gap) for bearing in machine.touchdown_bearings)
 
 
 def drop_unknowns(model: DropModel) -> Iterator[Unknown]:
@@ -220,9 +310,10 @@ def drop_unknowns(model: DropModel) -> Iterator[Unknown]:
     for plane, unbalance in enumerate(machine.unbalances):
         for row in rows("unbalance"):
             yield _of_drop(row, str(plane), 0.0, max(float(unbalance.amount), 1e-9), plane)
+    share = machine.rotor.mass * float(machine.gravity) / max(len(machine.ambs), 1)
     for a, amb in enumerate(machine.ambs):
         for row in rows("magnet"):
-            yield _of_drop(row, amb.name, 0.0, row.guess_sigma, a)
+            yield _of_drop(row, amb.name, 0.0, row.guess_sigma * share, a)
     if machine.ambs:
         yield _of_drop(parameter("remanence.time_constant", "drop"), "", math.log(2e-3))
     yield _of_drop(parameter("speed.aero_time_constant", "drop"), "", math.log(aero_time_constant(machine)))

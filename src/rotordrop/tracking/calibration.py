@@ -147,6 +147,8 @@ def track(
         Called with a sentence and the fraction done.
     """
     trajectories: list[Array | None] = list(references) if references is not None else [None] * len(problems)
+    # A pass from the guesses gives a place to linearise at, no estimate yet: it needs a second one.
+    from_guesses = references is None and sum(stage.passes for stage in schedule) > 1
     total = sum(stage.until * stage.passes for stage in schedule)
     done = 0.0
     smoothed: list[Smoothed] = []
@@ -160,7 +162,10 @@ def track(
             if progress is not None:
                 progress(f"fitting the first {1e3 * stage.until:.0f} ms", done / total)
             smoothed = []  # a pass fills hundreds of megabytes: the one before must be gone by then
-            smoothed = one_pass(_softened(problems, stage), settings, trajectories, stage.until)
+            smoothed = one_pass(
+                _softened(problems, stage), settings, trajectories, stage.until, from_guesses=from_guesses
+            )
+            from_guesses = False
             trajectories = [s.means for s in smoothed]
             done += stage.until
     return TrackedDrops(
@@ -184,12 +189,18 @@ def beside_the_record(tracked: TrackedDrops) -> bool:
 
 
 def one_pass(
-    problems: Sequence[DropProblem], settings: PassSettings, references: Sequence[Array | None], until: float
+    problems: Sequence[DropProblem],
+    settings: PassSettings,
+    references: Sequence[Array | None],
+    until: float,
+    *,
+    from_guesses: bool = False,
 ) -> list[Smoothed]:
     """One forward pass through the chain of drops and one backward pass through it."""
     shared = problems[0].machine_indices
     filtered: list[Forward] = []
-    mean, covariance = problems[0].mean, problems[0].covariance
+    mean = problems[0].start if from_guesses else problems[0].mean
+    covariance = problems[0].covariance
     for d, problem in enumerate(problems):
         if d > 0:
             mean, covariance = _handed_on(filtered[-1], problem, shared)

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.estimated import NINETY, Estimated
 from rotordrop.model import layout as L
+from rotordrop.model.parameter_table import parameter
 from rotordrop.model.parameters import DropModel, static_deflection
 from rotordrop.model.statics import levitated_sag, settled_sag
-from rotordrop.model.unknowns import Unknown, all_unknowns
+from rotordrop.model.unknowns import Unknown, all_unknowns, sensor_prior, smallest_gap
 from rotordrop.physics import aerodynamics
 from rotordrop.physics.ball_bearing import bearing_constants
 from rotordrop.tracking import _filter as F
@@ -21,8 +21,6 @@ from rotordrop.tracking.unknowns import parameter_targets
 
 Array = NDArray[np.float64]
 
-GAIN_SIGMA = 0.01
-OFFSET_SIGMA = 10e-6
 RUNOUT_SIGMA = 0.5e-6
 START_POSITION_SIGMA = 30e-6
 START_VELOCITY_SIGMA = 20e-3
@@ -90,6 +88,8 @@ class DropProblem:
         Noise variance of each channel [m²].
     mean, covariance : ndarray, shapes (n,), (n, n)
         Prior at the first sample.
+    start : ndarray, shape (n,)
+        Where the first pass begins: the prior mean with the guesses of the machine file.
     """
 
     model: DropModel
@@ -102,6 +102,7 @@ class DropProblem:
     variances: Array
     speed_variance: float
     mean: Array
+    start: Array
     covariance: Array
 
     @property
@@ -189,9 +190,11 @@ def build_problem(
         variances=_variances(drop.noise, readings),
         speed_variance=SPEED_READING_SIGMA**2,
         mean=mean,
+        start=_start(mean, model, unknowns),
         covariance=covariance,
     )
     if drop.tail_level is not None:
+        apply_tail(problem, drop.tail_level, problem.start, problem.covariance.copy())
         apply_tail(problem, drop.tail_level, problem.mean, problem.covariance)
     return problem
 
@@ -267,19 +270,23 @@ def _prior(
     sigma[layout.rotor_speed] = math.hypot(SPEED_SIGMA, drop.initial_speed_error)
     for i, unknown in enumerate(unknowns):
         mean[s + i], sigma[s + i] = unknown.mean, unknown.sigma
+    gap = smallest_gap(model.machine)
     for c, sensor in enumerate(model.machine.sensors):
         gain, offset = s + n_p + c, s + n_p + n_c + c
-        mean[gain], sigma[gain] = 1.0 / float(sensor.gain) - 1.0, _sensor_sigma(sensor.gain, GAIN_SIGMA)
-        mean[offset], sigma[offset] = float(sensor.offset), _sensor_sigma(sensor.offset, OFFSET_SIGMA)
+        known = sensor_prior(parameter("gain", "sensor"), sensor.gain, gap)
+        mean[gain], sigma[gain] = 1.0 / known.mean - 1.0, known.sigma
+        known = sensor_prior(parameter("offset", "sensor"), sensor.offset, gap)
+        mean[offset], sigma[offset] = known.mean, known.sigma
     sigma[s + n_p + 2 * n_c :] = RUNOUT_SIGMA
     return mean, np.diag(sigma**2)
 
 
-def _sensor_sigma(quantity: Estimated, default: float) -> float:
-    """Standard deviation of a gain [1] or an offset [m]: of its estimate where there is one."""
-    if quantity.interval_90 is not None:
-        return max((quantity.interval_90[1] - quantity.interval_90[0]) / (2.0 * NINETY), 1e-12)
-    return default if quantity.standard_error is None else quantity.standard_error
+def _start(mean: Array, model: DropModel, unknowns: tuple[Unknown, ...]) -> Array:
+    """The prior mean with the unknowns at the guesses of the machine file, which need not be the centre."""
+    start = mean.copy()
+    first = model.layout.size - 2
+    start[first : first + len(unknowns)] = [unknown.begin for unknown in unknowns]
+    return start
 
 
 def _rotor_prior(model: DropModel, rows: Array, level: Array, mean: Array, sigma: Array) -> None:

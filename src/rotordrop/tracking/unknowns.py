@@ -29,7 +29,7 @@ def parameter_targets(model: DropModel, unknowns: tuple[Unknown, ...]) -> P.Para
     targets.sort(key=lambda item: item[1].entry.rule in _KIND_OF_RULE)
     planes = [model.basis.node_row(unbalance.node) for unbalance in model.machine.unbalances]
     shape = np.array(planes) if planes else np.zeros((0, model.layout.n_modes))
-    drift = np.array([u.parameter.drift for u in unknowns])
+    drift = np.array([u.drift for u in unknowns])
     return P.ParameterTargets(
         target=np.array([(k, _kind(t), t.row, t.entry.column) for k, t in targets], dtype=np.int64).reshape(
             -1, 4
@@ -42,5 +42,5 @@ def parameter_targets(model: DropModel, unknowns: tuple[Unknown, ...]) -> P.Para
         plane_shape=np.ascontiguousarray(shape),
         lower=np.array([u.bounds[0] for u in unknowns]),
         upper=np.array([u.bounds[1] for u in unknowns]),
-        mean=np.array([u.mean for u in unknowns]),
+        mean=np.array([u.begin for u in unknowns]),
     )

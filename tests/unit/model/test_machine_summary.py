@@ -120,3 +120,13 @@ def test_a_rotor_that_lifts_out_of_a_bearing_is_named(machine):
 def test_the_nominal_speed_is_the_default(machine, summary):
     nominal = machine_warnings(machine, summary)
     assert nominal == machine_warnings(machine, summary, float(machine.speed.nominal))
+
+
+def test_a_guess_aside_of_the_middle_of_its_range_is_mentioned():
+    """The estimators take the range as it stands, not one about the guess."""
+    found = warnings_of(example_machine("lp400"), "guess", 60.0)
+    assert [warning.bearing for warning in found] == ["NDE", "DE"]
+    assert found[0].message == (
+        "NDE: air gap: the guess 250 µm is not the middle of its range, 200 µm to 350 µm; an estimate takes "
+        "the range for the 90 % interval about 275 µm, and the guess for where to begin"
+    )

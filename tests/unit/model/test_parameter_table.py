@@ -57,12 +57,12 @@ def test_a_path_leads_back_to_its_row():
     assert row_of("friction.dynamic") is parameter("friction.dynamic")  # one for all bearings
 
 
-def test_a_value_at_its_mean_is_what_the_machine_file_says(lp400):
+def test_a_search_begins_at_what_the_machine_file_says(lp400):
     for unknown in all_unknowns(build_drop_model(lp400, "quick")):
         if unknown.parameter.owner != "bearing":
             continue
         described = float(unknown.parameter.described(lp400.bearing(unknown.owner)))
-        assert unknown.value_of(unknown.mean) == pytest.approx(described, rel=1e-6), unknown.path
+        assert unknown.value_of(unknown.begin) == pytest.approx(described, rel=1e-6), unknown.path
 
 
 def test_the_horizontal_support_keeps_its_ratio_to_the_vertical_one(lp400):

@@ -26,9 +26,9 @@ def settings(substeps: int) -> P.FilterSettings:
 
 
 def theta_of(problem: DropProblem) -> np.ndarray:
-    theta = np.array([unknown.mean for unknown in problem.unknowns])
+    theta = np.array([unknown.begin for unknown in problem.unknowns])
     for i, unknown in enumerate(problem.unknowns):
-        if unknown.mean == 0.0:  # otherwise nothing of it would act
+        if unknown.begin == 0.0:  # otherwise nothing of it would act
             theta[i] = 0.4 * unknown.sigma
     return theta
 
@@ -246,20 +246,21 @@ def test_every_parameter_of_a_bearing_sets_its_own_entries_and_no_others(flight)
 
 def test_another_exponent_keeps_the_force_at_a_typical_indentation(flight):
     """Whatever stiffness is estimated beside it; below that indentation a higher exponent is softer."""
-    from rotordrop.model.unknowns import TYPICAL_FORCE, typical_depth
+    from rotordrop.model.unknowns import TYPICAL_LOADS, typical_depth
     from rotordrop.tracking.unknowns import parameter_targets
 
     by_path = {unknown.path: unknown for unknown in flight.unknowns}
     chosen = (by_path["DE.contact.exponent"], by_path["DE.contact.stiffness"])
     targets = parameter_targets(flight.model, chosen)
     p = private_copy(flight.model.parameters)
-    depth = typical_depth(flight.model.machine.bearing("DE"))
+    load = float(np.mean(flight.model.load_shares))
+    depth = typical_depth(flight.model.machine.bearing("DE"), load)
     for exponent in (1.0, 10.0 / 9.0, 1.5):
         stiffness = 1.2 * float(flight.model.machine.bearing("DE").contact.stiffness)
         P.apply_parameters(np.log([exponent, stiffness]), targets, p)
         row = p.bearing[1]
         assert row[L.CONTACT_EXPONENT] == pytest.approx(exponent)
-        assert row[L.CONTACT_STIFFNESS] * depth**exponent == pytest.approx(1.2 * TYPICAL_FORCE)
+        assert row[L.CONTACT_STIFFNESS] * depth**exponent == pytest.approx(1.2 * TYPICAL_LOADS * load)
 
 
 def test_the_rotor_shrinks_when_the_gap_grows(flight):

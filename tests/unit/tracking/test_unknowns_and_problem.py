@@ -17,12 +17,10 @@ from rotordrop.measurement.record import read_record
 from rotordrop.model.parameter_table import parameter
 from rotordrop.model.parameters import build_drop_model
 from rotordrop.model.reduction import Reduction
-from rotordrop.model.unknowns import aero_time_constant, all_unknowns, prior_sigma
+from rotordrop.model.unknowns import aero_time_constant, all_unknowns, prior
 from rotordrop.physics.ball_bearing import bearing_constants, preload_of_offset
 from rotordrop.tracking.problem import (
-    GAIN_SIGMA,
     NOISE_FLOOR,
-    OFFSET_SIGMA,
     TAIL_VERTICAL_SIGMA,
     apply_tail,
     settled_displacement,
@@ -57,7 +55,7 @@ def unknown_of(machine: Machine, path: str):
     ],
 )
 def test_the_prior_comes_from_interval_range_error_or_status(quantity, expected):
-    assert prior_sigma(parameter("support.stiffness"), quantity) == pytest.approx(expected)
+    assert prior(parameter("support.stiffness"), quantity).sigma == pytest.approx(expected)
 
 
 def test_the_machine_file_sets_the_priors(lp400):
@@ -65,28 +63,25 @@ def test_the_machine_file_sets_the_priors(lp400):
     assert stiffness.value_of(stiffness.mean) == pytest.approx(1e8)
     assert stiffness.sigma == pytest.approx(math.log(4.0) / (2 * NINETY))
     gap = unknown_of(lp400, "DE.air_gap")
-    assert (gap.mean, gap.logarithmic) == (pytest.approx(250e-6), False)
+    assert (gap.mean, gap.begin, gap.logarithmic) == (pytest.approx(275e-6), 250e-6, False)
     assert gap.sigma == pytest.approx(150e-6 / (2 * NINETY))
     damping = unknown_of(lp400, "NDE.contact.damping")  # a plain value
     assert damping.sigma == parameter("contact.damping").given_sigma
 
 
 def test_a_gap_that_is_only_given_may_still_be_wrong(lp400):
-    assert (
-        unknown_of(lp400.with_values({"NDE.air_gap": 260e-6}), "NDE.air_gap").sigma
-        == parameter("air_gap").given_sigma
-    )
+    given = unknown_of(lp400.with_values({"NDE.air_gap": 260e-6}), "NDE.air_gap")
+    assert given.sigma == pytest.approx(parameter("air_gap").given_sigma * 260e-6)
 
 
 def test_the_preload_is_estimated_by_the_axial_offset_it_belongs_to(lp400):
     unknown = unknown_of(lp400, "NDE.preload")
     bearing = lp400.bearing("NDE").bearing
     constants = bearing_constants(bearing)
-    assert preload_of_offset(constants, unknown.mean) == pytest.approx(float(bearing.preload), rel=1e-6)
-    assert unknown.value_of(unknown.mean) == pytest.approx(float(bearing.preload), rel=1e-6)
-    spread = math.log(760 / 370) / (2 * NINETY) * 530
-    ends = [preload_of_offset(constants, unknown.mean + s * 1e-3 * unknown.sigma) for s in (-1.0, 1.0)]
-    assert (ends[1] - ends[0]) / 2e-3 == pytest.approx(spread, rel=0.01)
+    assert preload_of_offset(constants, unknown.begin) == pytest.approx(float(bearing.preload), rel=1e-6)
+    assert unknown.value_of(unknown.begin) == pytest.approx(float(bearing.preload), rel=1e-6)
+    ends = [unknown.value_of(unknown.mean + s * NINETY * unknown.sigma) for s in (-1.0, 1.0)]
+    assert ends == pytest.approx([370.0, 760.0], rel=1e-6)
 
 
 def test_what_a_drop_owns_is_not_shared(flight):
@@ -117,6 +112,8 @@ def test_friction_drifts_and_late_in_a_drop_faster(flight):
     assert flight.targets.drift[i] == friction.parameter.drift > 0.0 and factor > 1.0
     assert flight.targets.late_drift[i] == factor * flight.targets.drift[i]
     assert flight.targets.late_drift[k] == flight.targets.drift[k] == stiffness.parameter.drift > 0.0
+    g = by_path["NDE.air_gap"][1]
+    assert flight.targets.drift[g] == pytest.approx(0.032 * 250e-6)
     assert by_path["NDE.preload"][0].parameter.drift == 0.0
 
 
@@ -149,8 +146,8 @@ def test_sensors_start_from_what_the_machine_says(lp400, prepared):
     assert sigma[gain] == pytest.approx(0.001 / NINETY)
     assert problem.mean[offset] == pytest.approx(4e-6)
     assert sigma[offset] == pytest.approx(1e-6 / NINETY)
-    assert sigma[gain + 1] == pytest.approx(GAIN_SIGMA)
-    assert sigma[offset + 1] == pytest.approx(OFFSET_SIGMA)
+    assert sigma[gain + 1] == pytest.approx(0.01)
+    assert sigma[offset + 1] == pytest.approx(0.04 * 250e-6)
 
 
 def test_the_rotor_starts_where_the_sensors_see_it_with_its_computed_sag(flight):
