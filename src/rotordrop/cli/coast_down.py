@@ -175,4 +175,6 @@ def _analysis(machine: Machine, path: Path, progress: Progress) -> CoastDownAnal
     from rotordrop.spectrum.machine_candidates import machine_candidates
 
     signal = simulated_coast_down(path, machine)
-    return analyse_coast_down(signal, machine_candidates(machine), progress=progress)
+    return analyse_coast_down(
+        signal, machine_candidates(machine, {name: name for name in signal.planes}), progress=progress
+    )

@@ -81,6 +81,7 @@ def waterfall(
     json_file: JsonOption = None,
 ) -> None:
     """Find and name the frequencies of a coast-down, and say whether 0.2 s held the maximum."""
+    from rotordrop.estimation.recorded_coast_down import with_found_air_gaps
     from rotordrop.machine import load_machine
     from rotordrop.report.page import write_page
     from rotordrop.report.terminal import print_summary
@@ -101,12 +102,19 @@ def waterfall(
         highest_frequency=highest,
         settings=WaterfallSettings(points=points, overlap=overlap),
     )
+    candidates = machine_candidates(
+        with_found_air_gaps(described, signal), {name: name for name in signal.planes}
+    )
     with progress_bar("frequencies") as progress:
-        found = analyse_coast_down(signal, machine_candidates(described), choice, progress=progress)
+        found = analyse_coast_down(signal, candidates, choice, progress=progress)
     page = waterfall_page(
         found,
         title=f"Frequencies of a coast-down of {described.name}",
-        facts=(("machine", f"{described.name} ({machine.name})"), ("record", record.name)),
+        facts=(
+            ("machine", f"{described.name} ({machine.name})"),
+            ("record", record.name),
+            ("centre of the bearings", signal.centre),
+        ),
         simulated=simulated,
         against=against.value,
     )

@@ -5,61 +5,63 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.errors import RecordError
+from rotordrop.errors import IdentificationError, RecordError
+from rotordrop.estimated import NINETY, Estimated
+from rotordrop.identification.air_gap import identify_air_gap, rest_at_end
+from rotordrop.identification.sensing import build_sensing, displacements_along
 from rotordrop.machine import Machine
-from rotordrop.measurement.axes import along_sensors, planar_of, sensor_planes
 from rotordrop.measurement.events import find_drop_instant
 from rotordrop.measurement.record import Record
 from rotordrop.model.assembly import build_rotor_fe
+from rotordrop.model.parameters import build_drop_model
 from rotordrop.model.statics import bearing_load_shares
 from rotordrop.spectrum.coast_down import RACES_SPUN_UP, SHORTEST_LAW, CoastDownSignal
 from rotordrop.spectrum.coast_down_law import fit_drag
-from rotordrop.spectrum.machine_candidates import swing_ranges
 from rotordrop.spectrum.speed_profile import SpeedProfile, fit_speed_profile
 
 Array = NDArray[np.float64]
 
-REST = 1.0
-"""Length of the end of a record [s] whose distance from the centre gives the air-gap window."""
-LARGEST_SHARE = 0.3
-"""How far the settled radius may be from the machine's gap, as a share of it, to replace it."""
-
 
 def recorded_coast_down(machine: Machine, record: Record) -> CoastDownSignal:
-    """Cut a record at power-off, centre it on the levitated rotor, and resolve x and y in each sensor plane.
+    """Cut a record at power-off and resolve x and y at each touchdown bearing, from the centre of its race.
 
-    The air-gap window of a plane is the distance of the settled rotor from the centre less what contact, race
-    and support give way under the weight; the machine's own gap where the rotor has not settled.
+    The settled rotor lies straight below the centre: horizontally the centre is where it rests, vertically it
+    is the zero of the sensors, from which the rest also gives the air gap, as in an estimate of the drop. The
+    levitated rotor tells neither; it may float anywhere.
 
     Parameters
     ----------
     machine : Machine
         The machine.
     record : Record
-        Begins while the rotor floats.
+        The coast-down; one that ends at rest shows centre and air gap.
     """
-    planes = sensor_planes(record.sensors)
     off = float(find_drop_instant(record, machine))
-    moved = planar_of(along_sensors(record.signals, record.sensors), planes)
-    before = record.time < off
-    if not np.any(before):
-        raise RecordError(
-            "the record begins at power-off: the centre of the rotor is not known; give an earlier start"
+    model = build_drop_model(machine, "quick")
+    sensing = build_sensing(model, record.sensors)
+    falling = record.time >= off
+    along = displacements_along(record)[falling]
+    moved = sensing.at_bearings(along - sensing.settled_bend)
+    names = model.bearing_names
+    try:
+        gap = identify_air_gap(rest_at_end(record, sensing), model, sensing)
+        moved[..., 0] -= gap.rest.sideways
+        gaps, errors = gap.value, dict(zip(names, map(float, gap.standard_error), strict=True))
+        centre = (
+            f"above the rest of the last {gap.rest.end - gap.rest.start:.3g} s, at the height of sensor zero"
         )
-    centred = moved[~before] - np.mean(moved[before], axis=0)
-    rest = max(1, int(REST * record.sampling_rate))
-    gaps, sags = _known_gaps(machine), _sags(machine)
-    signals, windows = {}, {}
-    for index, plane in enumerate(planes):
-        signals[plane.bearing] = np.ascontiguousarray(centred[:, index])
-        radius = float(np.median(np.hypot(*centred[-rest:, index].T)))
-        windows[plane.bearing] = _window(radius - sags[plane.bearing], gaps[plane.bearing])
+    except IdentificationError as error:
+        gaps = np.array([float(bearing.air_gap) for bearing in machine.touchdown_bearings])
+        errors = None
+        centre = f"taken as the zero of the sensors, the air gap from the machine file: {error}"
     time, speed = _speed(record, off)
     return CoastDownSignal(
-        planes=signals,
-        air_gap=windows,
+        planes={name: np.ascontiguousarray(moved[:, b]) for b, name in enumerate(names)},
+        air_gap=dict(zip(names, map(float, gaps), strict=True)),
+        air_gap_error=errors,
+        centre=centre,
         sampling_rate=record.sampling_rate,
-        start_time=float(record.time[~before][0]) - off,
+        start_time=float(record.time[falling][0]) - off,
         profile=_profile(time, speed),
         speed_time=time,
         speed=speed,
@@ -67,17 +69,25 @@ def recorded_coast_down(machine: Machine, record: Record) -> CoastDownSignal:
     )
 
 
-def _known_gaps(machine: Machine) -> dict[str, float]:
-    return {bearing.name: float(bearing.air_gap) for bearing in machine.touchdown_bearings}
-
-
-def _sags(machine: Machine) -> dict[str, float]:
-    gaps = _known_gaps(machine)
-    return {swing.bearing: swing.length - gaps[swing.bearing] for swing in swing_ranges(machine)}
-
-
-def _window(settled: float, known: float) -> float:
-    return settled if abs(settled - known) <= LARGEST_SHARE * known else known
+def with_found_air_gaps(machine: Machine, signal: CoastDownSignal) -> Machine:
+    """Give a machine the air gaps that its coast-down shows; itself where none was found."""
+    if signal.air_gap_error is None:
+        return machine
+    found = {
+        f"{name}.air_gap": Estimated(
+            value=gap,
+            status="estimated",
+            interval_90=(
+                gap - NINETY * signal.air_gap_error[name],
+                gap + NINETY * signal.air_gap_error[name],
+            ),
+            lower=max(gap - NINETY * signal.air_gap_error[name], 0.5 * gap),
+            upper=gap + NINETY * signal.air_gap_error[name],
+            unit="m",
+        )
+        for name, gap in signal.air_gap.items()
+    }
+    return machine.with_values(found)
 
 
 def _speed(record: Record, off: float) -> tuple[Array | None, Array | None]:

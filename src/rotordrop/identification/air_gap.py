@@ -34,6 +34,15 @@ BLOCK = 0.5
 LARGEST_SWAY = 0.25
 """Largest swing of a rotor that counts as settled, as a share of its radius [1]."""
 
+LARGEST_SWING = 0.7
+"""The same where only centre and radius are asked, which a swing along the race does not move."""
+
+MOST_SPREAD = 0.05
+"""Scatter of the radius of a rotor that lies in its bearings, as a share of it [1]."""
+
+END = 1.0
+"""Length of the end of a record that shows where the rotor lies [s]: some thirty swings."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class SettledRest:
@@ -51,6 +60,8 @@ class SettledRest:
         Mean horizontal reading at the bearings [m]; taken as horizontal sensor zero.
     sway : ndarray, shape (B,)
         Half the swing around the lowest point [m].
+    spread : ndarray, shape (B,)
+        Standard deviation of the radius [m].
     along : ndarray, shape (S,)
         Displacements along the sensors [m] with the rotor at the lowest point of its sway.
     start, end : float
@@ -63,6 +74,7 @@ class SettledRest:
     standard_error: Array
     sideways: Array
     sway: Array
+    spread: Array
     along: Array
     start: float
     end: float
@@ -140,6 +152,26 @@ def find_rest(record: Record, tail: Record | None, sensing: Sensing) -> SettledR
     return _rest(source.name, time, along, sensing)
 
 
+def rest_at_end(record: Record, sensing: Sensing) -> SettledRest:
+    """Where the rotor lies at the end of a record, the shaft turning or not: in contact, swinging at most.
+
+    Raises
+    ------
+    IdentificationError
+        If the rotor does not lie in its bearings for the last second, or the record is shorter.
+    """
+    late = record.time >= record.time[-1] - END
+    if record.time[-1] - record.time[0] < 2.0 * END:
+        raise IdentificationError(f"{record.name} is shorter than {2.0 * END:g} s")
+    rest = _rest(record.name, record.time[late], displacements_along(record)[late], sensing, LARGEST_SWING)
+    if np.any(rest.spread > MOST_SPREAD * rest.radius):
+        raise IdentificationError(
+            f"{record.name}: in its last {END:g} s the rotor still leaves its races: its distance from their "
+            f"centre scatters by {_microns(rest.spread)} µm; expected less than {MOST_SPREAD:.0%} of it"
+        )
+    return rest
+
+
 def _settled_samples(record: Record) -> NDArray[np.bool_]:
     """Samples after the shaft came to rest, for good."""
     if record.speed is None or record.speed_by_hand:
@@ -163,18 +195,20 @@ def _settled_samples(record: Record) -> NDArray[np.bool_]:
     return keep
 
 
-def _rest(name: str, time: Array, along: Array, sensing: Sensing) -> SettledRest:
+def _rest(
+    name: str, time: Array, along: Array, sensing: Sensing, largest_sway: float = LARGEST_SWAY
+) -> SettledRest:
     place = sensing.at_bearings(along - sensing.settled_bend)
     sideways = place[..., 0].mean(axis=0)
     swing = place[..., 0] - sideways
     radius = np.hypot(swing, place[..., 1])
     sway = 0.5 * np.ptp(swing, axis=0)
-    if np.any(place[..., 1].mean(axis=0) > 0.0) or np.any(sway > LARGEST_SWAY * radius.mean(axis=0)):
+    if np.any(place[..., 1].mean(axis=0) > 0.0) or np.any(sway > largest_sway * radius.mean(axis=0)):
         raise IdentificationError(
             f"{name}: the rotor is not at rest on its bearings: mean height "
             f"{_microns(place[..., 1].mean(axis=0))} µm, swing {_microns(sway)} µm; expected a height near "
             "minus the air "
-            f"gap and a swing below {LARGEST_SWAY:.0%} of it. Check polarity and angles of the sensors, or "
+            f"gap and a swing below {largest_sway:.0%} of it. Check polarity and angles of the sensors, or "
             "give a later tail (--tail)."
         )
     blocks = max(1, int((time[-1] - time[0]) / BLOCK + 0.1))
@@ -189,6 +223,7 @@ def _rest(name: str, time: Array, along: Array, sensing: Sensing) -> SettledRest
         standard_error=means.std(axis=0, ddof=1) / np.sqrt(blocks) if blocks > 1 else np.zeros(len(mean)),
         sideways=sideways,
         sway=sway,
+        spread=radius.std(axis=0),
         along=along.mean(axis=0) - raised,
         start=float(time[0]),
         end=float(time[-1]),

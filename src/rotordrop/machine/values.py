@@ -151,7 +151,8 @@ class Physical:
             raise UsageError(
                 f"{raw!r} is not a finite number; write for example {KINDS[self.kind].example!r}"
             )
-        if number and not SMALLEST <= abs(number) <= LARGEST:
+        least = 0.0 if self.above is None else SMALLEST  # a fitted drag may come out as good as zero
+        if number and not least <= abs(number) <= LARGEST:
             raise UsageError(
                 f"{raw!r} is no {self.kind.replace('_', ' ')} that a machine has; write for example "
                 f"{KINDS[self.kind].example!r}"

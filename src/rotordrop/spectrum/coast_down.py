@@ -86,6 +86,10 @@ class CoastDownSignal:
         Speed as it was recorded or simulated [s], [rad/s].
     recorded : bool
         False for a simulation.
+    air_gap_error : mapping of str to float, or None
+        Standard error of the air gaps [m], where the signal shows them.
+    centre : str
+        Where the displacements count from, in words.
     standstill : float or None
         When the rotor stopped [s], where that is known and need not be found, as in a simulation.
     force_and_stress : tuple of dict
@@ -101,6 +105,8 @@ class CoastDownSignal:
     speed_time: Array | None
     speed: Array | None
     recorded: bool
+    air_gap_error: Mapping[str, float] | None = None
+    centre: str = "the centre of the bearing"
     standstill: float | None = None
     force_and_stress: tuple[Mapping[str, Any], ...] = ()
 
@@ -179,6 +185,8 @@ class CoastDownAnalysis:
         content = {
             "recorded": self.signal.recorded,
             "sampling_rate_hz": self.signal.sampling_rate,
+            "centre": self.signal.centre,
+            "air_gap_m": dict(self.signal.air_gap),
             "speed_law": None if self.speed_law is None else _law_json(self.speed_law),
             "lines": [line.as_json() for line in self.lines],
             "planes": {name: _plane_json(plane) for name, plane in self.planes.items()},

@@ -210,7 +210,8 @@ def find_settling(
     settled = last < samples - int(sampling_rate)
     if settled:
         text = (
-            f"in contact without interruption from {time:.3f} s on, at {radius * 1e6:.1f} µm from the centre"
+            f"in contact without interruption from {time:.3f} s on, at {radius * 1e6:.1f} µm from the "
+            f"centre; bounces below {margin * 1e6:.0f} µm count as contact"
         )
     else:
         text = f"still lifting off at {time:.3f} s, within the last second of the signal: it did not settle"

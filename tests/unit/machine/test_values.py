@@ -88,3 +88,9 @@ def test_saved_numbers_in_si_come_back_exactly():
 def test_refusals_name_the_value_and_the_way_out(written, told):
     with pytest.raises(UsageError, match=told):
         STIFFNESS.read(written)
+
+
+def test_what_may_be_zero_may_be_as_good_as_zero():
+    assert Physical("quadratic_drag", least=0.0).read("1e-32 N m s^2").value == 1e-32
+    with pytest.raises(UsageError, match="'1e-32 m' is no length that a machine has"):
+        Physical("length", above=0.0).read("1e-32 m")
