@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import RecordError
+from rotordrop.estimated import Estimated
 from rotordrop.machine import example_machine
 from rotordrop.measurement import EarlyForces, find_drop_instant, first_contacts
 from rotordrop.measurement.axes import sensor_planes
@@ -51,6 +52,32 @@ def test_the_standard_error_of_the_power_off_is_its_scatter(drop, machine):
     scatter = np.std([one.value for one in found], ddof=1)
     stated = np.sqrt(np.mean([one.fall.standard_error**2 for one in found]))
     assert 0.53 < scatter / stated < 1.50  # √χ²₁₁/11 at 1 and 99 per cent
+
+
+def test_a_sensor_that_reads_more_is_told_by_the_fall(drop, machine):
+    """Five per cent more on one of four channels whose gains are hardly known, against the same record."""
+    loose = Estimated(value=1.0, status="guess", range=(0.7, 1.3))
+    sensors = tuple(sensor.model_copy(update={"gain": loose}) for sensor in machine.sensors)
+    unsure = machine.model_copy(update={"sensors": sensors})
+    record = replace(drop.window(-0.25, 0.03), sensors=sensors)
+    before = find_drop_instant(record, unsure)
+    fallen = record.signals - before.levitated.readings(record.time)
+    more = replace(record, signals=record.signals + 0.05 * fallen * np.array([0.0, 1.0, 0.0, 0.0]))
+    change = find_drop_instant(more, unsure).fall.gain_errors - before.fall.gain_errors
+    assert change == pytest.approx([0.0, 0.05, 0.0, 0.0], abs=0.011)
+    assert change[1] == pytest.approx(0.05, abs=0.005)
+
+
+@pytest.mark.parametrize("push", [-40.0, 40.0])
+def test_the_fall_is_fitted_until_something_pushes(drop, machine, found, push):
+    """From 4 ms after power-off on the rotor is pushed up or down [m/s²], long before it touches."""
+    record = drop.window(-0.25, 0.03)
+    since = np.clip(record.time - found.value - 4e-3, 0.0, None)
+    y = [np.sin(float(sensor.angle)) for sensor in record.sensors]
+    pushed = replace(record, signals=record.signals + 0.5 * push * since[:, None] ** 2 * y)
+    fall = find_drop_instant(pushed, machine).fall
+    assert 3.5e-3 < fall.end - found.value < 5e-3 < found.fall.end - found.value
+    assert fall.instant == pytest.approx(found.value, abs=3.0 * fall.standard_error + 1e-5)
 
 
 def test_the_remanent_lift_is_found_roughly(found, found_fast):
@@ -101,6 +128,8 @@ def test_forces_at_the_ends_of_the_span_do_not_hide_a_contact(drop, machine, fou
         assert contact.peak_force == pytest.approx(1000.0 * np.sin(np.pi * 4 / 9))
         assert contact.start == pytest.approx(1e-3, abs=1e-4)
         assert contact.end == pytest.approx(1.9e-3, abs=1e-4)
+    ends[-4, 1] = (0.0, 8000.0)  # the last knot that counts; 15 per cent of the largest force is no contact
+    assert [one.bearing for one in first_contacts(drop, machine, found)] == ["DE"]
 
 
 def test_first_contacts_need_the_amb_planes(drop, machine, found):

@@ -8,6 +8,7 @@ import pytest
 from rotordrop.errors import RecordError
 from rotordrop.measurement import check_record, refuse_unusable
 from rotordrop.measurement.quality.clock import check_clock
+from rotordrop.measurement.quality.motion import check_rotation_line, first_motion
 from rotordrop.synthesis import hidden_machine, synthesize_drop
 
 HZ = 2 * np.pi
@@ -204,6 +205,16 @@ class TestClock:
         assert "at 60 Hz by the speed channel" in found.message
 
 
+def test_the_fall_has_begun_when_half_of_the_channels_went_a_quarter_of_their_way(drop):
+    """Whatever units and polarities: one channel in volts, one inverted, one dead, one late."""
+    way = np.clip((np.arange(len(drop.time)) - 1000) / 800.0, 0.0, 1.0)
+    late = np.clip((np.arange(len(drop.time)) - 1400) / 800.0, 0.0, 1.0)
+    signals = np.column_stack([0.3 + 5.0 * way, -2e-4 * way, np.zeros_like(way), 1e-4 * late])
+    sample, level = first_motion(replace(drop, signals=signals))
+    assert level == pytest.approx([0.3, 0.0, 0.0, 0.0])
+    assert sample == 1401  # the median of four lies between the second and the third: 0 and a half of its way
+
+
 class TestSpeed:
     def test_missing(self, drop, machine):
         silent = replace(drop, speed=None, speed_time=None, speed_readings=None)
@@ -217,6 +228,22 @@ class TestSpeed:
         assert found.kind == "wrong speed unit"
         assert "3600 Hz by the speed channel" in found.message
         assert "rpm taken for Hz" in found.message
+
+    def test_the_direction_of_rotation_is_no_fault(self, drop):
+        for way in (-1.0, 1.0):
+            assert check_rotation_line(drop, -0.01, way * 60.0 * HZ) == []
+            (found,) = check_rotation_line(drop, -0.01, way * 3600.0 * HZ)
+            assert "rpm taken for Hz" in found.message
+
+    @pytest.mark.parametrize(("size", "seen"), [(0.0, False), (0.6, True), (3.0, True)])
+    def test_a_line_counts_from_50_times_the_power_beside_it(self, drop, size, seen):
+        """Amplitude against the noise; 0.24 s at 20 kHz gather 800 times the square of it in one line."""
+        dice = np.random.default_rng(3)
+        line = size * np.cos(60.0 * HZ * drop.time)[:, None]
+        levitated = replace(drop, signals=1e-6 * (dice.standard_normal(drop.signals.shape) + line))
+        assert [one.kind for one in check_rotation_line(levitated, -0.01, 41.0 * HZ)] == (
+            ["wrong sampling rate"] if seen else []
+        )
 
     def test_double_pulses(self, drop, tail, machine):
         readings = drop.speed_readings.copy()
