@@ -2,6 +2,7 @@
 
 from rotordrop.machine.amb import ActiveMagneticBearing
 from rotordrop.machine.ball_bearing import BallBearing
+from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin
 from rotordrop.machine.examples import example_machine, example_names, example_path
 from rotordrop.machine.loading import load_machine, loads_machine
 from rotordrop.machine.machine import Machine
@@ -20,6 +21,8 @@ __all__ = [
     "ActiveMagneticBearing",
     "BalanceGrade",
     "BallBearing",
+    "CalibrationDrop",
+    "CalibrationOrigin",
     "Contact",
     "Disc",
     "Doubt",

@@ -12,6 +12,7 @@ from pydantic import Field, PrivateAttr
 from rotordrop.errors import UsageError
 from rotordrop.estimated import Estimated
 from rotordrop.machine.amb import ActiveMagneticBearing
+from rotordrop.machine.calibration import CalibrationOrigin
 from rotordrop.machine.description import Description, Misfit, Text, place_on_nodes
 from rotordrop.machine.parameter_paths import changed_machine_parts
 from rotordrop.machine.provenance import Mention, mentions
@@ -22,7 +23,7 @@ from rotordrop.machine.touchdown_bearing import TouchdownBearing
 from rotordrop.machine.unbalance import BalanceGrade, Unbalance, from_grade
 from rotordrop.machine.values import Acceleration, default
 
-RESERVED_NAMES = ("speed", "unbalance", "rotor", "gravity", "sensors", "ambs", "machine")
+RESERVED_NAMES = ("speed", "unbalance", "rotor", "gravity", "sensors", "ambs", "machine", "calibration")
 
 
 class Machine(Description):
@@ -50,6 +51,8 @@ class Machine(Description):
         Nominal speed and aerodynamic drag.
     notes : tuple of str
         Remarks of the file's author.
+    calibration : CalibrationOrigin, optional
+        Recorded drops that its estimates come from.
     """
 
     name: Text
@@ -62,6 +65,9 @@ class Machine(Description):
     touchdown_bearings: tuple[TouchdownBearing, ...] = Field(min_length=1)
     ambs: tuple[ActiveMagneticBearing, ...] = ()
     sensors: tuple[Sensor, ...] = ()
+    calibration: CalibrationOrigin | None = Field(
+        default=None, description="Drops it was calibrated on, written by 'rotordrop calibrate'"
+    )
 
     _source_path: Path | None = PrivateAttr(default=None)
 
@@ -168,6 +174,12 @@ class Machine(Description):
         copy.__pydantic_fields_set__.update(parts)
         if parts.keys() - {"touchdown_bearings", "speed"}:
             copy.__dict__.update(copy.left_out())
+        return copy
+
+    def calibrated_on(self, origin: CalibrationOrigin) -> Machine:
+        """Give the same machine, with the drops that its estimates come from."""
+        copy = self.completed_with({"calibration": origin})
+        copy.__pydantic_fields_set__.add("calibration")
         return copy
 
     @cached_property
