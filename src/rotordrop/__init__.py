@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from rotordrop.measurement import check_record as check_record
     from rotordrop.measurement import example_record_path as example_record_path
     from rotordrop.measurement import read_record as read_record
+    from rotordrop.measurement.look import look as look
     from rotordrop.model.parameters import DropModel as DropModel
     from rotordrop.model.parameters import build_drop_model as build_drop_model
     from rotordrop.simulation.case import DropCase as DropCase
@@ -61,6 +62,7 @@ _PUBLIC = {
     "load_machine": "rotordrop.machine",
     "load_result": "rotordrop.simulation.result",
     "load_study": "rotordrop.study",
+    "look": "rotordrop.measurement.look",
     "machine_schema": "rotordrop.machine",
     "parse_quantity": "rotordrop.units",
     "read_record": "rotordrop.measurement",

@@ -48,6 +48,7 @@ _ORDER = (
     "simulate",
     "critical-speeds",
     "coast-down",
+    "look",
     "estimate",
     "calibrate",
     "compare",

@@ -1,4 +1,4 @@
-"""Print the JSON Schema of machine files or of estimates.
+"""Print the JSON Schema of machine files, estimates or looks at a record.
 
 Editors that know the first complete and check a machine file while one types; programs that read an estimate
 find its fields in the second.
@@ -22,6 +22,7 @@ class Document(StrEnum):
 
     machine = "machine"
     estimate = "estimate"
+    look = "look"
 
 
 def schema(
@@ -37,6 +38,8 @@ def schema(
     """Print the JSON Schema of a machine file or of an estimate, for editors and programs."""
     if document is Document.machine:
         from rotordrop.machine import machine_schema as schema_of
+    elif document is Document.look:
+        from rotordrop.measurement.look.schema import look_schema as schema_of
     else:
         from rotordrop.estimation.schema import estimate_schema as schema_of
 

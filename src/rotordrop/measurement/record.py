@@ -162,9 +162,13 @@ def read_record(
     path = Path(path)
     rules = profile if isinstance(profile, Profile) else load_profile(profile) if profile else Profile()
     recording = read_recording(path, rules)
+    return record_of(recording, machine.sensors, profile=rules, path=path, sha256=sha256_of(path))
+
+
+def sha256_of(path: Path) -> str:
+    """Hash of a file."""
     with path.open("rb") as stream:
-        digest = hashlib.file_digest(stream, "sha256").hexdigest()
-    return record_of(recording, machine.sensors, profile=rules, path=path, sha256=digest)
+        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def record_of(
