@@ -114,6 +114,15 @@ def palmgren_line_contact(inputs: Inputs) -> dict[str, float]:
     }
 
 
+def cylinder_on_a_block(inputs: Inputs) -> dict[str, float]:
+    (E_1, E_2), (nu_1, nu_2) = inputs["E"], inputs["nu"]
+    line = hertz.LineContact(
+        radius=inputs["radius"], length=1.0, compliance=hertz.compliance(E_1, nu_1, E_2, nu_2)
+    )
+    load = inputs["load_per_length"]
+    return {"largest pressure": line.maximum_pressure(load), "half width": line.half_width(load)}
+
+
 def circular_contacts(inputs: Inputs) -> dict[str, float]:
     steel, ceramic = (tuple(inputs[name][key] for key in ("E", "nu")) for name in ("steel", "Si3N4"))
     all_steel, hybrid = hertz.compliance(*steel, *steel), hertz.compliance(*ceramic, *steel)
@@ -221,6 +230,7 @@ CASES: dict[str, Compute] = {
     "H08": palmgren_line_contact,
     "H09": circular_contacts,
     "H11": papers_touchdown_bearing,
+    "H12": cylinder_on_a_block,
 }
 
 
@@ -246,6 +256,8 @@ def test_case(name: str) -> None:
         ("H11", {"fi": 0.52}),
         ("H11", {"alpha0_deg": 24.0}),
         ("H11", {"Dw": 0.0105}),
+        ("H12", {"radius": 0.0501}),
+        ("H12", {"load_per_length": 35.1e6}),
     ],
 )
 def test_perturbed_input_fails_the_case(name: str, change: dict[str, float]) -> None:

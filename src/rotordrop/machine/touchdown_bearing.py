@@ -144,6 +144,8 @@ class Race(Description):
         Mass [kg].
     inertia : Estimated
         Polar moment of inertia [kg m²].
+    width : Estimated
+        Width over which the rotor lies in the race [m]; the pressure between them follows from it.
     drag_coefficient : Estimated
         Drag torque over bearing force and half the pitch diameter [1].
     drag_speed : Estimated
@@ -152,6 +154,7 @@ class Race(Description):
 
     mass: PositiveMass = follows("from the size of the bearing")
     inertia: PositiveInertia = follows("from the size of the bearing")
+    width: PositiveLength = follows("the length of the contact, or from the size of the bearing")
     drag_coefficient: NonNegative = default(
         0.002, "rolling friction of angular-contact bearings", (0.001, 0.005)
     )
@@ -296,13 +299,12 @@ class TouchdownBearing(Placed):
             )
 
     def left_out(self) -> dict[str, Any]:
-        """Give the race a mass and inertia that were left out, from the size of the bearing."""
+        """Give the race a width, mass and inertia that were left out, from the size of the bearing."""
         given = self.race.model_fields_set
-        if {"mass", "inertia"} <= given:
-            return {}
-        mass, inertia = self._race_from_size()
+        width = self.race.width if "width" in given else self._race_width()
+        mass, inertia = self._race_from_size(width.value)
         why = "steel ring from the bore to 0.6 ball diameters inside the pitch circle"
-        values: dict[str, Estimated] = {}
+        values: dict[str, Estimated] = {"width": width}
         if "mass" not in given:
             bounds = (0.5 * mass, 2.0 * mass)
             values["mass"] = Estimated(value=mass, status="inferred", range=bounds, source=why, unit="kg")
@@ -315,12 +317,20 @@ class TouchdownBearing(Placed):
             )
         return {"race": self.race.completed_with(values)}
 
-    def _race_from_size(self) -> tuple[float, float]:
+    def _race_width(self) -> Estimated:
+        rows = 1 if self.bearing.arrangement == "single" else 2
+        if self.contact.length is not None:
+            return replace(self.contact.length, status="inferred", source="the length of the line contact")
+        if self.bearing.width is not None:
+            value, why = rows * self.bearing.width.value, "width of all rows"
+        else:
+            value, why = rows * 1.6 * self.bearing.ball_diameter.value, "1.6 ball diameters per row"
+        return Estimated(value=value, status="default", source=f"{why}; a sleeve differs", unit="m")
+
+    def _race_from_size(self, width: float) -> tuple[float, float]:
         bearing = self.bearing
         ball = bearing.ball_diameter.value
         inner = self.bore_radius.value
         outer = max(0.5 * (bearing.pitch_diameter.value - 0.6 * ball), 1.05 * inner)
-        width = 1.6 * ball if bearing.width is None else bearing.width.value
-        rows = 1 if bearing.arrangement == "single" else 2
-        mass = _STEEL_DENSITY * math.pi * (outer**2 - inner**2) * rows * width
+        mass = _STEEL_DENSITY * math.pi * (outer**2 - inner**2) * width
         return mass, 0.5 * mass * (outer**2 + inner**2)

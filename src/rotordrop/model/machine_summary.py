@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rotordrop.model.assembly import RotorFE, build_rotor_fe
 from rotordrop.model.modes import N_RIGID, free_free_modes, modes_on_springs
 from rotordrop.model.parameters import loose_race_seat, static_deflection
+from rotordrop.model.rotor_on_race import rotor_on_race
 from rotordrop.model.statics import bearing_load_shares, levitated_sag
 from rotordrop.physics.ball_bearing import BearingConstants, bearing_constants
 from rotordrop.physics.ball_bearing_response import bearing_response
@@ -38,6 +39,8 @@ class BearingSummary:
         Stiffness, preload and geometry of the ball bearing.
     preload_stress : float
         Hertz stress of a ball on the inner race from the preload alone [Pa].
+    contact_pressure : float
+        Hertz pressure of the rotor at rest on the race, over its whole width [Pa].
     ball_load : float
         Largest load of a ball with the rotor at rest [N].
     loaded_balls : int
@@ -56,6 +59,7 @@ class BearingSummary:
     load: float
     constants: BearingConstants
     preload_stress: float
+    contact_pressure: float
     ball_load: float
     loaded_balls: int
     deflection: float
@@ -94,7 +98,7 @@ def summarise_machine(machine: Machine) -> MachineSummary:
     fe = build_rotor_fe(machine)
     loads = bearing_load_shares(machine, fe)
     bearings = tuple(
-        _bearing(bearing, float(load))
+        _bearing(machine, bearing, float(load))
         for bearing, load in zip(machine.touchdown_bearings, loads, strict=True)
     )
     springs = {
@@ -111,7 +115,7 @@ def summarise_machine(machine: Machine) -> MachineSummary:
     )
 
 
-def _bearing(bearing: TouchdownBearing, load: float) -> BearingSummary:
+def _bearing(machine: Machine, bearing: TouchdownBearing, load: float) -> BearingSummary:
     constants = bearing_constants(bearing.bearing)
     deflection, tangent = static_deflection(constants, abs(load))
     seat = (0.0, -deflection) if constants.preloaded else loose_race_seat(constants, abs(load))
@@ -122,6 +126,7 @@ def _bearing(bearing: TouchdownBearing, load: float) -> BearingSummary:
         load=load,
         constants=constants,
         preload_stress=constants.stress_coefficient_inner * math.cbrt(constants.preload_ball_load),
+        contact_pressure=float(rotor_on_race(machine, bearing).maximum_pressure(abs(load))),
         ball_load=float(np.max(balls)),
         loaded_balls=int(np.count_nonzero(balls)),
         deflection=deflection,

@@ -204,6 +204,52 @@ def contacts_in_series(K_i: ArrayLike, K_o: ArrayLike) -> ArrayLike:
     return (K_i ** (-2.0 / 3.0) + K_o ** (-2.0 / 3.0)) ** -1.5
 
 
+@dataclass(frozen=True, kw_only=True)
+class LineContact:
+    """Two parallel cylinders, one perhaps hollow around the other, pressed together over a length.
+
+    Attributes
+    ----------
+    radius : float
+        Relative radius R [m], ``1/R = 1/R₁ + 1/R₂``; a bore counts negative.
+    length : float
+        Length of the contact [m].
+    compliance : float
+        Compliance of the material pair, 1/E* [1/Pa], see `compliance`.
+
+    Notes
+    -----
+    Source: Johnson, Contact Mechanics, ch. 4.
+    """
+
+    radius: float
+    length: float
+    compliance: float
+
+    def maximum_pressure(self, F: ArrayLike) -> Any:
+        """Largest Hertz pressure ``p₀ = √(F' E* / (π R))`` [Pa] under a load [N], F' per length.
+
+        Source: Johnson, Contact Mechanics, ch. 4. Not validated: ends of the contact and misalignment, which
+        raise it; waviness.
+        """
+        return np.sqrt(F / (math.pi * self.length * self.compliance * self.radius))
+
+    def half_width(self, F: ArrayLike) -> Any:
+        """Half width ``√(4 F' R / (π E*))`` [m] of the contact strip under a load [N].
+
+        Source: Johnson, Contact Mechanics, ch. 4. Valid while it is small against both radii.
+        """
+        return np.sqrt(4.0 * F * self.radius * self.compliance / (math.pi * self.length))
+
+
+def cylinder_in_bore(R_rotor: float, R_bore: float, length: float, eta: float) -> LineContact:
+    """Contact of a shaft in a bore: radii and length [m], compliance of the pair [1/Pa].
+
+    ``1/R = 1/R_rotor − 1/R_bore``. Source: Johnson, Contact Mechanics, ch. 4.
+    """
+    return LineContact(radius=R_rotor * R_bore / (R_bore - R_rotor), length=length, compliance=eta)
+
+
 def line_contact_stiffness(length: float) -> float:
     """Stiffness [N/m^(10/9)] of a line contact of a given length [m], with the exponent 10/9 of Neisi 2020.
 

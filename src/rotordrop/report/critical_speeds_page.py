@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotordrop._version import __version__
-from rotordrop.model.campbell import CampbellDiagram
+from rotordrop.model.campbell import CampbellDiagram, Crossing
 from rotordrop.model.critical_speeds import CriticalSpeedMap
 from rotordrop.report.content import Card, Figure, KeyFigure, ReportContent, Section, Statement, Table
 from rotordrop.report.critical_speeds_figure import campbell_figure, critical_speed_figure, mode_shape_figure
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 TURN = 2.0 * math.pi
 HIGHEST = 1000.0
+NEAR_NOMINAL = 0.05
+"""Distance of a critical speed from the nominal speed, as a share of it, below which a reader is warned."""
 SHAPES = 6
 AT_LINES = {
     "tangent": "bearings' tangent stiffness, supports without mass",
@@ -91,7 +93,22 @@ def _verdict(
             speeds = ", ".join(f"{c.speed / TURN:.1f}" for c in forward)
             text = f"{_held(name)}: forward or mixed modes meet the rotor's own speed at {speeds} Hz"
             statements.append(Statement(text=f"{text}, up to the nominal speed."))
+        statements += [_near_nominal(name, c, top) for c in diagram.crossings if _is_near(c, top)]
     return tuple(statements)
+
+
+def _is_near(crossing: Crossing, nominal: float) -> bool:
+    return crossing.direction != "backward" and abs(crossing.speed - nominal) <= NEAR_NOMINAL * nominal
+
+
+def _near_nominal(name: str, crossing: Crossing, nominal: float) -> Statement:
+    apart = abs(crossing.speed / nominal - 1.0)
+    return Statement(
+        text=f"{_held(name)}: a {crossing.direction} mode meets the rotor's own speed at "
+        f"{crossing.speed / TURN:.1f} Hz, {apart:.1%} from the nominal speed of {nominal / TURN:.1f} Hz, "
+        f"with a damping ratio of {crossing.damping_ratio:.2%}.",
+        level="warning",
+    )
 
 
 def _held(name: str) -> str:

@@ -53,6 +53,10 @@ def _card(machine: Machine, rest: BearingSummary) -> Card:
             KeyFigure(label="air gap", value=Quantity.of(bearing.air_gap, "length")),
             *_seat_of_the_balls(bearing.bearing, rest),
             KeyFigure(
+                label="pressure of rotor on race at rest",
+                value=Quantity(value=rest.contact_pressure, kind="pressure"),
+            ),
+            KeyFigure(
                 label="tangent stiffness at rest",
                 value=Quantity(value=rest.tangent_stiffness, kind="stiffness"),
             ),
@@ -153,6 +157,7 @@ def _bearing_json(rest: BearingSummary) -> dict[str, float]:
     return {
         "load_N": rest.load,
         "preload_stress_Pa": rest.preload_stress,
+        "contact_pressure_at_rest_Pa": rest.contact_pressure,
         "tangent_stiffness_N_per_m": rest.tangent_stiffness,
         "equivalent_stiffness_N_per_m": rest.equivalent_stiffness,
         "support_frequency_Hz": rest.support_frequency,

@@ -81,6 +81,16 @@ def _card(result: DropResult, index: int) -> Card:
             label="Peak Hertz stress", value=Quantity(value=stress, kind="pressure"), note=_at(stress_time)
         ),
     ]
+    pressed = result.peak_contact_pressure(index)
+    if pressed is not None:
+        width = Quantity(value=2.0 * pressed[1], kind="length", digits=3).text
+        figures.append(
+            KeyFigure(
+                label="Peak pressure, rotor on race",
+                value=Quantity(value=pressed[0], kind="pressure"),
+                note=f"{_at(pressed[2])}, {width} wide",
+            )
+        )
     settled = (result.time >= SETTLED_FROM) & (result.time <= SETTLED_TO)
     if result.time[-1] >= SETTLED_TO:
         mean = float(np.mean(result.bearing_force_magnitude[settled, index]))

@@ -44,6 +44,10 @@ def _bearing(result: DropResult, index: int) -> dict[str, Any]:
         "stress_statistics_Pa": stress_statistics(result.max_stress[:, index]).as_json(),
         "impacts": _impacts(result, index),
     }
+    pressed = result.peak_contact_pressure(index)
+    if pressed is not None:
+        numbers["peak_contact_pressure_Pa"] = {"value": pressed[0], "time_s": pressed[2]}
+        numbers["contact_half_width_m"] = {"value": pressed[1]}
     if result.time[-1] >= SETTLED_TO:
         window = (result.time >= SETTLED_FROM) & (result.time <= SETTLED_TO)
         mean = float(np.mean(result.bearing_force_magnitude[window, index]))

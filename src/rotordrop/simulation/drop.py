@@ -11,6 +11,7 @@ from rotordrop.machine import Machine
 from rotordrop.model.layout import KernelParameters
 from rotordrop.model.parameters import DropModel, build_drop_model
 from rotordrop.model.reduction import Reduction
+from rotordrop.model.rotor_on_race import rotor_on_race
 from rotordrop.simulation import _histories as H
 from rotordrop.simulation import _loop
 from rotordrop.simulation._tableau import Tableau, dp5, tsit5
@@ -135,6 +136,7 @@ def _result(
         bearing_force=force,
         max_ball_load=histories[..., H.H_BALL_LOAD],
         max_stress=histories[..., H.H_STRESS],
+        line_contacts=tuple(rotor_on_race(model.machine, b) for b in model.machine.touchdown_bearings),
         speed=states[:, layout.rotor_speed],
         race_speed=states[:, layout.race_spin],
         state=states,

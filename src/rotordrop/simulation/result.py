@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rotordrop.atomic_file import new_hdf5
 from rotordrop.errors import SimulationError
+from rotordrop.physics.hertz import LineContact
 from rotordrop.simulation.certificate import Certificate, refined_peak
 
 if TYPE_CHECKING:
@@ -90,6 +91,8 @@ class DropResult:
         How the computation ended, as a sentence.
     finished : bool
         Whether the whole duration was reached.
+    line_contacts : tuple of LineContact
+        Rotor in each race, which gives the pressure there; empty for a result read from a file.
     """
 
     time: Array
@@ -118,6 +121,15 @@ class DropResult:
     outcome: str
     finished: bool
     certificate: Certificate
+    line_contacts: tuple[LineContact, ...] = ()
+
+    def peak_contact_pressure(self, bearing: int) -> tuple[float, float, float] | None:
+        """Largest Hertz pressure of rotor on race [Pa], half width of the contact then [m], time [s]."""
+        if not self.line_contacts:
+            return None
+        force, time = refined_peak(self.time, self.contact_force[:, bearing])
+        line = self.line_contacts[bearing]
+        return float(line.maximum_pressure(force)), float(line.half_width(force)), time
 
     @property
     def bearing_force_magnitude(self) -> Array:

@@ -134,3 +134,16 @@ def test_line_contact_stiffness_inverts_its_approach() -> None:
     assert hertz.line_contact_stiffness(0.032) == pytest.approx(
         3.78e9, rel=1e-3
     )  # physics of the paper's contact
+
+
+def test_the_pressure_of_a_line_contact_carries_the_load() -> None:
+    line = hertz.LineContact(radius=0.05, length=1.0, compliance=1e-11)
+    assert line.maximum_pressure(1e5) * line.half_width(1e5) * math.pi / 2.0 == pytest.approx(1e5, rel=1e-12)
+    assert line.maximum_pressure(4e5) == pytest.approx(2.0 * line.maximum_pressure(1e5), rel=1e-12)
+
+
+def test_a_bore_that_fits_closer_spreads_the_load() -> None:
+    open_, close = (hertz.cylinder_in_bore(0.03, 0.03 + gap, 0.036, 1e-11) for gap in (300e-6, 100e-6))
+    assert open_.radius == pytest.approx(0.03 * 0.0303 / 300e-6)
+    assert close.maximum_pressure(1e3) < open_.maximum_pressure(1e3)
+    assert close.half_width(1e3) > open_.half_width(1e3)

@@ -63,10 +63,17 @@ def test_a_drop_onto_loose_bearings_keeps_its_energy_and_ends_on_the_weight(bear
     assert result.certificate.energy_residual < 1e-4 * result.certificate.energy_scale
     late = result.time > 0.1
     mean = np.mean(result.bearing_force[late, :, 1], axis=0)
-    weight = model.load_shares + model.parameters.bearing[:, L.RACE_WEIGHT]
+    p = model.parameters.bearing
+    weight = model.load_shares + p[:, L.RACE_WEIGHT]
     assert np.sum(mean) == pytest.approx(np.sum(weight), rel=0.1)
     shown = simulation_numbers(result)
     assert "nan" not in str(shown).lower()
+    pressure = shown["bearings"]["NDE"]["peak_contact_pressure_Pa"]["value"]
+    line = result.line_contacts[0]
+    bore, gap = p[0, L.BORE_RADIUS], p[0, L.AIR_GAP]
+    assert line.radius == pytest.approx(bore * (bore - gap) / gap, rel=1e-12)
+    per_length = np.max(result.contact_force[:, 0]) / line.length
+    assert pressure == pytest.approx(np.sqrt(per_length / line.compliance / np.pi / line.radius), rel=0.01)
 
 
 def test_a_loose_race_lies_on_its_balls_before_the_drop_and_stays_there():

@@ -1,0 +1,35 @@
+"""The page on critical speeds warns where one of them lies at the nominal speed."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from rotordrop.report.critical_speeds_page import _verdict
+
+AT_LINES = {"tangent": np.array([100.0]), "with support mass": np.array([90.0])}
+
+
+def said(hertz, direction="forward", nominal=550.0):
+    crossing = SimpleNamespace(speed=2.0 * math.pi * hertz, direction=direction, damping_ratio=0.025)
+    machine = SimpleNamespace(speed=SimpleNamespace(nominal=2.0 * math.pi * nominal))
+    found, diagrams = SimpleNamespace(at_lines=AT_LINES), {"AMBs": SimpleNamespace(crossings=(crossing,))}
+    return [
+        statement.text for statement in _verdict(machine, found, diagrams) if statement.level == "warning"
+    ]
+
+
+@pytest.mark.parametrize("hertz", [548.4, 523.0, 577.0])
+def test_a_mode_near_the_nominal_speed_is_a_warning(hertz):
+    (text,) = said(hertz)
+    assert f"a forward mode meets the rotor's own speed at {hertz:.1f} Hz" in text
+    assert f"{abs(hertz / 550.0 - 1.0):.1%} from the nominal speed of 550.0 Hz" in text
+    assert "damping ratio of 2.50%" in text
+
+
+def test_a_mode_further_off_or_against_the_spin_is_none():
+    assert said(520.0) == []
+    assert said(548.4, "backward") == []
