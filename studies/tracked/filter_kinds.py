@@ -73,7 +73,7 @@ def update(mean, covariance, readings, speed, rows, variances, speed_variance, s
         if not math.isfinite(value):
             continue
         if c < n_c:
-            predicted = F.measurement_row(c, mean, rows[c], s, n_p, n_c, row)
+            predicted = F.measurement_row(c, mean, mean[s - 1], rows[c], s + n_p, n_c, row)
             variance = variances[c]
         else:
             row[:] = 0.0
@@ -106,7 +106,7 @@ def sigma_point_pass(
     n = mean.shape[0]
     s = rows.shape[1]
     k = np.empty((6, s + 2))
-    work = np.empty((2, p.ball_cos.shape[1]))
+    work = np.empty((2, p.balls.shape[2]))
     contact = np.empty(6)
     impulses = np.zeros(p.bearing.shape[0])
     spare = np.zeros(p.bearing.shape[0])
@@ -207,7 +207,7 @@ def ensemble_pass(
     """Stochastic ensemble filter with perturbed readings, without localisation."""
     n, s, n_c = mean.shape[0], rows.shape[1], rows.shape[0]
     k = np.empty((6, s + 2))
-    work = np.empty((2, p.ball_cos.shape[1]))
+    work = np.empty((2, p.balls.shape[2]))
     contact = np.empty(6)
     row = np.zeros(n)
     seen = np.empty(members)
@@ -226,7 +226,11 @@ def ensemble_pass(
                 continue
             variance = speed_variance if c == n_c else variances[c]
             for m in range(members):
-                seen[m] = x[m, s - 2] if c == n_c else F.measurement_row(c, x[m], rows[c], s, n_p, n_c, row)
+                seen[m] = (
+                    x[m, s - 2]
+                    if c == n_c
+                    else F.measurement_row(c, x[m], x[m, s - 1], rows[c], s + n_p, n_c, row)
+                )
             E[i, c], S[i, c] = ensemble_update(random, x, value, seen, variance)
         for j in range(n):
             means[i, j] = x[:, j].mean()

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from rotordrop.physics import impact, whirl
-from rotordrop.physics.contact import hunt_crossley_force
+from rotordrop.physics.contact import contact_force, contact_law
 from rotordrop.physics.friction import stribeck_coefficient
 from rotordrop.physics.spin import surface_speed
 from rotordrop.physics.support import support_force
@@ -25,6 +25,11 @@ from rotordrop.physics.support import support_force
 pytestmark = pytest.mark.acceptance
 Inputs = Mapping[str, Any]
 Array = NDArray[np.float64]
+
+
+def hunt_crossley_force(delta: float, rate: float, K: float, n: float, lam: float) -> float:
+    """Normal force [N] of the contact kernel, none without indentation."""
+    return contact_force(contact_law(K, n, lam), delta, rate)[0] if delta > 0.0 else 0.0
 
 
 def integrate(

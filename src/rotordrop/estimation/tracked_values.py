@@ -227,7 +227,7 @@ def _equivalent_stiffness(
     problem: DropProblem, name: str, values: dict[str, IdentifiedValue]
 ) -> IdentifiedValue:
     """Support and bearing in series [N/m], the bearing by its tangent at the static load."""
-    from rotordrop.model.parameters import static_bearing_stiffness
+    from rotordrop.physics.ball_set import static_bearing_stiffness
 
     index = problem.model.bearing_names.index(name)
     constants = bearing_constants(problem.model.machine.bearing(name).bearing)

@@ -15,10 +15,8 @@ from numpy.typing import NDArray
 from rotordrop.errors import IdentificationError
 from rotordrop.identification.sensing import Sensing, displacements_along
 from rotordrop.measurement.record import Record
-from rotordrop.model import layout as L
-from rotordrop.model.layout import KernelParameters
-from rotordrop.model.parameters import DropModel, static_deflection
-from rotordrop.physics.ball_bearing import bearing_constants
+from rotordrop.model.parameters import DropModel
+from rotordrop.model.static_sag import StaticSag, sag_of_model
 
 Array = NDArray[np.float64]
 
@@ -78,26 +76,6 @@ class SettledRest:
     along: Array
     start: float
     end: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class StaticSag:
-    """What gives way under the static load shares, shape (B,) each [m].
-
-    Attributes
-    ----------
-    indentation, race, support : ndarray, shape (B,)
-        Rotor into race, race into balls, support on its spring [m].
-    """
-
-    indentation: Array
-    race: Array
-    support: Array
-
-    @property
-    def total(self) -> Array:
-        """All three together [m], shape (B,)."""
-        return self.indentation + self.race + self.support
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -230,22 +208,6 @@ def _rest(
     )
 
 
-def static_sag(model: DropModel, parameters: KernelParameters | None = None) -> StaticSag:
-    """What race, support and contact give way under the static load shares."""
-    p = model.parameters if parameters is None else parameters
-    loads = np.asarray(model.load_shares)
-    row = p.bearing
-    indentation = (loads / row[:, L.CONTACT_STIFFNESS]) ** (1.0 / row[:, L.CONTACT_EXPONENT])
-    bearings = model.machine.touchdown_bearings
-    race = [
-        static_deflection(bearing_constants(b.bearing), float(w))[0]
-        for b, w in zip(bearings, loads, strict=True)
-    ]
-    return StaticSag(
-        indentation=indentation, race=np.array(race), support=loads / row[:, L.SUPPORT_STIFFNESS_Y]
-    )
-
-
 def identify_air_gap(rest: SettledRest, model: DropModel, sensing: Sensing) -> AirGap:
     """Air gap of each bearing: settled radius less what gives way under the weight.
 
@@ -264,7 +226,7 @@ def identify_air_gap(rest: SettledRest, model: DropModel, sensing: Sensing) -> A
     race and support deflection, for the bend of the resting rotor between sensor and bearing, and for the arc
     of the sway.
     """
-    sag = static_sag(model)
+    sag = sag_of_model(model)
     vertical = np.abs(sensing.to_bearings[:, 1, :])
     zero = np.sqrt(np.sum((vertical * sensing.offset_sigma) ** 2, axis=1))
     gain = np.sqrt(np.sum((sensing.to_bearings[:, 1, :] * rest.along * sensing.gain_sigma) ** 2, axis=1))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError
-from rotordrop.identification.air_gap import SettledRest, StaticSag, static_sag
+from rotordrop.identification.air_gap import SettledRest
 from rotordrop.identification.free_fall import MAGNET_FORCES, FreeFall, build_free_fall, kernel_state
 from rotordrop.identification.initial_state import InitialState
 from rotordrop.identification.parameter_vector import ParameterVector, with_bearing
@@ -17,6 +17,7 @@ from rotordrop.measurement.record import Record
 from rotordrop.model import layout as L
 from rotordrop.model.layout import KernelParameters
 from rotordrop.model.parameters import DropModel, build_drop_model
+from rotordrop.model.static_sag import sag_of_model, static_sag
 from rotordrop.physics import aerodynamics
 from rotordrop.simulation import _loop
 from rotordrop.simulation._tableau import tsit5
@@ -85,10 +86,8 @@ class Replica:
         rows = self.model.parameters.bearing.copy()
         vector.set(theta, rows)
         loads = np.asarray(self.model.load_shares)
-        indentation = (loads / rows[:, L.CONTACT_STIFFNESS]) ** (1.0 / rows[:, L.CONTACT_EXPONENT])
-        sag = indentation + self.race_sag + loads / rows[:, L.SUPPORT_STIFFNESS_Y]
         down = 0.0 if rest_error is None else rest_error[:, 1]
-        rows[:, L.AIR_GAP] = self.radius - down - sag
+        rows[:, L.AIR_GAP] = self.radius - down - static_sag(rows, self.race_sag, loads).total
         return rows
 
     def states(
@@ -186,13 +185,12 @@ def build_replica(
     state, remanent, unbalance = kernel_state(fall, own.state_at(start), fall.speed * start)
     time = record.time - initial.drop_instant
     keep = (time > start + 1e-9) & (time <= until)
-    sag: StaticSag = static_sag(model)
     return Replica(
         model=replace(model, parameters=drop_parameters(model, own, remanent, unbalance)),
         sensing=own.sensing,
         initial=own,
         radius=rest.radius,
-        race_sag=sag.race,
+        race_sag=sag_of_model(model).race,
         start=start,
         state=state,
         time=time[keep],

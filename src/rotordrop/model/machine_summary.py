@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from rotordrop.model.assembly import RotorFE, build_rotor_fe
 from rotordrop.model.modes import N_RIGID, free_free_modes, modes_on_springs
-from rotordrop.model.parameters import loose_race_seat, static_deflection
 from rotordrop.model.rotor_on_race import rotor_on_race
 from rotordrop.model.statics import bearing_load_shares, levitated_sag
 from rotordrop.physics.ball_bearing import BearingConstants, bearing_constants
 from rotordrop.physics.ball_bearing_response import bearing_response
+from rotordrop.physics.ball_set import loose_race_seat, static_deflection
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine, TouchdownBearing

@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine, TouchdownBearing
-from rotordrop.model.parameters import static_bearing_stiffness
+from rotordrop.model.parameters import contact_law_of
 from rotordrop.model.statics import bearing_load_shares
 from rotordrop.model.supports import Support, in_series, link, spring
 from rotordrop.physics.ball_bearing import bearing_constants
 from rotordrop.physics.ball_bearing_response import simple_radial_stiffness
+from rotordrop.physics.ball_set import static_bearing_stiffness
+from rotordrop.physics.contact import contact_tangent
 from rotordrop.physics.hertz import compliance
 
 Array = NDArray[np.float64]
@@ -106,13 +108,8 @@ def _of_bearing(bearing: TouchdownBearing, load: float) -> EquivalentStiffness:
             materials,
         ),
         support=float(bearing.support.stiffness),
-        contact=contact_stiffness(float(bearing.contact.stiffness), float(bearing.contact.exponent), load),
+        contact=contact_tangent(contact_law_of(bearing.contact), load),
     )
-
-
-def contact_stiffness(K: float, n: float, load: float) -> float:
-    """Slope [N/m] of the contact law ``F = K δⁿ`` at a load [N]; K in N/mⁿ."""
-    return float(n * K ** (1.0 / n) * load ** (1.0 - 1.0 / n))
 
 
 def suspension_of(machine: Machine, name: str) -> tuple[Support, ...]:

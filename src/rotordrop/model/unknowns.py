@@ -14,8 +14,9 @@ from rotordrop.estimated import NINETY, Estimated
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.model.parameter import Entry, Parameter, Rule
 from rotordrop.model.parameter_table import parameter, rows
-from rotordrop.model.parameters import DropModel
+from rotordrop.model.parameters import DropModel, contact_law_of
 from rotordrop.physics.ball_bearing import bearing_constants, preload_of_offset
+from rotordrop.physics.contact import depth_at
 
 Scope = Literal["machine", "drop"]
 
@@ -236,8 +237,7 @@ def typical_depth(bearing: TouchdownBearing, load: float) -> float:
     load : float
         Share of the weight of one bearing, in the mean [N].
     """
-    contact = bearing.contact
-    return float((TYPICAL_LOADS * load / float(contact.stiffness)) ** (1.0 / float(contact.exponent)))
+    return depth_at(contact_law_of(bearing.contact), TYPICAL_LOADS * load)
 
 
 def _anisotropy(row: Parameter, bearing: TouchdownBearing, index: int) -> Unknown:

@@ -1,86 +1,109 @@
-"""Hunt–Crossley contact between rotor and inner race (Neisi 2020, eqs. 8–10)."""
+"""Contact of rotor and inner race: the one place that knows its law (Neisi 2020, eqs. 8–10).
+
+A law is a short array of numbers that only this module reads: `contact_law` makes it, the columns of
+`rotordrop.model.layout` hold it, and whoever needs force, derivative, energy, depth or tangent hands it back.
+"""
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rotordrop.physics._compile import inner_kernel, kernel
 
+Array = NDArray[np.float64]
 
-@inner_kernel
-def elastic_contact_force(delta: float, K: float, n: float) -> float:
-    """Elastic part [N] of the contact force, ``K δ^n``, at a positive indentation [m].
+# Entries of a contact law; SI units.
+STIFFNESS = 0
+EXPONENT = 1
+DAMPING = 2
+N_ENTRIES = 3
 
-    Source: Neisi 2020, eq. (8) without damping.
+
+def contact_law(stiffness: float, exponent: float, damping: float) -> Array:
+    """Contact law of Hunt and Crossley, shape (3,), from K [N/m^n], n [1] and λ [s/m].
+
+    Source: Neisi 2020, eq. (8) with b = 3/2 λ K.
     """
-    force: float = K * delta**n
-    return force
+    law = np.empty(N_ENTRIES)
+    law[STIFFNESS], law[EXPONENT], law[DAMPING] = stiffness, exponent, damping
+    return law
 
 
 @inner_kernel
-def damped_contact_force(elastic: float, delta_dot: float, lam: float) -> float:
-    """Normal force [N] from its elastic part [N] and the rate of indentation [m/s]; never pulls.
-
-    Source: Neisi 2020, eq. (8), ``max(0, K δ^n (1 + 1.5 λ δ̇))``.
-    """
-    force: float = elastic * (1.0 + 1.5 * lam * delta_dot)
-    return max(0.0, force)
-
-
-@inner_kernel
-def hunt_crossley_force(delta: float, delta_dot: float, K: float, n: float, lam: float) -> float:
-    """Normal force [N] pressing rotor and race apart at an indentation and its rate.
+def contact_force(law: Array, delta: float, delta_dot: float) -> tuple[float, float]:
+    """Normal force [N] pressing rotor and race apart, and its elastic part [N].
 
     Parameters
     ----------
+    law : ndarray, shape (3,)
+        From `contact_law`.
     delta : float
-        Indentation ``e_r - c_r`` [m]; no force at or below zero.
+        Indentation ``e_r - c_r`` [m]; positive, for there is no force without it.
     delta_dot : float
         Rate of indentation [m/s].
-    K : float
-        Contact stiffness [N/m^n].
-    n : float
-        Exponent [1]; 10/9 for line contact.
-    lam : float
-        Hunt–Crossley damping parameter λ [s/m].
 
     Returns
     -------
-    float
-        ``max(0, K δ^n (1 + 1.5 λ δ̇))`` [N].
+    tuple of float
+        ``max(0, K δ^n (1 + 1.5 λ δ̇))`` and ``K δ^n`` [N].
 
     Notes
     -----
-    Source: Neisi 2020, eq. (8) with b = 3/2 λ K. Differs from the paper: the printed "and" of the zero branch
-    is read as "or", so the force never pulls.
+    Source: Neisi 2020, eq. (8). Differs from the paper: the printed "and" of the zero branch is read as "or",
+    so the force never pulls.
     """
-    if delta <= 0.0:
-        return 0.0
-    return damped_contact_force(elastic_contact_force(delta, K, n), delta_dot, lam)
+    elastic: float = law[STIFFNESS] * delta ** law[EXPONENT]
+    return max(0.0, elastic * (1.0 + 1.5 * law[DAMPING] * delta_dot)), elastic
 
 
-@kernel
-def hunt_crossley_gradient(
-    delta: float, delta_dot: float, K: float, n: float, lam: float
-) -> tuple[float, float, float]:
+@inner_kernel
+def contact_gradient(law: Array, delta: float, delta_dot: float) -> tuple[float, float, float]:
     """Normal force [N] with its derivatives by indentation [N/m] and by rate of indentation [N s/m].
 
     Source: Neisi 2020, eq. (8), differentiated.
     """
-    if delta <= 0.0:
-        return 0.0, 0.0, 0.0
-    elastic = K * delta**n
-    growth = 1.0 + 1.5 * lam * delta_dot
+    elastic = law[STIFFNESS] * delta ** law[EXPONENT]
+    growth = 1.0 + 1.5 * law[DAMPING] * delta_dot
     if growth <= 0.0:
         return 0.0, 0.0, 0.0
-    return elastic * growth, n * elastic / delta * growth, elastic * 1.5 * lam
+    return elastic * growth, law[EXPONENT] * elastic / delta * growth, elastic * 1.5 * law[DAMPING]
 
 
-@kernel
-def elastic_contact_energy(delta: float, K: float, n: float) -> float:
-    """Energy [J] stored in the contact at an indentation [m]: ``K δ^(n+1) / (n+1)``.
+@inner_kernel
+def contact_energy(law: Array, delta: float) -> float:
+    """Energy [J] stored in the contact at a positive indentation [m]: ``K δ^(n+1) / (n+1)``.
 
     Source: integral of the elastic part of Neisi 2020, eq. (8).
     """
-    if delta <= 0.0:
-        return 0.0
-    energy: float = K * delta ** (n + 1.0) / (n + 1.0)
+    energy: float = law[STIFFNESS] * delta ** (law[EXPONENT] + 1.0) / (law[EXPONENT] + 1.0)
     return energy
+
+
+@kernel
+def depth_at(law: Array, load: float) -> float:
+    """Indentation [m] at which the contact at rest carries a load [N].
+
+    Source: inverse of the elastic part of Neisi 2020, eq. (8).
+    """
+    depth: float = (load / law[STIFFNESS]) ** (1.0 / law[EXPONENT])
+    return depth
+
+
+@kernel
+def contact_tangent(law: Array, load: float) -> float:
+    """Slope [N/m] of the law at rest under a load [N]: ``n K^(1/n) F^(1-1/n)``.
+
+    Source: Neisi 2020, eq. (8), differentiated at the depth of the load.
+    """
+    n = law[EXPONENT]
+    slope: float = n * law[STIFFNESS] ** (1.0 / n) * load ** (1.0 - 1.0 / n)
+    return slope
+
+
+def stiffness_of_exponent(law: Array, load: float, exponent: float) -> float:
+    """Stiffness [N/m^n] that another exponent [1] takes for the same indentation under a load [N].
+
+    Source: Neisi 2020, eq. (8), both laws through one point.
+    """
+    return float(load / depth_at(law, load) ** exponent)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rotordrop.model import layout as L
 from rotordrop.model.layout import KernelParameters
 from rotordrop.physics._compile import kernel
-from rotordrop.physics.ball_bearing_planar import largest_ball_load, planar_ball_force
+from rotordrop.physics.ball_set import ball_set_force, ball_set_load
 from rotordrop.simulation._loop import (
     BETA,
     FINISHED,
@@ -34,7 +34,7 @@ from rotordrop.simulation._loop import (
     scaled_error,
     start_running,
 )
-from rotordrop.simulation._rhs import drop_derivative
+from rotordrop.simulation._rhs import drop_derivative, race_deflection
 from rotordrop.simulation._tableau import Tableau
 
 Array = NDArray[np.float64]
@@ -79,21 +79,16 @@ def update_peaks(t: float, y: Array, p: KernelParameters, running: Array, peaks:
     its travel; directions differ by how the balls stand, which the margin of 10 % of the square covers.
     The peaks stand over the whole coast-down, so this is rare once the rotor has settled.
     """
-    m = p.eigenvalue.shape[0]
-    n_b = p.bearing.shape[0]
-    for b in range(n_b):
+    for b in range(p.bearing.shape[0]):
         if running[b, RUN_DELTA] > peaks[b, PEAK_INDENTATION]:
             peaks[b, PEAK_INDENTATION] = running[b, RUN_DELTA]
             peaks[b, PEAK_INDENTATION + 1] = t
-        r = 2 * m + 2 * b
-        h = r + 2 * n_b
-        dx = y[r] - y[h]
-        dy = y[r + 1] - y[h + 1]
+        dx, dy = race_deflection(b, y, p)
         travel = dx * dx + dy * dy
         if travel < 0.9 * peaks[b, PEAK_TRAVEL]:
             continue
         peaks[b, PEAK_TRAVEL] = max(travel, peaks[b, PEAK_TRAVEL])
-        force, stress = ball_set_load(b, dx, dy, p)
+        force, stress = force_and_stress(b, dx, dy, p)
         if force > peaks[b, PEAK_FORCE]:
             peaks[b, PEAK_FORCE] = force
             peaks[b, PEAK_FORCE + 1] = t
@@ -103,34 +98,12 @@ def update_peaks(t: float, y: Array, p: KernelParameters, running: Array, peaks:
 
 
 @kernel
-def ball_set_load(b: int, dx: float, dy: float, p: KernelParameters) -> tuple[float, float]:
+def force_and_stress(b: int, dx: float, dy: float, p: KernelParameters) -> tuple[float, float]:
     """Magnitude of the ball force [N] and largest Hertz stress [Pa] for a race moved by (dx, dy) [m]."""
-    row = p.bearing[b]
-    work = np.empty((2, p.ball_cos.shape[1]))
-    F_x, F_y = planar_ball_force(
-        dx,
-        dy,
-        row[L.RADIAL_OFFSET],
-        row[L.AXIAL_OFFSET],
-        row[L.GROOVE_DISTANCE],
-        row[L.BALL_STIFFNESS],
-        p.ball_cos[b],
-        p.ball_sin[b],
-        p.ball_weight[b],
-        work,
-    )
-    load = largest_ball_load(
-        dx,
-        dy,
-        row[L.RADIAL_OFFSET],
-        row[L.AXIAL_OFFSET],
-        row[L.GROOVE_DISTANCE],
-        row[L.BALL_STIFFNESS],
-        p.ball_cos[b],
-        p.ball_sin[b],
-        p.ball_weight[b],
-    )
-    return math.sqrt(F_x * F_x + F_y * F_y), row[L.STRESS_COEFFICIENT] * load ** (1.0 / 3.0)
+    entries, balls = p.bearing[b, L.BALL_SET : L.BALL_SET_END], p.balls[b]
+    F_x, F_y = ball_set_force(entries, balls, dx, dy, np.empty((2, p.balls.shape[2])))
+    _load, stress = ball_set_load(entries, balls, dx, dy)
+    return math.sqrt(F_x * F_x + F_y * F_y), stress
 
 
 @kernel
@@ -207,11 +180,10 @@ def integrate_window(  # noqa: C901, PLR0915  one compiled loop
         ``FINISHED``, ``STANDSTILL`` or why it ended early.
     """
     n = y.shape[0]
-    n_b = p.bearing.shape[0]
-    i_w = 2 * (2 * p.eigenvalue.shape[0] + 4 * n_b) + n_b
+    i_w = p.rotor_at[L.ROTOR_SPEED]
     y_new = np.empty(n)
     k = np.empty((7, n))
-    work = np.empty((2, p.ball_cos.shape[1]))
+    work = np.empty((2, p.balls.shape[2]))
     scratch = np.empty(n)
     t = progress[TIME]
     h = progress[STEP]

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from rotordrop.model import layout as L
 from rotordrop.model.layout import KernelParameters
-from rotordrop.physics._compile import kernel, lean_kernel
-from rotordrop.physics.ball_bearing_planar import largest_ball_load, planar_ball_energy, planar_ball_force
-from rotordrop.physics.contact import elastic_contact_energy
+from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
+from rotordrop.physics.ball_set import ball_set_energy, ball_set_force, ball_set_load
+from rotordrop.physics.contact import contact_energy
 from rotordrop.simulation._loop import contact_at
-from rotordrop.simulation._rhs import relative_motion
+from rotordrop.simulation._rhs import modal_parts, race_deflection, relative_motion
 
 Array = NDArray[np.float64]
 
@@ -31,80 +31,47 @@ H_STRESS = 9
 N_HISTORIES = 10
 
 
+@inner_kernel
+def fill_history(b: int, y: Array, p: KernelParameters, work: Array, out: Array) -> None:
+    """Fill ``out`` (10,) with what one bearing does in a state."""
+    contact_at(b, y, p, out)
+    entries, balls = p.bearing[b, L.BALL_SET : L.BALL_SET_END], p.balls[b]
+    dx, dy = race_deflection(b, y, p)
+    F_x, F_y = ball_set_force(entries, balls, dx, dy, work)
+    out[H_BEARING_FORCE_X] = -F_x
+    out[H_BEARING_FORCE_Y] = -F_y
+    out[H_BALL_LOAD], out[H_STRESS] = ball_set_load(entries, balls, dx, dy)
+
+
 @kernel
 def bearing_histories(states: Array, p: KernelParameters, out: Array) -> None:
     """Fill ``out`` (T, B, 10) from ``states`` (T, n); SI units, columns ``H_*``; the ball force is that on
     the race.
     """
-    m = p.eigenvalue.shape[0]
-    n_b = p.bearing.shape[0]
-    work = np.empty((2, p.ball_cos.shape[1]))
+    work = np.empty((2, p.balls.shape[2]))
     for i in range(states.shape[0]):
-        y = states[i]
-        for b in range(n_b):
-            contact_at(b, y, p, out[i, b])
-            row = p.bearing[b]
-            r = 2 * m + 2 * b
-            h = r + 2 * n_b
-            dx = y[r] - y[h]
-            dy = y[r + 1] - y[h + 1]
-            F_x, F_y = planar_ball_force(
-                dx,
-                dy,
-                row[L.RADIAL_OFFSET],
-                row[L.AXIAL_OFFSET],
-                row[L.GROOVE_DISTANCE],
-                row[L.BALL_STIFFNESS],
-                p.ball_cos[b],
-                p.ball_sin[b],
-                p.ball_weight[b],
-                work,
-            )
-            load = largest_ball_load(
-                dx,
-                dy,
-                row[L.RADIAL_OFFSET],
-                row[L.AXIAL_OFFSET],
-                row[L.GROOVE_DISTANCE],
-                row[L.BALL_STIFFNESS],
-                p.ball_cos[b],
-                p.ball_sin[b],
-                p.ball_weight[b],
-            )
-            out[i, b, H_BEARING_FORCE_X] = -F_x
-            out[i, b, H_BEARING_FORCE_Y] = -F_y
-            out[i, b, H_BALL_LOAD] = load
-            out[i, b, H_STRESS] = row[L.STRESS_COEFFICIENT] * np.cbrt(load)
+        for b in range(p.bearing.shape[0]):
+            fill_history(b, states[i], p, work, out[i, b])
 
 
 @lean_kernel
 def stored_energy(y: Array, p: KernelParameters, with_rotor_spin: bool) -> float:
     """Energy [J] of a state: motion, bending, contacts, balls, supports, gravity and spin."""
-    m = p.eigenvalue.shape[0]
-    n_b = p.bearing.shape[0]
-    n_q = 2 * m + 4 * n_b
+    n_q = p.rotor_at[L.N_COORDINATES]
+    qx, qy, sx, sy = modal_parts(y, p)
     energy = 0.0
-    for k in range(m):
-        energy += 0.5 * (y[n_q + k] ** 2 + y[n_q + m + k] ** 2)
-        energy += 0.5 * p.eigenvalue[k] * (y[k] ** 2 + y[m + k] ** 2) - p.gravity[k] * y[m + k]
-    for b in range(n_b):
+    for k in range(p.eigenvalue.shape[0]):
+        energy += 0.5 * (sx[k] ** 2 + sy[k] ** 2)
+        energy += 0.5 * p.eigenvalue[k] * (qx[k] ** 2 + qy[k] ** 2) - p.gravity[k] * qy[k]
+    for b in range(p.bearing.shape[0]):
         row = p.bearing[b]
-        r = 2 * m + 2 * b
-        h = r + 2 * n_b
+        r, h = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT]
         ux, uy, _vx, _vy = relative_motion(b, y, p)
         delta = math.sqrt(ux * ux + uy * uy) - row[L.AIR_GAP]
-        energy += elastic_contact_energy(delta, row[L.CONTACT_STIFFNESS], row[L.CONTACT_EXPONENT])
-        energy += planar_ball_energy(
-            y[r] - y[h],
-            y[r + 1] - y[h + 1],
-            row[L.RADIAL_OFFSET],
-            row[L.AXIAL_OFFSET],
-            row[L.GROOVE_DISTANCE],
-            row[L.BALL_STIFFNESS],
-            p.ball_cos[b],
-            p.ball_sin[b],
-            p.ball_weight[b],
-        )
+        if delta > 0.0:
+            energy += contact_energy(row[L.CONTACT : L.CONTACT_END], delta)
+        dx, dy = race_deflection(b, y, p)
+        energy += ball_set_energy(row[L.BALL_SET : L.BALL_SET_END], p.balls[b], dx, dy)
         energy += row[L.RACE_WEIGHT] * y[r + 1]
         energy += 0.5 * row[L.RACE_MASS] * (y[n_q + r] ** 2 + y[n_q + r + 1] ** 2)
         energy += (
@@ -113,9 +80,9 @@ def stored_energy(y: Array, p: KernelParameters, with_rotor_spin: bool) -> float
         energy += (
             0.5 * row[L.SUPPORT_STIFFNESS_X] * y[h] ** 2 + 0.5 * row[L.SUPPORT_STIFFNESS_Y] * y[h + 1] ** 2
         )
-        energy += 0.5 * row[L.RACE_INERTIA] * y[2 * n_q + b] ** 2
+        energy += 0.5 * row[L.RACE_INERTIA] * y[p.bearing_at[b, L.RACE_SPIN]] ** 2
     if with_rotor_spin:
-        energy += 0.5 * p.spin[L.POLAR_INERTIA] * y[2 * n_q + n_b] ** 2
+        energy += 0.5 * p.spin[L.POLAR_INERTIA] * y[p.rotor_at[L.ROTOR_SPEED]] ** 2
     return energy
 
 

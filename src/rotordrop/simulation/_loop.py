@@ -116,10 +116,8 @@ def contact_values(b: int, y: Array, p: KernelParameters) -> tuple[float, float,
     """Contact of one bearing in a state: indentation [m], normal force [N], friction force [N], normal
     x and y [1], power dissipated in the contact [W].
     """
-    n_b = p.bearing.shape[0]
-    n_q = 2 * p.eigenvalue.shape[0] + 4 * n_b
     ux, uy, vx, vy = relative_motion(b, y, p)
-    omega, omega_i = y[2 * n_q + n_b], y[2 * n_q + b]
+    omega, omega_i = y[p.rotor_at[L.ROTOR_SPEED]], y[p.bearing_at[b, L.RACE_SPIN]]
     delta, F_r, mu, nx, ny, v_t, elastic = contact_state(ux, uy, vx, vy, omega, omega_i, p.bearing[b])
     power = mu * F_r * v_t + (F_r - elastic) * (vx * nx + vy * ny)
     return delta, F_r, mu * F_r, nx, ny, power
@@ -288,7 +286,7 @@ def integrate_drop(  # noqa: C901, PLR0915  one compiled loop
     y = y0.copy()
     y_new = np.empty(n)
     k = np.empty((7, n))
-    work = np.empty((2, p.ball_cos.shape[1]))
+    work = np.empty((2, p.balls.shape[2]))
     scratch = np.empty(n)
     running = np.zeros((p.bearing.shape[0], 4))
     log[:, :] = 0.0

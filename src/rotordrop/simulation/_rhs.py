@@ -16,8 +16,8 @@ from rotordrop.model.layout import KernelParameters
 from rotordrop.physics import aerodynamics
 from rotordrop.physics._compile import inner_kernel, lean_kernel
 from rotordrop.physics.aerodynamics import exponential_deceleration, speed_dependent_deceleration
-from rotordrop.physics.ball_bearing_planar import planar_ball_force
-from rotordrop.physics.contact import damped_contact_force, elastic_contact_force
+from rotordrop.physics.ball_set import ball_set_force
+from rotordrop.physics.contact import contact_force
 from rotordrop.physics.friction import stribeck_coefficient
 from rotordrop.physics.remanence import remanent_fraction
 from rotordrop.physics.spin import race_drag_torque, surface_speed
@@ -40,21 +40,33 @@ def project(shape: Array, amplitudes: Array) -> float:
 
 
 @inner_kernel
+def modal_parts(y: Array, p: KernelParameters) -> tuple[Array, Array, Array, Array]:
+    """Views of the modal amplitudes in x and in y and of their velocities in a state or its derivative."""
+    m = p.eigenvalue.shape[0]
+    x, z, n_q = p.rotor_at[L.MODES_X], p.rotor_at[L.MODES_Y], p.rotor_at[L.N_COORDINATES]
+    return y[x : x + m], y[z : z + m], y[n_q + x : n_q + x + m], y[n_q + z : n_q + z + m]
+
+
+@inner_kernel
 def relative_motion(b: int, y: Array, p: KernelParameters) -> tuple[float, float, float, float]:
     """Displacement [m] and velocity [m/s] of the rotor relative to the race of one bearing, x and y."""
-    m = p.eigenvalue.shape[0]
-    n_q = 2 * m + 4 * p.bearing.shape[0]
-    r = 2 * m + 2 * b
+    n_q, r = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.RACE]
     shape = p.bearing_shape[b]
-    qx, qy = y[:m], y[m : 2 * m]
-    sx, sy = y[n_q : n_q + m], y[n_q + m : n_q + 2 * m]
+    qx, qy, sx, sy = modal_parts(y, p)
     ux = uy = vx = vy = 0.0
-    for k in range(m):
+    for k in range(shape.shape[0]):
         ux += shape[k] * qx[k]
         uy += shape[k] * qy[k]
         vx += shape[k] * sx[k]
         vy += shape[k] * sy[k]
     return ux - y[r], uy - y[r + 1], vx - y[n_q + r], vy - y[n_q + r + 1]
+
+
+@inner_kernel
+def race_deflection(b: int, y: Array, p: KernelParameters) -> tuple[float, float]:
+    """Displacement [m] of the race of one bearing relative to its support, x and y."""
+    r, h = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT]
+    return y[r] - y[h], y[r + 1] - y[h + 1]
 
 
 @inner_kernel
@@ -74,8 +86,7 @@ def contact_state(
     nx = ux / e_r
     ny = uy / e_r
     delta_dot = vx * nx + vy * ny
-    elastic = elastic_contact_force(delta, bearing[L.CONTACT_STIFFNESS], bearing[L.CONTACT_EXPONENT])
-    F_r = damped_contact_force(elastic, delta_dot, bearing[L.CONTACT_DAMPING])
+    F_r, elastic = contact_force(bearing[L.CONTACT : L.CONTACT_END], delta, delta_dot)
     v_t = surface_speed(vy * nx - vx * ny, omega, bearing[L.ROTOR_RADIUS], omega_i, bearing[L.BORE_RADIUS])
     mu = stribeck_coefficient(
         v_t,
@@ -120,21 +131,18 @@ def add_rotor_accelerations(
 
     Returns the power dissipated by modal damping and the power put in by unbalance and spin-up [W].
     """
-    m = p.eigenvalue.shape[0]
-    n_q = 2 * m + 4 * p.bearing.shape[0]
-    c = math.cos(y[2 * n_q + p.bearing.shape[0] + 1])
-    s = math.sin(y[2 * n_q + p.bearing.shape[0] + 1])
+    c = math.cos(y[p.rotor_at[L.ROTOR_ANGLE]])
+    s = math.sin(y[p.rotor_at[L.ROTOR_ANGLE]])
     w2 = omega * omega
     along = w2 * c + omega_dot * s
     across = w2 * s - omega_dot * c
-    ux, uy = y[:m], y[m : 2 * m]
-    vx, vy = y[n_q : n_q + m], y[n_q + m : n_q + 2 * m]
-    ax, ay = dy[n_q : n_q + m], dy[n_q + m : n_q + 2 * m]
-    gx, gy = dy[:m], dy[m : 2 * m]
+    ux, uy, vx, vy = modal_parts(y, p)
+    # The rates of the modes are written last of all; until then their places hold the gyroscopic forces.
+    gx, gy, ax, ay = modal_parts(dy, p)
     gyroscopic_forces(p.polar, ux, uy, vx, vy, omega, omega_dot, gx, gy)
     dissipated = 0.0
     put_in = 0.0
-    for k in range(m):
+    for k in range(p.eigenvalue.shape[0]):
         fx = p.unbalance_cos[k] * along - p.unbalance_sin[k] * across
         fy = p.unbalance_cos[k] * across + p.unbalance_sin[k] * along
         ax[k] += fx - p.eigenvalue[k] * ux[k] - p.damping[k] * vx[k] - gx[k]
@@ -147,29 +155,29 @@ def add_rotor_accelerations(
 @lean_kernel
 def add_magnet_forces(t: float, y: Array, p: KernelParameters, dy: Array) -> float:
     """Add holding, spring, damper and remanent forces of the AMBs; returns the power they put in [W]."""
-    m = p.eigenvalue.shape[0]
-    n_q = 2 * m + 4 * p.bearing.shape[0]
+    qx, qy, sx, sy = modal_parts(y, p)
+    _, _, ax, ay = modal_parts(dy, p)
     holds = t < p.spin[L.POWER_OFF_DELAY]
     left = remanent_fraction(t, p.spin[L.POWER_OFF_DELAY], p.spin[L.REMANENCE_TIME_CONSTANT])
     put_in = 0.0
     for a in range(p.magnet.shape[0]):
         shape = p.magnet_shape[a]
-        vx = project(shape, y[n_q : n_q + m])
-        vy = project(shape, y[n_q + m : n_q + 2 * m])
+        vx = project(shape, sx)
+        vy = project(shape, sy)
         fx = left * p.magnet[a, L.REMANENT_X]
         fy = left * p.magnet[a, L.REMANENT_Y]
         if holds:
-            ux = project(shape, y[:m]) - p.magnet[a, L.AMB_REFERENCE_X]
-            uy = project(shape, y[m : 2 * m]) - p.magnet[a, L.AMB_REFERENCE_Y]
+            ux = project(shape, qx) - p.magnet[a, L.AMB_REFERENCE_X]
+            uy = project(shape, qy) - p.magnet[a, L.AMB_REFERENCE_Y]
             fx += (
                 p.magnet[a, L.HOLDING_X] - p.magnet[a, L.AMB_STIFFNESS] * ux - p.magnet[a, L.AMB_DAMPING] * vx
             )
             fy += (
                 p.magnet[a, L.HOLDING_Y] - p.magnet[a, L.AMB_STIFFNESS] * uy - p.magnet[a, L.AMB_DAMPING] * vy
             )
-        for k in range(m):
-            dy[n_q + k] += shape[k] * fx
-            dy[n_q + m + k] += shape[k] * fy
+        for k in range(shape.shape[0]):
+            ax[k] += shape[k] * fx
+            ay[k] += shape[k] * fy
         put_in += fx * vx + fy * vy
     return put_in
 
@@ -182,28 +190,14 @@ def bearing_accelerations(
 
     Returns the friction torque on the rotor [N m] (positive drives it) and the power dissipated [W].
     """
-    m = p.eigenvalue.shape[0]
-    n_b = p.bearing.shape[0]
-    n_q = 2 * m + 4 * n_b
+    n_q = p.rotor_at[L.N_COORDINATES]
+    r, h, spin = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.RACE_SPIN]
     row = p.bearing[b]
     shape = p.bearing_shape[b]
-    r = 2 * m + 2 * b
-    h = r + 2 * n_b
-    spin = 2 * n_q + b
     ux, uy, vx, vy = relative_motion(b, y, p)
     delta, F_r, mu, nx, ny, v_t, elastic = contact_state(ux, uy, vx, vy, omega, y[spin], row)
-    F_x, F_y = planar_ball_force(
-        y[r] - y[h],
-        y[r + 1] - y[h + 1],
-        row[L.RADIAL_OFFSET],
-        row[L.AXIAL_OFFSET],
-        row[L.GROOVE_DISTANCE],
-        row[L.BALL_STIFFNESS],
-        p.ball_cos[b],
-        p.ball_sin[b],
-        p.ball_weight[b],
-        work,
-    )
+    race_x, race_y = race_deflection(b, y, p)
+    F_x, F_y = ball_set_force(row[L.BALL_SET : L.BALL_SET_END], p.balls[b], race_x, race_y, work)
     drag = race_drag_torque(
         math.sqrt(F_x * F_x + F_y * F_y),
         y[spin],
@@ -229,8 +223,8 @@ def bearing_accelerations(
         contact_y = F_r * ny + F_mu * nx
         torque = F_mu
         dissipated += F_mu * v_t + (F_r - elastic) * (vx * nx + vy * ny)
-        ax, ay = dy[n_q : n_q + m], dy[n_q + m : n_q + 2 * m]
-        for k in range(m):
+        _, _, ax, ay = modal_parts(dy, p)
+        for k in range(shape.shape[0]):
             ax[k] -= shape[k] * contact_x
             ay[k] -= shape[k] * contact_y
     dy[n_q + r] = (contact_x - F_x) / row[L.RACE_MASS]
@@ -256,17 +250,14 @@ def aerodynamic_deceleration(t: float, omega: float, p: KernelParameters) -> flo
     return 0.0
 
 
-@lean_kernel
+@inner_kernel
 def drop_derivative(t: float, y: Array, p: KernelParameters, dy: Array, work: Array) -> None:
     """Time derivative of the state of a drop.
 
     Bearings come first, then the rotor's spin, then its lateral motion, because the ω̇ terms of eq. (1) need
     the angular acceleration that friction causes.
     """
-    m = p.eigenvalue.shape[0]
-    n_b = p.bearing.shape[0]
-    n_q = 2 * m + 4 * n_b
-    i_w = 2 * n_q + n_b
+    n_q, i_w = p.rotor_at[L.N_COORDINATES], p.rotor_at[L.ROTOR_SPEED]
     omega = y[i_w]
     rates, accelerations = dy[:n_q], dy[n_q : 2 * n_q]
     velocities = y[n_q : 2 * n_q]
@@ -274,7 +265,7 @@ def drop_derivative(t: float, y: Array, p: KernelParameters, dy: Array, work: Ar
         accelerations[i] = 0.0
     contact_torque = 0.0
     dissipated = 0.0
-    for b in range(n_b):
+    for b in range(p.bearing.shape[0]):
         torque, lost = bearing_accelerations(b, y, omega, p, dy, work)
         contact_torque += torque
         dissipated += lost
@@ -291,6 +282,6 @@ def drop_derivative(t: float, y: Array, p: KernelParameters, dy: Array, work: Ar
     for i in range(n_q):
         rates[i] = velocities[i]
     dy[i_w] = omega_dot
-    dy[i_w + 1] = omega
-    dy[i_w + 2] = dissipated + lost
-    dy[i_w + 3] = put_in + gained
+    dy[p.rotor_at[L.ROTOR_ANGLE]] = omega
+    dy[p.rotor_at[L.DISSIPATED]] = dissipated + lost
+    dy[p.rotor_at[L.WORK_IN]] = put_in + gained

@@ -13,13 +13,12 @@ from numpy.typing import NDArray
 
 from rotordrop.model import layout as L
 from rotordrop.model.layout import KernelParameters
-from rotordrop.physics import aerodynamics
+from rotordrop.physics import aerodynamics, contact
 from rotordrop.physics._compile import kernel
-from rotordrop.physics.ball_bearing_planar import planar_ball_gradient
-from rotordrop.physics.contact import hunt_crossley_gradient
+from rotordrop.physics.ball_set import ball_set_gradient
 from rotordrop.physics.friction import stribeck_gradient
 from rotordrop.physics.spin import surface_speed
-from rotordrop.simulation._rhs import aerodynamic_deceleration, project
+from rotordrop.simulation._rhs import aerodynamic_deceleration, race_deflection, relative_motion
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -47,9 +46,7 @@ def contact_gradient(
     ty = nx
     v_n = vx * nx + vy * ny
     v_s = vx * tx + vy * ty
-    F, F_d, F_v = hunt_crossley_gradient(
-        delta, v_n, bearing[L.CONTACT_STIFFNESS], bearing[L.CONTACT_EXPONENT], bearing[L.CONTACT_DAMPING]
-    )
+    F, F_d, F_v = contact.contact_gradient(bearing[L.CONTACT : L.CONTACT_END], delta, v_n)
     v_t = surface_speed(v_s, omega, bearing[L.ROTOR_RADIUS], omega_i, bearing[L.BORE_RADIUS])
     mu, mu_v = stribeck_gradient(
         v_t,
@@ -86,46 +83,41 @@ def contact_gradient(
 @kernel
 def _rotor_jacobian(y: Array, p: KernelParameters, J: Array) -> None:
     m = p.eigenvalue.shape[0]
-    n_b = p.bearing.shape[0]
-    n_q = 2 * m + 4 * n_b
-    i_w = 2 * n_q + n_b
+    x, z, n_q = p.rotor_at[L.MODES_X], p.rotor_at[L.MODES_Y], p.rotor_at[L.N_COORDINATES]
+    i_w, i_a = p.rotor_at[L.ROTOR_SPEED], p.rotor_at[L.ROTOR_ANGLE]
     omega = y[i_w]
-    c = math.cos(y[i_w + 1])
-    s = math.sin(y[i_w + 1])
+    c = math.cos(y[i_a])
+    s = math.sin(y[i_a])
     w2 = omega * omega
     for k in range(m):
-        rx = n_q + k
-        ry = n_q + m + k
-        J[rx, k] -= p.eigenvalue[k]
-        J[ry, m + k] -= p.eigenvalue[k]
+        rx = n_q + x + k
+        ry = n_q + z + k
+        J[rx, x + k] -= p.eigenvalue[k]
+        J[ry, z + k] -= p.eigenvalue[k]
         J[rx, rx] -= p.damping[k]
         J[ry, ry] -= p.damping[k]
         turn_x = 0.0
         turn_y = 0.0
         for j in range(m):
             g = p.polar[k, j]
-            J[rx, n_q + m + j] -= omega * g
-            J[ry, n_q + j] += omega * g
-            turn_x -= g * y[n_q + m + j]
-            turn_y += g * y[n_q + j]
+            J[rx, n_q + z + j] -= omega * g
+            J[ry, n_q + x + j] += omega * g
+            turn_x -= g * y[n_q + z + j]
+            turn_y += g * y[n_q + x + j]
         uc = p.unbalance_cos[k]
         us = p.unbalance_sin[k]
         J[rx, i_w] += turn_x + 2.0 * omega * (uc * c - us * s)
         J[ry, i_w] += turn_y + 2.0 * omega * (uc * s + us * c)
-        J[rx, i_w + 1] += w2 * (-uc * s - us * c)
-        J[ry, i_w + 1] += w2 * (uc * c - us * s)
+        J[rx, i_a] += w2 * (-uc * s - us * c)
+        J[ry, i_a] += w2 * (uc * c - us * s)
 
 
 @kernel
 def _contact_jacobian(b: int, g: Array, p: KernelParameters, J: Array) -> None:
-    m = p.eigenvalue.shape[0]
-    n_b = p.bearing.shape[0]
-    n_q = 2 * m + 4 * n_b
-    i_w = 2 * n_q + n_b
-    spin = 2 * n_q + b
+    x, z, n_q = p.rotor_at[L.MODES_X], p.rotor_at[L.MODES_Y], p.rotor_at[L.N_COORDINATES]
+    r, spin = p.bearing_at[b, L.RACE], p.bearing_at[b, L.RACE_SPIN]
     row = p.bearing[b]
     shape = p.bearing_shape[b]
-    r = 2 * m + 2 * b
     prescribed = p.flags[L.SPIN_MODE] == PRESCRIBED
     for i in range(4):
         if i < 2:
@@ -139,71 +131,47 @@ def _contact_jacobian(b: int, g: Array, p: KernelParameters, J: Array) -> None:
         else:
             if prescribed:
                 continue
-            place = i_w
+            place = p.rotor_at[L.ROTOR_SPEED]
             factor = -row[L.ROTOR_RADIUS] / p.spin[L.POLAR_INERTIA]
             source = 2
         _spread(place, factor, g[source], b, p, J)
-    for k in range(m):
-        _spread(n_q + k, -shape[k], g[0], b, p, J)
-        _spread(n_q + m + k, -shape[k], g[1], b, p, J)
+    for k in range(shape.shape[0]):
+        _spread(n_q + x + k, -shape[k], g[0], b, p, J)
+        _spread(n_q + z + k, -shape[k], g[1], b, p, J)
 
 
 @kernel
 def _spread(place: int, factor: float, g: Array, b: int, p: KernelParameters, J: Array) -> None:
     """Add one row of the contact derivatives to the columns of rotor modes, race and spins."""
-    m = p.eigenvalue.shape[0]
-    n_b = p.bearing.shape[0]
-    n_q = 2 * m + 4 * n_b
-    r = 2 * m + 2 * b
+    x, z, n_q = p.rotor_at[L.MODES_X], p.rotor_at[L.MODES_Y], p.rotor_at[L.N_COORDINATES]
+    r = p.bearing_at[b, L.RACE]
     shape = p.bearing_shape[b]
     fx = factor * g[0]
     fy = factor * g[1]
     gx = factor * g[2]
     gy = factor * g[3]
-    for k in range(m):
-        J[place, k] += fx * shape[k]
-        J[place, m + k] += fy * shape[k]
-        J[place, n_q + k] += gx * shape[k]
-        J[place, n_q + m + k] += gy * shape[k]
+    for k in range(shape.shape[0]):
+        J[place, x + k] += fx * shape[k]
+        J[place, z + k] += fy * shape[k]
+        J[place, n_q + x + k] += gx * shape[k]
+        J[place, n_q + z + k] += gy * shape[k]
     J[place, r] -= fx
     J[place, r + 1] -= fy
     J[place, n_q + r] -= gx
     J[place, n_q + r + 1] -= gy
-    J[place, 2 * n_q + n_b] += factor * g[4]
-    J[place, 2 * n_q + b] += factor * g[5]
+    J[place, p.rotor_at[L.ROTOR_SPEED]] += factor * g[4]
+    J[place, p.bearing_at[b, L.RACE_SPIN]] += factor * g[5]
 
 
 @kernel
 def _bearing_jacobian(b: int, y: Array, p: KernelParameters, J: Array, g: Array) -> bool:
-    m = p.eigenvalue.shape[0]
-    n_b = p.bearing.shape[0]
-    n_q = 2 * m + 4 * n_b
+    n_q = p.rotor_at[L.N_COORDINATES]
+    r, h, spin = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.RACE_SPIN]
     row = p.bearing[b]
-    shape = p.bearing_shape[b]
-    r = 2 * m + 2 * b
-    h = r + 2 * n_b
-    spin = 2 * n_q + b
-    touches = contact_gradient(
-        project(shape, y[:m]) - y[r],
-        project(shape, y[m : 2 * m]) - y[r + 1],
-        project(shape, y[n_q : n_q + m]) - y[n_q + r],
-        project(shape, y[n_q + m : n_q + 2 * m]) - y[n_q + r + 1],
-        y[2 * n_q + n_b],
-        y[spin],
-        row,
-        g,
-    )
-    F_x, F_y, k_xx, k_xy, k_yy = planar_ball_gradient(
-        y[r] - y[h],
-        y[r + 1] - y[h + 1],
-        row[L.RADIAL_OFFSET],
-        row[L.AXIAL_OFFSET],
-        row[L.GROOVE_DISTANCE],
-        row[L.BALL_STIFFNESS],
-        p.ball_cos[b],
-        p.ball_sin[b],
-        p.ball_weight[b],
-    )
+    ux, uy, vx, vy = relative_motion(b, y, p)
+    touches = contact_gradient(ux, uy, vx, vy, y[p.rotor_at[L.ROTOR_SPEED]], y[spin], row, g)
+    dx, dy = race_deflection(b, y, p)
+    F_x, F_y, k_xx, k_xy, k_yy = ball_set_gradient(row[L.BALL_SET : L.BALL_SET_END], p.balls[b], dx, dy)
     C_b = row[L.BEARING_DAMPING]
     for i in range(2):
         race = n_q + r + i
@@ -255,12 +223,12 @@ def drop_jacobian(t: float, y: Array, p: KernelParameters, J: Array) -> None:
 @kernel
 def _deceleration_jacobian(t: float, y: Array, p: KernelParameters, J: Array) -> None:
     m = p.eigenvalue.shape[0]
-    n_q = 2 * m + 4 * p.bearing.shape[0]
-    omega_dot = aerodynamic_deceleration(t, y[2 * n_q + p.bearing.shape[0]], p)
+    x, z, n_q = p.rotor_at[L.MODES_X], p.rotor_at[L.MODES_Y], p.rotor_at[L.N_COORDINATES]
+    omega_dot = aerodynamic_deceleration(t, y[p.rotor_at[L.ROTOR_SPEED]], p)
     for k in range(m):
         for j in range(m):
-            J[n_q + k, m + j] -= omega_dot * p.polar[k, j]
-            J[n_q + m + k, j] += omega_dot * p.polar[k, j]
+            J[n_q + x + k, z + j] -= omega_dot * p.polar[k, j]
+            J[n_q + z + k, x + j] += omega_dot * p.polar[k, j]
 
 
 @kernel
@@ -273,17 +241,14 @@ def drop_jacobian_parts(
     hundred thousand times smaller than gyroscopics; ``g`` (B, 3, 6) with the gradients of each contact (see
     `contact_gradient`), valid where ``touching`` (B,) is not zero.
     """
-    m = p.eigenvalue.shape[0]
-    n_b = p.bearing.shape[0]
-    n_q = 2 * m + 4 * n_b
-    i_w = 2 * n_q + n_b
+    n_q, i_w = p.rotor_at[L.N_COORDINATES], p.rotor_at[L.ROTOR_SPEED]
     J[:, :] = 0.0
     for i in range(n_q):
         J[i, n_q + i] = 1.0
-    for b in range(n_b):
+    for b in range(p.bearing.shape[0]):
         touching[b] = 1 if _bearing_jacobian(b, y, p, J, g[b]) else 0
     _rotor_jacobian(y, p, J)
-    J[i_w + 1, i_w] = 1.0
+    J[p.rotor_at[L.ROTOR_ANGLE], i_w] = 1.0
     if p.flags[L.SPIN_MODE] == OF_SPEED:
         J[i_w, i_w] -= p.spin[L.AERO_LINEAR] + 2.0 * p.spin[L.AERO_QUADRATIC] * abs(y[i_w])
     if p.flags[L.MAGNETS_ACT] != 0 and t < p.spin[L.POWER_OFF_DELAY]:
@@ -292,13 +257,12 @@ def drop_jacobian_parts(
 
 @kernel
 def _magnet_jacobian(p: KernelParameters, J: Array) -> None:
-    m = p.eigenvalue.shape[0]
-    n_q = 2 * m + 4 * p.bearing.shape[0]
+    m, n_q = p.eigenvalue.shape[0], p.rotor_at[L.N_COORDINATES]
     for a in range(p.magnet.shape[0]):
         for k in range(m):
             for j in range(m):
                 shapes = p.magnet_shape[a, k] * p.magnet_shape[a, j]
-                for axis in range(2):
-                    row = n_q + axis * m + k
-                    J[row, axis * m + j] -= p.magnet[a, L.AMB_STIFFNESS] * shapes
-                    J[row, n_q + axis * m + j] -= p.magnet[a, L.AMB_DAMPING] * shapes
+                for axis in (L.MODES_X, L.MODES_Y):
+                    first = p.rotor_at[axis]
+                    J[n_q + first + k, first + j] -= p.magnet[a, L.AMB_STIFFNESS] * shapes
+                    J[n_q + first + k, n_q + first + j] -= p.magnet[a, L.AMB_DAMPING] * shapes

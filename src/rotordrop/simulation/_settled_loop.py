@@ -22,14 +22,12 @@ Array = NDArray[np.float64]
 @kernel
 def race_damping_rates(p: KernelParameters, n: int) -> Array:
     """Damping over mass [1/s] of the race velocities, shape (n,); zero for every other state."""
-    m = p.eigenvalue.shape[0]
-    n_b = p.bearing.shape[0]
     rates = np.zeros(n)
-    first = 2 * m + 4 * n_b + 2 * m
-    for b in range(n_b):
+    for b in range(p.bearing.shape[0]):
         rate = p.bearing[b, L.BEARING_DAMPING] / p.bearing[b, L.RACE_MASS]
-        rates[first + 2 * b] = rate
-        rates[first + 2 * b + 1] = rate
+        race = p.rotor_at[L.N_COORDINATES] + p.bearing_at[b, L.RACE]
+        rates[race] = rate
+        rates[race + 1] = rate
     return rates
 
 
@@ -42,7 +40,7 @@ def settled_step(
     Forces that depend on velocity are taken at the velocity extrapolated to the end of the step.
     """
     n = y.shape[0]
-    n_q = 2 * p.eigenvalue.shape[0] + 4 * p.bearing.shape[0]
+    n_q = p.rotor_at[L.N_COORDINATES]
     half = 0.5 * h
     for i in range(n_q):
         y_new[i] = y[i] + h * (y[n_q + i] + half * d[n_q + i])
@@ -55,15 +53,17 @@ def settled_step(
 
 @kernel
 def damp_races(
-    h: float, y: Array, d: Array, y_new: Array, d_new: Array, rates: Array, first: int, last: int
+    h: float, y: Array, d: Array, y_new: Array, d_new: Array, p: KernelParameters, rates: Array
 ) -> None:
     """Take the ball-set damping of the races implicitly: explicitly it would bound the step."""
     half = 0.5 * h
-    for i in range(first, last):
-        assumed = y[i] + h * d[i]
-        found = (y[i] + half * (d[i] + d_new[i] + rates[i] * assumed)) / (1.0 + half * rates[i])
-        d_new[i] -= rates[i] * (found - assumed)
-        y_new[i] = found
+    for b in range(p.bearing.shape[0]):
+        race = p.rotor_at[L.N_COORDINATES] + p.bearing_at[b, L.RACE]
+        for i in range(race, race + 2):
+            assumed = y[i] + h * d[i]
+            found = (y[i] + half * (d[i] + d_new[i] + rates[i] * assumed)) / (1.0 + half * rates[i])
+            d_new[i] -= rates[i] * (found - assumed)
+            y_new[i] = found
 
 
 @kernel
@@ -89,13 +89,9 @@ def integrate_settled(
         Number of samples filled; fewer than T only when the rotor is about to stand still.
     """
     n = y.shape[0]
-    n_b = p.bearing.shape[0]
-    n_q = 2 * p.eigenvalue.shape[0] + 4 * n_b
-    i_w = 2 * n_q + n_b
-    first = n_q + 2 * p.eigenvalue.shape[0]
-    last = first + 2 * n_b
+    i_w = p.rotor_at[L.ROTOR_SPEED]
     rates = race_damping_rates(p, n)
-    work = np.empty((2, p.ball_cos.shape[1]))
+    work = np.empty((2, p.balls.shape[2]))
     state = y.copy()
     y_new = np.empty(n)
     d = np.empty(n)
@@ -107,7 +103,7 @@ def integrate_settled(
         for part in range(parts):
             now = t + sample * output_step + part * h
             settled_step(now, h, state, d, y_new, d_new, p, work)
-            damp_races(h, state, d, y_new, d_new, rates, first, last)
+            damp_races(h, state, d, y_new, d_new, p, rates)
             state, y_new = y_new, state
             d, d_new = d_new, d
         if stop_speed >= 0.0 and sense * state[i_w] <= stop_speed:

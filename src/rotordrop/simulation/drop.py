@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.machine import Machine
+from rotordrop.model import layout as L
 from rotordrop.model.layout import KernelParameters
 from rotordrop.model.parameters import DropModel, build_drop_model
 from rotordrop.model.reduction import Reduction
@@ -22,9 +23,9 @@ from rotordrop.simulation.result import ContactLog, DropResult
 
 Array = NDArray[np.float64]
 
-TYPICAL_DISPLACEMENT = 1e-4
-TYPICAL_VELOCITY = 0.1
-TYPICAL_SPIN = 10.0
+TYPICAL = np.empty(L.AUDIT)
+"""Typical size of a state by its kind, in its unit; angle and audit follow without control."""
+TYPICAL[[L.POSITION, L.VELOCITY, L.SPIN, L.INTERNAL, L.ANGLE]] = 1e-4, 0.1, 10.0, 1.0, np.inf
 FIRST_STEP = 1e-6
 LOG_ROWS_PER_SECOND = 20_000
 
@@ -73,14 +74,10 @@ def error_scale(model: DropModel) -> Array:
     reach = np.max(np.abs(model.parameters.bearing_shape), axis=0)
     floor = 0.05 * np.max(reach)
     modal = 1.0 / np.maximum(reach, floor)
-    scale = np.ones(layout.rotor_speed + 1)
-    scale[: layout.n_coordinates] = TYPICAL_DISPLACEMENT
-    scale[layout.n_coordinates : 2 * layout.n_coordinates] = TYPICAL_VELOCITY
+    scale = TYPICAL[layout.kinds[: layout.n_controlled]]
     for part in (layout.modal_x, layout.modal_y):
         scale[part] *= modal
         scale[layout.velocity_of(part)] *= modal
-    scale[layout.race_spin] = TYPICAL_SPIN
-    scale[layout.rotor_speed] = TYPICAL_SPIN
     return scale
 
 

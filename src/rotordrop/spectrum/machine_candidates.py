@@ -8,11 +8,13 @@ import numpy as np
 
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.model.assembly import build_rotor_fe
-from rotordrop.model.parameters import static_deflection
+from rotordrop.model.parameters import contact_law_of
 from rotordrop.model.reduction import Reduction, reduce_rotor
 from rotordrop.model.suspension import EquivalentStiffness, equivalent_stiffness, touchdown_supports
 from rotordrop.model.whirl import matrices_of, whirl_modes
 from rotordrop.physics.ball_bearing import bearing_constants
+from rotordrop.physics.ball_set import static_deflection
+from rotordrop.physics.contact import depth_at
 from rotordrop.physics.pendulum import effective_length, period_ratio, small_frequency, spin_participation
 from rotordrop.spectrum.candidates import (
     Candidate,
@@ -97,8 +99,7 @@ def swing_ranges(machine: Machine) -> tuple[SwingRange, ...]:
 
 
 def _swing(bearing: TouchdownBearing, part: EquivalentStiffness, inertia: float, g: float) -> SwingRange:
-    contact = bearing.contact
-    indentation = (part.load / float(contact.stiffness)) ** (1.0 / float(contact.exponent))
+    indentation = depth_at(contact_law_of(bearing.contact), part.load)
     race_sag = static_deflection(bearing_constants(bearing.bearing), part.load)[0]
     sags = (indentation, race_sag, part.load / part.support)
     gap = bearing.air_gap

@@ -11,6 +11,7 @@ from rotordrop.errors import SimulationError
 from rotordrop.model import layout as L
 from rotordrop.model.layout import KernelParameters
 from rotordrop.model.parameters import DropModel
+from rotordrop.model.static_sag import sag_of_model
 from rotordrop.physics.ball_bearing import bearing_constants
 from rotordrop.physics.pendulum import small_frequency
 from rotordrop.simulation._histories import stored_energy
@@ -98,8 +99,8 @@ def _force_and_stiffness(
 ) -> tuple[Array, Array]:
     """Force left over (n_q,) and tangent stiffness (n_q, n_q) of a state at standstill."""
     layout = model.layout
-    n_q, size = layout.n_coordinates, layout.rotor_angle + 1
-    change, work = layout.zeros(), np.empty((2, parameters.ball_cos.shape[1]))
+    n_q, size = layout.n_coordinates, layout.n_dynamic
+    change, work = layout.zeros(), np.empty((2, parameters.balls.shape[2]))
     jacobian = np.zeros((size, size))
     drop_derivative(0.0, state, parameters, change, work)
     drop_jacobian(0.0, state, parameters, jacobian)
@@ -110,10 +111,9 @@ def _force_and_stiffness(
 def _guess(model: DropModel) -> Array:
     """Straight rotor, pressed into the contacts by its weight, loose races at the end of their play."""
     p = model.parameters.bearing
-    depth = (model.load_shares / p[:, L.CONTACT_STIFFNESS]) ** (1.0 / p[:, L.CONTACT_EXPONENT])
     constants = [bearing_constants(bearing.bearing) for bearing in model.machine.touchdown_bearings]
     play = np.array([c.radial_play for c in constants])
-    down = p[:, L.AIR_GAP] + depth + play
+    down = p[:, L.AIR_GAP] + sag_of_model(model).indentation + play
     nodes = [bearing.node for bearing in model.machine.touchdown_bearings]
     positions = np.asarray(model.fe.node_positions)[np.array(nodes) - 1]
     return rigid_amplitudes(model, positions, -down[:, None])[:, 0]

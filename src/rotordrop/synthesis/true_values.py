@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.model.parameter import Step
 from rotordrop.model.parameter_table import rows
-from rotordrop.model.parameters import static_bearing_stiffness
 from rotordrop.model.statics import bearing_load_shares
 from rotordrop.physics.ball_bearing import bearing_constants
+from rotordrop.physics.ball_set import static_bearing_stiffness
 from rotordrop.simulation.certificate import refined_peak
 from rotordrop.simulation.result import DropResult
 from rotordrop.synthesis.event import DropConditions, HiddenMachine

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.physics.contact import contact_law, stiffness_of_exponent
 
 TYPICAL_CONTACT_FORCE = 1500.0
 """Force [N] at which a contact with another exponent is as deep as the one it replaces."""
@@ -82,8 +83,8 @@ def _of_bearing(bearing: TouchdownBearing, violations: Violations) -> Mapping[st
     stiffness = float(contact.stiffness) * v.contact_stiffness
     values: dict[str, float] = {}
     if v.contact_exponent is not None:
-        depth = (TYPICAL_CONTACT_FORCE / stiffness) ** (1.0 / float(contact.exponent))
-        stiffness = TYPICAL_CONTACT_FORCE / depth**v.contact_exponent
+        law = contact_law(stiffness, float(contact.exponent), float(contact.damping))
+        stiffness = stiffness_of_exponent(law, TYPICAL_CONTACT_FORCE, v.contact_exponent)
         values["contact.exponent"] = v.contact_exponent
     factors = {
         "contact.damping": (float(contact.damping), v.contact_damping),

@@ -69,15 +69,18 @@ def scalar_update(
 
 
 @kernel
-def measurement_row(c: int, at: Array, sensor_row: Array, s: int, n_p: int, n_c: int, row: Array) -> float:
+def measurement_row(
+    c: int, at: Array, angle: float, sensor_row: Array, first: int, n_c: int, row: Array
+) -> float:
     """Reading of sensor ``c`` predicted at an estimate [m] and its derivative ``row`` (n,).
 
-    The reading is ``(1 + gain error) · (sensor row · state) + offset + runout at the rotor angle``.
+    The reading is ``(1 + gain error) · (sensor row · state) + offset + runout at the rotor angle``. The gains
+    begin at ``first``, the offsets, cosines and sines follow, ``n_c`` of each.
     """
     row[:] = 0.0
-    k = s + n_p + c
-    cosine = math.cos(at[s - 1])
-    sine = math.sin(at[s - 1])
+    k = first + c
+    cosine = math.cos(angle)
+    sine = math.sin(angle)
     seen = 0.0
     for j in range(sensor_row.shape[0]):
         seen += sensor_row[j] * at[j]
@@ -100,10 +103,9 @@ def soften_friction(P: Array, least: Array, p: KernelParameters) -> None:
     no slope there, and the filter cannot learn when that happens; the mean of the sign over a normal
     distribution of the slip is, to a few per cent, tanh(v / (1.25 σ)).
     """
-    n_b = least.shape[0]
-    n_q = 2 * p.eigenvalue.shape[0] + 4 * n_b
-    for b in range(n_b):
-        spread = SIGN_WIDTH * p.bearing[b, L.BORE_RADIUS] * math.sqrt(max(P[2 * n_q + b, 2 * n_q + b], 0.0))
+    for b in range(least.shape[0]):
+        spin = p.bearing_at[b, L.RACE_SPIN]
+        spread = SIGN_WIDTH * p.bearing[b, L.BORE_RADIUS] * math.sqrt(max(P[spin, spin], 0.0))
         p.bearing[b, L.SMOOTHING_SPEED] = math.hypot(least[b], spread)
 
 
@@ -171,11 +173,10 @@ def forward_pass(
     n = mean_0.shape[0]
     n_c, s = sensor_rows.shape
     n_p = n - s - 4 * n_c
-    full = s + 4 - 2
-    i_w = s - 2
+    i_w, i_a = p.rotor_at[L.ROTOR_SPEED], p.rotor_at[L.ROTOR_ANGLE]
     mean = mean_0.copy()
     P = P_0.copy()
-    y = np.zeros(full)
+    y = np.zeros(p.rotor_at[L.N_STATES])
     F = np.zeros((s, s + n_p))
     impulses = np.zeros(p.bearing.shape[0])
     row = np.empty(n)
@@ -222,11 +223,12 @@ def forward_pass(
             if c < n_c:
                 variance = variances[c]
                 if i < reference.shape[0]:
-                    predicted = measurement_row(c, reference[i], sensor_rows[c], s, n_p, n_c, row)
+                    at = reference[i]
+                    predicted = measurement_row(c, at, at[i_a], sensor_rows[c], s + n_p, n_c, row)
                     for j in range(n):
-                        predicted += row[j] * (mean[j] - reference[i, j])
+                        predicted += row[j] * (mean[j] - at[j])
                 else:
-                    predicted = measurement_row(c, mean, sensor_rows[c], s, n_p, n_c, row)
+                    predicted = measurement_row(c, mean, mean[i_a], sensor_rows[c], s + n_p, n_c, row)
             else:
                 variance = speed_variance
                 row[:] = 0.0
@@ -249,10 +251,11 @@ def forward_pass(
 @kernel
 def is_plausible(mean: Array, p: KernelParameters) -> bool:
     """Whether the estimate is finite and no race or support has left its place."""
-    first = 2 * p.eigenvalue.shape[0]
     good = math.isfinite(np.sum(mean))
-    for i in range(first, first + 4 * p.bearing.shape[0]):
-        good = good and abs(mean[i]) < LARGEST_DEFLECTION
+    for b in range(p.bearing.shape[0]):
+        for body in (L.RACE, L.SUPPORT):
+            i = p.bearing_at[b, body]
+            good = good and abs(mean[i]) < LARGEST_DEFLECTION and abs(mean[i + 1]) < LARGEST_DEFLECTION
     return good
 
 

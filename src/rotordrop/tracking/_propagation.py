@@ -199,36 +199,35 @@ def add_contact_product(b: int, g: Array, p: KernelParameters, V: Array, moved: 
     A contact couples all modes, but only through the six motions it sees and the three forces it gives:
     in two steps it takes a fraction of the operations of the full rows. ``moved`` (7, c) is scratch.
     """
-    m = p.eigenvalue.shape[0]
-    n_b = p.bearing.shape[0]
-    n_q = 2 * m + 4 * n_b
-    i_w = 2 * n_q + n_b
-    r = 2 * m + 2 * b
+    n_q, i_w = p.rotor_at[L.N_COORDINATES], p.rotor_at[L.ROTOR_SPEED]
+    r, spin = p.bearing_at[b, L.RACE], p.bearing_at[b, L.RACE_SPIN]
     shape = p.bearing_shape[b]
     row = p.bearing[b]
     c = V.shape[1]
     for part in range(4):
         base = (part // 2) * n_q
         axis = part % 2
+        modes = base + p.rotor_at[L.MODES_X + axis]
         for j in range(c):
             moved[part, j] = -V[base + r + axis, j]
-        for k in range(m):
+        for k in range(shape.shape[0]):
             weight = shape[k]
-            source = base + axis * m + k
+            source = modes + k
             for j in range(c):
                 moved[part, j] += weight * V[source, j]
     for force in range(3):
         for j in range(c):
-            moved[4 + force, j] = g[force, 4] * V[i_w, j] + g[force, 5] * V[2 * n_q + b, j]
+            moved[4 + force, j] = g[force, 4] * V[i_w, j] + g[force, 5] * V[spin, j]
         for part in range(4):
             weight = g[force, part]
             for j in range(c):
                 moved[4 + force, j] += weight * moved[part, j]
     for axis in range(2):
         add_row(1.0 / row[L.RACE_MASS], moved[4 + axis], out[n_q + r + axis])
-        for k in range(m):
-            add_row(-shape[k], moved[4 + axis], out[n_q + axis * m + k])
-    add_row(row[L.BORE_RADIUS] / row[L.RACE_INERTIA], moved[6], out[2 * n_q + b])
+        modes = n_q + p.rotor_at[L.MODES_X + axis]
+        for k in range(shape.shape[0]):
+            add_row(-shape[k], moved[4 + axis], out[modes + k])
+    add_row(row[L.BORE_RADIUS] / row[L.RACE_INERTIA], moved[6], out[spin])
     if p.flags[L.SPIN_MODE] != PRESCRIBED_SPEED:
         add_row(-row[L.ROTOR_RADIUS] / p.spin[L.POLAR_INERTIA], moved[6], out[i_w])
 
@@ -304,7 +303,7 @@ def propagate(
     starts = np.empty(s + 1, dtype=np.int64)
     k = np.empty((5, n))
     trial = np.empty(n)
-    work = np.empty((2, p.ball_cos.shape[1]))
+    work = np.empty((2, p.balls.shape[2]))
     contact = np.empty(6)
     g = np.zeros((p.bearing.shape[0], 3, 6))
     touching = np.zeros(p.bearing.shape[0], dtype=np.int64)
@@ -343,25 +342,23 @@ def add_process_noise(
     P: Array, p: KernelParameters, settings: FilterSettings, impulses: Array, drift: Array
 ) -> None:
     """Add unknown impulses at the bearings, noise of the spins and drift of the parameters to ``P``."""
-    m = p.eigenvalue.shape[0]
-    n_b = p.bearing.shape[0]
-    n_q = 2 * m + 4 * n_b
+    m, n_q, i_w = p.eigenvalue.shape[0], p.rotor_at[L.N_COORDINATES], p.rotor_at[L.ROTOR_SPEED]
     g = np.empty(m + 1)
     place = np.empty(m + 1, dtype=np.int64)
-    for b in range(n_b):
+    for b in range(p.bearing.shape[0]):
         sigma = settings.impulse + settings.share * impulses[b]
         for axis in range(2):
             for k in range(m):
                 g[k] = -p.bearing_shape[b, k]
-                place[k] = n_q + axis * m + k
+                place[k] = n_q + p.rotor_at[L.MODES_X + axis] + k
             g[m] = 1.0 / p.bearing[b, L.RACE_MASS]
-            place[m] = n_q + 2 * m + 2 * b + axis
+            place[m] = n_q + p.bearing_at[b, L.RACE] + axis
             for i in range(m + 1):
                 for j in range(m + 1):
                     P[place[i], place[j]] += sigma * sigma * g[i] * g[j]
         spin = settings.spin_noise + sigma * p.bearing[b, L.BORE_RADIUS] / p.bearing[b, L.RACE_INERTIA] * 0.1
-        P[2 * n_q + b, 2 * n_q + b] += spin * spin
-    P[2 * n_q + n_b, 2 * n_q + n_b] += settings.speed_noise * settings.speed_noise
-    s = 2 * n_q + n_b + 2
+        P[p.bearing_at[b, L.RACE_SPIN], p.bearing_at[b, L.RACE_SPIN]] += spin * spin
+    P[i_w, i_w] += settings.speed_noise * settings.speed_noise
+    s = p.rotor_at[L.N_DYNAMIC]
     for k in range(drift.shape[0]):
         P[s + k, s + k] += drift[k] * drift[k] * settings.dt

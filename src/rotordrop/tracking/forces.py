@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from rotordrop.model import layout as L
 from rotordrop.model.layout import KernelParameters
 from rotordrop.physics._compile import kernel
-from rotordrop.physics.ball_bearing_planar import largest_ball_load, planar_ball_force
+from rotordrop.physics.ball_set import ball_set_force, ball_set_load
 from rotordrop.simulation._loop import contact_at
+from rotordrop.simulation._rhs import race_deflection
 from rotordrop.tracking import _propagation as P
 from rotordrop.tracking._filter import LARGEST_DEFLECTION
 from rotordrop.tracking.problem import DropProblem, private_copy
@@ -27,35 +28,18 @@ N_VALUES = 4
 def bearing_values(
     dx: float, dy: float, axial: float, b: int, p: KernelParameters, work: Array, out: Array
 ) -> None:
-    """Ball force on the race in x and y and its magnitude [N] and the stress [Pa] at a deflection [m]."""
-    row = p.bearing[b]
-    F_x, F_y = planar_ball_force(
-        dx,
-        dy,
-        row[L.RADIAL_OFFSET],
-        axial,
-        row[L.GROOVE_DISTANCE],
-        row[L.BALL_STIFFNESS],
-        p.ball_cos[b],
-        p.ball_sin[b],
-        p.ball_weight[b],
-        work,
-    )
-    load = largest_ball_load(
-        dx,
-        dy,
-        row[L.RADIAL_OFFSET],
-        axial,
-        row[L.GROOVE_DISTANCE],
-        row[L.BALL_STIFFNESS],
-        p.ball_cos[b],
-        p.ball_sin[b],
-        p.ball_weight[b],
-    )
-    out[0] = -F_x
-    out[1] = -F_y
-    out[2] = np.hypot(F_x, F_y)
-    out[3] = row[L.STRESS_COEFFICIENT] * load ** (1.0 / 3.0)
+    """Ball force on the race in x and y and its magnitude [N] and the stress [Pa] at a deflection [m].
+
+    The axial offset of the balls is set to ``axial`` [m] and stays so.
+    """
+    p.bearing[b, L.AXIAL_OFFSET] = axial
+    entries, balls = p.bearing[b, L.BALL_SET : L.BALL_SET_END], p.balls[b]
+    F_x, F_y = ball_set_force(entries, balls, dx, dy, work)
+    _load, stress = ball_set_load(entries, balls, dx, dy)
+    out[FORCE_X] = -F_x
+    out[FORCE_Y] = -F_y
+    out[FORCE] = np.hypot(F_x, F_y)
+    out[STRESS] = stress
 
 
 @kernel
@@ -74,21 +58,16 @@ def force_values(
     Gradients are by race deflection x, y and axial offset. Values are ball force on the race x, y, its
     magnitude [N] and inner-race stress [Pa]; contacts as in `contact_at`.
     """
-    m = p.eigenvalue.shape[0]
-    n_b = p.bearing.shape[0]
-    work = np.empty((2, p.ball_cos.shape[1]))
-    above = np.empty(4)
-    below = np.empty(4)
-    y = np.zeros(s + 2)
+    work = np.empty((2, p.balls.shape[2]))
+    above = np.empty(N_VALUES)
+    below = np.empty(N_VALUES)
+    y = np.zeros(p.rotor_at[L.N_STATES])
     step_d = 1e-9
     for i in range(means.shape[0]):
         P.apply_parameters(means[i, s : s + n_parameters].copy(), targets, p)
         y[:s] = means[i, :s]
-        for b in range(n_b):
-            r = 2 * m + 2 * b
-            h = r + 2 * n_b
-            dx = y[r] - y[h]
-            dy = y[r + 1] - y[h + 1]
+        for b in range(p.bearing.shape[0]):
+            dx, dy = race_deflection(b, y, p)
             axial = p.bearing[b, L.AXIAL_OFFSET]
             contact_at(b, y, p, contacts[i, b])
             bearing_values(dx, dy, axial, b, p, work, values[i, b])
@@ -98,8 +77,9 @@ def force_values(
                 es = step_d if c == 2 else 0.0
                 bearing_values(dx + ex, dy + ey, axial + es, b, p, work, above)
                 bearing_values(dx - ex, dy - ey, axial - es, b, p, work, below)
-                for v in range(4):
+                for v in range(N_VALUES):
                     gradients[i, b, v, c] = (above[v] - below[v]) / (2.0 * step_d)
+            p.bearing[b, L.AXIAL_OFFSET] = axial
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -190,7 +170,7 @@ def stress_at_force(problem: DropProblem, smoothed: Smoothed, b: int, force: Arr
     )
     size = float(np.hypot(force[0], force[1]))
     along = np.asarray(force) / max(size, 1e-300)
-    work, out = np.empty((2, p.ball_cos.shape[1])), np.empty(N_VALUES)
+    work, out = np.empty((2, p.balls.shape[2])), np.empty(N_VALUES)
 
     def lacking(deflection: float) -> float:
         bearing_values(

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from rotordrop.model import layout as L
 from rotordrop.model.parameter_table import parameter
-from rotordrop.model.parameters import DropModel, static_deflection
+from rotordrop.model.parameters import DropModel
+from rotordrop.model.static_sag import race_sag, static_sag
 from rotordrop.model.statics import levitated_sag, settled_sag
 from rotordrop.model.unknowns import Unknown, all_unknowns, sensor_prior, smallest_gap
 from rotordrop.physics import aerodynamics
-from rotordrop.physics.ball_bearing import bearing_constants
 from rotordrop.tracking import _filter as F
 from rotordrop.tracking import _propagation as P
 from rotordrop.tracking.unknowns import parameter_targets
@@ -108,7 +108,7 @@ class DropProblem:
     @property
     def n_dynamic(self) -> int:
         """Number of dynamic states s."""
-        return self.model.layout.size - 2
+        return self.model.layout.n_dynamic
 
     @property
     def n_channels(self) -> int:
@@ -243,7 +243,7 @@ def rough_noise(readings: Array) -> Array:
 def sensor_rows(model: DropModel) -> Array:
     """Displacement along each sensor's direction from the dynamic state, shape (C, s) [m per state]."""
     layout = model.layout
-    rows = np.zeros((len(model.machine.sensors), layout.size - 2))
+    rows = np.zeros((len(model.machine.sensors), layout.n_dynamic))
     for c, sensor in enumerate(model.machine.sensors):
         shape = model.basis.node_row(sensor.node)
         angle = float(sensor.angle)
@@ -257,7 +257,7 @@ def _prior(
 ) -> tuple[Array, Array]:
     """Prior mean and covariance of the whole estimate at power-off."""
     layout = model.layout
-    s, n_p, n_c = layout.size - 2, len(unknowns), rows.shape[0]
+    s, n_p, n_c = layout.n_dynamic, len(unknowns), rows.shape[0]
     mean = np.zeros(s + n_p + 4 * n_c)
     sigma = np.zeros_like(mean)
     mean[:s] = model.at_rest()[:s]
@@ -335,13 +335,9 @@ def settled_displacement(problem: DropProblem, theta: Array) -> Array:
     """
     model = problem.model
     p = _with_theta(problem, theta)
-    level = np.empty(len(model.load_shares))
-    for b, load in enumerate(model.load_shares):
-        row = p.bearing[b]
-        indentation = (load / row[L.CONTACT_STIFFNESS]) ** (1.0 / row[L.CONTACT_EXPONENT])
-        bearing = model.machine.touchdown_bearings[b].bearing
-        race = static_deflection(bearing_constants(bearing), float(load))[0]
-        level[b] = -(row[L.AIR_GAP] + indentation + race + load / row[L.SUPPORT_STIFFNESS_Y])
+    loads = np.asarray(model.load_shares)
+    sag = static_sag(p.bearing, race_sag(model.machine.touchdown_bearings, loads), loads)
+    level = -sag.depth(p.bearing[:, L.AIR_GAP])
     nodes = np.array([bearing.node for bearing in model.machine.touchdown_bearings]) - 1
     z = np.asarray(model.fe.node_positions)
     line = np.polynomial.Polynomial.fit(z[nodes], level, min(1, len(nodes) - 1)).convert()

@@ -23,5 +23,6 @@ def transferred(coarse: DropProblem, fine: DropProblem, means: Array) -> Array:
         source, target = getattr(one, part), getattr(two, part)
         result[:, target] = means[:, source]
         result[:, two.velocity_of(target)] = means[:, one.velocity_of(source)]
-    result[:, two.race_spin.start :] = means[:, one.race_spin.start :]
+    # spins and all that follows, parameters and sensor errors too, do not depend on the basis
+    result[:, two.velocities.stop :] = means[:, one.velocities.stop :]
     return result

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import IdentificationError
-from rotordrop.identification.air_gap import SettledRest, find_rest, identify_air_gap, static_sag
+from rotordrop.identification.air_gap import SettledRest, find_rest, identify_air_gap
 from rotordrop.identification.sensing import Sensing
 from rotordrop.measurement.axes import sensor_directions
 from rotordrop.measurement.record import Record
 from rotordrop.model.parameters import DropModel
+from rotordrop.model.static_sag import sag_of_model
 from rotordrop.synthesis import SyntheticDrop
 
 
@@ -62,7 +63,7 @@ def test_sway_does_not_lift_the_rest_position(
 
 
 def test_sag_is_load_over_stiffness_in_the_support(model: DropModel) -> None:
-    assert static_sag(model).support == pytest.approx(np.asarray(model.load_shares) / [1e8, 4e8], rel=1e-12)
+    assert sag_of_model(model).support == pytest.approx(np.asarray(model.load_shares) / [1e8, 4e8], rel=1e-12)
 
 
 def test_limits_enclose_the_gap_and_zero_error_dominates(

@@ -13,7 +13,6 @@ from rotordrop.model.modes import free_free_modes, modes_on_springs
 from rotordrop.model.reduction import Reduction, reduce_rotor
 from rotordrop.model.supports import Support, link, spring
 from rotordrop.model.suspension import (
-    contact_stiffness,
     equivalent_stiffness,
     suspension_of,
     touchdown_supports,
@@ -100,14 +99,6 @@ def test_equivalent_stiffness_is_a_series(paper):
     assert [p.tangent / 1e6 for p in equivalent_stiffness(paper)] == pytest.approx(
         [509.925, 507.524], abs=1e-3
     )
-
-
-def test_contact_stiffness_is_the_slope_of_the_contact_law():
-    K, n, load = 8e8, 10 / 9, 300.0
-    delta = (load / K) ** (1 / n)
-    step = 1e-5 * delta
-    slope = (K * (delta + step) ** n - K * (delta - step) ** n) / (2 * step)
-    assert contact_stiffness(K, n, load) == pytest.approx(slope, rel=1e-8)
 
 
 def test_touchdown_supports_hold_with_contact_bearing_and_support(paper):

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rotordrop.model.parameters import loose_race_seat, static_deflection
 from rotordrop.physics.ball_bearing import bearing_constants, free_contact_angle
 from rotordrop.physics.ball_bearing_geometry import BallBearingGeometry
 from rotordrop.physics.ball_bearing_response import bearing_response
+from rotordrop.physics.ball_set import loose_race_seat, static_deflection
 
 GROOVES = BallBearingGeometry(
     ball_diameter=12.7e-3,

@@ -243,7 +243,7 @@ def contact_on_race(model: DropModel, azimuth: float, speed: float, velocity=(0.
         moving[:, 1],
     )
     state[layout.rotor_speed] = speed
-    rate, work = layout.zeros(), np.empty((2, p.ball_cos.shape[1]))
+    rate, work = layout.zeros(), np.empty((2, p.balls.shape[2]))
     drop_derivative(0.0, state, p, rate, work)
     force = rate[layout.velocity_of(layout.race)].reshape(-1, 2) * p.bearing[:, [L.RACE_MASS]]
     return force, rate, p

@@ -18,7 +18,7 @@ from rotordrop.simulation.levitation import start_of_drop
 
 
 def rate_of(state, parameters):
-    rate, work = np.zeros(len(state)), np.empty((2, parameters.ball_cos.shape[1]))
+    rate, work = np.zeros(len(state)), np.empty((2, parameters.balls.shape[2]))
     drop_derivative(0.003, state, parameters, rate, work)
     return rate
 
@@ -120,7 +120,7 @@ def test_a_moving_support_loses_to_its_own_dampers(quick):
     _, parameters = start_of_drop(quick, DropCase(speed=SPEED))
     layout, state = quick.layout, quick.layout.zeros()
     support = layout.velocity_of(layout.support)
-    work = np.empty((2, parameters.ball_cos.shape[1]))
+    work = np.empty((2, parameters.balls.shape[2]))
     state[support] = [0.3, 0.2, 0.0, 0.0]
     race = layout.velocity_of(layout.race)
     state[race] = state[support]

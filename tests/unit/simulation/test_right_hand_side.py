@@ -45,7 +45,7 @@ def a_state(model, depths, slip, seed=4):
 
 def kernel_derivative(model, state, case=CASE):
     _, parameters = start_of_drop(model, case)
-    rate, work = np.zeros(model.layout.size), np.empty((2, parameters.ball_cos.shape[1]))
+    rate, work = np.zeros(model.layout.size), np.empty((2, parameters.balls.shape[2]))
     drop_derivative(0.003, state, parameters, rate, work)
     return rate
 

@@ -23,7 +23,7 @@ def test_a_rotor_of_any_mass_finds_its_rest(mass, slenderness):
     layout, p = model.layout, model.parameters
     state = layout.zeros()
     state[: layout.n_coordinates] = settled_coordinates(model)
-    change, work = layout.zeros(), np.empty((2, p.ball_cos.shape[1]))
+    change, work = layout.zeros(), np.empty((2, p.balls.shape[2]))
     drop_derivative(0.0, state, p, change, work)
     left = change[layout.velocity_of(layout.modal_y)]
     assert np.max(np.abs(left)) < 1e-8 * np.max(np.abs(p.gravity))

@@ -132,7 +132,7 @@ def test_the_peak_stress_is_that_of_the_bearing_under_the_peak_force(pushed):
     P.apply_parameters(smoothed.means[0][problem.parameter_slice], problem.targets, p)
     out = np.empty(4)
     for b, deflection in ((0, 12e-6), (1, 25e-6)):
-        work = np.empty((2, p.ball_cos.shape[1]))
+        work = np.empty((2, p.balls.shape[2]))
         bearing_values(0.0, -deflection, p.bearing[b, L.AXIAL_OFFSET], b, p, work, out)
         found = stress_at_force(problem, smoothed, b, np.array([0.0, -out[2]]))
         assert found == pytest.approx(out[3], rel=1e-6)
