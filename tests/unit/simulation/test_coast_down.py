@@ -89,8 +89,11 @@ def test_dry_drag_sets_the_time_of_standstill(model, stopped, slow):
     """Rotor and races together under linear and dry drag: t = ln(1 + λω₀/d)/λ, from the first grip on."""
     parameters = model.parameters
     races = parameters.bearing
-    turning = parameters.spin[0] + races[:, 11].sum()
-    dry = float(np.sum(races[:, 12] * model.load_shares * 0.5 * races[:, 14])) / turning
+    turning = parameters.spin[0] + races[:, L.RACE_INERTIA].sum()
+    dry = (
+        float(np.sum(races[:, L.DRAG_COEFFICIENT] * model.load_shares * 0.5 * races[:, L.PITCH_DIAMETER]))
+        / turning
+    )
     linear = DECELERATION * parameters.spin[0] / turning
     gripped = slow.speed * parameters.spin[0] / turning
     expected = math.log1p(linear * gripped / dry) / linear
