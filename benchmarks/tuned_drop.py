@@ -12,7 +12,6 @@ from naive_drop import NaiveDrop
 
 from rotordrop.model import layout as L
 from rotordrop.model.parameters import DropModel
-from rotordrop.physics import ball_set
 from rotordrop.simulation.case import DropCase
 from rotordrop.simulation.levitation import start_of_drop
 
@@ -29,10 +28,10 @@ class Bearing:
     def ball_force(self, dx: float, dy: float) -> tuple[float, float]:
         """Force [N] of all balls against a displaced race, one array entry per ball."""
         v = self.value
-        across = v[L.BALL_SET + ball_set.RADIAL_OFFSET] + np.array([dx, dy]) @ self.directions
+        across = v[L.RADIAL_OFFSET] + np.array([dx, dy]) @ self.directions
         distance = np.hypot(across, v[L.AXIAL_OFFSET])
-        squeeze = np.maximum(distance - v[L.BALL_SET + ball_set.GROOVE_DISTANCE], 0.0)
-        load = v[L.BALL_SET + ball_set.BALL_STIFFNESS] * squeeze * np.sqrt(squeeze) * across / distance
+        squeeze = np.maximum(distance - v[L.GROOVE_DISTANCE], 0.0)
+        load = v[L.BALL_STIFFNESS] * squeeze * np.sqrt(squeeze) * across / distance
         x, y = self.directions @ load
         return float(x), float(y)
 

@@ -37,7 +37,7 @@ def contact_force(law: Array, delta: float, delta_dot: float) -> tuple[float, fl
     Parameters
     ----------
     law : ndarray, shape (3,)
-        From `contact_law`.
+        K [N/m^n], n [1] and λ [s/m], from `contact_law`.
     delta : float
         Indentation ``e_r - c_r`` [m]; positive, for there is no force without it.
     delta_dot : float

@@ -284,7 +284,7 @@ def _prior(
 def _start(mean: Array, model: DropModel, unknowns: tuple[Unknown, ...]) -> Array:
     """The prior mean with the unknowns at the guesses of the machine file, which need not be the centre."""
     start = mean.copy()
-    first = model.layout.size - 2
+    first = model.layout.n_dynamic
     start[first : first + len(unknowns)] = [unknown.begin for unknown in unknowns]
     return start
 
