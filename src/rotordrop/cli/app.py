@@ -49,6 +49,7 @@ _ORDER = (
     "critical-speeds",
     "coast-down",
     "look",
+    "clearance",
     "estimate",
     "calibrate",
     "compare",
