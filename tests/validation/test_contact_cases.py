@@ -1,4 +1,4 @@
-"""Contact, friction, whirl and small drop cases: the kernels with scipy's integrators, and closed forms.
+"""Contact, friction and whirl cases by the kernels with scipy's integrators; small drops by `simulate_drop`.
 
 The integrators restart nothing: their steps are short enough for make and break of a contact whose force
 starts at zero, and the times of make and break are the roots of the gap.
@@ -14,13 +14,15 @@ import numpy as np
 import pytest
 from cases import Compute, check, load_case
 from numpy.typing import NDArray
+from rigid_machine import rigid_model
 from scipy.integrate import solve_ivp
 
 from rotordrop.physics import impact, whirl
 from rotordrop.physics.contact import contact_force, contact_law
 from rotordrop.physics.friction import stribeck_coefficient
 from rotordrop.physics.spin import surface_speed
-from rotordrop.physics.support import support_force
+from rotordrop.simulation.case import DropCase, PlacedStart
+from rotordrop.simulation.drop import simulate_drop
 
 pytestmark = pytest.mark.acceptance
 Inputs = Mapping[str, Any]
@@ -118,45 +120,51 @@ def elastic_impact(inputs: Inputs) -> dict[str, float]:
 
 
 def bouncing_ball(inputs: Inputs) -> dict[str, float]:
-    """Each impact integrated with the λ that asks for e at its speed: the delivered restitution counts."""
-    h, g = inputs["h"], inputs["g"]
-    time, speed = impact.fall_time(h, g), math.sqrt(2 * g * h)
-    times, heights = [time], []
+    """One drop from each height, onto a ground that stands still, with the λ that asks for e at its speed."""
+    e, g = inputs["e"], inputs["g"]
+    heights, times = [inputs["h"]], []
     for _ in range(3):
-        lam = impact.damping_for_restitution(inputs["e"], speed)
-        speed = rebound_speed(1.0, 1e14, 1.0, lam, speed)
-        heights.append(speed**2 / (2 * g))
-        time += 2 * speed / g
-        times.append(time)
-    ratio = math.sqrt(heights[2] / heights[1])
+        h = heights[-1]
+        lam = impact.damping_for_restitution(e, math.sqrt(2 * g * h))
+        ground = {"ms": 1e6, "Ks": 1e12, "Cs": 1e9}
+        model = rigid_model({"m": 1.0, "c": h, "K": 1e15, "n": 1.0, "lam": lam, "g": g} | ground, link=1e15)
+        case = DropCase(
+            speed=0.0,
+            duration=(1.1 + 2 * e) * impact.fall_time(h, g),
+            output_step=1e-6,
+            tolerance=1e-9,
+            spin="constant",
+        )
+        result = simulate_drop(model, case)
+        log = result.contacts
+        if not times:
+            times.append(float(log.start[0]))
+        times.append(times[-1] + float(log.start[1] - log.start[0]))
+        flight = (result.time > log.end[0]) & (result.time < log.start[1])
+        heights.append(h + float(np.max(result.displacement[flight, 0, 1])))
+    ratio = math.sqrt(heights[3] / heights[2])
     numbers = {
         "first impact time": times[0],
         "time to rest": times[3] + (times[3] - times[2]) * ratio / (1 - ratio),
     }
     numbers |= {f"impact time {k}": times[k - 1] for k in (2, 3, 4)}
-    return numbers | {f"bounce height {k}": heights[k - 1] for k in (1, 2, 3)}
+    return numbers | {f"bounce height {k}": heights[k] for k in (1, 2, 3)}
 
 
 def mass_caught_by_a_spring(inputs: Inputs) -> dict[str, float]:
-    m, k, g, floor = inputs["m"], inputs["k"], inputs["g"], -inputs["gap"]
-
-    def force(state: Array) -> float:
-        return hunt_crossley_force(floor - state[0], -state[1], k, 1.0, 0.0)
-
-    def motion(_: float, state: Array) -> Sequence[float]:
-        return state[1], -g + force(state) / m
-
-    def gap(_: float, state: Array) -> float:
-        return float(state[0] - floor)
-
-    solution = integrate(motion, [0.0, inputs["v0"]], 1.2, gap, 1e-3)
-    dense = solution.sol(np.linspace(0, 1.2, 120_001)).T
+    """Drop of a rigid rotor of the case's mass; race and support stand as good as still."""
+    values = {"m": inputs["m"], "c": inputs["gap"], "K": inputs["k"], "n": 1.0, "lam": 0.0, "g": inputs["g"]}
+    model = rigid_model(values | {"ms": 2.0, "Ks": 1e9, "Cs": 4e4}, link=1e10)
+    start = PlacedStart(displacement=np.zeros((1, 2)), velocity=np.array([[0.0, inputs["v0"]]]))
+    case = DropCase(speed=0.0, duration=1.1, output_step=1e-3, start=start, tolerance=1e-9, spin="constant")
+    result = simulate_drop(model, case)
+    log, height = result.contacts, result.displacement[:, 0, 1]
     return {
-        "time of first contact": solution.t_events[0][0],
-        "time of lift-off": solution.t_events[0][1],
-        "z at 1.0 s": solution.sol(1.0)[0],
-        "z at 1.1 s": solution.sol(1.1)[0],
-        "peak force": k * (floor - dense[:, 0].min()),
+        "time of first contact": float(log.start[0]),
+        "time of lift-off": float(log.end[0]),
+        "z at 1.0 s": float(height[1000]),
+        "z at 1.1 s": float(height[1100]),
+        "peak force": float(log.peak_force[0]),
     }
 
 
@@ -214,76 +222,41 @@ def rolling_whirl(inputs: Inputs) -> dict[str, float]:
 
 
 def vertical_drop(inputs: Inputs) -> dict[str, float]:
-    """State: rotor and support travel, downwards, and their velocities."""
-    m, c, ms, g = inputs["m"], inputs["c"], inputs["ms"], inputs["g"]
-
-    def force(state: Array) -> float:
-        y, y_s, v, v_s = state
-        return hunt_crossley_force(y - y_s - c, v - v_s, inputs["K"], inputs["n"], inputs["lam"])
-
-    def motion(_: float, state: Array) -> Sequence[float]:
-        F = force(state)
-        on_support = F + support_force(state[1], state[3], inputs["Ks"], inputs["Cs"])
-        return state[2], state[3], g - F / m, on_support / ms
-
-    def gap(_: float, state: Array) -> float:
-        return float(state[0] - state[1] - c)
-
-    solution = integrate(motion, [0.0] * 4, 0.03, gap, 2e-5)
-    times = np.linspace(0, 0.03, 300_001)
-    states = solution.sol(times).T
-    touch, release, again = solution.t_events[0][:3]
-    flight = (times > release) & (times < again)
+    """Drop of a rigid rotor; the case counts downwards, we upwards."""
+    case = DropCase(speed=0.0, duration=0.03, output_step=1e-6, tolerance=1e-9, spin="constant")
+    result = simulate_drop(rigid_model(dict(inputs)), case)
+    log, time = result.contacts, result.time
+    rotor, support = -result.displacement[:, 0, 1], -result.race_displacement[:, 0, 1]
+    touch, release, again = log.start[0], log.end[0], log.start[1]
+    flight = (time > release) & (time < again)
     return {
-        "first contact": touch,
-        "end of first contact": release,
-        "start of second contact": again,
-        "peak contact force": max(force(state) for state in states[(times > touch) & (times < release)]),
-        "max rotor travel": states[:, 0].max(),
-        "max support travel": states[:, 1].max(),
-        "top of first rebound (min y)": states[flight, 0].min(),
-        "y at 30 ms": states[-1, 0],
-        "K from omega=pi/T (paper sect 5.1) on this record": impact.half_period_stiffness(m, release - touch),
+        "first contact": float(touch),
+        "end of first contact": float(release),
+        "start of second contact": float(again),
+        "peak contact force": float(log.peak_force[0]),
+        "max rotor travel": float(rotor.max()),
+        "max support travel": float(support.max()),
+        "top of first rebound (min y)": float(rotor[flight].min()),
+        "y at 30 ms": float(rotor[-1]),
+        "K from omega=pi/T (paper sect 5.1) on this record": impact.half_period_stiffness(
+            inputs["m"], release - touch
+        ),
     }
 
 
 def planar_drop(inputs: Inputs) -> dict[str, float]:
-    """State: x, z of rotor and support, their velocities, ring spin; friction is the tanh law of the case."""
-    m, ms, r = inputs["m"], inputs["ms"], inputs["r"]
-
-    def contact(state: Array) -> tuple[Array, Array, float, float]:
-        way, velocity = state[0:2] - state[2:4], state[4:6] - state[6:8]
-        e_r = math.hypot(*way)
-        normal = way / e_r if e_r > 0 else np.array([0.0, -1.0])
-        tangent = np.array([-normal[1], normal[0]])
-        N = hunt_crossley_force(
-            e_r - inputs["c"], float(velocity @ normal), inputs["K"], inputs["n"], inputs["lam"]
-        )
-        slip = surface_speed(float(velocity @ tangent), inputs["Om"], r, state[8], r)
-        return normal, tangent, N, inputs["mu"] * N * math.tanh(slip / inputs["vs"])
-
-    def motion(t: float, state: Array) -> Sequence[float]:
-        normal, tangent, N, friction = contact(state)
-        on_rotor = -N * normal - friction * tangent
-        angle = inputs["Om"] * t + inputs["phase"]
-        unbalance = inputs["e"] * inputs["Om"] ** 2 * np.array([math.cos(angle), math.sin(angle)])
-        holding = [support_force(state[2 + i], state[6 + i], inputs["Ks"], inputs["Cs"]) for i in (0, 1)]
-        rotor = on_rotor / m + unbalance - np.array([0.0, inputs["g"]])
-        support = (-on_rotor + holding) / ms
-        return [*state[4:8], *rotor, *support, friction * r / inputs["I"]]
-
-    def gap(_: float, state: Array) -> float:
-        return math.hypot(*(state[0:2] - state[2:4])) - inputs["c"]
-
-    solution = integrate(motion, [0.0] * 9, 0.015, gap, 1e-5)
-    times = np.linspace(*solution.t_events[0][:2], 4001)
+    """Drop of a rigid rotor; the case smooths friction otherwise, below a slip that does not occur."""
+    values = dict(inputs) | {"me": inputs["m"] * inputs["e"]}
+    case = DropCase(speed=inputs["Om"], duration=0.015, output_step=1e-6, tolerance=1e-9, spin="constant")
+    result = simulate_drop(rigid_model(values), case)
+    log, last = result.contacts, result.displacement[-1, 0]
     return {
-        "contact event 1": solution.t_events[0][0],
-        "contact event 2": solution.t_events[0][1],
-        "peak normal force": max(contact(state)[2] for state in solution.sol(times).T),
-        "ring speed at 15 ms": solution.y[8, -1],
-        "x at 15 ms": solution.y[0, -1],
-        "z at 15 ms": solution.y[1, -1],
+        "contact event 1": float(log.start[0]),
+        "contact event 2": float(log.end[0]),
+        "peak normal force": float(log.peak_force[0]),
+        "ring speed at 15 ms": float(result.race_speed[-1, 0]),
+        "x at 15 ms": float(last[0]),
+        "z at 15 ms": float(last[1]),
     }
 
 

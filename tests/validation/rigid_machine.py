@@ -1,0 +1,74 @@
+"""A rigid rotor in one touchdown bearing with balls as good as rigid: small drop cases by `simulate_drop`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from rotordrop.machine import loads_machine
+from rotordrop.model import layout as L
+from rotordrop.model.parameters import DropModel, build_drop_model
+from rotordrop.model.reduction import Reduction
+
+LINK = 1e13
+"""Stiffness [N/m] of the balls between race and support, which share the mass of the support of a case."""
+
+_BALLS = 8
+_PRESS = 1e-2
+
+
+def rigid_model(values: dict[str, Any], link: float = LINK) -> DropModel:
+    """Drop model of a rigid rotor.
+
+    Parameters
+    ----------
+    values : dict
+        m, c, K, n, lam, g; ms, Ks, Cs of the support; where they are there: mu, I, r, me and phase from +x.
+    link : float
+        Stiffness of the balls [N/m].
+    """
+    v = {"mu": 0.0, "I": 1e-3, "r": 100.0 * values["c"], "me": 0.0, "phase": 0.0} | values
+    half = 0.5 * v["ms"]
+    unbalance = (
+        f'unbalances = [{{ node = 2, amount = "{v["me"]} kg m", phase = "{v["phase"] - 0.5 * np.pi} rad" }}]'
+    )
+    machine = loads_machine(
+        f"""
+name = "rigid"
+gravity = "{v["g"]} m/s^2"
+speed = {{ nominal = "100 Hz" }}
+{unbalance if v["me"] else ""}
+[rotor]
+sections = [{{ length = "0.1 m", elements = 2, outer_diameter = "1 mm" }}]
+discs = [{{ node = 2, mass = "{v["m"] - np.pi / 4 * 1e-7 * 7850.0} kg", polar_inertia = "0.01 kg m^2", \
+diametral_inertia = "0.01 kg m^2" }}]
+materials = {{ steel = {{ youngs_modulus = "206 GPa", poisson_ratio = 0.3, density = "7850 kg/m^3" }} }}
+[[touchdown_bearings]]
+name = "A"
+node = 2
+air_gap = "{v["c"]} m"
+bore_radius = "{v["r"]} m"
+damping_time = "0 s"
+bearing = {{ ball_diameter = "{0.3 * v["r"]} m", ball_count = {_BALLS}, pitch_diameter = "{3.0 * v["r"]} m", \
+contact_angle = "15 deg", preload = "100 N", arrangement = "single" }}
+contact = {{ stiffness = "{v["K"]} N/m^{v["n"]:.4f}", exponent = {v["n"]}, damping = "{v["lam"]} s/m" }}
+friction = {{ static = {v["mu"]}, dynamic = {v["mu"]} }}
+race = {{ mass = "{half} kg", inertia = "{v["I"]} kg m^2", drag_coefficient = 0.0 }}
+support = {{ mass = "{half} kg", stiffness = "{v["Ks"]} N/m", damping = "{v["Cs"]} N s/m" }}
+"""
+    )
+    model = build_drop_model(machine, Reduction(modes=2, attachment=False))
+    return replace(model, parameters=_linked(model, link, half))
+
+
+def _linked(model: DropModel, link: float, half: float) -> L.KernelParameters:
+    """Balls pressed in so far that they are one stiff spring, damped against the ringing of the race."""
+    bearing = model.parameters.bearing.copy()
+    bearing[:, L.GROOVE_DISTANCE] = 1e-3
+    bearing[:, L.RADIAL_OFFSET] = 1e-3 + _PRESS
+    bearing[:, L.AXIAL_OFFSET] = 0.0
+    bearing[:, L.BALL_STIFFNESS] = link / (0.75 * _BALLS * np.sqrt(_PRESS))
+    bearing[:, L.BEARING_DAMPING] = np.sqrt(link * half)
+    return model.parameters._replace(bearing=bearing)
