@@ -8,7 +8,7 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_closing, label
+from scipy.ndimage import label
 
 from rotordrop.spectrum._clock import TURN, Clock, View
 from rotordrop.spectrum._found_line import FIVE_MOMENTS, FoundLine, path_range, radius
@@ -455,9 +455,18 @@ class LineSearch:
 
 def _connected(clear: Mask, spoken: Mask, gap: int) -> Mask:
     """Stretches of samples, joined over short gaps, that touch the part in which a line was detected."""
-    closed = binary_closing(np.pad(clear, gap), np.ones(gap, dtype=np.bool_))[gap:-gap] | clear
-    stretch, _ = label(closed | spoken)
+    stretch, _ = label(_closed(clear, gap) | spoken)
     return np.asarray(np.isin(stretch, np.unique(stretch[spoken])))
+
+
+def _closed(mask: Mask, gap: int) -> Mask:
+    """The mask with its gaps shorter than so many samples filled: a closing, in one pass over its edges."""
+    edges = np.flatnonzero(np.diff(mask, prepend=False, append=False))
+    filled = mask.copy()
+    for end, begin in zip(edges[1:-1:2], edges[2::2], strict=True):
+        if begin - end < gap:
+            filled[end:begin] = True
+    return filled
 
 
 def _weight(envelope: Envelope, present: Mask) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -231,10 +232,10 @@ def analyse_coast_down(
         air_gap=float(np.mean(list(signal.air_gap.values()))),
         settings=STANDARD_SETTINGS if signal.recorded else LineSettings(most_lines=LINES_OF_A_SIMULATION),
     )
-    planes = {}
-    for number, name in enumerate(signal.planes):
-        tell(f"orders and waterfall, {name}", 0.5 + 0.4 * number / len(signal.planes))
-        planes[name] = _plane(signal, name, read[name], lines, candidates, choice)
+    tell("orders and waterfalls", 0.5)
+    with ThreadPoolExecutor() as pool:
+        work = [(signal, name, read[name], lines, candidates, choice) for name in signal.planes]
+        planes = dict(zip(signal.planes, pool.map(lambda one: _plane(*one), work), strict=True))
     tell("speed", 0.95)
     return CoastDownAnalysis(signal=signal, planes=planes, lines=lines, speed_law=_speed_law(signal))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -171,8 +172,8 @@ def find_lines(
     if not planes:
         raise RecordError("lines: no plane given, at least one displacement (N, 2) is needed")
     highest = min(settings.highest_frequency, 0.4 * sampling_rate)
-    found: list[tuple[str, FoundLine]] = []
-    for plane, displacement in planes.items():
+
+    def lines_of(displacement: PlanarSignal) -> list[FoundLine]:
         thin, rate = reduce_rate(displacement, sampling_rate, highest, samples_per_turn=2.7)
         first = round(skip * rate)
         search = LineSearch(
@@ -183,7 +184,11 @@ def find_lines(
             settings=settings,
             highest_frequency=highest,
         )
-        found += [(plane, line) for line in search.run()]
+        return search.run()
+
+    with ThreadPoolExecutor() as pool:  # transforms and filters release the interpreter lock
+        searched = pool.map(lines_of, planes.values())
+        found = [(plane, line) for plane, lines in zip(planes, searched, strict=True) for line in lines]
     bands = (highest, settings.highest_order)
     lines = _joined(_named(found, candidates, air_gap, bands))
     return tuple(sorted(lines, key=lambda line: -line.amplitude))

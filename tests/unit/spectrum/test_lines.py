@@ -7,10 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import binary_closing
 from tests.unit.spectrum.synthetic import CoastDown
 
 from rotordrop.errors import RecordError
 from rotordrop.spectrum._found_line import FoundLine, path_range
+from rotordrop.spectrum._search import _closed
 from rotordrop.spectrum.candidates import (
     Candidate,
     mains_candidates,
@@ -250,3 +252,12 @@ def test_a_brief_line_has_a_frequency_only_while_it_is_there() -> None:
     unit = np.ones((3, 5))
     low, high = path_range(line, np.array([2.0, 6.5, 20.0]), np.full(3, 1.0), unit)
     assert low == pytest.approx([np.inf, 92.0, np.inf]) and high == pytest.approx([np.inf, 92.0, np.inf])
+
+
+@pytest.mark.parametrize("gap", [1, 2, 7, 40])
+def test_gaps_are_closed_as_a_morphological_closing_does(gap):
+    random = np.random.default_rng(gap)
+    for share in (0.02, 0.3, 0.7, 0.98):
+        mask = random.random(500) < share
+        padded = binary_closing(np.pad(mask, gap), np.ones(gap, dtype=np.bool_))[gap:-gap] | mask
+        np.testing.assert_array_equal(_closed(mask, gap), padded)
