@@ -25,6 +25,13 @@ SPEED_SOURCE, BY_HAND = "speed_source", "given by hand"
 """Header entry of a saved record whose speed nobody measured."""
 
 
+LEAST_REPEATED = 0.01
+"""Share of time stamps equal to their neighbour from which a clock may be a rounded one [1]."""
+
+ROUNDING_SLACK = 0.05
+"""How far a stamp may be off beyond half its resolution, for the fit of the even clock [1]."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Record:
     """Readings of the displacement sensors over a drop, with the shaft speed.
@@ -186,6 +193,9 @@ def record_of(
         raise RecordError("the machine has no sensors; describe them in [[sensors]] of the machine file")
     matched = match_sensors(recording, sensors, profile, place)
     time, rate = _shared_clock(matched, place)
+    rounded = (
+        ("time stamps are rounded; an even clock was put behind them",) if _repeats(matched[0].time) else ()
+    )
     columns = [displacement(c, s, recording, profile, place) for c, s in zip(matched, sensors, strict=True)]
     speed_time, speed_readings, notes = _speed(recording, matched, profile, time, place)
     speed = None
@@ -204,7 +214,7 @@ def record_of(
         path=path,
         sha256=sha256,
         metadata=recording.metadata,
-        notes=(*recording.notes, *notes),
+        notes=(*recording.notes, *notes, *(rounded if np.all(np.diff(time) > 0.0) else ())),
         warnings=(*recording.warnings, *spoken),
     )
 
@@ -242,8 +252,41 @@ def _even(time: Array) -> tuple[Array, float]:
     if step > 0 and float(np.max(np.abs(time - even))) <= 0.02 * step:
         rate = float(f"{1.0 / step:.9g}")
         return time[0] + np.arange(count + 1) / rate, rate
+    rounded = _rounded_clock(time)
+    if rounded is not None:
+        return rounded
     usual = _step(time)
     return time.copy(), 1.0 / usual if usual > 0 else float("nan")
+
+
+def _repeats(time: Array) -> bool:
+    return bool(np.any(np.diff(time) == 0.0))
+
+
+def _rounded_clock(time: Array) -> tuple[Array, float] | None:
+    """The even clock behind stamps that were rounded to about their step; None where there is none.
+
+    Such stamps are multiples of one resolution, many of them equal to their neighbour, and none is further
+    from the even clock than half the resolution. Rows that are there twice, or missing, drift away from it.
+    """
+    steps = np.diff(time)
+    if np.mean(steps == 0.0) < LEAST_REPEATED or np.any(steps < 0.0) or not np.any(steps > 0.0):
+        return None
+    resolution = float(np.min(steps[steps > 0.0]))
+    count = np.rint((time - time[0]) / resolution)
+    if np.max(np.abs(time - time[0] - count * resolution)) > 1e-3 * resolution:
+        return None
+    index = np.arange(len(time), dtype=np.float64)
+    slope, start = np.polyfit(index, count, 1)
+    if np.max(np.abs(count - start - slope * index)) > 0.5 + ROUNDING_SLACK:
+        return None
+    if (
+        abs(slope - 1.0) * len(time) < 1.0
+    ):  # within one step over the whole record: the step is the resolution
+        slope = 1.0
+        start = float(np.mean(count - index))
+    rate = float(f"{1.0 / (slope * resolution):.9g}")
+    return time[0] + start * resolution + index / rate, rate
 
 
 def _speed(
