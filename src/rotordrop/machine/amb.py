@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from collections.abc import Mapping
+from typing import Annotated, ClassVar
 
 from pydantic import Field, Strict
 
@@ -39,6 +40,8 @@ class ActiveMagneticBearing(Placed):
     integral_action: Annotated[bool, Strict()] = Field(
         default=True, description="The controller holds the rotor centred against gravity"
     )
+
+    reserved: ClassVar[Mapping[str, str]] = {"controller": "the controller of a closed loop"}
 
     def completed(self, carried_mass: float) -> dict[str, Estimated]:
         """Values for a stiffness and damping that were left out, from the mass carried [kg]."""

@@ -140,6 +140,11 @@ class BallBearing(Description):
         "clearance": ("clearance_class",),
     }
 
+    reserved: ClassVar[Mapping[str, str]] = {
+        "preload_kind": "a preload by springs (rigid today)",
+        "row_spacing": "the axial distance of two rows, which only tilt would feel",
+    }
+
     @classmethod
     def rewritten(cls, raw: dict[str, Any]) -> dict[str, Any]:
         """Read ``preload = "light"``, ``clearance = "C3"``, ``rows = 1``, one conformity for both races."""

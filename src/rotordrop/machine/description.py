@@ -59,12 +59,18 @@ class Description(BaseModel):
     displaces: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     """Fields that give way when another one is set, because both say the same thing."""
 
+    reserved: ClassVar[Mapping[str, str]] = {}
+    """Keys that a later version will know, with what they will hold."""
+
     @model_validator(mode="before")
     @classmethod
     def _refuse_unknown_keys(cls, raw: Any) -> Any:
         if isinstance(raw, Mapping):
             raw = cls.rewritten(dict(raw))
             for key in raw:
+                if key in cls.reserved:
+                    what = f"{key!r} is reserved for {cls.reserved[key]}"
+                    raise Misfit(f"{what}, which is not yet supported; leave it out", (key,))
                 if key not in cls.model_fields:
                     raise Misfit(unknown_key(str(key), cls.known_keys()), (str(key),))
         return raw

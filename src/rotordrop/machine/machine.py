@@ -71,6 +71,17 @@ class Machine(Description):
 
     _source_path: Path | None = PrivateAttr(default=None)
 
+    @classmethod
+    def rewritten(cls, raw: dict[str, Any]) -> dict[str, Any]:
+        """Refuse a direction of gravity, which a later version will know."""
+        if isinstance(raw.get("gravity"), list | tuple):
+            raise Misfit(
+                "gravity as a direction is reserved and not yet supported; it acts towards -y: give its "
+                'acceleration alone, gravity = "9.81 m/s^2"',
+                ("gravity",),
+            )
+        return raw
+
     def check(self) -> None:
         """Refuse parts that do not fit together."""
         nodes = self.rotor.node_positions

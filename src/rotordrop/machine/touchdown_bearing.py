@@ -274,6 +274,12 @@ class TouchdownBearing(Placed):
     race: Race = Field(default_factory=Race, description="The inner race")
     support: Support = Field(default_factory=Support, description="What carries the outer ring")
 
+    reserved: ClassVar[Mapping[str, str]] = {
+        "kind": "another kind of touchdown bearing than a ball bearing (sleeve, planetary)",
+        "mount": "a soft mount with a stop",
+        "thermal": "the heat of the bearing",
+    }
+
     def check(self) -> None:
         """Refuse a clearance that leaves no rotor and a bore outside the balls."""
         super().check()

@@ -18,7 +18,25 @@ BAD = [
     (GAP, "air_gap = 250 um", r'a value with a unit is a text: write "250 um" in quotes', "um"),
     (GAP, 'air_gap = "250 um', "not valid TOML", "air_gap"),
     # keys
+    (
+        'name = "small"',
+        'name = "small"\ngravity = [0.0, -9.81]',
+        "gravity as a direction is reserved and not yet supported",
+        "gravity",
+    ),
     (GAP, 'airgap = "250 um"', "unknown key 'airgap'; did you mean 'air_gap'", "airgap"),
+    (
+        GAP,
+        GAP + '\nkind = "sleeve"',
+        "'kind' is reserved for another kind of touchdown bearing .* not yet",
+        "kind",
+    ),
+    (
+        GAP,
+        GAP + '\nmount = "soft"',
+        "'mount' is reserved for a soft mount with a stop, which is not yet",
+        "mount",
+    ),
     ("[[rotor.discs]]", "[[rotor.disks]]", "unknown key 'disks'; did you mean 'discs'", "rotor.disks"),
     ("[speed]", "[sped]", "unknown key 'sped'; did you mean 'speed'", "sped"),
     (
