@@ -9,7 +9,6 @@ import pytest
 from rotordrop.physics.aerodynamics import exponential_deceleration, speed_dependent_deceleration
 from rotordrop.physics.remanence import remanent_fraction
 from rotordrop.physics.spin import race_drag_torque, surface_speed
-from rotordrop.physics.support import damping_from_ratio, ratio_from_damping, support_force
 
 
 def test_surface_speed_of_a_rotor_that_rolls_is_zero():
@@ -44,10 +43,3 @@ def test_remanence_starts_when_the_magnets_let_go():
     assert remanent_fraction(0.001, 0.001, 0.002) == 1.0
     assert remanent_fraction(0.003, 0.001, 0.002) == pytest.approx(1.0 / math.e)
     assert remanent_fraction(0.003, 0.001, 0.0) == 0.0
-
-
-def test_support_pulls_back_and_its_damping_ratio_returns():
-    """40 kg on 1e8 N/m with 2.5 %: 3162 N s/m."""
-    assert support_force(1e-5, 0.02, 1e8, 3000.0) == pytest.approx(-1060.0)
-    assert damping_from_ratio(0.025, 1e8, 40.0) == pytest.approx(3162.3, rel=1e-4)
-    assert ratio_from_damping(damping_from_ratio(0.025, 1e8, 40.0), 1e8, 40.0) == pytest.approx(0.025)
