@@ -89,8 +89,9 @@ class Machine(Description):
             place_on_nodes(getattr(self, key), nodes, key)
         self._check_names()
         self._check_bearing_nodes()
-        if self.sensors:
-            check_sensors_resolve_motion(self.sensors, nodes)
+        working = tuple(sensor for sensor in self.sensors if not sensor.lost)
+        if working or self.sensors:
+            check_sensors_resolve_motion(working, nodes)
 
     def _check_names(self) -> None:
         for key in ("touchdown_bearings", "ambs", "sensors"):
@@ -155,6 +156,7 @@ class Machine(Description):
             if "bearing" in sensor.model_fields_set
             else sensor.completed_with({"bearing": self._nearest_bearing(sensor.node)})
             for sensor in self.sensors
+            if not sensor.lost
         )
 
     def _nearest_bearing(self, node: int) -> str:

@@ -37,6 +37,8 @@ class Sensor(Placed):
         Name of the touchdown bearing at this end; the nearest when left out.
     position_error : Estimated
         Standard uncertainty of the axial position [m].
+    lost : bool
+        Whether the sensor gave no readings; the machine then goes without it.
     """
 
     name: Channel = Field(description="Name of the channel in the recording")
@@ -53,6 +55,7 @@ class Sensor(Placed):
         description="Touchdown bearing at this end; the nearest when left out",
     )
     position_error: NonNegativeLength = default(1e-3, "standard uncertainty of the axial position")
+    lost: bool = Field(default=False, description="A sensor without readings; left out of everything")
 
 
 def check_sensors_resolve_motion(sensors: tuple[Sensor, ...], nodes: tuple[float, ...]) -> None:
@@ -69,7 +72,10 @@ def check_sensors_resolve_motion(sensors: tuple[Sensor, ...], nodes: tuple[float
             "tilt of the rotor from its displacement; add sensors in a second plane",
             ("sensors",),
         )
-    if len([plane for plane in planes.values() if _resolves_both(plane)]) < 2 and _rank(sensors, nodes) < 4:
+    whole = [plane for plane in planes.values() if _resolves_both(plane)]
+    if len(whole) == 1 and any(len(plane) == 1 for plane in planes.values()):
+        return  # a plane that lost a sensor: the twin goes on with the other plane and what is left
+    if len(whole) < 2 and _rank(sensors, nodes) < 4:
         weak = next(z for z, plane in planes.items() if not _resolves_both(plane))
         raise Misfit(
             f"the sensors resolve only {_rank(sensors, nodes)} of the 4 rigid motions: in the plane at "

@@ -14,7 +14,7 @@ import numpy as np
 
 from rotordrop.errors import RecordError
 from rotordrop.measurement.axes import sensor_planes
-from rotordrop.measurement.events import coarse_drop
+from rotordrop.measurement.events import coarse_drop, with_whole_planes
 from rotordrop.measurement.levitated import LevitatedModel, fit_levitated
 from rotordrop.measurement.quality.arrangement import LEANING, check_planes, fall_of
 from rotordrop.measurement.quality.channels import check_channels
@@ -66,12 +66,14 @@ def check_record(record: Record, machine: Machine, tail: Record | None = None) -
         findings += [_of_tail(found) for found in check_clock(tail, drop=False) + check_channels(tail)]
     if stops(findings):
         return ranked(findings)
-    findings += check_blocks(record) + check_units(record, machine, sensor_planes(record.sensors))
+    whole, planes = with_whole_planes(record)
+    findings += check_blocks(record) + check_units(whole, machine, planes)
     findings += check_speed(record, machine)
     if stops(findings):
         misread = any(found.kind == "wrong unit factor" for found in findings)
         return ranked(found for found in findings if not (misread and found.kind == "coarse quantisation"))
-    return ranked(findings + _check_motion(record, machine, tail))
+    still = None if tail is None else with_whole_planes(tail)[0]
+    return ranked(findings + _check_motion(whole, machine, still))
 
 
 def _damage(words: str) -> Finding:
