@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.estimated import NINETY
 from rotordrop.measurement.axes import Plane, sensor_directions
 from rotordrop.measurement.levitated import LevitatedModel
 from rotordrop.measurement.recording import Array
@@ -19,6 +18,8 @@ from rotordrop.measurement.release import (
     response_at,
     tabulate_response,
 )
+from rotordrop.model.parameter_table import parameter
+from rotordrop.model.unknowns import sensor_prior
 
 if TYPE_CHECKING:
     from rotordrop.machine.sensor import Sensor
@@ -325,9 +326,5 @@ def _priors(rotor: FreeRotor, sensors: tuple[Sensor, ...], turning: float) -> tu
 
 
 def _gain_error(sensor: Sensor) -> float:
-    """Standard deviation of the gain, from its range or interval."""
-    gain = sensor.gain
-    if gain.standard_error is not None:
-        return max(gain.standard_error, 1e-4)
-    limits = gain.interval_90 or gain.range
-    return 0.01 if limits is None else max((limits[1] - limits[0]) / (2.0 * NINETY), 1e-4)
+    """Standard deviation of the gain, as every estimate takes it."""
+    return max(sensor_prior(parameter("gain", "sensor"), sensor.gain, smallest_gap=1.0).sigma, 1e-4)
