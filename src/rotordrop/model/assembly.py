@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import UsageError
 from rotordrop.physics import timoshenko
+from rotordrop.physics.linear_algebra import product
 from rotordrop.physics.timoshenko import Section
 
 if TYPE_CHECKING:
@@ -80,7 +81,7 @@ class RotorFE:
 
     @cached_property
     def _rigid_mass(self) -> Array:
-        return np.asarray(self.rigid_shapes.T @ self.mass @ self.rigid_shapes)
+        return product(product(self.rigid_shapes.T, self.mass), self.rigid_shapes)
 
     @property
     def total_mass(self) -> float:
@@ -95,12 +96,12 @@ class RotorFE:
     @property
     def diametral_inertia(self) -> float:
         """Inertia about a diameter through the centre of gravity [kg m²]."""
-        return float(self._rigid_mass[1, 1] - self.total_mass * self.centre_of_gravity**2)
+        return float(self._rigid_mass[1, 1] - self._rigid_mass[0, 1] * self.centre_of_gravity)
 
     @property
     def polar_inertia(self) -> float:
         """Inertia about the rotor axis [kg m²], which drives the spin."""
-        return float(self.rigid_shapes[:, 1] @ self.polar @ self.rigid_shapes[:, 1])
+        return float(product(product(self.rigid_shapes[:, 1], self.polar), self.rigid_shapes[:, 1]))
 
     def node_index(self, node: int) -> int:
         """Index of the displacement of a node (counted from 1) among the degrees of freedom of a plane."""

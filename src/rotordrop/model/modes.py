@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import SimulationError
 from rotordrop.model.assembly import RotorFE
+from rotordrop.physics.linear_algebra import generalised_eigen, product
 
 Array = NDArray[np.float64]
 
@@ -64,7 +65,7 @@ def free_free_modes(fe: RotorFE, count: int | None = None) -> PlanarModes:
         return PlanarModes(omega=np.zeros(N_RIGID), shapes=rigid)
     eigenvalues, vectors = _eigenpairs(fe.stiffness, fe.mass, count)
     bending = vectors[:, N_RIGID:]
-    bending = bending - rigid @ (rigid.T @ fe.mass @ bending)
+    bending = bending - product(rigid, product(product(rigid.T, fe.mass), bending))
     shapes = np.column_stack([rigid, with_positive_peak(bending)])
     omega = np.sqrt(np.concatenate([np.zeros(N_RIGID), eigenvalues[N_RIGID:]]))
     return PlanarModes(omega=omega, shapes=shapes)
@@ -93,8 +94,8 @@ def modes_on_springs(fe: RotorFE, springs: dict[int, float], count: int | None =
 def modal_damping_matrix(fe: RotorFE) -> Array:
     """Damping matrix [N s/m] that gives every free-free bending mode the modal damping, shape (2N, 2N)."""
     modes = free_free_modes(fe)
-    momentum = fe.mass @ modes.shapes
-    return np.asarray((momentum * (2.0 * fe.modal_damping * modes.omega)) @ momentum.T)
+    momentum = product(fe.mass, modes.shapes)
+    return product(momentum * (2.0 * fe.modal_damping * modes.omega), momentum.T)
 
 
 def with_positive_peak(shapes: Array) -> Array:
@@ -106,15 +107,13 @@ def with_positive_peak(shapes: Array) -> Array:
 
 
 def _eigenpairs(stiffness: Array, mass: Array, count: int) -> tuple[Array, Array]:
-    from scipy.linalg import LinAlgError, eigh
-
     try:
-        values, vectors = eigh(stiffness, mass, subset_by_index=(0, count - 1))
-    except LinAlgError:
+        values, vectors = generalised_eigen(stiffness, mass)
+    except np.linalg.LinAlgError:
         bare = [1 + i // 2 for i in range(0, len(mass), 2) if min(mass[i, i], mass[i + 1, i + 1]) <= 0.0]
         where = f"at node {bare[0]}" if bare else "somewhere"
         raise SimulationError(
             f"the rotor has neither mass nor inertia {where}, so not all of its modes are finite. "
             "Give the shaft a density, or ask for the 2 rigid modes only."
         ) from None
-    return np.asarray(values), np.asarray(vectors)
+    return values[:count], vectors[:, :count]

@@ -25,6 +25,8 @@ from rotordrop.physics.ball_set import (
     static_bearing_stiffness,
 )
 from rotordrop.physics.contact import contact_law
+from rotordrop.physics.elementary import sine_cosine
+from rotordrop.physics.linear_algebra import product
 
 Array = NDArray[np.float64]
 
@@ -114,7 +116,7 @@ def _kernel_parameters(
         eigenvalue=np.ascontiguousarray(basis.eigenvalues, dtype=np.float64),
         damping=np.ascontiguousarray(np.diag(basis.damping), dtype=np.float64),
         polar=np.ascontiguousarray(basis.polar, dtype=np.float64).reshape(m, m),
-        gravity=-float(machine.gravity) * (basis.shapes.T @ (fe.mass @ lift)),
+        gravity=-float(machine.gravity) * (product(basis.shapes.T, product(fe.mass, lift))),
         unbalance_cos=unbalance_cos,
         unbalance_sin=unbalance_sin,
         bearing_shape=_rows(basis, [b.node for b in bearings]),
@@ -163,8 +165,9 @@ def _unbalance(machine: Machine, basis: RotorBasis) -> tuple[Array, Array]:
     for unbalance in machine.unbalances:
         angle = float(unbalance.phase) + 0.5 * math.pi
         row = basis.node_row(unbalance.node)
-        cosine += float(unbalance.amount) * math.cos(angle) * row
-        sine += float(unbalance.amount) * math.sin(angle) * row
+        s, c = sine_cosine(angle)
+        cosine += float(unbalance.amount) * c * row
+        sine += float(unbalance.amount) * s * row
     return cosine, sine
 
 

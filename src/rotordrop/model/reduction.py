@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from rotordrop.errors import SimulationError, UsageError
 from rotordrop.model.assembly import RotorFE
 from rotordrop.model.modes import N_RIGID, PlanarModes, free_free_modes, with_positive_peak
+from rotordrop.physics.linear_algebra import orthonormal, product, symmetric_eigen
 
 Array = NDArray[np.float64]
 
@@ -158,8 +159,8 @@ def reduce_rotor(
     everything = free_free_modes(fe)
     kept = min(choice.modes, fe.size)
     inner, eigenvalues, damping = _attachment_coordinates(fe, everything, kept, nodes)
-    extra = with_positive_peak(everything.shapes[:, kept:] @ inner)
-    signs = np.sign(np.sum(extra * (fe.mass @ everything.shapes[:, kept:] @ inner), axis=0))
+    extra = with_positive_peak(product(everything.shapes[:, kept:], inner))
+    signs = np.sign(np.sum(extra * product(fe.mass, product(everything.shapes[:, kept:], inner)), axis=0))
     shapes = np.column_stack([everything.shapes[:, :kept], extra])
     projected = np.zeros((shapes.shape[1], shapes.shape[1]))
     projected[:kept, :kept] = np.diag(2.0 * fe.modal_damping * everything.omega[:kept])
@@ -174,13 +175,11 @@ def _attachment_coordinates(
     """Attachment modes from truncated ones: coefficients (t, a), eigenvalues (a,), damping (a, a)."""
     rows = np.array([fe.node_row(node) for node in nodes])
     omega = modes.omega[kept:]
-    residual = (modes.shapes[:, kept:].T @ rows.T) / omega[:, None] ** 2
-    residual = residual / np.maximum(np.linalg.norm(residual, axis=0), np.finfo(float).tiny)
-    left, strength, _ = np.linalg.svd(residual, full_matrices=False)
-    basis = left[:, strength > _DEPENDENT]
-    eigenvalues, rotation = np.linalg.eigh(basis.T @ (omega[:, None] ** 2 * basis))
-    inner = basis @ rotation
-    damping = inner.T @ (2.0 * fe.modal_damping * omega[:, None] * inner)
+    residual = product(modes.shapes[:, kept:].T, rows.T) / omega[:, None] ** 2
+    basis = orthonormal(residual, _DEPENDENT)
+    eigenvalues, rotation = symmetric_eigen(product(basis.T, omega[:, None] ** 2 * basis))
+    inner = product(basis, rotation)
+    damping = product(inner.T, 2.0 * fe.modal_damping * omega[:, None] * inner)
     return inner, eigenvalues, damping
 
 
@@ -192,7 +191,7 @@ def _basis(
     reduction: Reduction,
     nodes: tuple[int, ...],
 ) -> RotorBasis:
-    polar = shapes.T @ fe.polar @ shapes
+    polar = product(product(shapes.T, fe.polar), shapes)
     return RotorBasis(
         shapes=shapes,
         eigenvalues=eigenvalues,

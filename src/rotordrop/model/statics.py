@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rotordrop.errors import SimulationError
 from rotordrop.model.assembly import RotorFE, build_rotor_fe
 from rotordrop.model.modes import N_RIGID, free_free_modes, rigid_modes
+from rotordrop.physics.linear_algebra import product, solve
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
@@ -20,7 +21,7 @@ Array = NDArray[np.float64]
 
 def weight_vector(fe: RotorFE, gravity: float) -> Array:
     """Nodal forces of gravity in y [N, N m], shape (2N,); gravity [m/s²] acts towards −y."""
-    return np.asarray(-gravity * (fe.mass @ fe.rigid_shapes[:, 0]))
+    return -gravity * product(fe.mass, fe.rigid_shapes[:, 0])
 
 
 def rest_on(
@@ -57,7 +58,7 @@ def rest_on(
     scale = float(np.max(np.diag(fe.stiffness)))
     system = np.block([[fe.stiffness, -scale * rows.T], [-scale * rows, -(scale**2) * give]])
     right = np.concatenate([weight_vector(fe, gravity), np.zeros(held)])
-    solution = np.linalg.solve(system, right)
+    solution = solve(system, right)
     return solution[: fe.size], scale * solution[fe.size :]
 
 
@@ -92,7 +93,7 @@ def levitated_sag(fe: RotorFE, machine: Machine) -> Array:
 def bending_part(fe: RotorFE, shape: Array) -> Array:
     """What is left of a shape (2N,) without its rigid modes [m, rad]: how far it is from a straight rotor."""
     rigid = rigid_modes(fe)
-    return np.asarray(shape - rigid @ (rigid.T @ fe.mass @ shape))
+    return shape - product(rigid, product(rigid.T, product(fe.mass, shape)))
 
 
 def settled_sag(fe: RotorFE, machine: Machine) -> Array:
@@ -112,6 +113,6 @@ def _inertia_relief(fe: RotorFE, node: int, gravity: float) -> Array:
     modes = free_free_modes(fe)
     bending, eigenvalues = modes.shapes[:, N_RIGID:], modes.omega[N_RIGID:] ** 2
     force = weight_vector(fe, gravity) + fe.total_mass * gravity * fe.node_row(node)
-    shape = bending @ ((bending.T @ force) / eigenvalues)
+    shape = product(bending, product(bending.T, force) / eigenvalues)
     lift = fe.rigid_shapes[:, 0] * shape[fe.node_index(node)]
     return np.asarray(shape - lift)

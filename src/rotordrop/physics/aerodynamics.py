@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
-
 from rotordrop.physics._compile import kernel
+from rotordrop.physics.elementary import exp
 
 OFF = 0
 EXPONENTIAL_IN_TIME = 1
@@ -19,7 +18,7 @@ def exponential_deceleration(t: float, omega_0: float, tau: float) -> float:
     Time from power-off [s], initial speed [rad/s], time constant [s]. Source: Neisi 2020, eq. (13).
     Valid for windows up to about 1 s: with race drag on top it would drive a rotor backwards in a coast-down.
     """
-    return -(omega_0 / tau) * math.exp(-t / tau)
+    return -(omega_0 / tau) * exp(-t / tau)
 
 
 @kernel

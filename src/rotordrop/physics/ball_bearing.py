@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import UsageError
 from rotordrop.physics.ball_bearing_geometry import BallBearingDescription
+from rotordrop.physics.elementary import acos, asin, cos, cos_each, cube_root_each, magnitude, sin, sin_each
 from rotordrop.physics.hertz import compliance, contacts_in_series, race_contact
 
 Array = NDArray[np.float64]
@@ -95,7 +96,7 @@ class BearingConstants:
         if self.preloaded:
             return 0.0
         A_0, axial = self.groove_distance, self.axial_offset
-        return max(math.sqrt(max(A_0**2 - axial**2, 0.0)) - self.radial_offset, 0.0)
+        return max(math.sqrt(max(A_0 * A_0 - axial * axial, 0.0)) - self.radial_offset, 0.0)
 
     @property
     def axial_play(self) -> float:
@@ -103,7 +104,7 @@ class BearingConstants:
 
         Source: Harris, Rolling Bearing Analysis, free endplay of a bearing with radial clearance.
         """
-        return 2.0 * self.groove_distance * math.sin(self.contact_angle)
+        return 2.0 * self.groove_distance * sin(self.contact_angle)
 
     @property
     def radial_contact_angle(self) -> float:
@@ -111,7 +112,7 @@ class BearingConstants:
 
         Source: definition.
         """
-        return self.contact_angle if self.preloaded else math.asin(self.axial_offset / self.groove_distance)
+        return self.contact_angle if self.preloaded else asin(self.axial_offset / self.groove_distance)
 
     @property
     def row_count(self) -> int:
@@ -154,9 +155,10 @@ def row_axial_force(s: ArrayLike, ZK: ArrayLike, A_0: ArrayLike, alpha_0: ArrayL
     -----
     Source: Neisi 2020, eqs. (3)–(6), for an axial displacement.
     """
-    axial = A_0 * np.sin(alpha_0) + s
-    A = np.hypot(A_0 * np.cos(alpha_0), axial)
-    return ZK * _elongation(s, A, A_0, alpha_0) ** 1.5 * axial / A
+    axial = A_0 * sin_each(alpha_0) + s
+    A = magnitude(A_0 * cos_each(alpha_0), axial)
+    delta = _elongation(s, A, A_0, alpha_0)
+    return ZK * delta * np.sqrt(delta) * axial / A
 
 
 def row_axial_stiffness(s: ArrayLike, ZK: ArrayLike, A_0: ArrayLike, alpha_0: ArrayLike) -> Any:
@@ -164,11 +166,11 @@ def row_axial_stiffness(s: ArrayLike, ZK: ArrayLike, A_0: ArrayLike, alpha_0: Ar
 
     Source: Neisi 2020, eqs. (3)–(6), differentiated; the change of the contact angle is included.
     """
-    axial = A_0 * np.sin(alpha_0) + s
-    A = np.hypot(A_0 * np.cos(alpha_0), axial)
+    axial = A_0 * sin_each(alpha_0) + s
+    A = magnitude(A_0 * cos_each(alpha_0), axial)
     delta = _elongation(s, A, A_0, alpha_0)
-    sine = axial / A
-    return ZK * np.sqrt(delta) * (1.5 * sine**2 + delta / A * (1.0 - sine**2))
+    square = (axial / A) * (axial / A)
+    return ZK * np.sqrt(delta) * (1.5 * square + delta / A * (1.0 - square))
 
 
 def row_approach(F: ArrayLike, ZK: ArrayLike, A_0: ArrayLike, alpha_0: ArrayLike) -> Any:
@@ -179,12 +181,14 @@ def row_approach(F: ArrayLike, ZK: ArrayLike, A_0: ArrayLike, alpha_0: ArrayLike
     Source: inverse of Neisi 2020, eqs. (3)–(6), for an axial displacement.
     """
     F, ZK, A_0, alpha_0 = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in (F, ZK, A_0, alpha_0)))
-    sine = np.maximum(np.sin(alpha_0), 1e-9)
-    s = np.minimum((F / (ZK * sine**2.5)) ** (2.0 / 3.0), (F / ZK * A_0 * (2.0 * A_0) ** 1.5) ** 0.25)
+    sine = np.maximum(sin_each(alpha_0), 1e-9)
+    steep = cube_root_each(F / (ZK * sine * sine * np.sqrt(sine)))
+    flat = np.sqrt(np.sqrt(F / ZK * A_0 * (2.0 * A_0) * np.sqrt(2.0 * A_0)))
+    s, root = np.minimum(steep * steep, flat), cube_root_each(F)
     for _ in range(_NEWTON_STEPS):
         force = row_axial_force(s, ZK, A_0, alpha_0)
         slope = row_axial_stiffness(s, ZK, A_0, alpha_0)
-        gain = 1.5 * (force - np.cbrt(force) * np.cbrt(F) ** 2)
+        gain = 1.5 * (force - cube_root_each(force) * root * root)
         step = np.divide(gain, slope, out=np.zeros_like(s), where=slope > 0.0)
         s = np.maximum(s - step, 0.0)
         if np.all(np.abs(step) <= 1e-15 * s):
@@ -197,9 +201,9 @@ def preload_of_offset(constants: BearingConstants, axial_offset: float) -> float
 
     Source: Neisi 2020, eqs. (3)–(6), for an axial displacement; the inverse of what the preload sets.
     """
-    distance = math.hypot(constants.radial_offset, axial_offset)
+    distance = math.sqrt(constants.radial_offset * constants.radial_offset + axial_offset * axial_offset)
     approach = max(distance - constants.groove_distance, 0.0)
-    load = constants.ball_stiffness * approach**1.5
+    load = constants.ball_stiffness * approach * math.sqrt(approach)
     return float(len(constants.ball_angles) * load * axial_offset / distance)
 
 
@@ -219,14 +223,14 @@ def bearing_constants(bearing: BallBearingDescription) -> BearingConstants:
         float(bearing.ball_youngs_modulus),
         float(bearing.ball_poisson_ratio),
     )
-    radial = A_0 * math.cos(alpha)
+    radial = A_0 * cos(alpha)
     # The load of a loose bearing meets the balls at the angle of the first touch, in deep grooves at none.
-    touching = alpha if F_V > 0.0 or radial_play == 0.0 else math.acos(min((radial + radial_play) / A_0, 1.0))
+    touching = alpha if F_V > 0.0 or radial_play == 0.0 else acos(min((radial + radial_play) / A_0, 1.0))
     inner = race_contact(D_w, D_pw, f_i, touching, eta, inner=True)
     outer = race_contact(D_w, D_pw, f_o, touching, eta, inner=False)
     K = float(contacts_in_series(inner.stiffness, outer.stiffness))
     s = float(row_approach(F_V, Z * K, A_0, alpha))
-    axial = A_0 * math.sin(touching) + s
+    axial = A_0 * sin(touching) + s
     return BearingConstants(
         groove_distance=A_0,
         contact_angle=alpha,
@@ -243,7 +247,9 @@ def bearing_constants(bearing: BallBearingDescription) -> BearingConstants:
         axial_signs=_AXIAL_SIGNS[bearing.arrangement],
         preload=F_V,
         preload_approach=s,
-        preload_ball_load=F_V * math.hypot(radial, axial) / (Z * axial) if F_V > 0.0 else 0.0,
+        preload_ball_load=F_V * math.sqrt(radial * radial + axial * axial) / (Z * axial)
+        if F_V > 0.0
+        else 0.0,
     )
 
 
@@ -264,7 +270,7 @@ def free_contact_angle(P_d: float, A_0: float) -> float:
     ``α₀ = acos(1 − P_d / (2 A₀))`` from the radial clearance P_d, across the diameter [m], and the distance
     of the groove centres A₀ [m]. Source: Harris, Rolling Bearing Analysis, free contact angle.
     """
-    return math.acos(1.0 - 0.5 * P_d / A_0)
+    return acos(1.0 - 0.5 * P_d / A_0)
 
 
 def axial_rigidity(constants: BearingConstants) -> float:
@@ -294,14 +300,14 @@ def ball_centrifugal_force(bearing: BallBearingDescription, omega_i: ArrayLike) 
     too, and `rotordrop check` compares it with the preload ball load.
     """
     D_w, D_pw = float(bearing.ball_diameter), float(bearing.pitch_diameter)
-    mass = float(bearing.ball_density) * math.pi / 6.0 * D_w**3
-    gamma = D_w * math.cos(float(bearing.contact_angle)) / D_pw
+    mass = float(bearing.ball_density) * math.pi / 6.0 * D_w * D_w * D_w
+    gamma = D_w * cos(float(bearing.contact_angle)) / D_pw
     return 0.5 * mass * D_pw * np.square(0.5 * omega_i * (1.0 - gamma))
 
 
 def _elongation(s: ArrayLike, A: ArrayLike, A_0: ArrayLike, alpha_0: ArrayLike) -> Any:
     """``A − A₀`` [m] without the cancellation of the difference; zero where the balls are loose."""
-    return np.maximum(s * (2.0 * A_0 * np.sin(alpha_0) + s) / (A + A_0), 0.0)
+    return np.maximum(s * (2.0 * A_0 * sin_each(alpha_0) + s) / (A + A_0), 0.0)
 
 
 def _first_row_angles(Z: int, first_ball_angle: float) -> Array:

@@ -20,6 +20,8 @@ from rotordrop.physics.ball_bearing_planar import (
     planar_ball_force,
     planar_ball_gradient,
 )
+from rotordrop.physics.elementary import cos_each, cube_root, magnitude, sin_each
+from rotordrop.physics.linear_algebra import solve
 
 Array = NDArray[np.float64]
 LANES = 8
@@ -64,8 +66,8 @@ def balls_of(constants: BearingConstants, places: int = 0) -> Array:
     angles, counts = _merged_angles(constants)
     balls = np.zeros((3, LANES * max(1, -(-max(len(angles), places) // LANES))))
     balls[COSINE] = 1.0
-    balls[COSINE, : len(angles)] = np.cos(angles)
-    balls[SINE, : len(angles)] = np.sin(angles)
+    balls[COSINE, : len(angles)] = cos_each(angles)
+    balls[SINE, : len(angles)] = sin_each(angles)
     balls[COUNT, : len(angles)] = counts
     return balls
 
@@ -155,7 +157,7 @@ def ball_set_load(entries: Array, balls: Array, dx: float, dy: float) -> tuple[f
         balls[SINE],
         balls[COUNT],
     )
-    return load, entries[STRESS_COEFFICIENT] * np.cbrt(load)
+    return load, entries[STRESS_COEFFICIENT] * cube_root(load)
 
 
 def static_deflection(constants: BearingConstants, load: float) -> tuple[float, float]:
@@ -201,7 +203,8 @@ def _loose_seat(
     constants: BearingConstants, entries: Array, balls: Array, load: float
 ) -> tuple[float, float]:
     """Newton steps on the convex energy of the balls and the load, damped until it falls."""
-    single = (abs(load) / constants.ball_stiffness) ** (2.0 / 3.0)
+    root = cube_root(abs(load) / constants.ball_stiffness)
+    single = root * root
     # Deep enough for the two lowest balls of any bearing (three balls: twice the play) to be loaded at once.
     at = np.array([0.0, -math.copysign(2.0 * constants.radial_play + 4.0 * single, load)])
 
@@ -214,10 +217,10 @@ def _loose_seat(
     for _ in range(200):
         f_x, f_y, k_xx, k_xy, k_yy = ball_set_gradient(entries, balls, at[0], at[1])
         left = np.array([-f_x, -load - f_y])
-        if np.hypot(*left) <= 1e-13 * abs(load):
+        if magnitude(*left) <= 1e-13 * abs(load):
             break
         tangent = np.array([[k_xx, k_xy], [k_xy, k_yy]]) + damping * spring * np.eye(2)
-        trial = at + np.linalg.solve(tangent, left)
+        trial = at + solve(tangent, left)
         if energy_at(trial) <= energy + 1e-13 * abs(load * at[1]):
             at, energy, damping = trial, energy_at(trial), max(0.1 * damping, LEAST_DAMPING)
         else:

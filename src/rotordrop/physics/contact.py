@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.physics._compile import inner_kernel, kernel
+from rotordrop.physics.elementary import power
 
 Array = NDArray[np.float64]
 
@@ -53,7 +54,7 @@ def contact_force(law: Array, delta: float, delta_dot: float) -> tuple[float, fl
     Source: Neisi 2020, eq. (8). Differs from the paper: the printed "and" of the zero branch is read as "or",
     so the force never pulls.
     """
-    elastic: float = law[STIFFNESS] * delta ** law[EXPONENT]
+    elastic: float = law[STIFFNESS] * power(delta, law[EXPONENT])
     return max(0.0, elastic * (1.0 + 1.5 * law[DAMPING] * delta_dot)), elastic
 
 
@@ -63,7 +64,7 @@ def contact_gradient(law: Array, delta: float, delta_dot: float) -> tuple[float,
 
     Source: Neisi 2020, eq. (8), differentiated.
     """
-    elastic = law[STIFFNESS] * delta ** law[EXPONENT]
+    elastic = law[STIFFNESS] * power(delta, law[EXPONENT])
     growth = 1.0 + 1.5 * law[DAMPING] * delta_dot
     if growth <= 0.0:
         return 0.0, 0.0, 0.0
@@ -76,7 +77,8 @@ def contact_energy(law: Array, delta: float) -> float:
 
     Source: integral of the elastic part of Neisi 2020, eq. (8).
     """
-    energy: float = law[STIFFNESS] * delta ** (law[EXPONENT] + 1.0) / (law[EXPONENT] + 1.0)
+    n = law[EXPONENT]
+    energy: float = law[STIFFNESS] * delta * power(delta, n) / (n + 1.0)
     return energy
 
 
@@ -86,8 +88,7 @@ def depth_at(law: Array, load: float) -> float:
 
     Source: inverse of the elastic part of Neisi 2020, eq. (8).
     """
-    depth: float = (load / law[STIFFNESS]) ** (1.0 / law[EXPONENT])
-    return depth
+    return power(load / law[STIFFNESS], 1.0 / law[EXPONENT])
 
 
 @kernel
@@ -97,7 +98,7 @@ def contact_tangent(law: Array, load: float) -> float:
     Source: Neisi 2020, eq. (8), differentiated at the depth of the load.
     """
     n = law[EXPONENT]
-    slope: float = n * law[STIFFNESS] ** (1.0 / n) * load ** (1.0 - 1.0 / n)
+    slope: float = n * power(law[STIFFNESS], 1.0 / n) * power(load, 1.0 - 1.0 / n)
     return slope
 
 
@@ -106,4 +107,4 @@ def stiffness_of_exponent(law: Array, load: float, exponent: float) -> float:
 
     Source: Neisi 2020, eq. (8), both laws through one point.
     """
-    return float(load / depth_at(law, load) ** exponent)
+    return float(load / power(depth_at(law, load), exponent))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from rotordrop.physics._compile import kernel
+from rotordrop.physics.elementary import exp
 
 
 @kernel
@@ -35,7 +36,7 @@ def stribeck_coefficient(v: float, mu_s: float, mu_d: float, v_stribeck: float, 
     """
     speed = abs(v)
     if speed >= v_smooth:
-        mu = mu_d + (mu_s - mu_d) * math.exp(-(speed - v_smooth) / v_stribeck)
+        mu = mu_d + (mu_s - mu_d) * exp(-(speed - v_smooth) / v_stribeck)
     else:
         s = speed / v_smooth
         slope = -(mu_s - mu_d) * v_smooth / v_stribeck
@@ -53,7 +54,7 @@ def stribeck_gradient(
     """
     speed = abs(v)
     if speed >= v_smooth:
-        excess = (mu_s - mu_d) * math.exp(-(speed - v_smooth) / v_stribeck)
+        excess = (mu_s - mu_d) * exp(-(speed - v_smooth) / v_stribeck)
         return math.copysign(mu_d + excess, v), -excess / v_stribeck
     s = speed / v_smooth
     slope = -(mu_s - mu_d) * v_smooth / v_stribeck

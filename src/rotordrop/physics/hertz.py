@@ -12,7 +12,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ellipe, elliprd
+
+from rotordrop.physics.elementary import cos_each, cube_root_each, exp_each, ln_each, power
+from rotordrop.physics.elliptic import carlson_d, complete_second
 
 Array = NDArray[np.float64]
 ArrayLike = float | Array
@@ -63,19 +65,20 @@ class Contact:
 
         Source: Harris, Rolling Bearing Analysis.
         """
-        root = np.cbrt(Q)
+        root = cube_root_each(Q)
         return self.semi_major_coefficient * root, self.semi_minor_coefficient * root
 
-    def approach(self, Q: ArrayLike) -> ArrayLike:
+    def approach(self, Q: ArrayLike) -> Any:
         """Approach of the two bodies [m] under a load [N]. Source: inverse of Neisi 2020, eq. (6)."""
-        return (Q / self.stiffness) ** (2.0 / 3.0)
+        root = cube_root_each(Q / self.stiffness)
+        return root * root
 
-    def maximum_pressure(self, Q: ArrayLike) -> ArrayLike:
+    def maximum_pressure(self, Q: ArrayLike) -> Any:
         """Largest Hertz pressure [Pa], at the centre of the ellipse, under a load [N].
 
         Source: Neisi 2020, eq. (7); a* and b* there are the dimensional semi-axes.
         """
-        return self.stress_coefficient * np.cbrt(Q)
+        return self.stress_coefficient * cube_root_each(Q)
 
 
 def curvature_difference_of_ellipticity(kappa: ArrayLike) -> Any:
@@ -85,7 +88,7 @@ def curvature_difference_of_ellipticity(kappa: ArrayLike) -> Any:
     down to the circle. Source: Harris, Rolling Bearing Analysis, with DLMF 19.25.
     """
     q = 1.0 / np.square(kappa)
-    return q * (elliprd(0.0, 1.0, q) - elliprd(0.0, q, 1.0)) / (3.0 * ellipe(1.0 - q))
+    return q * (carlson_d(1.0, q) - carlson_d(q, 1.0)) / (3.0 * complete_second(q))
 
 
 def ellipticity(F_rho: ArrayLike) -> Any:
@@ -94,17 +97,21 @@ def ellipticity(F_rho: ArrayLike) -> Any:
     Solved by secants in ``ln κ`` against ``atanh F``, nearly a straight line.
     Source: inverse of `curvature_difference_of_ellipticity`.
     """
-    wanted = np.arctanh(np.asarray(F_rho, dtype=float))
+    wanted = _artanh(np.asarray(F_rho, dtype=float))
     x_old, x = np.zeros_like(wanted), wanted / 0.75
     f_old = -wanted
     for _ in range(_SECANT_STEPS):
-        f = np.arctanh(curvature_difference_of_ellipticity(np.exp(x))) - wanted
+        f = _artanh(curvature_difference_of_ellipticity(exp_each(x))) - wanted
         slope = f - f_old
         step = np.divide(f * (x - x_old), slope, out=np.zeros_like(x), where=slope != 0.0)
         x_old, f_old, x = x, f, np.maximum(x - step, 0.0)
         if np.all(np.abs(step) <= 1e-15 * (1.0 + x)):
             break
-    return np.exp(x)[()]
+    return exp_each(x)
+
+
+def _artanh(x: Array) -> Any:
+    return 0.5 * ln_each((1.0 + x) / (1.0 - x))
 
 
 def contact_parameters(F_rho: ArrayLike) -> tuple[Any, Any, Any]:
@@ -114,11 +121,12 @@ def contact_parameters(F_rho: ArrayLike) -> tuple[Any, Any, Any]:
     """
     kappa = ellipticity(F_rho)
     q = 1.0 / np.square(kappa)
-    E = ellipe(1.0 - q)
-    K = E + (1.0 - q) * elliprd(0.0, q, 1.0) / 3.0
-    a_star = np.cbrt(2.0 * kappa**2 * E / math.pi)
-    b_star = np.cbrt(2.0 * E / (math.pi * kappa))
-    delta_star = (2.0 * K / math.pi) * np.cbrt(math.pi / (2.0 * kappa**2 * E))
+    E = complete_second(q)
+    K = E + (1.0 - q) * carlson_d(q, 1.0) / 3.0
+    square = kappa * kappa
+    a_star = cube_root_each(2.0 * square * E / math.pi)
+    b_star = cube_root_each(2.0 * E / (math.pi * kappa))
+    delta_star = (2.0 * K / math.pi) * cube_root_each(math.pi / (2.0 * square * E))
     return a_star, b_star, delta_star
 
 
@@ -127,7 +135,7 @@ def compliance(E_1: float, nu_1: float, E_2: float, nu_2: float) -> float:
 
     Young's moduli [Pa], Poisson ratios [1]. Source: Johnson, Contact Mechanics, ch. 4.
     """
-    return (1.0 - nu_1**2) / E_1 + (1.0 - nu_2**2) / E_2
+    return (1.0 - nu_1 * nu_1) / E_1 + (1.0 - nu_2 * nu_2) / E_2
 
 
 def point_contact(curvature_sum: ArrayLike, curvature_difference: ArrayLike, eta: float) -> Contact:
@@ -136,11 +144,12 @@ def point_contact(curvature_sum: ArrayLike, curvature_difference: ArrayLike, eta
     Source: Harris, Rolling Bearing Analysis, ch. on contact stress; Neisi 2020, eqs. (6) and (7).
     """
     a_star, b_star, delta_star = contact_parameters(curvature_difference)
-    scale = np.cbrt(1.5 * eta / curvature_sum)
+    scale = cube_root_each(1.5 * eta / curvature_sum)
+    approach = 0.5 * delta_star * scale * scale * curvature_sum
     return Contact(
         curvature_sum=curvature_sum,
         curvature_difference=curvature_difference,
-        stiffness=(0.5 * delta_star * scale**2 * curvature_sum) ** -1.5,
+        stiffness=1.0 / (approach * np.sqrt(approach)),
         semi_major_coefficient=a_star * scale,
         semi_minor_coefficient=b_star * scale,
     )
@@ -171,7 +180,7 @@ def race_curvatures(
     -----
     Source: Harris, Rolling Bearing Analysis, eqs. for ball-raceway curvature.
     """
-    gamma = D_w * np.cos(alpha) / D_pw
+    gamma = D_w * cos_each(alpha) / D_pw
     rolling = 2.0 * gamma / (1.0 - gamma) if inner else -2.0 * gamma / (1.0 + gamma)
     total = 4.0 - 1.0 / f + rolling
     return total / D_w, (1.0 / f + rolling) / total
@@ -195,13 +204,15 @@ def circular_contact(R_1: float, R_2: float, eta: float) -> Contact:
     return point_contact(2.0 * (1.0 / R_1 + 1.0 / R_2), 0.0, eta)
 
 
-def contacts_in_series(K_i: ArrayLike, K_o: ArrayLike) -> ArrayLike:
+def contacts_in_series(K_i: ArrayLike, K_o: ArrayLike) -> Any:
     """Stiffness [N/m^1.5] of two Hertz contacts that carry the same load, inner and outer [N/m^1.5].
 
     ``K_tot = (K_i^(−2/3) + K_o^(−2/3))^(−3/2)``.
     Source: Harris, Rolling Bearing Analysis; Neisi 2020, eq. (6).
     """
-    return (K_i ** (-2.0 / 3.0) + K_o ** (-2.0 / 3.0)) ** -1.5
+    inner, outer = 1.0 / cube_root_each(K_i), 1.0 / cube_root_each(K_o)
+    total = inner * inner + outer * outer
+    return 1.0 / (total * np.sqrt(total))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -255,8 +266,8 @@ def line_contact_stiffness(length: float) -> float:
 
     Source: Palmgren, ``δ = 3.84e-5 Q^0.9 / l^0.8`` (mm, N). Differs from the paper: it says "Hertzian model".
     """
-    per_load = 1e-3 * _PALMGREN / (1e3 * length) ** 0.8
-    return float(per_load ** (-10.0 / 9.0))
+    per_load = 1e-3 * _PALMGREN / power(1e3 * length, 0.8)
+    return float(power(per_load, -10.0 / 9.0))
 
 
 def line_contact_approach(Q: float, length: float) -> float:
@@ -264,4 +275,4 @@ def line_contact_approach(Q: float, length: float) -> float:
 
     Source: Palmgren, ``δ = 3.84e-5 Q^0.9 / l^0.8`` (mm, N).
     """
-    return float(1e-3 * _PALMGREN * Q**0.9 / (1e3 * length) ** 0.8)
+    return float(1e-3 * _PALMGREN * power(Q, 0.9) / power(1e3 * length, 0.8))

@@ -4,9 +4,8 @@
 
 from __future__ import annotations
 
-import math
-
 from rotordrop.physics._compile import kernel
+from rotordrop.physics.elementary import exp
 
 
 @kernel
@@ -20,4 +19,4 @@ def remanent_fraction(t: float, delay: float, tau: float) -> float:
     """
     if t < delay or tau <= 0.0:
         return 0.0
-    return math.exp(-(t - delay) / tau)
+    return exp(-(t - delay) / tau)

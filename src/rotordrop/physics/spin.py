@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
-
 from rotordrop.physics._compile import kernel
+from rotordrop.physics.elementary import tanh
 
 
 @kernel
@@ -44,4 +43,4 @@ def race_drag_torque(
     Source: load-proportional bearing friction torque (Harris, Rolling Bearing Analysis), regularised at zero
     spin.
     """
-    return drag_coefficient * F_b * 0.5 * D_pw * math.tanh(omega_i / drag_speed)
+    return drag_coefficient * F_b * 0.5 * D_pw * tanh(omega_i / drag_speed)

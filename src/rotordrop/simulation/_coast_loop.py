@@ -16,6 +16,7 @@ from rotordrop.model import layout as L
 from rotordrop.model.layout import KernelParameters
 from rotordrop.physics._compile import kernel
 from rotordrop.physics.ball_set import ball_set_force, ball_set_load
+from rotordrop.physics.elementary import atan2, power
 from rotordrop.simulation._loop import (
     BETA,
     FINISHED,
@@ -206,7 +207,7 @@ def integrate_window(  # noqa: C901, PLR0915  one compiled loop
         error = scaled_error(step, y, y_new, k, tab.e, scale, tolerance, scratch)
         if not error <= 1.0:
             progress[REJECTED] += 1.0
-            h = 0.1 * step if not math.isfinite(error) else step * max(SHRINK, SAFETY * error**-0.2)
+            h = 0.1 * step if not math.isfinite(error) else step * max(SHRINK, SAFETY * power(error, -0.2))
             if h < 1e-14:
                 outcome = STEP_TOO_SMALL if math.isfinite(error) else NOT_FINITE
                 break
@@ -227,7 +228,9 @@ def integrate_window(  # noqa: C901, PLR0915  one compiled loop
         update_peaks(t_new, y_new, p, running, peaks)
         growth = GROW
         if error > 0.0:
-            growth = min(GROW, max(SHRINK, SAFETY * error ** -(0.2 - 0.75 * BETA) * previous**BETA))
+            growth = min(
+                GROW, max(SHRINK, SAFETY * power(error, -(0.2 - 0.75 * BETA)) * power(previous, BETA))
+            )
         previous = max(error, 1e-4)
         h = min(step * growth, largest_step) if step >= h else h
         t = t_new
@@ -249,7 +252,7 @@ def integrate_window(  # noqa: C901, PLR0915  one compiled loop
 def start_whirl(t: float, x: float, y: float, row: Array) -> None:
     """Begin the first sweep of the azimuth at a displacement (x, y) [m] relative to the race."""
     row[:] = 0.0
-    row[AZIMUTH] = math.atan2(y, x)
+    row[AZIMUTH] = atan2(y, x)
     row[SWEEP_START] = row[AZIMUTH]
     row[SWEEP_END] = row[AZIMUTH]
     row[SWEEP_START_TIME] = t
@@ -266,7 +269,7 @@ def follow_whirl(times: Array, relative: Array, whirl: Array) -> None:
     for b in range(relative.shape[1]):
         row = whirl[b]
         for i in range(times.shape[0]):
-            azimuth = math.atan2(relative[i, b, 1], relative[i, b, 0])
+            azimuth = atan2(relative[i, b, 1], relative[i, b, 0])
             change = azimuth - row[AZIMUTH]
             change -= 2.0 * math.pi * math.floor(change / (2.0 * math.pi) + 0.5)
             row[AZIMUTH] += change

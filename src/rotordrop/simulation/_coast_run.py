@@ -14,6 +14,7 @@ from rotordrop.model.layout import KernelParameters
 from rotordrop.model.parameters import DropModel
 from rotordrop.model.suspension import equivalent_stiffness
 from rotordrop.physics import aerodynamics
+from rotordrop.physics.elementary import atan2, magnitude
 from rotordrop.simulation import _coast_loop as C
 from rotordrop.simulation import _histories as H
 from rotordrop.simulation import _loop
@@ -166,8 +167,7 @@ def relative_displacement(setup: Setup, states: Array) -> Array:
 
 
 def displacement_at(setup: Setup, states: Array, rows: Array) -> Array:
-    layout = setup.model.layout
-    return np.stack([states[:, layout.modal_x] @ rows.T, states[:, layout.modal_y] @ rows.T], axis=-1)
+    return H.node_displacements(np.ascontiguousarray(states), np.ascontiguousarray(rows))
 
 
 def advance(setup: Setup, run: Run) -> tuple[dict[str, Single], Array]:
@@ -304,7 +304,7 @@ def keep_statistics(
     setup: Setup, run: Run, before: tuple[float, float], histories: Array, began: Array
 ) -> None:
     layout, windows = setup.model.layout, run.windows
-    force = np.hypot(histories[..., H.H_BEARING_FORCE_X], histories[..., H.H_BEARING_FORCE_Y])
+    force = magnitude(histories[..., H.H_BEARING_FORCE_X], histories[..., H.H_BEARING_FORCE_Y])
     depth = histories[..., H.H_DELTA]
     values = np.stack([depth, force, histories[..., H.H_STRESS]], axis=-1)
     balance = stored_energy_of(setup, run.state) + run.state[layout.dissipated] - run.state[layout.work_in]
@@ -328,7 +328,7 @@ def samples_of(setup: Setup, states: Array, histories: Array) -> dict[str, NDArr
         "sensor_displacement": displacement_at(setup, states, setup.sensor_rows),
         "indentation": histories[..., H.H_DELTA],
         "contact_force": histories[..., H.H_CONTACT_FORCE],
-        "bearing_force": np.hypot(histories[..., H.H_BEARING_FORCE_X], histories[..., H.H_BEARING_FORCE_Y]),
+        "bearing_force": magnitude(histories[..., H.H_BEARING_FORCE_X], histories[..., H.H_BEARING_FORCE_Y]),
         "max_stress": histories[..., H.H_STRESS],
         "race_speed": states[:, layout.race_spin],
     }
@@ -403,7 +403,7 @@ def _difference(setup: Setup, states: Array, histories: Array, reference: Array)
 
 def _carry_contacts(run: Run, histories: Array, begun: float, step: float, log: Array) -> None:
     """Bring the open contacts and the peaks up to the end of a settled stretch."""
-    force = np.hypot(histories[..., H.H_BEARING_FORCE_X], histories[..., H.H_BEARING_FORCE_Y])
+    force = magnitude(histories[..., H.H_BEARING_FORCE_X], histories[..., H.H_BEARING_FORCE_Y])
     values = (histories[..., H.H_DELTA], force, histories[..., H.H_STRESS])
     for b in range(len(run.running)):
         row = log[int(run.running[b, _loop.RUN_IN_CONTACT]) - 1]
@@ -414,9 +414,7 @@ def _carry_contacts(run: Run, histories: Array, begun: float, step: float, log: 
         if normal[best] > row[_loop.LOG_PEAK_FORCE]:
             row[_loop.LOG_PEAK_FORCE] = normal[best]
             row[_loop.LOG_PEAK_TIME] = begun + (best + 1) * step
-            row[_loop.LOG_AZIMUTH] = math.atan2(
-                histories[best, b, H.H_NORMAL_Y], histories[best, b, H.H_NORMAL_X]
-            )
+            row[_loop.LOG_AZIMUTH] = atan2(histories[best, b, H.H_NORMAL_Y], histories[best, b, H.H_NORMAL_X])
         run.running[b, _loop.RUN_FORCE] = normal[-1]
         run.running[b, _loop.RUN_POWER] = power[-1]
         run.running[b, _loop.RUN_DELTA] = histories[-1, b, H.H_DELTA]

@@ -13,7 +13,7 @@ from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
 from rotordrop.physics.ball_set import ball_set_energy, ball_set_force, ball_set_load
 from rotordrop.physics.contact import contact_energy
 from rotordrop.simulation._loop import contact_at
-from rotordrop.simulation._rhs import modal_parts, race_deflection, relative_motion
+from rotordrop.simulation._rhs import modal_parts, project, race_deflection, relative_motion
 
 Array = NDArray[np.float64]
 
@@ -52,6 +52,18 @@ def bearing_histories(states: Array, p: KernelParameters, out: Array) -> None:
     for i in range(states.shape[0]):
         for b in range(p.bearing.shape[0]):
             fill_history(b, states[i], p, work, out[i, b])
+
+
+@kernel
+def node_displacements(states: Array, shapes: Array) -> Array:
+    """Displacement of nodes [m], shape (T, P, 2), from states (T, n) and their rows of mode shapes (P, m)."""
+    m = shapes.shape[1]
+    out = np.empty((states.shape[0], shapes.shape[0], 2))
+    for i in range(states.shape[0]):
+        for k in range(shapes.shape[0]):
+            out[i, k, 0] = project(shapes[k], states[i, :m])
+            out[i, k, 1] = project(shapes[k], states[i, m : 2 * m])
+    return out
 
 
 @lean_kernel

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from rotordrop.model import layout as L
 from rotordrop.model.layout import KernelParameters
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
+from rotordrop.physics.elementary import atan2, exp, ln, power
 from rotordrop.simulation._rhs import contact_state, drop_derivative, relative_motion
 from rotordrop.simulation._tableau import Tableau
 
@@ -44,7 +45,7 @@ SHRINK = 0.2
 GROW = 5.0
 BETA = 0.04
 ALPHA = 0.2 - 0.75 * BETA
-LOG_SMALLEST_ERROR = math.log(1e-4)
+LOG_SMALLEST_ERROR = -9.210340371976182  # ln 1e-4, written out: a library may round it otherwise
 
 
 @inner_kernel
@@ -160,7 +161,7 @@ def note_peak(time: float, force: float, nx: float, ny: float, entry: Array) -> 
     if force > entry[LOG_PEAK_FORCE]:
         entry[LOG_PEAK_FORCE] = force
         entry[LOG_PEAK_TIME] = time
-        entry[LOG_AZIMUTH] = math.atan2(ny, nx)
+        entry[LOG_AZIMUTH] = atan2(ny, nx)
 
 
 @lean_kernel
@@ -239,7 +240,7 @@ def start_running(y: Array, t: float, p: KernelParameters, running: Array, log: 
                 log[n_log, LOG_END] = np.nan
                 log[n_log, LOG_PEAK_FORCE] = now[1]
                 log[n_log, LOG_PEAK_TIME] = t
-                log[n_log, LOG_AZIMUTH] = math.atan2(now[4], now[3])
+                log[n_log, LOG_AZIMUTH] = atan2(now[4], now[3])
             n_log += 1
             running[b, RUN_IN_CONTACT] = n_log
     return n_log
@@ -313,7 +314,7 @@ def integrate_drop(  # noqa: C901, PLR0915  one compiled loop
             if not math.isfinite(error):
                 h = 0.1 * step
             else:
-                h = step * max(SHRINK, SAFETY * error**-0.2)
+                h = step * max(SHRINK, SAFETY * power(error, -0.2))
             if h < 1e-14:
                 outcome = STEP_TOO_SMALL if math.isfinite(error) else NOT_FINITE
                 break
@@ -329,8 +330,8 @@ def integrate_drop(  # noqa: C901, PLR0915  one compiled loop
         growth = GROW
         log_error = LOG_SMALLEST_ERROR
         if error > 0.0:
-            log_error = math.log(error)
-            growth = min(GROW, max(SHRINK, SAFETY * math.exp(BETA * log_previous - ALPHA * log_error)))
+            log_error = ln(error)
+            growth = min(GROW, max(SHRINK, SAFETY * exp(BETA * log_previous - ALPHA * log_error)))
         log_previous = max(log_error, LOG_SMALLEST_ERROR)
         h = min(step * growth, largest_step) if step >= h else h
         t = t_new

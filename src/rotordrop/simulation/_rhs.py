@@ -18,6 +18,7 @@ from rotordrop.physics._compile import inner_kernel, lean_kernel
 from rotordrop.physics.aerodynamics import exponential_deceleration, speed_dependent_deceleration
 from rotordrop.physics.ball_set import ball_set_force
 from rotordrop.physics.contact import contact_force
+from rotordrop.physics.elementary import sine_cosine
 from rotordrop.physics.friction import stribeck_coefficient
 from rotordrop.physics.remanence import remanent_fraction
 from rotordrop.physics.spin import race_drag_torque, surface_speed
@@ -131,8 +132,7 @@ def add_rotor_accelerations(
 
     Returns the power dissipated by modal damping and the power put in by unbalance and spin-up [W].
     """
-    c = math.cos(y[p.rotor_at[L.ROTOR_ANGLE]])
-    s = math.sin(y[p.rotor_at[L.ROTOR_ANGLE]])
+    s, c = sine_cosine(y[p.rotor_at[L.ROTOR_ANGLE]])
     w2 = omega * omega
     along = w2 * c + omega_dot * s
     across = w2 * s - omega_dot * c

@@ -16,6 +16,7 @@ from rotordrop.model.layout import KernelParameters
 from rotordrop.physics import aerodynamics, contact
 from rotordrop.physics._compile import kernel
 from rotordrop.physics.ball_set import ball_set_gradient
+from rotordrop.physics.elementary import sine_cosine, tanh
 from rotordrop.physics.friction import stribeck_gradient
 from rotordrop.physics.spin import surface_speed
 from rotordrop.simulation._rhs import aerodynamic_deceleration, race_deflection, relative_motion
@@ -86,8 +87,7 @@ def _rotor_jacobian(y: Array, p: KernelParameters, J: Array) -> None:
     x, z, n_q = p.rotor_at[L.MODES_X], p.rotor_at[L.MODES_Y], p.rotor_at[L.N_COORDINATES]
     i_w, i_a = p.rotor_at[L.ROTOR_SPEED], p.rotor_at[L.ROTOR_ANGLE]
     omega = y[i_w]
-    c = math.cos(y[i_a])
-    s = math.sin(y[i_a])
+    s, c = sine_cosine(y[i_a])
     w2 = omega * omega
     for k in range(m):
         rx = n_q + x + k
@@ -192,7 +192,7 @@ def _bearing_jacobian(b: int, y: Array, p: KernelParameters, J: Array, g: Array)
         J[hold, h + i] -= row[L.SUPPORT_STIFFNESS_X + i] / m_h
     F = math.sqrt(F_x * F_x + F_y * F_y)
     half = 0.5 * row[L.DRAG_COEFFICIENT] * row[L.PITCH_DIAMETER] / row[L.RACE_INERTIA]
-    level = math.tanh(y[spin] / row[L.DRAG_SPEED])
+    level = tanh(y[spin] / row[L.DRAG_SPEED])
     J[spin, spin] -= half * F * (1.0 - level * level) / row[L.DRAG_SPEED]
     if F > 0.0:
         by_x = half * level * (F_x * k_xx + F_y * k_xy) / F

@@ -13,6 +13,7 @@ from rotordrop.model.layout import KernelParameters
 from rotordrop.model.parameters import DropModel, build_drop_model
 from rotordrop.model.reduction import Reduction
 from rotordrop.model.rotor_on_race import rotor_on_race
+from rotordrop.physics.elementary import magnitude
 from rotordrop.simulation import _histories as H
 from rotordrop.simulation import _loop
 from rotordrop.simulation._tableau import Tableau, dp5, tsit5
@@ -119,8 +120,7 @@ def _result(
     times, states = times[:reached], states[:reached]
     histories = np.empty((reached, n_b, H.N_HISTORIES))
     H.bearing_histories(states, parameters, histories)
-    shape = parameters.bearing_shape.T
-    displacement = np.stack([states[:, layout.modal_x] @ shape, states[:, layout.modal_y] @ shape], axis=-1)
+    displacement = H.node_displacements(states, parameters.bearing_shape)
     force = histories[..., H.H_BEARING_FORCE_X : H.H_BEARING_FORCE_Y + 1]
     return DropResult(
         time=times,
@@ -197,7 +197,7 @@ def _energy_certificate(
     return Certificate(
         energy_residual=float(np.max(np.abs(balance - balance[0]))),
         energy_scale=float(np.max(np.abs(stored - stored[0]))),
-        peak_force=peaks_of(times, np.hypot(force[..., 0], force[..., 1])),
+        peak_force=peaks_of(times, magnitude(force[..., 0], force[..., 1])),
     )
 
 

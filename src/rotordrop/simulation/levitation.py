@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +10,8 @@ from rotordrop.model import layout as L
 from rotordrop.model.layout import KernelParameters
 from rotordrop.model.parameters import DropModel
 from rotordrop.physics import aerodynamics
+from rotordrop.physics.elementary import sine_cosine
+from rotordrop.physics.linear_algebra import least_squares, product, solve
 from rotordrop.simulation.case import CentredStart, DropCase, LevitatedStart, PlacedStart, StateStart
 
 Array = NDArray[np.float64]
@@ -67,12 +67,12 @@ def rigid_amplitudes(model: DropModel, positions: Array, values: Array) -> Array
     [m].
     """
     line = np.column_stack([np.ones_like(positions), positions])
-    coefficients, *_ = np.linalg.lstsq(line, values, rcond=None)
+    coefficients = least_squares(line, values)
     z = np.asarray(model.fe.node_positions)
     shape = np.zeros((2 * len(z), 2))
     shape[0::2] = coefficients[0] + np.outer(z, coefficients[1])
     shape[1::2] = coefficients[1]
-    return np.asarray(model.basis.shapes.T @ (model.fe.mass @ shape))
+    return product(model.basis.shapes.T, product(model.fe.mass, shape))
 
 
 def _placed(model: DropModel, start: PlacedStart, state: Array) -> Array:
@@ -105,13 +105,15 @@ def levitated_orbit(
     """
     p = model.parameters
     m = p.eigenvalue.shape[0]
-    force = speed**2 * (p.unbalance_cos + 1j * p.unbalance_sin)
-    damping = np.diag(p.damping).astype(np.complex128)
-    dynamic = np.diag(p.eigenvalue) - speed**2 * np.eye(m) + 1j * speed * damping + speed**2 * p.polar
+    square = speed * speed
+    force = square * np.column_stack([p.unbalance_cos, p.unbalance_sin])
+    dynamic = np.diag(p.eigenvalue) - square * np.eye(m) + square * p.polar
+    damping = speed * np.diag(p.damping)
     if orbit is None:
-        stiffness = np.einsum("a,ak,aj->kj", p.magnet[:, L.AMB_STIFFNESS], p.magnet_shape, p.magnet_shape)
-        damper = np.einsum("a,ak,aj->kj", p.magnet[:, L.AMB_DAMPING], p.magnet_shape, p.magnet_shape)
-        forward = np.linalg.solve(dynamic + stiffness + 1j * speed * damper, force)
+        rows = p.magnet_shape.T
+        dynamic += product(rows * p.magnet[:, L.AMB_STIFFNESS], p.magnet_shape)
+        damping += speed * product(rows * p.magnet[:, L.AMB_DAMPING], p.magnet_shape)
+        forward = _complex_solution(dynamic, damping, force)
     else:
         n_a = p.magnet_shape.shape[0]
         if np.shape(orbit) != (n_a,):
@@ -119,9 +121,27 @@ def levitated_orbit(
                 f"the orbit has shape {np.shape(orbit)}; expected ({n_a},): "
                 "one complex amplitude for each AMB."
             )
+        given = np.asarray(orbit, dtype=np.complex128)
         held = np.block([[dynamic, -p.magnet_shape.T], [p.magnet_shape, np.zeros((n_a, n_a))]])
-        forward = np.linalg.solve(held, np.concatenate([force, np.asarray(orbit)]))[:m]
-    return np.column_stack([forward, -1j * forward])
+        turning = np.zeros_like(held)
+        turning[:m, :m] = damping
+        right = np.vstack([force, np.column_stack([given.real, given.imag])])
+        forward = _complex_solution(held, turning, right)[:m]
+    whole = np.empty((m, 2), dtype=np.complex128)
+    whole.real, whole.imag = (
+        np.column_stack([forward[:, 0], forward[:, 1]]),
+        np.column_stack([forward[:, 1], -forward[:, 0]]),
+    )
+    return whole
+
+
+def _complex_solution(real: Array, imaginary: Array, right: Array) -> Array:
+    """Real and imaginary part (n, 2) of the solution of a complex system, given by its parts.
+
+    In real numbers, because a product of complex ones is rounded otherwise where the processor fuses it.
+    """
+    system = np.block([[real, -imaginary], [imaginary, real]])
+    return solve(system, np.concatenate([right[:, 0], right[:, 1]])).reshape(2, -1).T
 
 
 def levitated_static(model: DropModel, offset: Array | None) -> tuple[Array, Array]:
@@ -135,7 +155,9 @@ def levitated_static(model: DropModel, offset: Array | None) -> tuple[Array, Arr
     load = np.column_stack([np.zeros(m), p.gravity])
     border = p.magnet_shape.T
     matrix = np.block([[np.diag(p.eigenvalue), -border], [p.magnet_shape, np.zeros((n_a, n_a))]])
-    solution = np.linalg.lstsq(matrix, np.vstack([load, target]), rcond=None)[0]
+    # rows of stiff modes are divided by their stiffness: its range would pass for a loss of rank
+    size = np.concatenate([np.maximum(p.eigenvalue, 1.0), np.ones(n_a)])[:, None]
+    solution = least_squares(matrix / size, np.vstack([load, target]) / size)
     return solution[:m], solution[m:]
 
 
@@ -153,9 +175,9 @@ def _levitated(
     orbit = np.zeros(static.shape, dtype=np.complex128)
     if speed != 0.0:
         orbit = levitated_orbit(model, speed, start.orbit)
-    turn = complex(math.cos(start.rotor_angle), math.sin(start.rotor_angle))
-    position = static + (orbit * turn).real
-    velocity = (1j * speed * orbit * turn).real
+    sine, cosine = sine_cosine(start.rotor_angle)
+    position = static + (orbit.real * cosine - orbit.imag * sine)
+    velocity = -speed * (orbit.real * sine + orbit.imag * cosine)
     layout = model.layout
     state[layout.modal_x], state[layout.modal_y] = position[:, 0], position[:, 1]
     state[layout.velocity_of(layout.modal_x)] = velocity[:, 0]

@@ -134,7 +134,8 @@ class DropResult:
     @property
     def bearing_force_magnitude(self) -> Array:
         """Magnitude of the elastic ball force on the race [N], shape (T, B)."""
-        return np.asarray(np.hypot(self.bearing_force[..., 0], self.bearing_force[..., 1]))
+        x, y = self.bearing_force[..., 0], self.bearing_force[..., 1]
+        return np.asarray(np.sqrt(x * x + y * y))
 
     def peak_force(self, bearing: int) -> tuple[float, float]:
         """Peak ball force on a race [N] and its time [s]."""
@@ -142,9 +143,10 @@ class DropResult:
 
     def at_nodes(self, nodes: list[int] | tuple[int, ...]) -> Array:
         """Rotor displacement [m] at any nodes (numbered from 1), shape (T, len(nodes), 2)."""
+        from rotordrop.simulation._histories import node_displacements
+
         rows = self.shapes[2 * (np.asarray(nodes) - 1)]
-        m = self.shapes.shape[1]
-        return np.stack([self.state[:, :m] @ rows.T, self.state[:, m : 2 * m] @ rows.T], axis=-1)
+        return node_displacements(self.state, np.ascontiguousarray(rows))
 
     def to_xarray(self) -> xarray.Dataset:
         """The histories as a labelled data set (needs the extra ``rotordrop[xarray]``)."""

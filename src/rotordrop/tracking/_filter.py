@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rotordrop.model import layout as L
 from rotordrop.model.layout import KernelParameters
 from rotordrop.physics._compile import kernel
+from rotordrop.physics.elementary import sine_cosine
 from rotordrop.tracking._propagation import (
     FilterSettings,
     ParameterTargets,
@@ -79,8 +80,7 @@ def measurement_row(
     """
     row[:] = 0.0
     k = first + c
-    cosine = math.cos(angle)
-    sine = math.sin(angle)
+    sine, cosine = sine_cosine(angle)
     seen = 0.0
     for j in range(sensor_row.shape[0]):
         seen += sensor_row[j] * at[j]
@@ -106,7 +106,7 @@ def soften_friction(P: Array, least: Array, p: KernelParameters) -> None:
     for b in range(least.shape[0]):
         spin = p.bearing_at[b, L.RACE_SPIN]
         spread = SIGN_WIDTH * p.bearing[b, L.BORE_RADIUS] * math.sqrt(max(P[spin, spin], 0.0))
-        p.bearing[b, L.SMOOTHING_SPEED] = math.hypot(least[b], spread)
+        p.bearing[b, L.SMOOTHING_SPEED] = math.sqrt(least[b] * least[b] + spread * spread)
 
 
 @kernel

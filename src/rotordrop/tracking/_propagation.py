@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +11,7 @@ from rotordrop.model import layout as L
 from rotordrop.model.layout import KernelParameters
 from rotordrop.physics._compile import kernel
 from rotordrop.physics.aerodynamics import PRESCRIBED_SPEED
+from rotordrop.physics.elementary import exp, power
 from rotordrop.simulation._loop import contact_at
 from rotordrop.simulation._rhs import drop_derivative
 from rotordrop.simulation._sensitivity import drop_jacobian_parts
@@ -86,14 +86,14 @@ def update_powers(k: int, value: float, targets: ParameterTargets, powers: Array
     """Factors on entries that follow parameter ``k`` as a power of a typical depth, one for each target."""
     for i in range(targets.target.shape[0]):
         if targets.target[i, 0] == k and targets.target[i, 1] == AT_TYPICAL_DEPTH:
-            powers[i] = targets.factor[i] ** (math.exp(targets.mean[k]) - value)
+            powers[i] = power(targets.factor[i], exp(targets.mean[k]) - value)
 
 
 @kernel
 def bounded_value(k: int, theta: float, targets: ParameterTargets, step: float) -> float:
     """Parameter ``k`` as the model takes it: within its bounds, then a step on, and no longer a logarithm."""
     within = min(max(theta, targets.lower[k]), targets.upper[k]) + step
-    return math.exp(within) if targets.logarithmic[k] != 0 else within
+    return exp(within) if targets.logarithmic[k] != 0 else within
 
 
 @kernel

@@ -38,7 +38,7 @@ def bearing_values(
     _load, stress = ball_set_load(entries, balls, dx, dy)
     out[FORCE_X] = -F_x
     out[FORCE_Y] = -F_y
-    out[FORCE] = np.hypot(F_x, F_y)
+    out[FORCE] = np.sqrt(F_x * F_x + F_y * F_y)
     out[STRESS] = stress
 
 
