@@ -58,6 +58,7 @@ _ORDER = (
     "log",
     "synthesize",
     "score",
+    "fingerprint",
 )
 
 # Typer carries its own copy of click in new versions and uses the installed one in old versions.

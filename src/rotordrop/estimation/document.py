@@ -15,6 +15,7 @@ from rotordrop.estimation.tracked import Impact, TrackedDrop
 from rotordrop.machine import Machine
 from rotordrop.physics.ball_bearing import bearing_constants
 from rotordrop.severity.statistics import stress_statistics
+from rotordrop.simulation.fingerprint import fingerprint
 
 Array = NDArray[np.float64]
 FORMAT = "rotordrop estimate 1"
@@ -55,6 +56,7 @@ def heading(drop: TrackedDrop, machine: Machine) -> dict[str, Any]:
     return {
         "format": FORMAT,
         "rotordrop_version": __version__,
+        "fingerprint": fingerprint(),
         "machine": machine.name,
         "record": record.name if record.path is None else record.path.name,
         "record_sha256": record.sha256,
@@ -102,6 +104,7 @@ def combined(documents: Mapping[str, dict[str, Any]], machine: Machine) -> dict[
     return {
         "format": FORMAT,
         "rotordrop_version": __version__,
+        "fingerprint": fingerprint(),
         "machine": machine.name,
         "drops": dict(documents),
     }

@@ -13,6 +13,7 @@ from rotordrop.estimation.document import FORMAT, nested, statistics_entry
 from rotordrop.estimation.replay_values import LOADS
 from rotordrop.estimation.uncertainty import FEWEST_DRAWS
 from rotordrop.physics.ball_bearing import bearing_constants
+from rotordrop.simulation.fingerprint import fingerprint
 
 if TYPE_CHECKING:
     from rotordrop.estimation.replayed import ReplayDrop
@@ -24,6 +25,7 @@ def replay_document(drop: ReplayDrop) -> dict[str, Any]:
     return {
         "format": FORMAT,
         "rotordrop_version": __version__,
+        "fingerprint": fingerprint(),
         "machine": drop.machine.name,
         "record": record.name if record.path is None else record.path.name,
         "record_sha256": record.sha256,

@@ -61,6 +61,10 @@ _DROP: dict[str, Any] = {
     "type": "object",
     "properties": {
         "drop_instant_s": {**_NUMBER, "description": "Power-off in record time."},
+        "fingerprint": {
+            "type": "string",
+            "description": "Hash of a probe drop: whether two computers compute the same bits.",
+        },
         "speed_Hz": {**_NUMBER, "description": "Rotor speed at power-off."},
         "method": {"enum": ["tracked", "replay"]},
         "warnings": {"type": "array", "items": {"type": "string"}},
@@ -82,6 +86,7 @@ def estimate_schema() -> dict[str, Any]:
                 "type": "object",
                 "properties": {
                     "machine": {"type": "string"},
+                    "fingerprint": {"type": "string"},
                     "drops": {"type": "object", "additionalProperties": {"$ref": "#/$defs/drop"}},
                 },
                 "required": ["machine", "drops"],

@@ -105,7 +105,7 @@ _LEADING = np.int64(-0x8000000)
 
 @inner_kernel
 def two_sum(a: float, b: float) -> tuple[float, float]:
-    """Sum and its rounding error, exactly. Source: Knuth, The Art of Computer Programming 2, 4.2.2."""
+    """Sum and its rounding error [any unit], exactly. Source: Knuth, Seminumerical Algorithms, 4.2.2."""
     total = a + b
     part = total - a
     return total, (a - (total - part)) + (b - part)
@@ -113,7 +113,10 @@ def two_sum(a: float, b: float) -> tuple[float, float]:
 
 @inner_kernel
 def two_product(a: float, b: float) -> tuple[float, float]:
-    """Product and its rounding error, exactly, below 1e299. Source: Dekker, Numer. Math. 18 (1971) 224."""
+    """Product below 1e299 and its rounding error [any unit], exactly.
+
+    Source: Dekker, Numer. Math. 18 (1971) 224.
+    """
     product = a * b
     t = 134217729.0 * a
     a_high = t - (t - a)
@@ -232,7 +235,7 @@ def ln(x: float) -> float:
 
 @lean_kernel
 def power(x: float, n: float) -> float:
-    """x^n [1] of a number that is not negative; x √x for n = 3/2, and exact where n is 1 or 2.
+    """Power x^n [1] of a number that is not negative; x √x for n = 3/2, and exact where n is 1 or 2.
 
     The logarithm keeps 2^-58 of itself, so one unit in the last place holds for |n| ≤ 16.
     Source: ``exp(n log x)`` in double-double arithmetic.

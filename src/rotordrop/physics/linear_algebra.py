@@ -23,7 +23,7 @@ _EPSILON = 2.220446049250313e-16
 
 
 def product(a: Array, b: Array) -> Array:
-    """Matrix product of two matrices, or of a matrix and a vector, summed in the order of the inner index.
+    """Matrix product [any unit], also with vectors, summed in the order of the inner index.
 
     Source: definition.
     """
@@ -35,7 +35,7 @@ def product(a: Array, b: Array) -> Array:
 
 
 def solve(a: Array, b: Array) -> Array:
-    """Solution of ``a x = b`` for a square matrix (n, n) and right sides (n,) or (n, k).
+    """Solution of ``a x = b`` for a square matrix (n, n) and right sides (n,) or (n, k) [any unit].
 
     Source: Gaussian elimination with row exchanges; Golub and Van Loan, Matrix Computations, section 3.4.
 
@@ -53,7 +53,7 @@ def solve(a: Array, b: Array) -> Array:
 
 
 def least_squares(a: Array, b: Array) -> Array:
-    """The shortest x (n, k) among those that come nearest to ``a x = b``, for a matrix (m, n) of any rank.
+    """The shortest x (n, k) [any unit] of those nearest to ``a x = b``, for a matrix (m, n) of any rank.
 
     Source: complete orthogonal decomposition; Golub and Van Loan, section 5.5.
     """
@@ -65,7 +65,7 @@ def least_squares(a: Array, b: Array) -> Array:
 
 
 def orthonormal(columns: Array, dependent: float = 1e-12) -> Array:
-    """Orthonormal columns (n, r) that span the same space, in the given order.
+    """Orthonormal columns (n, r) that span the same space, in the given order [1].
 
     A column of which less than the share ``dependent`` is left by those before it is dropped.
     Source: Gram and Schmidt, twice; Golub and Van Loan, section 5.2.
@@ -75,7 +75,7 @@ def orthonormal(columns: Array, dependent: float = 1e-12) -> Array:
 
 
 def symmetric_eigen(a: Array) -> tuple[Array, Array]:
-    """Eigenvalues (n,), lowest first, and eigenvectors (n, n) in columns of a symmetric matrix.
+    """Eigenvalues (n,), lowest first, and eigenvectors (n, n) in columns of a symmetric matrix [its unit, 1].
 
     Source: Householder's reduction to three diagonals and implicit QL; Bowdler, Martin, Reinsch and
     Wilkinson, Numer. Math. 11 (1968) 293.
@@ -86,7 +86,7 @@ def symmetric_eigen(a: Array) -> tuple[Array, Array]:
 
 
 def generalised_eigen(a: Array, b: Array) -> tuple[Array, Array]:
-    """Eigenvalues and eigenvectors X of ``a x = λ b x``, b positive definite, with ``Xᵀ b X = 1``.
+    """Eigenvalues and eigenvectors X of ``a x = λ b x``, b positive definite, ``Xᵀ b X = 1`` [any unit].
 
     Source: reduction by Cholesky's factor; Golub and Van Loan, section 8.7.
 

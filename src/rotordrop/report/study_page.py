@@ -14,6 +14,7 @@ from rotordrop.machine.parameter_paths import kind_of_path
 from rotordrop.report.content import Cell, Figure, ReportContent, Section, Statement, Table
 from rotordrop.report.quantity import display_unit
 from rotordrop.report.style import SERIES, axis_title, fit_legend, panels, plain
+from rotordrop.simulation.fingerprint import fingerprint
 from rotordrop.study.plan import CASE_KINDS
 from rotordrop.study.quantities import Quantity
 from rotordrop.study.summary import Known, StudyResults
@@ -185,6 +186,7 @@ def study_numbers(results: StudyResults, by: Sequence[str] = ()) -> dict[str, An
         "machine": study.machine.name,
         "digest": study.digest,
         "rotordrop": __version__,
+        "fingerprint": fingerprint(),
         "drops": len(results),
         "failed": dict(results.failed),
         "quantiles": {

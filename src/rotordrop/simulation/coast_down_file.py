@@ -14,6 +14,7 @@ from rotordrop.atomic_file import new_hdf5
 from rotordrop.errors import SimulationError
 from rotordrop.simulation.checkpoint import part_path
 from rotordrop.simulation.coast_down_result import CoastDownResult, WindowStatistics
+from rotordrop.simulation.fingerprint import fingerprint
 
 Array = NDArray[np.float64]
 
@@ -75,6 +76,7 @@ def write_coast_down(result: CoastDownResult, frame: Frame, folder: Path, parts:
     """Join the parts of a run to one file with its statistics; the file appears complete or not at all."""
     with new_hdf5(output) as file:
         file.attrs["format"] = FORMAT
+        file.attrs["fingerprint"] = fingerprint()
         _write_head(file, result, frame)
         _join(file, [part_path(folder, number) for number in range(parts)])
         count = file["speed"].shape[0]

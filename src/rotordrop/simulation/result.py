@@ -193,7 +193,10 @@ def _scale(file: Any, name: str, values: Any) -> None:
 def _write(result: DropResult, file: Any) -> None:
     import h5py
 
+    from rotordrop.simulation.fingerprint import fingerprint
+
     file.attrs["format"] = _FORMAT
+    file.attrs["fingerprint"] = fingerprint()
     file.attrs["Conventions"] = "CF-1.8"
     for name in _TEXTS + _NUMBERS:
         value = getattr(result, name)
