@@ -324,7 +324,9 @@ def sine_cosine(x: float) -> tuple[float, float]:
     r = exact - rest
     low = (exact - r) - rest
     # two parts of pi/2 do while the count leaves the first product exact and little cancels
-    if abs(r) < 1e-3 or abs(count) > 1e6:
+    if not (abs(r) >= 1e-3 and abs(count) <= 1e6):
+        if not abs(x) < math.inf:
+            return math.nan, math.nan
         r, low = _reduced_angle(x, count)
     z = r * r
     z2 = z * z
