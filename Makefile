@@ -9,7 +9,7 @@ OUTPUT := output/demo
 MACHINE := src/rotordrop/machine/examples/lp400.toml
 RECORDS := src/rotordrop/examples/lp400
 
-.PHONY: help demo test lint docs bench lock clean
+.PHONY: help demo test arithmetic lint docs bench lock clean
 .DEFAULT_GOAL := help
 
 help: ## list the commands
@@ -23,6 +23,14 @@ demo: $(READY) ## estimate force and stress from a bundled (simulated) recording
 
 test: $(READY) ## run the tests
 	@$(BIN)/python -m pytest
+
+NUMERIC := tests/unit/physics tests/unit/model tests/unit/simulation tests/validation
+FITTED := tests/unit/identification tests/unit/tracking
+
+arithmetic: $(READY) ## run the numeric tests with the arithmetic of other processors
+	@OPENBLAS_CORETYPE=Prescott $(BIN)/python -m pytest -q -m "not slow" $(NUMERIC) $(FITTED)
+	@OPENBLAS_CORETYPE=Haswell $(BIN)/python -m pytest -q -m "not slow" $(FITTED)
+	@GLIBC_TUNABLES=glibc.cpu.hwcaps=-FMA,-AVX2 $(BIN)/python -m pytest -q -m "not slow" $(NUMERIC) $(FITTED)
 
 lint: $(READY) ## check style, types and layers
 	@$(BIN)/ruff check .

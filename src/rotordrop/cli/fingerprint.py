@@ -1,15 +1,18 @@
-"""Print a hash of a short drop: equal on two computers where every drop has the same bits on both.
+"""Print a hash that tells whether drops have the same bits.
 
-Result files carry the same hash; compare them before comparing two results point by point.
+It is that of a short probe drop, equal on two computers where every drop has the same bits on both. Result
+files carry it; compare it before comparing two results point by point.
 """
 
 from __future__ import annotations
 
-import typer
+from rotordrop.cli._options import JsonOption
+from rotordrop.cli._output import deliver
 
 
-def fingerprint() -> None:
-    """Print the hash of a short probe drop, which tells whether two computers compute the same bits."""
+def fingerprint(json_file: JsonOption = None) -> None:
+    """Print a hash that tells whether drops have the same bits on two computers."""
     from rotordrop.simulation.fingerprint import fingerprint as of_this_computer
 
-    typer.echo(of_this_computer())
+    found = of_this_computer()
+    deliver({"fingerprint": found}, json_file, lambda out: out.print(found, no_wrap=True, crop=True))
