@@ -190,7 +190,7 @@ class FallFit:
         current = self.prior_mean.copy()
         count = self.readings.deviation.size
         for _ in range(ITERATIONS):
-            residual, jacobian = self._linearised(current)
+            residual, jacobian = self.linearised(current)
             scale = 1.0 / np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
             step = np.linalg.lstsq(jacobian * scale, residual, rcond=None)[0] * scale
             step[self.unknowns.decay] = np.clip(step[self.unknowns.decay], -0.3, 0.3)
@@ -199,14 +199,14 @@ class FallFit:
             sigma = 1.0 / np.maximum(np.diag(self.prior_root), 1e-300)
             if float(np.max(np.abs(step) / sigma)) < 1e-6:
                 break
-        residual, jacobian = self._linearised(current)
+        residual, jacobian = self.linearised(current)
         scale = 1.0 / np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
         scaled = jacobian * scale
         covariance = np.linalg.inv(scaled.T @ scaled) * np.outer(scale, scale)
         misfit = float(np.mean(residual[:count] ** 2))
         return current, covariance, misfit
 
-    def _linearised(self, current: Array) -> tuple[Array, Array]:
+    def linearised(self, current: Array) -> tuple[Array, Array]:
         """Weighted residual (samples, orbit, prior) and the Jacobian of the prediction."""
         samples = self._samples(current)
         orbit = self._orbit(current)
