@@ -71,6 +71,12 @@ class OutputError(RotordropError):
     exit_code: ClassVar[int] = 6
 
 
+class ConsistencyError(RotordropError):
+    """Model and record do not agree: what was asked for was made, but its single numbers do not hold."""
+
+    exit_code: ClassVar[int] = 7
+
+
 class UsageError(RotordropError, ValueError):
     """A command or function was called with a value it does not accept."""
 

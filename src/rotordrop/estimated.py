@@ -11,12 +11,13 @@ NINETY = 1.6448536269514722
 
 Verdict = Literal[
     "determined",
+    "weakly determined",
     "at its bound",
     "the record does not determine it",
     "known from the calibration",
     "the model does not fit the record",
     "of the cross-check: the model does not fit the record",
-    "prior",
+    "taken over",
 ]
 
 

@@ -20,7 +20,8 @@ from typing import Any
 from common import RESULTS, known_machine, write
 
 from rotordrop.errors import RotordropError
-from rotordrop.estimation.replay import replay_document, replay_drop
+from rotordrop.estimation import Replay, estimate_drop
+from rotordrop.estimation.document import estimate_document
 from rotordrop.measurement.record import Record, read_record
 from rotordrop.synthesis.score import score_estimate
 
@@ -65,10 +66,10 @@ def one(path: Path, record: Record, tail: Record, fixed: dict[str, Any] | None, 
     """One replay in short."""
     began, used = time.perf_counter(), time.process_time()
     try:
-        drop = replay_drop(known_machine(), record, tail, fixed=fixed, draws=draws)
+        drop = estimate_drop(known_machine(), record, tail, method=Replay(fixed=fixed, draws=draws))
     except RotordropError as error:  # what it says is the result
         return {"refused": f"{type(error).__name__}: {error}"}
-    document = replay_document(drop)
+    document = estimate_document(drop)
     truth = path.parent / "truth" / f"{path.stem}.json"
     identification = {
         key: value for key, value in document["identification"].items() if key != "friction_sweep"
@@ -78,7 +79,7 @@ def one(path: Path, record: Record, tail: Record, fixed: dict[str, Any] | None, 
         "speed_Hz": document["speed_Hz"],
         "drop_instant_s": document["drop_instant_s"],
         "bearings": {name: brief(entry) for name, entry in document["bearings"].items()},
-        "first_contact": {name: entry["first_contact"] for name, entry in document["bearings"].items()},
+        "first_contact": dict(document["first_contact"].items()),
         "identification": identification,
         "orbit_rms_um": {w["name"]: {b: 1e6 * rms for b, rms in w["rms"].items()} for w in windows},
         "horizon_s": {name: entry["horizon_s"] for name, entry in document["agreement"]["bearings"].items()},

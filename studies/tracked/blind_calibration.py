@@ -23,8 +23,10 @@ for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
 
 import numpy as np
 
+from rotordrop.estimated import NINETY
+from rotordrop.estimation import estimate_drop
 from rotordrop.estimation.calibrated import calibrate_machine, calibration_json
-from rotordrop.estimation.tracked import TrackedDrop, estimate_tracked
+from rotordrop.estimation.estimate import Estimate
 from rotordrop.machine import example_machine
 from rotordrop.synthesis.event import hidden_machine
 from rotordrop.synthesis.recording import SyntheticDrop, synthesize_drop
@@ -74,7 +76,7 @@ def half_width(entry: dict[str, Any]) -> float:
     return 0.5 * float(high - low)
 
 
-def drop_scores(drop: TrackedDrop, made: SyntheticDrop) -> dict[str, Any]:
+def drop_scores(drop: Estimate, made: SyntheticDrop) -> dict[str, Any]:
     """Estimate, truth and interval of everything that is scored in one drop."""
     truth = made.truth
     scores: dict[str, Any] = {
@@ -85,7 +87,13 @@ def drop_scores(drop: TrackedDrop, made: SyntheticDrop) -> dict[str, Any]:
         "instant_error_s": drop.drop_instant.value - truth["t_off_in_record_s"],
         "bearings": {},
     }
-    for name, values in drop.values.items():
+    for bearing in drop.bearings:
+        name = bearing.name
+        values = {
+            **bearing.values,
+            "peak_force_N": bearing.peak_force.known,
+            "peak_stress_Pa": bearing.peak_stress.known,
+        }
         entry: dict[str, Any] = {}
         for field, key, unit in (
             ("peak_force_N", "peak_force_N", 1.0),
@@ -105,15 +113,16 @@ def drop_scores(drop: TrackedDrop, made: SyntheticDrop) -> dict[str, Any]:
     return scores
 
 
-def impact_scores(drop: TrackedDrop, made: SyntheticDrop, name: str) -> list[list[float]]:
-    """Rows of estimated peak, its standard error and true peak, for every true impact above 500 N."""
+def impact_scores(drop: Estimate, made: SyntheticDrop, name: str) -> list[list[float]]:
+    """Rows of estimated peak, its stated standard error and true peak, for true impacts above 500 N."""
     rows = []
     result = made.result
     b = result.bearing_names.index(name)
     force = result.bearing_force_magnitude[:, b]
-    time_ = drop.forces.time
-    mine = drop.forces.magnitude[:, drop.problem.model.bearing_names.index(name)]
-    sigma = drop.forces.magnitude_sigma[:, drop.problem.model.bearing_names.index(name)]
+    bearing = drop.bearing(name)
+    time_, mine = bearing.force.time, bearing.force.values
+    assert bearing.force_band is not None
+    sigma = (bearing.force_band.upper - mine) / NINETY
     for start, end, peak in zip(
         *(getattr(result.contacts.of_bearing(b), f) for f in ("start", "end", "peak_force")), strict=True
     ):
@@ -174,9 +183,7 @@ def study(kind: str, seed: int, violation: str) -> dict[str, Any]:
     for drop in scored:
         started = time.perf_counter()
         try:
-            tracked = estimate_tracked(
-                calibration.machine, [drop.record], [drop.tail], names=[drop.truth["name"]]
-            )[0]
+            tracked = estimate_drop(calibration.machine, drop.record, drop.tail, name=drop.truth["name"])
             entry = drop_scores(tracked, drop)
         except Exception as error:  # a lost drop is a result too
             entry = {"error": f"{type(error).__name__}: {error}"}

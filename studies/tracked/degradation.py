@@ -24,8 +24,8 @@ from blind_calibration import HERE, drop_scores, half_width, holds
 
 from rotordrop.errors import RotordropError
 from rotordrop.estimated import Estimated
+from rotordrop.estimation import estimate_drop
 from rotordrop.estimation.calibrated import calibrate_machine
-from rotordrop.estimation.tracked import estimate_tracked
 from rotordrop.machine import Machine, example_machine
 from rotordrop.measurement.record import Record
 from rotordrop.synthesis import SensorChain, hidden_machine, synthesize_drop
@@ -136,7 +136,7 @@ def study(seed: int, case: Degradation) -> dict[str, Any]:
     for drop, whole, settled in zip(made[2:], records[2:], tails[2:], strict=True):
         record, tail = (with_signals_left(one, left, case) for one in (whole, settled))
         try:
-            tracked = estimate_tracked(left, [record], [tail], names=[drop.truth["name"]])[0]
+            tracked = estimate_drop(left, record, tail, name=drop.truth["name"])
         except RotordropError as error:  # a refused drop is a result too
             scores.append({"error": str(error)})
         else:

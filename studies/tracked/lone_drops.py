@@ -20,7 +20,7 @@ import numpy as np
 from blind_calibration import drop_scores, drops_of, holds
 
 from rotordrop.errors import RotordropError
-from rotordrop.estimation.tracked import estimate_tracked
+from rotordrop.estimation import estimate_drop
 
 RESULTS = Path(__file__).parent / "results" / "lone_drops"
 SCORED_FROM = 4201
@@ -38,18 +38,18 @@ def study(kind: str, seed: int) -> list[dict[str, Any]]:
             name = recording.truth["name"]
             entry: dict[str, Any] = {"name": name, "tail": tail is not None}
             try:
-                drop = estimate_tracked(known, [recording.record], [tail], names=[name])[0]
+                drop = estimate_drop(known, recording.record, tail, name=name)
             except RotordropError as error:  # a refused drop is a result too
                 entry["error"] = f"{type(error).__name__}: {error}"
             else:
                 entry |= drop_scores(drop, recording)
                 entry["air_gaps"] = {
-                    bearing: {
-                        "estimate": values["air_gap_m"].value,
-                        "interval_90": values["air_gap_m"].interval_90,
-                        "truth": true_gaps[bearing],
+                    bearing.name: {
+                        "estimate": bearing.values["air_gap_m"].value,
+                        "interval_90": bearing.values["air_gap_m"].interval_90,
+                        "truth": true_gaps[bearing.name],
                     }
-                    for bearing, values in drop.values.items()
+                    for bearing in drop.bearings
                 }
             entry["seconds"] = time.perf_counter() - started
             found.append(entry)

@@ -17,8 +17,8 @@ from typing import Any
 
 from blind_calibration import HERE, SPEEDS_HZ, drops_of
 
-from rotordrop.estimation import estimate_drop
-from rotordrop.estimation.replay import replay_document
+from rotordrop.estimation import Replay, estimate_drop
+from rotordrop.estimation.document import estimate_document
 from rotordrop.machine import Machine
 from rotordrop.synthesis.recording import SyntheticDrop
 
@@ -34,8 +34,8 @@ def replay_scores(machine: Machine, drop: SyntheticDrop) -> dict[str, Any]:
     """Estimates of the paper's route beside the truth; what went wrong when it gave none."""
     started = time.perf_counter()
     try:
-        estimate = estimate_drop(machine, drop.record, method="replay", tail=drop.tail, draws=0, threads=1)
-        document = replay_document(estimate)
+        method = Replay(draws=0, threads=1)
+        document = estimate_document(estimate_drop(machine, drop.record, drop.tail, method=method))
     except Exception as error:  # a failed drop is a result too
         return {"error": f"{type(error).__name__}: {error}"}
     bearings = {}

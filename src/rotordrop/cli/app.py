@@ -1,7 +1,8 @@
 """The command ``rotordrop``: finds the verb, runs it, and turns errors into a sentence and an exit code.
 
-Exit codes: 0 done, 2 machine file, 3 recording, 4 identification, 5 simulation, 6 output, 64 wrong call,
-130 stopped by Ctrl-C, 1 anything else.
+Exit codes: 0 done, 2 machine file, 3 recording, 4 identification, 5 simulation, 6 output, 7 model and
+record do not agree (everything asked for is written all the same), 64 wrong call, 130 stopped by Ctrl-C, 1
+anything else.
 """
 
 from __future__ import annotations

@@ -13,6 +13,7 @@ import typer
 from rotordrop.cli._options import JsonOption, MachineArgument
 from rotordrop.cli._output import deliver, progress_bar, require_places
 from rotordrop.cli._recordings import require_own_content, require_own_names, tails_of
+from rotordrop.errors import ConsistencyError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -37,6 +38,13 @@ def calibrate(
     profile: Annotated[
         Path | None, typer.Option("--profile", metavar="FILE", help="Channel map of the recorder.")
     ] = None,
+    even_if_inconsistent: Annotated[
+        bool,
+        typer.Option(
+            "--even-if-inconsistent",
+            help="Write the machine file, marked, although it does not fit.",
+        ),
+    ] = False,
     json: JsonOption = None,
 ) -> None:
     """Calibrate a machine on recorded drops."""
@@ -56,25 +64,33 @@ def calibrate(
         refuse_unusable(check_record(record, description, rest), record.name)
     with progress_bar("calibrating") as report:
         result = calibrate_machine(description, read, tails, progress=report)
-    save_machine(result.machine, output)
-    deliver(calibration_json(result), json, lambda out: _summary(result, output, out))
+    written = result.consistent or even_if_inconsistent
+    if written:
+        save_machine(result.machine, output)
+    deliver(calibration_json(result), json, lambda out: _summary(result, output if written else None, out))
+    if not result.consistent:
+        outcome = f"{output} is marked as such" if written else f"{output} was not written"
+        raise ConsistencyError(
+            f"{result.sentence()} {outcome}: air gaps and supports that do not fit would send every later "
+            "estimate the wrong way. Leave out the drop that does not fit, check sensors and bearing nodes, "
+            "or give better guesses; --even-if-inconsistent writes the file all the same."
+        )
 
 
-def _summary(result: Calibration, output: Path, out: Console) -> None:
+def _summary(result: Calibration, output: Path | None, out: Console) -> None:
     from rich.table import Table
 
     from rotordrop.model.parameter_table import row_of
     from rotordrop.report.quantity import Quantity
 
     table = Table("parameter", "estimate", "90 % interval", "verdict", box=None)
-    verdicts = {entry.path: entry.verdict for entry in result.identifiability}
     for path, value in result.values.items():
         shown = Quantity(value=value.value, kind=row_of(path).display_kind, interval_90=value.interval_90)
         table.add_row(
             path,
             shown.text,
             shown.interval_text,
-            verdicts.get(path, "determined"),
+            value.status,
         )
     out.print(table)
     for pair in result.confounded:
@@ -86,4 +102,5 @@ def _summary(result: Calibration, output: Path, out: Console) -> None:
             if not check.passed:
                 out.print(f"{name}: {check.message}")
     out.print(result.sentence())
-    out.print(f"Calibrated machine: {output}")
+    if output is not None:
+        out.print(f"Calibrated machine: {output}")

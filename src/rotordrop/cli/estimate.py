@@ -8,22 +8,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rotordrop.cli._options import JsonOption, MachineArgument
 from rotordrop.cli._output import deliver, progress_bar, require_places
 from rotordrop.cli._recordings import require_own_content, require_own_names, tails_of
-from rotordrop.errors import UsageError
+from rotordrop.errors import ConsistencyError, UsageError
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from rotordrop.estimation.estimate import Estimate
     from rotordrop.machine import Machine
-    from rotordrop.measurement.quality.finding import Finding
-    from rotordrop.measurement.record import Record
-    from rotordrop.report.content import ReportContent
 
 
 class Method(StrEnum):
@@ -60,9 +58,8 @@ def estimate(
     json: JsonOption = None,
 ) -> None:
     """Estimate touchdown-bearing force and stress from recorded drops."""
+    from rotordrop.estimation import Replay, Tracked, estimate_drops
     from rotordrop.machine import load_machine
-    from rotordrop.measurement.quality import check_record
-    from rotordrop.measurement.quality.finding import refuse_unusable
     from rotordrop.measurement.record import read_record
 
     if fixed is not None and method is not Method.replay:
@@ -78,15 +75,10 @@ def estimate(
     require_places(json, *reports)
     read = [read_record(path, description, profile=profile) for path in records]
     tails = tails_of(tail or [], len(read), lambda path: read_record(path, description, profile=profile))
-    findings = [check_record(r, description, t) for r, t in zip(read, tails, strict=True)]
-    for record, found in zip(read, findings, strict=True):
-        refuse_unusable(found, record.name)
+    chosen = Tracked(quick=quick) if method is Method.tracked else Replay(fixed=fixed)
     with progress_bar("estimating") as progress:
-        if method is Method.tracked:
-            documents, pages = _tracked(description, read, tails, findings, quick, progress)
-        else:
-            documents, pages = _replayed(description, read, tails, findings, fixed, progress)
-    _write(description, documents, pages, reports, json)
+        estimates = estimate_drops(description, read, tails, method=chosen, progress=progress)
+    _write(estimates, reports, json)
 
 
 def _report_places(report: Path | None, records: Sequence[Path]) -> list[Path]:
@@ -108,102 +100,25 @@ def _require_calibrated(description: Machine, file: Path) -> None:
         )
 
 
-def _warnings(findings: Sequence[Finding], tail: Record | None, notes: Sequence[str] = ()) -> list[str]:
-    """Collect what record, tail and method warn of, each said once; the notes are those of the method."""
-    words = [finding.message for finding in findings if finding.severity == "warning"]
-    if tail is None:
-        words.append(
-            "no settled tail: the air gap rests on its prior and on the contacts; give one with --tail"
-        )
-    return list(dict.fromkeys((*words, *notes)))
-
-
-COUNTED_TWICE = (
-    "the machine was calibrated on a drop named {}: if it is this one, its readings count twice and the "
-    "intervals are too narrow; use the machine file from before the calibration for it"
-)
-
-
-def _tracked(
-    machine: Machine,
-    records: list[Record],
-    tails: list[Record | None],
-    findings: Sequence[Sequence[Finding]],
-    quick: bool,
-    progress: Any,
-) -> tuple[dict[str, dict[str, Any]], dict[str, ReportContent]]:
-    from rotordrop.estimation.calibrated import calibrated_on
-    from rotordrop.estimation.document import tracked_document
-    from rotordrop.estimation.tracked import estimate_tracked, settled_tail
-    from rotordrop.report.estimate_page import tracked_page
-    from rotordrop.report.simulated_record import simulated_notice
-    from rotordrop.report.twin_cross_check import twin_cross_checks
-
-    drops = estimate_tracked(machine, records, tails, quick=quick, progress=progress)
-    documents, pages = {}, {}
-    for drop, found, tail in zip(drops, findings, tails, strict=True):
-        checks = () if quick and drop.cross_check is None else twin_cross_checks(drop)
-        words = _warnings(found, settled_tail(drop.record, tail), drop.drop_instant.notes)
-        if drop.name in calibrated_on(machine):
-            words.append(COUNTED_TWICE.format(drop.name))
-        documents[drop.name] = tracked_document(drop, machine, words)
-        documents[drop.name]["simulated_record"] = bool(simulated_notice(drop.record))
-        documents[drop.name]["cross_check"] = [
-            {
-                "name": check.name,
-                "estimate": check.estimate.value,
-                "cross_check": check.check.value,
-                "known_relative_accuracy": check.accuracy,
-                "agrees": check.agrees,
-            }
-            for check in checks
-        ]
-        pages[drop.name] = tracked_page(
-            drop, machine, findings=found, cross_checks=checks, warnings=words, quick=quick
-        )
-    return documents, pages
-
-
-def _replayed(
-    machine: Machine,
-    records: list[Record],
-    tails: list[Record | None],
-    findings: Sequence[Sequence[Finding]],
-    fixed: Path | None,
-    progress: Any,
-) -> tuple[dict[str, dict[str, Any]], dict[str, ReportContent]]:
-    from rotordrop.estimation.replay import replay_document, replay_drop
-    from rotordrop.report.replay_page import replay_page
-    from rotordrop.report.simulated_record import simulated_notice
-
-    documents, pages = {}, {}
-    for record, tail, found in zip(records, tails, findings, strict=True):
-        drop = replay_drop(machine, record, tail=tail, fixed=fixed, progress=progress)
-        words = _warnings(found, tail, (*drop.warnings, *drop.drop_instant.notes))
-        documents[record.name] = replay_document(drop)
-        documents[record.name] |= {"warnings": words, "simulated_record": bool(simulated_notice(record))}
-        pages[record.name] = replay_page(drop, machine, findings=found, warnings=words)
-    return documents, pages
-
-
-def _write(
-    machine: Machine,
-    documents: dict[str, dict[str, Any]],
-    pages: dict[str, ReportContent],
-    reports: list[Path],
-    json: Path | None,
-) -> None:
-    from rotordrop.estimation.document import combined
+def _write(estimates: Sequence[Estimate], reports: list[Path], json: Path | None) -> None:
+    from rotordrop.estimation.document import combined, estimate_document
+    from rotordrop.report.estimate_page import estimate_page
     from rotordrop.report.page import write_page
     from rotordrop.report.terminal import print_summary
 
-    for page, place in zip(pages.values(), reports, strict=False):
+    pages = [estimate_page(estimate) for estimate in estimates]
+    for page, place in zip(pages, reports, strict=False):
         write_page(page, place)
 
     def summarise(out: Console) -> None:
-        for page in pages.values():
+        for page in pages:
             print_summary(page, out)
         for place in reports:
             out.print(f"Report: {place}")
 
-    deliver(combined(documents, machine), json, summarise)
+    documents = [estimate_document(estimate) for estimate in estimates]
+    deliver(combined(documents, [estimate.name for estimate in estimates]), json, summarise)
+    beside = [estimate for estimate in estimates if not estimate.consistent]
+    if beside:
+        names = ", ".join(estimate.name for estimate in beside)
+        raise ConsistencyError(f"{names}: {beside[0].sentence}")

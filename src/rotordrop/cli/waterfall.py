@@ -130,11 +130,12 @@ def _signal(machine: Machine, path: Path, profile: Path | None) -> tuple[CoastDo
     from rotordrop.estimation.recorded_coast_down import recorded_coast_down
     from rotordrop.estimation.simulated_coast_down import simulated_coast_down
     from rotordrop.measurement.record import read_record
-    from rotordrop.report.simulated_record import simulated_notice
+    from rotordrop.measurement.simulated import is_simulated
+    from rotordrop.report.content import SIMULATED_RECORD
     from rotordrop.simulation.coast_down_file import is_coast_down
 
     if is_coast_down(path):
         text = "Everything on this page is computed from the machine description; nothing was measured."
         return simulated_coast_down(path, machine), text
     record = read_record(path, machine, profile=profile)
-    return recorded_coast_down(machine, record), simulated_notice(record)
+    return recorded_coast_down(machine, record), SIMULATED_RECORD if is_simulated(record) else ""

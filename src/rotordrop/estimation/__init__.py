@@ -2,45 +2,31 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal, overload
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from rotordrop.estimation.methods import Method as Method
+from rotordrop.estimation.methods import Replay as Replay
+from rotordrop.estimation.methods import Tracked as Tracked
 
 if TYPE_CHECKING:
-    from rotordrop.estimation.replayed import ReplayDrop
-    from rotordrop.estimation.tracked import TrackedDrop
+    from rotordrop.estimation.estimate import Estimate
     from rotordrop.machine import Machine
     from rotordrop.measurement.record import Record
 
-
-@overload
-def estimate_drop(
-    machine: Machine,
-    record: Record,
-    *,
-    method: Literal["tracked"] = "tracked",
-    tail: Record | None = None,
-    **options: Any,
-) -> TrackedDrop: ...
-
-
-@overload
-def estimate_drop(
-    machine: Machine,
-    record: Record,
-    *,
-    method: Literal["replay"],
-    tail: Record | None = None,
-    **options: Any,
-) -> ReplayDrop: ...
+Progress = Callable[[str, float], None]
+FOLLOWED = Tracked()
 
 
 def estimate_drop(
     machine: Machine,
     record: Record,
-    *,
-    method: str = "tracked",
     tail: Record | None = None,
-    **options: Any,
-) -> TrackedDrop | ReplayDrop:
+    *,
+    method: Method = FOLLOWED,
+    name: str | None = None,
+    progress: Progress | None = None,
+) -> Estimate:
     """Estimate force and stress of the touchdown bearings from one recorded drop.
 
     Parameters
@@ -49,27 +35,86 @@ def estimate_drop(
         The machine, with guesses where nothing better is known.
     record : Record
         The recorded drop.
-    method : {"tracked", "replay"}
-        A drop model that follows the record, or the paper's open-loop replay.
     tail : Record, optional
         The settled tail; the replay needs it when the record does not reach standstill.
-    **options
-        Of the method: ``quick`` and ``progress`` for the tracked twin; ``fixed``, ``draws``, ``starts``,
-        ``threads`` and ``progress`` for the replay.
+    method : Tracked or Replay
+        A drop model that follows the record, or the paper's open-loop replay, with options.
+    name : str, optional
+        Name of the drop; the file's by default.
+    progress : callable, optional
+        Called with a text and the fraction done.
 
-    Returns
-    -------
-    TrackedDrop or ReplayDrop
-        The estimate.
+    Raises
+    ------
+    RecordError
+        If the record cannot be used.
+    IdentificationError
+        If no estimate can be made of it.
+
+    Examples
+    --------
+    >>> from rotordrop.estimation import Replay, Tracked
+    >>> Tracked(quick=True)
+    Tracked(quick=True)
+    >>> Replay(draws=128).draws
+    128
     """
-    if method == "replay":
+    names = None if name is None else [name]
+    return estimate_drops(machine, [record], [tail], method=method, names=names, progress=progress)[0]
+
+
+def estimate_drops(
+    machine: Machine,
+    records: Sequence[Record],
+    tails: Sequence[Record | None],
+    *,
+    method: Method = FOLLOWED,
+    names: Sequence[str] | None = None,
+    progress: Progress | None = None,
+) -> tuple[Estimate, ...]:
+    """Estimate several recorded drops of one machine; tracked ones share its parameters in one fit.
+
+    Parameters
+    ----------
+    machine : Machine
+        The machine, calibrated or with guesses.
+    records, tails : sequence of Record
+        The drops and their settled tails (None where there is none).
+    method : Tracked or Replay
+        How, with options.
+    names : sequence of str, optional
+        Names of the drops; file stems by default.
+    progress : callable, optional
+        Called with a text and the fraction done.
+
+    Raises
+    ------
+    RecordError, IdentificationError
+        As for `estimate_drop`; nothing is computed before every record has passed the gate.
+    """
+    from rotordrop.errors import UsageError
+    from rotordrop.estimation.record_facts import facts_of
+    from rotordrop.estimation.tracked import settled_tail
+
+    if not isinstance(method, Tracked | Replay):
+        raise UsageError(f"the method is {method!r}; expected Tracked(...) or Replay(...).")
+    if len(tails) != len(records):
+        raise UsageError(f"{len(tails)} tails for {len(records)} records; expected one, or None, for each.")
+    stems = names or [r.path.stem if r.path else f"drop_{i + 1}" for i, r in enumerate(records)]
+    facts = [
+        facts_of(machine, record, settled_tail(record, tail), stem)
+        for record, tail, stem in zip(records, tails, stems, strict=True)
+    ]
+    if isinstance(method, Replay):
         from rotordrop.estimation.replay import replay_drop
 
-        return replay_drop(machine, record, tail, **options)
-    if method != "tracked":
-        from rotordrop.errors import UsageError
+        return tuple(
+            replay_drop(machine, record, tail, method, one, name=stem, progress=progress)
+            for record, tail, stem, one in zip(records, tails, stems, facts, strict=True)
+        )
+    from rotordrop.estimation.tracked import followed_drops, prepare
+    from rotordrop.estimation.tracked_estimate import estimate_of
 
-        raise UsageError(f"the method is {method!r}; expected 'tracked' or 'replay'.")
-    from rotordrop.estimation.tracked import estimate_tracked
-
-    return estimate_tracked(machine, [record], [tail], **options)[0]
+    prepared = [prepare(machine, r, t, n) for r, t, n in zip(records, tails, stems, strict=True)]
+    drops = followed_drops(machine, prepared, quick=method.quick, progress=progress)
+    return tuple(estimate_of(drop, method, one) for drop, one in zip(drops, facts, strict=True))

@@ -10,20 +10,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError, UsageError
-from rotordrop.estimated import NINETY, Estimated, IdentifiedValue
-from rotordrop.estimation.tracked import INCONSISTENT_WIDENING, prepare, track_drops
-from rotordrop.estimation.tracked_values import (
+from rotordrop.estimated import NINETY, Estimated, IdentifiedValue, Verdict
+from rotordrop.estimation.tracked import prepare, track_drops
+from rotordrop.estimation.tracked_loads import INCONSISTENT_WIDENING
+from rotordrop.estimation.tracked_parameters import (
+    NOT_DETERMINED,
     identified,
     model_error,
     parameter_widening,
 )
 from rotordrop.machine import Machine
+from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin
 from rotordrop.measurement.record import Record
 from rotordrop.model.parameter import Parameter
-from rotordrop.model.parameter_table import parameter, rows, separating_measurement
+from rotordrop.model.parameter_table import parameter, row_of, rows, separating_measurement
 from rotordrop.model.statics import bearing_load_shares
-from rotordrop.model.unknowns import Unknown, typical_depth
-from rotordrop.tracking.calibration import TrackedDrops
+from rotordrop.model.unknowns import typical_depth
 from rotordrop.tracking.consistency import Check, consistency_checks
 from rotordrop.tracking.problem import DropProblem
 from rotordrop.tracking.smoother import parameter_sample
@@ -34,18 +36,18 @@ Progress = Callable[[str, float], None]
 CONFOUNDED = 0.9
 """Correlation from which two parameters are reported as confounded [1]."""
 
-CALIBRATED_ON = "calibrated on "
-"""How the source of a calibrated value begins; the names of the drops follow."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Identifiability:
-    """What the records say about one parameter: its prior and posterior standard deviation and a verdict."""
+    """What the records say about one parameter: its prior and posterior standard deviation, and the verdict.
+
+    Standard deviations are of the logarithm for positive parameters; the verdict is that of its value.
+    """
 
     path: str
     prior_sigma: float
     posterior_sigma: float
-    verdict: str
+    verdict: Verdict
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,25 +87,21 @@ class Calibration:
     checks: dict[str, tuple[Check, ...]]
     consistent: bool
     nis: dict[str, float]
-    tracked: TrackedDrops
 
     def sentence(self) -> str:
         """The outcome in words."""
-        found = sum(entry.verdict == "determined" for entry in self.identifiability)
+        found, weakly = (
+            sum(entry.verdict == verdict for entry in self.identifiability)
+            for verdict in ("determined", "weakly determined")
+        )
         text = (
             f"{found} of {len(self.identifiability)} parameters are determined by {len(self.checks)} drop(s)"
+            f", {weakly} more weakly"
         )
         if self.consistent:
             return f"{text}; the model is consistent with all of them."
         bad = [name for name, checks in self.checks.items() if not all(check.passed for check in checks)]
         return f"{text}; the model is not consistent with {', '.join(bad)}: intervals are doubled."
-
-
-def calibrated_on(machine: Machine) -> frozenset[str]:
-    """Names of the drops that the supports of a machine were calibrated on; empty where they were not."""
-    sources = [bearing.support.stiffness.source or "" for bearing in machine.touchdown_bearings]
-    told = [source.removeprefix(CALIBRATED_ON) for source in sources if source.startswith(CALIBRATED_ON)]
-    return frozenset(name for names in told for name in names.split(", "))
 
 
 def calibrate_machine(
@@ -146,17 +144,21 @@ def calibrate_machine(
     mean = smoothed.means[at]
     widening = 1.0 if consistent else INCONSISTENT_WIDENING
     values = _values(problem, mean, covariance, widening, len(stems))
-    names = [bearing.name for bearing in machine.touchdown_bearings]
-    fitted = machine_values(names, at_fitted_exponents(machine, values), f"{CALIBRATED_ON}{', '.join(stems)}")
+    bearings = [bearing.name for bearing in machine.touchdown_bearings]
+    identifiability = _identifiability(problem, covariance, values)
+    known = _as_known(at_fitted_exponents(machine, values), identifiability)
+    beside = "" if consistent else " (not consistent with them)"
+    source = f"calibrated on {', '.join(stems)}{beside}"
+    drops = [CalibrationDrop(name=n, sha256=r.sha256) for n, r in zip(stems, records, strict=True)]
+    origin = CalibrationOrigin(drops=tuple(drops), consistent=consistent)
     return Calibration(
-        machine=_possible(machine, fitted, stems),
+        machine=_possible(machine, machine_values(bearings, known, source), stems).calibrated_on(origin),
         values=values,
-        identifiability=_identifiability(problem, covariance),
+        identifiability=identifiability,
         confounded=_confounded(problem, covariance),
         checks=checks,
         consistent=consistent,
         nis=dict(zip(stems, tracked.nis, strict=True)),
-        tracked=tracked,
     )
 
 
@@ -233,53 +235,72 @@ def _within_limits(value: IdentifiedValue, row: Parameter) -> IdentifiedValue:
     return replace(value, value=middle, interval_90=(low, high))
 
 
+def _as_known(
+    values: dict[str, IdentifiedValue], identifiability: tuple[Identifiability, ...]
+) -> dict[str, IdentifiedValue]:
+    """Values of which a parameter that the records do not determine has the interval of its prior.
+
+    What the fit leaves of its uncertainty rests on a random walk of the filter; an estimate with the
+    calibrated machine would take it for knowledge.
+    """
+    found = dict(values)
+    for entry in identifiability:
+        path = entry.path
+        if entry.verdict in NOT_DETERMINED and row_of(path).logarithmic:
+            row, value, reach = row_of(path), found[path].value, math.exp(NINETY * entry.prior_sigma)
+            interval = (row.within(value / reach), row.within(value * reach))
+            found[path] = replace(found[path], interval_90=interval)
+    return found
+
+
 def machine_values(
     bearings: Sequence[str], values: dict[str, IdentifiedValue], source: str
 ) -> dict[str, Estimated]:
-    """Calibrated values as entries of a machine description, the horizontal support with them."""
-    entries = {
-        path: Estimated(
+    """Calibrated values as entries of a machine description, the horizontal support with them.
+
+    What the records do not determine stays a guess, so that no later estimate calls it known.
+    """
+    entries = {}
+    for path, value in values.items():
+        known = value.status not in NOT_DETERMINED
+        entries[path] = Estimated(
             value=value.value,
-            status="estimated",
-            interval_90=value.interval_90,
-            source=source,
+            status="estimated" if known else "guess",
+            interval_90=value.interval_90 if known else None,
+            range=None if known else value.interval_90,
+            source=source if known else f"{source}; {value.status}",
             unit=value.unit,
         )
-        for path, value in values.items()
-    }
     for name in bearings:
         ratio = entries.pop(parameter("support.anisotropy").path_of(name), None)
         if ratio is None:
             continue
         vertical = entries[parameter("support.stiffness").path_of(name)]
-        low, high = vertical.interval_90 or (vertical.value, vertical.value)
+        low, high = vertical.interval_90 or vertical.range or (vertical.value, vertical.value)
+        scaled = (low * ratio.value, high * ratio.value)
         entries[f"{name}.support.stiffness_horizontal"] = replace(
             vertical,
             value=vertical.value * ratio.value,
-            interval_90=(low * ratio.value, high * ratio.value),
+            interval_90=None if vertical.interval_90 is None else scaled,
+            range=None if vertical.range is None else scaled,
         )
     return entries
 
 
-def _identifiability(problem: DropProblem, covariance: Array) -> tuple[Identifiability, ...]:
+def _identifiability(
+    problem: DropProblem, covariance: Array, values: dict[str, IdentifiedValue]
+) -> tuple[Identifiability, ...]:
     sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     return tuple(
         Identifiability(
             path=unknown.path,
             prior_sigma=unknown.sigma,
             posterior_sigma=float(sigma[problem.n_dynamic + k]),
-            verdict=_verdict(unknown, float(sigma[problem.n_dynamic + k])),
+            verdict=values[unknown.path].status,
         )
         for k, unknown in enumerate(problem.unknowns)
         if unknown.scope == "machine"
     )
-
-
-def _verdict(unknown: Unknown, sigma: float) -> str:
-    share = sigma / unknown.sigma
-    if share < 0.3:
-        return "determined"
-    return "weakly determined" if share < 0.7 else "the records do not determine it"
 
 
 def _confounded(problem: DropProblem, covariance: Array) -> tuple[Confounded, ...]:

@@ -2,68 +2,129 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotordrop._version import __version__
 from rotordrop.estimated import IdentifiedValue
-from rotordrop.estimation.tracked import Impact, TrackedDrop
-from rotordrop.machine import Machine
-from rotordrop.physics.ball_bearing import bearing_constants
-from rotordrop.severity.statistics import stress_statistics
+from rotordrop.estimation.agreement import Agreement
+from rotordrop.estimation.bearing_drop import BearingDrop, Impact, Peak
+from rotordrop.estimation.estimate import Estimate, ReplaySteps
+from rotordrop.estimation.methods import Replay
+from rotordrop.identification.first_contact import FirstContact
 from rotordrop.simulation.fingerprint import fingerprint
 
-Array = NDArray[np.float64]
-FORMAT = "rotordrop estimate 1"
+FORMAT = "rotordrop estimate 2"
 
 
-def tracked_document(drop: TrackedDrop, machine: Machine, warnings: Sequence[str] = ()) -> dict[str, Any]:
-    """One tracked drop ready for JSON."""
-    constants = {b.name: bearing_constants(b.bearing) for b in machine.touchdown_bearings}
-    bearings = {}
-    for index, (name, values) in enumerate(drop.values.items()):
-        entry = nested(values)
-        entry["peak_force_N"]["time_s"] = drop.peak_times[name]
-        c = constants[name]
-        preload_stress = c.stress_coefficient_inner * c.preload_ball_load ** (1.0 / 3.0)
-        entry["stress_statistics_Pa"] = statistics_entry(
-            drop.forces.stress[:, index], drop.forces.time, preload_stress
-        )
-        entry["impacts"] = [impact_entry(i) for i in drop.impacts if i.bearing == name]
-        bearings[name] = entry
+def estimate_document(estimate: Estimate) -> dict[str, Any]:
+    """One estimate ready for JSON, complete: whoever makes it, Python or the command line, gets the same."""
     return {
-        **heading(drop, machine),
-        "method": "tracked",
-        "warnings": [*warnings, *(check.message for check in drop.checks if not check.passed)],
-        "consistency": {
-            "consistent": drop.consistent,
-            "sentence": drop.sentence(),
-            "nis": drop.nis,
-            "process_noise_factor": drop.noise_factor,
-            "checks": [asdict(check) for check in drop.checks],
+        **_heading(estimate),
+        "warnings": list(estimate.warnings),
+        "notes": list(estimate.notes),
+        "consistency": _consistency(estimate),
+        "bearings": {bearing.name: bearing_entry(bearing) for bearing in estimate.bearings},
+        "cross_check": [_cross_check(one) for one in estimate.cross_check],
+        "later_motion": [{**asdict(one), "larger": one.larger} for one in estimate.later],
+        "parameters": [
+            {
+                "path": one.path,
+                "scope": one.scope,
+                "prior": None if one.prior is None else one.prior.as_json(),
+                "estimate": one.estimate.as_json(),
+            }
+            for one in estimate.parameters
+        ],
+        "sensors": {
+            one.sensor: {
+                "gain_error": one.gain_error.as_json(),
+                "offset_m": one.offset.as_json(),
+                "noise_m": one.noise,
+            }
+            for one in estimate.sensors
         },
-        "bearings": bearings,
+        **({} if estimate.replay is None else _replay(estimate, estimate.replay)),
     }
 
 
-def heading(drop: TrackedDrop, machine: Machine) -> dict[str, Any]:
-    """What every estimate document begins with."""
-    record = drop.record
+def combined(documents: Sequence[dict[str, Any]], names: Sequence[str]) -> dict[str, Any]:
+    """One document of a single drop, or ``machine`` and ``drops.<name>`` of several."""
+    if len(documents) == 1:
+        return documents[0]
     return {
         "format": FORMAT,
         "rotordrop_version": __version__,
         "fingerprint": fingerprint(),
-        "machine": machine.name,
-        "record": record.name if record.path is None else record.path.name,
-        "record_sha256": record.sha256,
-        "drop_instant_s": drop.drop_instant.value,
-        "drop_instant_interval_90_s": list(drop.drop_instant.interval_90),
-        "speed_Hz": drop.speed / (2.0 * np.pi),
+        "machine": documents[0]["machine"],
+        "drops": dict(zip(names, documents, strict=True)),
     }
+
+
+def _heading(estimate: Estimate) -> dict[str, Any]:
+    record, method = estimate.record, estimate.method
+    return {
+        "format": FORMAT,
+        "verdict": estimate.verdict.value,
+        "consistent": estimate.consistent,
+        "rotordrop_version": __version__,
+        "fingerprint": fingerprint(),
+        "machine": estimate.machine.name,
+        "record": estimate.name if record.path is None else record.path.name,
+        "record_sha256": record.sha256,
+        "simulated_record": estimate.simulated_record,
+        "method": "replay" if isinstance(method, Replay) else "tracked",
+        "quick": not isinstance(method, Replay) and method.quick,
+        "drop_instant_s": estimate.drop_instant.value,
+        "drop_instant_interval_90_s": list(estimate.drop_instant.interval_90),
+        "speed_Hz": estimate.speed / (2.0 * np.pi),
+        "estimated_until_s": estimate.until,
+    }
+
+
+def _consistency(estimate: Estimate) -> dict[str, Any]:
+    return {
+        "consistent": estimate.consistent,
+        "sentence": estimate.sentence,
+        "nis": _finite(estimate.nis),
+        "process_noise_factor": estimate.noise_factor,
+        "checks": [asdict(check) for check in estimate.checks],
+    }
+
+
+def _cross_check(one: Any) -> dict[str, Any]:
+    return {
+        "name": one.name,
+        "estimate": one.estimate.value,
+        "cross_check": one.check,
+        "known_relative_accuracy": one.accuracy,
+        "agrees": one.agrees,
+        "replaced": one.replaced,
+    }
+
+
+def bearing_entry(bearing: BearingDrop) -> dict[str, Any]:
+    """Numbers of one bearing, found from a record or simulated."""
+    entry: dict[str, Any] = {
+        "origin": bearing.peak_force.origin.value,
+        "peak_force_N": _peak(bearing.peak_force),
+        "peak_stress_Pa": _peak(bearing.peak_stress),
+        **nested(bearing.values),
+    }
+    statistics = {k: v for k, v in asdict(bearing.statistics).items() if v is not None}
+    entry["stress_statistics_Pa"] = statistics
+    entry["impacts"] = [impact_entry(impact) for impact in bearing.impacts]
+    if bearing.missing:
+        entry["not_stated"] = dict(bearing.missing)
+    return entry
+
+
+def _peak(peak: Peak) -> dict[str, Any]:
+    return {**peak.known.as_json(), "time_s": peak.time}
 
 
 def nested(values: Mapping[str, IdentifiedValue]) -> dict[str, Any]:
@@ -78,17 +139,11 @@ def nested(values: Mapping[str, IdentifiedValue]) -> dict[str, Any]:
     return tree
 
 
-def statistics_entry(stress: Array, time: Array, preload_stress: float) -> dict[str, Any]:
-    """Stress statistics of Table 5 [Pa] with the rules named."""
-    found = asdict(stress_statistics(stress, time=time, preload_stress=preload_stress))
-    return {key: value for key, value in found.items() if value is not None}
-
-
 def impact_entry(impact: Impact) -> dict[str, Any]:
     """One impact: times from power-off [s], azimuth [rad], peak [N], impulse [N s], energy [J]."""
     return {
         "start_s": impact.start,
-        "end_s": impact.end,
+        "end_s": _finite(impact.end),
         "peak_time_s": impact.peak_time,
         "azimuth_rad": impact.azimuth,
         "peak_force_N": impact.peak_force.as_json(),
@@ -97,14 +152,55 @@ def impact_entry(impact: Impact) -> dict[str, Any]:
     }
 
 
-def combined(documents: Mapping[str, dict[str, Any]], machine: Machine) -> dict[str, Any]:
-    """One document of a single drop, or ``machine`` and ``drops.<stem>`` of several."""
-    if len(documents) == 1:
-        return next(iter(documents.values()))
+def _replay(estimate: Estimate, steps: ReplaySteps) -> dict[str, Any]:
+    names = [bearing.name for bearing in estimate.bearings]
+    assert estimate.agreement is not None
     return {
-        "format": FORMAT,
-        "rotordrop_version": __version__,
-        "fingerprint": fingerprint(),
-        "machine": machine.name,
-        "drops": dict(documents),
+        "fixed": steps.fixed or None,
+        **steps.document,
+        "first_contact": {
+            name: _first_contact(contact) for name, contact in zip(names, steps.contacts, strict=True)
+        },
+        "agreement": _agreement(estimate.agreement, names),
     }
+
+
+def _first_contact(contact: FirstContact) -> dict[str, float]:
+    return {
+        "start_s": contact.start,
+        "end_s": contact.end,
+        "duration_s": contact.duration,
+        "timing_error_s": contact.timing_error,
+        "impact_speed_m_per_s": contact.impact_speed,
+        "indentation_m": contact.indentation,
+        "mass_kg": contact.mass,
+        "half_period_stiffness_N_per_m": contact.equivalent_stiffness,
+        "half_period_stiffness_error_N_per_m": contact.standard_error,
+        "gravity_corrected_stiffness_N_per_m": contact.corrected_stiffness,
+    }
+
+
+def _agreement(agreement: Agreement, names: Sequence[str]) -> dict[str, Any]:
+    bearings = {}
+    for name, one in zip(names, agreement.bearings, strict=True):
+        bearings[name] = {
+            "measured_contacts_s": one.measured_contacts.tolist(),
+            "simulated_contacts_s": one.simulated_contacts.tolist(),
+            "measured_bounce_m": _finite(one.measured_bounce),
+            "simulated_bounce_m": _finite(one.simulated_bounce),
+            "horizon_s": one.horizon,
+        }
+    windows = [
+        {**asdict(window), "rms": dict(zip(names, window.rms.tolist(), strict=True))}
+        for window in agreement.windows
+    ]
+    return {
+        "windows": windows,
+        "bearings": bearings,
+        "orbit_disagreement_m": agreement.disagreement,
+        "expected_horizon_s": agreement.expected_horizon,
+    }
+
+
+def _finite(value: float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else float(value)

@@ -8,27 +8,31 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.estimated import Estimated, IdentifiedValue
 from rotordrop.estimation.agreement import Agreement, compare_orbits, spread_horizon
+from rotordrop.estimation.estimate import Estimate, ReplaySteps, Verdict
 from rotordrop.estimation.fixed_values import (
     Document,
     fixed_correlations,
     machine_with_fixed,
     read_fixed,
 )
+from rotordrop.estimation.later_motion import later_motion
+from rotordrop.estimation.methods import Replay
+from rotordrop.estimation.record_facts import RecordFacts
 from rotordrop.estimation.recorded_fall import RecordedFall, measured_drop, recorded_fall
-from rotordrop.estimation.replay_document import replay_document as replay_document
-from rotordrop.estimation.replay_values import peak_time, replay_values
-from rotordrop.estimation.replayed import ReplayDrop as ReplayDrop
-from rotordrop.estimation.replayed import Replayed as Replayed
+from rotordrop.estimation.replay_estimate import (
+    Replayed,
+    replay_bearings,
+    replay_parameters,
+    steps_document,
+)
 from rotordrop.estimation.uncertainty import (
     FEWEST_DRAWS,
-    Candidate,
     Draws,
     best_candidate,
     draw_drops,
@@ -51,7 +55,6 @@ from rotordrop.machine import Machine
 from rotordrop.measurement.record import Record
 from rotordrop.model.parameter import Step
 from rotordrop.model.parameters import build_drop_model
-from rotordrop.simulation.result import DropResult
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -96,14 +99,13 @@ class Impacts:
 def replay_drop(
     machine: Machine,
     record: Record,
-    tail: Record | None = None,
-    fixed: str | Path | Document | None = None,
-    progress: Progress | None = None,
+    tail: Record | None,
+    method: Replay,
+    facts: RecordFacts,
     *,
-    draws: int = FEWEST_DRAWS,
-    starts: int = 8,
-    threads: int | None = None,
-) -> ReplayDrop:
+    name: str,
+    progress: Progress | None = None,
+) -> Estimate:
     """Estimate force and stress of a recorded drop by the paper's flowchart.
 
     Parameters
@@ -112,23 +114,16 @@ def replay_drop(
         The machine, with guesses where nothing better is known.
     record : Record
         The recorded drop.
-    tail : Record, optional
+    tail : Record or None
         The settled tail; needed when the record does not reach standstill.
-    fixed : path or mapping, optional
-        An earlier estimate whose supports and friction are used as they are (Neisi 2020, section 5.1).
+    method : Replay
+        Options of the route.
+    facts : RecordFacts
+        What the record itself gives.
+    name : str
+        Name of the drop.
     progress : callable, optional
         Called with a text and the share done.
-    draws : int
-        Draws behind the intervals of force and stress; fewer than 64 give no interval.
-    starts : int
-        Starts of the search for the supports.
-    threads : int, optional
-        Threads; all cores by default.
-
-    Returns
-    -------
-    ReplayDrop
-        Everything the steps found.
 
     Notes
     -----
@@ -137,40 +132,62 @@ def replay_drop(
     marginalised; the friction from a number; the intervals from draws.
     """
     say = progress or (lambda text, share: None)
-    document, origin = ({}, "") if fixed is None else read_fixed(fixed)
+    document, origin = ({}, "") if method.fixed is None else read_fixed(method.fixed)
     known = machine_with_fixed(machine, document, origin) if origin else machine
     say("air gap, speed, initial state, first contact", 0.0)
     fall = recorded_fall(known, record, tail)
-    impacts = _taken_over(fall, document) if origin else _first_impacts(fall, starts, threads, say)
+    impacts = _taken_over(fall, document) if origin else _first_impacts(fall, method, say)
     gap = _steady_gap(fall, impacts)
     say("replay of the whole drop", STAGES["replay"])
-    simulated, middle, lower, upper = _replay(impacts, gap)
-    drawn = _draws(impacts, fall, draws, threads, say)
-    when, measured = measured_drop(fall, DURATION)
-    return ReplayDrop(
+    replayed = _replay(impacts, fall, gap, _draws(impacts, fall, method, say))
+    found = replay_parameters(known, impacts.values, gap, impacts.friction)
+    later = later_motion(
+        replayed.result.bearing_names,
+        *measured_drop(fall, np.inf),
+        DURATION,
+        float(np.mean(fall.initial.noise)),
+    )
+    return Estimate(
+        name=name,
+        method=method,
         machine=machine,
-        identified=_identified_machine(known, impacts, gap),
         record=record,
         drop_instant=fall.instant,
-        gap=gap,
+        speed=fall.speed.initial,
+        until=DURATION,
+        verdict=Verdict.OPEN_LOOP,
+        bearings=replay_bearings(known, fall, gap, found, replayed),
+        parameters=found,
+        agreement=_agreement(replayed, gap),
+        replay=_steps(known, fall, impacts, gap, replayed, origin),
+        later=later,
+        findings=facts.findings,
+        warnings=facts.warnings_with(
+            *_warnings(fall, impacts, replayed.draws), *(one.sentence() for one in later if one.larger)
+        ),
+        notes=_notes(fall, gap),
+        simulated_record=facts.simulated,
+    )
+
+
+def _steps(
+    machine: Machine, fall: RecordedFall, impacts: Impacts, gap: AirGap, replayed: Replayed, origin: str
+) -> ReplaySteps:
+    result, draws = replayed.result, replayed.draws
+    return ReplaySteps(
         speed=fall.speed,
-        initial=fall.initial,
-        expanded=fall.expanded,
         contacts=fall.contacts,
-        support=impacts.support,
         friction=impacts.friction,
-        simulated=simulated,
-        middle=middle,
-        lower=lower,
-        upper=upper,
-        measured_time=when,
-        measured=measured,
-        agreement=_agreement(when, measured, middle, gap, drawn),
-        draws=drawn,
-        values=replay_values(impacts.values, known, gap, fall.contacts, impacts.friction, simulated, drawn),
-        peak_times={name: peak_time(simulated, b) for b, name in enumerate(simulated.bearing_names)},
+        correlations={} if impacts.support is None else impacts.support.correlations,
+        speed_time=result.time,
+        speed_simulated=result.speed,
         fixed=origin,
-        warnings=_warnings(fall, gap, impacts, drawn),
+        draws=None if draws is None else len(draws),
+        rejected=None if draws is None else draws.rejected,
+        identified=_identified_machine(machine, impacts, gap),
+        document=steps_document(
+            fall, gap, impacts.support, impacts.friction, draws, result.bearing_names, float(result.speed[-1])
+        ),
     )
 
 
@@ -197,7 +214,7 @@ def _taken_over(fall: RecordedFall, document: Document) -> Impacts:
     )
 
 
-def _first_impacts(fall: RecordedFall, starts: int, threads: int | None, say: Progress) -> Impacts:
+def _first_impacts(fall: RecordedFall, method: Replay, say: Progress) -> Impacts:
     """Supports by least squares on the first impacts, then the sweep of the friction."""
     quick = build_drop_model(fall.model.machine, "quick")
     coarse, fine = (
@@ -209,8 +226,8 @@ def _first_impacts(fall: RecordedFall, starts: int, threads: int | None, say: Pr
         coarse,
         fine,
         fall.later_contact,
-        starts=starts,
-        threads=threads,
+        starts=method.starts,
+        threads=method.threads,
         progress=lambda text, share: say(f"supports: {text}", begin + (end - begin) * share),
     )
     say("friction sweep", end)
@@ -221,9 +238,11 @@ def _first_impacts(fall: RecordedFall, starts: int, threads: int | None, say: Pr
         np.clip(best.x + root @ random.standard_normal(len(best.x)), *fine.bounds)
         for _ in range(FRICTION_DRAWS)
     ]
-    friction = sweep_friction(fine, best.x, fall.first_contact, draws=points, threads=threads)
+    friction = sweep_friction(fine, best.x, fall.first_contact, draws=points, threads=method.threads)
     longest = fall.later_contact + LONGEST_WINDOW
-    problem, x, covariance = refit_with_friction(fine, best, friction.value, longest=longest, threads=threads)
+    problem, x, covariance = refit_with_friction(
+        fine, best, friction.value, longest=longest, threads=method.threads
+    )
     return Impacts(
         problem=problem,
         x=x,
@@ -245,32 +264,29 @@ def _steady_gap(fall: RecordedFall, impacts: Impacts) -> AirGap:
     return identify_air_gap(fall.rest, settled, fall.initial.sensing)
 
 
-def _replay(impacts: Impacts, gap: AirGap) -> tuple[DropResult, Replayed, Replayed, Replayed]:
+def _replay(impacts: Impacts, fall: RecordedFall, gap: AirGap, draws: Draws | None) -> Replayed:
     """The whole drop with the identified values, for the air gap and for its two limits."""
     problem = impacts.problem
     central = best_candidate(problem, impacts.x)
     simulated = whole_drop(problem, central, duration=DURATION)
-    at_limits = (
+    lower, upper = (
         whole_drop(problem, central, duration=DURATION, gap_change=limit - gap.value)
         for limit in (gap.lower, gap.upper)
     )
-    lower, upper = (_beside_record(problem, central, result) for result in at_limits)
-    return simulated, _beside_record(problem, central, simulated), lower, upper
-
-
-def _beside_record(problem: ImpactFit, central: Candidate, result: DropResult) -> Replayed:
+    time, measured = measured_drop(fall, DURATION)
     return Replayed(
-        time=result.time,
-        displacement=seen_at_bearings(problem, central, result),
-        force=result.bearing_force_magnitude,
-        stress=result.max_stress,
+        result=simulated,
+        middle=seen_at_bearings(problem, central, simulated),
+        lower=seen_at_bearings(problem, central, lower),
+        upper=seen_at_bearings(problem, central, upper),
+        time=time,
+        measured=measured,
+        draws=draws,
     )
 
 
-def _draws(
-    impacts: Impacts, fall: RecordedFall, count: int, threads: int | None, say: Progress
-) -> Draws | None:
-    if count < 2:
+def _draws(impacts: Impacts, fall: RecordedFall, method: Replay, say: Progress) -> Draws | None:
+    if method.draws < 2:
         return None
     begin = STAGES["draws"]
     return draw_drops(
@@ -279,19 +295,22 @@ def _draws(
         impacts.covariance,
         window=fall.later_contact + KEPT_UNTIL if impacts.support is not None else 0.0,
         duration=DURATION,
-        count=count,
-        threads=threads,
+        count=method.draws,
+        threads=method.threads,
         progress=lambda text, share: say(text, begin + (1.0 - begin) * share),
     )
 
 
-def _agreement(time: Array, measured: Array, middle: Replayed, gap: AirGap, draws: Draws | None) -> Agreement:
-    simulated = np.empty_like(measured)
-    for b in range(measured.shape[1]):
+def _agreement(replayed: Replayed, gap: AirGap) -> Agreement:
+    simulated = np.empty_like(replayed.measured)
+    for b in range(simulated.shape[1]):
         for axis in range(2):
-            simulated[:, b, axis] = np.interp(time, middle.time, middle.displacement[:, b, axis])
+            simulated[:, b, axis] = np.interp(
+                replayed.time, replayed.result.time, replayed.middle[:, b, axis]
+            )
+    draws = replayed.draws
     expected = None if draws is None else spread_horizon(draws.spread_time, draws.spread, gap.value)
-    return compare_orbits(time, measured, simulated, gap.value, expected_horizon=expected)
+    return compare_orbits(replayed.time, replayed.measured, simulated, gap.value, expected_horizon=expected)
 
 
 def _identified_machine(machine: Machine, impacts: Impacts, gap: AirGap) -> Machine:
@@ -317,16 +336,20 @@ def _identified_machine(machine: Machine, impacts: Impacts, gap: AirGap) -> Mach
     return machine.with_values(values)
 
 
-def _warnings(fall: RecordedFall, gap: AirGap, impacts: Impacts, draws: Draws | None) -> tuple[str, ...]:
+def _notes(fall: RecordedFall, gap: AirGap) -> tuple[str, ...]:
     zero = ", ".join(f"{1e6 * z:.3g}" for z in gap.zero_sigma)
-    said = [
-        *fall.instant.notes,
-        *fall.initial.notes,
+    return (
         *([fall.speed.note] if fall.speed.note else []),
         "the settled tail cannot tell air gap from vertical sensor zero: a zero that is 1 µm off reads as 1 "
         "µm of "
         f"air gap (standard error {zero} µm); the fall height, and so the force, is hardly touched by it",
-    ]
+        "an open-loop replay is one drop like the recorded one: after some contacts its force is statistics "
+        "only",
+    )
+
+
+def _warnings(fall: RecordedFall, impacts: Impacts, draws: Draws | None) -> tuple[str, ...]:
+    said = [*fall.instant.notes, *fall.initial.notes]
     if impacts.support is not None:
         search = impacts.support.search
         if search.ended_early:
@@ -343,8 +366,4 @@ def _warnings(fall: RecordedFall, gap: AirGap, impacts: Impacts, draws: Draws | 
         ]
     if draws is not None and len(draws) < FEWEST_DRAWS:
         said.append(f"{len(draws)} draws keep to the record; {FEWEST_DRAWS} are needed for intervals")
-    said.append(
-        "an open-loop replay is one drop like the recorded one: after some contacts its force is statistics "
-        "only"
-    )
     return tuple(said)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -11,16 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError, RecordError
-from rotordrop.estimated import IdentifiedValue
-from rotordrop.estimation.tracked_impacts import Impact as Impact
-from rotordrop.estimation.tracked_impacts import tracked_impacts
-from rotordrop.estimation.tracked_values import (
-    INCONSISTENT,
-    UNSURE_GAP,
-    force_values,
-    parameter_values,
-    with_cross_check,
-)
+from rotordrop.estimation.tracked_parameters import UNSURE_GAP
 from rotordrop.identification.air_gap import STANDSTILL
 from rotordrop.identification.evidence import Evidence, read_evidence
 from rotordrop.identification.first_reach import reach_at_first_contact
@@ -45,7 +36,6 @@ from rotordrop.tracking.calibration import (
 )
 from rotordrop.tracking.consistency import DIRECTIONS, Check, consistency_checks
 from rotordrop.tracking.forces import ForceHistory, force_history
-from rotordrop.tracking.input_state import InputEstimate, input_state_estimate
 from rotordrop.tracking.problem import DropProblem, RecordedDrop, build_problem
 from rotordrop.tracking.smoother import PassSettings, Smoothed, forward
 from rotordrop.tracking.transfer import transferred
@@ -70,72 +60,6 @@ NOISE_WINDOW = 0.06
 LONG_RECORD, TAIL_SPAN = 20.0, 2.0
 """Length of a record that may hold its own settled tail, and of that tail [s]."""
 
-INCONSISTENT_WIDENING = 2.0
-"""Factor on intervals when the model is not consistent with the record [1]; those of force and stress grow
-further until they hold the cross-check as well."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class TrackedDrop:
-    """What the tracked twin says about one drop.
-
-    Attributes
-    ----------
-    record : Record
-        The recording.
-    drop_instant : DropInstant or PowerOff
-        Power-off in record time.
-    forces : ForceHistory
-        Force and stress over time with standard deviations.
-    values : dict of dict
-        Per bearing, identified values by the field names of the estimate's JSON.
-    impacts : tuple of Impact
-        Every impact.
-    checks : tuple of Check
-        Consistency of model and record.
-    consistent : bool
-        Whether all checks passed.
-    cross_check : InputEstimate or None
-        The estimate without contact law, made here when the model is not consistent with the record.
-    """
-
-    name: str
-    record: Record
-    drop_instant: DropInstant | PowerOff
-    speed: float
-    problem: DropProblem
-    smoothed: Smoothed
-    forces: ForceHistory
-    values: dict[str, dict[str, IdentifiedValue]]
-    peak_times: dict[str, float]
-    impacts: tuple[Impact, ...]
-    checks: tuple[Check, ...]
-    consistent: bool
-    noise_factor: float
-    nis: float
-    cross_check: InputEstimate | None = None
-
-    def sentence(self) -> str:
-        """The verdict on model and record."""
-        if self.consistent:
-            return "The model is consistent with the record."
-        failed = "; ".join(check.message for check in self.checks if not check.passed)
-        return f"The model is not consistent with the record: {failed}. {self._consequence()}"
-
-    def _consequence(self) -> str:
-        if self.cross_check is not None:
-            return (
-                "Intervals are widened until they hold the independent cross-check too, and a peak force "
-                "further from it than a factor of two gives way to it; the single numbers are not to be "
-                "relied on."
-            )
-        return f"Intervals are {INCONSISTENT_WIDENING:g} × as wide; no independent cross-check is possible."
-
-    @property
-    def can_be_cross_checked(self) -> bool:
-        """Whether the sensors see enough for the estimate without contact law."""
-        return _sees_all_directions(self.checks)
-
 
 @dataclass(frozen=True, kw_only=True)
 class Preparation:
@@ -154,6 +78,45 @@ class Preparation:
     def instant(self) -> DropInstant | PowerOff:
         """Power-off in record time."""
         return self.evidence.power_off
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrackedDrop:
+    """A drop that the twin has followed, with the arrays of its filter: the workshop, not the result.
+
+    Attributes
+    ----------
+    prepared : Preparation
+        The record made ready.
+    problem, smoothed : DropProblem, Smoothed
+        The estimation problem and its smoothed estimate; hundreds of megabytes.
+    forces : ForceHistory
+        Force and stress over time with standard deviations.
+    checks : tuple of Check
+        Consistency of model and record.
+    noise_factor : float
+        Size of the unknown impulses over the usual one [1].
+    drops : int
+        Number of drops that were fitted together.
+    """
+
+    prepared: Preparation
+    problem: DropProblem
+    smoothed: Smoothed
+    forces: ForceHistory
+    checks: tuple[Check, ...]
+    noise_factor: float
+    drops: int = 1
+
+    @property
+    def consistent(self) -> bool:
+        """Whether all checks passed."""
+        return all(check.passed for check in self.checks)
+
+    @property
+    def sees_all_directions(self) -> bool:
+        """Whether the sensors see enough for the estimate without contact law."""
+        return all(check.passed for check in self.checks if check.name == DIRECTIONS)
 
 
 def prepare(
@@ -243,11 +206,11 @@ def _start_gaps(problem: DropProblem, prepared: Preparation) -> None:
 
 
 def is_calibrated(machine: Machine) -> bool:
-    """Whether support and contact of every bearing are estimates, not guesses."""
+    """Whether the supports of all bearings are estimates, not guesses."""
     return all(
         quantity.status == "estimated"
         for bearing in machine.touchdown_bearings
-        for quantity in (bearing.support.stiffness, bearing.support.mass, bearing.contact.stiffness)
+        for quantity in (bearing.support.stiffness, bearing.support.mass)
     )
 
 
@@ -344,94 +307,38 @@ def best_noise_factor(problem: DropProblem, smoothed: Smoothed, stage: Stage) ->
 
 
 def tracked_drop(
-    prepared: Preparation, problem: DropProblem, smoothed: Smoothed, noise_factor: float
+    prepared: Preparation, problem: DropProblem, smoothed: Smoothed, noise_factor: float, drops: int = 1
 ) -> TrackedDrop:
-    """Forces, values, impacts and checks of one smoothed drop."""
-    checks = consistency_checks(problem, smoothed, noise_factor)
-    consistent = all(check.passed for check in checks)
-    widening = 1.0 if consistent else INCONSISTENT_WIDENING
-    forces = force_history(problem, smoothed)
-    cross_check = None
-    if not consistent and _sees_all_directions(checks):
-        cross_check = input_state_estimate(problem, smoothed)
-    if cross_check is None:
-        _refuse_unchecked(prepared.name, checks)
-    values: dict[str, dict[str, IdentifiedValue]] = {}
-    peak_times: dict[str, float] = {}
-    for b, name in enumerate(problem.model.bearing_names):
-        found = parameter_values(problem, smoothed, name, widening)
-        loads, peak_times[name] = force_values(forces, b, widening)
-        if cross_check is not None:
-            found = {field: replace(value, status=INCONSISTENT) for field, value in found.items()}
-            loads, peak_times[name] = with_cross_check(loads, peak_times[name], forces, cross_check, b)
-        values[name] = found | loads
+    """Forces and checks of one smoothed drop."""
     return TrackedDrop(
-        name=prepared.name,
-        record=prepared.record,
-        drop_instant=prepared.instant,
-        speed=float(problem.mean[problem.model.layout.rotor_speed]),
+        prepared=prepared,
         problem=problem,
         smoothed=smoothed,
-        forces=forces,
-        values=values,
-        peak_times=peak_times,
-        impacts=tracked_impacts(problem, forces, widening, cross_check),
-        checks=checks,
-        consistent=consistent,
+        forces=force_history(problem, smoothed),
+        checks=consistency_checks(problem, smoothed, noise_factor),
         noise_factor=noise_factor,
-        nis=smoothed.filtered.nis,
-        cross_check=cross_check,
+        drops=drops,
     )
 
 
-def _sees_all_directions(checks: Sequence[Check]) -> bool:
-    return all(check.passed for check in checks if check.name == DIRECTIONS)
-
-
-def _refuse_unchecked(name: str, checks: Sequence[Check]) -> None:
-    """Refuse a drop that the model does not fit and that nothing else can check: its errors have no limit."""
-    failed = [check for check in checks if not check.passed]
-    if {check.name for check in failed} <= {DIRECTIONS}:
-        return
-    raise IdentificationError(
-        f"the model does not fit the record {name} ({'; '.join(check.message for check in failed)}), and "
-        "nothing can check its force; expected a model that fits, or both directions in two planes. "
-        "Calibrate on drops with all sensors, estimate without --quick, or leave this drop out."
-    )
-
-
-def estimate_tracked(
+def followed_drops(
     machine: Machine,
-    records: Sequence[Record],
-    tails: Sequence[Record | None],
+    prepared: Sequence[Preparation],
     *,
-    names: Sequence[str] | None = None,
     quick: bool = False,
     progress: Progress | None = None,
-) -> tuple[TrackedDrop, ...]:
-    """Force and stress of recorded drops of one machine, each drop following its record.
+) -> Iterator[TrackedDrop]:
+    """Follow recorded drops of one machine, and hand them out one by one.
 
-    Parameters
-    ----------
-    machine : Machine
-        The machine, calibrated or with guesses; several drops share its parameters in one fit.
-    records, tails : sequence of Record
-        The drops and their settled tails (None where there is none).
-    names : sequence of str, optional
-        Names of the drops; file stems by default.
-    quick : bool
-        One pass instead of three; only with a calibrated machine.
-    progress : callable, optional
-        Called with a sentence and the fraction done.
+    Each is given away with its arrays, so that no more than one is kept when its result has been made.
     """
-    stems = names or [r.path.stem if r.path else f"drop_{i + 1}" for i, r in enumerate(records)]
-    prepared = [prepare(machine, r, t, n) for r, t, n in zip(records, tails, stems, strict=True)]
     tracked = track_drops(machine, prepared, quick=quick, progress=progress)
-    drops = []
-    for item, problem, smoothed, needed in zip(
-        prepared, tracked.problems, tracked.smoothed, tracked.noise_factors, strict=True
-    ):
+    count = len(prepared)
+    waiting = list(zip(prepared, tracked.problems, tracked.smoothed, tracked.noise_factors, strict=True))
+    del tracked
+    while waiting:
+        item, problem, smoothed, needed = waiting.pop(0)
         factor = 1.0 if quick else best_noise_factor(problem, smoothed, FINE_SCHEDULE[-1])
         factor = max(factor, needed) if needed > 1.0 else factor
-        drops.append(tracked_drop(item, problem, smoothed, factor))
-    return tuple(drops)
+        yield tracked_drop(item, problem, smoothed, factor, count)
+        del problem, smoothed

@@ -389,7 +389,7 @@ def identified_values(
         value = unknown.value_of(mean)
         values[unknown.path] = IdentifiedValue(
             value=value,
-            status="prior" if given else _verdict(at_bound, error, unknown.sigma),
+            status="taken over" if given else _verdict(at_bound, error, unknown.sigma),
             standard_error=unknown.standard_error(mean, error),
             interval_90=(unknown.value_of(mean - NINETY * error), unknown.value_of(mean + NINETY * error)),
             start=unknown.value_of(unknown.begin),

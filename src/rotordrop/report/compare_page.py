@@ -10,9 +10,7 @@ from rotordrop.errors import UsageError
 from rotordrop.report.compared_drop import NUMBERS, ComparedDrop, left_out
 from rotordrop.report.comparison import comparison_figure
 from rotordrop.report.content import Cell, Figure, ReportContent, Section, Statement, Table
-from rotordrop.report.first_contact import first_contacts_figure
 from rotordrop.report.quantity import Quantity
-from rotordrop.report.stress_box import stress_box_figure, stress_table
 from rotordrop.severity.ranking import DropSeverity, Ranking, rank_drops
 
 RANKED = ("peak_force_N", "peak_stress_Pa")
@@ -36,21 +34,6 @@ def compare_page(
         Standard deviation between equal drops by name of the number (``"peak_force_N"`` [N], …).
     """
     bearings = _bearings(drops)
-    sections = [_number_section(drops, bearings, drop_scatter or {})]
-    boxes = [box for drop in drops for box in drop.boxes]
-    if boxes:
-        figure = Figure(
-            chart=stress_box_figure(boxes),
-            caption="Distribution of the stress; dashed in the box: mean (Neisi 2020, Fig. 16).",
-        )
-        sections.append(Section(heading="Hertz stress", figures=(figure,), tables=(stress_table(boxes),)))
-    overlaid = [drop.first_contact for drop in drops if drop.first_contact is not None]
-    if overlaid:
-        figure = Figure(
-            chart=first_contacts_figure(overlaid, bearings),
-            caption="First contacts of all drops; solid simulated, dashed measured (Neisi 2020, Fig. 11).",
-        )
-        sections.append(Section(heading="First contact", figures=(figure,)))
     return ReportContent(
         title=f"Comparison of {len(drops)} drops" + (f" of {machine_name}" if machine_name else ""),
         subtitle=", ".join(drop.name for drop in drops),
@@ -58,7 +41,7 @@ def compare_page(
         verdict=_verdict(drops, bearings, drop_scatter or {}),
         summary=tuple(_number_table(drops, bearing) for bearing in bearings),
         facts=(("rotordrop", __version__),),
-        sections=tuple(sections),
+        sections=(_number_section(drops, bearings, drop_scatter or {}),),
     )
 
 

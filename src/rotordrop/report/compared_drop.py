@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from rotordrop.errors import UsageError
-from rotordrop.report.first_contact import OverlaidDrop
 from rotordrop.report.quantity import Quantity
-from rotordrop.report.stress_box import StressBox
 
 NUMBERS = (
     ("peak_force_N", "peak bearing force", "force"),
@@ -43,10 +41,6 @@ class ComparedDrop:
         SHA-256 of the recording, to know a drop that is given twice.
     simulated : bool
         Whether the record is known to be simulated.
-    boxes : tuple of StressBox
-        Distribution of the stress by bearing, where the histories are at hand.
-    first_contact : OverlaidDrop, optional
-        Vertical displacement, where the histories are at hand.
     """
 
     name: str
@@ -57,8 +51,6 @@ class ComparedDrop:
     method: str = ""
     record: str = ""
     simulated: bool = False
-    boxes: tuple[StressBox, ...] = field(default=())
-    first_contact: OverlaidDrop | None = None
 
     @classmethod
     def of_document(cls, name: str, document: Mapping[str, Any], *, simulated: bool = False) -> ComparedDrop:

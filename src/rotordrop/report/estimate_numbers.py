@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 from pathlib import Path
 
 from rotordrop.estimated import IdentifiedValue
-from rotordrop.model.parameter import Parameter, Role
+from rotordrop.estimation.bearing_drop import BearingDrop, Origin
+from rotordrop.model.parameter import Role
 from rotordrop.model.parameter_table import LOADS, published
 from rotordrop.report.content import Card, Cell, KeyFigure, Table
 from rotordrop.report.quantity import Quantity
-
-Values = Mapping[str, IdentifiedValue]
 
 MEANS = (
     "A mean force is the mean of the magnitude; the magnitude of the mean force would be smaller where its "
@@ -21,51 +19,62 @@ MEANS = (
 """What the mean numbers of an estimate are means of."""
 
 
-def headline_card(bearing: str, values: Values, peak_times: Mapping[str, float]) -> Card:
-    """Headline numbers of one bearing, peaks first, with the time of a peak where it is known.
+def headline_card(bearing: BearingDrop, *, certain: bool = True) -> Card:
+    """Headline numbers of one bearing, peaks first, each with its time, or the reason why it is missing.
 
     Parameters
     ----------
-    bearing : str
-        Name of the bearing.
-    values : mapping
-        Identified values by the field names of the estimate's JSON.
-    peak_times : mapping
-        Time [s] of the peaks by field name.
+    bearing : BearingDrop
+        The bearing.
+    certain : bool
+        Whether single numbers hold; else only ranges are shown.
     """
+    known: dict[str, IdentifiedValue] = {
+        **bearing.values,
+        "peak_force_N": bearing.peak_force.known,
+        "peak_stress_Pa": bearing.peak_stress.known,
+    }
+    times = {"peak_force_N": bearing.peak_force.time, "peak_stress_Pa": bearing.peak_stress.time}
     figures = []
     for load in LOADS:
-        if load.field not in values:
+        field, label = load.field, f"{load.label[0].upper()}{load.label[1:]}"
+        reason = bearing.missing.get(field, "")
+        if field not in known and not reason:
             continue
-        value = Quantity.of(values[load.field], load.kind)
-        note = "" if value.interval_90 or not value.status else f"no interval: {value.status}"
-        if load.field in peak_times:
-            moment = Quantity(value=peak_times[load.field], kind="time", digits=3).text
-            note = f"at {moment}{f'; {note}' if note else ''}"
-        figures.append(KeyFigure(label=f"{load.label[0].upper()}{load.label[1:]}", value=value, note=note))
-    return Card(title=f"{bearing} touchdown bearing", figures=tuple(figures))
+        value = Quantity.of(known.get(field), load.kind, range_only=not certain)
+        words = [reason]
+        if field in times and certain:
+            words.insert(0, f"at {Quantity(value=times[field], kind='time', digits=3).text}")
+        note = "; ".join(word for word in words if word)
+        figures.append(KeyFigure(label=label if certain else f"{label}, range", value=value, note=note))
+    origin = bearing.peak_force.origin
+    source = f", by the {origin.value}" if origin is Origin.CROSS_CHECK else ""
+    return Card(title=f"{bearing.name} touchdown bearing{source}", figures=tuple(figures))
 
 
-def identified_table(bearings: Mapping[str, Values], *, taken_over: str = "") -> Table:
+def identified_table(bearings: Sequence[BearingDrop], *, taken_over: str = "", certain: bool = True) -> Table:
     """Identified values of every bearing side by side, each with its interval and verdict.
 
     Parameters
     ----------
-    bearings : mapping
-        Identified values of every bearing.
+    bearings : sequence of BearingDrop
+        The drop.
     taken_over : str
         File from which supports and friction were taken over; empty when they were identified.
+    certain : bool
+        Whether single numbers hold; else only ranges are shown.
     """
     rows: list[tuple[Cell, ...]] = []
     for row in published().values():
         sought = row.role in (Role.SOUGHT, Role.DERIVED)
-        if sought and any(row.field in values for values in bearings.values()):
+        if sought and any(row.field in bearing.values for bearing in bearings):
             cells: list[Cell] = []
-            for values in bearings.values():
-                value = values.get(row.field)
-                cells += [Quantity.of(value, row.display_kind), _status(row, value, taken_over)]
+            for bearing in bearings:
+                value = bearing.values.get(row.field)
+                shown = Quantity.of(value, row.display_kind, range_only=not certain)
+                cells += [shown, _status(value, taken_over)]
             rows.append((row.label, *cells))
-    columns = [text for bearing in bearings for text in (bearing, f"{bearing}: verdict")]
+    columns = [text for bearing in bearings for text in (bearing.name, f"{bearing.name}: verdict")]
     return Table(
         columns=("identified", *columns),
         rows=tuple(rows),
@@ -74,16 +83,9 @@ def identified_table(bearings: Mapping[str, Values], *, taken_over: str = "") ->
     )
 
 
-def _status(row: Parameter, value: IdentifiedValue | None, taken_over: str) -> str:
+def _status(value: IdentifiedValue | None, taken_over: str) -> str:
     if value is None:
         return "not estimated"
-    if taken_over and value.status == "prior" and row.taken_over != "no":
+    if taken_over and value.status == "taken over":
         return f"taken over from {Path(taken_over).name}"
     return value.status
-
-
-def half_width(value: IdentifiedValue) -> float:
-    """Half width of the 90 % interval relative to the value [1]; NaN without an interval."""
-    if value.interval_90 is None or not value.value:
-        return math.nan
-    return 0.5 * (value.interval_90[1] - value.interval_90[0]) / abs(value.value)

@@ -4,91 +4,44 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import plotly.graph_objects as go
 
+from rotordrop.estimation.bearing_drop import BearingDrop, Impact
 from rotordrop.report.content import Table
 from rotordrop.report.quantity import Quantity
 from rotordrop.report.style import axis_title, panels, single
-from rotordrop.simulation.result import ContactLog
 
 LISTED = 24
-CONTACT_FORCE = "contact force"
-LATE, EARLY = "#cfe2f5", "#0b3d73"
+LATE, EARLY, INTERVAL = "#9cc3e8", "#0b3d73", "#7a8896"
 
 
-@dataclass(frozen=True, kw_only=True)
-class Impact:
-    """One impact; every number with its interval where one is known.
-
-    Attributes
-    ----------
-    bearing : str
-        Name of the bearing.
-    time, duration : Quantity
-        Time of the peak from power-off and length of the contact [s].
-    azimuth : Quantity
-        Direction from the race's centre to the rotor [rad ccw from +x]; −90° is the bottom.
-    peak_force, impulse, dissipated_energy : Quantity
-        Peak normal force or ball force [N], normal impulse [N s], energy lost in contact and friction [J].
-    """
-
-    bearing: str
-    time: Quantity
-    duration: Quantity
-    azimuth: Quantity
-    peak_force: Quantity
-    impulse: Quantity
-    dissipated_energy: Quantity
-
-
-def impacts_of(contacts: ContactLog, bearing_names: Sequence[str]) -> tuple[Impact, ...]:
-    """List the contacts of a simulated drop as impacts, bearing by bearing, without intervals."""
-    return tuple(
-        Impact(
-            bearing=bearing_names[int(contacts.bearing[i])],
-            time=Quantity(value=float(contacts.peak_time[i]), kind="time"),
-            duration=Quantity(value=float(contacts.duration[i]), kind="time", digits=3),
-            azimuth=Quantity(value=_signed(float(contacts.azimuth[i])), kind="angle", digits=3),
-            peak_force=Quantity(value=float(contacts.peak_force[i]), kind="force"),
-            impulse=Quantity(value=float(contacts.impulse[i]), kind="impulse", digits=3),
-            dissipated_energy=Quantity(value=float(contacts.dissipated_energy[i]), kind="energy", digits=3),
-        )
-        for i in np.argsort(contacts.bearing, kind="stable")
-    )
-
-
-def _signed(angle: float) -> float:
-    """Angle brought to −π … π."""
-    return float(np.angle(np.exp(1j * angle)))
-
-
-def impact_table(impacts: Sequence[Impact], *, force: str = CONTACT_FORCE, listed: int = LISTED) -> Table:
+def impact_table(bearings: Sequence[BearingDrop], *, force: str, listed: int = LISTED) -> Table:
     """List the strongest impacts in the order of time.
 
     Parameters
     ----------
-    impacts : sequence of Impact
-        All impacts of the drop.
+    bearings : sequence of BearingDrop
+        The drop.
     force : str
         Name of the force whose peak is stated.
     listed : int
         Number of impacts in the table; the strongest are kept.
     """
-    strongest = sorted(impacts, key=lambda impact: -impact.peak_force.value)[:listed]
+    impacts = [(bearing.name, impact) for bearing in bearings for impact in bearing.impacts]
+    strongest = sorted(impacts, key=lambda item: -item[1].peak_force.value)[:listed]
     rows = tuple(
         (
-            impact.bearing,
-            impact.time,
-            impact.azimuth,
-            impact.peak_force,
-            impact.impulse,
-            impact.dissipated_energy,
-            impact.duration,
+            name,
+            Quantity(value=impact.peak_time, kind="time"),
+            Quantity(value=impact.azimuth, kind="angle", digits=3),
+            Quantity.of(impact.peak_force, "force"),
+            Quantity.of(impact.impulse, "impulse", digits=3),
+            Quantity.of(impact.dissipated_energy, "energy", digits=3),
+            Quantity(value=impact.end - impact.start, kind="time", digits=3),
         )
-        for impact in sorted(strongest, key=lambda impact: impact.time.value)
+        for name, impact in sorted(strongest, key=lambda item: item[1].peak_time)
     )
     left_out = len(impacts) - len(rows)
     rest = f" {left_out} weaker ones are left out." if left_out else ""
@@ -113,15 +66,15 @@ def tick_spacing(span: float) -> float:
     return next((step for step in (15.0, 30.0, 45.0) if math.degrees(span) <= 6.0 * step), 90.0)
 
 
-def impact_figure(impacts: Sequence[Impact], *, force: str = CONTACT_FORCE) -> go.Figure:
+def impact_figure(bearings: Sequence[BearingDrop], *, force: str) -> go.Figure:
     """Draw the peak force of every impact over its azimuth, the earlier the darker, with known intervals."""
-    bearings = list(dict.fromkeys(impact.bearing for impact in impacts))
-    figure = panels(bearings, height=310)
-    latest = max(impact.time.value for impact in impacts)
+    figure = panels([bearing.name for bearing in bearings], height=310)
+    impacts = [impact for bearing in bearings for impact in bearing.impacts]
+    latest = max(impact.peak_time for impact in impacts)
     for column, bearing in enumerate(bearings, start=1):
-        _add_impacts(figure, [impact for impact in impacts if impact.bearing == bearing], column, latest)
+        _add_impacts(figure, bearing.impacts, column)
     figure.update_xaxes(title_text=axis_title("azimuth from +x, −90° at the bottom", "°"))
-    figure.update_xaxes(tick0=0, dtick=tick_spacing(np.ptp([impact.azimuth.value for impact in impacts])))
+    figure.update_xaxes(tick0=0, dtick=tick_spacing(np.ptp([impact.azimuth for impact in impacts])))
     figure.update_yaxes(title_text=axis_title(f"peak {force}", "N"), col=1)
     figure.update_yaxes(rangemode="tozero")
     figure.update_layout(
@@ -139,9 +92,9 @@ def impact_figure(impacts: Sequence[Impact], *, force: str = CONTACT_FORCE) -> g
     return figure
 
 
-def _add_impacts(figure: go.Figure, impacts: Sequence[Impact], column: int, latest: float) -> None:
+def _add_impacts(figure: go.Figure, impacts: Sequence[Impact], column: int) -> None:
     force = np.array([impact.peak_force.value for impact in impacts])
-    time = np.array([1e3 * impact.time.value for impact in impacts])
+    time = np.array([1e3 * impact.peak_time for impact in impacts])
     limits = np.array([impact.peak_force.interval_90 or (np.nan, np.nan) for impact in impacts]).reshape(
         -1, 2
     )
@@ -153,11 +106,12 @@ def _add_impacts(figure: go.Figure, impacts: Sequence[Impact], column: int, late
         "arrayminus": single(np.where(known, force - limits[:, 0], 0.0)),
         "thickness": 1,
         "width": 3,
+        "color": INTERVAL,  # else it would be taken from the marker's, which is a row of numbers
         "visible": bool(known.any()),
     }
     figure.add_trace(
         go.Scatter(
-            x=single(np.degrees([impact.azimuth.value for impact in impacts])),
+            x=single(np.degrees([impact.azimuth for impact in impacts])),
             y=single(force),
             error_y=error,
             mode="markers",

@@ -9,7 +9,7 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 
 from rotordrop.estimated import NINETY
-from rotordrop.report.history import History
+from rotordrop.estimation.bearing_drop import History
 from rotordrop.report.style import (
     LIMIT,
     MICRO,

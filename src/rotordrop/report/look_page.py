@@ -6,12 +6,20 @@ from math import degrees
 from typing import TYPE_CHECKING
 
 from rotordrop._version import __version__
-from rotordrop.report.content import Card, KeyFigure, ReportContent, Section, Statement, Table
-from rotordrop.report.history import AirGap, BearingMotions, Motion
+from rotordrop.estimation.bearing_drop import AirGap, BearingMotions, Motion
+from rotordrop.measurement.simulated import is_simulated
+from rotordrop.report.content import (
+    SIMULATED_RECORD,
+    Card,
+    KeyFigure,
+    ReportContent,
+    Section,
+    Statement,
+    Table,
+)
+from rotordrop.report.drop_sections import motion_section, orbit_section
 from rotordrop.report.quantity import Quantity
 from rotordrop.report.record_quality import quality_statements, record_quality_section
-from rotordrop.report.sections import motion_section, orbit_section
-from rotordrop.report.simulated_record import simulated_notice
 
 if TYPE_CHECKING:
     from rotordrop.measurement.look import Look
@@ -36,7 +44,7 @@ def look_page(seen: Look, *, drawn: bool = True) -> ReportContent:
         title=f"A look at {record.name}",
         subtitle=f"{len(seen.drops)} drop{'s' if len(seen.drops) > 1 else ''}{speed}",
         facts=_facts(seen),
-        simulated=simulated_notice(record),
+        simulated=SIMULATED_RECORD if is_simulated(record) else "",
         verdict=(*_verdict(seen), *quality_statements(seen.findings)),
         cards=tuple(_card(seen, number) for number in range(len(seen.planes))),
         summary=(_timeline(seen),),
@@ -127,7 +135,7 @@ def _figures(seen: Look) -> tuple[Section, ...]:
     time = seen.motion.time - start
     bearings = [
         BearingMotions(
-            bearing=path.name,
+            name=path.name,
             motions=(Motion(label="measured", time=time, displacement=path.position, role="measured"),),
             air_gap=AirGap.of(path.gap),
         )

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import plotly.graph_objects as go
 
+from rotordrop.estimation.bearing_drop import BearingDrop, BearingMotions, Motion
 from rotordrop.report.decimation import peak_indices
-from rotordrop.report.history import BearingMotions, Motion
 from rotordrop.report.style import (
     LIMIT,
     MICRO,
@@ -25,12 +25,12 @@ CIRCLE = np.linspace(0.0, 2.0 * np.pi, 181)
 ORBIT_BLOCKS = 450
 
 
-def orbit_figure(bearings: Sequence[BearingMotions]) -> go.Figure:
+def orbit_figure(bearings: Sequence[BearingMotions | BearingDrop]) -> go.Figure:
     """Draw the path of the rotor centre in each bearing inside its clearance circle (Neisi 2020, Fig. 12).
 
     Parameters
     ----------
-    bearings : sequence of BearingMotions
+    bearings : sequence of BearingDrop
         Motions to lay over each other, for example measured and simulated; the circle is the upper air gap.
 
     Returns
@@ -38,7 +38,7 @@ def orbit_figure(bearings: Sequence[BearingMotions]) -> go.Figure:
     Figure
         One panel per bearing in µm, x to the right and y up as seen from the last bearing, same scale.
     """
-    figure = panels([b.bearing for b in bearings], height=470, spacing=0.12)
+    figure = panels([b.name for b in bearings], height=470, spacing=0.12)
     for column, bearing in enumerate(bearings, start=1):
         for motion in bearing.motions:
             _add_orbit(figure, motion, column)
@@ -73,13 +73,13 @@ def _add_orbit(figure: go.Figure, motion: Motion, column: int) -> None:
     )
 
 
-def _reach(bearing: BearingMotions) -> float:
+def _reach(bearing: BearingMotions | BearingDrop) -> float:
     """Half width of the panel [µm]: a little more than the circle and every motion."""
     radii = [float(np.nanmax(np.abs(motion.displacement))) for motion in bearing.motions]
     return 1.08 * MICRO * max([*radii, bearing.air_gap.upper if bearing.air_gap else 0.0])
 
 
-def _add_circle(figure: go.Figure, bearing: BearingMotions, column: int) -> None:
+def _add_circle(figure: go.Figure, bearing: BearingMotions | BearingDrop, column: int) -> None:
     if bearing.air_gap is None:
         return
     gap = bearing.air_gap

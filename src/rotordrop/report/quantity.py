@@ -54,6 +54,8 @@ class Quantity:
         Verdict or reason, for example why there is no interval.
     digits : int
         Significant digits when no interval says how many are meant.
+    range_only : bool
+        Show the interval in place of the value, where a single number would say too much.
     """
 
     value: float
@@ -64,6 +66,7 @@ class Quantity:
     upper: float | None = None
     status: str = ""
     digits: int = 4
+    range_only: bool = False
 
     def __post_init__(self) -> None:
         if self.kind not in DISPLAY and self.kind not in KINDS:
@@ -72,7 +75,14 @@ class Quantity:
             )
 
     @classmethod
-    def of(cls, known: Estimated | IdentifiedValue | float | None, kind: str, digits: int = 4) -> Quantity:
+    def of(
+        cls,
+        known: Estimated | IdentifiedValue | float | None,
+        kind: str,
+        digits: int = 4,
+        *,
+        range_only: bool = False,
+    ) -> Quantity:
         """Take over a value of a machine or an identification with all that is known about it."""
         if known is None or isinstance(known, int | float):
             return cls(value=math.nan if known is None else float(known), kind=kind, digits=digits)
@@ -85,6 +95,7 @@ class Quantity:
             upper=known.upper,
             status=known.status,
             digits=digits,
+            range_only=range_only,
         )
 
     @property
@@ -99,7 +110,9 @@ class Quantity:
 
     @property
     def text(self) -> str:
-        """Number and unit; a speed in Hz and rpm."""
+        """Number and unit; a speed in Hz and rpm; the range where only that is to be shown."""
+        if self.range_only:
+            return self._range() if self.interval_90 is not None else "–"
         if self.kind == "speed" and math.isfinite(self.value):
             turns = self.value / (2 * math.pi)
             rpm = written(60 * turns, max(0, 3 - _magnitude(60 * turns)))
@@ -109,8 +122,10 @@ class Quantity:
     @property
     def interval_text(self) -> str:
         """The 90 % interval or else the limits in words; empty when neither is known."""
+        if self.range_only:
+            return ""
         if self.interval_90 is not None:
-            return self._with_unit(" to ".join(self._at(limit) for limit in self.interval_90))
+            return self._range()
         if self.lower is not None and self.upper is not None:
             return "limits " + self._with_unit(f"{self._at(self.lower)} to {self._at(self.upper)}")
         if self.standard_error is not None:
@@ -120,6 +135,9 @@ class Quantity:
                 + " (standard error)"
             )
         return ""
+
+    def _range(self) -> str:
+        return self._with_unit(" to ".join(self._at(limit) for limit in self.interval_90 or ()))
 
     def _at(self, value: float) -> str:
         return written(self._shown(value), self._places())

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rotordrop.report.content import Table
 from rotordrop.report.quantity import Quantity
 from rotordrop.report.style import SERIES, axis_title, panels, plain, single
-from rotordrop.severity.statistics import StressStatistics, stress_statistics
+from rotordrop.severity.statistics import StressStatistics
 
 Array = NDArray[np.float64]
 
@@ -42,8 +42,8 @@ class StressBox:
     outliers: Array
 
 
-def stress_box(label: str, bearing: str, stress: Array, preload_stress: float | None = None) -> StressBox:
-    """Take the statistics of a stress history, with its outliers to draw.
+def stress_box(label: str, bearing: str, stress: Array, statistics: StressStatistics) -> StressBox:
+    """Take the statistics of a stress history (T,) [Pa], with its outliers to draw.
 
     Parameters
     ----------
@@ -53,10 +53,9 @@ def stress_box(label: str, bearing: str, stress: Array, preload_stress: float | 
         Name of the bearing.
     stress : ndarray, shape (T,)
         Stress at equidistant times [Pa].
-    preload_stress : float, optional
-        Stress of the preload alone [Pa].
+    statistics : StressStatistics
+        Its statistics, as they are stated.
     """
-    statistics = stress_statistics(stress, preload_stress=preload_stress)
     beyond = (stress < statistics.lower_whisker) | (stress > statistics.upper_whisker)
     return StressBox(label=label, bearing=bearing, statistics=statistics, outliers=np.asarray(stress)[beyond])
 
@@ -80,7 +79,8 @@ def stress_box_figure(boxes: Sequence[StressBox]) -> go.Figure:
         for index, box in enumerate(box for box in boxes if box.bearing == bearing):
             _add_box(figure, box, column, SERIES[index % len(SERIES)])
     figure.update_yaxes(title_text=axis_title("max. Hertz stress", "MPa"), col=1)
-    figure.update_yaxes(matches="y")
+    for column in range(2, len(bearings) + 1):  # an axis that matches itself would be ignored
+        figure.layout[f"yaxis{column}"].matches = "y"
     drops = max(sum(box.bearing == bearing for box in boxes) for bearing in bearings)
     margin = max(0.6, 1.6 - 0.4 * drops)
     figure.update_xaxes(

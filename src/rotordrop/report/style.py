@@ -11,8 +11,8 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
+from rotordrop.estimation.bearing_drop import AirGap, Band, History, Role
 from rotordrop.report.decimation import block_envelope, peak_indices
-from rotordrop.report.history import AirGap, Band, History, Role
 
 Array = NDArray[np.float64]
 

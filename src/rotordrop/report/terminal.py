@@ -52,11 +52,12 @@ def _parts(content: ReportContent) -> list[RenderableType]:
         parts.append(Text(_safe(content.subtitle), style="dim"))
     if content.simulated:
         parts.append(Text(_safe(content.simulated), style="yellow"))
-    bad = [statement for statement in content.verdict if statement.level == "bad"]
-    parts.extend(_statement(statement) for statement in bad)
+    first = [s for s in content.verdict[:1] if s.level != "bad"]
+    first += [s for s in content.verdict if s.level == "bad"]
+    parts.extend(_statement(statement) for statement in first)
     if content.cards:
         parts.append(_cards(content))
-    parts.extend(_statement(statement) for statement in content.verdict if statement.level != "bad")
+    parts.extend(_statement(statement) for statement in content.verdict if statement not in first)
     parts.extend(_table(table) for table in content.summary)
     return parts
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.errors import IdentificationError
 from rotordrop.model import layout as L
 from rotordrop.model.layout import KernelParameters
 from rotordrop.physics._compile import kernel
@@ -16,7 +17,7 @@ from rotordrop.simulation._rhs import race_deflection
 from rotordrop.tracking import _propagation as P
 from rotordrop.tracking._filter import LARGEST_DEFLECTION
 from rotordrop.tracking.problem import DropProblem, private_copy
-from rotordrop.tracking.smoother import Smoothed, parameter_sample
+from rotordrop.tracking.smoother import Smoothed
 
 Array = NDArray[np.float64]
 
@@ -157,17 +158,15 @@ def force_history(problem: DropProblem, smoothed: Smoothed) -> ForceHistory:
     )
 
 
-def stress_at_force(problem: DropProblem, smoothed: Smoothed, b: int, force: Array) -> float:
+def stress_at_force(problem: DropProblem, theta: Array, b: int, force: Array) -> float:
     """Largest Hertz stress [Pa] at the inner race of bearing ``b`` under a static force (2,) [N].
 
-    The preload is the one estimated shortly after the first contacts; the deflection is along the force.
+    The preload is that of the parameters ``theta`` (P,); the deflection is along the force.
     """
     from scipy.optimize import brentq
 
     p = private_copy(problem.model.parameters)
-    P.apply_parameters(
-        smoothed.means[parameter_sample(smoothed)][problem.parameter_slice], problem.targets, p
-    )
+    P.apply_parameters(np.asarray(theta, dtype=np.float64).copy(), problem.targets, p)
     size = float(np.hypot(force[0], force[1]))
     along = np.asarray(force) / max(size, 1e-300)
     work, out = np.empty((2, p.balls.shape[2])), np.empty(N_VALUES)
@@ -178,7 +177,15 @@ def stress_at_force(problem: DropProblem, smoothed: Smoothed, b: int, force: Arr
         )
         return float(out[FORCE]) - size
 
-    brentq(lacking, 0.0, LARGEST_DEFLECTION, xtol=1e-12)
+    if lacking(0.0) >= 0.0:  # no force beyond the rounding of the preload's balance
+        return float(out[STRESS])
+    if lacking(LARGEST_DEFLECTION) < 0.0:
+        raise IdentificationError(
+            f"{problem.model.bearing_names[b]}: a bearing force of {size:.0f} N was found, which deflects "
+            f"its race by more than {1e3 * LARGEST_DEFLECTION:.1f} mm; expected less. The record and the "
+            "machine do not belong together, or a sensor is wrong; check units, sensors and bearing data."
+        )
+    lacking(brentq(lacking, 0.0, LARGEST_DEFLECTION, xtol=1e-12))  # leaves the stress at the root in `out`
     return float(out[STRESS])
 
 

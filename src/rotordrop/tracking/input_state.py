@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rotordrop.model.parameters import DropModel
 from rotordrop.tracking.forces import stress_at_force
 from rotordrop.tracking.problem import DropProblem
-from rotordrop.tracking.smoother import Smoothed
+from rotordrop.tracking.smoother import Smoothed, parameter_sample
 
 Array = NDArray[np.float64]
 
@@ -24,6 +24,8 @@ GATE_MARGIN = 10e-6
 GATE_SIGMA = 3.0
 BASE_RATE = 3e5
 RATE_PER_FORCE = 3e3
+STRESS_POINTS = 41
+"""Forces at which the stress of a bearing is computed; between them by straight lines."""
 KNOWN_PEAK_ERROR = 0.15
 """Relative error of the largest peak that this estimate is known to make at worst [1]."""
 KNOWN_STRESS_ERROR = 0.05
@@ -46,8 +48,10 @@ class InputEstimate:
         Its magnitude [N].
     peak : ndarray, shape (B,)
         Largest magnitude [N].
+    stress : ndarray, shape (N, B)
+        Largest Hertz stress that this force gives in the bearing at rest [Pa].
     peak_stress : ndarray, shape (B,)
-        Largest Hertz stress that this force gives in the bearing as the twin has it [Pa].
+        Its largest value [Pa].
     mean_late : ndarray, shape (B,)
         Magnitude of the mean force vector between 0.15 and 0.2 s [N]; NaN when the record is shorter.
     mean_magnitude_late : ndarray, shape (B,)
@@ -58,22 +62,107 @@ class InputEstimate:
     force: Array
     magnitude: Array
     peak: Array
+    stress: Array
     peak_stress: Array
     mean_late: Array
     mean_magnitude_late: Array
 
 
-def input_state_estimate(problem: DropProblem, smoothed: Smoothed) -> InputEstimate:
+@dataclass(frozen=True, kw_only=True)
+class Lent:
+    """What the cross-check has to be told; N samples, B bearings, C channels.
+
+    Attributes
+    ----------
+    gain_errors, offsets : ndarray, shape (C,)
+        Errors of the readings [1], [m].
+    radius : ndarray, shape (N, B)
+        Distance of rotor and race [m]; NaN where it is not known.
+    reach : ndarray, shape (B,)
+        Distance below which rotor and race cannot touch [m].
+    theta : ndarray, shape (P,)
+        Parameters of the drop model, of which the stress takes the preload.
+    """
+
+    gain_errors: Array
+    offsets: Array
+    radius: Array
+    reach: Array
+    theta: Array
+
+
+def lent_by_twin(problem: DropProblem, smoothed: Smoothed) -> Lent:
+    """What a twin that follows its record knows of sensors, gaps and preload, and where it saw the rotor."""
+    radius, gaps = _radius_and_gap(problem, smoothed)
+    gain_errors, offsets = problem.sensor_errors(smoothed.means[-1])
+    return Lent(
+        gain_errors=gain_errors,
+        offsets=offsets,
+        radius=radius,
+        reach=gaps - GATE_MARGIN,
+        theta=smoothed.means[parameter_sample(smoothed)][problem.parameter_slice],
+    )
+
+
+def lent_by_record(problem: DropProblem) -> Lent:
+    """What settled tail and machine file say alone, for a twin that has lost its record.
+
+    The rotor counts as clear of a race only where it is so by twice the error of gap and sensors: a gate that
+    closes during a contact would take force away, one that opens too early only lets a little noise in.
+    """
+    gain_errors, offsets = problem.sensor_errors(problem.mean)
+    entries = problem.gap_entries
+    variance = np.diag(problem.covariance)
+    first = problem.n_dynamic + len(problem.unknowns) + problem.n_channels
+    zero = float(np.max(variance[first : first + problem.n_channels]))
+    margin = GATE_MARGIN + 2.0 * np.sqrt(variance[entries] + zero)
+    motion = at_bearings(problem, (problem.readings - offsets) / (1.0 + gain_errors))
+    return Lent(
+        gain_errors=gain_errors,
+        offsets=offsets,
+        radius=np.hypot(motion[..., 0], motion[..., 1]),
+        reach=problem.mean[entries] - margin,
+        theta=problem.mean[problem.parameter_slice],
+    )
+
+
+def at_bearings(problem: DropProblem, along: Array) -> Array:
+    """Rotor at the bearings [m], shape (N, B, 2), on the straight line through its sensors.
+
+    Parameters
+    ----------
+    problem : DropProblem
+        Knows where sensors and bearings are.
+    along : ndarray, shape (N, C)
+        Displacement along every sensor [m], its gain and offset taken out; a sample that lacks a channel
+        gives NaN, a channel that is never there is left out.
+    """
+    layout, rigid = problem.model.layout, slice(0, problem.model.basis.n_rigid)
+    rows = problem.sensor_rows
+    design = np.hstack([rows[:, layout.modal_x][:, rigid], rows[:, layout.modal_y][:, rigid]])
+    heard = np.isfinite(along).any(axis=0)
+    amplitudes = along[:, heard] @ np.linalg.pinv(design[heard]).T
+    shapes = problem.model.parameters.bearing_shape[:, rigid]
+    half = shapes.shape[1]
+    return np.stack([amplitudes[:, :half] @ shapes.T, amplitudes[:, half:] @ shapes.T], axis=-1)
+
+
+def input_state_estimate(problem: DropProblem, lent: Lent) -> InputEstimate:
     """Joint estimate of motion and bearing forces from the readings, by a linear filter and smoother.
 
-    The tracked twin lends gains, offsets, air gaps and the radius that gates; no contact, friction or
-    support enters. The stress takes the ball bearing, its preload included, from the twin. Both directions
-    must be seen in two planes: with less, the rotor model alone does not bound the forces.
+    No contact, friction or support enters. Both directions must be seen in two planes: with less, the rotor
+    model alone does not bound the forces.
+
+    Parameters
+    ----------
+    problem : DropProblem
+        Readings and rotor.
+    lent : Lent
+        Sensor errors, air gaps and preload, from the twin or from the record alone.
     """
-    count = len(smoothed.means)
-    radius, gaps = _radius_and_gap(problem, smoothed)
-    gate = radius < gaps - GATE_MARGIN
-    readings = _corrected(problem, smoothed)[:count]
+    count = len(lent.radius)
+    gate = lent.radius < lent.reach
+    readings = ((problem.readings - lent.offsets) / (1.0 + lent.gain_errors))[:count]
     scale = np.full((count, gate.shape[1]), BASE_RATE)
     force = _smooth_forces(problem, readings, gate, scale)
     local = _running_maximum(np.hypot(force[..., 0], force[..., 1]), 10)
@@ -83,14 +172,14 @@ def input_state_estimate(problem: DropProblem, smoothed: Smoothed) -> InputEstim
     late = time >= 0.15
     unknown = np.full(force.shape[1], np.nan)
     whole = time[-1] > 0.199
-    at = magnitude.argmax(axis=0)
-    stress = [stress_at_force(problem, smoothed, b, force[i, b]) for b, i in enumerate(at)]
+    stress = np.column_stack([_stress(problem, lent.theta, b, force[:, b]) for b in range(force.shape[1])])
     return InputEstimate(
         time=time,
         force=force,
         magnitude=magnitude,
         peak=magnitude.max(axis=0),
-        peak_stress=np.array(stress),
+        stress=stress,
+        peak_stress=stress.max(axis=0),
         mean_late=np.hypot(*force[late].mean(axis=0).T) if whole else unknown,
         mean_magnitude_late=magnitude[late].mean(axis=0) if whole else unknown,
     )
@@ -102,22 +191,19 @@ def _radius_and_gap(problem: DropProblem, smoothed: Smoothed) -> tuple[Array, Ar
     x = smoothed.means[:, layout.modal_x] @ shapes.T
     y = smoothed.means[:, layout.modal_y] @ shapes.T
     race = smoothed.means[:, layout.race].reshape(len(x), -1, 2)
-    gaps = np.array(
-        [
-            smoothed.means[0][problem.n_dynamic + k]
-            for name in problem.model.bearing_names
-            for k, unknown in enumerate(problem.unknowns)
-            if unknown.path == f"{name}.air_gap"
-        ]
-    )
-    return np.hypot(x - race[..., 0], y - race[..., 1]), gaps
+    return np.hypot(x - race[..., 0], y - race[..., 1]), smoothed.means[0][problem.gap_entries]
 
 
-def _corrected(problem: DropProblem, smoothed: Smoothed) -> Array:
-    first, n_c = problem.n_dynamic + len(problem.unknowns), problem.n_channels
-    gain = smoothed.means[-1][first : first + n_c]
-    offset = smoothed.means[-1][first + n_c : first + 2 * n_c]
-    return np.asarray((problem.readings - offset) / (1.0 + gain))
+def _stress(problem: DropProblem, theta: Array, b: int, force: Array) -> Array:
+    """Stress of a bearing [Pa], shape (N,), under forces (N, 2) [N], by their size, in the worst direction.
+
+    The direction changes the stress by a few per mille only (one ball more or less below the force).
+    """
+    size = np.hypot(force[:, 0], force[:, 1])
+    worst = int(np.argmax(size))
+    sizes = size[worst] * np.linspace(0.0, 1.0, STRESS_POINTS) ** 2
+    along = force[worst] / max(size[worst], 1e-300)
+    return np.interp(size, sizes, [stress_at_force(problem, theta, b, one * along) for one in sizes])
 
 
 def _running_maximum(values: Array, half: int) -> Array:

@@ -129,6 +129,18 @@ class DropProblem:
         sensors = range(first, first + 2 * self.n_channels)
         return np.array([*shared, *sensors], dtype=np.int64)
 
+    @property
+    def gap_entries(self) -> NDArray[np.int64]:
+        """Entries of the estimate that hold the air gaps, bearing by bearing."""
+        paths = [unknown.path for unknown in self.unknowns]
+        gaps = [paths.index(f"{name}.air_gap") for name in self.model.bearing_names]
+        return np.array([self.n_dynamic + gap for gap in gaps], dtype=np.int64)
+
+    def sensor_errors(self, estimate: Array) -> tuple[Array, Array]:
+        """Gain errors [1] and offsets [m] of the readings in an estimate (n,) or deviation, shape (C,)."""
+        first, n_c = self.n_dynamic + len(self.unknowns), self.n_channels
+        return estimate[first : first + n_c], estimate[first + n_c : first + 2 * n_c]
+
     def watched_rows(self, name: str) -> Array:
         """Linear functions of the estimate that forces and orbit at a bearing depend on, shape (5, n).
 

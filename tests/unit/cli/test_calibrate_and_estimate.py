@@ -13,13 +13,13 @@ import jsonschema
 import pytest
 
 from rotordrop.cli.app import INTERRUPTED, run
-from rotordrop.errors import UsageError
-from rotordrop.estimation.calibrated import calibrated_on
+from rotordrop.errors import ConsistencyError, UsageError
 from rotordrop.estimation.schema import estimate_schema
 from rotordrop.estimation.tracked import is_calibrated
 from rotordrop.machine import example_path, load_machine
 from rotordrop.measurement.examples import example_record_path
 from rotordrop.tracking.calibration import BLIND_SCHEDULE, Stage
+from rotordrop.tracking.consistency import Check
 
 LP400 = str(example_path("lp400"))
 RECORD = str(example_record_path("lp400_drop_060"))
@@ -81,7 +81,9 @@ def interrupted(title: str) -> Any:
 def test_the_calibrated_machine_loads_with_intervals_and_provenance(folder: Path) -> None:
     before, machine = load_machine(LP400), load_machine(folder / "calibrated.toml")
     assert is_calibrated(machine) and not is_calibrated(before)
-    assert calibrated_on(machine) == {"drop_060"} and not calibrated_on(before)
+    assert machine.calibration is not None and before.calibration is None
+    assert [drop.name for drop in machine.calibration.drops] == ["drop_060"]
+    assert machine.calibration.drops[0].sha256 and machine.calibration.consistent
     found = json.loads((folder / "calibration.json").read_text())["values"]
     for b, bearing in enumerate(machine.touchdown_bearings):
         for path in ("stiffness", "mass", "damping"):
@@ -101,7 +103,7 @@ def test_the_calibration_says_what_the_records_determine(folder: Path) -> None:
     found = json.loads((folder / "calibration.json").read_text())
     verdicts = {entry["path"]: entry["verdict"] for entry in found["identifiability"]}
     assert verdicts["NDE.support.stiffness"] == "determined"
-    assert verdicts["NDE.race.drag_coefficient"] == "the records do not determine it"
+    assert verdicts["NDE.race.drag_coefficient"] == "the record does not determine it"
     assert found["sentence"].endswith(".")
     assert set(found["checks"]) == set(found["nis"]) == {"drop_060"}
 
@@ -142,6 +144,43 @@ def test_the_full_estimate_sets_the_cross_check_beside_it(folder: Path, tmp_path
         assert check["agrees"]
     html = page.read_text(encoding="utf-8")
     assert ">Independent cross-check<" in html and "Quick estimate" not in html
+
+
+def beside(*_: object) -> tuple[Check, ...]:
+    return (Check(name="innovation size", passed=False, message="mean squared innovation 9.00 × expected"),)
+
+
+def test_an_estimate_beside_its_record_is_written_and_ends_with_its_own_code(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("rotordrop.estimation.tracked.consistency_checks", beside)
+    out, page = tmp_path / "out.json", tmp_path / "report.html"
+    arguments = ["estimate", str(folder / "calibrated.toml"), RECORD, "--tail", TAIL, "--quick"]
+    code = run([*arguments, "--json", str(out), "--report", str(page)])
+    assert code == ConsistencyError.exit_code == 7
+    written = json.loads(out.read_text())
+    assert written["consistent"] is False and written["verdict"].startswith("The model is not consistent")
+    assert page.exists()
+    streams = capsys.readouterr()
+    told = words(streams.out)
+    assert told.index("problem: The model is not consistent") < told.index("Peak bearing force, range")
+    assert "drop_060: The model is not consistent with the record" in words(streams.err)
+    assert "9.00 × expected" in words(streams.err)
+
+
+def test_a_calibration_beside_its_drops_is_not_written(
+    shortened: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("rotordrop.estimation.calibrated.consistency_checks", beside)
+    output = tmp_path / "calibrated.toml"
+    arguments = ["calibrate", LP400, RECORD, "--tail", TAIL, "--output", str(output)]
+    assert run(arguments) == ConsistencyError.exit_code
+    told = words(capsys.readouterr().err)
+    assert f"not consistent with drop_060: intervals are doubled. {output} was not written" in told
+    assert "--even-if-inconsistent writes the file all the same" in told and not output.exists()
+    assert run([*arguments, "--even-if-inconsistent"]) == ConsistencyError.exit_code
+    origin = load_machine(output).calibration
+    assert origin is not None and not origin.consistent and origin.drops[0].name == "drop_060"
 
 
 def test_several_records_give_machine_and_drops(

@@ -19,7 +19,6 @@ def test_a_calibrated_gap_and_stiffness_are_shown_in_display_units() -> None:
             "DE.air_gap": IdentifiedValue(value=281e-6, interval_90=(270e-6, 292e-6), unit="m"),
             "DE.support.stiffness": IdentifiedValue(value=2.5e7, interval_90=(2.0e7, 3.0e7), unit="N/m"),
         },
-        identifiability=(),
         confounded=(),
         checks={},
         sentence=lambda: "done",

@@ -9,7 +9,11 @@ import pytest
 
 from rotordrop.estimated import Estimated
 from rotordrop.estimation import estimate_drop
-from rotordrop.estimation.tracked import TrackedDrop
+from rotordrop.estimation.estimate import Estimate
+from rotordrop.estimation.methods import Tracked
+from rotordrop.estimation.record_facts import facts_of
+from rotordrop.estimation.tracked import TrackedDrop, followed_drops, prepare
+from rotordrop.estimation.tracked_estimate import estimate_of
 from rotordrop.machine import Machine, example_machine
 from rotordrop.synthesis import HiddenMachine, SyntheticDrop, hidden_machine, synthesize_drop
 
@@ -100,12 +104,20 @@ def informed(known: Machine, hidden: HiddenMachine) -> Machine:
 
 
 @pytest.fixture(scope="session")
-def tracked(calibrated: Machine, synthetic: SyntheticDrop) -> TrackedDrop:
-    """The drop followed over its 0.2 s by the drop model of a calibrated machine."""
-    return estimate_drop(calibrated, synthetic.record, tail=synthetic.tail, names=["hidden_060"])
+def workshop(calibrated: Machine, synthetic: SyntheticDrop) -> TrackedDrop:
+    """The drop followed over its 0.2 s by the drop model of a calibrated machine, with its filter."""
+    item = prepare(calibrated, synthetic.record, synthetic.tail, "hidden_060")
+    return next(iter(followed_drops(calibrated, [item])))
 
 
 @pytest.fixture(scope="session")
-def quick(calibrated: Machine, synthetic: SyntheticDrop) -> TrackedDrop:
-    """The same in a single pass."""
-    return estimate_drop(calibrated, synthetic.record, tail=synthetic.tail, quick=True)
+def tracked(workshop: TrackedDrop, calibrated: Machine, synthetic: SyntheticDrop) -> Estimate:
+    """What is told of it."""
+    facts = facts_of(calibrated, synthetic.record, synthetic.tail, "hidden_060")
+    return estimate_of(workshop, Tracked(), facts)
+
+
+@pytest.fixture(scope="session")
+def quick(calibrated: Machine, synthetic: SyntheticDrop) -> Estimate:
+    """The same in a single pass, by the public function."""
+    return estimate_drop(calibrated, synthetic.record, synthetic.tail, method=Tracked(quick=True))

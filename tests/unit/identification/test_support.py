@@ -87,7 +87,7 @@ def test_verdicts_name_bounds_and_what_is_not_determined(problem: ImpactFit) -> 
     assert found[paths[0]].status == "at its bound"
     assert found[paths[1]].status == "the record does not determine it"
     assert found[paths[2]].status == "determined"
-    assert identified_values(problem, x, covariance, given=True)[paths[2]].status == "prior"
+    assert identified_values(problem, x, covariance, given=True)[paths[2]].status == "taken over"
 
 
 def test_gap_follows_the_sag_of_the_trial_support(replica: Replica, model: DropModel) -> None:

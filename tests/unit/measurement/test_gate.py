@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import RecordError
+from rotordrop.estimated import Estimated
 from rotordrop.measurement import check_record, refuse_unusable
 from rotordrop.measurement.quality.clock import check_clock
 from rotordrop.measurement.quality.motion import check_rotation_line, first_motion
@@ -435,3 +436,15 @@ def test_unusable_records_are_refused_with_all_faults(drop, machine, edited):
     ):
         refuse_unusable(found)
     refuse_unusable(one for one in found if one.severity != "stop")
+
+
+def test_an_estimated_air_gap_that_cannot_be_is_named_before_the_unit(drop, machine):
+    """A calibration that went astray: it is not the recorder that is wrong."""
+    gap = Estimated(
+        value=34e-6, status="estimated", interval_90=(0.0, 73e-6), source="calibrated on drop_060", unit="m"
+    )
+    values = {f"{bearing.name}.air_gap": gap for bearing in machine.touchdown_bearings}
+    found = check_record(drop, machine.with_values(values))[0]
+    assert (found.kind, found.severity) == ("wrong air gap", "stop")
+    assert "× the air gap of the machine file (34 µm, 34 µm; calibrated on drop_060)" in found.message
+    assert found.remedy.startswith("use the machine file from before that estimate")

@@ -9,22 +9,24 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from rotordrop.report.displacement import displacement_figure
-from rotordrop.report.displacement_pair import displacement_pair_figure
-from rotordrop.report.first_contact import (
+from rotordrop.estimated import IdentifiedValue
+from rotordrop.estimation.bearing_drop import (
+    AirGap,
+    Band,
+    BearingDrop,
     FirstContact,
-    OverlaidDrop,
-    first_contact_figure,
-    first_contacts_figure,
+    History,
+    Motion,
+    Origin,
+    Peak,
+    highest,
 )
-from rotordrop.report.force import Peak, force_figure
+from rotordrop.report.drop_sections import displacement_figure, drop_sections, speed_figure
+from rotordrop.report.first_contact import first_contact_figure
 from rotordrop.report.friction_curve import FrictionLaw, friction_curve_figure
-from rotordrop.report.history import AirGap, Band, BearingHistories, BearingMotions, History, Motion
 from rotordrop.report.innovations import innovations_figure, nis_figure, whiteness_figure
 from rotordrop.report.orbit import orbit_figure
-from rotordrop.report.radial import radial_figure
-from rotordrop.report.speed import speed_figure
-from rotordrop.report.stress import stress_figure
+from rotordrop.report.time_panels import Panel, time_panels
 
 TIME = np.linspace(0.0, 0.1, 1001)
 SINGLE = 2e-7
@@ -41,21 +43,44 @@ def motion(label: str, role: Any = "simulated", phase: float = 0.0) -> Motion:
     )
 
 
-def bearings(gap: AirGap | None = None) -> tuple[BearingMotions, ...]:
-    gap = gap or AirGap(lower=270e-6, upper=275e-6)
-    return tuple(
-        BearingMotions(
-            bearing=name, motions=(motion("measured", "measured", 0.1), motion("simulated")), air_gap=gap
-        )
-        for name in ("NDE", "DE")
-    )
-
-
-def histories(factor: float = 1.0) -> tuple[BearingHistories, ...]:
+def history(factor: float = 1.0) -> History:
     values = factor * (1000.0 + 900.0 * np.sin(40.0 * TIME))
-    history = History(label="estimated", time=TIME, values=values, role="estimated")
-    band = Band(time=TIME, lower=0.9 * values, upper=1.2 * values)
-    return tuple(BearingHistories(bearing=name, histories=(history,), band=band) for name in ("NDE", "DE"))
+    return History(label="estimated", time=TIME, values=values, role="estimated")
+
+
+def band(of: History) -> Band:
+    return Band(time=of.time, lower=0.9 * of.values, upper=1.2 * of.values)
+
+
+def drop(name: str, gap: AirGap | None = None, label: str = "simulated", **changes: Any) -> BearingDrop:
+    force, stress = history(), history(1e6)
+    given: dict[str, Any] = {
+        "name": name,
+        "motions": (motion("measured", "measured", 0.1), motion(label)),
+        "air_gap": gap or AirGap(lower=270e-6, upper=275e-6),
+        "force": force,
+        "force_band": band(force),
+        "stress": stress,
+        "stress_band": band(stress),
+        "peak_force": highest(force, "N", Origin.TWIN),
+        "peak_stress": highest(stress, "Pa", Origin.TWIN),
+    }
+    return BearingDrop(**{**given, **changes})
+
+
+def bearings(gap: AirGap | None = None) -> tuple[BearingDrop, ...]:
+    return drop("NDE", gap), drop("DE", gap)
+
+
+def charts(*drops: BearingDrop, loads: dict[str, float] | None = None) -> dict[str, Any]:
+    """Figures of a drop by a word of their caption."""
+    found = {}
+    for section in drop_sections(drops or bearings(), "simulated", 377.0, loads):
+        for figure in section.figures:
+            for word in ("ball force", "same force", "Hertz stress of all", "side by side", "Distance of"):
+                if word in figure.caption:
+                    found[word] = figure.chart
+    return found
 
 
 def trace(figure: Any, name: str, panel: int = 1) -> Any:
@@ -74,13 +99,13 @@ def shapes(figure: Any, panel: int = 1) -> list[Any]:
 ALL_FIGURES = {
     "friction curve": lambda: friction_curve_figure([LAW]),
     "displacement": lambda: displacement_figure(bearings()[0]),
-    "displacement pair": lambda: displacement_pair_figure(bearings()),
-    "first contact": lambda: first_contact_figure(bearings(), {}),
+    "displacement pair": lambda: charts()["side by side"],
+    "first contact": lambda: first_contact_figure(bearings()),
     "orbit": lambda: orbit_figure(bearings()),
-    "radial": lambda: radial_figure(bearings()),
-    "force": lambda: force_figure(histories()),
-    "stress": lambda: stress_figure(histories(1e6)),
-    "speed": lambda: speed_figure(histories()[0].histories, histories()[1].histories),
+    "radial": lambda: charts()["Distance of"],
+    "force": lambda: charts()["ball force"],
+    "stress": lambda: charts()["Hertz stress of all"],
+    "speed": lambda: speed_figure([history()], [history()]),
     "innovations": lambda: innovations_figure(TIME, np.zeros((1001, 2)), ("A", "B")),
     "innovation square": lambda: nis_figure(TIME, np.ones(1001), (0.8, 1.2)),
     "whiteness": lambda: whiteness_figure(np.random.default_rng(1).normal(size=(500, 2)), ("A", "B"), 5e-5),
@@ -118,12 +143,12 @@ def test_the_air_gap_is_below_in_the_vertical_and_on_both_sides_in_the_horizonta
 
 
 def test_a_gap_known_as_one_value_is_one_line() -> None:
-    drawn = radial_figure(bearings(AirGap.of(280e-6)))
+    drawn = charts(*bearings(AirGap.of(280e-6)))["Distance of"]
     assert [(round(shape.y0, 6), round(shape.y1, 6)) for shape in shapes(drawn, 1)] == [(280.0, 280.0)]
 
 
 def test_the_pair_has_horizontal_left_and_vertical_right_of_every_bearing() -> None:
-    drawn = displacement_pair_figure(bearings())
+    drawn = charts()["side by side"]
     given = motion("measured", "measured", 0.1)
     for panel, axis in ((1, 0), (2, 1), (3, 0), (4, 1)):
         assert_allclose(
@@ -132,7 +157,7 @@ def test_the_pair_has_horizontal_left_and_vertical_right_of_every_bearing() -> N
 
 
 def test_radial_displacement_is_the_distance_from_the_centre() -> None:
-    item = trace(radial_figure(bearings()), "simulated", 2)
+    item = trace(charts()["Distance of"], "simulated", 2)
     assert_allclose(item.y, 275.0, rtol=1e-6)
 
 
@@ -150,7 +175,7 @@ def test_the_orbit_lies_in_circles_of_both_gap_limits_at_equal_scales() -> None:
 
 def test_the_first_contact_is_marked_with_its_times_and_depth() -> None:
     contact = FirstContact(start=0.00775, end=0.0087, indentation=20.04e-6, deepest_time=0.008)
-    drawn = first_contact_figure(bearings(), {"DE": contact})
+    drawn = first_contact_figure((drop("NDE"), drop("DE", first_contact=contact)))
     texts = [note.text for note in drawn.layout.annotations]
     assert "t₁ 7.75, t₂ 8.70, T 0.95 ms" in texts
     assert "indentation 20.0 µm" in texts
@@ -159,47 +184,33 @@ def test_the_first_contact_is_marked_with_its_times_and_depth() -> None:
     assert trace(drawn, "simulated").x[-1] == pytest.approx(40.0)
 
 
-def test_several_drops_are_told_apart_by_colour_and_measured_from_simulated_by_dash() -> None:
-    def vertical(phase: float) -> dict[str, History]:
-        return {name: motion("", phase=phase).vertical for name in ("NDE", "DE")}
-
-    drops = [
-        OverlaidDrop(label=label, measured=vertical(phase), simulated=vertical(phase + 0.1))
-        for label, phase in (("60 Hz", 0.0), ("210 Hz", 0.5))
-    ]
-    drawn = first_contacts_figure(drops, ("NDE", "DE"), {"NDE": 275e-6, "DE": 285e-6})
-    simulated, measured = trace(drawn, "60 Hz"), trace(drawn, "60 Hz, measured (dashed)")
-    assert simulated.line.color == measured.line.color != trace(drawn, "210 Hz").line.color
-    assert (simulated.line.dash, measured.line.dash) == ("solid", "5px,3px")
-    inside = TIME <= 0.04
-    assert_allclose(measured.y, 1e6 * motion("").displacement[inside, 1], rtol=SINGLE, atol=1e-4)
-    assert [shape.y0 for shape in shapes(drawn, 2)] == [pytest.approx(-285.0)]
-
-
 def test_the_force_has_its_band_its_peak_and_the_weight() -> None:
-    peak = Peak(time=0.00818, value=3333.1, interval_90=(3180.0, 3490.0))
-    drawn = force_figure(histories(), peaks={"NDE": peak}, static_loads={"NDE": 174.6, "DE": 409.1})
-    values = histories()[0].histories[0].values
+    known = IdentifiedValue(value=3333.1, interval_90=(3180.0, 3490.0), unit="N")
+    peak = Peak(known=known, time=0.00818, origin=Origin.TWIN)
+    drawn = charts(drop("NDE", peak_force=peak), drop("DE"), loads={"NDE": 174.6, "DE": 409.1})["ball force"]
+    values = history().values
     assert_allclose(trace(drawn, "estimated").y, values, rtol=SINGLE)
-    band = [item for item in drawn.data if item.legendgroup == "90 % interval" and item.xaxis == "x"]
-    assert_allclose(band[0].y, 0.9 * values, rtol=SINGLE)
-    assert_allclose(band[1].y, 1.2 * values, rtol=SINGLE)
-    assert band[1].fill == "tonexty"
+    found = [item for item in drawn.data if item.legendgroup == "90 % interval" and item.xaxis == "x"]
+    assert_allclose(found[0].y, 0.9 * values, rtol=SINGLE)
+    assert_allclose(found[1].y, 1.2 * values, rtol=SINGLE)
+    assert found[1].fill == "tonexty"
     texts = [note.text.replace("\u202f", "") for note in drawn.layout.annotations]
     assert "peak 3333 N at 8.18 ms (90 %: 3180 to 3490 N)" in texts
     assert [shape.y0 for shape in shapes(drawn, 2)] == [409.1]
 
 
 def test_a_window_cuts_history_and_band_and_hides_a_later_peak() -> None:
-    late = Peak(time=0.05, value=2000.0)
-    drawn = force_figure(histories(), peaks={"NDE": late}, until=0.02)
+    late = Peak(known=IdentifiedValue(value=2000.0), time=0.05, origin=Origin.TWIN)
+    panel = Panel(title="NDE", axis="force", histories=(history(),), band=band(history()), peak=late)
+    drawn = time_panels([[panel.until(0.02)]], 1.0, "N")
     assert all(max(item.x) <= 20.0 for item in drawn.data)
     assert not any("peak" in note.text for note in drawn.layout.annotations)
+    assert any("peak" in note.text for note in time_panels([[panel]], 1.0, "N").layout.annotations)
 
 
 def test_stress_is_in_megapascal_above_the_preload() -> None:
-    drawn = stress_figure(histories(1e6), preload_stress={"NDE": 993.36e6})
-    assert_allclose(trace(drawn, "estimated").y, 1e-6 * histories(1e6)[0].histories[0].values, rtol=SINGLE)
+    drawn = charts(drop("NDE", preload_stress=993.36e6))["Hertz stress of all"]
+    assert_allclose(trace(drawn, "estimated").y, 1e-6 * history(1e6).values, rtol=SINGLE)
     assert [shape.y0 for shape in shapes(drawn, 1)] == [pytest.approx(993.36)]
 
 
@@ -255,23 +266,23 @@ def test_a_history_of_two_million_points_is_drawn_with_few_and_all_its_peaks() -
     time = np.linspace(0.0, 50.0, 2_000_001)
     values = np.sin(time)
     values[1_234_567] = 4858.0
-    history = History(label="force", time=time, values=values)
-    item = trace(force_figure([BearingHistories(bearing="NDE", histories=(history,))]), "force")
+    force = History(label="force", time=time, values=values)
+    item = trace(time_panels([[Panel(title="NDE", axis="force", histories=(force,))]], 1.0, "N"), "force")
     assert len(item.y) < 2000
     assert max(item.y) == pytest.approx(4858.0, rel=SINGLE)
 
 
 EVIL = "<a href='https://example.org'>x</a>"
 EVIL_HISTORY = History(label=EVIL, time=TIME, values=TIME)
-EVIL_MOTION = BearingMotions(bearing=EVIL, motions=(motion(EVIL),), air_gap=AirGap.of(1e-4))
+EVIL_DROP = drop(EVIL, AirGap.of(1e-4), label=EVIL, force=EVIL_HISTORY)
 EVIL_LAW = FrictionLaw(label=EVIL, static=0.2, dynamic=0.1, stribeck_speed=1.0, smoothing_speed=0.1)
 EVIL_FIGURES = {
-    "orbit": lambda: orbit_figure([EVIL_MOTION]),
-    "radial": lambda: radial_figure([EVIL_MOTION]),
-    "displacement": lambda: displacement_figure(EVIL_MOTION),
-    "displacement pair": lambda: displacement_pair_figure([EVIL_MOTION]),
-    "first contact": lambda: first_contact_figure([EVIL_MOTION], {}),
-    "force": lambda: force_figure([BearingHistories(bearing=EVIL, histories=(EVIL_HISTORY,))]),
+    "orbit": lambda: orbit_figure([EVIL_DROP]),
+    "radial": lambda: charts(EVIL_DROP)["Distance of"],
+    "displacement": lambda: displacement_figure(EVIL_DROP),
+    "displacement pair": lambda: charts(EVIL_DROP)["side by side"],
+    "first contact": lambda: first_contact_figure([EVIL_DROP]),
+    "force": lambda: charts(EVIL_DROP)["ball force"],
     "friction curve": lambda: friction_curve_figure([EVIL_LAW]),
     "innovations": lambda: innovations_figure(TIME, np.zeros((1001, 1)), (EVIL,)),
     "whiteness": lambda: whiteness_figure(np.eye(200)[:, :1], (EVIL,), 5e-5),

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import OutputError
+from rotordrop.estimation.bearing_drop import History
 from rotordrop.report.content import (
     Card,
     Figure,
@@ -23,10 +24,9 @@ from rotordrop.report.content import (
     Statement,
     Table,
 )
-from rotordrop.report.force import force_figure
-from rotordrop.report.history import BearingHistories, History
 from rotordrop.report.page import render_page, write_page
 from rotordrop.report.quantity import Quantity
+from rotordrop.report.time_panels import Panel, time_panels
 
 EVIL = "<script>alert('1')</script>\"&<img src=x onerror=alert(2)>"
 LOADING = {"src", "href", "action", "data", "poster", "srcset", "background", "formaction", "xlink:href"}
@@ -70,7 +70,8 @@ class Reader(HTMLParser):
 def content(name: str = "LP-400") -> ReportContent:
     time = np.linspace(0.0, 0.2, 20_001)
     history = History(label=name, time=time, values=1000.0 * np.abs(np.sin(90.0 * time)))
-    figure = Figure(chart=force_figure([BearingHistories(bearing=name, histories=(history,))]), caption=name)
+    panel = Panel(title=name, axis="bearing force", histories=(history,))
+    figure = Figure(chart=time_panels([[panel]], 1.0, "N"), caption=name)
     quantity = Quantity(value=3333.0, kind="force", interval_90=(3180.0, 3490.0))
     table = Table(columns=("quantity", name), rows=((name, quantity),), caption=name, note=name)
     return ReportContent(

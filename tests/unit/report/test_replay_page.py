@@ -11,19 +11,26 @@ import pytest
 from numpy.testing import assert_allclose
 
 from rotordrop.estimated import IdentifiedValue
-from rotordrop.estimation.agreement import compare_orbits
-from rotordrop.estimation.replayed import ReplayDrop, Replayed
+from rotordrop.estimation.agreement import Agreement, compare_orbits
+from rotordrop.estimation.bearing_drop import BearingDrop, Motion, Origin, Peak, simulated_bearings
+from rotordrop.estimation.estimate import Estimate, FittedParameter, ReplaySteps, Verdict
+from rotordrop.estimation.methods import Replay
 from rotordrop.identification.first_contact import FirstContact
 from rotordrop.identification.friction import FrictionSweep
 from rotordrop.machine import example_machine
-from rotordrop.report.agreement_tables import contact_time_table, window_table
+from rotordrop.model.parameter_table import parameter
+from rotordrop.report.content import Section
 from rotordrop.report.estimate_numbers import identified_table
-from rotordrop.report.friction_sweep import friction_sweep_figure
+from rotordrop.report.estimate_page import estimate_page
 from rotordrop.report.page import render_page
 from rotordrop.report.quantity import Quantity
-from rotordrop.report.replay_page import replay_page
-from rotordrop.report.replay_sections import gap_limit_motions, support_section
-from rotordrop.report.replay_tables import correlation_table, first_contact_table
+from rotordrop.report.replay_tables import (
+    contact_time_table,
+    correlation_table,
+    first_contact_table,
+    friction_sweep_figure,
+    window_table,
+)
 from rotordrop.simulation.result import DropResult
 
 GAPS = np.array([275e-6, 285e-6])
@@ -47,130 +54,161 @@ SWEEP = FrictionSweep(
 )
 
 
-def shifted(result: DropResult, by: float) -> Replayed:
-    return Replayed(
-        time=result.time,
-        displacement=result.displacement + by,
-        force=result.bearing_force_magnitude,
-        stress=result.max_stress,
+STIFFNESS = IdentifiedValue(value=7.8e7, interval_90=(7.7e7, 7.9e7), start=1e8, unit="N/m")
+
+
+def peak(value: float, interval: tuple[float, float] | None) -> Peak:
+    known = IdentifiedValue(value=value, interval_90=interval, unit="N")
+    return Peak(known=known, time=0.009, origin=Origin.REPLAY)
+
+
+def as_replayed(bearing: BearingDrop, gap: float) -> BearingDrop:
+    """A simulated bearing with a measured motion 3 micrometres off and the drop at both limits of the gap."""
+    (simulated,) = bearing.motions
+    measured = replace(
+        simulated, label="measured", role="measured", displacement=simulated.displacement + 3e-6
+    )
+
+    def moved(label: str, by: float) -> Motion:
+        return replace(simulated, label=label, displacement=simulated.displacement + by)
+
+    return replace(
+        bearing,
+        motions=(measured, simulated),
+        at_gap_limits=(measured, moved("simulated, lower gap", 5e-6), moved("simulated, upper gap", -5e-6)),
+        peak_force=peak(3333.0, (3000.0, 3700.0)),
+        peak_stress=peak(1.8e9, None),
+        values={
+            "air_gap_m": IdentifiedValue(value=gap, lower=gap - 5e-6, upper=gap, unit="m"),
+            "support.stiffness_N_per_m": STIFFNESS,
+        },
+        missing={"peak_stress_Pa": "no interval: 2 draws, at least 64 are needed"},
     )
 
 
 @pytest.fixture
-def drop(drop_result: DropResult) -> ReplayDrop:
-    machine = example_machine("lp400")
-    values = {
-        name: {
-            "air_gap_m": IdentifiedValue(value=float(gap), lower=float(gap) - 5e-6, upper=float(gap)),
-            "support.stiffness_N_per_m": IdentifiedValue(
-                value=7.8e7, interval_90=(7.7e7, 7.9e7), start=1e8, unit="N/m"
-            ),
-            "peak_force_N": IdentifiedValue(value=3333.0, interval_90=(3000.0, 3700.0), unit="N"),
-            "peak_stress_Pa": IdentifiedValue(value=1.8e9, status="prior", unit="Pa"),
-        }
-        for name, gap in zip(("NDE", "DE"), GAPS, strict=True)
-    }
+def agreement(drop_result: DropResult) -> Agreement:
     measured = drop_result.displacement + 3e-6
-    known = {
-        "machine": machine,
-        "identified": machine,
-        "record": SimpleNamespace(
-            name="drop_060",
-            path=None,
-            sha256="",
-            sampling_rate=20e3,
-            sensors=machine.sensors,
-            metadata={},
-            notes=(),
-            speed=drop_result.speed,
-            time=drop_result.time + 0.001,
-        ),
-        "drop_instant": SimpleNamespace(value=0.001, interval_90=(0.0009, 0.0011)),
-        "gap": SimpleNamespace(value=GAPS, lower=GAPS - 5e-6, upper=GAPS),
-        "speed": SimpleNamespace(
-            initial=2 * np.pi * 60.0,
-            profile_time_constant=5.9,
-            aero_time_constant=IdentifiedValue(value=7.5, interval_90=(7.0, 8.0), unit="s"),
-            note="",
-        ),
-        "initial": None,
-        "expanded": None,
-        "support": SimpleNamespace(
-            values={"NDE.support.stiffness": values["NDE"]["support.stiffness_N_per_m"]},
-            correlations={"NDE.support.stiffness ~ NDE.support.mass": 0.99},
-        ),
-        "draws": None,
-    }
-    return ReplayDrop(
+    return compare_orbits(drop_result.time, measured, drop_result.displacement, GAPS, expected_horizon=0.028)
+
+
+@pytest.fixture
+def drop(drop_result: DropResult, agreement: Agreement) -> Estimate:
+    machine = example_machine("lp400")
+    record = SimpleNamespace(
+        name="drop_060",
+        path=None,
+        sha256="",
+        sampling_rate=20e3,
+        sensors=machine.sensors,
+        speed=drop_result.speed,
+        time=drop_result.time + 0.001,
+    )
+    speed = SimpleNamespace(
+        initial=2 * np.pi * 60.0,
+        profile_time_constant=5.9,
+        aero_time_constant=IdentifiedValue(value=7.5, interval_90=(7.0, 8.0), unit="s"),
+    )
+    steps = ReplaySteps(
+        speed=cast(Any, speed),
         contacts=(CONTACT, CONTACT),
         friction=SWEEP,
-        simulated=drop_result,
-        middle=shifted(drop_result, 0.0),
-        lower=shifted(drop_result, 5e-6),
-        upper=shifted(drop_result, -5e-6),
-        measured_time=drop_result.time,
-        measured=measured,
-        agreement=compare_orbits(
-            drop_result.time, measured, drop_result.displacement, GAPS, expected_horizon=0.028
-        ),
-        values=values,
-        peak_times={"NDE": 0.009, "DE": 0.009},
+        correlations={"NDE.support.stiffness ~ NDE.support.mass": 0.99},
+        speed_time=drop_result.time,
+        speed_simulated=drop_result.speed,
         fixed="",
+        draws=None,
+        rejected=None,
+        identified=machine,
+        document={},
+    )
+    bearings = zip(simulated_bearings(drop_result), GAPS, strict=True)
+    return Estimate(
+        name="drop_060",
+        method=Replay(),
+        machine=machine,
+        record=cast(Any, record),
+        drop_instant=cast(Any, SimpleNamespace(value=0.001, interval_90=(0.0009, 0.0011))),
+        speed=2 * np.pi * 60.0,
+        until=0.2,
+        verdict=Verdict.OPEN_LOOP,
+        bearings=tuple(as_replayed(bearing, float(gap)) for bearing, gap in bearings),
+        parameters=(
+            FittedParameter(
+                row=parameter("support.stiffness"),
+                owner="NDE",
+                prior=IdentifiedValue(value=1e8, unit="N/m"),
+                estimate=STIFFNESS,
+            ),
+        ),
+        agreement=agreement,
+        replay=steps,
         warnings=("no standstill in the record",),
-        **cast(Any, known),
     )
 
 
-def test_headline_intervals_and_why_there_is_none(drop: ReplayDrop) -> None:
-    card = replay_page(drop, drop.machine).cards[0]
-    force, stress = card.figures[0], card.figures[1]
+def section(estimate: Estimate, heading: str) -> Section:
+    return next(part for part in estimate_page(estimate).sections if part.heading == heading)
+
+
+def test_headline_intervals_and_why_there_is_none(drop: Estimate) -> None:
+    force, stress = estimate_page(drop).cards[0].figures[:2]
     assert force.value.interval_90 == (3000.0, 3700.0)
     assert "at 9.00 ms" in force.note
     assert stress.value.interval_90 is None
-    assert stress.note == "no interval: prior"
+    assert stress.note == "at 9.00 ms; no interval: 2 draws, at least 64 are needed"
 
 
-def test_the_route_warnings_and_horizon_are_named(drop: ReplayDrop) -> None:
-    content = replay_page(drop, drop.machine)
+def test_the_route_warnings_and_horizon_are_named(drop: Estimate) -> None:
+    content = estimate_page(drop)
     assert "open-loop replay" in content.verdict[0].text
     assert any(s.level == "warning" and s.text == "no standstill in the record" for s in content.verdict)
-    agreement = next(
-        section for section in content.sections if section.heading == "Agreement with the record"
-    )
-    assert "28 ms are to be expected" in agreement.text[0]
+    assert "28 ms are to be expected" in section(drop, "Agreement with the record").text[0]
 
 
-def test_agreement_states_the_distances_of_the_windows(drop: ReplayDrop) -> None:
-    table = window_table(drop.agreement, ("NDE", "DE"))
+def test_agreement_states_the_distances_of_the_windows(agreement: Agreement) -> None:
+    table = window_table(agreement, ("NDE", "DE"))
     rows = {str(row[0]): row[1:] for row in table.rows}
-    for window in drop.agreement.windows:
+    for window in agreement.windows:
         cells = rows[f"distance of the orbits, {window.name}"]
         assert_allclose([cell.value for cell in cells if isinstance(cell, Quantity)], window.rms)
         assert_allclose(window.rms, 3e-6 * np.sqrt(2.0), rtol=1e-9)
 
 
-def test_contact_times_stand_side_by_side_and_missing_ones_are_dashes(drop: ReplayDrop) -> None:
-    bearing = drop.agreement.bearings[0]
+def test_contact_times_stand_side_by_side_and_missing_ones_are_dashes(agreement: Agreement) -> None:
+    bearing = agreement.bearings[0]
     fewer = replace(bearing, simulated_contacts=bearing.simulated_contacts[:0])
-    table = contact_time_table(replace(drop.agreement, bearings=(fewer, fewer)), ("NDE", "DE"))
+    table = contact_time_table(replace(agreement, bearings=(fewer, fewer)), ("NDE", "DE"))
     first = [cell.text for cell in table.rows[0][1:] if isinstance(cell, Quantity)]
     assert first[2:] == ["–", "–"]
     assert table.rows[0][1].value == bearing.measured_contacts[0, 0]  # type: ignore[union-attr]
 
 
-def test_both_limits_of_the_gap_are_drawn_beside_the_measurement(drop: ReplayDrop) -> None:
-    motions = gap_limit_motions(drop)[1].motions
-    assert [motion.label for motion in motions] == [
-        "measured",
-        "simulated, lower gap",
-        "simulated, upper gap",
-    ]
-    assert_allclose(motions[1].displacement, drop.lower.displacement[:, 1])
-    assert_allclose(motions[2].displacement, drop.upper.displacement[:, 1])
+def test_both_limits_of_the_gap_are_drawn_beside_the_measurement(drop: Estimate) -> None:
+    drawn = section(drop, "Orbit").figures[1].chart
+    names = ["measured", "simulated, lower gap", "simulated, upper gap"]
+    assert [item.name for item in drawn.data if item.xaxis == "x2"] == names
+    lower = next(item for item in drawn.data if item.name == names[1] and item.xaxis == "x2")
+    radius = drop.bearings[1].at_gap_limits[1].radial.values
+    assert (max(lower.y), lower.y[0], lower.y[-1]) == pytest.approx(
+        (1e6 * radius.max(), 1e6 * radius[0], 1e6 * radius[-1]), rel=1e-6
+    )
+
+
+def test_a_bounce_has_its_height_above_the_rest(agreement: Agreement, drop_result: DropResult) -> None:
+    """The fixture's rotor stays down after it has fallen: its one contact is left at the end of the drop."""
+    rows = {str(row[0]): row[1:] for row in window_table(agreement, ("NDE", "DE")).rows}
+    time = np.linspace(0.0, 0.1, 2001)
+    place = np.zeros((len(time), 1, 2))
+    place[:, 0, 1] = -np.abs(290e-6 * np.sin(2.0 * np.pi * 20.0 * time))  # down, up to the centre, down
+    found = compare_orbits(time, place, place, GAPS[:1]).bearings[0]
+    assert found.measured_bounce == pytest.approx(GAPS[0], abs=1e-6)
+    assert found.simulated_bounce == found.measured_bounce
+    assert "first bounce, measured" in rows
 
 
 def test_table_3_has_the_paper_s_value_and_the_corrected_one() -> None:
-    table = first_contact_table({"NDE": CONTACT})
+    table = first_contact_table(("NDE",), (CONTACT,))
     assert table.note.startswith("Standard error of t₁ and t₂: ")
     row = table.rows[0]
     texts = [cell.text if isinstance(cell, Quantity) else cell for cell in row]
@@ -194,10 +232,12 @@ def test_confounded_parameters_are_called_so() -> None:
     ]
 
 
-def test_supports_of_an_earlier_estimate_are_named_with_their_file(drop: ReplayDrop) -> None:
-    section = support_section(replace(drop, support=None, fixed="drop_060.json"))
-    assert "taken from drop_060.json" in section.statements[0].text
-    content = replay_page(replace(drop, support=None, friction=None, fixed="drop_060.json"), drop.machine)
+def test_supports_of_an_earlier_estimate_are_named_with_their_file(drop: Estimate) -> None:
+    assert drop.replay is not None
+    steps = replace(drop.replay, fixed="drop_060.json", friction=None, correlations={})
+    taken = replace(drop, replay=steps)
+    assert "taken from drop_060.json" in section(taken, "Parameters").text[0]
+    content = estimate_page(taken)
     assert "Friction" not in [part.heading for part in content.sections]
     assert ("method", "replay with the supports of drop_060.json") in content.facts
 
@@ -210,16 +250,18 @@ def test_the_friction_sweep_marks_best_and_interval() -> None:
     assert shapes["90 % interval"] == (0.107, 0.114)
 
 
-def test_the_page_is_complete(drop: ReplayDrop) -> None:
-    html = render_page(replay_page(drop, drop.machine))
+def test_the_page_is_complete(drop: Estimate) -> None:
+    html = render_page(estimate_page(drop))
     for figure in ("Figs 7 and 8", "Fig. 10", "Fig. 12", "Fig. 13", "Fig. 14", "Fig. 15", "Fig. 16"):
         assert figure in html
     assert len(html.encode()) < 6_000_000
 
 
-def test_values_of_an_earlier_estimate_are_not_called_a_prior() -> None:
-    prior = IdentifiedValue(value=2e7, status="prior", unit="N/m")
-    values = {"support.stiffness_N_per_m": prior, "equivalent_stiffness_N_per_m": prior}
-    verdicts = {row[0]: row[2] for row in identified_table({"DE": values}, taken_over="a/drop_1.json").rows}
+def test_values_of_an_earlier_estimate_are_called_so(drop: Estimate) -> None:
+    taken = IdentifiedValue(value=2e7, status="taken over", unit="N/m")
+    undetermined = replace(taken, status="the record does not determine it")
+    values = {"support.stiffness_N_per_m": taken, "equivalent_stiffness_N_per_m": undetermined}
+    bearing = replace(drop.bearings[1], values=values)
+    verdicts = {row[0]: row[2] for row in identified_table([bearing], taken_over="a/drop_1.json").rows}
     assert verdicts["support stiffness"] == "taken over from drop_1.json"
-    assert verdicts["equivalent stiffness, bearing and support"] == "prior"
+    assert verdicts["equivalent stiffness, bearing and support"] == "the record does not determine it"

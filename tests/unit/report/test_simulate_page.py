@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rotordrop.estimation.bearing_drop import simulated_bearings, simulated_gap
 from rotordrop.machine import example_machine
 from rotordrop.report.content import ReportContent
-from rotordrop.report.from_simulation import air_gap, first_contacts
 from rotordrop.report.machine_sections import defaults_section, friction_section, weight_shares
 from rotordrop.report.page import render_page
 from rotordrop.report.simulate_page import simulate_page
@@ -69,12 +69,13 @@ def test_the_peak_stress_stands_beside_the_static_limit(drop_result: DropResult)
 
 
 def test_the_gap_and_the_first_contacts_come_from_the_result(drop_result: DropResult) -> None:
-    assert [air_gap(drop_result, index) for index in range(2)] == pytest.approx([275e-6, 285e-6])
-    contacts = first_contacts(drop_result)
-    assert (contacts["DE"].start, contacts["DE"].end) == (0.0077, 0.0101)
+    assert [simulated_gap(drop_result, index) for index in range(2)] == pytest.approx([275e-6, 285e-6])
+    nde, de = (bearing.first_contact for bearing in simulated_bearings(drop_result))
+    assert nde is not None and de is not None
+    assert (de.start, de.end) == (0.0077, 0.0101)
     inside = (drop_result.time >= 0.0076) & (drop_result.time <= 0.0085)
     radius = np.hypot(*drop_result.displacement[inside, 0].T)
-    assert contacts["NDE"].indentation == pytest.approx(radius.max() - 275e-6)
+    assert nde.indentation == pytest.approx(radius.max() - 275e-6)
 
 
 def test_a_page_with_the_machine_shows_weight_friction_and_defaults(drop_result: DropResult) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,13 +11,15 @@ import pytest
 from numpy.testing import assert_allclose
 
 from rotordrop.estimated import IdentifiedValue
+from rotordrop.estimation.bearing_drop import simulated_bearings
+from rotordrop.estimation.estimate import CrossCheck
 from rotordrop.report.content import Table
-from rotordrop.report.cross_check import CrossCheck, cross_check_statements, cross_check_table
-from rotordrop.report.impacts import impact_figure, impact_table, impacts_of, tick_spacing
+from rotordrop.report.estimate_page import cross_check_statements, cross_check_table
+from rotordrop.report.impacts import impact_figure, impact_table, tick_spacing
 from rotordrop.report.parameters import ParameterRow, parameter_figure, parameter_table
 from rotordrop.report.quantity import Quantity
 from rotordrop.report.record_quality import record_quality_section
-from rotordrop.report.stress_box import stress_box, stress_box_figure, stress_table, thinned
+from rotordrop.report.stress_box import StressBox, stress_box, stress_box_figure, stress_table, thinned
 from rotordrop.report.waterfall_page import _law_rows
 from rotordrop.severity.statistics import stress_statistics
 from rotordrop.simulation.result import DropResult
@@ -35,8 +37,7 @@ def test_a_row_of_the_wrong_length_is_refused() -> None:
 
 
 def test_impacts_are_listed_in_the_order_of_time(drop_result: DropResult) -> None:
-    impacts = impacts_of(drop_result.contacts, drop_result.bearing_names)
-    table = impact_table(impacts)
+    table = impact_table(simulated_bearings(drop_result), force="contact force")
     assert [texts(row)[:3] for row in table.rows] == [
         ["NDE", "7.900 ms", "−90.0°"],
         ["DE", "9.200 ms", "−95.0°"],
@@ -47,18 +48,17 @@ def test_impacts_are_listed_in_the_order_of_time(drop_result: DropResult) -> Non
 
 
 def test_the_weakest_impacts_are_left_out_and_counted(drop_result: DropResult) -> None:
-    table = impact_table(impacts_of(drop_result.contacts, drop_result.bearing_names), listed=2)
+    table = impact_table(simulated_bearings(drop_result), force="contact force", listed=2)
     assert [texts(row)[1] for row in table.rows] == ["7.900 ms", "9.200 ms"]
     assert table.caption == "Impacts (2 of 3)"
     assert "1 weaker ones are left out" in table.note
 
 
 def test_impacts_are_drawn_at_their_azimuth_with_their_interval(drop_result: DropResult) -> None:
-    impacts = impacts_of(drop_result.contacts, drop_result.bearing_names)
-    first = impacts[0]
-    force = Quantity(value=2644.0, kind="force", interval_90=(2600.0, 2750.0))
-    known = type(first)(**{**first.__dict__, "peak_force": force})
-    drawn = impact_figure([known, *impacts[1:]])
+    nde, de = simulated_bearings(drop_result)
+    force = IdentifiedValue(value=2644.0, interval_90=(2600.0, 2750.0), unit="N")
+    known = replace(nde, impacts=(replace(nde.impacts[0], peak_force=force),))
+    drawn = impact_figure([known, de], force="contact force")
     assert_allclose(drawn.data[0].x, [-90.0])
     assert_allclose(drawn.data[0].y, [2644.0])
     assert_allclose(drawn.data[0].error_y.array, [106.0])
@@ -122,8 +122,8 @@ def test_parameters_are_drawn_relative_to_their_prior() -> None:
 def check(estimate: float, other: float) -> CrossCheck:
     return CrossCheck(
         name="NDE peak force",
-        estimate=Quantity(value=estimate, kind="force"),
-        check=Quantity(value=other, kind="force"),
+        estimate=IdentifiedValue(value=estimate, unit="N"),
+        check=other,
         accuracy=0.15,
     )
 
@@ -184,9 +184,13 @@ def test_a_sound_record_is_called_sound() -> None:
 STRESS = 993e6 + 2e8 * np.random.default_rng(6).exponential(size=4001)
 
 
+def box(label: str, bearing: str, stress: Any, preload: float | None = None) -> StressBox:
+    return stress_box(label, bearing, stress, stress_statistics(stress, preload_stress=preload))
+
+
 def test_the_box_plot_draws_the_numbers_of_the_statistics() -> None:
     statistics = stress_statistics(STRESS)
-    drawn = stress_box_figure([stress_box("60 Hz", "NDE", STRESS), stress_box("150 Hz", "NDE", 2 * STRESS)])
+    drawn = stress_box_figure([box("60 Hz", "NDE", STRESS), box("150 Hz", "NDE", 2 * STRESS)])
     first, outliers = drawn.data[0], drawn.data[1]
     shown = (first.lowerfence, first.q1, first.median, first.mean, first.q3, first.upperfence)
     expected = (
@@ -207,7 +211,7 @@ def test_the_box_plot_draws_the_numbers_of_the_statistics() -> None:
 
 def test_the_stress_table_states_the_statistics_names_the_rules_and_the_preload() -> None:
     statistics = stress_statistics(STRESS, preload_stress=993e6)
-    boxes = [stress_box("60 Hz", name, STRESS, 993e6) for name in ("NDE", "DE")]
+    boxes = [box("60 Hz", name, STRESS, 993e6) for name in ("NDE", "DE")]
     table = stress_table(boxes)
     rows = {str(cells[0]): cells[1:] for cells in table.rows}
     for name, value in (

@@ -2,40 +2,42 @@
 
 from __future__ import annotations
 
+import json
+import re
 from dataclasses import replace
 from importlib import resources
+from typing import Any
 
 import numpy as np
 import pytest
 
-from rotordrop.estimation.tracked import COARSE_BASIS, TrackedDrop, drop_problem, prepare, tracked_drop
-from rotordrop.machine import Machine, example_machine
+from rotordrop.estimated import IdentifiedValue
+from rotordrop.estimation.bearing_drop import Origin
+from rotordrop.estimation.document import estimate_document
+from rotordrop.estimation.estimate import CrossCheck, Estimate, Verdict
+from rotordrop.estimation.later_motion import LaterMotion
+from rotordrop.estimation.methods import Tracked
+from rotordrop.estimation.record_facts import facts_of
+from rotordrop.estimation.tracked import COARSE_BASIS, drop_problem, prepare, tracked_drop
+from rotordrop.estimation.tracked_estimate import estimate_of
+from rotordrop.machine import example_machine
 from rotordrop.measurement.quality.finding import Finding
 from rotordrop.measurement.record import read_record
+from rotordrop.measurement.simulated import is_simulated
 from rotordrop.model.parameters import build_drop_model
-from rotordrop.report.cross_check import CrossCheck
-from rotordrop.report.estimate_page import tracked_page
+from rotordrop.report.content import Table
+from rotordrop.report.drop_sections import drop_sections
+from rotordrop.report.estimate_page import cross_check_statements, estimate_page
 from rotordrop.report.page import render_page
 from rotordrop.report.quantity import Quantity
-from rotordrop.report.simulated_record import simulated_notice
-from rotordrop.report.tracked_sections import (
-    parameter_section,
-    sensor_table,
-    tracked_first_contacts,
-    tracked_forces,
-    tracked_motions,
-    tracked_stresses,
-)
 from rotordrop.tracking.calibration import CALIBRATED_SCHEDULE, track
+from rotordrop.tracking.consistency import Check
 
 
 @pytest.fixture(scope="module")
-def machine() -> Machine:
-    return example_machine("lp400")
-
-
-@pytest.fixture(scope="module")
-def drop(machine: Machine) -> TrackedDrop:
+def estimate() -> Estimate:
+    """The first 20 ms of the bundled record, in one coarse pass."""
+    machine = example_machine("lp400")
     folder = resources.files("rotordrop").joinpath("examples", "lp400")
     with resources.as_file(folder.joinpath("drop_060.h5")) as path:
         record = read_record(path, machine)
@@ -44,57 +46,76 @@ def drop(machine: Machine) -> TrackedDrop:
     prepared = prepare(machine, record, tail, "drop_060")
     problem = drop_problem(build_drop_model(machine, COARSE_BASIS), prepared, until=0.02)
     smoothed = track([problem], CALIBRATED_SCHEDULE[:1]).smoothed[0]
-    return tracked_drop(prepared, problem, smoothed, 1.0)
+    drop = tracked_drop(prepared, problem, smoothed, 1.0)
+    return estimate_of(drop, Tracked(), facts_of(machine, record, tail, "drop_060"))
 
 
-def test_the_headline_has_every_number_with_its_interval(drop: TrackedDrop, machine: Machine) -> None:
-    content = tracked_page(drop, machine)
-    for card, values in zip(content.cards, drop.values.values(), strict=True):
-        peak = card.figures[0].value
-        assert (peak.value, peak.interval_90) == (
-            values["peak_force_N"].value,
-            values["peak_force_N"].interval_90,
-        )
-        assert card.figures[1].value.interval_90 == values["peak_stress_Pa"].interval_90
-    rows = {row[0]: row for row in content.summary[0].rows}
+def table(estimate: Estimate, heading: str, number: int = 0) -> Table:
+    section = next(s for s in estimate_page(estimate).sections if s.heading == heading)
+    return section.tables[number]
+
+
+def test_card_document_figure_and_table_agree_on_every_peak(estimate: Estimate) -> None:
+    """Value, time and interval of a peak stand in four places and have one source."""
+    content = estimate_page(estimate)
+    document = json.loads(json.dumps(estimate_document(estimate), allow_nan=False))
+    loads = next(s for s in content.sections if s.heading == "Bearing force").figures[0].chart
+    statistics = {row[0]: row[1:] for row in table(estimate, "Hertz stress").rows}
+    for k, (bearing, card) in enumerate(zip(estimate.bearings, content.cards, strict=True)):
+        for figure, field, peak in (
+            (card.figures[0], "peak_force_N", bearing.peak_force),
+            (card.figures[1], "peak_stress_Pa", bearing.peak_stress),
+        ):
+            entry = document["bearings"][bearing.name][field]
+            assert figure.value.value == entry["value"] == peak.value
+            assert figure.value.interval_90 == tuple(entry["interval_90"]) == peak.interval_90
+            assert entry["time_s"] == peak.time
+            assert figure.note == f"at {1e3 * peak.time:.2f} ms"
+        cell = statistics["maximum"][k]
+        assert isinstance(cell, Quantity) and cell.value == bearing.peak_stress.value
+        mark = loads.layout.annotations[-2 + k]
+        assert (mark.x, mark.y) == pytest.approx((1e3 * bearing.peak_force.time, bearing.peak_force.value))
+
+
+def test_the_headline_has_every_number_with_its_interval(estimate: Estimate) -> None:
+    rows = {row[0]: row for row in estimate_page(estimate).summary[0].rows}
     gap = rows["air gap"][1]
     assert isinstance(gap, Quantity)
-    assert gap.value == drop.values["NDE"]["air_gap_m"].value
-    assert rows["static friction coefficient"][2] == "prior"
+    assert gap.value == estimate.bearing("NDE").values["air_gap_m"].value
+    assert rows["static friction coefficient"][2] == "the record does not determine it"
 
 
-def test_the_page_says_that_the_bundled_record_is_simulated(drop: TrackedDrop, machine: Machine) -> None:
-    assert "simulated" in tracked_page(drop, machine).simulated
-    other = replace(drop.record, sha256="0" * 64, metadata={}, notes=())
-    assert simulated_notice(other) == ""
-    assert simulated_notice(replace(other, metadata={"source": "Simulated by X"})) != ""
+def test_a_number_that_is_missing_has_its_reason(estimate: Estimate) -> None:
+    figures = {figure.label: figure for figure in estimate_page(estimate).cards[0].figures}
+    late = figures["Mean force, 150 to 200 ms"]
+    assert (late.value.text, late.note) == ("–", "the estimated part ends before 200 ms")
+    entry = estimate_document(estimate)["bearings"]["NDE"]
+    assert entry["not_stated"] == {"mean_force_0p15_0p2_N": "the estimated part ends before 200 ms"}
 
 
-def test_bands_are_as_wide_as_the_stated_intervals(drop: TrackedDrop) -> None:
-    for b, values in enumerate(drop.values.values()):
-        for histories, field in ((tracked_forces, "peak_force_N"), (tracked_stresses, "peak_stress_Pa")):
-            band = histories(drop)[b].band
-            stated = values[field].interval_90
-            assert band is not None
-            assert stated is not None
-            assert band.upper.max() == pytest.approx(stated[1], rel=0.01)
-            assert band.lower[np.argmax(band.upper)] == pytest.approx(stated[0], rel=0.01)
+def test_a_record_is_simulated_by_one_definition(estimate: Estimate) -> None:
+    assert "simulated" in estimate_page(estimate).simulated
+    assert estimate_document(estimate)["simulated_record"] is True
+    other = replace(estimate.record, sha256="0" * 64, metadata={}, notes=())
+    assert not is_simulated(other)
+    assert is_simulated(replace(other, metadata={"source": "Simulated by X"}))
+    assert is_simulated(replace(other, notes=("made by synthesize",)))
+
+
+def test_bands_are_as_wide_as_the_stated_intervals(estimate: Estimate) -> None:
+    for bearing in estimate.bearings:
+        for band, peak in (
+            (bearing.force_band, bearing.peak_force),
+            (bearing.stress_band, bearing.peak_stress),
+        ):
+            assert band is not None and peak.interval_90 is not None
+            assert band.upper.max() == pytest.approx(peak.interval_90[1], rel=0.01)
+            assert band.lower[np.argmax(band.upper)] == pytest.approx(peak.interval_90[0], rel=0.01)
             assert band.lower.min() >= 0.0
 
 
-def test_bands_widen_where_model_and_record_disagree(drop: TrackedDrop) -> None:
-    def width(shown: TrackedDrop) -> float:
-        band = tracked_stresses(shown)[0].band
-        assert band is not None
-        return float((band.upper - band.lower).max())
-
-    assert width(replace(drop, consistent=False)) == pytest.approx(2 * width(replace(drop, consistent=True)))
-
-
-def test_the_measured_motion_follows_the_estimated_one_within_the_bending(
-    drop: TrackedDrop, machine: Machine
-) -> None:
-    for bearing in tracked_motions(drop, machine):
+def test_the_measured_motion_follows_the_estimated_one_within_the_bending(estimate: Estimate) -> None:
+    for bearing in estimate.bearings:
         measured, estimated = bearing.motions
         assert (measured.role, estimated.role) == ("measured", "estimated")
         difference = measured.displacement[: len(estimated.time)] - estimated.displacement
@@ -102,67 +123,146 @@ def test_the_measured_motion_follows_the_estimated_one_within_the_bending(
         assert np.ptp(estimated.displacement[:, 1]) > 250e-6
 
 
-def test_the_first_contact_is_the_first_impact(drop: TrackedDrop) -> None:
-    contacts = tracked_first_contacts(drop)
-    for name in drop.values:
-        first = next(impact for impact in drop.impacts if impact.bearing == name)
-        assert (contacts[name].start, contacts[name].end) == (first.start, first.end)
-        assert 5e-6 < contacts[name].indentation < 60e-6
+def test_the_first_contact_is_the_first_impact(estimate: Estimate) -> None:
+    for bearing in estimate.bearings:
+        first, contact = bearing.impacts[0], bearing.first_contact
+        assert contact is not None
+        assert (contact.start, contact.end) == (first.start, first.end)
+        assert 5e-6 < contact.indentation < 60e-6
 
 
-def test_every_unknown_has_prior_estimate_interval_and_verdict(drop: TrackedDrop) -> None:
-    section = parameter_section(drop)
-    machine_table, drop_table, _ = section.tables
-    assert len(machine_table.rows) + len(drop_table.rows) == len(drop.problem.unknowns)
-    rows = {str(row[0]): row for row in machine_table.rows}
+def test_every_unknown_has_prior_estimate_interval_and_verdict(estimate: Estimate) -> None:
+    rows = {str(row[0]): row for number in (0, 1) for row in table(estimate, "Parameters", number).rows}
+    assert len(rows) == len(estimate.parameters)
     prior = rows["NDE.support.stiffness"][1]
-    assert isinstance(prior, Quantity)
-    assert prior.value == pytest.approx(1e8)
-    for path, field in (
-        ("air_gap", "air_gap_m"),
-        ("support.stiffness", "support.stiffness_N_per_m"),
-        ("friction.dynamic", "friction.dynamic"),
-        ("preload", "preload_N"),
-    ):
-        for bearing in drop.values:
-            shown, stated = rows[f"{bearing}.{path}"], drop.values[bearing][field]
-            assert isinstance(shown[2], Quantity)
-            assert (shown[2].value, shown[2].interval_90) == (stated.value, stated.interval_90)
-            assert shown[3] == stated.status
+    assert isinstance(prior, Quantity) and prior.value == pytest.approx(1e8)
+    for one in estimate.parameters:
+        shown = rows[one.path]
+        assert isinstance(shown[2], Quantity)
+        assert (shown[2].value, shown[2].interval_90) == (one.estimate.value, one.estimate.interval_90)
+        assert shown[3] == one.estimate.status
+        if one.scope == "machine":
+            assert estimate.bearing(one.owner).values[one.row.field] == one.estimate
 
 
-def test_sensor_errors_are_stated_by_channel(drop: TrackedDrop, machine: Machine) -> None:
-    table = sensor_table(drop)
-    assert [row[0] for row in table.rows] == [sensor.name for sensor in machine.sensors]
-    noise = table.rows[0][3]
-    assert isinstance(noise, Quantity)
-    assert noise.value == pytest.approx(0.46e-6, rel=0.15)
+def test_sensor_errors_are_stated_by_channel(estimate: Estimate) -> None:
+    found = table(estimate, "Parameters", 2)
+    assert [row[0] for row in found.rows] == [sensor.name for sensor in estimate.machine.sensors]
+    noise = found.rows[0][3]
+    assert isinstance(noise, Quantity) and noise.value == pytest.approx(0.46e-6, rel=0.15)
 
 
-def test_checks_findings_and_cross_check_are_on_the_page(drop: TrackedDrop, machine: Machine) -> None:
+def test_checks_findings_and_warnings_are_on_the_page(estimate: Estimate) -> None:
     finding = Finding(kind="hum", message="50 Hz hum", remedy="ground", severity="warning", channel="S_DE_B")
-    check = CrossCheck(
-        name="NDE peak force",
-        estimate=Quantity(value=3000.0, kind="force"),
-        check=Quantity(value=2000.0, kind="force"),
-        accuracy=0.1,
-    )
-    content = tracked_page(drop, machine, findings=[finding], cross_checks=[check], warnings=["no tail"])
+    told = replace(estimate, findings=(finding,), warnings=("no tail",), notes=("unbalance of 3 g mm",))
+    content = estimate_page(told)
     texts = [statement.text for statement in content.verdict]
-    assert texts[:2] == [drop.sentence(), "no tail"]
-    assert any("a difference of −33 %" in text for text in texts)
+    assert texts[0] == estimate.sentence and "no tail" in texts and "unbalance of 3 g mm" in texts
     assert "Channel S_DE_B: 50 Hz hum" in texts
-    again = tracked_page(drop, machine, findings=[finding], warnings=["50 Hz hum"])
+    again = estimate_page(replace(told, warnings=("50 Hz hum",)))
     assert sum("50 Hz hum" in statement.text for statement in again.verdict) == 1
-    consistency = next(section for section in content.sections if section.heading == "Consistency")
-    assert [row[0] for row in consistency.tables[0].rows] == [item.name for item in drop.checks]
+    assert [row[0] for row in table(estimate, "Consistency").rows] == [item.name for item in estimate.checks]
     headings = [section.heading for section in content.sections]
     assert headings.index("Bearing force") < headings.index("Parameters") < headings.index("Data quality")
 
 
-def test_the_page_is_complete_and_small(drop: TrackedDrop, machine: Machine) -> None:
-    html = render_page(tracked_page(drop, machine))
+def beside(estimate: Estimate, verdict: Verdict, origin: Origin) -> Estimate:
+    """The estimate as it would look had the model not fitted the record."""
+    failed = Check(name="innovation size", passed=False, message="mean squared innovation 9.00 × expected")
+    bearings = tuple(
+        replace(
+            b,
+            peak_force=replace(b.peak_force, origin=origin),
+            peak_stress=replace(b.peak_stress, origin=origin),
+        )
+        for b in estimate.bearings
+    )
+    return replace(estimate, verdict=verdict, checks=(failed,), bearings=bearings)
+
+
+def test_an_estimate_beside_its_record_shows_ranges_and_no_single_number(estimate: Estimate) -> None:
+    shown = estimate_page(beside(estimate, Verdict.HELD, Origin.TWIN))
+    assert shown.verdict[0].level == "bad"
+    assert shown.verdict[0].text.startswith("The model is not consistent with the record.")
+    assert "9.00 × expected" in shown.verdict[0].text
+    for card in shown.cards:
+        for figure in card.figures:
+            low, high = figure.value.interval_90 or (0.0, 0.0)
+            assert figure.value.text == "–" or re.fullmatch(
+                r"[\d\u202f.]+ to [\d\u202f.]+ (N|MPa)", figure.value.text
+            )
+            assert figure.value.interval_text == "" and "at " not in figure.note
+            assert low <= high
+    html = render_page(shown)
+    assert html.index("not consistent with the record") < html.index('class="cards"')
+
+
+def test_loads_of_the_cross_check_are_called_so(estimate: Estimate) -> None:
+    shown = estimate_page(beside(estimate, Verdict.GIVEN_WAY, Origin.CROSS_CHECK))
+    assert all(
+        card.title.endswith("touchdown bearing, by the independent cross-check") for card in shown.cards
+    )
+    document = estimate_document(beside(estimate, Verdict.GIVEN_WAY, Origin.CROSS_CHECK))
+    assert document["consistent"] is False and document["verdict"] == Verdict.GIVEN_WAY.value
+    assert document["bearings"]["DE"]["origin"] == "independent cross-check"
+    assert list(document)[:3] == ["format", "verdict", "consistent"]
+
+
+def compared(value: float, other: float, *, replaced: bool = False) -> CrossCheck:
+    return CrossCheck(
+        name="NDE peak force",
+        estimate=IdentifiedValue(value=value, unit="N"),
+        check=other,
+        accuracy=0.15,
+        replaced=replaced,
+    )
+
+
+def test_what_gave_way_is_not_compared_with_itself(estimate: Estimate) -> None:
+    gone = compared(2528.0, 9433.0, replaced=True)
+    assert cross_check_statements([gone]) == ()
+    (statement,) = cross_check_statements([gone, compared(3000.0, 2400.0)])
+    assert "−20 %" in statement.text and "273" not in statement.text
+    rows = table(replace(estimate, cross_check=(gone,)), "Independent cross-check").rows
+    assert rows[0][3:] == ("–", "± 15 %", "stated in place of the twin")
+
+
+def test_a_later_and_larger_motion_is_a_warning_in_page_and_document(estimate: Estimate) -> None:
+    later = LaterMotion(
+        bearing="DE", first=310e-6, first_time=0.009, later=333e-6, later_time=0.559, resolved=2e-6
+    )
+    told = replace(estimate, later=(later,), warnings=(later.sentence(),))
+    words = [statement for statement in estimate_page(told).verdict if statement.level == "warning"]
+    assert any("23.0 µm further out at 0.559 s" in statement.text for statement in words)
+    (entry,) = estimate_document(told)["later_motion"]
+    assert entry["larger"] is True and entry["later_time"] == 0.559
+    same = replace(later, later=311e-6)
+    assert not same.larger
+    quiet = estimate_page(replace(estimate, later=(same,)))
+    assert any("went no further out" in statement.text for statement in quiet.verdict)
+
+
+def test_the_page_is_complete_and_small(estimate: Estimate) -> None:
+    html = render_page(estimate_page(estimate))
     assert len(html.encode()) < 6_000_000
-    assert drop.record.sha256 in html
+    assert estimate.record.sha256 in html
     assert html.count('class="chart"') >= 14
     assert "60.00 Hz (3\u202f600 rpm)" in html
+
+
+def test_no_colour_is_a_row_of_numbers_and_no_axis_matches_itself(estimate: Estimate) -> None:
+    """A browser would complain of either and draw something else."""
+    for section in drop_sections(estimate.bearings, "", estimate.speed):
+        for figure in section.figures:
+            described: dict[str, Any] = json.loads(figure.chart.to_json())
+            for one in described["data"]:
+                if one.get("error_y", {}).get("visible"):
+                    assert isinstance(one["error_y"]["color"], str)
+            layout = described["layout"]
+            for name, axis in layout.items():
+                if name.startswith(("xaxis", "yaxis")):
+                    seen, follows = [name.replace("axis", "")], axis.get("matches")
+                    while follows:  # a circle of axes that follow each other is broken up by the browser
+                        assert follows not in seen, (seen, follows)
+                        seen.append(follows)
+                        follows = layout[f"{follows[0]}axis{follows[1:]}"].get("matches")

@@ -34,6 +34,7 @@ def test_a_right_model_passes_every_check(impacts, impacts_smoothed):
         "sensor errors",
         "directions",
         "parameters",
+        "unknowns of the drop",
         "process noise",
         "filter",
     }

@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rotordrop.errors import IdentificationError
 from rotordrop.model import layout as L
 from rotordrop.model.parameters import DropModel
 from rotordrop.tracking import _propagation as P
 from rotordrop.tracking.forces import bearing_values, stress_at_force
-from rotordrop.tracking.input_state import GATE_MARGIN, input_state_estimate
+from rotordrop.tracking.input_state import GATE_MARGIN, input_state_estimate, lent_by_record, lent_by_twin
 from rotordrop.tracking.problem import DropProblem, private_copy
 from rotordrop.tracking.smoother import Smoothed
 
@@ -116,7 +117,7 @@ def peaks_of(force: np.ndarray) -> list[np.ndarray]:
 
 def test_the_peaks_of_known_pulses_are_found_back(pushed):
     problem, smoothed, force = pushed
-    found = input_state_estimate(problem, smoothed)
+    found = input_state_estimate(problem, lent_by_twin(problem, smoothed))
     for estimate, pulse in zip(peaks_of(found.force), PULSES, strict=True):
         true = pulse[4] * np.array(pulse[1])
         assert np.hypot(*(estimate - true)) < 0.2 * pulse[4]
@@ -128,21 +129,45 @@ def test_the_peaks_of_known_pulses_are_found_back(pushed):
 def test_the_peak_stress_is_that_of_the_bearing_under_the_peak_force(pushed):
     """The twin's own force at a deflection leads back to the twin's own stress there."""
     problem, smoothed, _ = pushed
+    theta = smoothed.means[0][problem.parameter_slice]
     p = private_copy(problem.model.parameters)
-    P.apply_parameters(smoothed.means[0][problem.parameter_slice], problem.targets, p)
+    P.apply_parameters(theta.copy(), problem.targets, p)
     out = np.empty(4)
     for b, deflection in ((0, 12e-6), (1, 25e-6)):
         work = np.empty((2, p.balls.shape[2]))
         bearing_values(0.0, -deflection, p.bearing[b, L.AXIAL_OFFSET], b, p, work, out)
-        found = stress_at_force(problem, smoothed, b, np.array([0.0, -out[2]]))
+        found = stress_at_force(problem, theta, b, np.array([0.0, -out[2]]))
         assert found == pytest.approx(out[3], rel=1e-6)
-    estimate = input_state_estimate(problem, smoothed)
-    assert np.all(estimate.peak_stress > stress_at_force(problem, smoothed, 0, np.array([0.0, -100.0])))
+    estimate = input_state_estimate(problem, lent_by_twin(problem, smoothed))
+    for b in range(2):
+        worst = estimate.force[estimate.magnitude[:, b].argmax(), b]
+        assert estimate.peak_stress[b] == pytest.approx(stress_at_force(problem, theta, b, worst), rel=1e-9)
+        for i in range(0, COUNT, 50):
+            there = stress_at_force(problem, theta, b, estimate.force[i, b])
+            assert estimate.stress[i, b] == pytest.approx(there, rel=0.01)
+
+
+def test_without_the_twin_the_record_itself_opens_the_gate(pushed):
+    """Nothing of the twin enters: gains within 1 per cent, gaps within their prior, and the same peaks."""
+    problem, smoothed, force = pushed
+    lent = lent_by_record(problem)
+    opened = replace(lent, reach=np.zeros(2))  # this rotor is pushed where no race is
+    found = input_state_estimate(problem, opened)
+    np.testing.assert_allclose(found.peak, np.hypot(*force.transpose(2, 0, 1)).max(axis=0), rtol=0.15)
+    lost = replace(smoothed, means=smoothed.means * np.nan)
+    assert np.all(np.isnan(lent_by_twin(problem, lost).radius)) and np.all(np.isfinite(lent.reach))
+
+
+def test_a_force_that_no_bearing_carries_is_refused(pushed):
+    problem, smoothed, _ = pushed
+    theta = smoothed.means[0][problem.parameter_slice]
+    with pytest.raises(IdentificationError, match=r"NDE: a bearing force of 1000000000000 N was found"):
+        stress_at_force(problem, theta, 0, np.array([0.0, -1e12]))
 
 
 def test_impulses_are_those_of_the_pulses(pushed):
     problem, smoothed, force = pushed
-    found = input_state_estimate(problem, smoothed)
+    found = input_state_estimate(problem, lent_by_twin(problem, smoothed))
     np.testing.assert_allclose(
         DT * found.force.sum(axis=0), DT * force.sum(axis=0), atol=0.05 * DT * np.abs(force).sum(axis=0).max()
     )
@@ -150,7 +175,7 @@ def test_impulses_are_those_of_the_pulses(pushed):
 
 def test_in_flight_the_force_is_held_at_zero(pushed):
     problem, smoothed, force = pushed
-    found = input_state_estimate(problem, smoothed)
+    found = input_state_estimate(problem, lent_by_twin(problem, smoothed))
     flying = np.abs(force).max(axis=2) == 0.0
     assert np.count_nonzero(flying) > 1000
     assert found.magnitude[flying].max() < 0.05 * found.peak.max()
@@ -161,7 +186,8 @@ def test_missing_readings_are_bridged(pushed):
     readings = problem.readings.copy()
     readings[400:405] = np.nan
     readings[100:130, 2] = np.nan
-    found = input_state_estimate(replace(problem, readings=readings), smoothed)
+    worse = replace(problem, readings=readings)
+    found = input_state_estimate(worse, lent_by_twin(worse, smoothed))
     assert np.all(np.isfinite(found.force))
-    whole = input_state_estimate(problem, smoothed)
+    whole = input_state_estimate(problem, lent_by_twin(problem, smoothed))
     np.testing.assert_allclose(found.peak, whole.peak, rtol=0.05)

@@ -70,7 +70,7 @@ def check_record(record: Record, machine: Machine, tail: Record | None = None) -
     findings += check_blocks(record) + check_units(whole, machine, planes)
     findings += check_speed(record, machine)
     if stops(findings):
-        misread = any(found.kind == "wrong unit factor" for found in findings)
+        misread = any(found.kind in ("wrong unit factor", "wrong air gap") for found in findings)
         return ranked(found for found in findings if not (misread and found.kind == "coarse quantisation"))
     still = None if tail is None else with_whole_planes(tail)[0]
     return ranked(findings + _check_motion(whole, machine, still))

@@ -46,7 +46,7 @@ def check_units(record: Record, machine: Machine, planes: tuple[Plane, ...]) -> 
                 suspects.setdefault(round(math.log10(ratio / 1.5)), []).append((name, ratio))
     if suspects and not _sinks(record):
         return []  # nothing falls: the search for the drop says so
-    return [_unit_finding(found) for found in suspects.values()]
+    return [_unit_finding(found, machine) for found in suspects.values()]
 
 
 def _sinks(record: Record) -> bool:
@@ -63,7 +63,7 @@ def _nearest(ratio: float) -> float | None:
     return min(fitting, key=lambda factor: abs(math.log(ratio / factor / 1.5))) if fitting else None
 
 
-def _unit_finding(found: list[tuple[str, float]]) -> Finding:
+def _unit_finding(found: list[tuple[str, float]], machine: Machine) -> Finding:
     names = ", ".join(name for name, _ in found)
     ratio = float(np.median([value for _, value in found]))
     factor = _nearest(ratio)
@@ -72,6 +72,19 @@ def _unit_finding(found: list[tuple[str, float]]) -> Finding:
         if factor
         else "no unit factor fits"
     )
+    gaps = [bearing.air_gap for bearing in machine.touchdown_bearings]
+    if any(gap.status == "estimated" for gap in gaps):
+        sizes = ", ".join(f"{1e6 * float(gap):.0f} µm" for gap in gaps)
+        source = next((gap.source for gap in gaps if gap.source), "estimated")
+        return Finding(
+            kind="wrong air gap",
+            message=f"the readings span {ratio:.3g} × the air gap of the machine file ({sizes}; {source}), a "
+            f"drop 1 to 2.5 ×; {guess}, and so would a wrong estimate of the gap",
+            remedy="use the machine file from before that estimate; if it says the same, correct unit or "
+            "sensitivity in the profile or the machine file",
+            severity="stop",
+            channel=names,
+        )
     return Finding(
         kind="wrong unit factor",
         message=f"the readings span {ratio:.3g} × the nominal air gap, a drop 1 to 2.5 ×; {guess}",

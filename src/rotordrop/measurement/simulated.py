@@ -1,4 +1,4 @@
-"""Is a record simulated? What ships with rotordrop is, and the report must say so."""
+"""Is a record simulated? What ships with rotordrop is, and every document and page must say so."""
 
 from __future__ import annotations
 
@@ -7,19 +7,15 @@ from functools import lru_cache
 from importlib import resources
 
 from rotordrop.measurement.record import Record
-from rotordrop.report.content import SIMULATED_RECORD
 
 
-def simulated_notice(record: Record) -> str:
-    """Sentence that says a record is simulated; empty when nothing says so.
+def is_simulated(record: Record) -> bool:
+    """Whether a record is known to be simulated.
 
-    A record counts as simulated when it is one of those that ship with rotordrop, or when its header or its
-    notes say so.
+    It is when it is one of those that ship with rotordrop, or when its header or its notes say so.
     """
     words = " ".join((*record.metadata, *record.metadata.values(), *record.notes)).lower()
-    if record.sha256 in _bundled() or "simulat" in words or "synthe" in words:
-        return SIMULATED_RECORD
-    return ""
+    return record.sha256 in _bundled() or "simulat" in words or "synthe" in words
 
 
 @lru_cache(maxsize=1)

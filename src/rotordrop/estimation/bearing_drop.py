@@ -1,0 +1,345 @@
+"""What a drop did at one touchdown bearing, whoever found it: histories with bands, peaks, impacts.
+
+A followed record, a replayed one and a simulated drop end here, so that pages and documents know one form.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.estimated import IdentifiedValue
+from rotordrop.severity.statistics import StressStatistics, stress_statistics
+from rotordrop.simulation.certificate import refined_peak
+from rotordrop.simulation.result import DropResult
+
+Array = NDArray[np.float64]
+Role: TypeAlias = Literal["measured", "simulated", "simulated, lower gap", "estimated", "cross-check"]
+
+LATE = (0.15, 0.2)
+"""Stretch of the late mean force [s from power-off]."""
+
+
+class Origin(StrEnum):
+    """Who found the loads of a bearing."""
+
+    TWIN = "tracked twin"
+    CROSS_CHECK = "independent cross-check"
+    REPLAY = "open-loop replay"
+    SIMULATION = "simulation"
+
+
+@dataclass(frozen=True, kw_only=True)
+class History:
+    """A quantity against time.
+
+    Attributes
+    ----------
+    label : str
+        Name in the legend.
+    time : ndarray, shape (T,)
+        Time from power-off [s].
+    values : ndarray, shape (T,)
+        Values in SI units.
+    role : Role
+        Where the history comes from; decides colour and line.
+    """
+
+    label: str
+    time: Array
+    values: Array
+    role: Role = "simulated"
+
+    def between(self, start: float, end: float) -> History:
+        """The part between two times [s]."""
+        inside = (self.time >= start) & (self.time <= end)
+        return replace(self, time=self.time[inside], values=self.values[inside])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motion:
+    """Movement of the rotor in the plane of one bearing.
+
+    Attributes
+    ----------
+    label : str
+        Name in the legend.
+    time : ndarray, shape (T,)
+        Time from power-off [s].
+    displacement : ndarray, shape (T, 2)
+        Displacement (x, y) from the bearing centre [m].
+    role : Role
+        Where the motion comes from; decides colour and line.
+    """
+
+    label: str
+    time: Array
+    displacement: Array
+    role: Role = "simulated"
+
+    @property
+    def horizontal(self) -> History:
+        """Displacement in x."""
+        return self._history(self.displacement[:, 0])
+
+    @property
+    def vertical(self) -> History:
+        """Displacement in y."""
+        return self._history(self.displacement[:, 1])
+
+    @property
+    def radial(self) -> History:
+        """Distance from the centre."""
+        return self._history(np.hypot(self.displacement[:, 0], self.displacement[:, 1]))
+
+    def _history(self, values: Array) -> History:
+        return History(label=self.label, time=self.time, values=np.asarray(values), role=self.role)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Band:
+    """Lower and upper limit of a history, shape (T,) each, time [s] from power-off."""
+
+    time: Array
+    lower: Array
+    upper: Array
+    label: str = "90 % interval"
+
+    def between(self, start: float, end: float) -> Band:
+        """The part between two times [s]."""
+        inside = (self.time >= start) & (self.time <= end)
+        return replace(self, time=self.time[inside], lower=self.lower[inside], upper=self.upper[inside])
+
+
+@dataclass(frozen=True, kw_only=True)
+class AirGap:
+    """Lower and upper limit of the air gap of one bearing [m]; equal where there is one value only."""
+
+    lower: float
+    upper: float
+
+    @classmethod
+    def of(cls, value: float) -> AirGap:
+        """A gap known as one value."""
+        return cls(lower=value, upper=value)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Peak:
+    """Highest point of a history: the number with its interval, when it was [s], and who found it."""
+
+    known: IdentifiedValue
+    time: float
+    origin: Origin
+
+    @property
+    def value(self) -> float:
+        """The peak in SI units."""
+        return self.known.value
+
+    @property
+    def interval_90(self) -> tuple[float, float] | None:
+        """Interval that holds the true peak with 90 % probability, where one is known."""
+        return self.known.interval_90
+
+
+@dataclass(frozen=True, kw_only=True)
+class Impact:
+    """One impact at one bearing; numbers found from a record carry their 90 % intervals.
+
+    Attributes
+    ----------
+    start, end, peak_time : float
+        Times [s] from power-off; the end is NaN where the contact still lasts.
+    azimuth : float
+        Direction of the contact normal at the peak [rad ccw from +x], between −π and π.
+    peak_force, impulse, dissipated_energy : IdentifiedValue
+        Peak force [N], normal impulse [N s], energy lost in the contact [J].
+    """
+
+    start: float
+    end: float
+    azimuth: float
+    peak_time: float
+    peak_force: IdentifiedValue
+    impulse: IdentifiedValue
+    dissipated_energy: IdentifiedValue
+
+
+@dataclass(frozen=True, kw_only=True)
+class FirstContact:
+    """Times and depth of the first contact at one bearing.
+
+    Attributes
+    ----------
+    start, end : float
+        Beginning t1 and end t2 of the first contact [s] from power-off.
+    indentation : float
+        Largest displacement beyond the air gap during it [m].
+    deepest_time : float
+        Time of the largest displacement [s].
+    """
+
+    start: float
+    end: float
+    indentation: float
+    deepest_time: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class BearingMotions:
+    """Motions of the rotor at one bearing, or in one plane of sensors, where no more is known."""
+
+    name: str
+    motions: tuple[Motion, ...]
+    air_gap: AirGap | None = None
+    at_gap_limits: tuple[Motion, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class BearingDrop:
+    """Everything one touchdown bearing went through in a drop.
+
+    Attributes
+    ----------
+    name : str
+        Name of the bearing.
+    motions : tuple of Motion
+        Motions of the rotor, the measured one first where there is a record.
+    at_gap_limits : tuple of Motion
+        Motions simulated with the lower and the upper air gap (Neisi 2020, Fig. 14); may be empty.
+    air_gap : AirGap or None
+        Limits of the air gap.
+    force, stress : History
+        Magnitude of the ball force on the race [N] and largest Hertz stress at the inner race [Pa].
+    force_band, stress_band : Band or None
+        Their 90 % bands.
+    preload_stress : float or None
+        Stress of the preload alone [Pa].
+    peak_force, peak_stress : Peak
+        Highest points of the two histories.
+    values : mapping
+        Further numbers by the field names of the published document, means and parameters.
+    missing : mapping
+        Numbers that are not stated, by field name, and why.
+    impacts : tuple of Impact
+        In the order of their beginning.
+    impact_force : str
+        Name of the force whose peak the impacts state.
+    first_contact : FirstContact or None
+        None where the bearing was not touched.
+    """
+
+    name: str
+    motions: tuple[Motion, ...]
+    force: History
+    stress: History
+    peak_force: Peak
+    peak_stress: Peak
+    air_gap: AirGap | None = None
+    at_gap_limits: tuple[Motion, ...] = ()
+    force_band: Band | None = None
+    stress_band: Band | None = None
+    preload_stress: float | None = None
+    values: Mapping[str, IdentifiedValue] = field(default_factory=dict)
+    missing: Mapping[str, str] = field(default_factory=dict)
+    impacts: tuple[Impact, ...] = ()
+    impact_force: str = "contact force"
+    first_contact: FirstContact | None = None
+
+    @property
+    def statistics(self) -> StressStatistics:
+        """Distribution of the stress (Neisi 2020, Table 5); its maximum is the stated peak."""
+        found = stress_statistics(
+            self.stress.values, time=self.stress.time, preload_stress=self.preload_stress
+        )
+        return replace(found, maximum=self.peak_stress.value)
+
+
+def deepest(motion: Motion, start: float, end: float, gap: float) -> FirstContact:
+    """First contact between two times [s]: how far beyond the gap [m] the rotor went, and when."""
+    radius = motion.radial
+    inside = (radius.time >= start) & (radius.time <= end)
+    at = int(np.argmax(np.where(inside, radius.values, -np.inf)))
+    return FirstContact(
+        start=start,
+        end=end,
+        indentation=float(radius.values[at]) - gap,
+        deepest_time=float(radius.time[at]),
+    )
+
+
+def simulated_bearings(result: DropResult) -> tuple[BearingDrop, ...]:
+    """What happened at every bearing in a simulated drop; its numbers have no intervals."""
+    return tuple(_simulated_bearing(result, b) for b in range(len(result.bearing_names)))
+
+
+def _simulated_bearing(result: DropResult, b: int) -> BearingDrop:
+    name, log = result.bearing_names[b], result.contacts.of_bearing(b)
+    gap = simulated_gap(result, b)
+    motion = Motion(label="simulated", time=result.time, displacement=result.displacement[:, b])
+    force = History(label="simulated", time=result.time, values=result.bearing_force_magnitude[:, b])
+    stress = History(label="simulated", time=result.time, values=result.max_stress[:, b])
+    first = None
+    if len(log):
+        end = float(np.nan_to_num(log.end[0], nan=result.time[-1]))
+        first = deepest(motion, float(log.start[0]), end, gap)
+    free = result.indentation[0, b] < 0.0  # a drop that starts free shows what the preload alone does
+    return BearingDrop(
+        name=name,
+        motions=(motion,),
+        air_gap=AirGap.of(gap),
+        force=force,
+        stress=stress,
+        preload_stress=float(result.max_stress[0, b]) if free else None,
+        peak_force=highest(force, "N", Origin.SIMULATION),
+        peak_stress=highest(stress, "Pa", Origin.SIMULATION),
+        values=mean_values(force, stress),
+        impacts=tuple(
+            Impact(
+                start=float(log.start[i]),
+                end=float(log.end[i]),
+                azimuth=float(np.angle(np.exp(1j * log.azimuth[i]))),
+                peak_time=float(log.peak_time[i]),
+                peak_force=IdentifiedValue(value=float(log.peak_force[i]), unit="N"),
+                impulse=IdentifiedValue(value=float(log.impulse[i]), unit="N s"),
+                dissipated_energy=IdentifiedValue(value=float(log.dissipated_energy[i]), unit="J"),
+            )
+            for i in range(len(log))
+        ),
+        first_contact=first,
+    )
+
+
+def simulated_gap(result: DropResult, b: int) -> float:
+    """Air gap [m] of one bearing, from the motion and the indentation of the first instant."""
+    relative = result.displacement[0, b] - result.race_displacement[0, b]
+    return float(np.hypot(relative[0], relative[1]) - result.indentation[0, b])
+
+
+def highest(history: History, unit: str, origin: Origin) -> Peak:
+    """Highest point of a history between its samples, without an interval."""
+    value, time = refined_peak(history.time, history.values)
+    return Peak(known=IdentifiedValue(value=value, unit=unit), time=time, origin=origin)
+
+
+def mean_values(force: History, stress: History) -> dict[str, IdentifiedValue]:
+    """Mean stress over the drop, and the late mean force where the history reaches its end."""
+    values = {"mean_stress_Pa": IdentifiedValue(value=float(np.mean(stress.values)), unit="Pa")}
+    if late_mean := mean_late(force):
+        values["mean_force_0p15_0p2_N"] = IdentifiedValue(value=late_mean, unit="N")
+    return values
+
+
+def mean_late(force: History) -> float | None:
+    """Mean of a history over the late stretch; None where it ends before."""
+    step = float(force.time[1] - force.time[0])
+    if force.time[-1] < LATE[1] - 1.5 * step:
+        return None
+    late = force.between(*LATE).values
+    return float(np.mean(late)) if len(late) else None

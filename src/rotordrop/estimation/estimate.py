@@ -1,0 +1,290 @@
+"""The estimate of one recorded drop: one frozen result for every method; pages and documents draw from it.
+
+Nothing in here points into a filter: the arrays of a pass are hundreds of megabytes and go when the estimate
+is made.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.estimated import IdentifiedValue
+from rotordrop.estimation.agreement import Agreement
+from rotordrop.estimation.bearing_drop import BearingDrop
+from rotordrop.estimation.later_motion import LaterMotion
+from rotordrop.estimation.methods import Method
+from rotordrop.identification.first_contact import FirstContact as FirstContact
+from rotordrop.identification.friction import FrictionSweep as FrictionSweep
+from rotordrop.identification.speed import SpeedFit
+from rotordrop.machine import Machine
+from rotordrop.measurement.events import DropInstant
+from rotordrop.measurement.power_off import PowerOff
+from rotordrop.measurement.quality.finding import Finding
+from rotordrop.measurement.record import Record
+from rotordrop.model.parameter import Parameter
+from rotordrop.tracking.consistency import Check
+
+Array = NDArray[np.float64]
+
+
+class Verdict(Enum):
+    """What model and record say of each other; the values are the sentences a reader sees first."""
+
+    CONSISTENT = "The model is consistent with the record."
+    ONE_DIRECTION = (
+        "Not every plane shows both directions: forces across the missing one rest on the model alone. "
+        "Intervals are 2 × as wide, and no independent cross-check is possible."
+    )
+    HELD = (
+        "The model is not consistent with the record. Only ranges are stated: they hold the independent "
+        "cross-check too."
+    )
+    GIVEN_WAY = (
+        "The model is not consistent with the record and lost it at a bearing. Loads there are those of the "
+        "independent cross-check, as ranges."
+    )
+    OPEN_LOOP = (
+        "This is the paper's route, an open-loop replay: one drop like the recorded one. The tracked twin "
+        "(--method tracked) follows the record and gives narrower intervals."
+    )
+
+    @property
+    def holds(self) -> bool:
+        """Whether single numbers may be relied on within their intervals."""
+        return self in (Verdict.CONSISTENT, Verdict.ONE_DIRECTION, Verdict.OPEN_LOOP)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CrossCheck:
+    """One number found in two ways.
+
+    Attributes
+    ----------
+    name : str
+        What is compared, for example ``"NDE peak force"``.
+    estimate : IdentifiedValue
+        The number of the tracked twin.
+    check : float
+        The number of the estimate without contact law, in the same unit.
+    accuracy : float
+        Known accuracy of the latter, relative [1]; a larger difference is a warning.
+    replaced : bool
+        Whether the estimate has given way to the cross-check.
+    """
+
+    name: str
+    estimate: IdentifiedValue
+    check: float
+    accuracy: float
+    replaced: bool = False
+
+    @property
+    def difference(self) -> float:
+        """Relative difference of the cross-check from the twin [1]."""
+        return self.check / self.estimate.value - 1.0 if self.estimate.value else math.nan
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the difference stays within the known accuracy."""
+        return abs(self.difference) <= self.accuracy
+
+
+@dataclass(frozen=True, kw_only=True)
+class FittedParameter:
+    """One unknown: its row in the parameter table, what was known before, and what the record made of it.
+
+    ``owner`` is the bearing, magnet or unbalance it belongs to; ``prior`` None where nothing was known.
+    """
+
+    row: Parameter
+    owner: str
+    prior: IdentifiedValue | None
+    estimate: IdentifiedValue
+
+    @property
+    def path(self) -> str:
+        """Path in the machine, such as ``"NDE.support.stiffness"``."""
+        return self.row.path_of(self.owner)
+
+    @property
+    def scope(self) -> str:
+        """Whether it belongs to the machine or to this drop alone."""
+        return "machine" if self.row.owner == "bearing" else "drop"
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorErrors:
+    """Gain error [1] and offset [m] of one sensor as estimated, and its noise (standard deviation) [m]."""
+
+    sensor: str
+    gain_error: IdentifiedValue
+    offset: IdentifiedValue
+    noise: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Innovations:
+    """What every reading said beyond the prediction from all before it; N samples, C channels.
+
+    Attributes
+    ----------
+    channels : tuple of str
+        Names of the sensors.
+    time : ndarray, shape (N,)
+        Time from power-off [s].
+    values, deviation : ndarray, shape (N, C)
+        Reading minus prediction and its expected standard deviation [m]; NaN where nothing was read.
+    limits : tuple of float
+        Mean normalised squares between which model and record count as consistent [1].
+    """
+
+    channels: tuple[str, ...]
+    time: Array
+    values: Array
+    deviation: Array
+    limits: tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReplaySteps:
+    """The steps of the paper's route beside the common result.
+
+    Attributes
+    ----------
+    speed : SpeedFit
+        Speed at power-off and how it falls.
+    contacts : tuple of FirstContact
+        First contact of every bearing in the record, with the stiffness of eq. (17).
+    friction : FrictionSweep or None
+        Sweep of the friction coefficient; None when it was taken over.
+    correlations : mapping
+        Correlations of support values by ``"first ~ second"`` [1].
+    speed_time, speed_simulated : ndarray, shape (T,)
+        Simulated speed [rad/s] against time [s].
+    fixed : str
+        Where supports and friction were taken from; empty when they were identified.
+    draws, rejected : int or None
+        Draws behind the intervals, and those that did not keep to the record; None where none were made.
+    identified : Machine
+        The machine with what was identified.
+    document : mapping
+        Initial state, settled rest and search, ready for the published document.
+    """
+
+    speed: SpeedFit
+    contacts: tuple[FirstContact, ...]
+    friction: FrictionSweep | None
+    correlations: Mapping[str, float]
+    speed_time: Array
+    speed_simulated: Array
+    fixed: str
+    draws: int | None
+    rejected: int | None
+    identified: Machine
+    document: Mapping[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """Force and stress of one recorded drop, with everything a page or a document says of it.
+
+    Attributes
+    ----------
+    name : str
+        Name of the drop.
+    method : Tracked or Replay
+        How it was made.
+    machine : Machine
+        The machine as it was given.
+    record : Record
+        The recording.
+    drop_instant : DropInstant or PowerOff
+        Power-off in record time.
+    speed : float
+        Speed at power-off [rad/s].
+    until : float
+        End of the estimated part [s from power-off].
+    verdict : Verdict
+        What model and record say of each other.
+    checks : tuple of Check
+        The consistency checks behind it; empty for a replay.
+    bearings : tuple of BearingDrop
+        Histories, peaks, impacts and values of every bearing.
+    parameters : tuple of FittedParameter
+        Every unknown with prior and estimate.
+    sensors : tuple of SensorErrors
+        Gain, offset and noise of every sensor; empty for a replay.
+    cross_check : tuple of CrossCheck
+        Comparisons with the estimate without contact law; empty where none was made.
+    innovations : Innovations or None
+        What the filter did not foresee; None for a replay.
+    nis, noise_factor : float or None
+        Mean normalised innovation squared [1], and size of the unknown impulses over the usual one [1].
+    agreement : Agreement or None
+        How far the replayed drop follows the record.
+    replay : ReplaySteps or None
+        The steps of the paper's route.
+    later : tuple of LaterMotion
+        What the rest of the record shows; empty where it has none.
+    findings : tuple of Finding
+        What the gate found in the record.
+    warnings, notes : tuple of str
+        What makes the numbers less certain, and what is worth knowing and does not.
+    simulated_record : bool
+        Whether the record is known to be simulated.
+    """
+
+    name: str
+    method: Method
+    machine: Machine
+    record: Record
+    drop_instant: DropInstant | PowerOff
+    speed: float
+    until: float
+    verdict: Verdict
+    bearings: tuple[BearingDrop, ...]
+    parameters: tuple[FittedParameter, ...]
+    checks: tuple[Check, ...] = ()
+    sensors: tuple[SensorErrors, ...] = ()
+    cross_check: tuple[CrossCheck, ...] = ()
+    innovations: Innovations | None = None
+    nis: float | None = None
+    noise_factor: float | None = None
+    agreement: Agreement | None = None
+    replay: ReplaySteps | None = None
+    later: tuple[LaterMotion, ...] = ()
+    findings: tuple[Finding, ...] = ()
+    warnings: tuple[str, ...] = field(default=())
+    notes: tuple[str, ...] = field(default=())
+    simulated_record: bool = False
+
+    @property
+    def consistent(self) -> bool:
+        """Whether single numbers may be relied on within their intervals."""
+        return self.verdict.holds
+
+    @property
+    def sentence(self) -> str:
+        """The verdict, with what failed."""
+        failed = "; ".join(check.message for check in self.checks if not check.passed)
+        return f"{self.verdict.value} {failed[:1].upper()}{failed[1:]}." if failed else self.verdict.value
+
+    def bearing(self, name: str) -> BearingDrop:
+        """What happened at the bearing of a name.
+
+        Raises
+        ------
+        KeyError
+            If the machine has no such bearing; names those it has.
+        """
+        for one in self.bearings:
+            if one.name == name:
+                return one
+        raise KeyError(f"no bearing {name!r}; the machine has {', '.join(b.name for b in self.bearings)}")

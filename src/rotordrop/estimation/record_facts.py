@@ -1,0 +1,71 @@
+"""What a record itself gives every estimate of it: findings of the gate, warnings, is it simulated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rotordrop.errors import RecordError
+from rotordrop.machine import Machine
+from rotordrop.measurement.quality import Finding, check_record, refuse_unusable
+from rotordrop.measurement.record import Record
+from rotordrop.measurement.simulated import is_simulated
+
+NO_TAIL = "no settled tail: the air gap rests on its prior and on the contacts; give one with --tail"
+COUNTED_TWICE = (
+    "the machine was calibrated on a drop named {}: if it is this one, its readings count twice and the "
+    "intervals are too narrow; use the machine file from before the calibration for it"
+)
+
+
+BESIDE = (
+    "the machine file was calibrated on drops that its model is not consistent with, so its air gaps and "
+    "supports may be far off; use the file from before that calibration"
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordFacts:
+    """Findings of the gate, what to warn of before anything is estimated, and whether it is simulated."""
+
+    findings: tuple[Finding, ...]
+    warnings: tuple[str, ...]
+    simulated: bool
+
+    def warnings_with(self, *further: str) -> tuple[str, ...]:
+        """All warnings, each said once."""
+        return tuple(dict.fromkeys((*self.warnings, *further)))
+
+
+def _findings(machine: Machine, record: Record, tail: Record | None) -> tuple[Finding, ...]:
+    """What the gate finds; a lost sensor keeps it from looking, but not the twin from following."""
+    try:
+        return check_record(record, machine, tail)
+    except RecordError as error:
+        unseen = Finding(
+            kind="not looked at",
+            message=f"the plausibility checks could not look at this record: {error}",
+            remedy="look at its channels by eye",
+            severity="warning",
+        )
+        return (unseen,)
+
+
+def facts_of(machine: Machine, record: Record, tail: Record | None, name: str) -> RecordFacts:
+    """What a record of a machine, with its settled tail, gives every estimate.
+
+    Raises
+    ------
+    RecordError
+        If the gate finds that results would be wrong.
+    """
+    findings = _findings(machine, record, tail)
+    refuse_unusable(findings, name)
+    warnings = [finding.message for finding in findings if finding.severity == "warning"]
+    if tail is None:
+        warnings.append(NO_TAIL)
+    origin = machine.calibration
+    if origin is not None:
+        same = [d.name for d in origin.drops if d.name == name or (d.sha256 and d.sha256 == record.sha256)]
+        warnings += [COUNTED_TWICE.format(one) for one in same]
+        warnings += [] if origin.consistent else [BESIDE]
+    return RecordFacts(findings=findings, warnings=tuple(warnings), simulated=is_simulated(record))

@@ -1,0 +1,237 @@
+"""From a followed drop to its estimate: which numbers hold, which give way, and nothing of the filter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.errors import IdentificationError
+from rotordrop.estimated import IdentifiedValue
+from rotordrop.estimation.bearing_drop import BearingDrop
+from rotordrop.estimation.estimate import (
+    CrossCheck,
+    Estimate,
+    FittedParameter,
+    Innovations,
+    SensorErrors,
+    Verdict,
+)
+from rotordrop.estimation.later_motion import LaterMotion, later_motion
+from rotordrop.estimation.methods import Tracked
+from rotordrop.estimation.record_facts import RecordFacts
+from rotordrop.estimation.tracked import TrackedDrop
+from rotordrop.estimation.tracked_loads import (
+    INCONSISTENT_WIDENING,
+    Loads,
+    bearing_drop,
+    cross_checks,
+    holding_cross_check,
+    is_beside,
+    loads_of_cross_check,
+    twin_loads,
+)
+from rotordrop.estimation.tracked_parameters import (
+    bearing_values,
+    gap_of_record,
+    is_lost,
+    parameters,
+    sensor_errors,
+)
+from rotordrop.tracking.consistency import NIS_RANGE
+from rotordrop.tracking.input_state import (
+    InputEstimate,
+    at_bearings,
+    input_state_estimate,
+    lent_by_record,
+    lent_by_twin,
+)
+
+Array = NDArray[np.float64]
+
+QUICK = (
+    "Quick estimate: one pass over the record, {}without the search for the size of the unknown impulses. "
+    "For a number that decides, leave --quick out."
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Judgement:
+    """How far the twin is believed.
+
+    ``check`` is the estimate without contact law, if one was made; ``widening`` the factor on the twin's
+    intervals [1]; ``parameters`` and ``sensors`` what it identified; ``given_way`` the bearings whose numbers
+    are not the twin's.
+    """
+
+    verdict: Verdict
+    check: InputEstimate | None
+    widening: float
+    parameters: tuple[FittedParameter, ...]
+    sensors: tuple[SensorErrors, ...]
+    given_way: tuple[bool, ...]
+
+    @property
+    def fits(self) -> bool:
+        """Whether the twin's own numbers hold."""
+        return self.verdict.holds
+
+
+def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estimate:
+    """The estimate of a followed drop; it keeps nothing of the filter.
+
+    Raises
+    ------
+    IdentificationError
+        If the model does not fit the record and the sensors see too little for a cross-check: the errors of
+        its numbers have no limit then.
+    """
+    problem, prepared = drop.problem, drop.prepared
+    judged = _judge(drop, method)
+    later = _later(drop, judged)
+    quick = (QUICK.format("" if judged.check else "without the independent cross-check and "),)
+    return Estimate(
+        name=prepared.name,
+        method=method,
+        machine=problem.model.machine,
+        record=prepared.record,
+        drop_instant=prepared.instant,
+        speed=float(problem.mean[problem.model.layout.rotor_speed]),
+        until=float(problem.time[-1]),
+        verdict=judged.verdict,
+        bearings=_bearings(drop, judged),
+        parameters=judged.parameters,
+        checks=drop.checks,
+        sensors=judged.sensors,
+        cross_check=_comparisons(drop, judged),
+        innovations=_innovations(drop),
+        nis=drop.smoothed.filtered.nis,
+        noise_factor=drop.noise_factor,
+        later=later,
+        findings=facts.findings,
+        warnings=facts.warnings_with(
+            *prepared.instant.notes, *(one.sentence() for one in later if one.larger)
+        ),
+        notes=(*(check.note for check in drop.checks if check.note), *(quick if method.quick else ())),
+        simulated_record=facts.simulated,
+    )
+
+
+def _judge(drop: TrackedDrop, method: Tracked) -> _Judgement:
+    """Compare the twin with its own checks and, where they fail, with the estimate without contact law.
+
+    A twin that does not fit lends nothing to that estimate: what it says of gaps and sensors may be as wrong
+    as what it says of forces.
+    """
+    problem, smoothed = drop.problem, drop.smoothed
+    check = None
+    if drop.sees_all_directions and not (drop.consistent and method.quick):
+        lent = lent_by_twin(problem, smoothed) if drop.consistent else lent_by_record(problem)
+        check = input_state_estimate(problem, lent)
+    if not drop.consistent and check is None:
+        _refuse_unchecked(drop)
+    fits = drop.consistent or check is None
+    widening = 1.0 if drop.consistent else INCONSISTENT_WIDENING
+    found = parameters(problem, smoothed, fits=fits, widening=widening, drops=drop.drops)
+    given_way = [False] * len(problem.model.bearing_names)
+    if not fits and check is not None:
+        given_way = [_gives_way(drop, found, check, b) for b in range(len(given_way))]
+    verdict = Verdict.CONSISTENT if drop.consistent else Verdict.ONE_DIRECTION
+    if not fits:
+        verdict = Verdict.GIVEN_WAY if any(given_way) else Verdict.HELD
+    return _Judgement(
+        verdict=verdict,
+        check=check,
+        widening=widening,
+        parameters=tuple(_with_own_gap(drop, parameter, given_way) for parameter in found),
+        sensors=sensor_errors(problem, smoothed, fits=fits, widening=widening),
+        given_way=tuple(given_way),
+    )
+
+
+def _refuse_unchecked(drop: TrackedDrop) -> None:
+    failed = [check for check in drop.checks if not check.passed]
+    if len(failed) == 1:  # the directions themselves: the model fits what is seen
+        return
+    raise IdentificationError(
+        f"the model does not fit the record {drop.prepared.name} "
+        f"({'; '.join(check.message for check in failed)}), and "
+        "nothing can check its force; expected a model that fits, or both directions in two planes. "
+        "Calibrate on drops with all sensors, estimate without --quick, or leave this drop out."
+    )
+
+
+def _gives_way(drop: TrackedDrop, found: tuple[FittedParameter, ...], check: InputEstimate, b: int) -> bool:
+    """Whether the twin has lost the drop at a bearing: by its peak force, or by an air gap that cannot be."""
+    name = drop.problem.model.bearing_names[b]
+    gap = next(parameter.estimate for parameter in found if parameter.path == f"{name}.air_gap")
+    return is_beside(float(drop.forces.magnitude[:, b].max()), check, b) or is_lost(drop.problem, gap, b)
+
+
+def _with_own_gap(drop: TrackedDrop, parameter: FittedParameter, given_way: list[bool]) -> FittedParameter:
+    for b, name in enumerate(drop.problem.model.bearing_names):
+        if given_way[b] and parameter.path == f"{name}.air_gap":
+            return replace(parameter, estimate=gap_of_record(drop.problem, b))
+    return parameter
+
+
+def _bearings(drop: TrackedDrop, judged: _Judgement) -> tuple[BearingDrop, ...]:
+    measured = _measured(drop, judged, drop.problem.readings)
+    found = []
+    for b in range(len(drop.problem.model.bearing_names)):
+        values: dict[str, IdentifiedValue] = bearing_values(drop.problem, judged.parameters, b)
+        held = None if judged.fits else judged.check
+        found.append(
+            bearing_drop(drop.problem, drop.forces, b, _loads(drop, judged, b), measured[:, b], values, held)
+        )
+    return tuple(found)
+
+
+def _loads(drop: TrackedDrop, judged: _Judgement, b: int) -> Loads:
+    twin = twin_loads(drop.forces, b, judged.widening)
+    if judged.fits or judged.check is None:
+        return twin
+    if judged.given_way[b]:
+        return loads_of_cross_check(judged.check, b)
+    return holding_cross_check(twin, drop.forces, judged.check, b)
+
+
+def _comparisons(drop: TrackedDrop, judged: _Judgement) -> tuple[CrossCheck, ...]:
+    if judged.check is None:
+        return ()
+    found: list[CrossCheck] = []
+    for b, name in enumerate(drop.problem.model.bearing_names):
+        twin = twin_loads(drop.forces, b, judged.widening)
+        found += cross_checks(name, twin, drop.forces, judged.check, b, replaced=judged.given_way[b])
+    return tuple(found)
+
+
+def _measured(drop: TrackedDrop, judged: _Judgement, readings: Array) -> Array:
+    """Motion at the bearings [m], shape (N, B, 2), sensor errors as estimated or by the record alone."""
+    estimate = drop.smoothed.means[-1] if judged.fits else drop.problem.mean
+    gain_errors, offsets = drop.problem.sensor_errors(estimate)
+    return at_bearings(drop.problem, (readings - offsets) / (1.0 + gain_errors))
+
+
+def _later(drop: TrackedDrop, judged: _Judgement) -> tuple[LaterMotion, ...]:
+    evidence = drop.prepared.evidence
+    return later_motion(
+        drop.problem.model.bearing_names,
+        evidence.time,
+        _measured(drop, judged, evidence.readings(np.inf)),
+        until=float(drop.problem.time[-1]),
+        noise=float(np.sqrt(np.mean(drop.problem.variances))),
+    )
+
+
+def _innovations(drop: TrackedDrop) -> Innovations:
+    filtered = drop.smoothed.filtered
+    done = filtered.done
+    return Innovations(
+        channels=tuple(sensor.name for sensor in drop.problem.model.machine.sensors),
+        time=drop.problem.time[:done].copy(),
+        values=filtered.innovations[:done, :-1].copy(),
+        deviation=np.sqrt(filtered.innovation_variances[:done, :-1]),
+        limits=NIS_RANGE,
+    )

@@ -1,0 +1,205 @@
+"""Identified parameters and sensor errors of a followed drop: values with intervals, priors and verdicts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rotordrop.estimated import NINETY, IdentifiedValue, Verdict
+from rotordrop.estimation.estimate import FittedParameter, SensorErrors
+from rotordrop.estimation.tracked_loads import INCONSISTENT, OF_CROSS_CHECK, with_interval
+from rotordrop.machine.ball_bearing import BallBearing
+from rotordrop.model.parameter import Parameter
+from rotordrop.model.parameter_table import parameter, published
+from rotordrop.model.unknowns import Unknown
+from rotordrop.physics.ball_bearing import bearing_constants
+from rotordrop.physics.ball_set import static_bearing_stiffness
+from rotordrop.tracking.consistency import PARAMETER_LIMIT
+from rotordrop.tracking.problem import DropProblem
+from rotordrop.tracking.smoother import Smoothed, parameter_sample
+
+MODEL_GAP_SIGMA = 2.5e-6
+"""Standard deviation of an air gap by what confounds it with gains and offsets beyond the fit [m]."""
+LONE_GAP_SIGMA = 4e-6
+"""The same for a gap that was only guessed before a lone drop [m]: one drop seldom touches all round, and
+near the bottom gap and sensor offset are hard to tell apart."""
+UNSURE_GAP = 12e-6
+"""Prior standard deviation from which an air gap counts as guessed [m]."""
+PARAMETER_WIDENING = 1.5
+"""Factor on standard errors of parameters for what the linearised fit leaves out [1]."""
+UNDETERMINED: Verdict = "the record does not determine it"
+KNOWN: Verdict = "known from the calibration"
+NOT_DETERMINED: tuple[Verdict, ...] = (UNDETERMINED, KNOWN)
+"""Verdicts on a parameter that the record says little about; the second where it was calibrated before."""
+DETERMINED_SHARE, WEAKLY_DETERMINED_SHARE = 0.3, 0.7
+"""Standard error over that of the prior up to which a parameter is determined, and weakly determined [1]."""
+
+
+def determination(share: float, *, calibrated: bool = False) -> Verdict:
+    """Verdict on a parameter whose standard error is this share of its prior's [1]."""
+    if share < DETERMINED_SHARE:
+        return "determined"
+    if share < WEAKLY_DETERMINED_SHARE:
+        return "weakly determined"
+    return KNOWN if calibrated else UNDETERMINED
+
+
+def identified(unknown: Unknown, theta: float, sigma: float, widening: float = 1.0) -> IdentifiedValue:
+    """An estimated parameter as a value with interval, start and verdict."""
+    half = NINETY * sigma * widening
+    interval = (unknown.value_of(theta - half), unknown.value_of(theta + half))
+    return IdentifiedValue(
+        value=unknown.value_of(theta),
+        status=determination(sigma / unknown.sigma, calibrated=unknown.calibrated),
+        standard_error=unknown.standard_error(theta, sigma * widening),
+        interval_90=within_bounds(unknown.parameter, interval),
+        start=unknown.value_of(unknown.begin),
+        unit=unknown.unit,
+    )
+
+
+def within_bounds(row: Parameter, interval: tuple[float, float]) -> tuple[float, float]:
+    """An interval that ends where the quantity does: no air gap is below zero."""
+    low, high = interval
+    return (max(low, 0.0), max(high, 0.0)) if row is parameter("air_gap") else interval
+
+
+def model_error(unknown: Unknown, sigma: float, drops: int) -> float:
+    """Standard error of a parameter with what the fit to a number of drops leaves out of it."""
+    if unknown.parameter is not parameter("air_gap"):
+        return sigma
+    lone = drops == 1 and unknown.sigma > UNSURE_GAP
+    return math.hypot(sigma, LONE_GAP_SIGMA if lone else MODEL_GAP_SIGMA)
+
+
+def parameter_widening(unknown: Unknown, sigma: float, widening: float = 1.0) -> float:
+    """Factor on a parameter's standard error [1]; the widened error stays within that of the prior."""
+    return max(1.0, min(PARAMETER_WIDENING * widening, unknown.sigma / max(sigma, 1e-300)))
+
+
+def parameters(
+    problem: DropProblem, smoothed: Smoothed, *, fits: bool, widening: float, drops: int
+) -> tuple[FittedParameter, ...]:
+    """Every unknown as it was shortly after the first contacts, beside what was known before.
+
+    Where model and record disagree, a parameter may be anything between its prior and the fit.
+    """
+    at = parameter_sample(smoothed)
+    theta = smoothed.means[at][problem.parameter_slice]
+    sigma = np.sqrt(np.maximum(np.diag(smoothed.covariance(at))[problem.parameter_slice], 0.0))
+    found = []
+    for unknown, t, s in zip(problem.unknowns, theta, sigma, strict=True):
+        error = model_error(unknown, float(s), drops)
+        prior = identified(unknown, unknown.mean, unknown.sigma)
+        value = identified(unknown, float(t), error, parameter_widening(unknown, error, widening))
+        if not fits:
+            value = replace(value, status=INCONSISTENT, interval_90=_hull(value, prior))
+        found.append(FittedParameter(row=unknown.parameter, owner=unknown.owner, prior=prior, estimate=value))
+    return tuple(found)
+
+
+def _hull(one: IdentifiedValue, other: IdentifiedValue) -> tuple[float, float]:
+    (a, b), (c, d) = (v.interval_90 or (v.value, v.value) for v in (one, other))
+    return min(a, c), max(b, d)
+
+
+def gap_of_record(problem: DropProblem, b: int) -> IdentifiedValue:
+    """Air gap [m] by settled tail and machine file alone, for a twin that lost the record."""
+    entry = problem.gap_entries[b]
+    value = float(problem.mean[entry])
+    return replace(
+        with_interval(value, math.hypot(math.sqrt(problem.covariance[entry, entry]), MODEL_GAP_SIGMA)),
+        status=OF_CROSS_CHECK,
+        unit="m",
+    )
+
+
+def is_lost(problem: DropProblem, gap: IdentifiedValue, b: int) -> bool:
+    """Whether an estimated air gap is none that the machine can have, by settled tail and machine file."""
+    entry = problem.gap_entries[b]
+    sigma = math.sqrt(problem.covariance[entry, entry])
+    return gap.value <= 0.0 or abs(gap.value - float(problem.mean[entry])) > PARAMETER_LIMIT * sigma
+
+
+def published_values(name: str, found: Sequence[FittedParameter]) -> dict[str, IdentifiedValue]:
+    """Parameters of the bearing of a name by the field names of the published document, in its order."""
+    own = {one.row.field: one.estimate for one in found if one.row.owner == "bearing" and one.owner == name}
+    return {field: own[field] for field in published() if field in own}
+
+
+def bearing_values(
+    problem: DropProblem, found: Sequence[FittedParameter], b: int
+) -> dict[str, IdentifiedValue]:
+    """Identified values of one bearing by the field names of the published document."""
+    bearing = problem.model.machine.touchdown_bearings[b]
+    values = published_values(bearing.name, found)
+    if "friction.dynamic" in values:  # a bearing described without friction has none to find
+        ratio = float(bearing.friction.static) / float(bearing.friction.dynamic)
+        values["friction.static"] = static_friction(ratio, values["friction.dynamic"])
+    values["equivalent_stiffness_N_per_m"] = equivalent_stiffness(
+        bearing.bearing, float(problem.model.load_shares[b]), values["support.stiffness_N_per_m"]
+    )
+    return values
+
+
+def static_friction(ratio: float, dynamic: IdentifiedValue) -> IdentifiedValue:
+    """Static coefficient at its prior ratio to the dynamic one: sliding drops say little about it."""
+    low, high = dynamic.interval_90 or (dynamic.value, dynamic.value)
+    return IdentifiedValue(
+        value=ratio * dynamic.value,
+        status="the record does not determine it",
+        standard_error=None if dynamic.standard_error is None else ratio * dynamic.standard_error,
+        interval_90=(0.85 * ratio * low, 1.15 * ratio * high),
+        unit="1",
+    )
+
+
+def equivalent_stiffness(bearing: BallBearing, load: float, support: IdentifiedValue) -> IdentifiedValue:
+    """Support and bearing in series [N/m], the bearing by its tangent at its static load [N]."""
+    races = static_bearing_stiffness(bearing_constants(bearing), load)
+    low, high = support.interval_90 or (support.value, support.value)
+
+    def series(stiffness: float) -> float:
+        return stiffness * races / (stiffness + races)
+
+    return replace(
+        support,
+        value=series(support.value),
+        interval_90=(series(low), series(high)),
+        standard_error=(series(high) - series(low)) / (2.0 * NINETY),
+        start=None,
+    )
+
+
+def sensor_errors(
+    problem: DropProblem, smoothed: Smoothed, *, fits: bool, widening: float
+) -> tuple[SensorErrors, ...]:
+    """Gain and offset of every sensor at the end of the drop, and its noise."""
+    last = len(smoothed.means) - 1
+    sigma = np.sqrt(np.maximum(np.diag(smoothed.covariance(last)), 0.0))
+    gain, offset = problem.sensor_errors(smoothed.means[last])
+    gain_sigma, offset_sigma = problem.sensor_errors(sigma)
+    status: Verdict = "determined" if fits else INCONSISTENT
+
+    def known(value: float, error: float, unit: str) -> IdentifiedValue:
+        half = NINETY * widening * error
+        return IdentifiedValue(
+            value=value,
+            standard_error=widening * error,
+            interval_90=(value - half, value + half),
+            status=status,
+            unit=unit,
+        )
+
+    return tuple(
+        SensorErrors(
+            sensor=sensor.name,
+            gain_error=known(float(gain[c]), float(gain_sigma[c]), "1"),
+            offset=known(float(offset[c]), float(offset_sigma[c]), "m"),
+            noise=float(np.sqrt(problem.variances[c])),
+        )
+        for c, sensor in enumerate(problem.model.machine.sensors)
+    )

@@ -1,0 +1,261 @@
+"""The sections that every drop has, followed, replayed or simulated: all drawn from `BearingDrop`.
+
+A further figure of a drop is one function here, or one file and a line here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from rotordrop.estimation.bearing_drop import BearingDrop, BearingMotions, History
+from rotordrop.report.content import Figure, Section, Statement, Table
+from rotordrop.report.first_contact import first_contact_figure
+from rotordrop.report.impacts import impact_figure, impact_table
+from rotordrop.report.orbit import orbit_figure
+from rotordrop.report.quantity import Quantity
+from rotordrop.report.stress_box import StressBox, stress_box, stress_box_figure, stress_table
+from rotordrop.report.style import MICRO
+from rotordrop.report.time_panels import Panel, time_panels
+from rotordrop.severity.damage import STATIC_LIMIT
+
+EARLY = 0.04
+"""Window [s] around the first contacts that gets figures of its own."""
+MEGA = 1e-6
+PER_TURN = 1.0 / (2.0 * math.pi)
+CARRIED = (
+    "The measured motion is carried from the planes of the sensors to the bearings along the straight line "
+    "through them; the bending in between, a few micrometres, is left out."
+)
+
+
+def drop_sections(
+    bearings: Sequence[BearingDrop],
+    origin: str,
+    speed: float,
+    static_loads: Mapping[str, float] | None = None,
+    *,
+    contact_tables: tuple[Table, ...] = (),
+) -> tuple[Section, ...]:
+    """Force, stress, impacts, motion, first contact and orbit of a drop, in this order.
+
+    Parameters
+    ----------
+    bearings : sequence of BearingDrop
+        The drop, bearing by bearing.
+    origin : str
+        What is drawn, for example "measured and estimated".
+    speed : float
+        Speed at power-off [rad/s]; names the drop.
+    static_loads : mapping, optional
+        Share of the weight by bearing [N].
+    contact_tables : tuple of Table
+        Further tables on the first contact.
+    """
+    return (
+        _force(bearings, static_loads or {}),
+        _stress(bearings, speed),
+        _impacts(bearings),
+        motion_section(bearings, origin),
+        _first_contact(bearings, contact_tables),
+        orbit_section(bearings),
+    )
+
+
+def _force(bearings: Sequence[BearingDrop], loads: Mapping[str, float]) -> Section:
+    rows = [
+        [
+            Panel(
+                title=bearing.name,
+                axis="bearing force",
+                histories=(bearing.force,),
+                band=bearing.force_band,
+                levels=(("share of the weight", loads[bearing.name]),) if bearing.name in loads else (),
+                peak=bearing.peak_force,
+            )
+        ]
+        for bearing in bearings
+    ]
+    figures = [
+        Figure(
+            chart=time_panels(rows, 1.0, "N", from_zero=True),
+            caption="Magnitude of the ball force on the race, instantaneous (Neisi 2020, Fig. 15).",
+        )
+    ]
+    if max(bearing.force.time[-1] for bearing in bearings) > EARLY:
+        early = [[panel.until(EARLY) for panel in row] for row in rows]
+        figures.append(
+            Figure(
+                chart=time_panels(early, 1.0, "N", from_zero=True),
+                caption=f"The same force in the first {1e3 * EARLY:.0f} ms.",
+            )
+        )
+    return Section(heading="Bearing force", figures=tuple(figures))
+
+
+def _stress(bearings: Sequence[BearingDrop], speed: float) -> Section:
+    rows = [
+        [
+            Panel(
+                title=bearing.name,
+                axis="max. Hertz stress",
+                histories=(bearing.stress,),
+                band=bearing.stress_band,
+                levels=() if bearing.preload_stress is None else (("preload alone", bearing.preload_stress),),
+                peak=bearing.peak_stress,
+            )
+        ]
+        for bearing in bearings
+    ]
+    boxes = stress_boxes(bearings, speed)
+    history = Figure(
+        chart=time_panels(rows, MEGA, "MPa"),
+        caption="Largest Hertz stress of all balls at the inner race, instantaneous.",
+    )
+    box = Figure(
+        chart=stress_box_figure(boxes),
+        caption="Distribution of the stress within the drop; dashed in the box: mean (Neisi 2020, Fig. 16).",
+    )
+    return Section(heading="Hertz stress", figures=(history, box), tables=(stress_table(boxes),))
+
+
+def stress_boxes(bearings: Sequence[BearingDrop], speed: float) -> tuple[StressBox, ...]:
+    """Distribution of the stress at every bearing, under the speed of the drop."""
+    label = Quantity(value=speed * PER_TURN, kind="frequency", digits=3).text
+    return tuple(
+        stress_box(label, bearing.name, bearing.stress.values, bearing.statistics) for bearing in bearings
+    )
+
+
+def _impacts(bearings: Sequence[BearingDrop]) -> Section:
+    reasons = tuple(
+        Statement(text=f"{bearing.name}: no impacts are listed, because {bearing.missing['impacts']}.")
+        for bearing in bearings
+        if "impacts" in bearing.missing
+    )
+    hit = [bearing for bearing in bearings if bearing.impacts]
+    if not hit:
+        none = Statement(text="The rotor did not touch a bearing in this window.", level="notice")
+        return Section(heading="Impacts", statements=reasons or (none,))
+    force = hit[0].impact_force
+    figure = Figure(
+        chart=impact_figure(hit, force=force),
+        caption=f"Peak {force} of every impact over its place on the race; −90° is the bottom.",
+    )
+    table = impact_table(hit, force=force)
+    return Section(heading="Impacts", statements=reasons, figures=(figure,), tables=(table,))
+
+
+def motion_section(bearings: Sequence[BearingMotions | BearingDrop], origin: str, *text: str) -> Section:
+    """Displacement against time: every bearing for itself, and all side by side."""
+    figures = [
+        Figure(
+            chart=displacement_figure(bearing),
+            caption=f"Displacement of the rotor in the {bearing.name} touchdown bearing, {origin}; "
+            "vertical above, horizontal below (Neisi 2020, Figs 7 and 8).",
+        )
+        for bearing in bearings
+    ]
+    rows = [
+        [_sideways(bearing, "displacement", ()), _upwards(bearing, "displacement")] for bearing in bearings
+    ]
+    pair = Figure(
+        chart=time_panels(rows, MICRO, "µm", height=250, together=True),
+        caption="All bearings side by side; the panels zoom together (Neisi 2020, Fig. 13).",
+    )
+    carried = any(isinstance(b, BearingDrop) and b.motions[0].role == "measured" for b in bearings)
+    text = (*text, *((CARRIED,) if carried else ()))
+    return Section(heading="Displacement", text=text, figures=(*figures, pair))
+
+
+def displacement_figure(bearing: BearingMotions | BearingDrop) -> object:
+    """Draw vertical (y, up) and horizontal (x) displacement at one bearing (Neisi 2020, Figs 7 and 8).
+
+    Differs from the paper: vertical is y and horizontal is x here, z runs along the rotor.
+    """
+    rows = [[_upwards(bearing, "displacement y")], [_sideways(bearing, "displacement x", (-1.0, 1.0))]]
+    return time_panels(rows, MICRO, "µm", height=235)
+
+
+def _upwards(bearing: BearingMotions | BearingDrop, axis: str) -> Panel:
+    return Panel(
+        title=f"{bearing.name}: vertical, y",
+        axis=axis,
+        histories=tuple(motion.vertical for motion in bearing.motions),
+        air_gap=bearing.air_gap,
+        gap_signs=(-1.0,),
+    )
+
+
+def _sideways(bearing: BearingMotions | BearingDrop, axis: str, signs: tuple[float, ...]) -> Panel:
+    return Panel(
+        title=f"{bearing.name}: horizontal, x",
+        axis=axis,
+        histories=tuple(motion.horizontal for motion in bearing.motions),
+        air_gap=bearing.air_gap,
+        gap_signs=signs,
+    )
+
+
+def _first_contact(bearings: Sequence[BearingDrop], tables: tuple[Table, ...]) -> Section:
+    figure = Figure(
+        chart=first_contact_figure(bearings),
+        caption="Vertical displacement around the first contact: t₁ first touch, t₂ lift-off, T the time "
+        "between; indentation counts from the air gap, support included (Neisi 2020, Fig. 10).",
+    )
+    return Section(heading="First contact", figures=(figure,), tables=tables)
+
+
+def orbit_section(bearings: Sequence[BearingMotions | BearingDrop]) -> Section:
+    """Orbits in the clearance circle and the radial displacement."""
+    orbit = Figure(
+        chart=orbit_figure(bearings),
+        caption="Path of the rotor centre against the clearance circle; x to the right, y up, seen from the "
+        "last bearing (Neisi 2020, Fig. 12).",
+    )
+    limits = any(bearing.at_gap_limits for bearing in bearings)
+    rows = [
+        [
+            Panel(
+                title=bearing.name,
+                axis="radial displacement",
+                histories=tuple(motion.radial for motion in bearing.at_gap_limits or bearing.motions),
+                air_gap=bearing.air_gap,
+            )
+        ]
+        for bearing in bearings
+    ]
+    radial = Figure(
+        chart=time_panels(rows, MICRO, "µm", from_zero=True),
+        caption="Radial displacement, simulated for both limits of the air gap (Neisi 2020, Fig. 14)."
+        if limits
+        else "Distance of the rotor from the bearing centre; above the air gap the rotor indents the race "
+        "(Neisi 2020, Fig. 14).",
+    )
+    return Section(heading="Orbit", figures=(orbit, radial))
+
+
+def speed_figure(rotor: Sequence[History], races: Sequence[History] = ()) -> object:
+    """Draw the speed of the rotor, and of the inner races beside it [rad/s], in Hz; × 60 in rpm."""
+    row = [Panel(title="rotor", axis="speed, × 60 in rpm", histories=tuple(rotor))]
+    if races:
+        row.append(
+            Panel(title="inner races", axis="race speed, × 60 in rpm", histories=tuple(races), series=True)
+        )
+    return time_panels([row], PER_TURN, "Hz", height=250)
+
+
+def static_limit_statement(bearing: BearingDrop, *, certain: bool = True) -> Statement:
+    """Set a peak stress beside the stress of the static load rating, as information."""
+    peak = Quantity.of(bearing.peak_stress.known, "pressure", range_only=not certain)
+    limit = Quantity(value=STATIC_LIMIT, kind="pressure").text
+    stress = bearing.peak_stress.value
+    low, high = bearing.peak_stress.interval_90 or (stress, stress)
+    share = f"{100.0 * stress / STATIC_LIMIT:.0f} %"
+    if not certain:
+        share = f"{100.0 * low / STATIC_LIMIT:.0f} to {100.0 * high / STATIC_LIMIT:.0f} %"
+    return Statement(
+        text=f"{bearing.name}: the peak stress of {peak.text} is {share} of the {limit} at which ISO 76 "
+        "defines the static load rating of ball bearings (information, not an acceptance limit).",
+        level="notice" if (high if not certain else stress) < STATIC_LIMIT else "warning",
+    )

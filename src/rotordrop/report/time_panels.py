@@ -1,0 +1,161 @@
+"""Panels of quantities against time, with bands, limits and a marked peak: one way to draw them all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import plotly.graph_objects as go
+
+from rotordrop.estimation.bearing_drop import AirGap, Band, History, Peak
+from rotordrop.report.quantity import written
+from rotordrop.report.style import (
+    INK,
+    MILLI,
+    MUTED,
+    add_band,
+    add_gap_limits,
+    add_history,
+    add_level,
+    axis_title,
+    fit_legend,
+    label_time,
+    line_style,
+    panels,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Panel:
+    """One panel of a figure against time.
+
+    Attributes
+    ----------
+    title : str
+        Above the panel.
+    axis : str
+        What the vertical axis shows.
+    histories : tuple of History
+        The curves.
+    band : Band or None
+        The 90 % band of the first.
+    air_gap : AirGap or None
+        Drawn as horizontal limits, with the signs in ``gap_signs``.
+    gap_signs : tuple of float
+        1 above zero, −1 below.
+    levels : tuple of (str, float)
+        Further horizontal limits with their names.
+    peak : Peak or None
+        Marked with its value, time and interval.
+    series : bool
+        Whether the curves take the colours of a series instead of those of their roles.
+    """
+
+    title: str
+    axis: str
+    histories: tuple[History, ...]
+    band: Band | None = None
+    air_gap: AirGap | None = None
+    gap_signs: tuple[float, ...] = (1.0,)
+    levels: tuple[tuple[str, float], ...] = ()
+    peak: Peak | None = None
+    series: bool = False
+
+    def until(self, end: float) -> Panel:
+        """The panel up to a time [s]; a later peak is not marked."""
+        return replace(
+            self,
+            histories=tuple(history.between(-np.inf, end) for history in self.histories),
+            band=None if self.band is None else self.band.between(-np.inf, end),
+            peak=self.peak if self.peak is not None and self.peak.time <= end else None,
+        )
+
+
+def time_panels(
+    rows: Sequence[Sequence[Panel]],
+    scale: float,
+    unit: str,
+    *,
+    height: int = 240,
+    from_zero: bool = False,
+    together: bool = False,
+) -> go.Figure:
+    """Draw panels in rows and columns against the time from power-off.
+
+    Parameters
+    ----------
+    rows : sequence of sequence of Panel
+        As many panels in each row.
+    scale, unit : float, str
+        Factor from SI units to the shown unit, and the unit.
+    height : int
+        Height of one panel [pixels].
+    from_zero : bool
+        Whether the vertical axes begin at zero.
+    together : bool
+        Whether all panels zoom together in time, and not only those of a column.
+    """
+    columns = len(rows[0])
+    titles = [panel.title for row in rows for panel in row]
+    figure = panels(titles, rows=len(rows), columns=columns, height=height)
+    legend: set[str] = set()
+    for i, row in enumerate(rows, start=1):
+        for j, panel in enumerate(row, start=1):
+            _draw(figure, panel, scale, unit, i, j, legend)
+    label_time(figure, row=len(rows))
+    figure.update_yaxes(rangemode="tozero" if from_zero else "normal")
+    if together:  # the panels of a column follow its lowest one; the lowest ones follow the first of them
+        first = (len(rows) - 1) * columns + 1
+        for number in range(first + 1, first + columns):
+            figure.layout[f"xaxis{number}"].matches = "x" if first == 1 else f"x{first}"
+    return fit_legend(figure)
+
+
+def _draw(
+    figure: go.Figure, panel: Panel, scale: float, unit: str, row: int, column: int, legend: set[str]
+) -> None:
+    def first(name: str) -> bool:
+        """Whether a name stands in the legend for the first time."""
+        new = name not in legend
+        legend.add(name)
+        return new
+
+    if panel.band is not None:
+        add_band(figure, panel.band, scale, unit, row=row, column=column, legend=first(panel.band.label))
+    for index, history in enumerate(panel.histories):
+        line = line_style(history.role, index + 4 * (column - 1)) if panel.series else None
+        add_history(
+            figure, history, scale, unit, row=row, column=column, legend=first(history.label), line=line
+        )
+    if panel.air_gap is not None:
+        for sign in panel.gap_signs:
+            add_gap_limits(figure, panel.air_gap, sign=sign, row=row, column=column, legend=first("air gap"))
+    for name, level in panel.levels:
+        add_level(figure, scale * level, name, row=row, col=column, legend=first(name))
+    if panel.peak is not None:
+        _mark(figure, panel.peak, scale, unit, row, column)
+    figure.update_yaxes(title_text=axis_title(panel.axis, unit), row=row, col=column)
+
+
+def _mark(figure: go.Figure, peak: Peak, scale: float, unit: str, row: int, column: int) -> None:
+    """Mark a peak with its value, time and 90 % interval."""
+    text = f"peak {written(scale * peak.value, 0)} {unit} at {MILLI * peak.time:.2f} ms"
+    if peak.interval_90 is not None:
+        low, high = (written(scale * limit, 0) for limit in peak.interval_90)
+        text += f" (90 %: {low} to {high} {unit})"
+    figure.add_annotation(
+        x=MILLI * peak.time,
+        y=scale * peak.value,
+        text=text,
+        showarrow=True,
+        arrowhead=2,
+        arrowcolor=MUTED,
+        ax=34,
+        ay=4,
+        xanchor="left",
+        bgcolor="rgba(255,255,255,0.85)",
+        font={"size": 11.5, "color": INK},
+        row=row,
+        col=column,
+    )
