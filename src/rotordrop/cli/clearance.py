@@ -1,4 +1,4 @@
-"""Measure the air gap by a lift check: the shaft pushed round its touchdown bearings at standstill.
+"""Measure the air gap: a shaft pushed round its bearings.
 
 Circle and polygon per bearing, gap with interval, and wear by the difference of two checks.
 """

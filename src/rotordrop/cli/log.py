@@ -1,4 +1,4 @@
-"""Keep the log of a machine's drops and of what they are allowed.
+"""Keep the log of a machine's drops and what they are allowed.
 
 The log is one SQLite file, or a PostgreSQL data base by URL.
 """

@@ -1,4 +1,4 @@
-"""Print the JSON Schema of machine files, estimates or looks at a record.
+"""Print the JSON Schema of a machine, an estimate or a look.
 
 Editors that know the first complete and check a machine file while one types; programs that read an estimate
 find its fields in the second.

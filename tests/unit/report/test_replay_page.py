@@ -103,6 +103,7 @@ def drop(drop_result: DropResult, agreement: Agreement) -> Estimate:
         sensors=machine.sensors,
         speed=drop_result.speed,
         time=drop_result.time + 0.001,
+        measured_speed=(drop_result.time, drop_result.speed),
     )
     speed = SimpleNamespace(
         initial=2 * np.pi * 60.0,
