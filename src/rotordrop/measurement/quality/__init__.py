@@ -30,6 +30,7 @@ from rotordrop.measurement.quality.motion import (
     first_motion,
     no_drop,
 )
+from rotordrop.measurement.quality.recorder import check_again, check_filters, check_speed_signal
 from rotordrop.measurement.quality.tail import check_tail
 
 if TYPE_CHECKING:
@@ -68,7 +69,7 @@ def check_record(record: Record, machine: Machine, tail: Record | None = None) -
         return ranked(findings)
     whole, planes = with_whole_planes(record)
     findings += check_blocks(record) + check_units(whole, machine, planes)
-    findings += check_speed(record, machine)
+    findings += check_speed_signal(record) or check_speed(record, machine)
     if stops(findings):
         misread = any(found.kind in ("wrong unit factor", "wrong air gap") for found in findings)
         return ranked(found for found in findings if not (misread and found.kind == "coarse quantisation"))
@@ -109,6 +110,9 @@ def _check_motion(record: Record, machine: Machine, tail: Record | None) -> list
         levitated = fit_levitated(record, coarse.instant - _MARGIN, speed=coarse.speed)
     except RecordError as error:
         return [no_drop(error, record)]
+    findings += [*check_filters(record, coarse.instant), *check_again(record)]
+    if stops(findings):
+        return findings
     findings += check_levitated(levitated, record)
     findings += check_length(record, coarse.instant, tail is not None)
     findings = _not_both(findings, check_ends(record, machine, planes, levitated, coarse))

@@ -1,0 +1,180 @@
+"""What a recorder does to good readings: bridged gaps, filters, coupling; a dead speed, a second drop.
+
+None of it needs the machine; each shows by what it takes from the motion of a dropped rotor.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotordrop.measurement.quality.finding import Finding
+from rotordrop.measurement.recording import Array
+from rotordrop.units import format_quantity
+
+if TYPE_CHECKING:
+    from rotordrop.measurement.record import Record
+
+_BRIDGE_S = 1e-3
+"""A straight line this long between noisy readings was drawn by a program [s]."""
+
+_LEAST_HIGH = 0.1
+"""Acceleration from 500 Hz to 2 kHz over that from 30 to 150 Hz (medians of the power) after a drop.
+
+Records of drops have 2.5 to 10, behind a low-pass of 300 Hz 0.01 to 0.03."""
+
+_HIGH, _LOW = (500.0, 2000.0), (30.0, 150.0)
+_RISEN = 0.75
+"""A rest that comes back to this share of its depth within the record leaks away."""
+
+_DEEP = 5e-5
+
+
+def bridged(record: Record, channel: str, values: Array) -> Finding | None:
+    """Find a stretch that is straighter than the noise of the channel allows."""
+    bend = np.abs(np.diff(values, 2))
+    usual = float(np.median(bend))
+    noisy = usual < 0.8 * float(np.median(np.abs(np.diff(values, 3))))  # a smooth channel is no noise
+    if usual <= 0.0 or not noisy or float(np.mean(bend == 0.0)) > 0.1:
+        return None
+    straight = bend < 0.1 * usual
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], straight, [False]]).astype(np.int8)))
+    if not len(edges):
+        return None
+    lengths = edges[1::2] - edges[::2]
+    longest = int(np.argmax(lengths))
+    if lengths[longest] < max(_BRIDGE_S * record.sampling_rate, 12):
+        return None
+    at, count = float(record.time[edges[2 * longest]]), int(lengths[longest]) + 2
+    return Finding(
+        kind="bridged gap",
+        message=f"{count} samples ({(count - 1) / record.sampling_rate * 1e3:.3g} ms) lie on a straight line "
+        f"without noise from {at:.6g} s on",
+        remedy="export the recording without filling its gaps, or cut it before them",
+        severity="stop",
+        channel=channel,
+        time=at,
+    )
+
+
+def check_filters(record: Record, drop: float) -> list[Finding]:
+    """See whether impacts and rest of a dropped rotor are as sharp and as lasting as they must be."""
+    return [*_low_pass(record, drop), *_coupling(record, drop)]
+
+
+def _low_pass(record: Record, drop: float) -> list[Finding]:
+    inside = (record.time > drop) & (record.time < drop + 0.2)
+    if record.sampling_rate < 2.2 * _HIGH[1] or int(inside.sum()) < 0.1 * record.sampling_rate:
+        return []
+    bend = np.diff(record.signals[inside], 2, axis=0)
+    power = np.abs(np.fft.rfft(bend * np.hanning(len(bend))[:, None], axis=0)) ** 2
+    frequency = np.fft.rfftfreq(len(bend), 1.0 / record.sampling_rate)
+    high, low = (np.median(power[(frequency >= a) & (frequency < b)], axis=0) for a, b in (_HIGH, _LOW))
+    ratio = float(np.median(high / np.maximum(low, 1e-300)))
+    if ratio >= _LEAST_HIGH:
+        return []
+    return [
+        Finding(
+            kind="recorder low-pass",
+            message=f"after the drop the acceleration above {_HIGH[0]:.0f} Hz is {ratio:.2g} of that below "
+            f"{_LOW[1]:.0f} Hz, that of impacts is above {_LEAST_HIGH:g}: a filter has smoothed them",
+            remedy="record without the low-pass, or with one far above 1 kHz",
+            severity="stop",
+        )
+    ]
+
+
+def _coupling(record: Record, drop: float) -> list[Finding]:
+    """A rotor at rest stays at rest; behind a high-pass its reading creeps back to zero."""
+    block = 0.1
+    if record.time[-1] < drop + 0.2 + 4 * block:
+        return []
+    level = np.mean(record.signals[record.time < drop - 5e-3], axis=0)
+    starts = np.linspace(drop + 0.2, float(record.time[-1]) - block, 4)
+    means = np.array(
+        [
+            np.mean(record.signals[(record.time >= a) & (record.time < a + block)], axis=0) - level
+            for a in starts
+        ]
+    )
+    deep = np.abs(means[0]) > _DEEP
+    if not deep.any():
+        return []
+    share = means[:, deep] / means[0, deep]
+    falling = np.all(np.diff(share, axis=0) < 0.0) and float(np.ptp(share[-1])) < 0.15
+    if not falling or float(np.max(share[-1])) > _RISEN:
+        return []
+    return [
+        Finding(
+            kind="AC coupling",
+            message=f"the readings at rest creep back towards zero, to {float(np.mean(share[-1])):.0%} of "
+            "their depth by the end, all alike: a rotor on its bearings cannot rise",
+            remedy="record with DC coupling; a high-pass takes away where the rotor lies",
+            severity="stop",
+        )
+    ]
+
+
+def check_again(record: Record) -> list[Finding]:
+    """Find further drops in the record, without knowing the machine."""
+    from rotordrop.errors import RecordError
+    from rotordrop.measurement.axes import sensor_planes
+    from rotordrop.measurement.look.events import drops_of
+    from rotordrop.measurement.look.motion import motion_of
+
+    try:
+        gaps = (None,) * len(sensor_planes(record.sensors))
+        drops = drops_of(motion_of(record, gaps=gaps, angles_known=True))
+    except RecordError:
+        return []  # who looks for the drop says why there is none
+    if len(drops) < 2:
+        return []
+    return [
+        Finding(
+            kind="second drop",
+            message=f"the rotor was lifted at {drops[0].end:.6g} s and dropped again at "
+            f"{drops[1].release:.6g} s ({len(drops)} drops)",
+            remedy="cut the record before the rotor is lifted, and give each drop as a record of its own",
+            severity="stop",
+            time=drops[1].release,
+        )
+    ]
+
+
+def check_speed_signal(record: Record) -> list[Finding]:
+    """Find a speed that is dead before the drop or goes dead in it, or has a sign of its own."""
+    readings, time = record.speed_readings, record.speed_time
+    if readings is None or time is None or len(readings) < 2 or not np.isfinite(readings).all():
+        return []
+    size = np.abs(readings)
+    turning = float(np.median(size[: max(len(size) // 20, 3)]))
+    if turning < np.pi:
+        return [
+            _of_speed(
+                "dead speed", f"it reads {format_quantity(turning, 'speed')} from the beginning", 0, record
+            )
+        ]
+    dead = np.flatnonzero((size[1:] < 0.02 * turning) & (size[:-1] > 0.5 * turning))
+    if len(dead):
+        at = int(dead[0]) + 1
+        words = (
+            f"it falls from {format_quantity(float(size[at - 1]), 'speed')} to nothing between two readings"
+        )
+        return [_of_speed("dead speed", words, at, record)]
+    if float(np.median(readings)) < 0.0:
+        words = "it is negative; the spin is counter-clockwise seen from the DE, the sign is left out"
+        return [_of_speed("negative speed", words, 0, record, "warning")]
+    return []
+
+
+def _of_speed(kind: str, words: str, at: int, record: Record, severity: str = "stop") -> Finding:
+    assert record.speed_time is not None
+    return Finding(
+        kind=kind,
+        message=words,
+        remedy="check the tacho and the direction of rotation; or give the speed by hand ([speed] constant)",
+        severity="stop" if severity == "stop" else "warning",
+        channel="speed",
+        time=float(record.speed_time[at]),
+    )

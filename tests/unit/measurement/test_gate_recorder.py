@@ -1,0 +1,82 @@
+"""What a recorder does to a good record is found under its own name, and a good record is left alone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import butter, sosfilt
+
+from rotordrop.measurement import check_record
+
+
+def filtered(signals, rate, corner, kind):
+    sections = butter(2 if kind == "low" else 1, corner, btype=kind, fs=rate, output="sos")
+    level = np.mean(signals[: int(0.2 * rate)], axis=0)
+    return level + sosfilt(sections, signals - level, axis=0)
+
+
+def first_stop(record, machine):
+    return next((finding for finding in check_record(record, machine) if finding.severity == "stop"), None)
+
+
+@pytest.mark.parametrize("corner", [50.0, 100.0, 200.0])
+def test_a_low_pass_in_the_recorder(corner, whole_drop, machine):
+    smooth = replace(whole_drop, signals=filtered(whole_drop.signals, 20e3, corner, "low"))
+    found = first_stop(smooth, machine)
+    assert found.kind == "recorder low-pass"
+    assert "record without the low-pass" in found.remedy
+
+
+@pytest.mark.parametrize("corner", [0.3, 1.0])
+def test_ac_coupling(corner, whole_drop, machine):
+    found = first_stop(
+        replace(whole_drop, signals=filtered(whole_drop.signals, 20e3, corner, "high")), machine
+    )
+    assert found.kind == "AC coupling"
+    assert "cannot rise" in found.message
+
+
+@pytest.mark.parametrize("span", [2e-3, 20e-3, 50e-3])
+def test_a_gap_bridged_by_a_straight_line(span, whole_drop, machine):
+    signals = whole_drop.signals.copy()
+    start, count = 6400, int(span * 20e3)
+    line = np.linspace(signals[start, 2], signals[start + count, 2], count + 1)
+    signals[start : start + count + 1, 2] = np.round(line, 9)
+    found = first_stop(replace(whole_drop, signals=signals), machine)
+    assert (found.kind, found.channel) == ("bridged gap", whole_drop.channel_names[2])
+    assert found.time == pytest.approx(float(whole_drop.time[start]), abs=2e-4)
+
+
+def test_a_second_drop(whole_drop, machine):
+    once = whole_drop.window(-0.25, 0.6)
+    rng = np.random.default_rng(0)
+    again = once.signals + rng.normal(0.0, 0.3e-6, once.signals.shape)
+    ramp = np.linspace(0.0, 1.0, 400)[:, None]
+    lift = once.signals[-1] * (1 - ramp) + again[0] * ramp
+    lift += rng.normal(0.0, 0.5e-6, lift.shape)
+    signals = np.vstack([once.signals, lift, again])
+    time = once.time[0] + np.arange(len(signals)) / 20e3
+    speed = np.full(len(time), float(once.speed_readings[0]))
+    changes = {"speed": speed, "speed_time": time[[0, -1]], "speed_readings": speed[:2]}
+    twice = replace(once, time=time, signals=signals, **changes)
+    found = first_stop(twice, machine)
+    assert found.kind == "second drop"
+    assert found.time == pytest.approx(0.87, abs=5e-3)
+
+
+@pytest.mark.parametrize(("factor", "after", "kind"), [(0.0, -1.0, "dead speed"), (0.0, 0.0, "dead speed")])
+def test_a_dead_speed(factor, after, kind, whole_drop, machine):
+    dead = np.where(whole_drop.speed_time > after, factor, 1.0) * whole_drop.speed_readings
+    found = first_stop(replace(whole_drop, speed_readings=dead), machine)
+    assert (found.kind, found.channel) == (kind, "speed")
+
+
+def test_a_negative_speed_is_told(whole_drop, tail, machine):
+    found = check_record(replace(whole_drop, speed_readings=-whole_drop.speed_readings), machine, tail)
+    assert "negative speed" in [finding.kind for finding in found]
+
+
+def test_a_good_record_is_left_alone(whole_drop, fast_drop, tail, machine):
+    assert check_record(whole_drop, machine, tail) == ()
+    mine = {"recorder low-pass", "AC coupling", "bridged gap", "clipping", "second drop", "dead speed"}
+    assert not mine & {finding.kind for finding in check_record(fast_drop, machine)}
