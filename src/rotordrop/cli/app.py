@@ -49,6 +49,7 @@ _ORDER = (
     "simulate",
     "critical-speeds",
     "coast-down",
+    "profile",
     "look",
     "clearance",
     "estimate",

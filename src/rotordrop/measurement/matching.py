@@ -45,6 +45,7 @@ def match_sensors(
     if unknown:
         names = ", ".join(sensor.name for sensor in sensors)
         raise RecordError(f"the channel map names a sensor {unknown[0]!r}; the machine has {names}")
+    _refuse_missing(recording, sensors, profile, place)
     found = tuple(_match(recording, sensor.name, profile, place) for sensor in sensors)
     for index, channel in enumerate(found):
         if any(channel is other for other in found[:index]):
@@ -72,13 +73,25 @@ def _match(recording: Recording, sensor: str, profile: Profile, place: str) -> C
                 f"{place}: sensor {sensor} fits the channels {labels}; choose one with the channel map of a "
                 f'profile: [channels] {sensor} = "..."'
             )
+    raise AssertionError(f"{sensor} was found to have a channel")
+
+
+def _refuse_missing(recording: Recording, sensors: tuple[Sensor, ...], profile: Profile, place: str) -> None:
+    """Name every sensor without a channel at once, with the lines of a profile that would map them."""
+    names = {text for c in recording.channels for text in (c.label, c.name, _plain(c.name)) if text}
+    wanted = {sensor.name: profile.channels.get(sensor.name, sensor.name) for sensor in sensors}
+    missing = [n for n, channel in wanted.items() if not {channel, _plain(channel)} & names]
+    if not missing:
+        return
     present = [channel.label for channel in recording.channels]
-    close = get_close_matches(wanted, present, 1, 0.5)
-    hint = f"; did you mean {close[0]!r}?" if close else ""
+    close = get_close_matches(wanted[missing[0]], present, 1, 0.5)
+    hint = f"; did you mean {close[0]!r}?" if close else "."
+    several = f" ({len(missing)} sensors have none)" if len(missing) > 1 else ""
+    lines = ", ".join(f'{name} = "..."' for name in missing)
     raise RecordError(
-        f"{place} has no channel {wanted!r} for sensor {sensor}; it has {', '.join(present)}{hint} Map it in "
-        "a "
-        f'profile: [channels] {sensor} = "..."'
+        f"{place} has no channel {wanted[missing[0]]!r} for sensor {missing[0]}{several}; it has "
+        f"{', '.join(present)}{hint} Map them in a profile: [channels] {lines}, or make one with "
+        "'rotordrop profile'"
     )
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import tomllib
+from difflib import get_close_matches
 from pathlib import Path
+from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
@@ -107,15 +109,48 @@ def load_profile(path: str | Path) -> Profile:
         raise RecordError(f"cannot read the profile {path}: {error.strerror}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise RecordError(f"{path} is not a TOML file: {error}") from error
+    return profile_of(content, str(path))
+
+
+def profile_of(content: dict[str, Any], place: str) -> Profile:
+    """Make a profile of the entries of a TOML file, or say which entry is wrong and what belongs there.
+
+    Raises
+    ------
+    RecordError
+        Names every entry that does not fit, with the entries its section knows.
+    """
     try:
         return Profile.model_validate(content)
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"])
-        known = ", ".join(Profile.model_fields)
-        raise RecordError(
-            f"{path}: {place} = {first['input']!r}: {first['msg']}; a profile knows {known}"
-        ) from error
+        told = "\n  also: ".join(_told(entry) for entry in error.errors())
+        raise RecordError(f"{place}: {told}") from error
+
+
+def _told(entry: Any) -> str:
+    """One entry that does not fit, in words."""
+    *sections, name = (str(part) for part in entry["loc"])
+    section = sections[0] if sections and sections[0] in _SECTIONS else ""
+    known = tuple((_SECTIONS[section] if section else Profile).model_fields)
+    where = f"[{section}] " if section else ""
+    if entry["type"] == "extra_forbidden":
+        close = get_close_matches(name, known, 1, 0.6)
+        hint = f"did you mean {close[0]!r}?" if close else f"it knows {', '.join(known)}"
+        what = f"the section [{section}]" if section else "a profile"
+        return f"{where}{name} = {entry['input']!r} is not known in {what}; {hint}"
+    cause = entry.get("ctx", {}).get("error")
+    return f"{where}{name} = {entry['input']!r} does not fit: {cause or _EXPECTED.get(name, entry['msg'])}"
+
+
+_SECTIONS: dict[str, type[BaseModel]] = {"text": TextLayout, "time": Clock, "speed": SpeedSource}
+_EXPECTED = {
+    "channels": 'expected a table, [channels] S_NDE_A = "X1"',
+    "units": 'expected a table, [units] "X1" = "um"',
+    "separator": "expected one sign, such as ';'",
+    "decimal": "expected '.' or ','",
+    "first_data_line": "expected the number of a line, counted from 1",
+    "names": 'expected a list of names, ["Time [s]", ...]',
+}
 
 
 def save_profile(profile: Profile, path: str | Path) -> None:

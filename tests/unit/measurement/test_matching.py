@@ -149,10 +149,10 @@ def test_a_profile_is_saved_and_read_back(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("chanels = {}", r"chanels = \{\}.*a profile knows format, channels"),
-        ("[time]\nstep = '50'", r"time.step = '50'.*has no unit"),
-        ("[speed]\nconstant = '60 m'", r"speed.constant = '60 m'.*is not a speed"),
-        ("[text]\ndecimal = ';'", r"text.decimal = ';'"),
+        ("chanels = {}", r"chanels = \{\} is not known.*did you mean 'channels'"),
+        ("[time]\nstep = '50'", r"\[time\] step = '50'.*has no unit"),
+        ("[speed]\nconstant = '60 m'", r"\[speed\] constant = '60 m'.*is not a speed"),
+        ("[text]\ndecimal = ';'", r"\[text\] decimal = ';'"),
         ("a =", r"is not a TOML file"),
     ],
 )

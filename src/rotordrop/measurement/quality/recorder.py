@@ -38,7 +38,8 @@ def bridged(record: Record, channel: str, values: Array) -> Finding | None:
     noisy = usual < 0.8 * float(np.median(np.abs(np.diff(values, 3))))  # a smooth channel is no noise
     if usual <= 0.0 or not noisy or float(np.mean(bend == 0.0)) > 0.1:
         return None
-    straight = bend < 0.1 * usual
+    moving = np.diff(values)[:-1] != 0.0  # a channel that stands still is stuck, which has its own name
+    straight = (bend < 0.1 * usual) & moving
     edges = np.flatnonzero(np.diff(np.concatenate([[False], straight, [False]]).astype(np.int8)))
     if not len(edges):
         return None

@@ -1,0 +1,91 @@
+"""A profile is made from one file of the recorder; everything missing is asked for at once."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rotordrop.cli.app import run
+from rotordrop.errors import RecordError
+from rotordrop.machine import example_machine, example_path
+from rotordrop.measurement import load_profile, read_record
+from rotordrop.measurement.profile import profile_of
+
+LP400 = str(example_path("lp400"))
+SENSORS = ("S_NDE_A", "S_NDE_B", "S_DE_A", "S_DE_B")
+
+
+@pytest.fixture
+def strange(tmp_path):
+    """A recording whose channels have other names, no unit and no speed."""
+    time = np.arange(50) * 5e-5
+    rows = [f"{t:.5f};" + ";".join(f"{k + 100 * t:.3f}" for k in range(4)) for t in time]
+    (tmp_path / "drop.csv").write_text("\n".join(["Time [s];X1;Y1;X2;Y2", *rows]) + "\n")
+    return tmp_path / "drop.csv"
+
+
+def test_everything_missing_is_asked_for_at_once(strange, tmp_path, capsys):
+    profile = tmp_path / "recorder.toml"
+    assert run(["profile", str(strange), "--machine", LP400, "-o", str(profile)]) == 3
+    told = capsys.readouterr()
+    for name in SENSORS:
+        assert f'--channel "{name}=..."' in told.err
+    assert "there are X1, Y1, X2, Y2" in told.err
+    assert '--speed-channel "..." or --speed "60 Hz"' in told.err
+    assert "channel X1: 50 samples at 20000 Hz, 0 to 0.245 (no unit)" in told.out
+    assert not profile.exists()
+    options = [
+        f"--channel={name}={label}" for name, label in zip(SENSORS, ("X1", "Y1", "X2", "Y2"), strict=True)
+    ]
+    arguments = [
+        "profile",
+        str(strange),
+        "--machine",
+        LP400,
+        "-o",
+        str(profile),
+        *options,
+        "--speed",
+        "60 Hz",
+    ]
+    assert run(arguments) == 3
+    assert "the unit of X1, Y1, X2, Y2: --unit um" in capsys.readouterr().err
+    assert run([*arguments, "--unit", "um"]) == 0
+    record = read_record(strange, example_machine("lp400"), profile=profile)
+    np.testing.assert_allclose(record.signals[0], np.arange(4) * 1e-6, atol=1e-15)
+    assert load_profile(profile).speed.constant == "60 Hz"
+
+
+def test_every_missing_channel_is_named_in_one_message(strange):
+    with pytest.raises(RecordError, match=r"\(4 sensors have none\); it has X1, Y1, X2, Y2\. Map them in a"):
+        read_record(strange, example_machine("lp400"))
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("chanels = 3", r"chanels = 3 is not known in a profile; did you mean 'channels'\?"),
+        (
+            '[speed]\nchanel = "n"',
+            r"\[speed\] chanel = 'n' is not known in .*; did you mean 'channel'",
+        ),
+        ('[time]\nstep = "5"', r"\[time\] step = '5' does not fit: '5' has no unit; a time needs one"),
+        ('[text]\nseparator = ";;"', r"\[text\] separator = ';;' does not fit: expected one sign"),
+        ('channels = "X1"', r"channels = 'X1' does not fit: expected a table, \[channels\] S_NDE_A"),
+        ("a = 1\nb = 2", r"a = 1 is not known.*\n  also: b = 2 is not known"),
+    ],
+)
+def test_errors_of_a_profile_are_words(text, told, tmp_path):
+    (tmp_path / "p.toml").write_text(text)
+    with pytest.raises(RecordError, match=told):
+        load_profile(tmp_path / "p.toml")
+
+
+def test_the_examples_of_the_documentation_are_profiles():
+    page = (Path(__file__).parents[3] / "docs" / "recorders.md").read_text(encoding="utf-8")
+    examples = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
+    assert len(examples) == 5
+    for example in examples:
+        profile_of(tomllib.loads(example), "example")
