@@ -16,10 +16,11 @@ from rotordrop.identification.air_gap import STANDSTILL
 from rotordrop.identification.evidence import Evidence, read_evidence
 from rotordrop.identification.first_reach import reach_at_first_contact
 from rotordrop.machine import Machine
-from rotordrop.measurement.axes import sensor_polarity
+from rotordrop.measurement.axes import sees_both_directions, sensor_polarity
 from rotordrop.measurement.events import DropInstant
 from rotordrop.measurement.power_off import PowerOff
 from rotordrop.measurement.record import Record
+from rotordrop.model.contact_band import reduction_for_contact
 from rotordrop.model.parameters import DropModel, build_drop_model
 from rotordrop.model.reduction import Reduction
 from rotordrop.tracking.calibration import (
@@ -45,6 +46,12 @@ Progress = Callable[[str, float], None]
 
 COARSE_BASIS = Reduction(modes=6, attachment=True)
 FINE_BASIS = Reduction(modes=10, attachment=True)
+"""Bases with the fewest modes; a rotor whose modes lie lower against its contact frequency gets more."""
+
+COARSE_REACH, FINE_REACH = 2.25, 6.0
+"""The highest mode over the contact frequency, at least [1]: a rotor of 1.8 m and 130 kg with a sensor plane
+at mid-span was lost at 2.1 and followed from 3.2 on, one of 1.1 m and 60 kg is followed at 2.4."""
+
 FINE_SCHEDULE: tuple[Stage, ...] = (
     Stage(until=0.06, impulse=1e-3, share=0.01, passes=2),
     Stage(until=0.1, impulse=1e-3, share=0.01, passes=1),
@@ -229,13 +236,13 @@ def track_drops(
     """
     until = BLIND_SCHEDULE[-1].until + 0.01 if calibrate_only else WINDOW
     prepared = _tail_first(prepared)
-    fine_model = build_drop_model(machine, FINE_BASIS)
+    fine_model = build_drop_model(machine, _basis(machine, FINE_BASIS, FINE_REACH))
     fine = [drop_problem(fine_model, item, until) for item in prepared]
     if is_calibrated(machine) and not calibrate_only:
         schedule = QUICK_SCHEDULE if quick else CALIBRATED_SCHEDULE
         return _not_lost(track(fine, schedule, progress=progress), prepared)
-    coarse_model = build_drop_model(machine, COARSE_BASIS)
-    coarse = [drop_problem(coarse_model, item, until) for item in prepared]
+    coarse_model = build_drop_model(_seen_at_the_ends(machine), _basis(machine, COARSE_BASIS, COARSE_REACH))
+    coarse = [drop_problem(coarse_model, _with_sensors_of(coarse_model, item), until) for item in prepared]
     contact = max(_first_contact(item) for item in prepared)
     first = _from_guesses(coarse, contact, progress)
     references = [
@@ -243,6 +250,44 @@ def track_drops(
     ]
     schedule = shifted(CALIBRATION_SCHEDULE if calibrate_only else FINE_SCHEDULE, contact)
     return _not_lost(track(fine, schedule, references=references, progress=progress), prepared)
+
+
+def _basis(machine: Machine, least: Reduction, reach: float) -> Reduction:
+    assert least.modes is not None
+    return reduction_for_contact(machine, least=least.modes, reach=reach)
+
+
+def _seen_at_the_ends(machine: Machine) -> Machine:
+    """The machine with those two whole sensor planes only that lie farthest apart, where it has more.
+
+    A search from guesses begins far from the record, and a plane between the bearings makes it stiff: what
+    the first impacts get wrong has to bend the rotor then, and gains run away with it. Once the parameters
+    are found, every plane takes part.
+    """
+    planes = {
+        sensor.node: [s for s in machine.sensors if s.node == sensor.node] for sensor in machine.sensors
+    }
+    whole = [node for node, sensors in planes.items() if sees_both_directions(sensors)]
+    if len(planes) <= 2 or len(whole) < 2:
+        return machine
+    z = machine.rotor.node_positions
+    ends = {min(whole, key=lambda node: z[node - 1]), max(whole, key=lambda node: z[node - 1])}
+    return machine.model_copy(update={"sensors": tuple(s for s in machine.sensors if s.node in ends)})
+
+
+def _with_sensors_of(model: DropModel, prepared: Preparation) -> Preparation:
+    """A prepared record with the channels of a model's sensors."""
+    sensors, record = model.machine.sensors, prepared.record
+    if len(sensors) == len(record.sensors):
+        return prepared
+    names = [sensor.name for sensor in sensors]
+    columns = [c for c, sensor in enumerate(record.sensors) if sensor.name in names]
+    tail = prepared.tail_level
+    return replace(
+        prepared,
+        evidence=prepared.evidence.of_channels(columns),
+        tail_level=None if tail is None else tail[columns],
+    )
 
 
 def _from_guesses(coarse: Sequence[DropProblem], contact: float, progress: Progress | None) -> TrackedDrops:

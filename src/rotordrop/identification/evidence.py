@@ -5,7 +5,8 @@ The tracked twin and the replay differ only in what they do after the first cont
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,6 +76,19 @@ class Evidence:
         if self.levitated is not None:
             signals = signals - self.levitated.disturbance(self.record.time[near], self.angle)
         return np.asarray(signals * sensor_polarity(self.record.sensors))
+
+    def of_channels(self, columns: Sequence[int]) -> Evidence:
+        """The same for some of the sensors; power-off and speed stay."""
+        chosen, record = list(columns), self.record
+        return replace(
+            self,
+            record=replace(
+                record,
+                signals=np.ascontiguousarray(record.signals[:, chosen]),
+                sensors=tuple(record.sensors[c] for c in chosen),
+            ),
+            levitated=None if self.levitated is None else self.levitated.of_channels(chosen),
+        )
 
     def measured_speed(self, until: float) -> Array:
         """Measured speed at the samples [rad/s]; NaN where nobody measured it."""

@@ -59,6 +59,14 @@ def sensor_polarity(sensors: Sequence[Sensor]) -> Array:
     return np.array([sensor.polarity for sensor in sensors], dtype=np.float64)
 
 
+def sees_both_directions(sensors: Sequence[Sensor]) -> bool:
+    """Whether the sensors of a plane look in two directions that are far enough apart."""
+    if len(sensors) < 2:
+        return False
+    strength = np.linalg.svd(sensor_directions(sensors), compute_uv=False)
+    return bool(strength[1] >= LEAST_RATIO * strength[0])
+
+
 def along_sensors(signals: Array, sensors: Sequence[Sensor]) -> Array:
     """True displacement along every sensor [m], shape (N, S): offset taken off, gain applied."""
     offset = np.array([float(sensor.offset) for sensor in sensors])
@@ -82,8 +90,7 @@ def _plane(node: int, sensors: Sequence[Sensor]) -> Plane:
     columns = tuple(i for i, sensor in enumerate(sensors) if sensor.node == node)
     members = [sensors[i] for i in columns]
     directions = sensor_directions(members)
-    strength = np.linalg.svd(directions, compute_uv=False)
-    if len(members) < 2 or strength[1] < LEAST_RATIO * strength[0]:
+    if not sees_both_directions(members):
         seen = ", ".join(f"{sensor.name} at {math.degrees(float(sensor.angle)):.4g}°" for sensor in members)
         why = "one sensor" if len(members) < 2 else "sensors along one line"
         raise RecordError(

@@ -30,6 +30,8 @@ SPEED_SIGMA = 0.5
 SPEED_READING_SIGMA = 1.0
 SPEED_SPACING = 2.5e-3
 """Time between speed readings that count as independent [s]."""
+AFTER_FALL = 1.4
+"""Time at which parameters are read over the time of a free fall through the widest air gap [1]."""
 FIRST_READINGS = 0.49e-3
 """Time after power-off whose mean reading says where the rotor is [s]."""
 NOISE_FLOOR = 0.1e-6
@@ -109,6 +111,15 @@ class DropProblem:
     def n_dynamic(self) -> int:
         """Number of dynamic states s."""
         return self.model.layout.n_dynamic
+
+    @property
+    def parameter_time(self) -> float:
+        """Time from power-off [s] at which parameters are read: shortly after the first contacts.
+
+        Later in a drop friction and race drift with what their laws get wrong.
+        """
+        gap = max(float(bearing.air_gap) for bearing in self.model.machine.touchdown_bearings)
+        return AFTER_FALL * math.sqrt(2.0 * gap / float(self.model.machine.gravity))
 
     @property
     def n_channels(self) -> int:

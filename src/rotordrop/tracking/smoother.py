@@ -18,9 +18,6 @@ Array = NDArray[np.float64]
 Compact = NDArray[np.float32]
 """What a pass stores for the smoother: hundreds of megabytes, of which seven digits are plenty."""
 
-PARAMETER_SAMPLE = 200
-"""Sample at which parameters are read: shortly after the first contacts."""
-
 LARGEST_PHASE = 1.0
 """Largest phase [rad] by which the fastest mode may turn in one integration step of the filter."""
 
@@ -77,7 +74,7 @@ class Forward:
 
     ``done`` is the number of samples reached; ``innovations`` and ``innovation_variances`` have one column
     per channel and one for the speed, NaN where nothing was measured; ``impulse`` is the size of the
-    unknown impulses of the pass [N s].
+    unknown impulses of the pass [N s]; ``parameter_sample`` is where parameters are read.
     """
 
     done: int
@@ -89,6 +86,7 @@ class Forward:
     gains: Array
     innovations: Array
     innovation_variances: Array
+    parameter_sample: int
 
     @property
     def nis(self) -> float:
@@ -154,6 +152,7 @@ def forward(
         gains=np.empty((kept, n_c + 1, n)),
         innovations=np.empty((count, n_c + 1)),
         innovation_variances=np.empty((count, n_c + 1)),
+        parameter_sample=int(np.searchsorted(problem.time, problem.parameter_time)),
     )
     done = F.forward_pass(
         np.ascontiguousarray(mean),
@@ -216,7 +215,7 @@ class Smoothed:
 
 def parameter_sample(smoothed: Smoothed) -> int:
     """Sample at which parameters are read: shortly after the first contacts."""
-    return min(PARAMETER_SAMPLE, len(smoothed.means) - 1)
+    return min(smoothed.filtered.parameter_sample, len(smoothed.means) - 1)
 
 
 def smooth(
@@ -240,7 +239,7 @@ def smooth(
         and the last.
     """
     done, n = filtered.done, filtered.means.shape[1]
-    samples = (0, min(PARAMETER_SAMPLE, done - 1), done - 1) if kept is None else kept
+    samples = (0, min(filtered.parameter_sample, done - 1), done - 1) if kept is None else kept
     chosen = np.unique(np.asarray(samples, dtype=np.int64))
     rows = np.zeros((0, n)) if watched is None else np.ascontiguousarray(watched)
     means = np.empty((done, n))

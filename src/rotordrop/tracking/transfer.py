@@ -11,7 +11,10 @@ Array = NDArray[np.float64]
 
 
 def transferred(coarse: DropProblem, fine: DropProblem, means: Array) -> Array:
-    """Trajectory (N, n) of a coarse problem in the coordinates of a fine one, by projecting the modes."""
+    """Trajectory (N, n) of a coarse problem in the coordinates of a fine one, by projecting the modes.
+
+    Sensors that the coarse problem leaves out start at what is known of them beforehand.
+    """
     one, two = coarse.model.layout, fine.model.layout
     result = np.zeros((len(means), len(fine.mean)))
     project = (fine.model.basis.shapes.T @ (fine.model.fe.mass @ coarse.model.basis.shapes)).T
@@ -23,6 +26,14 @@ def transferred(coarse: DropProblem, fine: DropProblem, means: Array) -> Array:
         source, target = getattr(one, part), getattr(two, part)
         result[:, target] = means[:, source]
         result[:, two.velocity_of(target)] = means[:, one.velocity_of(source)]
-    # spins and all that follows, parameters and sensor errors too, do not depend on the basis
-    result[:, two.velocities.stop :] = means[:, one.velocities.stop :]
+    # spins and parameters do not depend on the basis
+    own, wanted = coarse.n_dynamic + len(coarse.unknowns), fine.n_dynamic + len(fine.unknowns)
+    result[:, two.velocities.stop : wanted] = means[:, one.velocities.stop : own]
+    result[:, wanted:] = fine.mean[wanted:]
+    names = [sensor.name for sensor in coarse.model.machine.sensors]
+    for c, sensor in enumerate(fine.model.machine.sensors):
+        if sensor.name in names:
+            kinds = np.arange(4)  # gain, offset, cosine and sine of the runout
+            source = own + kinds * coarse.n_channels + names.index(sensor.name)
+            result[:, wanted + kinds * fine.n_channels + c] = means[:, source]
     return result

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -94,7 +95,7 @@ def pushed(flight: DropProblem) -> tuple[DropProblem, Smoothed, np.ndarray]:
     )
     empty = np.zeros((0, 0))
     smoothed = Smoothed(
-        filtered=None,
+        filtered=SimpleNamespace(parameter_sample=200),
         means=means,
         watched=empty,
         kept=np.zeros(0, dtype=np.int64),
