@@ -14,10 +14,10 @@ import numpy as np
 from rotordrop.machine import Machine
 from rotordrop.model.assembly import RotorFE, build_rotor_fe
 from rotordrop.model.modes import free_free_modes, rigid_modes
-from rotordrop.model.parameters import static_deflection
 from rotordrop.model.reduction import Reduction
 from rotordrop.model.statics import bearing_load_shares
 from rotordrop.physics.ball_bearing import bearing_constants
+from rotordrop.physics.ball_set import static_deflection
 
 PEAK_OVER_WEIGHT = 10.0
 """Usual ratio of the largest force of a drop to the static load [1]: 11 to 17 on machines of 13 to 130 kg."""
