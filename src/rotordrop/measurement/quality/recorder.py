@@ -36,7 +36,8 @@ def bridged(record: Record, channel: str, values: Array) -> Finding | None:
     bend = np.abs(np.diff(values, 2))
     usual = float(np.median(bend))
     noisy = usual < 0.8 * float(np.median(np.abs(np.diff(values, 3))))  # a smooth channel is no noise
-    if usual <= 0.0 or not noisy or float(np.mean(bend == 0.0)) > 0.1:
+    known = 0.0 < record.sampling_rate < np.inf
+    if not known or usual <= 0.0 or not noisy or float(np.mean(bend == 0.0)) > 0.1:
         return None
     moving = np.diff(values)[:-1] != 0.0  # a channel that stands still is stuck, which has its own name
     straight = (bend < 0.1 * usual) & moving

@@ -121,7 +121,7 @@ def _refuse_damaged_start(
 ) -> None:
     """Refuse rows that stand where the samples begin and are none: left out, the record would start later."""
     last = max((i for i, row in enumerate(rows) if row in named and row), default=-1)
-    damaged = [i for i in range(last + 1, len(rows)) if _was_a_row(header[i], rows[i], layout)]
+    damaged = [i for i in range(last + 1, len(rows)) if _was_a_row(header[i], rows[i], layout, last >= 0)]
     if damaged:
         raise RecordError(
             f"{path}, line {damaged[0] + 1} is damaged ({header[damaged[0]][:60]!r}; {len(damaged)} such "
@@ -129,12 +129,13 @@ def _refuse_damaged_start(
         )
 
 
-def _was_a_row(line: str, fields: list[str], layout: Layout) -> bool:
+def _was_a_row(line: str, fields: list[str], layout: Layout, below_names: bool) -> bool:
     """Whether a line that is no row begins like one: no comment, no word in front, numbers among the rest."""
     if not line.strip() or line.lstrip()[0] in "#%!*" or re.match(r'\s*"?[^\W\d_]{2}', line):
         return False
     numbers = sum(is_number(field, layout.decimal) for field in fields)
-    return 2 * abs(len(fields) - layout.columns) <= layout.columns and numbers > 0
+    whole = 2 * abs(len(fields) - layout.columns) <= layout.columns
+    return numbers > 0 and (below_names or whole)
 
 
 def _intact_rows(
