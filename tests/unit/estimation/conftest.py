@@ -55,17 +55,16 @@ def synthetic(hidden: HiddenMachine) -> SyntheticDrop:
     return synthesize_drop(hidden, SPEED, 10 * SEED, duration=0.22, name="hidden_060")
 
 
-@pytest.fixture(scope="session")
-def calibrated(known: Machine, hidden: HiddenMachine) -> Machine:
-    """The owner's machine with estimates near the truth, off by about their standard error."""
-    random = np.random.default_rng(SEED)
+def calibrated_about(known: Machine, hidden: HiddenMachine, seed: int, share: float) -> Machine:
+    """The owner's machine with estimates near the truth, off by a share of their standard error."""
+    random = np.random.default_rng(seed)
     values: dict[str, Estimated] = {}
     for bearing in hidden.machine.touchdown_bearings:
         for path, sigma in CALIBRATED.items():
             part = bearing.bearing if path == "preload" else bearing
             for name in path.split("."):
                 part = getattr(part, name)
-            value = float(part) * math.exp(0.7 * sigma * random.standard_normal())
+            value = float(part) * math.exp(share * sigma * random.standard_normal())
             half = math.exp(NINETY * sigma)
             values[f"{bearing.name}.{path}"] = Estimated(
                 value=value,
@@ -73,7 +72,7 @@ def calibrated(known: Machine, hidden: HiddenMachine) -> Machine:
                 interval_90=(value / half, value * half),
                 source="calibration",
             )
-        gap = float(bearing.air_gap) + 0.7 * GAP_SIGMA * random.standard_normal()
+        gap = float(bearing.air_gap) + share * GAP_SIGMA * random.standard_normal()
         values[f"{bearing.name}.air_gap"] = Estimated(
             value=gap,
             status="estimated",
@@ -81,6 +80,12 @@ def calibrated(known: Machine, hidden: HiddenMachine) -> Machine:
             source="calibration",
         )
     return known.with_values(values)
+
+
+@pytest.fixture(scope="session")
+def calibrated(known: Machine, hidden: HiddenMachine) -> Machine:
+    """The machine as known after a calibration."""
+    return calibrated_about(known, hidden, SEED, 0.7)
 
 
 @pytest.fixture(scope="session")
