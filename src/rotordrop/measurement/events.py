@@ -11,16 +11,15 @@ from numpy.typing import NDArray
 from rotordrop.errors import RecordError
 from rotordrop.estimated import NINETY
 from rotordrop.measurement.axes import Plane, along_sensors, planar_of, sensor_planes
-from rotordrop.measurement.fall import Fall, fit_fall
 from rotordrop.measurement.levitated import LevitatedModel, fit_levitated
 from rotordrop.measurement.preprocess import acceleration
 from rotordrop.measurement.recording import Array
-from rotordrop.measurement.release import free_rotor
 from rotordrop.measurement.speed import require_speed
 from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
+    from rotordrop.measurement.fall import Fall
     from rotordrop.measurement.record import Record
 
 FALLEN_SHARE = 0.35
@@ -165,6 +164,10 @@ def find_fall(
     window = (coarse.instant, coarse.sunk, coarse.contact)
     if until is not None:
         window = (coarse.instant, until, until)
+    # The rotor model brings the compiler with it, and a first look at a record needs neither.
+    from rotordrop.measurement.fall import fit_fall
+    from rotordrop.measurement.release import free_rotor
+
     return fit_fall(record, planes, free_rotor(machine, planes), levitated, window)
 
 

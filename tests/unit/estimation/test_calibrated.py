@@ -12,7 +12,7 @@ from rotordrop.estimation.tracked import is_calibrated
 from rotordrop.estimation.tracked_parameters import NOT_DETERMINED
 from rotordrop.machine import Machine, load_machine, save_machine
 from rotordrop.model.parameter_table import parameter, row_of
-from rotordrop.model.unknowns import prior_sigma
+from rotordrop.model.unknowns import prior
 from rotordrop.synthesis import HiddenMachine, SyntheticDrop, synthesize_drop
 
 BEARINGS = ("NDE", "DE")
@@ -103,8 +103,8 @@ def test_what_the_records_do_not_determine_stays_a_guess(calibration: Calibratio
     for b, bearing in enumerate(calibration.machine.touchdown_bearings):
         inertia, before = bearing.race.inertia, known.touchdown_bearings[b].race.inertia
         assert inertia.status == "guess" and inertia.range is not None
-        sigma = prior_sigma(parameter("race.inertia"), inertia)
-        assert sigma == pytest.approx(prior_sigma(parameter("race.inertia"), before), rel=1e-6)
+        sigma = prior(parameter("race.inertia"), inertia).sigma
+        assert sigma == pytest.approx(prior(parameter("race.inertia"), before).sigma, rel=1e-6)
 
 
 def test_every_sensor_has_the_gain_that_was_fitted(calibration: Calibration, hidden: HiddenMachine) -> None:

@@ -17,12 +17,12 @@ import numpy as np
 from rotordrop.estimated import Estimated
 from rotordrop.measurement.axes import Plane
 from rotordrop.measurement.events import CoarseDrop, find_fall
-from rotordrop.measurement.fall import Fall
 from rotordrop.measurement.levitated import LevitatedModel
 from rotordrop.measurement.quality.finding import Finding
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
+    from rotordrop.measurement.fall import Fall
     from rotordrop.measurement.record import Record
 
 GOOD_FIT = 2.0
