@@ -26,6 +26,7 @@ from rotordrop._version import __version__
 from rotordrop.cli import INTERRUPTED as INTERRUPTED
 from rotordrop.cli import STOPPED
 from rotordrop.cli._interruption import interruptions_kept
+from rotordrop.cli._output import read_by_this_command, require_places
 from rotordrop.cli._streams import open_streams, printable
 from rotordrop.errors import OutputError, RotordropError, UsageError
 
@@ -90,8 +91,6 @@ def _with_files_apart(verb: Callable[..., None]) -> Callable[..., None]:
 
     @wraps(verb)
     def called(**values: Any) -> None:
-        from rotordrop.cli._output import read_by_this_command, require_places
-
         read = [
             path
             for name, value in values.items()

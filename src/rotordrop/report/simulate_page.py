@@ -53,13 +53,13 @@ def simulate_page(result: DropResult, machine: Machine | None = None) -> ReportC
 def _card(result: DropResult, index: int, bearing: BearingDrop) -> Card:
     card = headline_card(bearing)
     figures = list(card.figures)
-    pressed = result.peak_contact_pressure(index)
-    if pressed is not None:
-        moment = Quantity(value=pressed[2], kind="time", digits=3).text
-        width = Quantity(value=2.0 * pressed[1], kind="length", digits=3).text
-        pressure = Quantity(value=pressed[0], kind="pressure")
-        label = "Peak pressure, rotor on race"
-        figures.insert(2, KeyFigure(label=label, value=pressure, note=f"at {moment}, {width} wide"))
+    pressure, half_width, pressed_at = result.peak_contact_pressure(index)
+    note = (
+        f"at {Quantity(value=pressed_at, kind='time', digits=3).text}, "
+        f"{Quantity(value=2.0 * half_width, kind='length', digits=3).text} wide"
+    )
+    pressed = Quantity(value=pressure, kind="pressure")
+    figures.insert(2, KeyFigure(label="Peak pressure, rotor on race", value=pressed, note=note))
     if bearing.first_contact is not None and bearing.air_gap is not None:
         deepest = float(bearing.motions[0].radial.values.max()) - bearing.air_gap.upper
         value = Quantity(value=deepest, kind="length", digits=3)

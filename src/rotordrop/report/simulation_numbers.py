@@ -35,13 +35,11 @@ def simulation_numbers(result: DropResult) -> dict[str, Any]:
 
 
 def _contact(result: DropResult, index: int) -> dict[str, Any]:
-    """Pressure of rotor on race as a line contact, where the contact is one."""
-    pressed = result.peak_contact_pressure(index)
-    if pressed is None:
-        return {}
+    """Pressure of rotor on race as a line contact."""
+    pressure, half_width, moment = result.peak_contact_pressure(index)
     return {
-        "peak_contact_pressure_Pa": {"value": pressed[0], "time_s": pressed[2]},
-        "contact_half_width_m": {"value": pressed[1]},
+        "peak_contact_pressure_Pa": {"value": pressure, "time_s": moment},
+        "contact_half_width_m": {"value": half_width},
     }
 
 

@@ -92,7 +92,7 @@ class DropResult:
     finished : bool
         Whether the whole duration was reached.
     line_contacts : tuple of LineContact
-        Rotor in each race, which gives the pressure there; empty for a result read from a file.
+        Rotor in each race, which gives the pressure there; one per bearing.
     """
 
     time: Array
@@ -121,12 +121,10 @@ class DropResult:
     outcome: str
     finished: bool
     certificate: Certificate
-    line_contacts: tuple[LineContact, ...] = ()
+    line_contacts: tuple[LineContact, ...]
 
-    def peak_contact_pressure(self, bearing: int) -> tuple[float, float, float] | None:
+    def peak_contact_pressure(self, bearing: int) -> tuple[float, float, float]:
         """Largest Hertz pressure of rotor on race [Pa], half width of the contact then [m], time [s]."""
-        if not self.line_contacts:
-            return None
         force, time = refined_peak(self.time, self.contact_force[:, bearing])
         line = self.line_contacts[bearing]
         return float(line.maximum_pressure(force)), float(line.half_width(force)), time
@@ -182,7 +180,7 @@ HISTORIES: tuple[tuple[str, tuple[str, ...], str, str], ...] = (
 
 _TEXTS = ("machine_name", "reduction", "outcome")
 _NUMBERS = ("initial_speed", "tolerance", "steps", "rejected_steps", "finished")
-_FORMAT = "rotordrop drop 1"
+_FORMAT = "rotordrop drop 2"
 
 
 def _scale(file: Any, name: str, values: Any) -> None:
@@ -217,6 +215,9 @@ def _write(result: DropResult, file: Any) -> None:
         _dataset(
             file, f"contact_{item.name}", getattr(result.contacts, item.name), ("contact",), "", item.name
         )
+    for item in fields(LineContact):
+        values = np.array([getattr(line, item.name) for line in result.line_contacts])
+        _dataset(file, f"line_contact_{item.name}", values, ("bearing",), "", f"rotor on race: {item.name}")
     for item in fields(Certificate):
         value = getattr(result.certificate, item.name)
         if value is not None:
@@ -266,6 +267,10 @@ def _read(file: Any) -> DropResult:
     values["rejected_steps"] = int(file.attrs["rejected_steps"])
     values["finished"] = bool(file.attrs["finished"])
     values["contacts"] = ContactLog(**{f.name: file[f"contact_{f.name}"][()] for f in fields(ContactLog)})
+    lines = {f.name: file[f"line_contact_{f.name}"][()].tolist() for f in fields(LineContact)}
+    values["line_contacts"] = tuple(
+        LineContact(**dict(zip(lines, numbers, strict=True))) for numbers in zip(*lines.values(), strict=True)
+    )
     certificate = {
         f.name: file.attrs[f"certificate_{f.name}"]
         for f in fields(Certificate)

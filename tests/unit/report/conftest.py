@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rotordrop.physics.hertz import LineContact
 from rotordrop.simulation.certificate import Certificate
 from rotordrop.simulation.result import ContactLog, DropResult
 
@@ -64,4 +65,5 @@ def drop_result() -> DropResult:
         certificate=Certificate(
             energy_residual=1e-6, energy_scale=0.2, peak_force=np.array([3020.0, 5298.0])
         ),
+        line_contacts=(LineContact(radius=4.0, length=0.032, compliance=8.7e-12),) * 2,
     )

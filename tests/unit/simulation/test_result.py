@@ -78,7 +78,7 @@ def test_a_file_of_another_kind_is_refused(tmp_path):
     path = tmp_path / "other.h5"
     with h5py.File(path, "w") as file:
         file["time"] = [0.0, 1.0]
-    with pytest.raises(SimulationError, match=r"other\.h5 has format None; expected 'rotordrop drop 1'"):
+    with pytest.raises(SimulationError, match=r"other\.h5 has format None; expected 'rotordrop drop 2'"):
         load_result(path)
 
 
