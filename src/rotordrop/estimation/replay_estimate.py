@@ -110,6 +110,7 @@ def _bearing(
     }
     reason = (
         f"no interval: {0 if replayed.draws is None else len(replayed.draws)} draws, at least {FEWEST_DRAWS} "
+        "are needed"
     )
     loads = ("peak_force_N", "peak_stress_Pa", *means)
     return replace(

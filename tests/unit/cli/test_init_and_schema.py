@@ -92,8 +92,11 @@ def test_the_schema_of_an_estimate_knows_its_fields(capsys):
     assert run(["schema", "estimate"]) == 0
     schema = json.loads(capsys.readouterr().out)
     jsonschema.Draft202012Validator.check_schema(schema)
-    bearing = {"peak_force_N": {"value": 2907.0}, "peak_stress_Pa": {"value": 1.7e9}}
-    drop = {"drop_instant_s": 0.0, "speed_Hz": 60.0, "method": "tracked", "warnings": []}
-    jsonschema.validate(drop | {"bearings": {"NDE": bearing}}, schema)
-    with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate(drop | {"bearings": {"NDE": bearing | {"peak_force_N": 2907.0}}}, schema)
+    value = {"value": 2907.0}
+    bearing = {"$defs": schema["$defs"], **schema["$defs"]["bearing"]["properties"]["peak_force_N"]}
+    jsonschema.validate(value | {"time_s": 0.009, "interval_90": [2800.0, 3000.0]}, bearing)
+    for broken in (2907.0, {"peek": 2907.0}, value | {"time_s": "now"}):
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.validate(broken, bearing)
+    for part in ("drop", "bearing"):
+        assert schema["$defs"][part]["additionalProperties"] is False

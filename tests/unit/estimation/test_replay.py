@@ -21,7 +21,9 @@ from rotordrop.estimation import Replay, estimate_drop, replay_estimate, uncerta
 from rotordrop.estimation.document import estimate_document
 from rotordrop.estimation.estimate import Estimate, Verdict
 from rotordrop.estimation.fixed_values import fixed_correlations
+from rotordrop.estimation.replay_estimate import _speed
 from rotordrop.estimation.schema import estimate_schema
+from rotordrop.identification.speed import SpeedFit
 from rotordrop.machine import Machine, example_path
 from rotordrop.synthesis import SyntheticDrop
 from rotordrop.synthesis.files import write_synthetic
@@ -108,7 +110,7 @@ def test_every_number_of_the_document_is_that_of_its_source(
     speed = document["speed"]
     assert speed["friction_loss_Hz"] == pytest.approx(steps.speed.friction_loss / (2.0 * math.pi))
     assert speed["simulated_end_Hz"] == pytest.approx(steps.speed_simulated[-1] / (2.0 * math.pi))
-    assert 0.0 < speed["friction_loss_Hz"] < document["speed_Hz"] - speed["simulated_end_Hz"]
+    assert 0.0 <= speed["friction_loss_Hz"] < document["speed_Hz"] - speed["simulated_end_Hz"]
     assert document["speed_Hz"] == pytest.approx(replayed.speed / (2.0 * math.pi))
     for name, contact, compared in zip(BEARINGS, steps.contacts, agreement.bearings, strict=True):
         entry, found = document["bearings"][name], document["first_contact"][name]
@@ -126,6 +128,22 @@ def test_every_number_of_the_document_is_that_of_its_source(
         assert bounce["measured_bounce_m"] == compared.measured_bounce
         assert bounce["measured_bounce_m"] == pytest.approx(bounce["simulated_bounce_m"], rel=0.3)
         assert 5e-6 < bounce["measured_bounce_m"] < 400e-6
+
+
+def test_the_speed_that_friction_took_is_shown_in_hertz() -> None:
+    air = IdentifiedValue(value=9.0)
+    fit = SpeedFit(
+        initial=377.0,
+        initial_error=0.1,
+        profile_time_constant=6.0,
+        aero_time_constant=air,
+        friction_loss=math.pi,
+        residual=0.1,
+    )
+    fall: Any = SimpleNamespace(speed=fit)
+    shown = _speed(fall, 4.0 * math.pi)
+    assert (shown["friction_loss_Hz"], shown["simulated_end_Hz"]) == (0.5, 2.0)
+    assert shown["profile_time_constant_s"] == 6.0
 
 
 def test_the_equivalent_stiffness_is_support_and_bearing_in_series(
@@ -195,7 +213,7 @@ def test_a_record_that_ends_before_standstill_needs_a_tail(known: Machine, synth
     ):
         estimate_drop(known, synthetic.record, method=Replay())
     without = replace(synthetic.record, speed=None)
-    with pytest.raises(IdentificationError, match=r"no shaft speed.*tail"):
+    with pytest.raises(IdentificationError, match=r"no measured shaft speed.*--tail"):
         from rotordrop.identification.air_gap import find_rest
         from rotordrop.identification.sensing import build_sensing
         from rotordrop.model.parameters import build_drop_model

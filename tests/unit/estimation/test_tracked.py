@@ -6,6 +6,7 @@ import gc
 import json
 import math
 import pickle
+import re
 import weakref
 from dataclasses import replace
 from pathlib import Path
@@ -34,7 +35,7 @@ from rotordrop.estimation.tracked import (
     track_drops,
     tracked_drop,
 )
-from rotordrop.estimation.tracked_estimate import estimate_of
+from rotordrop.estimation.tracked_estimate import _cross_checked, estimate_of
 from rotordrop.estimation.tracked_loads import (
     INCONSISTENT,
     INCONSISTENT_WIDENING,
@@ -251,7 +252,7 @@ def test_a_machine_that_lost_a_sensor_is_still_estimated(
     )
     assert drop.drop_instant.value == pytest.approx(quick.drop_instant.value, abs=2e-4)
     assert drop.verdict is Verdict.ONE_DIRECTION and not drop.cross_check, drop.sentence
-    assert any("could not look at this record" in warning for warning in drop.warnings)
+    assert not any(finding.severity == "stop" for finding in drop.findings)
     assert_right(drop, synthetic, factor=2.0)
 
 
@@ -372,6 +373,25 @@ def test_a_fit_beside_the_record_is_noticed(nis: float, factor: float, diverged:
         problems=(), smoothed=(), nis=(0.9, nis), diverged=(False, diverged), noise_factors=(1.0, factor)
     )
     assert beside_the_record(fit) == beside
+
+
+def test_a_peak_far_from_the_cross_check_is_not_called_consistent(workshop: TrackedDrop) -> None:
+    """White innovations do not show a wrong contact law; seen with bearings that have play."""
+    forces = workshop.forces
+    magnitude = forces.magnitude.copy()
+    magnitude[:, 0] *= 3.0
+    wrong = replace(workshop, forces=replace(forces, magnitude=magnitude))
+    assert wrong.consistent
+    drop, check = _cross_checked(wrong, Tracked())
+    assert check is not None
+    assert not drop.consistent
+    (failed,) = [one for one in drop.checks if not one.passed]
+    assert failed.name == "cross-check"
+    assert re.search(r"the peak force at NDE is \d+ N, without a contact law \d+ N", failed.message)
+    assert "DE is" not in failed.message.replace("NDE is", "")
+    kept, check = _cross_checked(workshop, Tracked())
+    assert kept is workshop and check is not None
+    assert _cross_checked(wrong, Tracked(quick=True)) == (wrong, None)
 
 
 def test_a_twin_far_from_the_cross_check_gives_way_to_it(workshop: TrackedDrop, tracked: Estimate) -> None:
