@@ -40,7 +40,6 @@ from rotordrop.estimation.tracked_loads import (
     INCONSISTENT,
     INCONSISTENT_WIDENING,
     MODEL_FORCE_SIGMA,
-    MODEL_STRESS_SIGMA,
     OF_CROSS_CHECK,
     holding,
     holding_cross_check,
@@ -141,7 +140,7 @@ def test_one_pass_agrees_with_three(tracked: Estimate, quick: Estimate) -> None:
         assert times[0] == pytest.approx(times[1], abs=1e-4)
 
 
-def test_estimated_orbit_has_the_shape_of_the_true_one_to_a_micrometre(
+def test_estimated_orbit_has_the_shape_of_the_true_one_to_half_a_micrometre(
     workshop: TrackedDrop, tracked: Estimate, synthetic: SyntheticDrop
 ) -> None:
     true = synthetic.histories["bearing_displacement"]
@@ -152,13 +151,9 @@ def test_estimated_orbit_has_the_shape_of_the_true_one_to_a_micrometre(
         for axis in range(2):
             there = np.interp(at, np.arange(len(true)), true[:, b, axis])
             apart = workshop.forces.displacement[:, b, axis] - there
-            assert np.std(apart) < 1.5e-6
-            assert (
-                np.mean(
-                    np.abs(apart - np.mean(apart)) < 1.645 * workshop.forces.displacement_sigma[:, b, axis]
-                )
-                > 0.7
-            )
+            assert np.std(apart) < 0.5e-6
+            inside = np.abs(apart) < NINETY * workshop.forces.displacement_sigma[:, b, axis]
+            assert np.mean(inside) > 0.9
 
 
 def test_document_follows_the_published_schema(tracked: Estimate, calibrated: Machine) -> None:
@@ -181,12 +176,6 @@ def test_document_follows_the_published_schema(tracked: Estimate, calibrated: Ma
                 assert low <= impact[field]["value"] <= high
 
 
-def test_intervals_hold_no_less_than_what_every_model_leaves_out(tracked: Estimate) -> None:
-    for field, share in (("peak_force_N", MODEL_FORCE_SIGMA), ("peak_stress_Pa", MODEL_STRESS_SIGMA)):
-        for name, half in zip(BEARINGS, half_widths(tracked, field), strict=True):
-            assert half >= NINETY * share * number(tracked, name, field).value
-
-
 def test_impulses_of_the_impacts_add_up_to_the_impulse_of_the_force(
     workshop: TrackedDrop, tracked: Estimate
 ) -> None:
@@ -198,17 +187,22 @@ def test_impulses_of_the_impacts_add_up_to_the_impulse_of_the_force(
         assert parts == pytest.approx(whole, rel=1e-9)
 
 
-def test_vertical_impulse_carries_the_weight(
-    workshop: TrackedDrop, tracked: Estimate, calibrated: Machine
-) -> None:
-    """Momentum: over 0.2 s the bearings give back what gravity gave, less what the rotor still moves with."""
-    time, force = workshop.forces.time, workshop.forces.force
-    late = time > 0.1
-    dt = float(time[1] - time[0])
-    down = dt * float(np.sum(force[late, :, 1]))
-    weight = 9.80665 * float(workshop.problem.model.fe.total_mass)
-    moving = workshop.problem.model.fe.total_mass * 0.1
-    assert down == pytest.approx(weight * dt * np.count_nonzero(late), abs=moving)
+def test_vertical_impulse_carries_the_weight(workshop: TrackedDrop) -> None:
+    """Momentum: the bearings push up the weight and what the centre of mass gained, to 0.3 per cent."""
+    model, forces = workshop.problem.model, workshop.forces
+    time, dt = forces.time, float(forces.time[1] - forces.time[0])
+    mass, shares = float(model.fe.total_mass), np.asarray(model.load_shares)
+    height = forces.displacement[..., 1] @ (shares / shares.sum())  # of the centre, by the law of the lever
+    late = np.flatnonzero(time > 0.1)
+
+    def speed(at: int) -> float:
+        near = slice(at - 20, at + 20)  # 2 ms: longer than a contact
+        return float(np.polyfit(time[near], height[near], 1)[0])
+
+    first, last = int(late[0]), int(late[-1]) - 20
+    up = dt * float(np.sum(forces.force[first:last, :, 1]))
+    weight = mass * float(model.machine.gravity) * dt * (last - first)
+    assert up - weight == pytest.approx(mass * (speed(last) - speed(first)), abs=0.003 * weight)
 
 
 def followed(machine: Machine, item: Preparation) -> tuple[TrackedDrop, Estimate]:
