@@ -125,6 +125,15 @@ class IdentifiedValue:
         )
 
 
+@dataclass(frozen=True, kw_only=True)
+class Correlation:
+    """Two parameters by their paths, and how their errors correlate [1]."""
+
+    first: str
+    second: str
+    value: float
+
+
 def _known_fields(**fields: Any) -> dict[str, Any]:
     known = {name: value for name, value in fields.items() if value is not None}
     return {name: list(value) if isinstance(value, tuple) else value for name, value in known.items()}

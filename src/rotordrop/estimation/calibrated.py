@@ -19,8 +19,7 @@ from rotordrop.estimation.tracked_parameters import (
     model_error,
     parameter_widening,
 )
-from rotordrop.machine import Machine
-from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin
+from rotordrop.machine import CalibrationDrop, CalibrationOrigin, Machine
 from rotordrop.measurement.record import Record
 from rotordrop.model.parameter import Parameter
 from rotordrop.model.parameter_table import parameter, row_of, rows, separating_measurement
@@ -147,7 +146,7 @@ def calibrate_machine(
     bearings = [bearing.name for bearing in machine.touchdown_bearings]
     identifiability = _identifiability(problem, covariance, values)
     known = _as_known(at_fitted_exponents(machine, values), identifiability)
-    beside = "" if consistent else " (not consistent with them)"
+    beside = "" if consistent else " (not consistent with them)"  # for people: nothing reads a source
     source = f"calibrated on {', '.join(stems)}{beside}"
     drops = [CalibrationDrop(name=n, sha256=r.sha256) for n, r in zip(stems, records, strict=True)]
     origin = CalibrationOrigin(drops=tuple(drops), consistent=consistent)

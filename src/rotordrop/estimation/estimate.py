@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.estimated import IdentifiedValue
+from rotordrop.estimated import Correlation, IdentifiedValue
 from rotordrop.estimation.agreement import Agreement
 from rotordrop.estimation.bearing_drop import BearingDrop
 from rotordrop.estimation.later_motion import LaterMotion
@@ -164,8 +164,8 @@ class ReplaySteps:
         First contact of every bearing in the record, with the stiffness of eq. (17).
     friction : FrictionSweep or None
         Sweep of the friction coefficient; None when it was taken over.
-    correlations : mapping
-        Correlations of support values by ``"first ~ second"`` [1].
+    correlations : tuple of Correlation
+        Correlations of support values.
     speed_time, speed_simulated : ndarray, shape (T,)
         Simulated speed [rad/s] against time [s].
     fixed : str
@@ -181,7 +181,7 @@ class ReplaySteps:
     speed: SpeedFit
     contacts: tuple[FirstContact, ...]
     friction: FrictionSweep | None
-    correlations: Mapping[str, float]
+    correlations: tuple[Correlation, ...]
     speed_time: Array
     speed_simulated: Array
     fixed: str

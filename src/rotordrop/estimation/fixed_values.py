@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rotordrop.errors import UsageError
-from rotordrop.estimated import Estimated
+from rotordrop.estimated import Correlation, Estimated
 from rotordrop.machine import Machine
 from rotordrop.model.parameter_table import rows
 
@@ -21,7 +21,7 @@ def read_fixed(fixed: str | Path | Document) -> tuple[Document, str]:
     Raises
     ------
     UsageError
-        If it cannot be read, or holds several drops.
+        If it cannot be read, holds several drops, or correlations of another form.
     """
     if isinstance(fixed, Mapping):
         document, place = fixed, "an earlier estimate"
@@ -49,6 +49,7 @@ def read_fixed(fixed: str | Path | Document) -> tuple[Document, str]:
             f"{place} holds {', '.join(document) or 'nothing'}; expected 'bearings' with their supports. "
             "Give a file written by 'rotordrop estimate --json'."
         )
+    fixed_correlations(document, place)  # refused before the fall is computed, not after
     return document, place
 
 
@@ -98,15 +99,24 @@ def _estimated(found: Mapping[str, Any], source: str) -> Estimated:
     )
 
 
-def fixed_correlations(document: Document) -> dict[tuple[str, str], float]:
-    """Correlations of support values in an earlier estimate by pairs of paths [1]; may be empty."""
+def fixed_correlations(document: Document, place: str = "an earlier estimate") -> tuple[Correlation, ...]:
+    """Correlations of support values in an earlier estimate; may be empty.
+
+    Raises
+    ------
+    UsageError
+        If they are something else: without them the intervals would be others, and nobody would know.
+    """
     at: Any = document.get("identification")
     for key in ("support", "correlations"):
         at = at.get(key) if isinstance(at, Mapping) else None
-    if not isinstance(at, Mapping):
-        return {}
-    pairs = {}
-    for names, value in at.items():
-        first, _, second = str(names).partition(" ~ ")
-        pairs[first, second] = float(value)
-    return pairs
+    try:
+        return tuple(
+            Correlation(first=str(pair["first"]), second=str(pair["second"]), value=float(pair["value"]))
+            for pair in at or ()
+        )
+    except (TypeError, KeyError, ValueError) as error:
+        raise UsageError(
+            f"{place} holds the correlations {str(at)[:80]}; expected a list of "
+            "'first', 'second' and 'value'. Estimate that drop anew with this version."
+        ) from error

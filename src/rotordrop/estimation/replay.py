@@ -178,7 +178,7 @@ def _steps(
         speed=fall.speed,
         contacts=fall.contacts,
         friction=impacts.friction,
-        correlations={} if impacts.support is None else impacts.support.correlations,
+        correlations=() if impacts.support is None else impacts.support.correlations,
         speed_time=result.time,
         speed_simulated=result.speed,
         fixed=origin,
@@ -198,12 +198,10 @@ def _taken_over(fall: RecordedFall, document: Document) -> Impacts:
     )
     covariance = np.diag(problem.prior_sigma**2)
     paths = problem.vector.paths
-    for (first, second), correlation in fixed_correlations(document).items():
-        if first in paths and second in paths:
-            i, k = paths.index(first), paths.index(second)
-            covariance[i, k] = covariance[k, i] = (
-                correlation * problem.prior_sigma[i] * problem.prior_sigma[k]
-            )
+    for pair in fixed_correlations(document):
+        if pair.first in paths and pair.second in paths:
+            i, k = paths.index(pair.first), paths.index(pair.second)
+            covariance[i, k] = covariance[k, i] = pair.value * problem.prior_sigma[i] * problem.prior_sigma[k]
     return Impacts(
         problem=problem,
         x=problem.prior_mean,

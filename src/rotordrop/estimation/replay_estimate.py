@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -296,7 +296,7 @@ def _identification(
             "misfit": support.search.best.misfit,
             "simulations": support.coarse.evaluations + support.search.evaluations,
             "ended_early": support.search.ended_early or None,
-            "correlations": support.correlations,
+            "correlations": [asdict(pair) for pair in support.correlations],
         }
     if friction is not None:
         entry["friction_sweep"] = {

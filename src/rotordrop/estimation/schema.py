@@ -151,7 +151,7 @@ _IDENTIFICATION = _closed(
             misfit=_NUMBER,
             simulations=_COUNT,
             ended_early={"type": ["string", "null"]},
-            correlations=_by_name(_NUMBER),
+            correlations={"type": "array", "items": _closed({}, first=_TEXT, second=_TEXT, value=_NUMBER)},
         ),
         "friction_sweep": _closed({}, dynamic=_NUMBERS, disagreement_m=_NUMBERS, window_s=_PAIR),
         "draws": _closed({}, count=_COUNT, rejected=_COUNT),

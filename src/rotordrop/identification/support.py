@@ -17,7 +17,7 @@ from os import cpu_count
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.estimated import NINETY, IdentifiedValue, Verdict
+from rotordrop.estimated import NINETY, Correlation, IdentifiedValue, Verdict
 from rotordrop.identification.directions import DIRECTIONS, influential_directions
 from rotordrop.identification.fit import Fit, completed, considered_covariance
 from rotordrop.identification.parameter_vector import (
@@ -200,8 +200,8 @@ class SupportFit:
         Covariance of all unknowns, widened for what the linearised fit leaves out.
     values : dict
         Identified value by path, such as ``"NDE.support.stiffness"``.
-    correlations : dict
-        Correlation of pairs of support parameters of one bearing by ``"path ~ path"`` [1].
+    correlations : tuple of Correlation
+        Correlation of pairs of support parameters of one bearing.
     """
 
     problem: ImpactFit
@@ -209,7 +209,7 @@ class SupportFit:
     search: Search
     covariance: Array
     values: dict[str, IdentifiedValue]
-    correlations: dict[str, float]
+    correlations: tuple[Correlation, ...]
 
 
 def impact_problem(replica: Replica, *, directions: int = DIRECTIONS) -> ImpactFit:
@@ -405,14 +405,14 @@ def _verdict(at_bound: bool, error: float, prior: float) -> Verdict:
     return "the record does not determine it" if error > UNDETERMINED * prior else "determined"
 
 
-def _correlations(problem: ImpactFit, found: Search, supports: int) -> dict[str, float]:
+def _correlations(problem: ImpactFit, found: Search, supports: int) -> tuple[Correlation, ...]:
     covariance = found.best.covariance[:supports, :supports]
     scale = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(scale, scale)
-    paths = problem.vector.paths
-    pairs = {}
-    for i in range(supports):
-        for k in range(i):
-            if paths[i].split(".")[0] == paths[k].split(".")[0]:
-                pairs[f"{paths[k]} ~ {paths[i]}"] = float(correlation[i, k])
-    return pairs
+    unknowns = problem.vector.unknowns
+    return tuple(
+        Correlation(first=unknowns[k].path, second=unknowns[i].path, value=float(correlation[i, k]))
+        for i in range(supports)
+        for k in range(i)
+        if unknowns[i].owner == unknowns[k].owner
+    )

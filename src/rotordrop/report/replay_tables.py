@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import plotly.graph_objects as go
 
+from rotordrop.estimated import Correlation
 from rotordrop.estimation.agreement import Agreement
 from rotordrop.estimation.estimate import FirstContact, FrictionSweep
 from rotordrop.report.content import Cell, Table
@@ -63,15 +64,15 @@ def _timing(contacts: Sequence[FirstContact]) -> str:
     return f"Standard error of t₁ and t₂: {error.text} or less. "
 
 
-def correlation_table(correlations: Mapping[str, float]) -> Table:
+def correlation_table(correlations: Sequence[Correlation]) -> Table:
     """Say which parameters the record cannot tell apart."""
     rows = tuple(
         (
-            pair,
-            Quantity(value=value, kind="dimensionless", digits=2),
-            "confounded: only their combination is known" if abs(value) >= CONFOUNDED else "told apart",
+            f"{pair.first} and {pair.second}",
+            Quantity(value=pair.value, kind="dimensionless", digits=2),
+            "confounded: only their combination is known" if abs(pair.value) >= CONFOUNDED else "told apart",
         )
-        for pair, value in sorted(correlations.items(), key=lambda item: -abs(item[1]))
+        for pair in sorted(correlations, key=lambda pair: -abs(pair.value))
     )
     return Table(columns=("parameters", "correlation", "meaning"), rows=rows, caption="Correlations")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,10 +15,13 @@ import pytest
 
 from rotordrop.cli.app import INTERRUPTED, run
 from rotordrop.errors import ConsistencyError, UsageError
+from rotordrop.estimated import Estimated
+from rotordrop.estimation.record_facts import BESIDE, COUNTED_TWICE, facts_of
 from rotordrop.estimation.schema import estimate_schema
 from rotordrop.estimation.tracked import is_calibrated
-from rotordrop.machine import example_path, load_machine
+from rotordrop.machine import CalibrationDrop, CalibrationOrigin, Machine, example_path, load_machine
 from rotordrop.measurement.examples import example_record_path
+from rotordrop.measurement.record import read_record
 from rotordrop.tracking.calibration import BLIND_SCHEDULE, Stage
 from rotordrop.tracking.consistency import Check
 
@@ -82,8 +86,9 @@ def test_the_calibrated_machine_loads_with_intervals_and_provenance(folder: Path
     before, machine = load_machine(LP400), load_machine(folder / "calibrated.toml")
     assert is_calibrated(machine) and not is_calibrated(before)
     assert machine.calibration is not None and before.calibration is None
-    assert [drop.name for drop in machine.calibration.drops] == ["drop_060"]
-    assert machine.calibration.drops[0].sha256 and machine.calibration.consistent
+    digest = hashlib.sha256(Path(RECORD).read_bytes()).hexdigest()
+    assert [(drop.name, drop.sha256) for drop in machine.calibration.drops] == [("drop_060", digest)]
+    assert machine.calibration.consistent
     found = json.loads((folder / "calibration.json").read_text())["values"]
     for b, bearing in enumerate(machine.touchdown_bearings):
         for path in ("stiffness", "mass", "damping"):
@@ -295,3 +300,26 @@ def test_two_records_of_one_name_are_refused(
     output = ["--output", str(tmp_path / "out.toml")] if verb == "calibrate" else []
     assert run([verb, LP400, "a/drop_060.csv", "b/drop_060.csv", *output]) == USAGE
     assert "2 records are named 'drop_060'; expected a name of its own" in words(capsys.readouterr().err)
+
+
+def told_of(machine: Machine, name: str) -> set[str]:
+    """Warnings that the bundled record, under a name, gets for the calibration of a machine."""
+    known = {BESIDE, *(COUNTED_TWICE.format(drop) for drop in ("drop_060", "first", "first, second"))}
+    return known & set(facts_of(machine, read_record(RECORD, machine), None, name).warnings)
+
+
+def test_what_a_user_writes_as_a_source_is_not_taken_for_a_calibration() -> None:
+    text = "calibrated on drop_060 (not consistent with them)"
+    written = Estimated(value=1e8, status="estimated", interval_90=(9e7, 1.1e8), source=text)
+    machine = load_machine(LP400).with_values({f"{end}.support.stiffness": written for end in ("NDE", "DE")})
+    assert told_of(machine, "drop_060") == set()
+
+
+def test_a_drop_of_the_calibration_is_known_by_its_whole_name_or_its_hash() -> None:
+    """A comma does not make two drops of it, and a copy under another name is the same recording."""
+    digest = hashlib.sha256(Path(RECORD).read_bytes()).hexdigest()
+    twice = {COUNTED_TWICE.format("first, second")}
+    for sha256, name, told in (("", "first, second", twice), ("", "first", set()), (digest, "copy", twice)):
+        drop = CalibrationDrop(name="first, second", sha256=sha256)
+        machine = load_machine(LP400).calibrated_on(CalibrationOrigin(drops=(drop,), consistent=True))
+        assert told_of(machine, name) == told, (sha256, name)

@@ -20,7 +20,7 @@ from rotordrop.estimated import IdentifiedValue
 from rotordrop.estimation import Replay, estimate_drop, replay_estimate, uncertainty
 from rotordrop.estimation.document import estimate_document
 from rotordrop.estimation.estimate import Estimate, Verdict
-from rotordrop.estimation.fixed_values import fixed_correlations
+from rotordrop.estimation.fixed_values import fixed_correlations, read_fixed
 from rotordrop.estimation.replay_estimate import _speed
 from rotordrop.estimation.schema import estimate_schema
 from rotordrop.identification.speed import SpeedFit
@@ -198,8 +198,17 @@ def test_fixed_takes_supports_and_friction_with_their_errors(
             assert value.status == "taken over"
             assert value.interval_90 == pytest.approx(part["interval_90"], rel=1e-6), (name, path)
     assert estimate_document(again)["fixed"] == "an earlier estimate"
-    pairs = fixed_correlations(document)
+    pairs = {(pair.first, pair.second): pair.value for pair in fixed_correlations(document)}
     assert pairs["NDE.support.stiffness", "NDE.support.mass"] > 0.5
+
+
+def test_correlations_of_another_form_are_refused() -> None:
+    """They were passed over, and intervals that rest on them came out others without a word."""
+    document = {"bearings": {}, "identification": {"support": {"correlations": {"K ~ M": 0.9}}}}
+    with pytest.raises(
+        UsageError, match=r"an earlier estimate holds the correlations \{'K ~ M': 0.9\}; .*'first'"
+    ):
+        read_fixed(document)
 
 
 def test_an_unknown_method_is_named(known: Machine, synthetic: SyntheticDrop) -> None:

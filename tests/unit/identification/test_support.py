@@ -72,8 +72,9 @@ def test_search_from_several_starts_over_short_windows(
     assert fit.search.best.misfit < 1.3
     assert fit.values["NDE.support.stiffness"].value == pytest.approx(1e8, rel=0.15)
     assert fit.values["NDE.support.stiffness"].start == pytest.approx(1e8)
-    assert fit.correlations["NDE.support.stiffness ~ NDE.support.mass"] > 0.5
-    ends = [[path.strip().split(".")[0] for path in pair.split("~")] for pair in fit.correlations]
+    pairs = {(pair.first, pair.second): pair.value for pair in fit.correlations}
+    assert pairs["NDE.support.stiffness", "NDE.support.mass"] > 0.5
+    ends = [[path.split(".")[0] for path in pair] for pair in pairs]
     assert ends and all(first == second for first, second in ends)
 
 

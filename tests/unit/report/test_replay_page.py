@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from rotordrop.estimated import IdentifiedValue
+from rotordrop.estimated import Correlation, IdentifiedValue
 from rotordrop.estimation.agreement import Agreement, compare_orbits
 from rotordrop.estimation.bearing_drop import BearingDrop, Motion, Origin, Peak, simulated_bearings
 from rotordrop.estimation.estimate import Estimate, FittedParameter, ReplaySteps, Verdict
@@ -114,7 +114,7 @@ def drop(drop_result: DropResult, agreement: Agreement) -> Estimate:
         speed=cast(Any, speed),
         contacts=(CONTACT, CONTACT),
         friction=SWEEP,
-        correlations={"NDE.support.stiffness ~ NDE.support.mass": 0.99},
+        correlations=(Correlation(first="NDE.support.stiffness", second="NDE.support.mass", value=0.99),),
         speed_time=drop_result.time,
         speed_simulated=drop_result.speed,
         fixed="",
@@ -226,16 +226,18 @@ def test_table_3_has_the_paper_s_value_and_the_corrected_one() -> None:
 
 
 def test_confounded_parameters_are_called_so() -> None:
-    table = correlation_table({"a ~ b": -0.35, "K ~ M": 0.99})
+    table = correlation_table(
+        (Correlation(first="a", second="b", value=-0.35), Correlation(first="K", second="M", value=0.99))
+    )
     assert [(row[0], row[2]) for row in table.rows] == [
-        ("K ~ M", "confounded: only their combination is known"),
-        ("a ~ b", "told apart"),
+        ("K and M", "confounded: only their combination is known"),
+        ("a and b", "told apart"),
     ]
 
 
 def test_supports_of_an_earlier_estimate_are_named_with_their_file(drop: Estimate) -> None:
     assert drop.replay is not None
-    steps = replace(drop.replay, fixed="drop_060.json", friction=None, correlations={})
+    steps = replace(drop.replay, fixed="drop_060.json", friction=None, correlations=())
     taken = replace(drop, replay=steps)
     assert "taken from drop_060.json" in section(taken, "Parameters").text[0]
     content = estimate_page(taken)
