@@ -237,7 +237,7 @@ def ln(x: float) -> float:
 def power(x: float, n: float) -> float:
     """Power x^n [1] of a number that is not negative; x √x for n = 3/2, and exact where n is 1 or 2.
 
-    The logarithm keeps 2^-58 of itself, so one unit in the last place holds for |n| ≤ 16.
+    The logarithm keeps 2^-58 of itself, so one unit in the last place holds for n from −16 to 16.
     Source: ``exp(n log x)`` in double-double arithmetic.
     """
     if n == 1.5:
