@@ -35,7 +35,7 @@ TABLES = (
 )
 
 
-class Session:
+class Transaction:
     """One transaction: statements with ``?`` for values, whatever the data base calls them."""
 
     def __init__(self, cursor: Any, mark: str) -> None:
@@ -54,7 +54,7 @@ def is_url(where: str | Path) -> bool:
 
 
 @contextmanager
-def transaction(where: str | Path, *, writing: bool) -> Iterator[Session]:
+def transaction(where: str | Path, *, writing: bool) -> Iterator[Transaction]:
     """Open a log for one transaction: all of it is kept, or nothing.
 
     Parameters
@@ -71,12 +71,12 @@ def transaction(where: str | Path, *, writing: bool) -> Iterator[Session]:
     OutputError
         If it cannot be written.
     """
-    with _postgresql(str(where)) if is_url(where) else _sqlite(Path(where), writing) as session:
-        yield session
+    with _postgresql(str(where)) if is_url(where) else _sqlite(Path(where), writing) as opened:
+        yield opened
 
 
 @contextmanager
-def _sqlite(file: Path, writing: bool) -> Iterator[Session]:
+def _sqlite(file: Path, writing: bool) -> Iterator[Transaction]:
     if not writing and not file.is_file():
         raise UsageError(f"{file} is not there; 'rotordrop log add' makes a log with its first drop")
     try:
@@ -85,13 +85,13 @@ def _sqlite(file: Path, writing: bool) -> Iterator[Session]:
             connection.execute("PRAGMA journal_mode = WAL")
             connection.execute("PRAGMA synchronous = FULL")
             connection.execute("PRAGMA foreign_keys = ON")
-            session = Session(connection.cursor(), "?")
+            opened = Transaction(connection.cursor(), "?")
             if writing:
                 for table in TABLES:
-                    session.run(table.format(serial="INTEGER PRIMARY KEY", real="REAL"))
-            session.run("BEGIN IMMEDIATE" if writing else "BEGIN")
+                    opened.run(table.format(serial="INTEGER PRIMARY KEY", real="REAL"))
+            opened.run("BEGIN IMMEDIATE" if writing else "BEGIN")
             try:
-                yield session
+                yield opened
                 connection.execute("COMMIT")
             except BaseException:
                 if connection.in_transaction:
@@ -106,7 +106,7 @@ def _sqlite(file: Path, writing: bool) -> Iterator[Session]:
 
 
 @contextmanager
-def _postgresql(url: str) -> Iterator[Session]:
+def _postgresql(url: str) -> Iterator[Transaction]:
     try:
         import psycopg
     except ImportError as error:
@@ -116,11 +116,11 @@ def _postgresql(url: str) -> Iterator[Session]:
         ) from error
     try:
         with psycopg.connect(url, connect_timeout=10) as connection, connection.cursor() as cursor:
-            session = Session(cursor, "%s")
+            opened = Transaction(cursor, "%s")
             # Two who make the tables at once would clash inside PostgreSQL's catalogue
-            session.run("SELECT pg_advisory_xact_lock(7208)")
+            opened.run("SELECT pg_advisory_xact_lock(7208)")
             for table in TABLES:
-                session.run(table.format(serial="SERIAL PRIMARY KEY", real="DOUBLE PRECISION"))
-            yield session
+                opened.run(table.format(serial="SERIAL PRIMARY KEY", real="DOUBLE PRECISION"))
+            yield opened
     except psycopg.OperationalError as error:
         raise OutputError(f"the log at {url.rpartition('@')[2]} cannot be used: {error}") from error

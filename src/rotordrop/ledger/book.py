@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rotordrop.errors import UsageError
-from rotordrop.ledger._store import Session, transaction
+from rotordrop.ledger._store import Transaction, transaction
 
 QUANTITIES: Mapping[str, str] = {
     "peak_force_N": "N",
@@ -225,7 +225,7 @@ def used_shares(where: str | Path) -> tuple[UsedShare, ...]:
         return tuple(_used(log, machine, bearings) for machine, bearings in _pairs(log))
 
 
-def _pairs(log: Session) -> list[tuple[str, str]]:
+def _pairs(log: Transaction) -> list[tuple[str, str]]:
     rows = log.run(
         "SELECT machine, bearing_set FROM drops UNION SELECT machine, bearing_set FROM allowances "
         "ORDER BY 1, 2"
@@ -233,7 +233,7 @@ def _pairs(log: Session) -> list[tuple[str, str]]:
     return [(machine, bearings) for machine, bearings in rows]
 
 
-def _used(log: Session, machine: str, bearings: str) -> UsedShare:
+def _used(log: Transaction, machine: str, bearings: str) -> UsedShare:
     key = (machine, bearings)
     durations = [
         row[0] for row in log.run("SELECT duration FROM drops WHERE machine = ? AND bearing_set = ?", key)
