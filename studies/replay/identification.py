@@ -31,7 +31,6 @@ from numpy.typing import NDArray
 from rotordrop.estimated import IdentifiedValue
 from rotordrop.estimation.recorded_fall import RecordedFall, recorded_fall
 from rotordrop.identification.air_gap import identify_air_gap
-from rotordrop.identification.parameter_vector import FRICTION
 from rotordrop.identification.replica import build_replica
 from rotordrop.identification.support import (
     LONGEST_WINDOW,
@@ -59,7 +58,7 @@ def supports_of(fall: RecordedFall) -> tuple[SupportFit, dict[str, IdentifiedVal
     )
     found = fit_support(coarse, fine, fall.later_contact)
     longest = fall.later_contact + LONGEST_WINDOW
-    friction = found.values[FRICTION]
+    friction = found.values[fine.vector.paths[fine.vector.friction]]
     problem, x, covariance = refit_with_friction(fine, found.search.best, friction, longest=longest)
     return found, identified_values(problem, x, covariance), problem, x
 

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from rotordrop.estimation.recorded_fall import recorded_fall
 from rotordrop.estimation.uncertainty import best_candidate, seen_at_bearings, whole_drop
-from rotordrop.identification.air_gap import SettledRest, find_rest, static_sag
+from rotordrop.identification.air_gap import SettledRest, find_rest
 from rotordrop.identification.evidence import read_evidence
 from rotordrop.identification.initial_state import InitialState, fit_initial_state
 from rotordrop.identification.modal_expansion import ExpandedState, expand_initial_state
@@ -36,6 +36,7 @@ from rotordrop.identification.support import impact_problem
 from rotordrop.machine import Machine
 from rotordrop.measurement.record import Record
 from rotordrop.model.parameters import DropModel
+from rotordrop.model.static_sag import sag_of_model
 from rotordrop.simulation.case import DropCase, StateStart
 from rotordrop.simulation.drop import simulate_drop
 from rotordrop.simulation.result import DropResult
@@ -65,7 +66,7 @@ def by_fit(
 ) -> tuple[InitialState, DropResult, Array]:
     """Replay from the fit over the fall, and its orbit at the bearings as the sensors would show it."""
     evidence, sensing = read_evidence(model, record), build_sensing(model, record.sensors)
-    gaps = rest.radius - static_sag(model).total
+    gaps = rest.radius - sag_of_model(model).total
     initial = fit_initial_state(evidence, rest, gaps, model, sensing)
     problem = impact_problem(build_replica(record, rest, initial, model, until=EARLY))
     central = best_candidate(problem, problem.prior_mean)
@@ -123,7 +124,7 @@ def one(seed: int, hertz: float) -> dict[str, Any]:
     machine = true_machine(known, hidden)
     fall = recorded_fall(machine, drop.record, drop.tail)
     model, gaps = fall.model, [value_of(b, "air_gap") for b in hidden.machine.touchdown_bearings]
-    settled = replace(fall.rest, radius=np.array(gaps) + static_sag(model).total)
+    settled = replace(fall.rest, radius=np.array(gaps) + sag_of_model(model).total)
     found: dict[str, tuple[DropResult, Array]] = {}
     initial, result, _ = by_fit(machine, model, drop.record, settled)
     found["fit"] = result, result.displacement
