@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import FIRST_EXCEPTION, Executor, ThreadPoolExecutor, wait
 from dataclasses import dataclass
+from importlib import import_module
 from os import cpu_count
 from pathlib import Path
 from typing import Any, Literal
@@ -192,19 +193,21 @@ def _on_dask(
     place: StudyFolder, wanted: list[int], address: str, study: Study, report: Report | None
 ) -> None:
     try:
-        from distributed import Client, LocalCluster
+        distributed: Any = import_module("distributed")
     except ImportError as error:
         raise UsageError(
             "a Dask cluster needs the extra 'cluster'; install it with: pip install 'rotordrop[cluster]'"
         ) from error
     path = str(place.path.resolve())
     if address != "local":
-        with Client(address) as client:
+        with distributed.Client(address) as client:
             _drive(client.get_executor(pure=False), wanted, _Task(path), study, place, report)
         return
     with (
-        LocalCluster(n_workers=cpu_count() or 1, threads_per_worker=1, dashboard_address=None) as cluster,
-        Client(cluster) as client,
+        distributed.LocalCluster(
+            n_workers=cpu_count() or 1, threads_per_worker=1, dashboard_address=None
+        ) as cluster,
+        distributed.Client(cluster) as client,
     ):
         _drive(client.get_executor(pure=False), wanted, _Task(path), study, place, report)
 

@@ -238,6 +238,31 @@ def test_two_processes_share_one_study(serial, tmp_path):
     same_shards(tmp_path / "alone", tmp_path / "shared")
 
 
+PROGRAM_ON_DASK = """
+import sys
+from rotordrop.study.folder import study_of
+from rotordrop.study.run import run_study
+if __name__ == "__main__":
+    run_study(study_of(sys.argv[1]), sys.argv[1], dask="local")
+"""
+
+
+def test_a_cluster_computes_the_same_bits(serial, tmp_path):
+    """Where the extra "cluster" is installed; workers of a cluster import the program that started it."""
+    pytest.importorskip("distributed")
+    open_folder(study_with(), tmp_path / "study")
+    program = tmp_path / "program.py"
+    program.write_text(PROGRAM_ON_DASK)
+    subprocess.run([sys.executable, str(program), str(tmp_path / "study")], check=True, timeout=300)
+    same_shards(serial[0], tmp_path / "study")
+
+
+def test_a_cluster_without_its_extra_says_what_to_install(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(UsageError, match=r"needs the extra 'cluster'.*rotordrop\[cluster\]"):
+        run_study(study_with(), tmp_path / "study", dask="local")
+
+
 def test_a_study_ends_when_its_quantile_is_known_whatever_was_finished_first(tmp_path):
     until = {"column": "DE.peak_stress", "quantile": 0.5, "within": 0.01}
     study = study_with(drops=60, shard=3, until=until)
