@@ -124,11 +124,13 @@ def _cross_checked(drop: TrackedDrop, method: Tracked) -> tuple[TrackedDrop, Inp
 
     A twin whose innovations are white may still be wrong where its contact law is: a peak that is a factor
     apart from the cross-check is not called consistent. A twin that does not fit lends nothing to the
-    cross-check, since what it says of gaps and sensors may be as wrong as what it says of forces.
+    cross-check, since what it says of gaps and sensors may be as wrong as what it says of forces. A quick
+    estimate does without it, but not for a bearing with play, whose force no study has validated.
     """
-    if not drop.sees_all_directions or (drop.consistent and method.quick):
-        return drop, None
     problem = drop.problem
+    with_play = any(b.bearing.clearance is not None for b in problem.model.machine.touchdown_bearings)
+    if not drop.sees_all_directions or (drop.consistent and method.quick and not with_play):
+        return drop, None
     if drop.consistent:
         check = input_state_estimate(problem, lent_by_twin(problem, drop.smoothed))
         apart = [

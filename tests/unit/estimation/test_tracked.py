@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import IdentificationError, UsageError
-from rotordrop.estimated import IdentifiedValue
+from rotordrop.estimated import Estimated, IdentifiedValue
 from rotordrop.estimation import Tracked, estimate_drop, estimate_drops
 from rotordrop.estimation.bearing_drop import Origin
 from rotordrop.estimation.document import combined, estimate_document
@@ -386,6 +386,17 @@ def test_a_peak_far_from_the_cross_check_is_not_called_consistent(workshop: Trac
     kept, check = _cross_checked(workshop, Tracked())
     assert kept is workshop and check is not None
     assert _cross_checked(wrong, Tracked(quick=True)) == (wrong, None)
+
+
+def test_a_bearing_with_play_is_cross_checked_however_quick(workshop: TrackedDrop) -> None:
+    model = workshop.problem.model
+    first, *others = model.machine.touchdown_bearings
+    ball = first.bearing.model_copy(update={"clearance": Estimated(value=20e-6)})
+    loose = (first.model_copy(update={"bearing": ball}), *others)
+    machine = model.machine.model_copy(update={"touchdown_bearings": loose})
+    drop = replace(workshop, problem=replace(workshop.problem, model=replace(model, machine=machine)))
+    assert _cross_checked(drop, Tracked(quick=True))[1] is not None
+    assert _cross_checked(workshop, Tracked(quick=True))[1] is None
 
 
 def test_a_twin_far_from_the_cross_check_gives_way_to_it(workshop: TrackedDrop, tracked: Estimate) -> None:
