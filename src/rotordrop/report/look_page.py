@@ -84,7 +84,8 @@ def _verdict(seen: Look) -> list[Statement]:
     contact = drop.permanent_contact
     ends = "." if contact is None else f"; from {contact:.4g} s on it stayed in contact."
     told = [
-        f"The rotor was released at {drop.release:.3f} s of the record (± 2 ms), {len(seen.impacts)} impacts{ends}"
+        f"The rotor was released at {drop.release:.3f} s of the record (± 2 ms), {len(seen.impacts)} "
+        f"impacts{ends}"
     ]
     told += [
         f"{plane.plane}: {_text(plane.excess, 'length')} beyond the air gap of {_text(plane.gap, 'length')} "
