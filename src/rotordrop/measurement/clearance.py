@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotordrop.errors import RecordError
+from rotordrop.estimated import NINETY
 from rotordrop.measurement.axes import along_sensors, planar_of, sensor_planes
 from rotordrop.measurement.look.planes import arrangement_of
 from rotordrop.measurement.profile import Profile, load_profile
@@ -298,7 +299,7 @@ def _found(wall: Array, centre: Array, radius: float, scatter: float, name: str)
     distance = np.hypot(*offset.T)
     jacobian = np.column_stack([offset / distance[:, None], np.ones(len(wall))])
     error = scatter * math.sqrt(float(np.linalg.inv(jacobian.T @ jacobian)[2, 2]))
-    reach = math.hypot(error * float(stdtrit(max(len(wall) - 3, 1), 0.95)), 1.645 * _SHARED)
+    reach = math.hypot(error * float(stdtrit(max(len(wall) - 3, 1), 0.95)), NINETY * _SHARED)
     order = np.argsort(np.arctan2(offset[:, 1], offset[:, 0]))
     return Clearance(
         bearing=name,

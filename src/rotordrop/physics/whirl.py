@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.physics._compile import kernel
+from rotordrop.physics.elementary import atan2
 
 Array = NDArray[np.float64]
 
@@ -101,12 +102,12 @@ def circling_spells(  # noqa: C901  one compiled loop
         inside = i < x.shape[0] and x[i] * x[i] + y[i] * y[i] >= nearest * nearest
         if inside and start < 0:
             start = far = i
-            previous = math.atan2(y[i], x[i])
+            previous = atan2(y[i], x[i])
             angle = start_angle = far_angle = previous
             continue
         back = False
         if inside:
-            polar = math.atan2(y[i], x[i])
+            polar = atan2(y[i], x[i])
             step = polar - previous
             if step > math.pi:
                 step -= 2.0 * math.pi

@@ -291,12 +291,6 @@ def cross_check_table(checks: Sequence[CrossCheck]) -> Table:
     )
 
 
-def _outcome(check: CrossCheck) -> str:
-    if check.replaced:
-        return "stated in place of the twin"
-    return "agrees" if check.agrees else "disagrees"
-
-
 def _own(check: CrossCheck) -> Quantity:
     return Quantity.of(check.estimate, KINDS[check.estimate.unit], digits=3)
 

@@ -59,12 +59,13 @@ def whirl_spells(time: Array, orbit: Array, air_gap: float, *, spin: float = 1.0
     Source: own definition, see `rotordrop.physics.whirl.circling_spells`: at least two turns in one sense
     outside of half the air gap. A pendulum motion at the bottom swings back and is none.
     """
-    found = np.empty((256, 3))
     x, y = (np.ascontiguousarray(orbit[:, axis], dtype=np.float64) for axis in range(2))
-    count = circling_spells(x, y, LEAST_RADIUS * air_gap, LEAST_TURNS, found)
+    found = np.empty((0, 3))
+    while (count := circling_spells(x, y, LEAST_RADIUS * air_gap, LEAST_TURNS, found)) > len(found):
+        found = np.empty((count, 3))
     sense = math.copysign(1.0, spin)
     spells = []
-    for first, last, _ in found[: min(count, len(found))]:
+    for first, last, _ in found:
         whole = slice(int(first), int(last) + 1)
         spells.append(_steady(time[whole], np.unwrap(np.arctan2(y[whole], x[whole])), sense))
     return tuple(spells)

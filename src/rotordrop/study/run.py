@@ -17,7 +17,17 @@ import numpy as np
 from rotordrop.errors import RotordropError, UsageError
 from rotordrop.model.parameters import DropModel, build_drop_model
 from rotordrop.simulation.drop import simulate_drop
-from rotordrop.study.folder import Claim, Shard, StudyFolder, claimed, open_folder, publish, study_of, tidy
+from rotordrop.study.folder import (
+    Claim,
+    Shard,
+    StudyFolder,
+    claimed,
+    open_folder,
+    publish,
+    read_plan,
+    study_of,
+    tidy,
+)
 from rotordrop.study.plan import Study
 from rotordrop.study.quantities import columns_of, row_of
 from rotordrop.study.summary import StudyResults, load_results, shards_needed
@@ -144,19 +154,20 @@ def _one_drop(study: Study, model: DropModel, values: dict[str, float]) -> tuple
 
 def work_on(folder: str | Path, shard: int) -> bool:
     """Compute and publish one shard of the study in a folder, unless another one does; for Dask workers."""
-    study, model = _opened(str(folder))
+    study, model = _opened(folder)
     return _work(study, model, StudyFolder(Path(folder)), shard, None)
 
 
 _OPEN: dict[str, tuple[Study, DropModel]] = {}
-"""Studies that this process has opened: a worker builds the model of a study once."""
+"""Studies that this process has opened, by digest: a worker builds the model of a study once."""
 
 
-def _opened(folder: str) -> tuple[Study, DropModel]:
-    if folder not in _OPEN:
+def _opened(folder: str | Path) -> tuple[Study, DropModel]:
+    digest = read_plan(folder)["digest"]  # another study may have taken the place of the one before
+    if digest not in _OPEN:
         study = study_of(folder)
-        _OPEN[folder] = (study, build_drop_model(study.machine, study.reduction))
-    return _OPEN[folder]
+        _OPEN[digest] = (study, build_drop_model(study.machine, study.reduction))
+    return _OPEN[digest]
 
 
 def _work(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -117,6 +118,17 @@ def test_a_folder_tells_its_study_and_refuses_another(serial):
         run_study(study_with(seed=4), folder)
     with pytest.raises(UsageError, match=r"is not a study folder"):
         load_results(folder / "shards")
+
+
+def test_another_study_in_the_place_of_one_before_is_the_one_computed(tmp_path):
+    place = tmp_path / "study"
+    open_folder(study_with(), place)
+    assert work_on(place, 0)
+    shutil.rmtree(place)
+    other = study_with(seed=5)
+    open_folder(other, place)
+    assert work_on(place, 0)
+    np.testing.assert_array_equal(read_shard(StudyFolder(place), other, 0)["varied"], other.values(0, 5))
 
 
 def test_a_changed_machine_file_is_noticed(serial, tmp_path):
