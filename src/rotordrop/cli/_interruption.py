@@ -12,11 +12,13 @@ import sys
 from _thread import interrupt_main
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from threading import Event, Timer
-from typing import TYPE_CHECKING
+from threading import Event, Thread, Timer
+from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
     from sys import UnraisableHookArgs
+
+Result = TypeVar("Result")
 
 AGAIN_AFTER_S = 0.02
 """Until an ignored interrupt is raised again [s]: the callback that ignored it has returned by then."""
@@ -53,3 +55,26 @@ def interruptions_kept() -> Iterator[Callable[[], bool]]:
         for timer in timers:
             timer.cancel()
         sys.unraisablehook = print_ignored
+
+
+def interruptible(compute: Callable[[], Result]) -> Result:
+    """Compute in a thread of its own, so that Ctrl-C is heard while compiled code runs for minutes.
+
+    The thread is left behind then; it ends with the program.
+    """
+    results: list[Result] = []
+    faults: list[BaseException] = []
+
+    def attempt() -> None:
+        try:
+            results.append(compute())
+        except BaseException as fault:  # noqa: BLE001  raised again below, in the thread that waits
+            faults.append(fault)
+
+    worker = Thread(target=attempt, daemon=True)
+    worker.start()
+    while worker.is_alive():
+        worker.join(0.1)  # a join without end would keep the interrupt waiting on some systems
+    if faults:
+        raise faults[0]
+    return results[0]

@@ -1,6 +1,7 @@
 """Check a machine file and show what it amounts to.
 
-Prints mass, inertias, load shares, frequencies and sag, what was assumed, and where the drop model ends.
+Prints one line of verdict, then mass, inertias, load shares and frequencies on one screen; with ``--all``
+also what was assumed, and where the drop model ends and why.
 """
 
 from __future__ import annotations
@@ -27,6 +28,9 @@ def check(
             help='Speed at the drop, such as "60 Hz", for the warnings; the nominal speed when left out.',
         ),
     ] = None,
+    everything: Annotated[
+        bool, typer.Option("--all", help="Also every default and inferred value, and limits with numbers.")
+    ] = False,
     report: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Write the same with a drawing of the rotor as an HTML page."),
@@ -47,7 +51,7 @@ def check(
     warnings = machine_warnings(described, summary, speed)
 
     def summarise(out: Console) -> None:
-        print_summary(machine_content(described, summary, warnings), out)
+        print_summary(machine_content(described, summary, warnings, brief=not everything), out)
         for line in rotor_lines(described):
             out.print(line, no_wrap=True, crop=True)
 

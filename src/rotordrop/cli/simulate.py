@@ -5,12 +5,14 @@ Starts centred, from given displacements and velocities, or levitated in the AMB
 
 from __future__ import annotations
 
+import sys
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rotordrop.cli._interruption import interruptible
 from rotordrop.cli._options import JsonOption, MachineArgument, quantity
 from rotordrop.cli._output import deliver, require_places
 from rotordrop.cli._start import levitated_start, placed_start
@@ -116,9 +118,10 @@ def simulate(
     from rotordrop.report.page import write_page
     from rotordrop.report.simulate_page import simulate_page
     from rotordrop.report.simulation_numbers import simulation_numbers
-    from rotordrop.report.terminal import print_summary
+    from rotordrop.report.terminal import print_summary, summary_console
     from rotordrop.simulation.case import DropCase
     from rotordrop.simulation.drop import simulate_drop
+    from rotordrop.simulation.expected_steps import MANY_STEPS, expected_steps
 
     require_places(output, report, json_file)
     described = load_machine(machine)
@@ -138,7 +141,10 @@ def simulate(
         spin=spin.value,
         integrator=integrator.value,
     )
-    result = simulate_drop(described, case, certify=certify)
+    expected = expected_steps(described, duration)
+    if expected.steps > MANY_STEPS:
+        summary_console(sys.stderr).print(f"this will take long: {expected}; Ctrl-C stops it", soft_wrap=True)
+    result = interruptible(lambda: simulate_drop(described, case, certify=certify))
     page = simulate_page(result, described)
     if output is not None:
         result.save(output)

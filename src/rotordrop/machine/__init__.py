@@ -7,7 +7,7 @@ from rotordrop.machine.examples import example_machine, example_names, example_p
 from rotordrop.machine.loading import load_machine, loads_machine
 from rotordrop.machine.machine import Machine
 from rotordrop.machine.material import Material
-from rotordrop.machine.plausibility import Doubt, doubts
+from rotordrop.machine.plausibility import doubts
 from rotordrop.machine.rotor import Disc, Element, Rotor, Section, SectionByLength, SectionByNodes
 from rotordrop.machine.saving import machine_text, save_machine
 from rotordrop.machine.schema import machine_schema
@@ -16,6 +16,7 @@ from rotordrop.machine.speed import SpeedDescription
 from rotordrop.machine.template import template_text
 from rotordrop.machine.touchdown_bearing import Contact, Friction, Race, Support, TouchdownBearing
 from rotordrop.machine.unbalance import BalanceGrade, Unbalance
+from rotordrop.machine.usual_values import Doubt
 
 __all__ = [
     "ActiveMagneticBearing",

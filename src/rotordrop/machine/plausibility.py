@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from rotordrop.machine.machine import Machine
 from rotordrop.machine.touchdown_bearing import TouchdownBearing
+from rotordrop.machine.usual_values import Doubt, unusual_values
 from rotordrop.units import format_quantity
 
 USUAL_GAP = (30e-6, 1.5e-3)
@@ -22,32 +22,9 @@ USUAL_DAMPING_TIME = (0.25e-5, 2.5e-5)
 """Bearing damping over stiffness [s], Neisi 2020."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Doubt:
-    """Something that looks odd in a description.
-
-    Attributes
-    ----------
-    kind : str
-        "air gap", "rotor radius", "friction", "smoothing speed", "bearing damping", "preload".
-    bearing : str
-        Name of the touchdown bearing.
-    value, limit : float
-        The two numbers compared, SI units.
-    message : str
-        What it means and what to look at.
-    """
-
-    kind: str
-    bearing: str
-    value: float
-    limit: float
-    message: str
-
-
 def doubts(machine: Machine) -> tuple[Doubt, ...]:
     """List what looks odd in a machine file although it can be used."""
-    found: list[Doubt] = []
+    found = list(unusual_values(machine))
     for bearing in machine.touchdown_bearings:
         found += [*_air_gap(bearing), *_rotor_radius(machine, bearing), *_friction(bearing)]
         found += [*_damping(bearing), *_preload(bearing)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from rotordrop.machine.plausibility import doubts
@@ -30,6 +30,9 @@ HEAT_WINDOW = 0.2
 GROWTH_SHARE = 0.1
 """Thermal growth of the race over the elastic approach of a preloaded ball from which heat counts."""
 
+STATIC_STRESS = 4.2e9
+"""Hertz stress [Pa] of the static load rating C0 of a ball bearing, ISO 76."""
+
 ASIDE = 0.5
 """Distance of a guess from the middle of its range from which it is mentioned, in standard deviations [1]."""
 
@@ -44,11 +47,13 @@ class MachineWarning:
         "limiting speed", "ball centrifugal force", "support resonance", "frictional heat", "load direction",
         "guess", or one of the doubts about the description itself.
     bearing : str
-        Name of the touchdown bearing.
+        Name of the touchdown bearing, or of the part of the machine.
     value, limit : float
         The two numbers compared, SI units.
     message : str
         What it means.
+    doubtful : bool
+        Whether the description itself looks wrong; else it is the drop model that ends there.
     """
 
     kind: str
@@ -56,6 +61,7 @@ class MachineWarning:
     value: float
     limit: float
     message: str
+    doubtful: bool = False
 
 
 def machine_warnings(
@@ -73,11 +79,11 @@ def machine_warnings(
         Speed at the drop [rad/s]; the nominal speed by default.
     """
     omega = float(machine.speed.nominal) if speed is None else speed
-    found = [MachineWarning(**vars(doubt)) for doubt in doubts(machine)]
+    found = [MachineWarning(**vars(doubt), doubtful=True) for doubt in doubts(machine)]
     for bearing, rest in zip(machine.touchdown_bearings, summary.bearings, strict=True):
         found += [*_limiting_speed(bearing, omega), *_centrifugal(bearing, rest, omega)]
         found += [*_resonance(rest, summary), *_heat(bearing, rest, omega), *_lifted(rest)]
-        found += _guesses_aside(bearing)
+        found += [*_preload_stress(rest), *_guesses_aside(bearing)]
     return tuple(found)
 
 
@@ -149,6 +155,14 @@ def _heat(bearing: TouchdownBearing, rest: BearingSummary, omega: float) -> Iter
         f"it grows by {grown}, not small against {against}; the drop model has no heat in it"
     )
     yield _warning("frictional heat", bearing.name, growth, room, text)
+
+
+def _preload_stress(rest: BearingSummary) -> Iterator[MachineWarning]:
+    if rest.preload_stress <= STATIC_STRESS:
+        return
+    stress, limit = (format_quantity(value, "pressure") for value in (rest.preload_stress, STATIC_STRESS))
+    text = f"the preload alone presses the balls with {stress}, and ISO 76 rates bearings up to {limit}"
+    yield replace(_warning("preload", rest.name, rest.preload_stress, STATIC_STRESS, text), doubtful=True)
 
 
 def _guesses_aside(bearing: TouchdownBearing) -> Iterator[MachineWarning]:

@@ -24,16 +24,26 @@ def machine_content(
     warnings: tuple[MachineWarning, ...],
     *,
     drawn: bool = False,
+    brief: bool = False,
 ) -> ReportContent:
-    """Put what is known about a machine into a report; `drawn` adds the rotor's drawing for a page."""
+    """Put what is known about a machine into a report.
+
+    Parameters
+    ----------
+    machine, summary, warnings
+        The machine, what it amounts to, what to know before trusting a result of it.
+    drawn : bool
+        With the rotor's drawing, for a page.
+    brief : bool
+        For one screen: where the drop model ends is named only, and defaults are counted only.
+    """
     open_values = defaults_section(machine)
-    tables = tuple(table for section in open_values for table in section.tables)
+    tables = () if brief else tuple(table for section in open_values for table in section.tables)
     return ReportContent(
         title=f"Machine: {machine.name}",
         subtitle="; ".join(machine.notes),
         facts=(("machine file", str(machine.source_path or "-")), ("rotordrop", __version__)),
-        verdict=tuple(Statement(text=warning.message, level="warning") for warning in warnings)
-        or (Statement(text="Nothing found that the drop model leaves out.", level="good"),),
+        verdict=(_verdict(warnings), *_remarks(machine, warnings, brief)),
         cards=tuple(_card(machine, rest) for rest in summary.bearings),
         summary=(
             _rotor_table(summary),
@@ -42,6 +52,44 @@ def machine_content(
         ),
         sections=(_drawing(machine), *open_values) if drawn else (),
     )
+
+
+def _verdict(warnings: tuple[MachineWarning, ...]) -> Statement:
+    """One line: may this description be worked with?"""
+    doubtful = [warning for warning in warnings if warning.doubtful]
+    if doubtful:
+        count = "one value looks" if len(doubtful) == 1 else f"{len(doubtful)} values look"
+        text = f"The file can be read, but {count} wrong: {', '.join(_named(doubtful))}."
+        return Statement(text=text, level="warning")
+    if warnings:
+        kinds = len({warning.kind for warning in warnings})
+        what = "one thing" if kinds == 1 else f"{kinds} things"
+        return Statement(text=f"The machine can be worked with; {what} to know below.", level="good")
+    text = "The machine can be worked with; the drop model leaves out nothing known of it."
+    return Statement(text=text, level="good")
+
+
+def _named(warnings: Iterable[MachineWarning]) -> list[str]:
+    """Kinds of warning, each with the places it was found at."""
+    places: dict[str, list[str]] = {}
+    for warning in warnings:
+        places.setdefault(warning.kind, []).append(warning.bearing)
+    return [f"{kind} ({', '.join(dict.fromkeys(found))})" for kind, found in places.items()]
+
+
+def _remarks(machine: Machine, warnings: tuple[MachineWarning, ...], brief: bool) -> list[Statement]:
+    told = [warning for warning in warnings if warning.doubtful or not brief]
+    remarks = [Statement(text=warning.message, level="warning") for warning in told]
+    if not brief:
+        return remarks
+    limits = _named(warning for warning in warnings if not warning.doubtful)
+    if limits:
+        remarks.append(Statement(text=f"To know: {'; '.join(limits)}. 'check --all' says why, with numbers."))
+    assumed, inferred = len(machine.defaults_in_use), len(machine.inferred)
+    if assumed or inferred:
+        text = f"{assumed} defaults in use, {inferred} values inferred; 'check --all' lists them."
+        remarks.append(Statement(text=text))
+    return remarks
 
 
 def _card(machine: Machine, rest: BearingSummary) -> Card:

@@ -14,7 +14,7 @@ PAPER = str(example_path("paper"))
 
 
 def test_the_summary_names_the_numbers(capsys):
-    assert run(["check", PAPER]) == 0
+    assert run(["check", PAPER, "--all"]) == 0
     text = capsys.readouterr().out
     for expected in (
         "59.50 kg",
@@ -30,8 +30,30 @@ def test_the_summary_names_the_numbers(capsys):
     assert "\x1b" not in text
 
 
+def test_without_all_it_is_one_screen_with_the_verdict_first(capsys):
+    assert run(["check", PAPER]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) <= 50
+    verdicts = [line for line in lines if line.startswith(("good:", "warning:", "bad:"))]
+    assert verdicts == ["good: The machine can be worked with; 3 things to know below."]
+    text = "\n".join(lines)
+    assert "ball centrifugal force (NDE, DE)" in text
+    assert "defaults in use" in text
+
+
+def test_a_value_that_looks_wrong_comes_first_and_in_full(tmp_path, capsys):
+    odd = tmp_path / "odd.toml"
+    text = example_path("paper").read_text(encoding="utf-8")
+    odd.write_text(text.replace("[speed]", "[speed]\n# a slip: Hz for rpm", 1).replace("550 Hz", "33000 Hz"))
+    assert run(["check", str(odd)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    first = next(line for line in lines if line.startswith("warning:"))
+    assert "one value looks wrong: nominal speed (machine)" in first
+    assert any("a surface speed of" in line and "check the unit (Hz or rpm)" in line for line in lines)
+
+
 def test_the_speed_of_the_drop_decides_the_warnings(capsys):
-    assert run(["check", PAPER, "--speed", "3600 rpm"]) == 0
+    assert run(["check", PAPER, "--all", "--speed", "3600 rpm"]) == 0
     text = capsys.readouterr().out
     assert "each ball is thrown outwards" not in text
     assert "the support by itself resonates" in text

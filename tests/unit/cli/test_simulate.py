@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import json
+import signal
+import subprocess
+import sys
+import time
 
 import numpy as np
 import pytest
@@ -10,7 +14,7 @@ import pytest
 from rotordrop.cli._start import named_pairs
 from rotordrop.cli.app import run
 from rotordrop.errors import UsageError
-from rotordrop.machine import example_path
+from rotordrop.machine import example_machine, example_path, save_machine
 from rotordrop.simulation.result import load_result
 
 PAPER = str(example_path("paper"))
@@ -103,3 +107,20 @@ def test_a_refusal_names_the_value_and_leaves_nothing(
 def test_a_machine_without_the_part_is_told_so():
     with pytest.raises(UsageError, match=r"'NDE: 0 N, 1 N' names a part of the machine, which has none"):
         named_pairs(["NDE: 0 N, 1 N"], "force", [])
+
+
+def test_a_drop_of_millions_of_steps_says_so_first_and_stops_on_ctrl_c(tmp_path):
+    machine = tmp_path / "stiff.toml"
+    save_machine(example_machine("paper").with_values({"NDE.support.mass": 1e-9}), machine)
+    command = [sys.executable, "-m", "rotordrop", "simulate", str(machine), "--speed", "60 Hz"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as running:
+        assert running.stderr is not None
+        said = running.stderr.readline()
+        time.sleep(1.0)
+        running.send_signal(signal.SIGINT)
+        out, rest = running.communicate(timeout=60.0)
+    assert "this will take long: at least" in said
+    assert "million steps are needed, because the bearing damping of NDE on the mass of its support" in said
+    assert running.returncode == 130
+    assert "Traceback" not in rest
+    assert out == ""

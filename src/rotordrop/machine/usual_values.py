@@ -1,0 +1,292 @@
+"""Values that no machine of the field has: mistyped units, swapped entries, a decimal point lost.
+
+Where a value has a scale of its own in the machine (its weight, its gap, its size), it is compared with that,
+so that a 1 kg spindle and a 10 t compressor are judged alike. Limits are wide: a doubt should be a mistake.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+from rotordrop.estimated import Estimated
+from rotordrop.machine.amb import ActiveMagneticBearing
+from rotordrop.machine.ball_bearing import BallBearing
+from rotordrop.machine.description import Description
+from rotordrop.machine.machine import Machine
+from rotordrop.machine.material import Material
+from rotordrop.machine.rotor import Rotor, Section
+from rotordrop.machine.sensor import Sensor
+from rotordrop.machine.touchdown_bearing import Contact, Friction, TouchdownBearing
+from rotordrop.machine.unbalance import BalanceGrade
+from rotordrop.machine.values import LEFT_OUT
+from rotordrop.units import format_quantity
+
+
+@dataclass(frozen=True, kw_only=True)
+class Doubt:
+    """Something that looks odd in a description.
+
+    Attributes
+    ----------
+    kind : str
+        "air gap", "rotor radius", "friction", "smoothing speed", "bearing damping", "preload", or the name
+        of the entry that no machine of the field has so.
+    bearing : str
+        Name of the touchdown bearing, or of the part of the machine.
+    value, limit : float
+        The two numbers compared, SI units.
+    message : str
+        What it means and what to look at.
+    """
+
+    kind: str
+    bearing: str
+    value: float
+    limit: float
+    message: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Usual:
+    """Bounds of one entry and what to look at beyond them."""
+
+    least: float
+    most: float
+    kind: str
+    look: str
+    label: str = ""
+
+
+_UNIT = "check the unit"
+_ELASTIC = Usual(least=20e9, most=700e9, kind="pressure", look="E of steel is 210 GPa; check the unit")
+_DENSITY = Usual(least=800.0, most=2.3e4, kind="density", look="steel has 7850 kg/m^3; check the unit")
+_POISSON = Usual(least=0.05, most=0.499, kind="dimensionless", look="metals have 0.25 to 0.35")
+_FRICTION = Usual(
+    least=0.005,
+    most=0.8,
+    kind="dimensionless",
+    look="steel on steel has 0.05 to 0.4; is it in percent?",
+    label="dynamic friction",
+)
+
+USUAL: dict[tuple[type[Description], str], Usual] = {
+    (Material, "youngs_modulus"): _ELASTIC,
+    (Material, "density"): _DENSITY,
+    (Material, "poisson_ratio"): _POISSON,
+    (Section, "layer_density"): _DENSITY,
+    (Rotor, "modal_damping"): Usual(
+        least=0.0, most=0.3, kind="dimensionless", look="a shaft has 0.001 to 0.05; is it in percent?"
+    ),
+    (BallBearing, "ring_youngs_modulus"): _ELASTIC,
+    (BallBearing, "ball_youngs_modulus"): _ELASTIC,
+    (BallBearing, "ring_poisson_ratio"): _POISSON,
+    (BallBearing, "ball_poisson_ratio"): _POISSON,
+    (BallBearing, "ball_density"): _DENSITY,
+    (Contact, "damping"): Usual(
+        least=0.0,
+        most=20.0,
+        kind="contact_damping",
+        look="steel has 0.05 to 0.5 s/m at low speed",
+        label="contact damping",
+    ),
+    (Friction, "dynamic"): _FRICTION,
+    (Friction, "static"): Usual(
+        least=0.005,
+        most=1.2,
+        kind="dimensionless",
+        look="it is 1 to 1.5 times the dynamic coefficient",
+        label="static friction",
+    ),
+    (Sensor, "gain"): Usual(
+        least=0.5, most=2.0, kind="dimensionless", look="true displacement over reading is near 1"
+    ),
+    (Sensor, "sensitivity"): Usual(
+        least=1e2, most=1e7, kind="voltage_sensitivity", look="eddy-current sensors have 1 to 100 mV/um"
+    ),
+    (BalanceGrade, "at_speed"): Usual(least=1.0, most=2e4, kind="speed", look=_UNIT),
+}
+"""Entries with bounds of their own: constants of materials and of instruments, which do not scale."""
+
+SURFACE_SPEED = 700.0
+"""Speed of the surface [m/s] no rotor of steel or titanium withstands: its hoop stress ρ v² is 3.8 GPa."""
+
+SLENDERNESS = 120.0
+"""Length of a rotor over the diameter of one of its sections from which that section is no shaft."""
+
+
+def unusual_values(machine: Machine) -> Iterator[Doubt]:
+    """List values far outside of what machines of the field have."""
+    yield from _walk(machine, "machine")
+    yield from _of_the_rotor(machine)
+    yield from _of_the_sensors(machine)
+    for amb in machine.ambs:
+        yield from _of_the_amb(machine, amb)
+    for bearing in machine.touchdown_bearings:
+        yield from _of_the_ring(machine, bearing)
+        yield from _of_the_support(machine, bearing)
+
+
+def _walk(part: Description, name: str) -> Iterator[Doubt]:
+    """Compare every entry of a description, and of what it is made of, with its bounds."""
+    own = getattr(part, "name", None)
+    name = own if isinstance(own, str) and own and not isinstance(part, Machine) else name
+    for field in type(part).model_fields:
+        value = getattr(part, field)
+        if isinstance(value, Estimated):
+            yield from _bounded(part, field, value, name)
+        for item, called in _inside(value, f"{name} {field}" if name == "machine" else name):
+            yield from _walk(item, called)
+
+
+def _inside(value: Any, name: str) -> Iterator[tuple[Description, str]]:
+    if isinstance(value, Description):
+        yield value, name
+    elif isinstance(value, tuple):
+        yield from ((item, name) for item in value if isinstance(item, Description))
+    elif isinstance(value, dict):
+        yield from ((item, str(key)) for key, item in value.items() if isinstance(item, Description))
+
+
+def _bounded(part: Description, field: str, value: Estimated, name: str) -> Iterator[Doubt]:
+    usual = next((USUAL[base, field] for base in type(part).__mro__ if (base, field) in USUAL), None)
+    if usual is None or value is LEFT_OUT:
+        return
+    label = usual.label or field.replace("_", " ")
+    yield from _outside(label, name, value.value, usual.least, usual.most, usual.kind, usual.look)
+
+
+def _of_the_rotor(machine: Machine) -> Iterator[Doubt]:
+    rotor, length = machine.rotor, machine.rotor.node_positions[-1]
+    widest = max(e.layer_diameter or e.outer_diameter for e in rotor.elements)
+    surface = 0.5 * widest * machine.speed.nominal.value
+    if surface > SURFACE_SPEED:
+        speed, across = format_quantity(machine.speed.nominal.value, "speed"), _length(widest)
+        text = (
+            f"a nominal speed of {speed} gives the diameter of {across} "
+            f"a surface speed of {surface:.4g} m/s, and no rotor withstands "
+            f"more than about {SURFACE_SPEED:g} m/s; check the unit (Hz or rpm)"
+        )
+        yield _doubt("nominal speed", "machine", surface, SURFACE_SPEED, text)
+    for number, element in enumerate(rotor.elements, start=1):
+        if not length / SLENDERNESS <= element.outer_diameter <= 2.0 * length:
+            text = (
+                f"the shaft between nodes {number} and {number + 1} has a diameter of "
+                f"{_length(element.outer_diameter)} on a rotor of {_length(length)} length; check the unit"
+            )
+            yield _doubt("outer diameter", "rotor", element.outer_diameter, length / SLENDERNESS, text)
+            break
+    shaft = rotor.mass - math.fsum(disc.mass.value for disc in rotor.discs)
+    for disc in rotor.discs:
+        name = disc.name or f"disc at node {disc.node}"
+        yield from _outside(
+            "mass", name, disc.mass.value, 0.0, 20.0 * shaft, "mass", f"the shaft weighs {shaft:.3g} kg"
+        )
+    gravity = machine.gravity.value
+    if not 9.7 <= gravity <= 9.9:
+        text = f"gravity is {gravity:.4g} m/s²; it is 9.81 m/s² everywhere on earth, along the vertical"
+        yield _doubt("gravity", "machine", gravity, 9.81, text)
+    grade = machine.balance_grade
+    if grade is not None:
+        look = "turbomachines have G 0.4 to G 6.3; ISO 21940-11 ends at G 4000"
+        yield from _outside("balance grade", "machine", grade.grade_mm_s, 0.02, 4000.0, "dimensionless", look)
+
+
+def _of_the_sensors(machine: Machine) -> Iterator[Doubt]:
+    gap = max(bearing.air_gap.value for bearing in machine.touchdown_bearings)
+    for sensor in machine.sensors:
+        yield from _outside(
+            "offset", sensor.name, abs(sensor.offset.value), 0.0, 4.0 * gap, "length", "four air gaps"
+        )
+    for one, other in combinations(machine.sensors, 2):
+        apart = abs(math.remainder(one.angle.value - other.angle.value, math.pi))
+        if one.node == other.node and 1e-9 < apart < math.radians(20.0):
+            text = (
+                f"sensors {one.name} and {other.name} of one plane stand {math.degrees(apart):.3g}° apart; "
+                "90° is usual: check their angles"
+            )
+            yield _doubt("angle", one.name, apart, math.radians(20.0), text)
+
+
+def _of_the_amb(machine: Machine, amb: ActiveMagneticBearing) -> Iterator[Doubt]:
+    share = machine.rotor.mass / max(1, len(machine.ambs))
+    if amb.stiffness is LEFT_OUT or amb.stiffness.value <= 0.0:
+        return
+    own = math.sqrt(amb.stiffness.value / share) / (2.0 * math.pi)
+    if not 1.0 <= own <= 2e3:
+        text = (
+            f"a stiffness of {format_quantity(amb.stiffness.value, 'stiffness')} makes its share of the "
+            f"rotor swing at {own:.3g} Hz; levitated rotors swing at 10 to 200 Hz"
+        )
+        yield _doubt("stiffness", amb.name, own, 2e3 if own > 2e3 else 1.0, text)
+
+
+def _of_the_ring(machine: Machine, bearing: TouchdownBearing) -> Iterator[Doubt]:
+    radius, race = bearing.bore_radius.value, bearing.race
+    pitch = bearing.bearing.pitch_diameter.value
+    look = "the balls run outside of the bore"
+    yield from _outside("pitch diameter", bearing.name, pitch, 2.0 * radius, 6.0 * radius, "length", look)
+    reach = math.sqrt(race.inertia.value / race.mass.value)
+    text_of_ring = (
+        f"inertia over mass of the race puts its mass at a radius of {_length(reach)}, and its bore has "
+        f"{_length(radius)}; check both"
+    )
+    if not 0.5 * radius <= reach <= 4.0 * radius:
+        yield _doubt("race inertia", bearing.name, reach, radius, text_of_ring)
+    ratio = race.mass.value / machine.rotor.mass
+    look = f"the rotor weighs {machine.rotor.mass:.3g} kg"
+    least, most = 1e-5 * machine.rotor.mass, machine.rotor.mass
+    if not 1e-5 <= ratio <= 1.0:
+        yield from _outside("race mass", bearing.name, race.mass.value, least, most, "mass", look)
+
+
+def _of_the_support(machine: Machine, bearing: TouchdownBearing) -> Iterator[Doubt]:
+    gap, support = bearing.air_gap.value, bearing.support
+    weight = machine.rotor.mass * 9.81 / len(machine.touchdown_bearings)
+    sag = weight / support.stiffness.value
+    if not 1e-5 * gap <= sag <= 2.0 * gap:
+        text = (
+            f"its support of {format_quantity(support.stiffness.value, 'stiffness')} gives way by "
+            f"{_length(sag)} under its share of the weight, in an air gap of {_length(gap)}; check the unit"
+        )
+        limit = 1e-5 * gap if sag < gap else 2.0 * gap
+        yield _doubt("support stiffness", bearing.name, sag, limit, text)
+    least, most = 1e-4 * machine.rotor.mass, 1e3 * machine.rotor.mass
+    look = f"the rotor weighs {machine.rotor.mass:.3g} kg; a tiny mass also makes a drop slow to compute"
+    yield from _outside("support mass", bearing.name, support.mass.value, least, most, "mass", look)
+    critical = 2.0 * math.sqrt(support.stiffness.value * support.mass.value)
+    damping = support.damping.value / critical
+    look = "damping over critical damping of the support by itself; elastomers reach 0.3"
+    yield from _outside("support damping ratio", bearing.name, damping, 0.0, 3.0, "dimensionless", look)
+    contact = bearing.contact
+    pressed = (weight / contact.stiffness.value) ** (1.0 / contact.exponent.value)
+    if not 1e-6 * gap <= pressed <= 0.5 * gap:
+        text = (
+            f"with its contact stiffness the rotor lies {_length(pressed)} deep in the race under its share "
+            f"of the weight, in an air gap of {_length(gap)}; check the unit N/m^n and the exponent"
+        )
+        limit = 1e-6 * gap if pressed < gap else 0.5 * gap
+        yield _doubt("contact stiffness", bearing.name, pressed, limit, text)
+
+
+def _outside(
+    label: str, place: str, value: float, least: float, most: float, kind: str, look: str
+) -> Iterator[Doubt]:
+    if least <= value <= most:
+        return
+    limit = least if value < least else most
+    shown, low, high = (format_quantity(number, kind) for number in (value, least, most))
+    side = f"above {high}" if value > most else f"below {low}"
+    text = f"{label} {shown} lies {side}, where no machine is known; {look}"
+    yield _doubt(label, place, value, limit, text)
+
+
+def _length(value: float) -> str:
+    return format_quantity(value, "length")
+
+
+def _doubt(kind: str, place: str, value: float, limit: float, text: str) -> Doubt:
+    return Doubt(kind=kind, bearing=place, value=value, limit=limit, message=f"{place}: {text}")
