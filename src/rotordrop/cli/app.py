@@ -54,6 +54,7 @@ _ORDER = (
     "look",
     "clearance",
     "estimate",
+    "serve",
     "calibrate",
     "compare",
     "waterfall",

@@ -32,13 +32,13 @@ def peak_indices(*signals: Array, blocks: int = DRAWN_BLOCKS) -> NDArray[np.int6
     edges = np.linspace(0, count, blocks + 1).astype(np.int64)
     chosen: list[NDArray[np.int64]] = [np.array([0, count - 1], dtype=np.int64)]
     for signal in signals:
-        chosen.append(_block_extremes(np.where(np.isnan(signal), np.inf, signal), edges))
-        chosen.append(_block_extremes(np.where(np.isnan(signal), np.inf, -signal), edges))
+        chosen.append(block_extremes(np.where(np.isnan(signal), np.inf, signal), edges))
+        chosen.append(block_extremes(np.where(np.isnan(signal), np.inf, -signal), edges))
     return np.unique(np.concatenate(chosen))
 
 
-def _block_extremes(values: Array, edges: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Index of the first smallest value of every block."""
+def block_extremes(values: Array, edges: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Index of the first smallest value of every block between two edges; no block is empty."""
     width = int(np.max(np.diff(edges)))
     index = edges[:-1, None] + np.arange(width)
     inside = index < edges[1:, None]

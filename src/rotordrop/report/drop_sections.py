@@ -62,20 +62,32 @@ def drop_sections(
     )
 
 
+def force_panel(bearing: BearingDrop, loads: Mapping[str, float]) -> Panel:
+    """The ball force on the race with its band and peak, beside the share of the weight [N]."""
+    return Panel(
+        title=bearing.name,
+        axis="bearing force",
+        histories=(bearing.force,),
+        band=bearing.force_band,
+        levels=(("share of the weight", loads[bearing.name]),) if bearing.name in loads else (),
+        peak=bearing.peak_force,
+    )
+
+
+def stress_panel(bearing: BearingDrop) -> Panel:
+    """The largest Hertz stress with its band and peak, and what the preload alone does."""
+    return Panel(
+        title=bearing.name,
+        axis="max. Hertz stress",
+        histories=(bearing.stress,),
+        band=bearing.stress_band,
+        levels=() if bearing.preload_stress is None else (("preload alone", bearing.preload_stress),),
+        peak=bearing.peak_stress,
+    )
+
+
 def _force(bearings: Sequence[BearingDrop], loads: Mapping[str, float]) -> Section:
-    rows = [
-        [
-            Panel(
-                title=bearing.name,
-                axis="bearing force",
-                histories=(bearing.force,),
-                band=bearing.force_band,
-                levels=(("share of the weight", loads[bearing.name]),) if bearing.name in loads else (),
-                peak=bearing.peak_force,
-            )
-        ]
-        for bearing in bearings
-    ]
+    rows = [[force_panel(bearing, loads)] for bearing in bearings]
     figures = [
         Figure(
             chart=time_panels(rows, 1.0, "N", from_zero=True),
@@ -94,19 +106,7 @@ def _force(bearings: Sequence[BearingDrop], loads: Mapping[str, float]) -> Secti
 
 
 def _stress(bearings: Sequence[BearingDrop], speed: float) -> Section:
-    rows = [
-        [
-            Panel(
-                title=bearing.name,
-                axis="max. Hertz stress",
-                histories=(bearing.stress,),
-                band=bearing.stress_band,
-                levels=() if bearing.preload_stress is None else (("preload alone", bearing.preload_stress),),
-                peak=bearing.peak_stress,
-            )
-        ]
-        for bearing in bearings
-    ]
+    rows = [[stress_panel(bearing)] for bearing in bearings]
     boxes = stress_boxes(bearings, speed)
     history = Figure(
         chart=time_panels(rows, MEGA, "MPa"),

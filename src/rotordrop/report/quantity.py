@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal, TypeAlias
 
 from rotordrop.estimated import Estimated, IdentifiedValue
 from rotordrop.units import KINDS
+
+System: TypeAlias = Literal["SI", "US"]
 
 DISPLAY: dict[str, tuple[float, str]] = {
     "length": (1e-6, "µm"),
@@ -28,6 +31,21 @@ DISPLAY: dict[str, tuple[float, str]] = {
     "count": (1.0, ""),
 }
 """Unit in which a report shows a kind, so that the numbers of a column can be compared."""
+
+IN_OTHER_UNITS: dict[str, tuple[float, str]] = {
+    "length": (25.4e-6, "mil"),
+    "dimension": (25.4e-3, "in"),
+    "force": (4.4482216152605, "lbf"),
+    "pressure": (6.894757293168e6, "ksi"),
+    "stiffness": (175126.83524647637, "klbf/in"),
+    "damping": (175.12683524647637, "lbf s/in"),
+    "impulse": (4.4482216152605, "lbf s"),
+    "energy": (0.1129848290276167, "in lbf"),
+    "velocity": (25.4e-3, "in/s"),
+    "mass": (0.45359237, "lb"),
+    "speed": (math.pi / 30.0, "rpm"),
+}
+"""The same for readers who think in mil, rpm and lbf."""
 
 PLACES_OF_SCIENCE = (-4, 7)
 FIXED_PLACES = {"count": 0, "probability": 1}
@@ -56,6 +74,8 @@ class Quantity:
         Significant digits when no interval says how many are meant.
     range_only : bool
         Show the interval in place of the value, where a single number would say too much.
+    system : str
+        ``"SI"``, or ``"US"`` for mil, rpm and lbf.
     """
 
     value: float
@@ -67,6 +87,7 @@ class Quantity:
     status: str = ""
     digits: int = 4
     range_only: bool = False
+    system: System = "SI"
 
     def __post_init__(self) -> None:
         if self.kind not in DISPLAY and self.kind not in KINDS:
@@ -101,7 +122,7 @@ class Quantity:
     @property
     def unit(self) -> str:
         """Unit shown with the number, empty for a pure number."""
-        return display_unit(self.kind)[1]
+        return display_unit(self.kind, self.system)[1]
 
     @property
     def number(self) -> str:
@@ -113,7 +134,7 @@ class Quantity:
         """Number and unit; a speed in Hz and rpm; the range where only that is to be shown."""
         if self.range_only:
             return self._range() if self.interval_90 is not None else "–"
-        if self.kind == "speed" and math.isfinite(self.value):
+        if self.kind == "speed" and self.system == "SI" and math.isfinite(self.value):
             turns = self.value / (2 * math.pi)
             rpm = written(60 * turns, max(0, 3 - _magnitude(60 * turns)))
             return f"{self.number} Hz ({rpm} rpm)"
@@ -148,7 +169,7 @@ class Quantity:
         return f"{number}{self.unit}" if self.unit == "°" else f"{number} {self.unit}"
 
     def _shown(self, value: float) -> float:
-        return value / display_unit(self.kind)[0]
+        return value / display_unit(self.kind, self.system)[0]
 
     def _places(self) -> int | None:
         """Decimal places: two digits of the error if there is one, else the significant digits asked for."""
@@ -172,8 +193,10 @@ class Quantity:
         return 0.0
 
 
-def display_unit(kind: str) -> tuple[float, str]:
+def display_unit(kind: str, system: System = "SI") -> tuple[float, str]:
     """Factor and unit in which a kind is shown; kinds without an entry in `DISPLAY` in their first scale."""
+    if system == "US" and kind in IN_OTHER_UNITS:
+        return IN_OTHER_UNITS[kind]
     if kind in DISPLAY:
         return DISPLAY[kind]
     scales = KINDS[kind].scales

@@ -1,0 +1,176 @@
+"""The child process of the page: sets its own limits, reads the files of a job, looks or estimates.
+
+It writes what it is at into the state file and what it found into a folder that appears whole; it answers to
+nobody, so that neither page nor server has to be there when it ends.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+import tomllib
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotordrop.atomic_file import write_json
+from rotordrop.errors import MachineFileError, RotordropError, UsageError
+from rotordrop.web.running import Verb, clear, publish, state_file, state_of
+from rotordrop.web.workspace import Job, is_path
+
+if TYPE_CHECKING:
+    from rotordrop.machine import Machine
+    from rotordrop.measurement.record import Record
+
+MEMORY: dict[str, int] = {"look": 2 * 2**30, "estimate": 8 * 2**30}
+MEMORY_PER_BYTE = 40
+CPU_S: dict[str, int] = {"look": 300, "estimate": 4 * 3600}
+BETWEEN_WORDS_S = 0.3
+
+
+def main(order: dict[str, Any]) -> None:
+    """Do what was ordered and say how it ended."""
+    job, verb = Job(Path(order["job"])), order["verb"]
+    told = state_of(job, verb)
+    assert told is not None
+    try:
+        _limit(job, verb)
+        made = job.path / f"{verb}.part-{told['run']}"
+        made.mkdir()
+        (_look if verb == "look" else _estimate)(job, made, told)
+        publish(job, verb, told["run"], made)
+        ended = {"state": "done", "fraction": 1.0, "stage": ""}
+    except RotordropError as error:
+        ended = {"state": "failed", "error": _without_folder(str(error), job)}
+    except MemoryError:
+        ended = {
+            "state": "failed",
+            "error": "there is not enough memory for this; cut the record to the drop",
+        }
+    except Exception as error:  # noqa: BLE001 - whatever it is, the page must say that it happened
+        ended = {"state": "failed", "error": f"this should not happen: {type(error).__name__}: {error}"}
+    clear(job, verb)
+    write_json(state_file(job, verb), {**(state_of(job, verb) or told), **ended, "ended": time.time()})
+
+
+def _without_folder(message: str, job: Job) -> str:
+    """A message that names files as the user does, not where the page keeps them."""
+    for entry in job.read()["files"].values():
+        message = message.replace(str(job.path / "files" / entry["stored"]), entry["name"])
+    return message.replace(str(job.path), "")
+
+
+def _limit(job: Job, verb: Verb) -> None:
+    if os.name != "posix":
+        return
+    import resource
+
+    size = sum(entry["bytes"] for entry in job.read()["files"].values())
+    memory = MEMORY[verb] + MEMORY_PER_BYTE * size
+    with suppress(ValueError, OSError):
+        resource.setrlimit(resource.RLIMIT_CPU, (CPU_S[verb], CPU_S[verb] + 1))
+    with suppress(ValueError, OSError):
+        resource.setrlimit(
+            resource.RLIMIT_DATA if sys.platform == "linux" else resource.RLIMIT_AS, (memory, memory)
+        )
+    with suppress(ValueError, OSError):
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def machine_of(job: Job) -> Machine | None:
+    """Read the machine file of a job; None where none was sent.
+
+    Raises
+    ------
+    MachineFileError
+        When it cannot be used, or names a file that is not beside it.
+    """
+    from rotordrop.machine import load_machine
+
+    file = job.file("machine")
+    if file is None:
+        return None
+    with suppress(
+        ValueError, RecursionError, OSError
+    ):  # whoever reads it properly says what is wrong with it
+        rotor = tomllib.loads(file.read_text(encoding="utf-8-sig")).get("rotor")
+        table = rotor.get("shaft_table") if isinstance(rotor, dict) else None
+        if isinstance(table, str) and (is_path(table) or not (file.parent / table).is_file()):
+            raise MachineFileError(
+                f"the machine file names the shaft table {table!r}; drop that file on the page together with "
+                "it, under this plain name",
+                file=file,
+            )
+    machine = load_machine(file)
+    machine._source_path = Path(job.read()["files"]["machine"]["name"])
+    return machine
+
+
+def record_of(job: Job, machine: Machine, role: str) -> Record | None:
+    """Read the record or the tail of a job; None where none was sent."""
+    from rotordrop.measurement.record import read_record
+
+    file = job.file(role)
+    return None if file is None else named(read_record(file, machine), job, role)
+
+
+def named(record: Record, job: Job, role: str) -> Record:
+    """A record under the name that its file has for the user."""
+    return replace(record, path=Path(job.read()["files"][role]["name"]))
+
+
+def _look(job: Job, made: Path, told: dict[str, Any]) -> None:
+    from rotordrop.measurement.look import look
+    from rotordrop.units import parse_quantity
+    from rotordrop.web.drawn import write_look
+
+    options = told["options"]
+    file = job.file("record")
+    if file is None:
+        raise UsageError("no record was sent; drop one on the page")
+    gap, speed = options.get("gap"), options.get("speed")
+    seen = look(
+        file,
+        machine=machine_of(job),
+        gap=parse_quantity(gap, "length") if gap else None,
+        speed=parse_quantity(speed, "speed") if speed else None,
+    )
+    write_look(replace(seen, record=named(seen.record, job, "record")), job, made, options)
+
+
+def _estimate(job: Job, made: Path, told: dict[str, Any]) -> None:
+    from rotordrop.estimation import Replay, Tracked, estimate_drop
+    from rotordrop.web.drawn import write_estimate
+
+    last = [0.0]
+
+    def progress(stage: str, fraction: float) -> None:
+        now = time.monotonic()
+        if now - last[0] >= BETWEEN_WORDS_S:
+            last[0] = now
+            write_json(
+                state_file(job, "estimate"), {**running, "stage": stage, "fraction": round(fraction, 4)}
+            )
+
+    running = state_of(job, "estimate") or told
+    options = told["options"]
+    progress("reading machine and record", 0.0)
+    machine = machine_of(job)
+    if machine is None:
+        raise UsageError("an estimate needs the machine file; drop it on the page beside the record")
+    record = record_of(job, machine, "record")
+    if record is None:
+        raise UsageError("no record was sent; drop one on the page")
+    method = Replay() if options.get("method") == "replay" else Tracked(quick=bool(options.get("quick")))
+    estimate = estimate_drop(
+        machine,
+        record,
+        record_of(job, machine, "tail"),
+        method=method,
+        name=job.read()["name"],
+        progress=progress,
+    )
+    progress("drawing", 1.0)
+    write_estimate(estimate, job, made, options)

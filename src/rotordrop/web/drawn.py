@@ -1,0 +1,273 @@
+"""What the page draws: histories with their levels, and the content of the report as JSON.
+
+Cards, sentences, tables and panels are those of the report; the page derives no number of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop._version import __version__
+from rotordrop.atomic_file import write_json
+from rotordrop.report.content import Card, Cell, ReportContent, Statement, Table
+from rotordrop.report.quantity import Quantity, System, display_unit
+from rotordrop.web.python_lines import estimate_lines, look_lines
+from rotordrop.web.traces import write_traces
+from rotordrop.web.workspace import Job
+
+if TYPE_CHECKING:
+    from rotordrop.estimation.bearing_drop import BearingDrop
+    from rotordrop.estimation.estimate import Estimate
+    from rotordrop.measurement.look import Look
+    from rotordrop.report.time_panels import Panel
+
+Array = NDArray[np.float64]
+SYSTEMS: tuple[System, ...] = ("SI", "US")
+SHOWN_KINDS = ("length", "force", "pressure", "speed", "velocity")
+
+
+def write_look(seen: Look, job: Job, made: Path, options: Mapping[str, Any]) -> None:
+    """Write what a look shows: motion of every plane with the speed, and its page as JSON."""
+    from rotordrop.report.look_page import look_page
+
+    columns: dict[str, Array] = {}
+    for number, path in enumerate(seen.motion.paths):
+        columns |= {f"x{number}": path.position[:, 0], f"y{number}": path.position[:, 1]}
+        columns[f"r{number}"] = path.radius
+    if seen.record.speed is not None:
+        columns["speed"] = seen.record.speed
+    write_traces(made, "motion", seen.motion.time, columns)
+    content = look_page(seen, drawn=False)
+    write_json(made / "document.json", seen.as_json())
+    write_json(
+        made / "page.json",
+        {
+            **content_json(content),
+            **_common("motion", tuple(columns), seen.motion.time),
+            "zero": seen.drops[0].release,
+            "places": [
+                {
+                    "name": path.name,
+                    "gap": [path.gap, path.gap],
+                    "measured": [f"x{b}", f"y{b}"],
+                    "radius": f"r{b}",
+                }
+                for b, path in enumerate(seen.motion.paths)
+            ],
+            "timeline": [{"time": time, "words": words} for time, words in seen.timeline()],
+            "impacts": [
+                {
+                    "place": impact.plane,
+                    "time": impact.time,
+                    "azimuth": impact.azimuth,
+                    "numbers": [
+                        quantity_json(Quantity(value=impact.depth, kind="length", digits=3)),
+                        quantity_json(Quantity(value=impact.approach, kind="velocity", digits=3)),
+                    ],
+                }
+                for impact in seen.impacts
+            ],
+            "impact_columns": ["beyond the air gap", "radial velocity before"],
+            "findings": [
+                {"severity": f.severity, "channel": f.channel, "message": f.message, "remedy": f.remedy}
+                for f in seen.findings
+            ],
+            "python": look_lines(job.read()["files"], options, len(seen.motion.paths)),
+        },
+    )
+
+
+def write_estimate(estimate: Estimate, job: Job, made: Path, options: Mapping[str, Any]) -> None:
+    """Write what an estimate says: histories with bands, its document, its report, and its page as JSON."""
+    from rotordrop.estimation.document import estimate_document
+    from rotordrop.report.estimate_page import estimate_page
+    from rotordrop.report.page import write_page
+
+    content = estimate_page(estimate)
+    names, grid, columns = _histories(estimate)
+    write_traces(made, "drop", grid, columns)
+    write_page(content, made / "report.html")
+    write_json(made / "document.json", estimate_document(estimate))
+    write_json(
+        made / "page.json",
+        {
+            **content_json(content),
+            **_common("drop", tuple(columns), grid),
+            "zero": estimate.drop_instant.value,
+            "speed": estimate.speed,
+            "places": [_place(bearing, names[b]) for b, bearing in enumerate(estimate.bearings)],
+            "panels": _panels(estimate),
+            "impacts": _impacts(estimate.bearings),
+            "impact_columns": ["peak force", "impulse"],
+            "python": estimate_lines(job.read()["files"], options, [b.name for b in estimate.bearings]),
+        },
+    )
+
+
+def _common(name: str, columns: tuple[str, ...], time: Array) -> dict[str, Any]:
+    return {
+        "version": __version__,
+        "traces": {"name": name, "columns": list(columns), "start": float(time[0]), "end": float(time[-1])},
+        "units": {kind: {system: display_unit(kind, system) for system in SYSTEMS} for kind in SHOWN_KINDS},
+    }
+
+
+def _histories(estimate: Estimate) -> tuple[list[dict[str, Any]], Array, dict[str, Array]]:
+    """Every history of an estimate on the clock of its force, and which column of a bearing is what.
+
+    Where a history has a clock of its own it is read off between its samples by straight lines.
+    """
+    grid = np.asarray(estimate.bearings[0].force.time)
+    columns: dict[str, Array] = {}
+    names: list[dict[str, Any]] = []
+    for b, bearing in enumerate(estimate.bearings):
+        told: dict[str, Any] = {}
+        for motion in bearing.motions:
+            role = "measured" if motion.role == "measured" else "estimated"
+            if role in told:
+                continue
+            told[role] = [f"{axis} {role} {b}" for axis in "xy"]
+            for column, history in zip(told[role], (motion.horizontal, motion.vertical), strict=True):
+                columns[column] = _on(grid, history.time, history.values)
+        if {"measured", "estimated"} <= told.keys():
+            told["residual"] = [f"{axis} residual {b}" for axis in "xy"]
+            for axis, column in zip("xy", told["residual"], strict=True):
+                columns[column] = columns[f"{axis} measured {b}"] - columns[f"{axis} estimated {b}"]
+        for kind, history, band in (
+            ("force", bearing.force, bearing.force_band),
+            ("stress", bearing.stress, bearing.stress_band),
+        ):
+            told[kind] = [f"{kind} {b}"]
+            columns[f"{kind} {b}"] = _on(grid, history.time, history.values)
+            if band is not None:
+                told[kind] += [f"{kind} lower {b}", f"{kind} upper {b}"]
+                columns[f"{kind} lower {b}"] = _on(grid, band.time, band.lower)
+                columns[f"{kind} upper {b}"] = _on(grid, band.time, band.upper)
+        names.append(told)
+    return names, grid, columns
+
+
+def _on(grid: Array, time: Array, values: Array) -> Array:
+    if len(time) == len(grid) and np.array_equal(time, grid):
+        return values
+    return np.asarray(np.interp(grid, time, values, left=math.nan, right=math.nan))
+
+
+def _place(bearing: BearingDrop, names: Mapping[str, Any]) -> dict[str, Any]:
+    gap = bearing.air_gap
+    peak = {"force": bearing.peak_force, "stress": bearing.peak_stress}
+    return {
+        "name": bearing.name,
+        "gap": None if gap is None else [gap.lower, gap.upper],
+        **names,
+        "peaks": {
+            kind: {"time": one.time, "value": one.value, "interval_90": one.interval_90}
+            for kind, one in peak.items()
+        },
+    }
+
+
+def _panels(estimate: Estimate) -> dict[str, list[dict[str, Any]]]:
+    """Titles, levels and origins of force and stress, from the panels that the report draws."""
+    from rotordrop.report.drop_sections import force_panel, stress_panel
+    from rotordrop.report.machine_sections import weight_shares
+
+    loads = weight_shares(estimate.machine)
+    return {
+        "force": [_panel(force_panel(bearing, loads)) for bearing in estimate.bearings],
+        "stress": [_panel(stress_panel(bearing)) for bearing in estimate.bearings],
+    }
+
+
+def _panel(panel: Panel) -> dict[str, Any]:
+    return {
+        "title": panel.title,
+        "axis": panel.axis,
+        "origin": panel.histories[0].label,
+        "band": None if panel.band is None else panel.band.label,
+        "levels": [{"name": name, "value": value} for name, value in panel.levels],
+    }
+
+
+def _impacts(bearings: Sequence[BearingDrop]) -> list[dict[str, Any]]:
+    found = [
+        {
+            "place": bearing.name,
+            "time": impact.peak_time,
+            "azimuth": impact.azimuth,
+            "numbers": [
+                quantity_json(Quantity.of(impact.peak_force, "force")),
+                quantity_json(Quantity.of(impact.impulse, "impulse", digits=3)),
+            ],
+        }
+        for bearing in bearings
+        for impact in bearing.impacts
+    ]
+    return sorted(found, key=lambda impact: float(str(impact["time"])))
+
+
+def content_json(content: ReportContent) -> dict[str, Any]:
+    """A report without its pictures, its numbers written in both systems of units."""
+    return {
+        "title": content.title,
+        "subtitle": content.subtitle,
+        "simulated": content.simulated,
+        "facts": [list(fact) for fact in content.facts],
+        "verdict": [_statement(statement) for statement in content.verdict],
+        "cards": [_card(card) for card in content.cards],
+        "summary": [_table(table) for table in content.summary],
+        "sections": [
+            {
+                "heading": section.heading,
+                "text": list(section.text),
+                "statements": [_statement(statement) for statement in section.statements],
+                "tables": [_table(table) for table in section.tables],
+            }
+            for section in content.sections
+            if section.text or section.statements or section.tables
+        ],
+    }
+
+
+def _statement(statement: Statement) -> dict[str, str]:
+    return {"text": statement.text, "level": statement.level}
+
+
+def _card(card: Card) -> dict[str, Any]:
+    return {
+        "title": card.title,
+        "figures": [
+            {"label": figure.label, "note": figure.note, "value": quantity_json(figure.value)}
+            for figure in card.figures
+        ],
+    }
+
+
+def _table(table: Table) -> dict[str, Any]:
+    return {
+        "caption": table.caption,
+        "note": table.note,
+        "columns": list(table.columns),
+        "rows": [[_cell(cell) for cell in row] for row in table.rows],
+    }
+
+
+def _cell(cell: Cell) -> Any:
+    return quantity_json(cell) if isinstance(cell, Quantity) else cell
+
+
+def quantity_json(quantity: Quantity) -> dict[str, Any]:
+    """A number as it is [SI] and as it is written, with its interval."""
+    finite = math.isfinite(quantity.value) and not quantity.range_only
+    told: dict[str, Any] = {"value": quantity.value if finite else None, "kind": quantity.kind}
+    for system in SYSTEMS:
+        shown = replace(quantity, system=system)
+        told[system] = [shown.text, shown.interval_text]
+    return told

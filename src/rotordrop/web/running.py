@@ -1,0 +1,248 @@
+"""Computations of the page: each in a child process of its own that outlives page and server.
+
+What a computation is at lies in its state file, what it found in a folder that appears whole. A child holds a
+lock as long as it lives, so that the next server, too, knows whether it still runs.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import secrets
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
+
+from rotordrop.atomic_file import write_json
+from rotordrop.web.workspace import Job, Workspace
+
+Verb: TypeAlias = Literal["look", "estimate"]
+Key: TypeAlias = tuple[str, Verb]
+VERBS: tuple[Verb, ...] = ("look", "estimate")
+AT_ONCE: dict[Verb, int] = {"look": 2, "estimate": max(1, (os.cpu_count() or 2) // 2)}
+"""Computations of one verb that run beside each other; others wait."""
+
+_PROGRAM = (
+    "import json, sys; order = json.loads(sys.argv[1]); sys.path[:] = order['sys_path']; "
+    "from rotordrop.web.child import main; main(order)"
+)
+_PATIENCE_S = 5.0
+
+
+def state_file(job: Job, verb: Verb) -> Path:
+    """Where a computation says what it is at."""
+    return job.path / f"{verb}.state.json"
+
+
+def state_of(job: Job, verb: Verb) -> dict[str, Any] | None:
+    """What a computation is at; None where none was asked for."""
+    try:
+        told: dict[str, Any] = json.loads(state_file(job, verb).read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return None
+    return told
+
+
+def result_folder(job: Job, verb: Verb) -> Path | None:
+    """What the last finished computation found; None where none has finished."""
+    run = published_run(job, verb)
+    return None if run is None else job.path / f"{verb}.{run}"
+
+
+def published_run(job: Job, verb: Verb) -> str | None:
+    """Which computation the result is of."""
+    with suppress(FileNotFoundError):
+        return str(json.loads((job.path / f"{verb}.result.json").read_text(encoding="utf-8"))["run"])
+    return None
+
+
+def publish(job: Job, verb: Verb, run: str, made: Path) -> None:
+    """Make a finished folder the result: its name first, then the word that it counts."""
+    made.rename(job.path / f"{verb}.{run}")
+    write_json(job.path / f"{verb}.result.json", {"run": run})
+
+
+@dataclass
+class Runner:
+    """Begins what waits, notices what ended; the files say all there is to know."""
+
+    space: Workspace
+    _children: dict[Key, subprocess.Popen[bytes]] = field(default_factory=dict)
+    _open: dict[Key, Job] = field(default_factory=dict)
+    _one: threading.RLock = field(default_factory=threading.RLock)
+
+    def take_over(self) -> None:
+        """Find what an earlier server left waiting or running."""
+        for job in self.space.jobs():
+            for verb in VERBS:
+                told = state_of(job, verb)
+                if told is not None and told["state"] in ("waiting", "running"):
+                    self._open[job.number, verb] = job
+
+    def ask(self, job: Job, verb: Verb, options: dict[str, Any]) -> dict[str, Any]:
+        """Ask for a computation; it begins when there is room. What waits or runs is not asked for twice."""
+        with self._one:
+            told = state_of(job, verb)
+            if told is None or told["state"] not in ("waiting", "running"):
+                now = time.time()
+                told = {"state": "waiting", "run": secrets.token_hex(8), "asked": now, "options": options}
+                write_json(state_file(job, verb), told)
+                self._open[job.number, verb] = job
+            self.tend()
+            return state_of(job, verb) or told
+
+    def tend(self) -> None:
+        """Give whoever ended without a word one; let whoever waits longest begin where there is room."""
+        with self._one:
+            for key in [key for key, child in self._children.items() if child.poll() is not None]:
+                del self._children[key]
+            busy = dict.fromkeys(VERBS, 0)
+            waiting: list[tuple[float, Key, dict[str, Any]]] = []
+            for (number, verb), job in list(self._open.items()):
+                told = state_of(job, verb)
+                if told is not None and told["state"] == "waiting":
+                    waiting.append((told["asked"], (number, verb), told))
+                elif told is not None and told["state"] == "running" and self._still_running(job, verb):
+                    busy[verb] += 1
+                else:
+                    del self._open[number, verb]
+            for _, (number, verb), told in sorted(waiting, key=lambda entry: entry[0]):
+                if busy[verb] < AT_ONCE[verb]:
+                    busy[verb] += 1
+                    self._begin(self._open[number, verb], verb, told)
+
+    def _still_running(self, job: Job, verb: Verb) -> bool:
+        if (job.number, verb) in self._children or _locked(job, verb):
+            return True
+        told = state_of(job, verb)  # the child may have had its last word since
+        if told is not None and told["state"] == "running":
+            _settle(job, verb, told)
+        return False
+
+    def _begin(self, job: Job, verb: Verb, told: dict[str, Any]) -> None:
+        lock = os.open(_lock_file(job, verb), os.O_RDWR | os.O_CREAT, 0o600)
+        try:
+            if not _lock(lock):
+                return
+            write_json(
+                state_file(job, verb), {**told, "state": "running", "started": time.time(), "fraction": 0.0}
+            )
+            order = {"job": str(job.path), "verb": verb, "sys_path": [entry for entry in sys.path if entry]}
+            child = subprocess.Popen(
+                [sys.executable, "-I", "-c", _PROGRAM, json.dumps(order)],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                env=os.environ
+                | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"},
+                start_new_session=True,
+                pass_fds=(lock,) if os.name == "posix" else (),
+            )
+            self._children[job.number, verb] = child
+            with suppress(OSError):
+                (job.path / f"{verb}.process").write_text(str(child.pid), encoding="ascii")
+        finally:
+            os.close(lock)
+
+    def cancel(self, job: Job, verb: Verb) -> None:
+        """Stop a computation that waits or runs, with everything it has begun."""
+        with self._one:
+            self._cancel(job, verb)
+
+    def _cancel(self, job: Job, verb: Verb) -> None:
+        told = state_of(job, verb)
+        if told is None or told["state"] not in ("waiting", "running"):
+            return
+        if told["state"] == "running" and not self._stop(job, verb):
+            return
+        latest = state_of(job, verb) or told
+        if latest["state"] in ("waiting", "running"):
+            write_json(state_file(job, verb), {**latest, "state": "cancelled", "ended": time.time()})
+        clear(job, verb)
+
+    def _stop(self, job: Job, verb: Verb) -> bool:
+        """Kill a child whose lock is held, and wait for it; whether it ended."""
+        child = self._children.pop((job.number, verb), None)
+        until = time.monotonic() + _PATIENCE_S
+        while (child is not None and child.poll() is None) or _locked(job, verb):
+            with suppress(OSError, ValueError):
+                _kill(child.pid if child else int((job.path / f"{verb}.process").read_text(encoding="ascii")))
+            if time.monotonic() > until:
+                return False
+            time.sleep(0.02)
+        return True
+
+    def remove(self, job: Job) -> None:
+        """Stop what a job computes and remove it."""
+        with self._one:
+            for verb in VERBS:
+                self._cancel(job, verb)
+                self._open.pop((job.number, verb), None)
+            job.remove()
+
+
+def _kill(process: int) -> None:
+    if os.name == "posix":
+        os.killpg(process, signal.SIGKILL)
+    else:
+        os.kill(process, signal.SIGTERM)
+
+
+def _settle(job: Job, verb: Verb, told: dict[str, Any]) -> None:
+    """A child is gone without its last word: what it published counts, anything else is a failure."""
+    ended: dict[str, Any] = {"ended": time.time()}
+    if published_run(job, verb) == told["run"]:
+        ended |= {"state": "done", "fraction": 1.0}
+    else:
+        ended |= {
+            "state": "failed",
+            "error": "the computation was ended from outside before it was done; start it again",
+        }
+    write_json(state_file(job, verb), {**told, **ended})
+    clear(job, verb)
+
+
+def clear(job: Job, verb: Verb) -> None:
+    """Remove what a killed child had begun, and results that no longer count."""
+    kept = published_run(job, verb)
+    for left in job.path.glob(f"{verb}.*"):
+        if left.is_dir() and left.name != f"{verb}.{kept}":
+            shutil.rmtree(left, ignore_errors=True)
+
+
+def _lock_file(job: Job, verb: Verb) -> Path:
+    return job.path / f"{verb}.lock"
+
+
+def _lock(descriptor: int) -> bool:
+    """Take the lock that the child inherits; elsewhere than on POSIX systems there is none to inherit."""
+    if os.name != "posix":
+        return True
+    import fcntl
+
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
+def _locked(job: Job, verb: Verb) -> bool:
+    """Whether a child holds the lock of a computation, whichever server began it."""
+    if os.name != "posix":
+        return False
+    try:
+        descriptor = os.open(_lock_file(job, verb), os.O_RDWR)
+    except OSError:
+        return False
+    try:
+        return not _lock(descriptor)
+    finally:
+        os.close(descriptor)

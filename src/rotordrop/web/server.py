@@ -1,0 +1,68 @@
+"""Start the server of the page on this computer."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable
+from pathlib import Path
+
+from rotordrop.errors import UsageError
+from rotordrop.web.workspace import Workspace
+
+
+def serve(folder: Path, port: int, announce: Callable[[str], None]) -> None:
+    """Serve the page until it is interrupted; computations that run go on without it.
+
+    Parameters
+    ----------
+    folder : Path
+        Where jobs are kept.
+    port : int
+        Where to listen, on the loopback address only; 0 takes a free one.
+    announce : callable
+        Told the address with its token once the server listens.
+
+    Raises
+    ------
+    UsageError
+        When the port is taken or the extra is not installed.
+    """
+    try:
+        import uvicorn
+
+        from rotordrop.web.app import make_app
+    except ModuleNotFoundError as error:
+        raise UsageError(
+            f"the page needs the package {error.name}; install it with pip install 'rotordrop[serve]'"
+        ) from None
+    listening = listening_at(port)
+    port = listening.getsockname()[1]
+    space = Workspace(folder)
+    app = make_app(space, port=port)
+    announce(f"http://127.0.0.1:{port}/#token={space.token()}")
+    config = uvicorn.Config(
+        app, log_level="warning", access_log=False, ws="none", server_header=False, date_header=False,
+        timeout_graceful_shutdown=2, proxy_headers=False,
+    )  # fmt: skip
+    uvicorn.Server(config).run(sockets=[listening])
+
+
+def listening_at(port: int) -> socket.socket:
+    """A socket that listens on this computer alone.
+
+    Raises
+    ------
+    UsageError
+        When the port is taken.
+    """
+    listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listening.bind(("127.0.0.1", port))
+    except OSError as error:
+        listening.close()
+        raise UsageError(
+            f"port {port} cannot be used: {error.strerror}; a server may be running there already, or name "
+            "another with --port"
+        ) from None
+    return listening

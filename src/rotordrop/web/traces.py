@@ -1,0 +1,191 @@
+"""Histories of any length on disk, of which a window is drawn from at most as many points as a figure shows.
+
+Beside the samples lie levels of indices: for every block of 8, 64, 512, ... samples the place of its
+smallest and of its largest value. A window is cut into as many stretches as the points allow, and of every
+stretch both extremes are sent, so that a spike of one sample is seen at every zoom, and every point that is
+sent is a sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.atomic_file import atomic_path
+from rotordrop.errors import UsageError
+from rotordrop.report.decimation import block_extremes
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+FACTOR = 8
+"""Blocks of a level that make one of the next."""
+
+MOST_POINTS = 4000
+FEWEST_POINTS = 100
+MOST_COLUMNS = 12
+
+
+@dataclass(frozen=True, kw_only=True)
+class Traces:
+    """Histories over one clock.
+
+    Attributes
+    ----------
+    columns : tuple of str
+        Names.
+    time : ndarray, shape (N,)
+        Time [s], rising.
+    values : ndarray, shape (C, N)
+        Values in SI units, in single precision.
+    levels : ndarray, shape (C, B, 2)
+        Index of the smallest and of the largest sample of every block, level after level.
+    """
+
+    columns: tuple[str, ...]
+    time: Array
+    values: NDArray[np.float32]
+    levels: NDArray[np.int32]
+
+    def chosen(self, names: tuple[str, ...]) -> list[int]:
+        """Rows of the columns of these names.
+
+        Raises
+        ------
+        UsageError
+            When there is no such column, or more are asked for than a figure shows.
+        """
+        if not 1 <= len(names) <= MOST_COLUMNS:
+            raise UsageError(f"{len(names)} columns asked for; 1 to {MOST_COLUMNS} are sent at once")
+        missing = [name for name in names if name not in self.columns]
+        if missing:
+            raise UsageError(f"there is no column {missing[0]!r}; there are {', '.join(self.columns)}")
+        return [self.columns.index(name) for name in names]
+
+    def window(self, rows: list[int], start: float, end: float, points: int = MOST_POINTS) -> Indices:
+        """Samples that show a window: all, or the extremes of as many stretches as there is room for.
+
+        The sample before the window and the one after it belong to it, so that lines reach its edges.
+
+        Parameters
+        ----------
+        rows : list of int
+            Columns whose extremes count.
+        start, end : float
+            Window [s].
+        points : int
+            Samples that may be chosen.
+        """
+        first = max(int(np.searchsorted(self.time, start)) - 1, 0)
+        last = min(int(np.searchsorted(self.time, end, side="right")) + 1, len(self.time))
+        if last - first <= points:
+            return np.arange(first, last, dtype=np.int64)
+        stretches = max((points - 2 - 4 * len(rows)) // (2 * len(rows)), 1)
+        size, offset = self._level((last - first) / stretches)
+        if size == 1:
+            edges = np.linspace(first, last, stretches + 1).astype(np.int64)
+            found = [first + extremes(self._read(row, slice(first, last)), edges - first) for row in rows]
+        else:
+            found = [self._from_level(row, first, last, size, offset, stretches) for row in rows]
+        return np.unique(np.concatenate([[first, last - 1], *(places.ravel() for places in found)]))
+
+    def _level(self, width: float) -> tuple[int, int]:
+        """Coarsest level with blocks no wider than a stretch: samples in a block, and where it begins."""
+        size, offset = 1, 0
+        for level_size, level_offset, _ in levels_of(len(self.time)):
+            if level_size > width:
+                break
+            size, offset = level_size, level_offset
+        return size, offset
+
+    def _from_level(self, row: int, first: int, last: int, size: int, offset: int, stretches: int) -> Indices:
+        """Extremes of the stretches by the blocks inside the window; its ragged ends sample by sample.
+
+        A block that reaches beyond the window must not be used: its extreme may lie outside and hide a
+        smaller spike inside.
+        """
+        begin, stop = -(-first // size), last // size
+        ends = [
+            (a + extremes(self._read(row, slice(a, b)), np.array([0, b - a]))).ravel()
+            for a, b in ((first, begin * size), (stop * size, last))
+            if b > a
+        ]
+        places = self.levels[row, offset + begin : offset + stop].astype(np.int64)
+        edges = np.unique(np.linspace(0, len(places), stretches + 1).astype(np.int64))
+        low, high = self._read(row, places[:, 0]), self._read(row, places[:, 1])
+        inside = [
+            places[block_extremes(np.nan_to_num(low, nan=np.inf), edges), 0],
+            places[block_extremes(np.nan_to_num(-high, nan=np.inf), edges), 1],
+        ]
+        return np.concatenate([*ends, *inside])
+
+    def _read(self, row: int, where: slice | Indices) -> Array:
+        return np.asarray(self.values[row, where], dtype=np.float64)
+
+
+def extremes(values: Array, edges: Indices) -> Indices:
+    """Index of the smallest and the largest value of every block, shape (blocks, 2); NaN is neither."""
+    low = block_extremes(np.where(np.isnan(values), np.inf, values), edges)
+    high = block_extremes(np.where(np.isnan(values), np.inf, -values), edges)
+    return np.stack([low, high], axis=1)
+
+
+def levels_of(count: int) -> list[tuple[int, int, int]]:
+    """Whole blocks of all levels over a number of samples: samples in a block, first place, number."""
+    levels, offset, size = [], 0, FACTOR
+    while count // size > 1:
+        levels.append((size, offset, count // size))
+        offset, size = offset + count // size, size * FACTOR
+    return levels
+
+
+def write_traces(folder: Path, name: str, time: Array, columns: Mapping[str, Array]) -> None:
+    """Write histories over one clock with their levels, as plain array files."""
+    values = np.stack([np.asarray(column, dtype=np.float32) for column in columns.values()])
+    levels = np.stack([_extremes_of_blocks(row) for row in values])
+    for part, array in (("time", np.asarray(time, dtype=np.float64)), ("values", values), ("levels", levels)):
+        with atomic_path(folder / f"{name}.{part}.npy") as place, place.open("wb") as stream:
+            np.save(stream, array, allow_pickle=False)
+
+
+def _extremes_of_blocks(values: NDArray[np.float32]) -> NDArray[np.int32]:
+    low = np.where(np.isnan(values), np.inf, values)
+    high = np.where(np.isnan(values), -np.inf, values)
+    place_low = place_high = np.arange(len(values), dtype=np.int32)
+    levels = [np.empty((0, 2), dtype=np.int32)]
+    for _, _, count in levels_of(len(values)):
+        rows = np.arange(count)
+        low, high = (one[: count * FACTOR].reshape(count, FACTOR) for one in (low, high))
+        at_low, at_high = np.argmin(low, axis=1), np.argmax(high, axis=1)
+        place_low = place_low[: count * FACTOR].reshape(count, FACTOR)[rows, at_low]
+        place_high = place_high[: count * FACTOR].reshape(count, FACTOR)[rows, at_high]
+        low, high = low[rows, at_low], high[rows, at_high]
+        levels.append(np.stack([place_low, place_high], axis=1))
+    return np.concatenate(levels)
+
+
+def open_traces(folder: Path, name: str, columns: tuple[str, ...]) -> Traces:
+    """Open histories that were written, without reading them: what a window needs comes from the disk."""
+    parts = [
+        np.load(folder / f"{name}.{part}.npy", mmap_mode="r", allow_pickle=False)
+        for part in ("time", "values", "levels")
+    ]
+    return Traces(columns=columns, time=parts[0], values=parts[1], levels=parts[2])
+
+
+def sent(traces: Traces, rows: list[int], chosen: Indices) -> bytes:
+    """Samples as they go to the page: start [s], their number, the number of columns, then single precision.
+
+    Times count from the start of the window, so that single precision resolves every zoom.
+    """
+    start = float(traces.time[chosen[0]])
+    head = (
+        np.array([start], dtype="<f8").tobytes() + np.array([len(chosen), len(rows)], dtype="<u4").tobytes()
+    )
+    times = np.asarray(traces.time[chosen] - start, dtype="<f4")
+    columns = [np.asarray(traces.values[row, chosen], dtype="<f4").tobytes() for row in rows]
+    return b"".join((head, times.tobytes(), *columns))

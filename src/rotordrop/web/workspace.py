@@ -1,0 +1,255 @@
+"""The folder of the page: one folder per job, with what was dropped on it and what was found.
+
+Names from a client are labels. Files lie under names made here, all but a file that another one names (a
+shaft table), whose name must be a plain one.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import secrets
+import shutil
+import time
+from collections.abc import AsyncIterable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import Any, Literal, TypeAlias
+
+from rotordrop.atomic_file import atomic_path, write_json, write_text
+from rotordrop.errors import OutputError, UsageError
+
+Role: TypeAlias = Literal["machine", "record", "tail", "beside"]
+ROLES: tuple[Role, ...] = ("machine", "record", "tail", "beside")
+
+QUOTA = 8 * 2**30
+"""Bytes the folder may hold before uploads are refused."""
+
+LARGEST: dict[str, int] = {"machine": 16 * 2**20, "record": 2 * 2**30, "tail": 2 * 2**30, "beside": 2**30}
+"""Bytes of one upload."""
+
+MOST_JOBS = 500
+MOST_BESIDE = 8
+LONGEST_NAME = 120
+LONGEST_OPTION = 200
+
+_JOB = re.compile(r"[0-9a-f]{16}")
+_SUFFIX = re.compile(r"(?:\.[a-z0-9]{1,8})?\.[a-z0-9]{1,8}")
+_PLAIN = re.compile(r"[\w(][\w .()+-]*")
+
+
+class TooLargeError(OutputError):
+    """An upload is larger than allowed, or the folder is full."""
+
+
+@dataclass(frozen=True)
+class Workspace:
+    """Where the jobs lie."""
+
+    path: Path
+    quota: int = QUOTA
+
+    def prepare(self) -> None:
+        """Make the folder, for nobody else to read, and remove what a killed server left half written."""
+        self.jobs_folder.mkdir(parents=True, exist_ok=True)
+        with suppress(OSError):
+            self.path.chmod(0o700)
+        for left in self.jobs_folder.glob("*/files/.*.part*"):
+            left.unlink(missing_ok=True)
+        for left in self.jobs_folder.glob("*.removed"):
+            shutil.rmtree(left, ignore_errors=True)
+
+    @property
+    def jobs_folder(self) -> Path:
+        """Folder of all jobs."""
+        return self.path / "jobs"
+
+    def token(self) -> str:
+        """Secret of the page, kept so that a page that is open outlives its server."""
+        file = self.path / "token"
+        with suppress(OSError):
+            kept = file.read_text(encoding="ascii").strip()
+            if re.fullmatch(r"[\w-]{43}", kept):
+                return kept
+        made = secrets.token_urlsafe(32)
+        write_text(file, made)
+        file.chmod(0o600)
+        return made
+
+    def new_job(self, name: str, options: dict[str, str]) -> Job:
+        """Make a job for a drop.
+
+        Raises
+        ------
+        UsageError
+            When there are too many.
+        """
+        if len(self.jobs()) >= MOST_JOBS:
+            raise UsageError(f"there are {MOST_JOBS} jobs; remove some before adding another")
+        job = Job(self.jobs_folder / secrets.token_hex(8))
+        (job.path / "files").mkdir(parents=True)
+        job.write({"name": name, "created": time.time(), "options": options, "files": {}})
+        return job
+
+    def job(self, number: str) -> Job | None:
+        """The job of a number; None where there is none."""
+        if not _JOB.fullmatch(number):
+            return None
+        job = Job(self.jobs_folder / number)
+        return job if (job.path / "job.json").is_file() else None
+
+    def jobs(self) -> list[Job]:
+        """All jobs, the newest first."""
+        found = [job for name in os.listdir(self.jobs_folder) if (job := self.job(name))]  # noqa: PTH208
+        return sorted(found, key=lambda job: -float(job.read()["created"]))
+
+    def used(self) -> int:
+        """Bytes in the folder."""
+        total = 0
+        for folder, _, names in os.walk(self.path):
+            for name in names:
+                with suppress(OSError):
+                    total += (Path(folder) / name).lstat().st_size
+        return total
+
+
+@dataclass(frozen=True)
+class Job:
+    """One drop: machine, record, tail, and what was found."""
+
+    path: Path
+
+    @property
+    def number(self) -> str:
+        """Sixteen hexadecimal digits."""
+        return self.path.name
+
+    def read(self) -> dict[str, Any]:
+        """Name, options and files of the job."""
+        found: dict[str, Any] = json.loads((self.path / "job.json").read_text(encoding="utf-8"))
+        return found
+
+    def write(self, told: dict[str, Any]) -> None:
+        """Keep name, options and files."""
+        write_json(self.path / "job.json", told)
+
+    def file(self, role: str) -> Path | None:
+        """Where the file of a role lies; None where none was sent."""
+        told = self.read()["files"].get(role)
+        return None if told is None else self.path / "files" / told["stored"]
+
+    def remove(self) -> None:
+        """Remove the job with everything; it is gone at once, whatever happens to its files."""
+        away = self.path.with_name(f"{self.number}.removed")
+        self.path.rename(away)
+        shutil.rmtree(away, ignore_errors=True)
+
+
+async def receive(
+    space: Workspace, job: Job, role: Role, name: str, declared: int | None, body: AsyncIterable[bytes]
+) -> dict[str, Any]:
+    """Write an upload, counted while it comes in; it stands there whole or not at all.
+
+    Parameters
+    ----------
+    space, job : Workspace, Job
+        Where it belongs.
+    role : str
+        What it is for.
+    name : str
+        Name at the client: a label.
+    declared : int or None
+        Bytes the client says will come.
+    body : async iterable of bytes
+        The upload.
+
+    Raises
+    ------
+    TooLargeError
+        When it is larger than allowed, or the folder is full.
+    UsageError
+        When the name cannot be one.
+    """
+    label, stored = labelled(name), stored_as(role, name)
+    limit = min(LARGEST[role], space.quota - space.used())
+    if role == "beside" and len(beside(job)) >= MOST_BESIDE:
+        raise UsageError(f"a job takes {MOST_BESIDE} files beside machine and record")
+    if declared is not None and declared > limit:
+        raise _too_large(label, limit)
+    counted, digest = 0, hashlib.sha256()
+    with atomic_path(job.path / "files" / stored) as place, place.open("wb") as stream:
+        async for part in body:
+            counted += len(part)
+            if counted > limit:
+                raise _too_large(label, limit)
+            digest.update(part)
+            stream.write(part)
+        if counted == 0:
+            raise UsageError(f"{label} is empty")
+    told = job.read()
+    entry = {"name": label, "stored": stored, "bytes": counted, "sha256": digest.hexdigest()}
+    told["files"][role if role != "beside" else f"beside {stored}"] = entry
+    job.write(told)
+    return entry
+
+
+def _too_large(label: str, limit: int) -> TooLargeError:
+    return TooLargeError(
+        f"{label} is larger than the {max(limit, 0) / 1e6:.0f} MB that may still be sent; remove jobs that "
+        "are no longer needed, or cut the record to the drop"
+    )
+
+
+def beside(job: Job) -> list[str]:
+    """Names of the files that others name."""
+    return [entry["stored"] for role, entry in job.read()["files"].items() if role.startswith("beside ")]
+
+
+def labelled(name: str) -> str:
+    """A name for people: one line, not too long."""
+    line = "".join(sign if sign.isprintable() else "\N{REPLACEMENT CHARACTER}" for sign in name)
+    return line[:LONGEST_NAME] or "unnamed"
+
+
+def stored_as(role: Role, name: str) -> str:
+    """Name under which an upload lies.
+
+    Raises
+    ------
+    UsageError
+        When the name has no suffix that can be one, or that of a file beside is not a plain one.
+    """
+    if role == "machine":
+        return "machine.toml"
+    if role == "beside" and name.lower().endswith(".dat"):
+        return "record.dat"  # the samples of a COMTRADE recording, whose configuration is the record
+    if role == "beside":
+        plain = _PLAIN.fullmatch(name) and len(name) <= LONGEST_NAME and not is_path(name)
+        if (
+            not plain
+            or name.split(".")[0].lower() in ("machine", "record", "tail")
+            or name.endswith((" ", "."))
+        ):
+            raise UsageError(
+                f"{labelled(name)!r} cannot be the name of a file beside; use letters and digits"
+            )
+        return name
+    suffix = "".join(PurePosixPath(name).suffixes[-2:]).lower()
+    if not suffix.endswith(".gz"):
+        suffix = PurePosixPath(name).suffix.lower()
+    if not _SUFFIX.fullmatch(suffix):
+        raise UsageError(f"{labelled(name)!r} has no suffix that tells its format; name it for example .csv")
+    return f"{role}{suffix}"
+
+
+def is_path(name: str) -> bool:
+    """Whether a name means more than a file in its folder, on any system."""
+    return (
+        name in ("", ".", "..")
+        or PurePosixPath(name).name != name
+        or PureWindowsPath(name).name != name
+        or PureWindowsPath(name).is_reserved()
+    )

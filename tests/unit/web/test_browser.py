@@ -1,0 +1,219 @@
+"""The page in a headless Chromium: from upload to report, by keyboard, quiet, and talking to nobody else."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from urllib.parse import quote
+
+import pytest
+from tests.unit.web.browser import CHROMIUM, Browser
+from tests.unit.web.serving import Served
+
+from rotordrop.web.workspace import Workspace
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here")
+
+LOOKED = "document.querySelectorAll('.panel canvas').length >= 2"
+
+
+@pytest.fixture
+def browser(tmp_path: Path) -> Iterator[Browser]:
+    page = Browser(tmp_path / "profile")
+    yield page
+    page.close()
+
+
+@contextlib.contextmanager
+def serving(folder: Path) -> Iterator[Served]:
+    server = Served(Workspace(folder))
+    try:
+        yield server
+    finally:
+        server.stop()
+
+
+def send(browser: Browser, files: list[Path]) -> None:
+    browser.choose_files("#files", files)
+    browser.until("document.getElementById('sending').open")
+    browser.key("Enter")
+
+
+def quiet(browser: Browser) -> None:
+    assert browser.messages() == []
+    assert browser.foreign() == []
+
+
+def words(browser: Browser, selector: str) -> str:
+    return str(browser.evaluate(f"document.querySelector({selector!r})?.innerText"))
+
+
+def test_from_upload_by_keys_to_figures_and_again_after_a_reload(browser, tmp_path, files):
+    with serving(tmp_path / "served") as server:
+        browser.open(server.address)
+        browser.until("!document.getElementById('empty').hidden")
+        assert server.token not in browser.evaluate("location.href")
+        send(browser, list(files.values()))
+        browser.until(LOOKED)
+        assert "The rotor was released at" in words(browser, "#status")
+        browser.key("n")
+        browser.until("document.querySelector('tr.here')")
+        first = words(browser, "tr.here")
+        browser.key("n")
+        browser.until(f"document.querySelector('tr.here').innerText !== {json.dumps(first)}")
+        browser.until("/[0-9]/.test(document.querySelector('#readout td').innerText)")
+        browser.key("p")
+        browser.until(f"document.querySelector('tr.here').innerText === {json.dumps(first)}")
+        browser.key("u")
+        browser.until("document.querySelector('#readout').innerText.includes('mil')")
+        browser.key("u")
+        before = browser.evaluate("document.documentElement.dataset.theme")
+        browser.key("t")
+        assert browser.evaluate("document.documentElement.dataset.theme") != before
+        browser.key("0")
+        browser.until("Number(document.getElementById('to').value) > 1900")
+        browser.key("?")
+        browser.until("document.getElementById('keys').open")
+        browser.key("Escape")
+        for _ in range(60):
+            browser.key("Tab")
+            if browser.evaluate("document.activeElement.getAttribute('role') === 'tab'"):
+                break
+        browser.key("ArrowRight")
+        browser.until("document.querySelector('[aria-selected=true]').innerText === 'Events'")
+        assert "released" in words(browser, "#tabpanel")
+        browser.call("Page.reload")
+        browser.until(LOOKED)
+        quiet(browser)
+
+
+def test_an_estimate_goes_on_over_reload_and_restart_and_is_cancelled(browser, tmp_path, files):
+    with serving(tmp_path / "served") as server:
+        port = server.port
+        browser.open(server.address)
+        send(browser, list(files.values()))
+        browser.until(LOOKED)
+        browser.evaluate("document.getElementById('estimate').click()")
+        browser.until("document.getElementById('cancel')")
+        browser.call("Page.reload")
+        browser.until("document.getElementById('cancel')")
+        quiet(browser)
+    server = Served(Workspace(tmp_path / "served"), port)
+    try:
+        browser.until("document.getElementById('cancel') || document.body.innerText.includes('tries again')")
+        browser.call("Page.reload")
+        browser.until("document.getElementById('cancel')")
+        browser.evaluate("document.getElementById('cancel').click()")
+        browser.until("document.body.innerText.includes('The estimate was cancelled')")
+        job = server.ask("GET", "/api/jobs").told["jobs"][0]
+        assert job["states"]["estimate"]["state"] == "cancelled"
+    finally:
+        server.stop()
+
+
+@pytest.mark.slow
+def test_an_estimate_from_the_button_to_the_report(browser, tmp_path, files):
+    with serving(tmp_path / "served") as server:
+        browser.open(server.address)
+        send(browser, list(files.values()))
+        browser.until(LOOKED)
+        browser.evaluate("document.getElementById('estimate').click()")
+        browser.until("document.querySelectorAll('.panel canvas').length === 4", 560)
+        assert "The model is consistent with the record." in words(browser, "#status")
+        job = server.ask("GET", "/api/jobs").told["jobs"][0]["id"]
+        document = server.ask("GET", f"/api/jobs/{job}/estimate/document").told
+        peak = document["bearings"]["NDE"]["peak_force_N"]["value"]
+        shown = words(browser, "#status").replace("\u202f", "")
+        assert f"NDE peak bearing force {peak:.0f} N" in shown
+        quiet(browser)
+        address = server.order(f"/api/jobs/{job}/estimate/report").told["address"]
+        browser.open(f"http://127.0.0.1:{server.port}{address}")
+        browser.until("document.documentElement.getAttribute('data-drawn')")
+        quiet(browser)
+        assert "consistent with the record" in words(browser, "#verdict")
+        again = server.ask("GET", address)
+        assert (again.status, "has been used" in again.text) == (404, True)
+
+
+MARK = "window.stolen=1"
+SCRIPTS = [
+    f"<script>{MARK}</script>",
+    f"<img src=x onerror={MARK}>",
+    f"<svg/onload={MARK}>",
+    f'"><script>{MARK}</script>',
+    f"'-{MARK}-'",
+    f"javascript:{MARK}",
+    f"<iframe srcdoc='<script>parent.{MARK}</script>'>",
+    f"</title><script>{MARK}</script>",
+    f"<details open ontoggle={MARK}>",
+    f"${{{MARK}}}",
+    f"{{{{constructor.constructor('{MARK}')()}}}}",
+    f"<input autofocus onfocus={MARK}>",
+    f"</option></select><img src=x onerror={MARK}>",
+    f"<math><mtext><table><mglyph><style><img src=x onerror={MARK}>",
+    f"<a href=javascript:{MARK}>x</a>",
+    f"<body onload={MARK}>",
+    f"<object data=javascript:{MARK}>",
+    f"<embed src=javascript:{MARK}>",
+    f"<link rel=stylesheet href=javascript:{MARK}>",
+    f"<meta http-equiv=refresh content='0;url=javascript:{MARK}'>",
+]
+WRAPPED = ["{}", "a{}b", "</script>{}", "]]>{}", "-->{}"]
+
+
+def payloads() -> list[str]:
+    return [wrapping.format(script) for wrapping in WRAPPED for script in SCRIPTS]
+
+
+def test_no_script_in_a_name_is_executed(browser, tmp_path):
+    """In the name of a job, of its files, of a plane and a channel, in a header entry, in an option."""
+    assert len(payloads()) >= 100
+    with serving(tmp_path / "served") as server:
+        for number, script in enumerate(payloads()):
+            plain = script.replace(";", "").replace("[", "").replace("\n", "")
+            rows = [f"0.{n:04d};{y:.2f};0;{y:.2f};0" for n, y in enumerate(_fall())]
+            head = f"# {plain}\ntime [s];X {plain} [um];Y {plain} [um];X2{plain} [um];Y2{plain} [um]\n"
+            job = server.order("/api/jobs", {"name": script, "options": {"gap": script}}).told["id"]
+            name = script.replace("/", "|").replace("#", "").replace("?", "") + ".csv"
+            sent = (head + "\n".join(rows)).encode()
+            done = server.ask("PUT", f"/api/jobs/{job}/files/record?name={quote(name)}", sent)
+            assert done.status == 201, done.text
+            if number % 10 == 0:
+                told = server.space.job(job).read()
+                server.space.job(job).write({**told, "options": {}})
+                server.order(f"/api/jobs/{job}/look")
+            elif number % 20 == 1:
+                server.order(f"/api/jobs/{job}/look")
+        jobs = [one["id"] for one in server.ask("GET", "/api/jobs").told["jobs"]]
+        assert len(jobs) == len(payloads())
+        browser.open(server.address)
+        looked = 0
+        for job in jobs:
+            states = server.ask("GET", f"/api/jobs/{job}").told["states"]
+            if "look" in states:
+                looked += server.settled(job, "look")["state"] == "done"
+            chosen = f"s=document.getElementById('jobs');s.value='{job}';s.dispatchEvent(new Event('change'))"
+            browser.evaluate(chosen)
+            if "look" in states:
+                browser.until("!document.getElementById('status').innerText.includes('Looking')")
+                for tab in ("Events", "Numbers", "Quality", "All", "Origin", "Impacts"):
+                    tabs = "[...document.querySelectorAll('[role=tab]')]"
+                    browser.evaluate(f"{tabs}.find(t => t.innerText === '{tab}')?.click()")
+        assert looked >= 8
+        assert browser.evaluate("window.stolen") is None
+        quiet(browser)
+
+
+def _fall() -> list[float]:
+    """Floats for 50 ms, falls 250 µm, bounces once and lies [µm], at 10 kHz."""
+    path = [0.5 * (-1) ** n for n in range(500)]
+    height, speed = 0.0, 0.0
+    for n in range(2500):
+        speed -= 9.81e-4
+        height += 1e6 * speed * 1e-4
+        if height < -250.0:
+            height, speed = -250.0, -0.4 * speed if n < 1500 else 0.0
+        path.append(height + 0.3 * (-1) ** n)
+    return path

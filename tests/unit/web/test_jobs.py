@@ -1,0 +1,241 @@
+"""Jobs: a look from upload to figures, cancelling, and nothing finished lost whoever is killed."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from tests.unit.web.serving import Served
+
+from rotordrop import load_machine, look
+from rotordrop.web import running
+from rotordrop.web.running import Runner, published_run, result_folder, state_of
+from rotordrop.web.workspace import Workspace
+
+posix = pytest.mark.skipif(os.name != "posix", reason="locks are inherited on POSIX systems only")
+
+
+@pytest.fixture(scope="module")
+def looked(served: Served, files) -> str:
+    job = served.new_job(files)
+    assert served.order(f"/api/jobs/{job}/look").status == 202
+    assert served.settled(job, "look")["state"] == "done"
+    return job
+
+
+def test_a_look_on_the_page_says_what_a_look_in_python_says(served, looked, files):
+    seen = look(files["record"], machine=load_machine(files["machine"]))
+    document = served.ask("GET", f"/api/jobs/{looked}/look/document").told
+    assert document == json.loads(json.dumps({**seen.as_json(), "record": "drop_060"}))
+    page = served.ask("GET", f"/api/jobs/{looked}/look/page").told
+    assert [impact["time"] for impact in page["impacts"]] == [impact.time for impact in seen.impacts]
+    body = served.ask("GET", f"/api/jobs/{looked}/look/window?column=y0&start=0&end=0.01").body
+    count = int(np.frombuffer(body, "<u4", 1, 8)[0])
+    values = np.frombuffer(body, "<f4", count, 16 + 4 * count)
+    first = int(np.searchsorted(seen.motion.time, np.frombuffer(body, "<f8", 1)[0]))
+    np.testing.assert_array_equal(
+        values, seen.motion.paths[0].position[first : first + count, 1].astype("f4")
+    )
+
+
+def test_a_table_holds_every_sample_of_a_window(served, looked, files):
+    seen = look(files["record"], machine=load_machine(files["machine"]))
+    text = served.ask("GET", f"/api/jobs/{looked}/look/csv?column=x0&column=y0&start=0&end=1").text
+    head, *rows = text.strip().split("\n")
+    assert head == "time [s],x0 [SI],y0 [SI]"
+    inside = (seen.motion.time >= 0) & (seen.motion.time <= 1)
+    table = np.array([[float(cell) for cell in row.split(",")] for row in rows])
+    np.testing.assert_array_equal(table[:, 0], seen.motion.time[inside])
+    np.testing.assert_allclose(table[:, 1:], seen.motion.paths[0].position[inside], rtol=1e-7, atol=1e-18)
+
+
+def test_a_record_alone_is_looked_at_with_the_gap_given(served, files):
+    job = served.new_job({"record": files["record"]}, gap="300 um", speed="60 Hz")
+    served.order(f"/api/jobs/{job}/look")
+    assert served.settled(job, "look")["state"] == "done"
+    document = served.ask("GET", f"/api/jobs/{job}/look/document").told
+    assert {plane["air_gap_m"] for plane in document["planes"]} == {300e-6}
+    assert document["speed_rad_per_s"] == pytest.approx(2 * np.pi * 60)
+
+
+def test_an_estimate_without_a_machine_says_what_is_missing(served, files):
+    job = served.new_job({"record": files["record"]})
+    served.order(f"/api/jobs/{job}/estimate", {"method": "tracked"})
+    state = served.settled(job, "estimate")
+    assert (state["state"], "needs the machine file" in state["error"]) == ("failed", True)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"method": "guess"}, "the method is 'guess'; there are tracked, replay"),
+        ({"quick": "yes"}, "the option quick is 'yes'; expected bool"),
+        ({"path": "/etc"}, "there is no option 'path'"),
+        ({"gap": 3}, "the option gap is '3'; expected str"),
+    ],
+)
+def test_an_option_that_is_none_is_refused(served, looked, options, words):
+    answer = served.order(f"/api/jobs/{looked}/estimate", options)
+    assert answer.status == 400
+    assert words in answer.text
+
+
+@posix
+def test_an_estimate_is_cancelled_with_all_it_began(served, files):
+    job = served.new_job(files)
+    served.order(f"/api/jobs/{job}/estimate")
+    folder = served.space.jobs_folder / job
+    until = time.monotonic() + 60
+    while not (folder / "estimate.process").is_file():
+        assert time.monotonic() < until
+        time.sleep(0.05)
+    process = int((folder / "estimate.process").read_text())
+    answer = served.order(f"/api/jobs/{job}/estimate/cancel")
+    assert answer.told["states"]["estimate"]["state"] == "cancelled"
+    with pytest.raises(ProcessLookupError):
+        os.killpg(process, 0)
+    assert [entry.name for entry in folder.iterdir() if entry.is_dir()] == ["files"]
+
+
+def test_what_waits_is_cancelled_too(tmp_path, monkeypatch):
+    monkeypatch.setitem(running.AT_ONCE, "look", 0)
+    space = Workspace(tmp_path)
+    space.prepare()
+    runner, job = Runner(space), space.new_job("drop", {})
+    assert runner.ask(job, "look", {})["state"] == "waiting"
+    runner.cancel(job, "look")
+    assert state_of(job, "look")["state"] == "cancelled"
+
+
+def test_three_people_at_once_get_what_is_theirs(served, files):
+    jobs = [served.new_job({"record": files["record"]}, gap=f"{gap} um") for gap in (250, 260, 270)]
+    for job in jobs:
+        served.order(f"/api/jobs/{job}/look")
+    for job, gap in zip(jobs, (250e-6, 260e-6, 270e-6), strict=True):
+        assert served.settled(job, "look")["state"] == "done"
+        document = served.ask("GET", f"/api/jobs/{job}/look/document").told
+        assert document["planes"][0]["air_gap_m"] == pytest.approx(gap)
+
+
+def test_a_removed_job_is_gone(served, files):
+    job = served.new_job({"record": files["record"]})
+    assert served.ask("DELETE", f"/api/jobs/{job}").status == 204
+    assert served.ask("GET", f"/api/jobs/{job}").status == 404
+    assert not (served.space.jobs_folder / job).exists()
+
+
+@posix
+def test_a_child_outlives_its_server_and_the_next_one_finds_its_result(tmp_path, files):
+    first = Served(Workspace(tmp_path))
+    job, token = first.new_job({"record": files["record"]}), first.token
+    first.order(f"/api/jobs/{job}/look")
+    first.stop()
+    second = Served(Workspace(tmp_path))
+    try:
+        assert second.token == token
+        assert second.settled(job, "look")["state"] == "done"
+        assert second.ask("GET", f"/api/jobs/{job}/look/page").status == 200
+    finally:
+        second.stop()
+
+
+@posix
+def test_a_child_that_is_killed_is_told_of_and_the_older_result_stays(served, files):
+    job = served.new_job({"record": files["record"]})
+    served.order(f"/api/jobs/{job}/look")
+    served.settled(job, "look")
+    old, told = published_run(served.space.job(job), "look"), served.space.jobs_folder / job / "look.process"
+    first = told.read_text()
+    served.order(f"/api/jobs/{job}/look", {"gap": "270 um"})
+    while told.read_text() in (first, ""):
+        time.sleep(0.01)
+    os.kill(int(told.read_text()), signal.SIGKILL)
+    state = served.settled(job, "look")
+    assert state["state"] == "failed"
+    assert "ended from outside before it was done; start it again" in state["error"]
+    assert published_run(served.space.job(job), "look") == old
+    assert served.ask("GET", f"/api/jobs/{job}/look/page").status == 200
+
+
+_KILLED_SERVER = """
+import sys, time
+from pathlib import Path
+from rotordrop.web.running import Runner
+from rotordrop.web.workspace import Workspace
+space = Workspace(Path(sys.argv[1])); space.prepare()
+runner = Runner(space); runner.take_over()
+for job in space.jobs():
+    runner.ask(job, "look", {})
+while True:
+    runner.tend(); time.sleep(0.01)
+"""
+
+
+@posix
+@pytest.mark.slow
+def test_no_finished_job_is_lost_whenever_server_or_child_is_killed(tmp_path, files):
+    """A hundred deaths at random moments: what was published before is there after, whole."""
+    generator = random.Random(5)
+    space = Workspace(tmp_path)
+    space.prepare()
+    job = space.new_job("drop", {})
+    (job.path / "files" / "record.h5").write_bytes(files["record"].read_bytes())
+    entry = {"name": "a.h5", "stored": "record.h5", "bytes": 1, "sha256": ""}
+    job.write({**job.read(), "files": {"record": entry}})
+    published = 0
+    for turn in range(100):
+        before = published_run(job, "look")
+        server = subprocess.Popen(
+            [sys.executable, "-c", _KILLED_SERVER, str(tmp_path)],
+            env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+        )
+        time.sleep(generator.uniform(0.3, 2.2))
+        if turn % 2 and (job.path / "look.process").is_file():
+            with contextlib.suppress(ProcessLookupError, ValueError):
+                os.killpg(int((job.path / "look.process").read_text()), signal.SIGKILL)
+        server.kill()
+        server.wait()
+        after = published_run(job, "look")
+        assert before is None or after is not None
+        published += after != before
+        if after is not None:
+            folder = result_folder(job, "look")
+            assert folder is not None
+            assert json.loads((folder / "page.json").read_text())["title"]
+    assert published > 10
+    until = time.monotonic() + 30
+    runner = Runner(space)
+    runner.take_over()
+    while state_of(job, "look")["state"] == "running" and time.monotonic() < until:
+        runner.tend()
+        time.sleep(0.05)
+    runner.tend()
+    assert state_of(job, "look")["state"] in ("done", "failed")
+
+
+def test_the_first_page_comes_within_a_second_and_loads_no_compiler():
+    program = (
+        "import sys, tempfile, time; from pathlib import Path; from rotordrop.web.workspace import Workspace;"
+        "from rotordrop.web.app import make_app; make_app(Workspace(Path(tempfile.mkdtemp())), port=1);"
+        "print([name for name in ('numba', 'numpy', 'scipy', 'plotly', 'h5py') if name in sys.modules])"
+    )
+    env = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    begun = time.perf_counter()
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, env=env, check=True
+    )
+    assert done.stdout.strip() == "[]"
+    assert time.perf_counter() - begun < 3.0  # a busy computer; alone it is 0.5 s
+
+
+def test_the_folder_of_the_page_is_the_users_own(served):
+    assert (served.space.path.stat().st_mode & 0o077) == 0 or os.name != "posix"
+    assert ((served.space.path / "token").stat().st_mode & 0o077) == 0 or os.name != "posix"

@@ -1,0 +1,177 @@
+"""What comes in is counted while it comes, stands whole or not at all, and a limited child reads it."""
+
+from __future__ import annotations
+
+import gzip
+import pickle
+import socket
+import time
+import zipfile
+from io import BytesIO
+
+import numpy as np
+import pytest
+from tests.unit.web.serving import Served
+
+from rotordrop.errors import UsageError
+from rotordrop.web import workspace
+from rotordrop.web.workspace import Workspace, labelled, stored_as
+
+
+def left_over(served: Served, job: str) -> list[str]:
+    return sorted(file.name for file in (served.space.jobs_folder / job / "files").iterdir())
+
+
+def test_an_upload_over_the_limit_is_refused_by_its_length_alone(served, monkeypatch):
+    monkeypatch.setitem(workspace.LARGEST, "record", 1000)
+    job = served.new_job({})
+    answer = served.ask("PUT", f"/api/jobs/{job}/files/record?name=a.csv", b"x" * 1001)
+    assert answer.status == 413
+    assert "a.csv is larger than the 0 MB" in answer.text
+    assert left_over(served, job) == []
+
+
+def test_an_upload_without_a_length_is_refused_while_it_comes(served, monkeypatch):
+    monkeypatch.setitem(workspace.LARGEST, "record", 100_000)
+    job = served.new_job({})
+    with socket.create_connection(("127.0.0.1", served.port)) as connection:
+        connection.sendall(
+            f"PUT /api/jobs/{job}/files/record?name=a.csv HTTP/1.1\r\nHost: 127.0.0.1:{served.port}\r\n"
+            f"X-Rotordrop-Token: {served.token}\r\nTransfer-Encoding: chunked\r\n\r\n".encode()
+        )
+        answer = b""
+        for _ in range(100):
+            try:
+                connection.sendall(b"2000\r\n" + b"x" * 0x2000 + b"\r\n")
+            except OSError:
+                break
+        answer = connection.recv(4096)
+    assert b" 413 " in answer
+    assert left_over(served, job) == []
+
+
+def test_half_an_upload_leaves_nothing(served):
+    job = served.new_job({})
+    with socket.create_connection(("127.0.0.1", served.port)) as connection:
+        connection.sendall(
+            f"PUT /api/jobs/{job}/files/record?name=a.csv HTTP/1.1\r\nHost: 127.0.0.1:{served.port}\r\n"
+            f"X-Rotordrop-Token: {served.token}\r\nContent-Length: 100000\r\n\r\n".encode()
+            + b"x" * 5000
+        )
+    time.sleep(0.5)
+    assert left_over(served, job) == []
+    assert served.ask("GET", f"/api/jobs/{job}").told["files"] == {}
+
+
+def test_a_full_folder_takes_nothing_more(tmp_path):
+    server = Served(Workspace(tmp_path, quota=4000))
+    try:
+        job = server.new_job({})
+        answer = server.ask("PUT", f"/api/jobs/{job}/files/record?name=a.csv", b"x" * 4500)
+        assert answer.status == 413
+        assert left_over(server, job) == []
+    finally:
+        server.stop()
+
+
+def test_what_a_killed_server_left_is_removed_by_the_next(tmp_path):
+    space = Workspace(tmp_path)
+    space.prepare()
+    job = space.new_job("drop", {})
+    left = job.path / "files" / ".record.0123abcd-1-0123abcd.part.csv"
+    left.write_bytes(b"half")
+    space.prepare()
+    assert not left.exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "stored"),
+    [
+        ("a.csv", "record.csv"),
+        ("../../x.CSV", "record.csv"),
+        ("/etc/p.mat", "record.mat"),
+        ("a.b.csv.gz", "record.csv.gz"),
+    ],
+)
+def test_a_name_of_a_client_is_a_label_only(name, stored):
+    assert stored_as("record", name) == stored
+
+
+@pytest.mark.parametrize("name", ["", "a", "a.", "a.c/v", "a.\0csv", "a.csv\n", "a.%2e%2e"])
+def test_a_record_without_a_suffix_is_refused(name):
+    with pytest.raises(UsageError, match="no suffix that tells its format"):
+        stored_as("record", name)
+
+
+@pytest.mark.parametrize(
+    "name", ["..", ".ssh", "../a.csv", "a\\b.csv", "C:a.csv", "CON", "machine.toml", "a/b", "x" * 121]
+)
+def test_a_file_beside_needs_a_plain_name(name):
+    with pytest.raises(UsageError, match="cannot be the name of a file beside"):
+        stored_as("beside", name)
+
+
+def test_a_label_is_one_printable_line():
+    assert labelled("a\nb\x1b[31m") == "a\ufffdb\ufffd[31m"
+    assert len(labelled("x" * 1000)) == workspace.LONGEST_NAME
+
+
+class Wicked:
+    def __reduce__(self):
+        return (open, ("/tmp/rotordrop-was-unpickled", "w"))
+
+
+def _packed_objects() -> bytes:
+    stream = BytesIO()
+    np.save(stream, np.array([Wicked()], dtype=object), allow_pickle=True)
+    return stream.getvalue()
+
+
+def _bomb() -> bytes:
+    return gzip.compress(b"0;" * 400_000_000, compresslevel=1)
+
+
+def _zip_bomb() -> bytes:
+    stream = BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("xl/workbook.xml", b"<a>" * 100_000_000)
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("a.npy", _packed_objects()),
+        ("a.npz", pickle.dumps(Wicked())),
+        ("a.mat", pickle.dumps(Wicked())),
+        ("a.csv", b"\x00" * 5000),
+        ("a.csv", b"time [s];X1 [um];Y1 [um]\n" + b"0;0;0\n" * 3),
+        ("a.h5", b"\x89HDF\r\n\x1a\n" + b"\xff" * 3000),
+        ("a.csv.gz", _bomb()),
+        ("a.xlsx", _zip_bomb()),
+        ("a.exe", b"MZ"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_a_file_that_is_no_record_ends_in_a_sentence(served, tmp_path, name, content):
+    from pathlib import Path
+
+    job = served.new_job({"record": (name, content)})
+    served.order(f"/api/jobs/{job}/look")
+    state = served.settled(job, "look")
+    assert state["state"] == "failed"
+    assert len(state["error"]) > 20
+    assert "this should not happen" not in state["error"]
+    assert str(served.space.path) not in state["error"]
+    assert not Path("/tmp/rotordrop-was-unpickled").exists()
+    folders = [entry.name for entry in (served.space.jobs_folder / job).iterdir() if entry.is_dir()]
+    assert folders == ["files"]
+
+
+def test_a_machine_file_may_name_no_file_elsewhere(served, files):
+    text = files["machine"].read_text().replace('"lp400_shaft.csv"', '"/etc/hostname"')
+    job = served.new_job({"record": files["record"], "machine": ("m.toml", text.encode())})
+    served.order(f"/api/jobs/{job}/look")
+    state = served.settled(job, "look")
+    assert state["state"] == "failed"
+    assert "names the shaft table '/etc/hostname'" in state["error"]
