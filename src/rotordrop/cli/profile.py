@@ -35,6 +35,9 @@ def profile(
     speed: Annotated[str | None, typer.Option(help='Speed by hand, "60 Hz".')] = None,
     speed_channel: Annotated[str | None, typer.Option(help="Channel of the shaft speed.")] = None,
     speed_unit: Annotated[str | None, typer.Option(help="Its unit, rpm.")] = None,
+    pulses: Annotated[str | None, typer.Option(help="Channel of tacho or keyphasor pulses.")] = None,
+    pulses_per_turn: Annotated[int | None, typer.Option(min=1, help="Pulses per turn, 1.")] = None,
+    edge: Annotated[str | None, typer.Option(help="Edge that counts, rising or falling.")] = None,
     time_step: Annotated[str | None, typer.Option(help='Sampling interval, "50 us".')] = None,
     time_start: Annotated[str | None, typer.Option(help='Time of the first sample, "-0.25 s".')] = None,
     names: Annotated[str | None, typer.Option(help="Names of the columns, commas between them.")] = None,
@@ -56,7 +59,14 @@ def profile(
             "full_scale": full_scale,
             "text": {"names": None if names is None else [name.strip() for name in names.split(",")]},
             "time": {"step": time_step, "start": time_start},
-            "speed": {"constant": speed, "channel": speed_channel, "unit": speed_unit},
+            "speed": {
+                "constant": speed,
+                "channel": speed_channel,
+                "unit": speed_unit,
+                "pulses": pulses,
+                "pulses_per_turn": pulses_per_turn,
+                "edge": edge,
+            },
         }
     )
     sensors: Any = ()

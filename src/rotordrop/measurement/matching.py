@@ -111,13 +111,9 @@ def find_speed(
     """
     free = [channel for channel in recording.channels if all(channel is not other for other in taken)]
     if profile.speed.channel is not None:
-        for channel in free:
-            if profile.speed.channel in (channel.label, channel.name):
-                return channel
-        raise RecordError(
-            f"{place} has no speed channel {profile.speed.channel!r}; it has "
-            f"{', '.join(channel.label for channel in recording.channels)}"
-        )
+        return _named(free, profile.speed.channel, "speed channel", recording, place)
+    if profile.speed.pulses is not None:
+        return None
     in_speed_unit = [channel for channel in free if channel.unit in _SPEED_UNITS]
     candidates = in_speed_unit or [channel for channel in free if _SPEED_NAMES.match(channel.name)]
     if len(candidates) > 1:
@@ -127,6 +123,31 @@ def find_speed(
             '"..."'
         )
     return candidates[0] if candidates else None
+
+
+def find_pulses(
+    recording: Recording, taken: tuple[Channel, ...], profile: Profile, place: str
+) -> Channel | None:
+    """Find the channel of tacho pulses that the profile names, or None when it names none.
+
+    Raises
+    ------
+    RecordError
+        When there is no such channel.
+    """
+    if profile.speed.pulses is None:
+        return None
+    free = [channel for channel in recording.channels if all(channel is not other for other in taken)]
+    return _named(free, profile.speed.pulses, "channel of pulses", recording, place)
+
+
+def _named(free: list[Channel], name: str, what: str, recording: Recording, place: str) -> Channel:
+    for channel in free:
+        if name in (channel.label, channel.name):
+            return channel
+    raise RecordError(
+        f"{place} has no {what} {name!r}; it has {', '.join(channel.label for channel in recording.channels)}"
+    )
 
 
 def displacement(
@@ -205,6 +226,6 @@ def speed_factor(channel: Channel, profile: Profile, place: str) -> float:
     except UsageError as error:
         raise RecordError(
             f"{place}: the speed channel {channel.label!r} is in {unit!r}; expected Hz, rpm or rad/s, name "
-            "it in the "
-            'profile: [speed] unit = "rpm"'
+            f'it in the profile: [speed] unit = "rpm"; or, if it holds pulses of a tacho, pulses = '
+            f'"{channel.label}"'
         ) from error

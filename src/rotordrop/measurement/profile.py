@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from rotordrop.atomic_file import write_text
 from rotordrop.errors import RecordError, UsageError
+from rotordrop.measurement.tacho import Edge
 from rotordrop.units import parse_quantity
 
 
@@ -50,6 +51,9 @@ class SpeedSource(_Section):
     channel: str | None = Field(default=None, description="name of the speed channel")
     unit: str | None = Field(default=None, description="unit of the speed channel")
     constant: str | None = Field(default=None, description='speed by hand, for example "60 Hz"')
+    pulses: str | None = Field(default=None, description="name of a channel of tacho or keyphasor pulses")
+    pulses_per_turn: int = Field(default=1, ge=1, le=10_000)
+    edge: Edge = Field(default="rising", description="the edge of a pulse that counts, rising or falling")
 
     @field_validator("constant")
     @classmethod
@@ -149,6 +153,8 @@ _EXPECTED = {
     "separator": "expected one sign, such as ';'",
     "decimal": "expected '.' or ','",
     "first_data_line": "expected the number of a line, counted from 1",
+    "pulses_per_turn": "expected a whole number from 1 on",
+    "edge": "expected 'rising' or 'falling'",
     "names": 'expected a list of names, ["Time [s]", ...]',
 }
 

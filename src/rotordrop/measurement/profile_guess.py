@@ -54,11 +54,15 @@ def guess_profile(recording: Recording, given: Profile, sensors: Sequence[Sensor
         free = [channel.label for channel in recording.channels if channel.label not in mapped.values()]
         options = " ".join(f'--channel "{name}=..."' for name in unmapped)
         missing.append(f"channels of {', '.join(unmapped)}: {options} (there are {', '.join(free)})")
-    used = [channel for channel in recording.channels if not sensors or channel.label in mapped.values()]
+    used = [
+        channel
+        for channel in recording.channels
+        if (not sensors and channel.label != given.speed.pulses) or channel.label in mapped.values()
+    ]
     profile = given.model_copy(update={"channels": mapped})
     profile, speed = _with_speed(recording, profile, used if sensors else [])
     if speed is None:
-        missing.append('the shaft speed: --speed-channel "..." or --speed "60 Hz"')
+        missing.append('the shaft speed: --speed-channel "...", --pulses "..." or --speed "60 Hz"')
     shafts = [channel for channel in used if channel.label != speed and channel.unit not in _SPEEDS]
     bare = [c.label for c in shafts if not (profile.units.get(c.label) or c.unit or profile.unit)]
     if bare:
@@ -93,6 +97,8 @@ def _with_speed(
 ) -> tuple[Profile, str | None]:
     if profile.speed.constant is not None:
         return profile, profile.speed.constant
+    if profile.speed.pulses is not None:
+        return profile, f"pulses of {profile.speed.pulses}"
     try:
         channel = find_speed(recording, tuple(taken), profile, "the recording")
     except RecordError:

@@ -13,11 +13,12 @@ import numpy as np
 from rotordrop.errors import RecordError
 from rotordrop.machine import Machine
 from rotordrop.machine.sensor import Sensor
-from rotordrop.measurement.matching import displacement, find_speed, match_sensors, speed_factor
+from rotordrop.measurement.matching import displacement, find_pulses, find_speed, match_sensors, speed_factor
 from rotordrop.measurement.profile import Profile, load_profile
 from rotordrop.measurement.readers import read_recording
-from rotordrop.measurement.recording import Array, Channel, Recording
+from rotordrop.measurement.recording import MARKS, Array, Channel, Recording
 from rotordrop.measurement.speed import readings_of_held_signal
+from rotordrop.measurement.tacho import Passages, passages
 from rotordrop.measurement.writers import recording_of, write_hdf5
 from rotordrop.units import format_quantity, parse_quantity
 
@@ -53,6 +54,8 @@ class Record:
     speed_by_hand : bool
         Whether somebody gave the speed: it then holds until the magnetic bearings let go, and nothing is
         known of it afterwards.
+    marks : array, shape (M,), optional
+        When a mark of the shaft passed the keyphasor [s]: the rotor angle there is a whole number of turns.
     path : Path, optional
         Where the record comes from.
     sha256 : str
@@ -73,6 +76,7 @@ class Record:
     speed_time: Array | None = None
     speed_readings: Array | None = None
     speed_by_hand: bool = False
+    marks: Array | None = None
     path: Path | None = None
     sha256: str = ""
     metadata: Mapping[str, str] = field(default_factory=dict)
@@ -86,7 +90,7 @@ class Record:
                 f"signals have the shape {self.signals.shape}; {shape[0]} times and {shape[1]} sensors need "
                 f"{shape}"
             )
-        for array in (self.time, self.signals, self.speed, self.speed_time, self.speed_readings):
+        for array in (self.time, self.signals, self.speed, self.speed_time, self.speed_readings, self.marks):
             if array is not None:
                 array.setflags(write=False)
 
@@ -197,7 +201,8 @@ def record_of(
         ("time stamps are rounded; an even clock was put behind them",) if _repeats(matched[0].time) else ()
     )
     columns = [displacement(c, s, recording, profile, place) for c, s in zip(matched, sensors, strict=True)]
-    speed_time, speed_readings, notes = _speed(recording, matched, profile, time, place)
+    pulses = _pulses(recording, matched, profile, place)
+    speed_time, speed_readings, notes = _speed(recording, matched, profile, time, place, pulses)
     speed = None
     if speed_time is not None and speed_readings is not None:
         speed = np.interp(time, speed_time, speed_readings)
@@ -211,11 +216,12 @@ def record_of(
         speed_time=speed_time,
         speed_readings=speed_readings,
         speed_by_hand=profile.speed.constant is not None or recording.metadata.get(SPEED_SOURCE) == BY_HAND,
+        marks=_marks(recording, pulses),
         path=path,
         sha256=sha256,
         metadata=recording.metadata,
         notes=(*recording.notes, *notes, *(rounded if np.all(np.diff(time) > 0.0) else ())),
-        warnings=(*recording.warnings, *spoken),
+        warnings=(*recording.warnings, *spoken, *(pulses.warnings if pulses else ())),
     )
 
 
@@ -289,14 +295,41 @@ def _rounded_clock(time: Array) -> tuple[Array, float] | None:
     return time[0] + start * resolution + index / rate, rate
 
 
+def _pulses(
+    recording: Recording, taken: tuple[Channel, ...], profile: Profile, place: str
+) -> Passages | None:
+    channel = find_pulses(recording, taken, profile, place)
+    if channel is None:
+        return None
+    rules, where = profile.speed, f"{place}: channel {channel.label!r}"
+    return passages(
+        channel.time, channel.values, per_turn=rules.pulses_per_turn, edge=rules.edge, place=where
+    )
+
+
+def _marks(recording: Recording, pulses: Passages | None) -> Array | None:
+    """Passages of a mark: from pulses, or as a record that was saved keeps them."""
+    if pulses is not None:
+        return pulses.marks if pulses.marks.size else None
+    kept = [channel.values for channel in recording.channels if channel.name == MARKS and channel.unit == "s"]
+    return kept[0] if kept else None
+
+
 def _speed(
-    recording: Recording, taken: tuple[Channel, ...], profile: Profile, time: Array, place: str
+    recording: Recording,
+    taken: tuple[Channel, ...],
+    profile: Profile,
+    time: Array,
+    place: str,
+    pulses: Passages | None,
 ) -> tuple[Array | None, Array | None, list[str]]:
     if profile.speed.constant is not None:
         value = parse_quantity(profile.speed.constant, "speed")
         note = f"speed given by hand: {profile.speed.constant}"
         return time[[0, -1]], np.array([value, value]), [note]
     channel = find_speed(recording, taken, profile, place)
+    if channel is None and pulses is not None:
+        return pulses.time, pulses.speed, [f"shaft speed from the pulses of {profile.speed.pulses!r}"]
     if channel is None:
         return None, None, []
     when, readings = readings_of_held_signal(channel.time, channel.values)
@@ -319,6 +352,7 @@ def save_record(record: Record, path: str | Path) -> None:
         record.channel_names,
         speed_time=record.speed_time,
         speed=record.speed_readings,
+        marks=record.marks,
         metadata=metadata,
         notes=record.notes,
         warnings=record.warnings,

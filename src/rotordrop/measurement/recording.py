@@ -20,6 +20,9 @@ _UNITS = {
 }  # fmt: skip
 _LONGEST_NAME = 200
 
+MARKS = "mark_passages"
+"""Channel of a saved record that holds when a mark of the shaft passed [s]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Channel:

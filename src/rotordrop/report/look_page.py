@@ -22,7 +22,7 @@ from rotordrop.report.quantity import Quantity
 from rotordrop.report.record_quality import quality_statements, record_quality_section
 
 if TYPE_CHECKING:
-    from rotordrop.measurement.look import Look
+    from rotordrop.measurement.look import Look, Synchronous
 
 MOST_LISTED = 40
 """Impacts listed on the page; the JSON has all."""
@@ -123,7 +123,22 @@ def _card(seen: Look, number: int) -> Card:
                 value=Quantity(value=plane.velocity_index, kind="dimensionless"),
             )
         )
+    for found in seen.synchronous:
+        if found.plane == plane.plane:
+            figures += _synchronous(found)
     return Card(title=plane.plane, figures=tuple(figures))
+
+
+def _synchronous(found: Synchronous) -> list[KeyFigure]:
+    note = f"of {found.turns} turns before the release, runout of the sensors included"
+    amplitude = Quantity(
+        value=found.amplitude, kind="length", interval_90=found.amplitude_interval_90, digits=3
+    )
+    phase = Quantity(value=found.phase, kind="angle", interval_90=found.phase_interval_90, digits=3)
+    return [
+        KeyFigure(label="1X amplitude", value=amplitude, note=note),
+        KeyFigure(label="1X high spot at the mark, from +y with the spin", value=phase, note=note),
+    ]
 
 
 def _timeline(seen: Look) -> Table:

@@ -33,7 +33,7 @@ def test_everything_missing_is_asked_for_at_once(strange, tmp_path, capsys):
     for name in SENSORS:
         assert f'--channel "{name}=..."' in told.err
     assert "there are X1, Y1, X2, Y2" in told.err
-    assert '--speed-channel "..." or --speed "60 Hz"' in told.err
+    assert '--speed-channel "...", --pulses "..." or --speed "60 Hz"' in told.err
     assert "channel X1: 50 samples at 20000 Hz, 0 to 0.245 (no unit)" in told.out
     assert not profile.exists()
     options = [
@@ -86,6 +86,6 @@ def test_errors_of_a_profile_are_words(text, told, tmp_path):
 def test_the_examples_of_the_documentation_are_profiles():
     page = (Path(__file__).parents[3] / "docs" / "recorders.md").read_text(encoding="utf-8")
     examples = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
-    assert len(examples) == 5
+    assert len(examples) == 6
     for example in examples:
         profile_of(tomllib.loads(example), "example")

@@ -28,9 +28,13 @@ from rotordrop.measurement.quality.clock import check_blocks, check_clock
 from rotordrop.measurement.quality.finding import ranked
 from rotordrop.measurement.readers import read_recording
 from rotordrop.measurement.record import Record, record_of, sha256_of
+from rotordrop.measurement.synchronous import Synchronous, synchronous_motion
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
+
+BEFORE_RELEASE = 4e-3
+"""Distance from the release [s], which a look knows to about 2 ms, up to which the rotor surely floats."""
 
 INDEX_WINDOW = 0.2
 """Time from the release on over which the indices are taken [s], or to the end where that comes first."""
@@ -92,6 +96,8 @@ class Look:
         When the shaft came to rest [s].
     speed : float or None
         Shaft speed at the release [rad/s].
+    synchronous : tuple of Synchronous
+        1X before the drop against the mark of the shaft, per plane; empty without a keyphasor.
     notes : tuple of str
         What was guessed.
     """
@@ -105,6 +111,7 @@ class Look:
     planes: tuple[PlaneLook, ...]
     standstill: float | None
     speed: float | None
+    synchronous: tuple[Synchronous, ...]
     notes: tuple[str, ...]
 
     def timeline(self) -> tuple[tuple[float, str], ...]:
@@ -199,6 +206,17 @@ class Look:
                 }
                 for whirl in self.whirls
             ],
+            "synchronous": [
+                {
+                    "plane": found.plane,
+                    "amplitude_m": found.amplitude,
+                    "amplitude_interval_90_m": list(found.amplitude_interval_90),
+                    "phase_rad": found.phase,
+                    "phase_interval_90_rad": list(found.phase_interval_90),
+                    "turns": found.turns,
+                }
+                for found in self.synchronous
+            ],
             "timeline": [{"time_s": time, "event": words} for time, words in self.timeline()],
             "notes": list(self.notes),
         }
@@ -265,6 +283,7 @@ def look(
         planes=tuple(_plane_looks(motion, drops[0], turning)),
         standstill=standstill_of(read),
         speed=turning,
+        synchronous=_synchronous(read, motion, drops[0].release),
         notes=(*read.notes, *(arrangement.notes if arrangement else ()), *motion.notes),
     )
 
@@ -323,6 +342,16 @@ def _speed_at(record: Record, release: float) -> float | None:
     return abs(float(np.median(chosen)))
 
 
+def _synchronous(record: Record, motion: Motion, release: float) -> tuple[Synchronous, ...]:
+    if record.marks is None:
+        return ()
+    found = (
+        synchronous_motion(path.name, motion.time, path.position, record.marks, release - BEFORE_RELEASE)
+        for path in motion.paths
+    )
+    return tuple(one for one in found if one is not None)
+
+
 def _plane_looks(motion: Motion, drop: Drop, speed: float | None) -> list[PlaneLook]:
     during = (motion.time >= drop.release) & (motion.time <= drop.end)
     window = during & (motion.time <= drop.release + INDEX_WINDOW)
@@ -345,4 +374,4 @@ def _plane_looks(motion: Motion, drop: Drop, speed: float | None) -> list[PlaneL
     return found
 
 
-__all__ = ["Drop", "Impact", "Look", "PlaneLook", "Whirl", "look"]
+__all__ = ["Drop", "Impact", "Look", "PlaneLook", "Synchronous", "Whirl", "look"]

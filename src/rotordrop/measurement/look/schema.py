@@ -6,6 +6,7 @@ from typing import Any
 
 _NUMBER = {"type": "number"}
 _MAYBE = {"type": ["number", "null"]}
+_PAIR = {"type": "array", "items": _NUMBER, "minItems": 2, "maxItems": 2}
 _TEXT = {"type": "string"}
 
 
@@ -68,6 +69,14 @@ def look_schema() -> dict[str, Any]:
             turns=_NUMBER,
             frequency_Hz=_NUMBER,
             sense={"enum": ["forward", "backward"]},
+        ),
+        synchronous=_listed(
+            plane=_TEXT,
+            amplitude_m=_NUMBER,
+            amplitude_interval_90_m=_PAIR,
+            phase_rad=_NUMBER,
+            phase_interval_90_rad=_PAIR,
+            turns=_NUMBER,
         ),
         timeline=_listed(time_s=_NUMBER, event=_TEXT),
         notes={"type": "array", "items": _TEXT},

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from rotordrop.measurement.recording import Array, Channel, Recording
+from rotordrop.measurement.recording import MARKS, Array, Channel, Recording
 from rotordrop.measurement.writers.delimited import write_delimited
 from rotordrop.measurement.writers.hdf5 import write_hdf5
 
@@ -18,6 +18,7 @@ def recording_of(
     *,
     speed_time: Array | None = None,
     speed: Array | None = None,
+    marks: Array | None = None,
     metadata: Mapping[str, str] | None = None,
     notes: tuple[str, ...] = (),
     warnings: tuple[str, ...] = (),
@@ -34,6 +35,8 @@ def recording_of(
         Names of the channels.
     speed_time, speed : array, shape (K,), optional
         When the speed was read [s] and what was read [rad/s].
+    marks : array, shape (M,), optional
+        When a mark of the shaft passed [s].
     metadata : mapping of str to str, optional
         Header entries.
     notes, warnings : tuple of str
@@ -46,6 +49,8 @@ def recording_of(
     if speed is not None and speed_time is not None:
         turns = np.asarray(speed) / (2 * np.pi)
         channels.append(Channel(name="speed", label="speed", unit="Hz", values=turns, time=speed_time))
+    if marks is not None:
+        channels.append(Channel(name=MARKS, label=MARKS, unit="s", values=marks, time=marks))
     return Recording(channels=tuple(channels), metadata=dict(metadata or {}), notes=notes, warnings=warnings)
 
 

@@ -1,0 +1,104 @@
+"""The synchronous motion before a drop against the mark of the shaft: amplitude and phase of 1X."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from rotordrop.measurement.recording import Array
+
+FEWEST_TURNS = 4
+"""Turns from which the scatter between them gives an interval [1]."""
+
+CONFIDENCE = 0.95
+"""Quantile of Student's t of a two-sided 90 % interval [1]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Synchronous:
+    """1X of a plane: the circle that runs with the spin, electrical runout included.
+
+    Attributes
+    ----------
+    plane : str
+        Plane of the sensors.
+    amplitude : float
+        Radius of the circle [m].
+    phase : float
+        Direction of the high spot when the mark passes, from +y, positive with the spin [rad].
+    amplitude_interval_90, phase_interval_90 : tuple of float
+        90 % intervals from the scatter between turns [m], [rad]; the phase that of the whole circle where
+        the amplitude is within its noise.
+    turns : int
+        Turns used [1].
+    """
+
+    plane: str
+    amplitude: float
+    phase: float
+    amplitude_interval_90: tuple[float, float]
+    phase_interval_90: tuple[float, float]
+    turns: int
+
+
+def synchronous_motion(
+    plane: str, time: Array, position: Array, marks: Array, until: float
+) -> Synchronous | None:
+    """Amplitude and phase of 1X before a drop.
+
+    Parameters
+    ----------
+    plane : str
+        Name of the plane.
+    time : array, shape (N,)
+        Time [s].
+    position : array, shape (N, 2)
+        Path of the shaft [m], (x, y).
+    marks : array, shape (M,)
+        When the mark passed [s].
+    until : float
+        End of the levitated part [s].
+
+    Returns
+    -------
+    Synchronous or None
+        None where too few turns lie before the drop.
+    """
+    usual = float(np.median(np.diff(marks)))
+    per_turn = [
+        _turn(time, position, begin, end)
+        for begin, end in pairwise(marks)
+        if begin >= time[0] and end <= until and end - begin < 1.5 * usual
+    ]
+    if len(per_turn) < FEWEST_TURNS:
+        return None
+    from scipy.stats import t
+
+    vectors = np.array(per_turn)
+    mean, n = complex(np.mean(vectors)), len(vectors)
+    # along and across the mean vector: the one is the error of the amplitude, the other that of the phase
+    turned = vectors * np.conj(mean) / max(abs(mean), 1e-300)
+    wide = float(t.ppf(CONFIDENCE, n - 1)) / math.sqrt(n)
+    along, across = wide * float(np.std(turned.real, ddof=1)), wide * float(np.std(turned.imag, ddof=1))
+    phase = math.remainder(math.atan2(mean.imag, mean.real) - 0.5 * math.pi, 2.0 * math.pi)
+    spread = math.asin(across / abs(mean)) if across < abs(mean) else math.pi
+    return Synchronous(
+        plane=plane,
+        amplitude=abs(mean),
+        phase=phase,
+        amplitude_interval_90=(max(abs(mean) - along, 0.0), abs(mean) + along),
+        phase_interval_90=(phase - spread, phase + spread),
+        turns=n,
+    )
+
+
+def _turn(time: Array, position: Array, begin: float, end: float) -> complex:
+    """Forward 1X of one turn: the mean of the path, turned back with the shaft."""
+    inside = (time >= begin) & (time < end)
+    angle = 2.0 * np.pi * (time[inside] - begin) / (end - begin)
+    design = np.column_stack([np.exp(1j * angle), np.exp(-1j * angle), np.ones(len(angle))])
+    path = position[inside, 0] + 1j * position[inside, 1]
+    return complex(np.linalg.lstsq(design, path, rcond=None)[0][0])
