@@ -46,6 +46,7 @@ _NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO, errno.EBADF)
 _ORDER = (
     "init",
     "schema",
+    "bearings",
     "check",
     "simulate",
     "critical-speeds",

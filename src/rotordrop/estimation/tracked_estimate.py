@@ -39,6 +39,7 @@ from rotordrop.estimation.tracked_parameters import (
     parameters,
     sensor_errors,
 )
+from rotordrop.model.inferred_balls import inferred_stress_sigma
 from rotordrop.tracking.consistency import NIS_RANGE, Check
 from rotordrop.tracking.input_state import (
     InputEstimate,
@@ -208,7 +209,7 @@ def _bearings(drop: TrackedDrop, judged: _Judgement) -> tuple[BearingDrop, ...]:
 
 
 def _loads(drop: TrackedDrop, judged: _Judgement, b: int) -> Loads:
-    twin = twin_loads(drop.forces, b, judged.widening)
+    twin = _twin(drop, judged, b)
     if judged.fits or judged.check is None:
         return twin
     if judged.given_way[b]:
@@ -216,12 +217,17 @@ def _loads(drop: TrackedDrop, judged: _Judgement, b: int) -> Loads:
     return holding_cross_check(twin, drop.forces, judged.check, b)
 
 
+def _twin(drop: TrackedDrop, judged: _Judgement, b: int) -> Loads:
+    bearing = drop.problem.model.machine.touchdown_bearings[b].bearing
+    return twin_loads(drop.forces, b, judged.widening, inferred_stress_sigma(bearing))
+
+
 def _comparisons(drop: TrackedDrop, judged: _Judgement) -> tuple[CrossCheck, ...]:
     if judged.check is None:
         return ()
     found: list[CrossCheck] = []
     for b, name in enumerate(drop.problem.model.bearing_names):
-        twin = twin_loads(drop.forces, b, judged.widening)
+        twin = _twin(drop, judged, b)
         found += cross_checks(name, twin, drop.forces, judged.check, b, replaced=judged.given_way[b])
     return tuple(found)
 

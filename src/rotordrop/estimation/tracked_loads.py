@@ -83,13 +83,17 @@ def with_interval(value: float, sigma: float, widening: float = 1.0, unit: str =
     )
 
 
-def twin_loads(forces: ForceHistory, b: int, widening: float) -> Loads:
-    """Force and stress of one bearing as the twin has them; bands are as wide as the stated intervals."""
+def twin_loads(forces: ForceHistory, b: int, widening: float, ball_sigma: float = 0.0) -> Loads:
+    """Force and stress of one bearing as the twin has them; bands are as wide as the stated intervals.
+
+    ``ball_sigma`` is the relative standard deviation of the stress by balls inferred from a designation [1].
+    """
     force, force_sigma = _history(forces, forces.magnitude, forces.magnitude_sigma, b, MODEL_FORCE_SIGMA)
-    stress, stress_sigma = _history(forces, forces.stress, forces.stress_sigma, b, MODEL_STRESS_SIGMA)
+    model_sigma = math.hypot(MODEL_STRESS_SIGMA, ball_sigma)
+    stress, stress_sigma = _history(forces, forces.stress, forces.stress_sigma, b, model_sigma)
     mean_stress = float(np.mean(stress.values))
     spread = float(np.mean(forces.stress_sigma[:, b]))
-    sigma = math.hypot(spread, MODEL_MEAN_STRESS_SIGMA * mean_stress)
+    sigma = math.hypot(spread, math.hypot(MODEL_MEAN_STRESS_SIGMA, ball_sigma) * mean_stress)
     means = {"mean_stress_Pa": with_interval(mean_stress, sigma, widening, "Pa")}
     late_mean = mean_late(force)
     if late_mean is not None:

@@ -61,7 +61,8 @@ class BallBearing(Description):
     Attributes
     ----------
     designation : str, optional
-        Designation in the catalogue, for example "XCB71914-E".
+        Designation, for example "XCB71914-E"; where no maker's list in the catalogue has it, the balls are
+        inferred from its size.
     ball_diameter, pitch_diameter : Estimated
         Ball diameter D_w and pitch diameter D_pw [m].
     ball_count : int
@@ -94,12 +95,14 @@ class BallBearing(Description):
         Width of one row [m].
     limiting_speed : Estimated, optional
         Speed up to which the maker allows the bearing [rad/s].
-    static_load_rating : Estimated, optional
-        Static load rating C_0 of one row [N].
+    static_load_rating, dynamic_load_rating : Estimated, optional
+        Static and dynamic load rating C_0 and C of one row [N]; they narrow balls that are inferred.
+    ball_count_range : tuple of int, optional
+        90 % interval of the number of balls, where it is inferred.
     """
 
     designation: Text | None = Field(
-        default=None, description="Designation in the catalogue, such as XCB71914-E"
+        default=None, description="Designation, such as XCB71914-E, 7016 ACD/HCP4A or 6016-2Z/C3"
     )
     ball_diameter: PositiveLength = follows("reconstructed from the catalogue")
     ball_count: Annotated[int, Strict(), Field(ge=3)] = Field(
@@ -133,6 +136,12 @@ class BallBearing(Description):
     limiting_speed: PositiveSpeed | None = Field(default=None, description="Highest speed the maker allows")
     static_load_rating: PositiveForce | None = Field(
         default=None, description="Static load rating of one row"
+    )
+    dynamic_load_rating: PositiveForce | None = Field(
+        default=None, description="Dynamic load rating of one row"
+    )
+    ball_count_range: tuple[int, int] | None = Field(
+        default=None, description="90 % interval of the balls per row where they are inferred"
     )
 
     displaces: ClassVar[Mapping[str, tuple[str, ...]]] = {
@@ -186,13 +195,18 @@ class BallBearing(Description):
             )
         if self.preload_class is not None:
             self._check_preload_class(catalogued)
-        elif catalogued is None and "preload" not in self.model_fields_set and not self._has_clearance():
+        elif not self._has_preload(catalogued) and not self._has_clearance(catalogued):
             raise Misfit(
                 'the bearing has no \'preload\'; write for example preload = "100 N", or clearance = "12 um"'
             )
 
-    def _has_clearance(self) -> bool:
-        return not self.model_fields_set.isdisjoint(_CLEARANCE)
+    def _has_preload(self, entry: CatalogueBearing | None) -> bool:
+        return "preload" in self.model_fields_set or (entry is not None and bool(entry.preload))
+
+    def _has_clearance(self, entry: CatalogueBearing | None = None) -> bool:
+        """Whether the rows have play: a clearance is given, or the grooves are deep."""
+        given = not self.model_fields_set.isdisjoint(_CLEARANCE)
+        return given or (entry is not None and entry.kind == "deep groove")
 
     def _needed(self) -> tuple[str, ...]:
         """What a bearing outside the catalogue must say of itself; a clearance leaves it a contact angle."""
@@ -203,7 +217,7 @@ class BallBearing(Description):
             raise Misfit(
                 "the preload is given both as a force and as a class; keep one of them", ("preload",)
             )
-        if catalogued is None:
+        if catalogued is None or not catalogued.preload:
             raise Misfit(
                 f"preload = {self.preload_class!r} needs a 'designation' that is in the catalogue; "
                 'give the force, for example preload = "100 N"',
@@ -218,8 +232,13 @@ class BallBearing(Description):
         described = all(name in known for name in self._needed()) and (
             "preload" in known or self._has_clearance()
         )
+        ratings = {
+            name: getattr(self, name).value
+            for name in ("static_load_rating", "dynamic_load_rating")
+            if name in known
+        }
         try:
-            return find_bearing(self.designation)
+            return find_bearing(self.designation, **ratings)
         except LookupError as error:
             if described:
                 return None
@@ -242,11 +261,11 @@ class BallBearing(Description):
             material = self.ball_material
         for name, (value, unit) in _BALL_MATERIALS[material].items():
             values[name] = Estimated(value=value, status="default", source=f"balls of {material}", unit=unit)
-        if self._has_clearance():
+        if self._has_clearance(entry):
             values |= self._of_clearance(entry)
         given = values | {name: getattr(self, name) for name in self.model_fields_set}
         self._check_fill(given)
-        if self._has_clearance():
+        if self._has_clearance(entry):
             _check_play(given)
         return {name: value for name, value in values.items() if name not in self.model_fields_set}
 
@@ -259,13 +278,17 @@ class BallBearing(Description):
         if entry is None and "contact_angle" not in self.model_fields_set:
             why = "deep grooves: the angle under load follows from the clearance"
             values["contact_angle"] = Estimated(value=0.0, status="default", source=why, unit="rad")
-        if self.clearance_class is not None:
+        preloaded = self.preload_class is not None or "preload" in self.model_fields_set
+        if entry is not None and entry.kind == "deep groove" and not preloaded:
+            values["arrangement"] = "single"
+        if self.clearance_class is not None or "clearance" not in self.model_fields_set:
             values["clearance"] = self._clearance_of_class(entry)
         return values
 
     def _clearance_of_class(self, entry: CatalogueBearing | None) -> Estimated:
-        group = self.clearance_class
-        if group is None or "clearance" in self.model_fields_set:
+        said = entry.read.clearance_class if entry is not None and entry.read is not None else None
+        group = self.clearance_class or said or "CN"
+        if "clearance" in self.model_fields_set:
             raise Misfit("the clearance is given both as a length and as a class; keep one", ("clearance",))
         bore = self.bore_diameter.value if self.bore_diameter else entry.bore if entry else None
         if bore is None:
@@ -287,17 +310,20 @@ class BallBearing(Description):
 
     def _from_catalogue(self, entry: CatalogueBearing) -> dict[str, Any]:
         complement = entry.complement
-        preload_class = self.preload_class or "light"
-        status: Literal["default", "inferred"] = "default" if self.preload_class is None else "inferred"
-        why = f"{entry.maker} catalogue, {preload_class} preload of {entry.designation}"
-        return _inferred(entry, complement) | {
-            "preload": Estimated(
-                value=entry.preload[preload_class],
-                status=status,
-                source=why,
-                unit="N",
-            )
-        }
+        said = entry.read.preload_class if entry.read is not None else None
+        preload_class = self.preload_class or said or "light"
+        values = _inferred(entry, complement)
+        if entry.read is not None and entry.read.arrangement is not None:
+            values["arrangement"] = entry.read.arrangement
+        if not entry.preload:
+            return values
+        status: Literal["default", "inferred"] = "inferred" if self.preload_class or said else "default"
+        force = entry.preload[preload_class]
+        why, bounds = f"{entry.maker} catalogue, {preload_class} preload of {entry.designation}", None
+        if entry.preload_basis:
+            why, bounds = f"{preload_class} preload {entry.preload_basis}", (0.5 * force, 2.0 * force)
+        values["preload"] = Estimated(value=force, status=status, range=bounds, source=why, unit="N")
+        return values
 
     @staticmethod
     def _check_fill(values: dict[str, Any]) -> None:
@@ -316,7 +342,8 @@ class BallBearing(Description):
         """Say why a value that was left out is what it is."""
         entry = self.catalogue_entry()
         if entry is not None and name in ("ball_count", "ball_material"):
-            return entry.complement.basis if name == "ball_count" else f"{entry.maker} catalogue"
+            listed = f"{entry.maker} catalogue" if entry.listed else "the designation"
+            return entry.complement.basis if name == "ball_count" else listed
         return super().reason(name)
 
 
@@ -359,23 +386,29 @@ def _check_play(values: dict[str, Any]) -> None:
 
 
 def _inferred(entry: CatalogueBearing, complement: BallComplement) -> dict[str, Any]:
-    """What the catalogue gives or lets infer of the geometry."""
-    listed = f"{entry.maker} catalogue, {entry.designation}"
+    """What the catalogue, or a size alone, gives or lets infer of the geometry."""
+    listed = f"{entry.maker} catalogue, {entry.designation}" if entry.listed else "ISO 15"
     lengths = (
-        ("ball_diameter", complement.ball_diameter, complement.basis),
-        ("pitch_diameter", complement.pitch_diameter, complement.basis),
-        ("width", entry.width, listed),
+        ("ball_diameter", complement.ball_diameter, complement.diameter_range, complement.basis),
+        ("pitch_diameter", complement.pitch_diameter, None, complement.basis),
+        ("bore_diameter", entry.bore, None, listed),
+        ("width", entry.width, None, listed),
     )
     values: dict[str, Any] = {
-        name: Estimated(value=value, status="inferred", source=why, unit="m")
-        for name, value, why in lengths
+        name: Estimated(value=value, status="inferred", range=bounds, source=why, unit="m")
+        for name, value, bounds, why in lengths
         if value is not None
     }
     for race in ("inner", "outer"):
         values[f"conformity_{race}"] = Estimated(
-            value=complement.conformity, status="inferred", source=complement.basis
+            value=complement.conformity,
+            status="inferred",
+            range=complement.conformity_range,
+            source=complement.basis,
         )
-    values["contact_angle"] = Estimated(
-        value=entry.contact_angle, status="inferred", source=listed, unit="rad"
-    )
+    angle, angles = entry.contact_angle, entry.contact_angle_range
+    why = f"{listed}; the designation does not say it" if angles else f"{listed}, the designation"
+    values["contact_angle"] = Estimated(value=angle, status="inferred", range=angles, source=why, unit="rad")
+    if complement.count_range is not None:
+        values["ball_count_range"] = complement.count_range
     return values | {"ball_count": complement.ball_count, "ball_material": entry.ball_material}

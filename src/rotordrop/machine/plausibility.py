@@ -88,7 +88,7 @@ def _damping(bearing: TouchdownBearing) -> Iterator[Doubt]:
 
 def _preload(bearing: TouchdownBearing) -> Iterator[Doubt]:
     entry = bearing.bearing.catalogue_entry()
-    if entry is None:
+    if entry is None or not entry.preload:
         return
     preload, heavy = bearing.bearing.preload.value, entry.preload["heavy"]
     if preload > heavy:

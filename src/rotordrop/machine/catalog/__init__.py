@@ -1,5 +1,6 @@
 """Bearings by designation: catalogue values, and ball complements where the maker does not publish them."""
 
+from rotordrop.machine.catalog.designation import Designation, read_designation
 from rotordrop.machine.catalog.lookup import (
     BallComplement,
     CatalogueBearing,
@@ -7,6 +8,17 @@ from rotordrop.machine.catalog.lookup import (
     ball_size,
     designations,
     find_bearing,
+    search_bearings,
 )
 
-__all__ = ["BallComplement", "CatalogueBearing", "PreloadClass", "ball_size", "designations", "find_bearing"]
+__all__ = [
+    "BallComplement",
+    "CatalogueBearing",
+    "Designation",
+    "PreloadClass",
+    "ball_size",
+    "designations",
+    "find_bearing",
+    "read_designation",
+    "search_bearings",
+]

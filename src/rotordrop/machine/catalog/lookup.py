@@ -1,18 +1,29 @@
-"""Find a bearing by its designation."""
+"""Find a bearing by its designation: as its maker lists it, else inferred from its size."""
 
 from __future__ import annotations
 
 import json
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import lru_cache
 from importlib.resources import files
 from typing import Any, Literal
 
+from rotordrop.estimated import NINETY
+from rotordrop.machine.catalog.boundary import DIMENSION_SERIES, boundary_dimensions, known_bores
+from rotordrop.machine.catalog.designation import Designation, Kind, read_designation
+from rotordrop.machine.catalog.inference import infer_balls
+
 PreloadClass = Literal["light", "medium", "heavy"]
 _CLASSES: tuple[PreloadClass, ...] = ("light", "medium", "heavy")
+_UNSAID_ANGLE, _UNSAID_ANGLES = math.radians(25.0), (math.radians(15.0), math.radians(30.0))
+_PRELOAD_FACTOR = 2.0
+"""What the preload of a class of one maker is known to from that of others."""
+_FAMILIES = ("B", "HCB", "XCB", "HS", "HC", "XC")
+_HYBRID_PRELOAD = 0.6
+"""Preload of hybrid over steel bearings of one class in the catalogue [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,6 +40,10 @@ class BallComplement:
         Groove radius over ball diameter of both races [1].
     basis : str
         What the numbers rest on.
+    count_range : tuple of int, optional
+        90 % interval of the balls per row, where they are inferred.
+    diameter_range, conformity_range : tuple of float, optional
+        90 % intervals of D_w [m] and of the conformity [1], where they are inferred.
     """
 
     ball_count: int
@@ -36,6 +51,9 @@ class BallComplement:
     pitch_diameter: float
     conformity: float
     basis: str
+    count_range: tuple[int, int] | None = None
+    diameter_range: tuple[float, float] | None = None
+    conformity_range: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,6 +76,16 @@ class CatalogueBearing:
         "steel" or "silicon nitride".
     complement : BallComplement
         Balls of one row.
+    kind : {"deep groove", "angular contact"}
+        Whether the grooves have shoulders on both sides.
+    contact_angle_range : tuple of float, optional
+        Angles [rad] it may have where the designation does not say it.
+    listed : bool
+        Whether its maker's list is in the catalogue; False where size and balls follow from the designation.
+    preload_basis : str
+        What the preloads rest on, where they are not its maker's.
+    read : Designation, optional
+        What the designation said, where it was not found in a maker's list.
     """
 
     maker: str
@@ -71,26 +99,177 @@ class CatalogueBearing:
     lift_off: dict[PreloadClass, float]
     ball_material: Literal["steel", "silicon nitride"]
     complement: BallComplement
+    kind: Kind = "angular contact"
+    contact_angle_range: tuple[float, float] | None = None
+    listed: bool = True
+    preload_basis: str = ""
+    read: Designation | None = None
 
 
-def find_bearing(designation: str) -> CatalogueBearing:
-    """Find a bearing by designation; suffixes of cage and accuracy may be left out.
+@lru_cache(maxsize=256)
+def find_bearing(
+    designation: str,
+    *,
+    static_load_rating: float | None = None,
+    dynamic_load_rating: float | None = None,
+) -> CatalogueBearing:
+    """Find a bearing by designation, however it is written.
+
+    A bearing of the catalogue comes with the numbers of its maker. Of any other of the series 60, 62, 618,
+    619, 70, 72, 718 and 719 the boundary dimensions are those of ISO 15 and the balls are inferred from them
+    and from the load ratings [N] where these are given.
 
     Raises
     ------
     LookupError
-        When the catalogue does not hold it; the message names the nearest designations.
+        When neither is possible; the message names the nearest designations.
     """
     found = _index().get(_key(designation))
-    if found is None:
-        close = get_close_matches(_key(designation), list(_index()), 3, 0.7)
-        nearest = ", ".join(_index()[key].designation for key in close)
-        hint = f"did you mean one of {nearest}?" if close else "no designation is similar."
-        raise LookupError(
-            f"the catalogue holds no bearing {designation!r}; {hint} Else give the geometry: "
-            "'ball_diameter', 'ball_count', 'pitch_diameter', 'contact_angle' and a 'preload' in N"
+    if found is not None:
+        return found
+    read = read_designation(designation)
+    if read is None:
+        raise LookupError(_unknown(designation, _nearest(designation)))
+    listed = _index().get(_key(_listed_name(read)))
+    if listed is not None:
+        return replace(listed, read=read)
+    if _is_mistyped(read):
+        raise LookupError(_unknown(designation, _nearest(designation)))
+    return infer_from_designation(read, static_load_rating, dynamic_load_rating)
+
+
+def search_bearings(text: str) -> list[CatalogueBearing]:
+    """Bearings that a designation may mean: the one of that name first, then those of its size."""
+    try:
+        first = [find_bearing(text)]
+    except LookupError:
+        first = []
+    read = read_designation(text)
+    if read is None:
+        return first or [_index()[_key(name)] for name in _nearest(text)]
+    size = boundary_dimensions(read.series, read.bore)
+    same = [b for b in _index().values() if size and _is_of_size(b, read.bore, size[0])]
+    return first + [b for b in same if not first or b.designation != first[0].designation]
+
+
+def _is_mistyped(read: Designation) -> bool:
+    """Whether a bearing of a family of the catalogue goes on with letters that are no contact angle."""
+    family = re.sub(r"^(H[CS]|XC)S$", r"\1", read.prefix)
+    return family in _FAMILIES and read.contact_angle is None and read.goes_on
+
+
+def _nearest(designation: str) -> list[str]:
+    close = get_close_matches(_key(designation), list(_index()), 3, 0.7)
+    return [_index()[key].designation for key in close]
+
+
+def _unknown(designation: str, nearest: list[str], why: str = "") -> str:
+    hint = f"did you mean one of {', '.join(nearest)}?" if nearest else "no designation is similar."
+    return (
+        f"the catalogue holds no bearing {designation!r}{why}; {hint} Else give the geometry: "
+        "'ball_diameter', 'ball_count', 'pitch_diameter', 'contact_angle' and a 'preload' in N"
+    )
+
+
+def _listed_name(read: Designation) -> str:
+    """The name under which a maker of the catalogue would list it: family, size and letter of the angle."""
+    letter = {15: "C", 25: "E"}.get(round(math.degrees(read.contact_angle or 0.0)), "")
+    prefix = re.sub(r"^(H[CS]|XC)S$", r"\1", read.prefix)
+    if (
+        not letter and read.prefix == "S"
+    ):  # spindle bearing of the maker that writes S; its letter was left out
+        letter = next((c for c in "EC" if _key(f"S{read.basic}{c}") in _index()), "")
+    return f"{prefix}{read.basic}{letter}"
+
+
+def infer_from_designation(
+    read: Designation, static: float | None = None, dynamic: float | None = None
+) -> CatalogueBearing:
+    """A bearing of which only the designation, and perhaps its load ratings [N], are known."""
+    size = boundary_dimensions(read.series, read.bore)
+    if size is None:
+        near = sorted(known_bores(read.series), key=lambda bore: abs(bore - read.bore))[:3]
+        names = [replace(read, bore=bore).basic for bore in sorted(near)]
+        at = f"series {read.series} at a bore of {1e3 * read.bore:g} mm"
+        why = f": the boundary dimensions of {at} are not known"
+        raise LookupError(_unknown(read.written, names, why))
+    angle, angles = read.contact_angle, None
+    if read.kind == "deep groove":
+        angle = 0.0
+    elif angle is None:
+        angle, angles = _UNSAID_ANGLE, _UNSAID_ANGLES
+    balls = infer_balls(
+        kind=read.kind,
+        dimension_series=DIMENSION_SERIES[read.series],
+        bore=read.bore,
+        outside_diameter=size[0],
+        contact_angle=angle,
+        small_balls=read.balls == "small",
+        static_load_rating=static,
+        dynamic_load_rating=dynamic,
+    )
+    preload, basis = _usual_preload(read, size[0], angle)
+    middle, sigma = balls.conformity
+    return CatalogueBearing(
+        maker=read.maker or "ISO 15",
+        designation=read.written,
+        bore=read.bore,
+        outside_diameter=size[0],
+        width=size[1],
+        contact_angle=angle,
+        preload=preload,
+        axial_rigidity={},
+        lift_off={},
+        ball_material="silicon nitride" if read.hybrid else "steel",
+        complement=BallComplement(
+            ball_count=balls.ball_count,
+            ball_diameter=balls.ball_diameter,
+            pitch_diameter=balls.pitch_diameter,
+            conformity=middle,
+            basis=balls.basis,
+            count_range=balls.count_range,
+            diameter_range=balls.diameter_range,
+            conformity_range=(middle - NINETY * sigma, middle + NINETY * sigma),
+        ),
+        kind=read.kind,
+        contact_angle_range=angles,
+        listed=False,
+        preload_basis=basis,
+        read=read,
+    )
+
+
+def _usual_preload(read: Designation, outside: float, angle: float) -> tuple[dict[PreloadClass, float], str]:
+    """Preloads [N] of the listed bearings of that size, carried to its angle and balls; empty without any."""
+    same = [
+        b
+        for b in _index().values()
+        if _is_of_size(b, read.bore, outside) and ball_size(b.designation) == read.balls
+    ]
+    if read.kind == "deep groove" or not same:
+        return {}, ""
+    factors = [
+        math.sin(angle)
+        / math.sin(b.contact_angle)
+        * (
+            1.0
+            if read.hybrid == (b.ball_material != "steel")
+            else _HYBRID_PRELOAD ** (1 if read.hybrid else -1)
         )
-    return found
+        for b in same
+    ]
+    preload = {
+        name: math.exp(
+            sum(math.log(f * b.preload[name]) for f, b in zip(factors, same, strict=True)) / len(same)
+        )
+        for name in _CLASSES
+    }
+    names = ", ".join(b.designation for b in same[:3]) + (" and others" if len(same) > 3 else "")
+    return preload, f"carried over from listed bearings of the same size ({names}), within a factor of two"
+
+
+def _is_of_size(bearing: CatalogueBearing, bore: float, outside: float) -> bool:
+    return abs(bearing.bore - bore) < 1e-6 and abs(bearing.outside_diameter - outside) < 1e-6
 
 
 def designations() -> tuple[str, ...]:
@@ -99,6 +278,7 @@ def designations() -> tuple[str, ...]:
 
 
 def _key(designation: str) -> str:
+    """Letters and digits, without cage, accuracy and universal matching."""
     plain = re.sub(r"[^A-Z0-9]", "", designation.upper())
     return re.sub(r"(T?P4S?|TA)(UL|DUL)?$", "", plain)
 
@@ -178,5 +358,5 @@ def _gmn(row: dict[str, Any]) -> CatalogueBearing:
 
 
 def ball_size(designation: str) -> Literal["small", "standard"]:
-    """Size of the balls of a FAG series: HS, HC and XC have small ones, B, HCB and XCB standard ones."""
-    return "small" if re.match(r"HS|[HX]C\d", designation) else "standard"
+    """Size of the balls of a series: HS, HC, XC of FAG and KH of GMN have small ones, all others standard."""
+    return "small" if re.match(r"HS|[HX]C\d|(HY ?)?KH", designation) else "standard"
