@@ -53,6 +53,7 @@ _ORDER = (
     "coast-down",
     "profile",
     "look",
+    "split",
     "clearance",
     "estimate",
     "serve",

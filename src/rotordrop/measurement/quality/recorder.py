@@ -137,7 +137,7 @@ def check_again(record: Record) -> list[Finding]:
             kind="second drop",
             message=f"the rotor was lifted at {drops[0].end:.6g} s and dropped again at "
             f"{drops[1].release:.6g} s ({len(drops)} drops)",
-            remedy="cut the record before the rotor is lifted, and give each drop as a record of its own",
+            remedy="cut it into a record for each drop with 'rotordrop split MACHINE RECORD -o FOLDER'",
             severity="stop",
             time=drops[1].release,
         )
