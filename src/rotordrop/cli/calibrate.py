@@ -38,6 +38,10 @@ def calibrate(
     profile: Annotated[
         Path | None, typer.Option("--profile", metavar="FILE", help="Channel map of the recorder.")
     ] = None,
+    tail_profile: Annotated[
+        Path | None,
+        typer.Option("--tail-profile", metavar="FILE", help="Channel map of the recorder of the tails."),
+    ] = None,
     even_if_inconsistent: Annotated[
         bool,
         typer.Option(
@@ -59,7 +63,8 @@ def calibrate(
     require_own_content(records)
     description = load_machine(machine)
     read = [read_record(path, description, profile=profile) for path in records]
-    tails = tails_of(tail or [], len(read), lambda path: read_record(path, description, profile=profile))
+    of_tails = tail_profile or profile
+    tails = tails_of(tail or [], len(read), lambda path: read_record(path, description, profile=of_tails))
     for record, rest in zip(read, tails, strict=True):
         refuse_unusable(check_record(record, description, rest), record.name)
     with progress_bar("calibrating") as report:

@@ -51,6 +51,10 @@ def estimate(
     profile: Annotated[
         Path | None, typer.Option("--profile", metavar="FILE", help="Channel map of the recorder.")
     ] = None,
+    tail_profile: Annotated[
+        Path | None,
+        typer.Option("--tail-profile", metavar="FILE", help="Channel map of the recorder of the tails."),
+    ] = None,
     report: Annotated[
         Path | None,
         typer.Option("--report", metavar="FILE", help="Write the report, one offline HTML file per drop."),
@@ -74,7 +78,8 @@ def estimate(
     reports = _report_places(report, records)
     require_places(json, *reports)
     read = [read_record(path, description, profile=profile) for path in records]
-    tails = tails_of(tail or [], len(read), lambda path: read_record(path, description, profile=profile))
+    of_tails = tail_profile or profile
+    tails = tails_of(tail or [], len(read), lambda path: read_record(path, description, profile=of_tails))
     chosen = Tracked(quick=quick) if method is Method.tracked else Replay(fixed=fixed)
     with progress_bar("estimating") as progress:
         estimates = estimate_drops(description, read, tails, method=chosen, progress=progress)
