@@ -1,4 +1,4 @@
-"""Coefficients of the polynomials in `rotordrop.physics.elementary`, computed to 60 digits.
+"""Coefficients of the polynomials in `rotordrop.physics.elementary_tables`, computed to 60 digits.
 
 Each is the polynomial of least largest relative error of one function on one interval, found by Remez'
 exchange algorithm; the coefficients are then rounded to doubles. ``python tools/minimax.py`` prints what
@@ -22,14 +22,21 @@ def series(terms: Callable[[int], mp.mpf], count: int = 40) -> Function:
 
 
 WANTED: dict[str, tuple[Function, mp.mpf, mp.mpf, int]] = {
-    "EXP": (series(lambda k: 1 / mp.factorial(k + 2)), -mp.log(2) / 2, mp.log(2) / 2, 10),
+    "EXP": (series(lambda k: 1 / mp.factorial(k + 2)), -mp.log(2) / 256, mp.log(2) / 256, 3),
+    "LOG2": (
+        series(lambda k: (-1) ** (k + 1) * mp.log(2) ** (k + 1) / (k + 2)),
+        -1 / (256 * mp.log(2)),
+        1 / (256 * mp.log(2)),
+        4,
+    ),
     "ATANH": (series(lambda k: mp.mpf(1) / (2 * k + 3)), mp.mpf(0), (3 - 2 * mp.sqrt(2)) ** 2, 7),
     "SIN": (series(lambda k: (-1) ** (k + 1) / mp.factorial(2 * k + 3)), mp.mpf(0), (mp.pi / 4) ** 2, 6),
     "COS": (series(lambda k: (-1) ** k / mp.factorial(2 * k + 4)), mp.mpf(0), (mp.pi / 4) ** 2, 5),
     "ATAN": (series(lambda k: (-1) ** (k + 1) / mp.mpf(2 * k + 3)), mp.mpf(0), mp.mpf(1) / 16, 9),
 }
-"""Function of the polynomial's argument, interval, degree. EXP is (eˣ − 1 − x)/x² of x; the others are, of
-z = x², (atanh x − x)/x³, (sin x − x)/x³, (cos x − 1 + z/2)/z² and (atan x − x)/x³."""
+"""Function of the polynomial's argument, interval, degree. EXP is (eˣ − 1 − x)/x² of x, LOG2 is
+(log₂(1 + x ln 2) − x)/x² of x; the others are, of z = x², (atanh x − x)/x³, (sin x − x)/x³,
+(cos x − 1 + z/2)/z² and (atan x − x)/x³."""
 
 
 def remez(f: Function, low: mp.mpf, high: mp.mpf, degree: int) -> list[mp.mpf]:

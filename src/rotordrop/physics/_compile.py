@@ -22,14 +22,14 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _MARK = "rotordrop.physics._compile import"
-_CONSTANTS = _PACKAGE / "model" / "layout.py"
-"""Compiled into the kernels as numbers though it has no kernel itself."""
+_CONSTANTS = (_PACKAGE / "model" / "layout.py", _PACKAGE / "physics" / "elementary_tables.py")
+"""Compiled into the kernels as numbers though they have no kernel themselves."""
 
 
 def _kernel_sources() -> list[Path]:
     folders = ("physics", "model", "simulation", "tracking")
     files = (file for folder in folders for file in sorted((_PACKAGE / folder).glob("*.py")))
-    return [file for file in files if file == _CONSTANTS or _MARK in file.read_text(encoding="utf-8")]
+    return [file for file in files if file in _CONSTANTS or _MARK in file.read_text(encoding="utf-8")]
 
 
 @lru_cache(maxsize=1)

@@ -6,8 +6,8 @@ last bit. After the first contact that bit grows until two drops differ visibly.
 within one unit in the last place of the exact value on the range it names (a test compares with 60
 digits). Nothing may be contracted or reassociated, which `rotordrop.physics._compile` sees to.
 
-The polynomials have the least largest relative error on their interval; ``tools/minimax.py`` computes
-them. They are summed in pairs, not by Horner's rule, because what counts is how long the last term waits.
+The polynomials of `elementary_tables` are summed in pairs, not by Horner's rule, because what counts is how
+long the last term waits. Exponential and power start from a table: a polynomial for a 128th is short.
 Where a result must keep more than a double holds, it is carried as an unevaluated sum ``high + low``.
 """
 
@@ -21,68 +21,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
+from rotordrop.physics.elementary_tables import ATAN, ATANH, COS, EXP, LOG2, LOGARITHMS, POWERS, SIN
 
 Array = NDArray[np.float64]
-
-_EXP = (
-    0.5,
-    0.1666666666666667,
-    0.041666666666666616,
-    0.00833333333332611,
-    0.0013888888888918187,
-    0.0001984126987492317,
-    2.480158724539699e-05,
-    2.7557255257429236e-06,
-    2.7557349764679505e-07,
-    2.5105280484407848e-08,
-    2.0889388025337233e-09,
-)
-_ATANH = (
-    0.3333333333333333,
-    0.20000000000000442,
-    0.14285714285399045,
-    0.11111111196463369,
-    0.09090897756980333,
-    0.07693123204870787,
-    0.06634298532292894,
-    0.06544217817121768,
-)
-_SIN = (
-    -0.16666666666666666,
-    0.008333333333333331,
-    -0.00019841269841265003,
-    2.7557319219294575e-06,
-    -2.5052106217872983e-08,
-    1.6058529427806369e-10,
-    -7.5865738041884e-13,
-)
-_COS = (
-    0.041666666666666664,
-    -0.001388888888888738,
-    2.4801587298741908e-05,
-    -2.755731726020999e-07,
-    2.087614400047863e-09,
-    -1.138247671587663e-11,
-)
-_ATAN = (
-    -0.3333333333333333,
-    0.19999999999999982,
-    -0.14285714285704634,
-    0.11111111109128637,
-    -0.09090908883819364,
-    0.07692295241795181,
-    -0.06666209496070775,
-    0.058719046534877535,
-    -0.05117227854764703,
-    0.0360180182727522,
-)
 
 _NEAREST = 6755399441055744.0
 """1.5 · 2^52: adding and subtracting it rounds to the nearest whole number."""
 
-_LOG2_E = 1.4426950408889634
 _LN2 = (0.6931471805592082, 7.371002565167799e-13)
 """ln 2 with its last bits zero, so that it times an exponent is exact, and the rest."""
+
+_STEPS_OF_TWO = 128.0
+_STEPS = 184.6649652337873
+"""128 / ln 2: steps of the table of powers in a unit of a natural exponent."""
+_STEP = (0.005415212347998022, 1.2655086083325438e-13)
+"""ln 2 / 128 in 34 bits, which times a count of steps up to 2^18 are exact, and the rest."""
+_LN2_FULL = 0.6931471805599453
 
 _TWO_OVER_PI = 0.6366197723675814
 _HALF_PI = (1.570796325802803, 9.920935739593517e-10, 5.721188709663575e-18, 1.6446256936324258e-26)
@@ -101,6 +55,9 @@ _BIAS = np.int64(1023)
 _PLACES = np.int64(52)
 _THIRD = np.int64(0x2A9F84FE36D22425)
 _LEADING = np.int64(-0x8000000)
+_IN_TABLE = np.int64(127)
+_OF_TABLE = np.int64(7)
+_BELOW_TABLE = np.int64(45)
 
 
 @inner_kernel
@@ -142,62 +99,69 @@ def _scaled(value: float, k: int) -> float:
 
 
 @inner_kernel
-def _exp_parts(x: float, low: float) -> tuple[int, float, float, float]:
-    """k, r, t and l with exp(x + low) = 2^k (1 + r + t) (1 + l).
-
-    Source: argument reduction of Cody and Waite, Software Manual for the Elementary Functions (1980), ch. 6.
-    """
-    count = (x * _LOG2_E + _NEAREST) - _NEAREST
-    exact = x - count * _LN2[0]
-    rest = count * _LN2[1]
-    r = exact - rest
-    low += (exact - r) - rest
+def _grown(r: float) -> float:
+    """The exponential less 1 + r, for |r| ≤ ln 2 / 256."""
     r2 = r * r
-    r4 = r2 * r2
-    p = (_EXP[0] + _EXP[1] * r) + (_EXP[2] + _EXP[3] * r) * r2
-    p += ((_EXP[4] + _EXP[5] * r) + (_EXP[6] + _EXP[7] * r) * r2) * r4
-    p += ((_EXP[8] + _EXP[9] * r) + _EXP[10] * r2) * (r4 * r4)
-    return int(count), r, r2 * p, low
+    return r2 * ((EXP[0] + EXP[1] * r) + (EXP[2] + EXP[3] * r) * r2)
 
 
 @inner_kernel
-def _exp_of_sum(x: float, low: float) -> float:
-    if not -708.0 < x < 709.0:
-        return _extreme_exp(x, low)
-    k, r, t, low = _exp_parts(x, low)
-    first = 1.0 + r
-    value = first + ((((1.0 - first) + r) + t) + low * (first + t))
-    bits = np.float64(value).view(np.int64) + (np.int64(k) << _PLACES)
+def _exponential(count: float, r: float) -> float:
+    """2^(count/128) exp(r) [1] for a whole count and |r| ≤ ln 2 / 256.
+
+    Source: Tang, ACM Trans. Math. Software 15 (1989) 144.
+    """
+    if not abs(count) < 130000.0:
+        return _extreme_exponential(count, r)
+    j = np.int64(count)
+    entry = POWERS[j & _IN_TABLE]
+    value = entry[0] + (entry[1] + entry[0] * (r + _grown(r)))
+    bits = np.float64(value).view(np.int64) + ((j >> _OF_TABLE) << _PLACES)
     return np.int64(bits).view(np.float64)
 
 
 @lean_kernel
-def _extreme_exp(x: float, low: float) -> float:
-    if x != x:
-        return x
-    if x > 709.8:
-        return math.inf
-    if x < -745.2:
-        return 0.0
-    k, r, t, low = _exp_parts(x, low)
-    return _scaled(1.0 + (r + (t + low)), k)
+def _extreme_exponential(count: float, r: float) -> float:
+    if count != count:
+        return count
+    if abs(count) > 140000.0:
+        return math.inf if count > 0.0 else 0.0
+    j = np.int64(count)
+    entry = POWERS[j & _IN_TABLE]
+    return _scaled(entry[0] + (entry[1] + entry[0] * (r + _grown(r))), int(j >> _OF_TABLE))
+
+
+@inner_kernel
+def _steps_and_rest(x: float) -> tuple[float, float, float]:
+    """Nearest whole number of steps ln 2 / 128 in x, and what is left [1] as high + low.
+
+    Source: argument reduction of Cody and Waite, Software Manual for the Elementary Functions (1980), ch. 6.
+    """
+    count = (x * _STEPS + _NEAREST) - _NEAREST
+    exact = x - count * _STEP[0]
+    rest = count * _STEP[1]
+    r = exact - rest
+    return count, r, (exact - r) - rest
 
 
 @lean_kernel
 def exp(x: float) -> float:
-    """Exponential [1]; inf above 709.78, 0 below −745.2. Source: `_exp_parts`."""
-    return _exp_of_sum(x, 0.0)
+    """Exponential [1]; inf above 709.78, 0 below −745.2. Source: `_exponential`."""
+    count, r, _ = _steps_and_rest(x)
+    return _exponential(count, r)
 
 
-@inner_kernel
-def _log_parts(x: float) -> tuple[float, float]:
-    """Natural logarithm of a positive finite number as high + low, to about 2^-58 of it.
+@lean_kernel
+def ln(x: float) -> float:
+    """Natural logarithm [1]; −inf of 0, NaN of a negative number.
 
-    ``log m = 2 atanh s`` with ``s = (m − 1)/(m + 1)`` and m between √½ and √2.
-    Source: Tang, ACM Trans. Math. Software 16 (1990) 378, without his table.
+    ``log m = 2 artanh s`` with ``s = (m − 1)/(m + 1)`` and m between √½ and √2, of which m − 1 is exact.
+    Source: fdlibm, e_log.c.
     """
     k = 0
-    if x < 2.2250738585072014e-308:
+    if not 2.2250738585072014e-308 <= x < math.inf:
+        if not 0.0 < x < math.inf:
+            return x if x > 0.0 or x != x else (-math.inf if x == 0.0 else math.nan)
         x *= 18014398509481984.0
         k = -54
     bits = np.float64(x).view(np.int64)
@@ -207,54 +171,67 @@ def _log_parts(x: float) -> tuple[float, float]:
         m *= 0.5
         k += 1
     f = m - 1.0
-    sum_ = m + 1.0
-    sum_low = m - (sum_ - 1.0)
-    inverse = 1.0 / sum_
-    s = f * inverse
-    product, product_low = two_product(s, sum_)
-    s_low = (((f - product) - product_low) - s * sum_low) * inverse
+    s = f / (2.0 + f)
     z = s * s
     z2 = z * z
-    p = (_ATANH[0] + _ATANH[1] * z) + (_ATANH[2] + _ATANH[3] * z) * z2
-    p += ((_ATANH[4] + _ATANH[5] * z) + (_ATANH[6] + _ATANH[7] * z) * z2) * (z2 * z2)
-    of_k = k * _LN2[0]
-    high = of_k + 2.0 * s
-    error = 2.0 * s - (high - of_k)
-    low = error + (2.0 * (s_low + s * z * p) + k * _LN2[1])
-    total = high + low
-    return total, (high - total) + low
+    p = (ATANH[0] + ATANH[1] * z) + (ATANH[2] + ATANH[3] * z) * z2
+    p += ((ATANH[4] + ATANH[5] * z) + (ATANH[6] + ATANH[7] * z) * z2) * (z2 * z2)
+    half = 0.5 * f * f
+    return k * _LN2[0] + (f - (half - (s * (half + 2.0 * z * p) + k * _LN2[1])))
+
+
+@inner_kernel
+def _ordinary_power(x: float, n: float) -> float:
+    """Power x^n [1] of a normal number.
+
+    What counts for ``exp(n log x)`` is the absolute error of the logarithm, 2^-59 at most. Its leading part
+    has so few bits that 26 bits of n times it are exact; taking whole steps from that product is exact too.
+    Source: Tang, ACM Trans. Math. Software 16 (1990) 378 and 15 (1989) 144.
+    """
+    bits = np.float64(x).view(np.int64)
+    k = (bits >> _PLACES) - _BIAS
+    entry = LOGARITHMS[(bits >> _BELOW_TABLE) & _IN_TABLE]
+    s = (np.int64((bits & _FRACTION) | _UNIT).view(np.float64) - entry[0]) * entry[1]
+    s2 = s * s
+    p = (LOG2[0] + LOG2[1] * s) + ((LOG2[2] + LOG2[3] * s) + LOG2[4] * s2) * s2
+    leading = k + entry[2]
+    t = 134217729.0 * n
+    n_high = t - (t - n)
+    first = n_high * leading
+    # The nearest step need not wait for the small terms; r may then pass half a step by a twentieth.
+    count = ((first + n * s) * _STEPS_OF_TWO + _NEAREST) - _NEAREST
+    rest = s + (entry[3] + s2 * p)
+    r = ((first - count / _STEPS_OF_TWO) + ((n - n_high) * leading + n * rest)) * _LN2_FULL
+    return _exponential(count, r)
 
 
 @lean_kernel
-def ln(x: float) -> float:
-    """Natural logarithm [1]; −inf of 0, NaN of a negative number. Source: `_log_parts`."""
-    if not 0.0 < x < math.inf:
-        return x if x > 0.0 or x != x else (-math.inf if x == 0.0 else math.nan)
-    return _log_parts(x)[0]
+def _special_power(x: float, n: float) -> float:
+    if n == 0.0:
+        return 1.0
+    if n == 1.0:
+        return x
+    if n == 2.0:
+        return x * x
+    if x == 0.0 or x == math.inf:
+        return 0.0 if (x == 0.0) == (n > 0.0) else math.inf
+    if not x > 0.0:
+        return math.nan
+    # below the smallest normal number
+    return _ordinary_power(x * 18014398509481984.0, n) * _ordinary_power(18014398509481984.0, -n)
 
 
 @lean_kernel
 def power(x: float, n: float) -> float:
     """Power x^n [1] of a number that is not negative; x √x for n = 3/2, and exact where n is 1 or 2.
 
-    The logarithm keeps 2^-58 of itself, so one unit in the last place holds for n from −16 to 16.
-    Source: ``exp(n log x)`` in double-double arithmetic.
+    One unit in the last place holds for n from −16 to 16. Source: `_ordinary_power`.
     """
     if n == 1.5:
         return x * math.sqrt(x)
-    if n == 1.0:
-        return x
-    if n == 2.0:
-        return x * x
-    if n == 0.0:
-        return 1.0
-    if not 0.0 < x < math.inf:
-        if x == 0.0 or x == math.inf:
-            return 0.0 if (x == 0.0) == (n > 0.0) else math.inf
-        return math.nan
-    high, low = _log_parts(x)
-    y, error = two_product(n, high)
-    return _exp_of_sum(y, error + n * low)
+    if not 2.2250738585072014e-308 <= x < math.inf or n == 1.0 or n == 2.0 or n == 0.0:
+        return _special_power(x, n)
+    return _ordinary_power(x, n)
 
 
 @lean_kernel
@@ -287,12 +264,16 @@ def tanh(x: float) -> float:
         return 1.0 if x > 0.0 else -1.0
     if size != size:
         return x
-    k, r, t, low = _exp_parts(2.0 * size, 0.0)
-    scale = _power_of_two(k)
+    count, r, low = _steps_and_rest(2.0 * size)
+    j = np.int64(count)
+    entry = POWERS[j & _IN_TABLE]
+    scale = _power_of_two(int(j >> _OF_TABLE))
+    # one less than the power is exact while it is below 2^53, and small where the rest is large beside it
+    above = scale * entry[0] - 1.0
+    t = _grown(r)
     head = r + t
-    tail = ((r - head) + t) + low * (1.0 + head)
-    e, e_low = two_sum(scale - 1.0, scale * head)
-    e_low += scale * tail
+    e, e_low = two_sum(above, head)
+    e, e_low = two_sum(e, e_low + (((r - head) + t + low) + (above * head + scale * entry[1] * (1.0 + head))))
     d, d_low = two_sum(e, 2.0)
     inverse = 1.0 / d
     quotient = e * inverse
@@ -331,10 +312,10 @@ def sine_cosine(x: float) -> tuple[float, float]:
     z = r * r
     z2 = z * z
     z4 = z2 * z2
-    p = (_SIN[0] + _SIN[1] * z) + (_SIN[2] + _SIN[3] * z) * z2
-    p += ((_SIN[4] + _SIN[5] * z) + _SIN[6] * z2) * z4
-    q = (_COS[0] + _COS[1] * z) + (_COS[2] + _COS[3] * z) * z2
-    q += (_COS[4] + _COS[5] * z) * z4
+    p = (SIN[0] + SIN[1] * z) + (SIN[2] + SIN[3] * z) * z2
+    p += ((SIN[4] + SIN[5] * z) + SIN[6] * z2) * z4
+    q = (COS[0] + COS[1] * z) + (COS[2] + COS[3] * z) * z2
+    q += (COS[4] + COS[5] * z) * z4
     half = 0.5 * z
     s = r + (r * z * p + low * (1.0 - half))
     head = 1.0 - half
@@ -389,9 +370,9 @@ def atan2(y: float, x: float) -> float:
     z = t * t
     z2 = z * z
     z4 = z2 * z2
-    p = (_ATAN[0] + _ATAN[1] * z) + (_ATAN[2] + _ATAN[3] * z) * z2
-    p += ((_ATAN[4] + _ATAN[5] * z) + (_ATAN[6] + _ATAN[7] * z) * z2) * z4
-    p += (_ATAN[8] + _ATAN[9] * z) * (z4 * z4)
+    p = (ATAN[0] + ATAN[1] * z) + (ATAN[2] + ATAN[3] * z) * z2
+    p += ((ATAN[4] + ATAN[5] * z) + (ATAN[6] + ATAN[7] * z) * z2) * z4
+    p += (ATAN[8] + ATAN[9] * z) * (z4 * z4)
     angle, low = two_sum(base, t)
     low += base_low + (t_low * (1.0 - z) + t * z * p)
     if steep:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from rotordrop.physics._compile import kernel
+from rotordrop.physics._compile import inner_kernel, kernel
 from rotordrop.physics.elementary import exp
 
 
-@kernel
+@inner_kernel
 def stribeck_coefficient(v: float, mu_s: float, mu_d: float, v_stribeck: float, v_smooth: float) -> float:
     """Signed friction coefficient [1] at a relative surface speed; it has the sign of the speed.
 

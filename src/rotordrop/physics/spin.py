@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from rotordrop.physics._compile import kernel
+from rotordrop.physics._compile import inner_kernel
 from rotordrop.physics.elementary import tanh
 
 
-@kernel
+@inner_kernel
 def surface_speed(v_tangential: float, omega_r: float, r_r: float, omega_i: float, R_i: float) -> float:
     """Speed [m/s] of the rotor surface over the race surface along the tangent.
 
@@ -31,7 +31,7 @@ def surface_speed(v_tangential: float, omega_r: float, r_r: float, omega_i: floa
     return v_tangential + omega_r * r_r - omega_i * R_i
 
 
-@kernel
+@inner_kernel
 def race_drag_torque(
     F_b: float, omega_i: float, drag_coefficient: float, D_pw: float, drag_speed: float
 ) -> float:
