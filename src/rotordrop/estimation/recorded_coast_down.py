@@ -13,6 +13,7 @@ from rotordrop.machine import Machine
 from rotordrop.measurement.events import find_drop_instant
 from rotordrop.measurement.record import Record
 from rotordrop.model.assembly import build_rotor_fe
+from rotordrop.model.bearing_numbers import numbers_of
 from rotordrop.model.parameters import build_drop_model
 from rotordrop.model.statics import bearing_load_shares
 from rotordrop.spectrum.coast_down import RACES_SPUN_UP, SHORTEST_LAW, CoastDownSignal
@@ -132,7 +133,7 @@ def with_recorded_drag(machine: Machine, signal: CoastDownSignal) -> Machine:
     drag = fit_drag(signal.speed_time, signal.speed, start=RACES_SPUN_UP)
     shares = bearing_load_shares(machine)
     lever = sum(
-        float(share) * 0.5 * float(bearing.bearing.pitch_diameter)
+        float(share) * 0.5 * numbers_of(bearing).drag_diameter
         for bearing, share in zip(machine.touchdown_bearings, shares, strict=True)
     )
     races = sum(float(bearing.race.inertia) for bearing in machine.touchdown_bearings)

@@ -101,7 +101,7 @@ def _bearing(
         float(bearing.friction.static) / float(bearing.friction.dynamic), values["friction.dynamic"]
     )
     values["equivalent_stiffness_N_per_m"] = equivalent_stiffness(
-        bearing.bearing, float(fall.model.load_shares[b]), values["support.stiffness_N_per_m"]
+        bearing, float(fall.model.load_shares[b]), values["support.stiffness_N_per_m"]
     )
     means = {
         name: _mean(simulated.values[name], None if draws is None else sample(draws)[:, b], model)

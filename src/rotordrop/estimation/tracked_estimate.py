@@ -39,7 +39,7 @@ from rotordrop.estimation.tracked_parameters import (
     parameters,
     sensor_errors,
 )
-from rotordrop.model.inferred_balls import inferred_stress_sigma
+from rotordrop.model.bearing_numbers import numbers_of
 from rotordrop.tracking.consistency import NIS_RANGE, Check
 from rotordrop.tracking.input_state import (
     InputEstimate,
@@ -129,7 +129,7 @@ def _cross_checked(drop: TrackedDrop, method: Tracked) -> tuple[TrackedDrop, Inp
     estimate does without it, but not for a bearing with play, whose force no study has validated.
     """
     problem = drop.problem
-    with_play = any(b.bearing.clearance is not None for b in problem.model.machine.touchdown_bearings)
+    with_play = any(not numbers_of(b).held for b in problem.model.machine.touchdown_bearings)
     if not drop.sees_all_directions or (drop.consistent and method.quick and not with_play):
         return drop, None
     if drop.consistent:
@@ -218,8 +218,8 @@ def _loads(drop: TrackedDrop, judged: _Judgement, b: int) -> Loads:
 
 
 def _twin(drop: TrackedDrop, judged: _Judgement, b: int) -> Loads:
-    bearing = drop.problem.model.machine.touchdown_bearings[b].bearing
-    return twin_loads(drop.forces, b, judged.widening, inferred_stress_sigma(bearing))
+    numbers = numbers_of(drop.problem.model.machine.touchdown_bearings[b])
+    return twin_loads(drop.forces, b, judged.widening, numbers.stress_sigma)
 
 
 def _comparisons(drop: TrackedDrop, judged: _Judgement) -> tuple[CrossCheck, ...]:

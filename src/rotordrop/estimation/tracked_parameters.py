@@ -11,12 +11,11 @@ import numpy as np
 from rotordrop.estimated import NINETY, IdentifiedValue, Verdict
 from rotordrop.estimation.estimate import FittedParameter, SensorErrors
 from rotordrop.estimation.tracked_loads import INCONSISTENT, OF_CROSS_CHECK, with_interval
-from rotordrop.machine.ball_bearing import BallBearing
+from rotordrop.machine import TouchdownBearing
+from rotordrop.model.bearing_numbers import numbers_of
 from rotordrop.model.parameter import Parameter
 from rotordrop.model.parameter_table import parameter, published
 from rotordrop.model.unknowns import Unknown
-from rotordrop.physics.ball_bearing import bearing_constants
-from rotordrop.physics.ball_set import static_bearing_stiffness
 from rotordrop.tracking.consistency import PARAMETER_LIMIT
 from rotordrop.tracking.problem import DropProblem
 from rotordrop.tracking.smoother import Smoothed, parameter_sample
@@ -140,7 +139,7 @@ def bearing_values(
         ratio = float(bearing.friction.static) / float(bearing.friction.dynamic)
         values["friction.static"] = static_friction(ratio, values["friction.dynamic"])
     values["equivalent_stiffness_N_per_m"] = equivalent_stiffness(
-        bearing.bearing, float(problem.model.load_shares[b]), values["support.stiffness_N_per_m"]
+        bearing, float(problem.model.load_shares[b]), values["support.stiffness_N_per_m"]
     )
     return values
 
@@ -157,9 +156,9 @@ def static_friction(ratio: float, dynamic: IdentifiedValue) -> IdentifiedValue:
     )
 
 
-def equivalent_stiffness(bearing: BallBearing, load: float, support: IdentifiedValue) -> IdentifiedValue:
+def equivalent_stiffness(bearing: TouchdownBearing, load: float, support: IdentifiedValue) -> IdentifiedValue:
     """Support and bearing in series [N/m], the bearing by its tangent at its static load [N]."""
-    races = static_bearing_stiffness(bearing_constants(bearing), load)
+    races = numbers_of(bearing).tangent_stiffness(load)
     low, high = support.interval_90 or (support.value, support.value)
 
     def series(stiffness: float) -> float:

@@ -24,9 +24,6 @@ SWEEP = np.round(np.arange(0.05, 0.2001, 0.01), 3)
 HORIZON = 33e-3
 """Length of the comparison after the first contact [s]: about one tenfold growth of differences."""
 
-START_SPREAD = 1e-6
-"""Difference of two drops at the first contact that cannot be avoided [m]."""
-
 TENFOLD = 33e-3
 """Time in which small differences grow tenfold [s]."""
 

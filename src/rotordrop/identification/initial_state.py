@@ -9,7 +9,7 @@ it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -283,8 +283,3 @@ def _fall_readings(
         orbit_velocity=(1j * turning * turned).real * gain,
         orbit_acceleration=(-(turning**2) * turned).real * gain,
     )
-
-
-def with_unknowns(state: InitialState, unknowns: Array) -> InitialState:
-    """The same initial state with other values of the unknowns, for draws."""
-    return replace(state, mean=unknowns)

@@ -16,7 +16,7 @@ from rotordrop.identification.sensing import Sensing, build_sensing
 from rotordrop.measurement.record import Record
 from rotordrop.model import layout as L
 from rotordrop.model.layout import KernelParameters
-from rotordrop.model.parameters import DropModel, build_drop_model
+from rotordrop.model.parameters import DropModel
 from rotordrop.model.static_sag import sag_of_model, static_sag
 from rotordrop.physics import aerodynamics
 from rotordrop.simulation import _loop
@@ -215,11 +215,6 @@ def drop_parameters(
     return p._replace(
         magnet=magnet, spin=spin, flags=flags, unbalance_cos=unbalance[0], unbalance_sin=unbalance[1]
     )
-
-
-def coarser_model(model: DropModel, reduction: str) -> DropModel:
-    """The same machine in another reduction."""
-    return build_drop_model(model.machine, reduction)
 
 
 def transferred(initial: InitialState, model: DropModel) -> InitialState:

@@ -45,6 +45,9 @@ _BALL_MATERIALS: dict[BallMaterial, dict[str, tuple[float, str]]] = {
     },
 }
 
+STATIC_STRESS = 4.2e9
+"""Hertz stress [Pa] of the static load rating C0 of a ball bearing, ISO 76: the race is dented beyond it."""
+
 _CONFORMITY = 0.53
 _NEEDED = ("ball_diameter", "ball_count", "pitch_diameter", "contact_angle")
 _ROWS = {1: "single", 2: "X"}
@@ -337,6 +340,35 @@ class BallBearing(Description):
                 f"at most {int(3.14159266 * pitch / ball)} do",
                 ("ball_count",),
             )
+
+    def check_bore(self, radius: float) -> None:
+        """Refuse a bore [m] that reaches into the inner ring or the balls."""
+        entry = self.catalogue_entry()
+        if entry is not None and radius > 0.5 * entry.bore * (1.0 + 1e-9):
+            raise Misfit(
+                f"the bore radius {radius * 1e3:.4g} mm is larger than that of {entry.designation}, "
+                f"{0.5e3 * entry.bore:.4g} mm; a diameter perhaps, or another bearing",
+                ("bore_radius",),
+            )
+        inner = 0.5 * (self.pitch_diameter.value - self.ball_diameter.value)
+        if radius >= inner:
+            raise Misfit(
+                f"the bore radius {radius * 1e3:.4g} mm must be smaller than the radius of the inner groove, "
+                f"{inner * 1e3:.4g} mm; a diameter perhaps?",
+                ("bore_radius",),
+            )
+
+    def usual_race_width(self) -> tuple[float, str]:
+        """Width of all rows [m], and why."""
+        rows = 1 if self.arrangement == "single" else 2
+        if self.width is not None:
+            return rows * self.width.value, "width of all rows"
+        return rows * 1.6 * self.ball_diameter.value, "1.6 ball diameters per row"
+
+    def race_radius(self) -> tuple[float, str]:
+        """Outer radius of what spins with the inner race [m], and why."""
+        radius = 0.5 * (self.pitch_diameter.value - 0.6 * self.ball_diameter.value)
+        return radius, "steel ring from the bore to 0.6 ball diameters inside the pitch circle"
 
     def reason(self, name: str) -> str:
         """Say why a value that was left out is what it is."""

@@ -289,27 +289,14 @@ class TouchdownBearing(Placed):
                 f"the air gap {gap * 1e3:.4g} mm must be smaller than the bore radius {bore * 1e3:.4g} mm",
                 ("air_gap",),
             )
-        entry = self.bearing.catalogue_entry()
-        if entry is not None and bore > 0.5 * entry.bore * (1.0 + 1e-9):
-            raise Misfit(
-                f"the bore radius {bore * 1e3:.4g} mm is larger than that of {entry.designation}, "
-                f"{0.5e3 * entry.bore:.4g} mm; a diameter perhaps, or another bearing",
-                ("bore_radius",),
-            )
-        inner = 0.5 * (self.bearing.pitch_diameter.value - self.bearing.ball_diameter.value)
-        if bore >= inner:
-            raise Misfit(
-                f"the bore radius {bore * 1e3:.4g} mm must be smaller than the radius of the inner groove, "
-                f"{inner * 1e3:.4g} mm; a diameter perhaps?",
-                ("bore_radius",),
-            )
+        self.bearing.check_bore(bore)
 
     def left_out(self) -> dict[str, Any]:
         """Give the race a width, mass and inertia that were left out, from the size of the bearing."""
         given = self.race.model_fields_set
         width = self.race.width if "width" in given else self._race_width()
         mass, inertia = self._race_from_size(width.value)
-        why = "steel ring from the bore to 0.6 ball diameters inside the pitch circle"
+        why = self.bearing.race_radius()[1]
         values: dict[str, Estimated] = {"width": width}
         if "mass" not in given:
             bounds = (0.5 * mass, 2.0 * mass)
@@ -324,19 +311,13 @@ class TouchdownBearing(Placed):
         return {"race": self.race.completed_with(values)}
 
     def _race_width(self) -> Estimated:
-        rows = 1 if self.bearing.arrangement == "single" else 2
         if self.contact.length is not None:
             return replace(self.contact.length, status="inferred", source="the length of the line contact")
-        if self.bearing.width is not None:
-            value, why = rows * self.bearing.width.value, "width of all rows"
-        else:
-            value, why = rows * 1.6 * self.bearing.ball_diameter.value, "1.6 ball diameters per row"
+        value, why = self.bearing.usual_race_width()
         return Estimated(value=value, status="default", source=f"{why}; a sleeve differs", unit="m")
 
     def _race_from_size(self, width: float) -> tuple[float, float]:
-        bearing = self.bearing
-        ball = bearing.ball_diameter.value
         inner = self.bore_radius.value
-        outer = max(0.5 * (bearing.pitch_diameter.value - 0.6 * ball), 1.05 * inner)
+        outer = max(self.bearing.race_radius()[0], 1.05 * inner)
         mass = _STEEL_DENSITY * math.pi * (outer**2 - inner**2) * width
         return mass, 0.5 * mass * (outer**2 + inner**2)

@@ -1,6 +1,6 @@
 """How many modes a rotor needs for its impacts: as many as reach beyond the frequency of the contact.
 
-An impact is a pulse of about half a period of rotor and support against each other on contact and balls in
+An impact is a pulse of about half a period of rotor and support against each other on contact and bearing in
 series. Modes far above that frequency give way statically, which attachment modes at the bearings hold; those
 near it swing, and a sensor far from the bearings shows it.
 """
@@ -13,11 +13,10 @@ import numpy as np
 
 from rotordrop.machine import Machine
 from rotordrop.model.assembly import RotorFE, build_rotor_fe
+from rotordrop.model.bearing_numbers import numbers_of
 from rotordrop.model.modes import free_free_modes, rigid_modes
 from rotordrop.model.reduction import Reduction
 from rotordrop.model.statics import bearing_load_shares
-from rotordrop.physics.ball_bearing import bearing_constants
-from rotordrop.physics.ball_set import static_deflection
 
 PEAK_OVER_WEIGHT = 10.0
 """Usual ratio of the largest force of a drop to the static load [1]: 11 to 17 on machines of 13 to 130 kg."""
@@ -31,8 +30,7 @@ def contact_frequency(machine: Machine, fe: RotorFE | None = None) -> float:
     for bearing, share in zip(machine.touchdown_bearings, bearing_load_shares(machine, fe), strict=True):
         force, exponent = PEAK_OVER_WEIGHT * float(share), float(bearing.contact.exponent)
         depth = (force / float(bearing.contact.stiffness)) ** (1.0 / exponent)
-        balls = static_deflection(bearing_constants(bearing.bearing), force)[1]
-        stiffness = 1.0 / (depth / (exponent * force) + 1.0 / balls)
+        stiffness = 1.0 / (depth / (exponent * force) + 1.0 / numbers_of(bearing).tangent_stiffness(force))
         rotor = float(np.sum(rigid[2 * (bearing.node - 1)] ** 2))
         found.append(math.sqrt(stiffness * (rotor + 1.0 / float(bearing.support.mass))) / (2.0 * math.pi))
     return max(found)

@@ -10,12 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.model.assembly import RotorFE, build_rotor_fe
+from rotordrop.model.bearing_numbers import BearingFigure, numbers_of
 from rotordrop.model.modes import N_RIGID, free_free_modes, modes_on_springs
 from rotordrop.model.rotor_on_race import rotor_on_race
 from rotordrop.model.statics import bearing_load_shares, levitated_sag
-from rotordrop.physics.ball_bearing import BearingConstants, bearing_constants
-from rotordrop.physics.ball_bearing_response import bearing_response
-from rotordrop.physics.ball_set import loose_race_seat, static_deflection
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine, TouchdownBearing
@@ -35,33 +33,24 @@ class BearingSummary:
         Name of the bearing.
     load : float
         Share of the rotor's weight [N].
-    constants : BearingConstants
-        Stiffness, preload and geometry of the ball bearing.
-    preload_stress : float
-        Hertz stress of a ball on the inner race from the preload alone [Pa].
+    figures : tuple of BearingFigure
+        What the bearing states of itself: what holds it without a load, how it lies under this one.
     contact_pressure : float
         Hertz pressure of the rotor at rest on the race, over its whole width [Pa].
-    ball_load : float
-        Largest load of a ball with the rotor at rest [N].
-    loaded_balls : int
-        Balls that carry a load then, of all rows [1].
     deflection : float
         Deflection of the race against the outer ring under the load [m].
     tangent_stiffness : float
-        Radial stiffness of the ball bearing at that deflection [N/m].
+        Radial stiffness of the bearing at that deflection [N/m].
     support_frequency : float
         Natural frequency of the support by itself, vertical [Hz].
     equivalent_stiffness : float
-        Ball bearing and support in series [N/m].
+        Bearing and support in series [N/m].
     """
 
     name: str
     load: float
-    constants: BearingConstants
-    preload_stress: float
+    figures: tuple[BearingFigure, ...]
     contact_pressure: float
-    ball_load: float
-    loaded_balls: int
     deflection: float
     tangent_stiffness: float
     support_frequency: float
@@ -116,19 +105,14 @@ def summarise_machine(machine: Machine) -> MachineSummary:
 
 
 def _bearing(machine: Machine, bearing: TouchdownBearing, load: float) -> BearingSummary:
-    constants = bearing_constants(bearing.bearing)
-    deflection, tangent = static_deflection(constants, abs(load))
-    seat = (0.0, -deflection) if constants.preloaded else loose_race_seat(constants, abs(load))
-    balls = bearing_response(constants, [*seat, 0.0, 0.0, 0.0]).ball_loads
+    numbers = numbers_of(bearing)
+    deflection, tangent = numbers.deflection(abs(load))
     support = bearing.support
     return BearingSummary(
         name=bearing.name,
         load=load,
-        constants=constants,
-        preload_stress=constants.stress_coefficient_inner * math.cbrt(constants.preload_ball_load),
+        figures=numbers.figures(abs(load)),
         contact_pressure=float(rotor_on_race(machine, bearing).maximum_pressure(abs(load))),
-        ball_load=float(np.max(balls)),
-        loaded_balls=int(np.count_nonzero(balls)),
         deflection=deflection,
         tangent_stiffness=tangent,
         support_frequency=math.sqrt(float(support.stiffness) / float(support.mass)) / (2.0 * math.pi),

@@ -8,18 +8,15 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from rotordrop.machine.plausibility import doubts
+from rotordrop.model.bearing_numbers import numbers_of
 from rotordrop.model.machine_summary import BearingSummary, MachineSummary
 from rotordrop.model.parameter_table import rows
 from rotordrop.model.unknowns import prior
-from rotordrop.physics.ball_bearing import ball_centrifugal_force
 from rotordrop.physics.thermal import friction_heat, growth_of_race
 from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine, TouchdownBearing
-
-CENTRIFUGAL_SHARE = 0.25
-"""Ball centrifugal force over preload ball load from which it counts."""
 
 FREQUENCY_DISTANCE = 0.15
 """Relative distance of a support frequency and a rotor mode below which they shift each other."""
@@ -28,10 +25,7 @@ HEAT_WINDOW = 0.2
 """Time [s] over which frictional heat is added up: the part of a drop the force is estimated for."""
 
 GROWTH_SHARE = 0.1
-"""Thermal growth of the race over the elastic approach of a preloaded ball from which heat counts."""
-
-STATIC_STRESS = 4.2e9
-"""Hertz stress [Pa] of the static load rating C0 of a ball bearing, ISO 76."""
+"""Thermal growth of the race over the room it has from which heat counts."""
 
 ASIDE = 0.5
 """Distance of a guess from the middle of its range from which it is mentioned, in standard deviations [1]."""
@@ -81,34 +75,16 @@ def machine_warnings(
     omega = float(machine.speed.nominal) if speed is None else speed
     found = [MachineWarning(**vars(doubt), doubtful=True) for doubt in doubts(machine)]
     for bearing, rest in zip(machine.touchdown_bearings, summary.bearings, strict=True):
-        found += [*_limiting_speed(bearing, omega), *_centrifugal(bearing, rest, omega)]
+        found += _excesses(bearing, rest, omega)
         found += [*_resonance(rest, summary), *_heat(bearing, rest, omega), *_lifted(rest)]
-        found += [*_preload_stress(rest), *_guesses_aside(bearing)]
+        found += _guesses_aside(bearing)
     return tuple(found)
 
 
-def _limiting_speed(bearing: TouchdownBearing, omega: float) -> Iterator[MachineWarning]:
-    limit = bearing.bearing.limiting_speed
-    if limit is None or omega <= float(limit):
-        return
-    reached, allowed = format_quantity(omega, "speed"), format_quantity(float(limit), "speed")
-    text = f"a race that reaches the rotor's {reached} turns faster than the {allowed} its maker allows"
-    yield _warning("limiting speed", bearing.name, omega, float(limit), text)
-
-
-def _centrifugal(bearing: TouchdownBearing, rest: BearingSummary, omega: float) -> Iterator[MachineWarning]:
-    force = float(ball_centrifugal_force(bearing.bearing, omega))
-    preloaded = rest.constants.preloaded
-    carried = rest.constants.preload_ball_load if preloaded else rest.ball_load
-    if force <= CENTRIFUGAL_SHARE * carried:
-        return
-    speed, thrown = format_quantity(omega, "speed"), format_quantity(force, "force")
-    text = (
-        f"at {speed} of the race each ball is thrown outwards with {thrown}, not small against "
-        f"{'its preload of' if preloaded else 'the load of the lowest ball at rest,'} "
-        f"{format_quantity(carried, 'force')}; the drop model leaves this out"
-    )
-    yield _warning("ball centrifugal force", bearing.name, force, carried, text)
+def _excesses(bearing: TouchdownBearing, rest: BearingSummary, omega: float) -> Iterator[MachineWarning]:
+    for excess in numbers_of(bearing).excesses(omega, abs(rest.load)):
+        told = _warning(excess.kind, bearing.name, excess.value, excess.limit, excess.text)
+        yield replace(told, doubtful=excess.doubtful)
 
 
 def _resonance(rest: BearingSummary, summary: MachineSummary) -> Iterator[MachineWarning]:
@@ -125,7 +101,7 @@ def _resonance(rest: BearingSummary, summary: MachineSummary) -> Iterator[Machin
 
 
 def _heat(bearing: TouchdownBearing, rest: BearingSummary, omega: float) -> Iterator[MachineWarning]:
-    race, radius = bearing.race, float(bearing.bore_radius)
+    race, radius, numbers = bearing.race, float(bearing.bore_radius), numbers_of(bearing)
     sliding, rolling = friction_heat(
         F_r=max(rest.load, 0.0),
         mu=float(bearing.friction.dynamic),
@@ -133,36 +109,24 @@ def _heat(bearing: TouchdownBearing, rest: BearingSummary, omega: float) -> Iter
         R_i=radius,
         race_inertia=float(race.inertia),
         drag_coefficient=float(race.drag_coefficient),
-        D_pw=float(bearing.bearing.pitch_diameter),
+        D_pw=numbers.drag_diameter,
         duration=HEAT_WINDOW,
     )
     warming, growth = growth_of_race(0.5 * sliding + rolling, float(race.mass), radius)
-    constants = rest.constants
-    approach = (constants.preload_ball_load / constants.ball_stiffness) ** (2.0 / 3.0)
-    room = approach if constants.preloaded else constants.radial_play
+    room, against = numbers.room_to_grow()
     if growth <= GROWTH_SHARE * room:
         return
-    speed, grown, pressed = (
+    speed, grown, small = (
         format_quantity(omega, "speed"),
         format_quantity(growth, "length", 2),
         format_quantity(room, "length", 2),
     )
-    against = f"the {pressed} a preloaded ball is pressed in, so that the preload rises"
-    if not constants.preloaded:
-        against = f"its radial play of {pressed}, which closes"
     text = (
         f"after a drop at {speed} friction heats the race by about {warming:.2g} K in {HEAT_WINDOW:g} s; "
-        f"it grows by {grown}, not small against {against}; the drop model has no heat in it"
+        f"it grows by {grown}, not small against {against.format(room=small)}; the drop model has no heat in "
+        "it"
     )
     yield _warning("frictional heat", bearing.name, growth, room, text)
-
-
-def _preload_stress(rest: BearingSummary) -> Iterator[MachineWarning]:
-    if rest.preload_stress <= STATIC_STRESS:
-        return
-    stress, limit = (format_quantity(value, "pressure") for value in (rest.preload_stress, STATIC_STRESS))
-    text = f"the preload alone presses the balls with {stress}, and ISO 76 rates bearings up to {limit}"
-    yield replace(_warning("preload", rest.name, rest.preload_stress, STATIC_STRESS, text), doubtful=True)
 
 
 def _guesses_aside(bearing: TouchdownBearing) -> Iterator[MachineWarning]:

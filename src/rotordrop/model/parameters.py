@@ -13,17 +13,11 @@ from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.machine.touchdown_bearing import Contact
 from rotordrop.model import layout as L
 from rotordrop.model.assembly import RotorFE, build_rotor_fe
+from rotordrop.model.bearing_numbers import numbers_of, places_of
 from rotordrop.model.layout import KernelParameters
 from rotordrop.model.reduction import Reduction, RotorBasis, reduce_rotor
 from rotordrop.model.statics import bearing_load_shares
 from rotordrop.physics import aerodynamics
-from rotordrop.physics.ball_bearing import BearingConstants, bearing_constants
-from rotordrop.physics.ball_set import (
-    ball_set_entries,
-    balls_of,
-    loose_race_seat,
-    static_bearing_stiffness,
-)
 from rotordrop.physics.contact import contact_law
 from rotordrop.physics.elementary import sine_cosine
 from rotordrop.physics.linear_algebra import product
@@ -51,13 +45,13 @@ class DropModel:
         return replace(self, machine=machine, parameters=_with_machine(self, machine))
 
     def at_rest(self) -> Array:
-        """State, shape (n,), of a centred rotor with all at rest; loose races lie on their lowest balls."""
+        """State, shape (n,), of a centred rotor with all at rest; loose races lie where they fall."""
         state = self.layout.zeros()
         p = self.parameters.bearing
         for b, bearing in enumerate(self.machine.touchdown_bearings):
             weight = p[b, L.RACE_WEIGHT]
             if weight > 0.0:
-                seat = loose_race_seat(bearing_constants(bearing.bearing), weight)
+                seat = numbers_of(bearing).seat(weight)
                 sag = weight / p[b, L.SUPPORT_STIFFNESS_Y]
                 state[self.layout.race][2 * b : 2 * b + 2] = seat[0], seat[1] - sag
                 state[self.layout.support][2 * b + 1] = -sag
@@ -121,7 +115,7 @@ def _kernel_parameters(
         unbalance_sin=unbalance_sin,
         bearing_shape=_rows(basis, [b.node for b in bearings]),
         bearing=_bearing_rows(machine, shares),
-        balls=_balls([bearing_constants(b.bearing) for b in bearings]),
+        balls=places_of([numbers_of(b) for b in bearings]),
         magnet_shape=_rows(basis, [amb.node for amb in machine.ambs]),
         magnet=magnet,
         spin=_spin(machine, fe),
@@ -138,7 +132,7 @@ def _with_machine(model: DropModel, machine: Machine) -> KernelParameters:
     spin = _spin(machine, model.fe)
     return model.parameters._replace(
         bearing=_bearing_rows(machine, model.load_shares),
-        balls=_balls([bearing_constants(b.bearing) for b in bearings]),
+        balls=places_of([numbers_of(b) for b in bearings]),
         unbalance_cos=unbalance_cos,
         unbalance_sin=unbalance_sin,
         spin=spin,
@@ -171,12 +165,6 @@ def _unbalance(machine: Machine, basis: RotorBasis) -> tuple[Array, Array]:
     return cosine, sine
 
 
-def _balls(constants: list[BearingConstants]) -> Array:
-    """Balls of every bearing, shape (B, 3, Z8), padded to the longest."""
-    places = max((balls_of(c).shape[1] for c in constants), default=0)
-    return np.array([balls_of(c, places) for c in constants]).reshape(len(constants), 3, -1)
-
-
 def contact_law_of(contact: Contact) -> Array:
     """Law of a contact as its machine file describes it, for the functions of `physics.contact`."""
     return contact_law(float(contact.stiffness), float(contact.exponent), float(contact.damping))
@@ -185,8 +173,8 @@ def contact_law_of(contact: Contact) -> Array:
 def _bearing_rows(machine: Machine, shares: Array) -> Array:
     rows = np.array([bearing_row(b, w) for b, w in zip(machine.touchdown_bearings, shares, strict=True)])
     for row, bearing in zip(rows, machine.touchdown_bearings, strict=True):
-        # Preloaded balls give way to the weight of the race by nanometres; loose ones let it fall.
-        if not bearing_constants(bearing.bearing).preloaded:
+        # A held race gives way to its own weight by nanometres; a loose one falls.
+        if not numbers_of(bearing).held:
             row[L.RACE_WEIGHT] = row[L.RACE_MASS] * float(machine.gravity)
     return rows
 
@@ -195,14 +183,14 @@ def bearing_row(bearing: TouchdownBearing, static_load: float) -> Array:
     """One row of `KernelParameters.bearing` [SI], with the bearing damping from the tangent stiffness at a
     load [N].
     """
-    constants = bearing_constants(bearing.bearing)
+    numbers = numbers_of(bearing)
     row = np.zeros(L.N_BEARING_COLUMNS)
     gap = float(bearing.air_gap)
     row[L.AIR_GAP] = gap
     row[L.BORE_RADIUS] = float(bearing.bore_radius)
     row[L.ROTOR_RADIUS] = float(bearing.bore_radius) - gap
     row[L.CONTACT : L.CONTACT_END] = contact_law_of(bearing.contact)
-    row[L.BALL_SET : L.BALL_SET_END] = ball_set_entries(constants)
+    row[L.BALL_SET : L.BALL_SET_END] = numbers.entries()
     row[L.FRICTION_STATIC] = float(bearing.friction.static)
     row[L.FRICTION_DYNAMIC] = float(bearing.friction.dynamic)
     row[L.STRIBECK_SPEED] = float(bearing.friction.stribeck_speed)
@@ -211,8 +199,8 @@ def bearing_row(bearing: TouchdownBearing, static_load: float) -> Array:
     row[L.RACE_INERTIA] = float(bearing.race.inertia)
     row[L.DRAG_COEFFICIENT] = float(bearing.race.drag_coefficient)
     row[L.DRAG_SPEED] = float(bearing.race.drag_speed)
-    row[L.PITCH_DIAMETER] = float(bearing.bearing.pitch_diameter)
-    row[L.BEARING_DAMPING] = float(bearing.damping_time) * static_bearing_stiffness(constants, static_load)
+    row[L.PITCH_DIAMETER] = numbers.drag_diameter
+    row[L.BEARING_DAMPING] = float(bearing.damping_time) * numbers.tangent_stiffness(static_load)
     support = bearing.support
     row[L.SUPPORT_MASS_X] = float(support.mass_horizontal)
     row[L.SUPPORT_MASS_Y] = float(support.mass)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.model.bearing_numbers import numbers_of
 from rotordrop.physics.hertz import LineContact, compliance, cylinder_in_bore
 
 
@@ -12,12 +13,6 @@ def rotor_on_race(machine: Machine, bearing: TouchdownBearing) -> LineContact:
     The rotor is of the material of the shaft at the bearing's node, the race of that of the rings.
     """
     beside = machine.rotor.elements[max(0, bearing.node - 2)]
-    rings = bearing.bearing
-    eta = compliance(
-        beside.youngs_modulus,
-        beside.poisson_ratio,
-        float(rings.ring_youngs_modulus),
-        float(rings.ring_poisson_ratio),
-    )
+    eta = compliance(beside.youngs_modulus, beside.poisson_ratio, *numbers_of(bearing).ring_material)
     bore = float(bearing.bore_radius)
     return cylinder_in_bore(bore - float(bearing.air_gap), bore, float(bearing.race.width), eta)

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from rotordrop.machine import TouchdownBearing
 from rotordrop.model import layout as L
+from rotordrop.model.bearing_numbers import numbers_of
 from rotordrop.model.parameters import DropModel
-from rotordrop.physics.ball_bearing import bearing_constants
-from rotordrop.physics.ball_set import static_deflection
 from rotordrop.physics.contact import depth_at
 
 Array = NDArray[np.float64]
@@ -27,7 +26,7 @@ class StaticSag:
     indentation : ndarray, shape (B,)
         Contact indentation under the static load shares [m].
     race : ndarray, shape (B,)
-        Deflection of the ball bearing [m].
+        Deflection of the bearing [m].
     support : ndarray, shape (B,)
         Deflection of the support [m].
     """
@@ -47,9 +46,9 @@ class StaticSag:
 
 
 def race_sag(bearings: Sequence[TouchdownBearing], loads: Array) -> Array:
-    """Deflection [m] of every ball bearing, shape (B,), under static loads (B,) [N]."""
+    """Deflection [m] of every bearing, shape (B,), under static loads (B,) [N]."""
     pairs = zip(bearings, loads, strict=True)
-    return np.array([static_deflection(bearing_constants(b.bearing), float(load))[0] for b, load in pairs])
+    return np.array([numbers_of(b).deflection(float(load))[0] for b, load in pairs])
 
 
 def static_sag(rows: Array, race: Array, loads: Array) -> StaticSag:

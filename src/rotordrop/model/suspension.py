@@ -10,21 +10,16 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.model.bearing_numbers import numbers_of
 from rotordrop.model.parameters import contact_law_of
 from rotordrop.model.statics import bearing_load_shares
 from rotordrop.model.supports import Support, in_series, link, spring
-from rotordrop.physics.ball_bearing import bearing_constants
-from rotordrop.physics.ball_bearing_response import simple_radial_stiffness
-from rotordrop.physics.ball_set import static_bearing_stiffness
 from rotordrop.physics.contact import contact_tangent
-from rotordrop.physics.hertz import compliance
 
 Array = NDArray[np.float64]
 
 SUSPENSIONS = ("free-free", "AMBs", "touchdown bearings")
 FORMULAS = ("tangent", "simple")
-_STEEL_YOUNGS_MODULUS = 208e9
-_STEEL_POISSON_RATIO = 0.3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +35,7 @@ class EquivalentStiffness:
     load : float
         Static load [N].
     tangent, simple : float
-        Radial stiffness of the ball bearing at that load [N/m]: slope of the ball forces with preload, and
+        Radial stiffness of the bearing at that load [N/m]: slope of its forces with any preload, and
         the simple engineering formula, which knows no preload.
     support : float
         Stiffness of the support [N/m].
@@ -87,26 +82,13 @@ def _of_bearing(bearing: TouchdownBearing, load: float) -> EquivalentStiffness:
             f"touchdown bearing {bearing.name!r} carries {load:.3g} N of the rotor's weight and is not "
             "loaded; its stiffness is not defined"
         )
-    constants = bearing_constants(bearing.bearing)
-    ball = bearing.bearing
-    materials = compliance(
-        float(ball.ring_youngs_modulus),
-        float(ball.ring_poisson_ratio),
-        float(ball.ball_youngs_modulus),
-        float(ball.ball_poisson_ratio),
-    ) / compliance(_STEEL_YOUNGS_MODULUS, _STEEL_POISSON_RATIO, _STEEL_YOUNGS_MODULUS, _STEEL_POISSON_RATIO)
+    numbers = numbers_of(bearing)
     return EquivalentStiffness(
         bearing=bearing.name,
         node=bearing.node,
         load=load,
-        tangent=static_bearing_stiffness(constants, load),
-        simple=simple_radial_stiffness(
-            float(ball.ball_diameter),
-            constants.row_count * constants.ball_count,
-            constants.radial_contact_angle,
-            load,
-            materials,
-        ),
+        tangent=numbers.tangent_stiffness(load),
+        simple=numbers.simple_stiffness(load),
         support=float(bearing.support.stiffness),
         contact=contact_tangent(contact_law_of(bearing.contact), load),
     )
@@ -136,7 +118,7 @@ def amb_supports(machine: Machine) -> tuple[Support, ...]:
 def touchdown_supports(
     machine: Machine, formula: str = "tangent", loads: Sequence[float] | None = None
 ) -> tuple[Support, ...]:
-    """Contact, race, ball bearing and support under the settled rotor, with their masses and damping.
+    """Contact, race, bearing and support under the settled rotor, with their masses and damping.
 
     The bearing damping of a formula is the machine's damping time times the tangent stiffness.
     Differs from the paper: its critical speed map has neither the contact nor the masses. The contact holds
@@ -147,10 +129,10 @@ def touchdown_supports(
     supports = []
     for bearing, parts in zip(machine.touchdown_bearings, equivalent_stiffness(machine, loads), strict=True):
         ground = bearing.support
-        balls = parts.tangent if formula == "tangent" else parts.simple
+        race = parts.tangent if formula == "tangent" else parts.simple
         links = (
             link(parts.contact),
-            link(balls, float(bearing.damping_time) * parts.tangent),
+            link(race, float(bearing.damping_time) * parts.tangent),
             link(
                 (float(ground.stiffness_horizontal), float(ground.stiffness)),
                 (float(ground.damping_horizontal), float(ground.damping)),

@@ -5,17 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Literal
 
 import numpy as np
 
 from rotordrop.estimated import NINETY, Estimated
 from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.model.bearing_numbers import Measure, numbers_of
 from rotordrop.model.parameter import Entry, Parameter, Rule
 from rotordrop.model.parameter_table import parameter, rows
 from rotordrop.model.parameters import DropModel, contact_law_of
-from rotordrop.physics.ball_bearing import bearing_constants, preload_of_offset
 from rotordrop.physics.contact import depth_at
 
 Scope = Literal["machine", "drop"]
@@ -193,8 +192,9 @@ def bearing_unknowns(model: DropModel, index: int) -> Iterator[Unknown]:
     for row in rows("bearing"):
         if not row.entries or float(row.described(bearing)) == 0.0:
             continue  # for a loose bearing, the air gap takes up an error of the play
-        if row.path == "preload":
-            yield _preload(row, bearing, index)
+        measure = numbers_of(bearing).measure(row.path)
+        if measure is not None:
+            yield _measured_otherwise(row, bearing, index, measure)
         elif row.path == "support.anisotropy":
             yield _anisotropy(row, bearing, index)
         else:
@@ -257,28 +257,27 @@ def _anisotropy(row: Parameter, bearing: TouchdownBearing, index: int) -> Unknow
     )
 
 
-def _preload(row: Parameter, bearing: TouchdownBearing, index: int) -> Unknown:
-    """Preload, estimated by the axial offset of the rows, which is what the ball forces depend on.
+def _measured_otherwise(row: Parameter, bearing: TouchdownBearing, index: int, measure: Measure) -> Unknown:
+    """A parameter estimated by another number, on which the forces depend: a preload by an axial offset.
 
-    The ends of the 90 % interval are those of the preload; between them the prior is normal in the offset.
+    The ends of the 90 % interval are those of the parameter; between them the prior is normal in the number.
     """
     quantity = row.described(bearing)
     known = prior(row, quantity, logarithmic=True)
-    constants = bearing_constants(bearing.bearing)
     low, high = (
-        bearing_constants(bearing.bearing.changed(preload=Estimated(value=math.exp(end)))).axial_offset
+        measure.of_value(math.exp(end))
         for end in (known.mean - NINETY * known.sigma, known.mean + NINETY * known.sigma)
     )
     stated = quantity.interval_90 or quantity.range
     return Unknown(
         parameter=row,
         owner=bearing.name,
-        mean=constants.axial_offset if stated is None else 0.5 * (low + high),
+        mean=measure.start if stated is None else 0.5 * (low + high),
         sigma=(high - low) / (2.0 * NINETY),
-        start=constants.axial_offset,
+        start=measure.start,
         targets=tuple(Target(entry=entry, row=index) for entry in row.entries),
         calibrated=quantity.status == "estimated",
-        published=partial(preload_of_offset, constants),
+        published=measure.value_of,
     )
 
 

@@ -226,11 +226,3 @@ def _loose_seat(
         else:
             damping = max(4.0 * damping, 1e-3)
     return float(at[0]), float(at[1])
-
-
-def static_bearing_stiffness(constants: BearingConstants, load: float) -> float:
-    """Tangent radial stiffness [N/m] of the ball set at the deflection of a static load [N] downwards.
-
-    Source: Neisi 2020, eqs. (2)–(6), differentiated.
-    """
-    return static_deflection(constants, load)[1]

@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from rotordrop.estimation.bearing_drop import BearingDrop, BearingMotions, History
+from rotordrop.machine.ball_bearing import STATIC_STRESS
 from rotordrop.report.content import Figure, Section, Statement, Table
 from rotordrop.report.first_contact import first_contact_figure
 from rotordrop.report.impacts import impact_figure, impact_table
@@ -17,7 +18,6 @@ from rotordrop.report.quantity import Quantity
 from rotordrop.report.stress_box import StressBox, stress_box, stress_box_figure, stress_table
 from rotordrop.report.style import MICRO
 from rotordrop.report.time_panels import Panel, time_panels
-from rotordrop.severity.damage import STATIC_LIMIT
 
 EARLY = 0.04
 """Window [s] around the first contacts that gets figures of its own."""
@@ -248,14 +248,14 @@ def speed_figure(rotor: Sequence[History], races: Sequence[History] = ()) -> obj
 def static_limit_statement(bearing: BearingDrop, *, certain: bool = True) -> Statement:
     """Set a peak stress beside the stress of the static load rating, as information."""
     peak = Quantity.of(bearing.peak_stress.known, "pressure", range_only=not certain)
-    limit = Quantity(value=STATIC_LIMIT, kind="pressure").text
+    limit = Quantity(value=STATIC_STRESS, kind="pressure").text
     stress = bearing.peak_stress.value
     low, high = bearing.peak_stress.interval_90 or (stress, stress)
-    share = f"{100.0 * stress / STATIC_LIMIT:.0f} %"
+    share = f"{100.0 * stress / STATIC_STRESS:.0f} %"
     if not certain:
-        share = f"{100.0 * low / STATIC_LIMIT:.0f} to {100.0 * high / STATIC_LIMIT:.0f} %"
+        share = f"{100.0 * low / STATIC_STRESS:.0f} to {100.0 * high / STATIC_STRESS:.0f} %"
     return Statement(
         text=f"{bearing.name}: the peak stress of {peak.text} is {share} of the {limit} at which ISO 76 "
         "defines the static load rating of ball bearings (information, not an acceptance limit).",
-        level="notice" if (high if not certain else stress) < STATIC_LIMIT else "warning",
+        level="notice" if (high if not certain else stress) < STATIC_STRESS else "warning",
     )

@@ -13,7 +13,7 @@ from rotordrop.report.quantity import Quantity
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
-    from rotordrop.machine.ball_bearing import BallBearing
+    from rotordrop.model.bearing_numbers import BearingFigure
     from rotordrop.model.machine_summary import BearingSummary, MachineSummary
     from rotordrop.model.machine_warnings import MachineWarning
 
@@ -99,7 +99,7 @@ def _card(machine: Machine, rest: BearingSummary) -> Card:
         figures=(
             KeyFigure(label="share of the weight", value=Quantity(value=rest.load, kind="force")),
             KeyFigure(label="air gap", value=Quantity.of(bearing.air_gap, "length")),
-            *_seat_of_the_balls(bearing.bearing, rest),
+            *(_stated(figure) for figure in rest.figures),
             KeyFigure(
                 label="pressure of rotor on race at rest",
                 value=Quantity(value=rest.contact_pressure, kind="pressure"),
@@ -119,28 +119,11 @@ def _card(machine: Machine, rest: BearingSummary) -> Card:
     )
 
 
-def _seat_of_the_balls(balls: BallBearing, rest: BearingSummary) -> tuple[KeyFigure, ...]:
-    """What holds the balls without a load: the preload, or else the play they have and how they lie."""
-    if rest.constants.preloaded:
-        return (
-            KeyFigure(label="preload of a row", value=Quantity.of(balls.preload, "force")),
-            KeyFigure(label="stress by preload", value=Quantity(value=rest.preload_stress, kind="pressure")),
-        )
-    play = Quantity(value=2.0 * rest.constants.radial_play, kind="length")
-    return (
-        KeyFigure(
-            label="radial clearance",
-            value=play if balls.clearance is None else Quantity.of(balls.clearance, "length"),
-        ),
-        KeyFigure(
-            label="free contact angle", value=Quantity(value=rest.constants.contact_angle, kind="angle")
-        ),
-        KeyFigure(
-            label="largest ball load at rest",
-            value=Quantity(value=rest.ball_load, kind="force"),
-            note=f"on {rest.loaded_balls} balls",
-        ),
-    )
+def _stated(figure: BearingFigure) -> KeyFigure:
+    known = Quantity(value=figure.value, kind=figure.kind)
+    if figure.described is not None:
+        known = Quantity.of(figure.described, figure.kind)
+    return KeyFigure(label=figure.label, value=known, note=figure.note)
 
 
 def _rotor_table(summary: MachineSummary) -> Table:
@@ -204,7 +187,7 @@ def machine_json(
 def _bearing_json(rest: BearingSummary) -> dict[str, float]:
     return {
         "load_N": rest.load,
-        "preload_stress_Pa": rest.preload_stress,
+        **{figure.field: figure.value for figure in rest.figures},
         "contact_pressure_at_rest_Pa": rest.contact_pressure,
         "tangent_stiffness_N_per_m": rest.tangent_stiffness,
         "equivalent_stiffness_N_per_m": rest.equivalent_stiffness,

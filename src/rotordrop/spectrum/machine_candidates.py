@@ -8,12 +8,11 @@ import numpy as np
 
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.model.assembly import build_rotor_fe
+from rotordrop.model.bearing_numbers import numbers_of
 from rotordrop.model.parameters import contact_law_of
 from rotordrop.model.reduction import Reduction, reduce_rotor
 from rotordrop.model.suspension import EquivalentStiffness, equivalent_stiffness, touchdown_supports
 from rotordrop.model.whirl import matrices_of, whirl_modes
-from rotordrop.physics.ball_bearing import bearing_constants
-from rotordrop.physics.ball_set import static_deflection
 from rotordrop.physics.contact import depth_at
 from rotordrop.physics.pendulum import effective_length, period_ratio, small_frequency, spin_participation
 from rotordrop.spectrum.candidates import (
@@ -100,7 +99,7 @@ def swing_ranges(machine: Machine) -> tuple[SwingRange, ...]:
 
 def _swing(bearing: TouchdownBearing, part: EquivalentStiffness, inertia: float, g: float) -> SwingRange:
     indentation = depth_at(contact_law_of(bearing.contact), part.load)
-    race_sag = static_deflection(bearing_constants(bearing.bearing), part.load)[0]
+    race_sag = numbers_of(bearing).deflection(part.load)[0]
     sags = (indentation, race_sag, part.load / part.support)
     gap = bearing.air_gap
     lower, upper = gap.range or (gap.lower or float(gap), gap.upper or float(gap))
@@ -153,11 +152,5 @@ def settled_modes(machine: Machine) -> tuple[Candidate, ...]:
 
 
 def _defects(bearing: TouchdownBearing) -> tuple[Candidate, ...]:
-    balls = bearing.bearing
-    return bearing_defect_candidates(
-        bearing.name,
-        ball_count=balls.ball_count,
-        ball_diameter=float(balls.ball_diameter),
-        pitch_diameter=float(balls.pitch_diameter),
-        contact_angle=float(balls.contact_angle),
-    )
+    elements = numbers_of(bearing).rolling_elements()
+    return () if elements is None else bearing_defect_candidates(bearing.name, **vars(elements))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rotordrop.errors import UsageError
 from rotordrop.estimated import Estimated
 from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.model.bearing_numbers import Spread, numbers_of
 from rotordrop.model.parameters import DropModel, build_drop_model
 from rotordrop.model.reduction import Reduction
 from rotordrop.simulation.case import LevitatedStart
@@ -168,13 +169,19 @@ def _bearing_values(
         "friction.dynamic": dynamic,
         "friction.static": dynamic * common["static"],
         "friction.stribeck_speed": _within(friction.stribeck_speed, common["stribeck"]),
-        "preload": _within(bearing.bearing.preload, _log_uniform(random, 0.8, 1.25)),
-        "bearing.first_ball_angle": float(random.uniform(0.0, 2.0 * math.pi / bearing.bearing.ball_count)),
+        **{spread.path: _drawn(spread, random) for spread in numbers_of(bearing).spreads()},
         "race.inertia": _within(bearing.race.inertia, _log_uniform(random, 0.85, 1.2)),
         "race.mass": _within(bearing.race.mass, common["race_mass"]),
         "race.drag_coefficient": float(bearing.race.drag_coefficient) * common["drag"],
         "damping_time": _within(bearing.damping_time, common["damping_time"]),
     }
+
+
+def _drawn(spread: Spread, random: np.random.Generator) -> float:
+    """A factor on what is described, or a value of a range."""
+    if spread.described is not None:
+        return _within(spread.described, _log_uniform(random, spread.low, spread.high))
+    return float(random.uniform(spread.low, spread.high))
 
 
 def _shared_values(machine: Machine, random: np.random.Generator) -> dict[str, float]:

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import SimulationError
 from rotordrop.model import layout as L
+from rotordrop.model.bearing_numbers import numbers_of
 from rotordrop.model.layout import KernelParameters
 from rotordrop.model.parameters import DropModel
 from rotordrop.model.static_sag import sag_of_model
-from rotordrop.physics.ball_bearing import bearing_constants
 from rotordrop.physics.pendulum import small_frequency
 from rotordrop.simulation._histories import stored_energy
 from rotordrop.simulation._rhs import drop_derivative
@@ -111,8 +111,7 @@ def _force_and_stiffness(
 def _guess(model: DropModel) -> Array:
     """Straight rotor, pressed into the contacts by its weight, loose races at the end of their play."""
     p = model.parameters.bearing
-    constants = [bearing_constants(bearing.bearing) for bearing in model.machine.touchdown_bearings]
-    play = np.array([c.radial_play for c in constants])
+    play = np.array([numbers_of(bearing).play for bearing in model.machine.touchdown_bearings])
     down = p[:, L.AIR_GAP] + sag_of_model(model).indentation + play
     nodes = [bearing.node for bearing in model.machine.touchdown_bearings]
     positions = np.asarray(model.fe.node_positions)[np.array(nodes) - 1]

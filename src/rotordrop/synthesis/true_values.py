@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.model.bearing_numbers import numbers_of
 from rotordrop.model.parameter import Step
 from rotordrop.model.parameter_table import rows
 from rotordrop.model.statics import bearing_load_shares
-from rotordrop.physics.ball_bearing import bearing_constants
-from rotordrop.physics.ball_set import static_bearing_stiffness
 from rotordrop.simulation.certificate import refined_peak
 from rotordrop.simulation.result import DropResult
 from rotordrop.synthesis.event import DropConditions, HiddenMachine
@@ -142,7 +141,7 @@ def machine_truth(machine: Machine) -> dict[str, Any]:
         "contact": [_contact(b) for b in bearings],
         "support": [_support(b) for b in bearings],
         "ring": [{"m": float(b.race.mass), "Ip": float(b.race.inertia)} for b in bearings],
-        "bearing": [_ball_bearing(b) for b in bearings],
+        "bearing": [_bearing(b) for b in bearings],
         "unbalance": [
             {"node": u.node, "U": float(u.amount), "phase": float(u.phase)} for u in machine.unbalances
         ],
@@ -159,7 +158,7 @@ def _equivalent_stiffness(machine: Machine) -> dict[str, float]:
     """Support and bearing in series [N/m], the bearing by its tangent at the static load."""
     found = {}
     for bearing, load in zip(machine.touchdown_bearings, bearing_load_shares(machine), strict=True):
-        tangent = static_bearing_stiffness(bearing_constants(bearing.bearing), float(load))
+        tangent = numbers_of(bearing).tangent_stiffness(float(load))
         support = float(bearing.support.stiffness)
         found[bearing.name] = support * tangent / (support + tangent)
     return found
@@ -192,22 +191,9 @@ def _support(b: TouchdownBearing) -> dict[str, float]:
     }
 
 
-def _ball_bearing(b: TouchdownBearing) -> dict[str, float]:
-    balls = b.bearing
+def _bearing(b: TouchdownBearing) -> dict[str, float]:
     return {
-        "Dw": float(balls.ball_diameter),
-        "Z": balls.ball_count,
-        "Dpw": float(balls.pitch_diameter),
-        "alpha_deg": math.degrees(float(balls.contact_angle)),
-        "fi": float(balls.conformity_inner),
-        "fo": float(balls.conformity_outer),
-        "E_ring": float(balls.ring_youngs_modulus),
-        "nu_ring": float(balls.ring_poisson_ratio),
-        "E_ball": float(balls.ball_youngs_modulus),
-        "nu_ball": float(balls.ball_poisson_ratio),
-        "preload_N": float(balls.preload),
-        "beta0_deg": math.degrees(float(balls.first_ball_angle)),
-        "row2_offset_pitch": float(balls.second_row_offset),
+        **numbers_of(b).truth(),
         "Cb_over_Kb": float(b.damping_time),
         "drag_mu": float(b.race.drag_coefficient),
         "drag_omega0": float(b.race.drag_speed),

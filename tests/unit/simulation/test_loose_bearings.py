@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from tests.scaled_machines import scaled_machine
@@ -10,6 +12,7 @@ from rotordrop.model import layout as L
 from rotordrop.model.machine_summary import summarise_machine
 from rotordrop.model.machine_warnings import machine_warnings
 from rotordrop.model.parameters import build_drop_model
+from rotordrop.physics.ball_bearing import bearing_constants
 from rotordrop.report.simulation_numbers import simulation_numbers
 from rotordrop.simulation.case import DropCase
 from rotordrop.simulation.drop import simulate_drop
@@ -47,10 +50,12 @@ def test_the_class_gives_clearance_with_its_range():
 def test_a_loose_bearing_is_summarised_and_checked(bearing, first):
     machine = loose(bearing, first)
     summary = summarise_machine(machine)
-    for rest in summary.bearings:
-        assert rest.deflection > rest.constants.radial_play
+    for described, rest in zip(machine.touchdown_bearings, summary.bearings, strict=True):
+        constants = bearing_constants(described.bearing)
+        assert rest.deflection > constants.radial_play
         assert 1e6 < rest.tangent_stiffness < 1e9
-        assert rest.loaded_balls < 0.6 * rest.constants.row_count * rest.constants.ball_count
+        loaded = re.search(r"on (\d+) balls", rest.figures[-1].note)
+        assert 1 <= int(loaded[1]) < 0.6 * constants.row_count * constants.ball_count
     told = [warning.message for warning in machine_warnings(machine, summary)]
     assert any("the load of the lowest ball at rest" in text for text in told)
     assert not any("preload" in text for text in told)

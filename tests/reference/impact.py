@@ -1,7 +1,6 @@
-"""Closed-form impacts: restitution, contact time, bounces. References for the contact kernels, and estimates.
+"""Closed-form impacts: restitution, contact time, bounces. References for the contact kernels.
 
-One mass against one contact or one spring. The simulation does not use them; the tests and the first-contact
-identification do.
+One mass against one contact or one spring.
 """
 
 from __future__ import annotations
