@@ -2,7 +2,7 @@
 
     python tools/mutate.py follow [FOLDER ...]   # which lines the commands, which functions the tests run
     python tools/mutate.py draw                  # 150 faults into tests/mutation/mutants.json
-    python tools/mutate.py try [--survivors] [--package NAME] [--count N]
+    python tools/mutate.py try [--survivors] [--package NAME] [--count N] [--only N ...] [--tests FILE ...]
 
 A fault is drawn from a line that `estimate` (both methods), `calibrate` or `waterfall` executes. It is put
 into a copy of the package and tried against the tests that run the faulty function, the nearest and quickest
@@ -331,7 +331,7 @@ def kernel_names(fault: Mutation) -> set[str]:
 
 
 class Progress:
-    """A pytest plugin in the child: runs the chosen tests in their order and tells the parent."""
+    """A pytest plugin in the child: runs the chosen tests, or files, in their order and tells the parent."""
 
     def __init__(self, order: list[str], pipe: Any) -> None:
         self.place = {name: i for i, name in enumerate(order)}
@@ -339,9 +339,11 @@ class Progress:
         self.failed = ""
 
     def pytest_collection_modifyitems(self, items: list[Any]) -> None:
-        items[:] = sorted(
-            (item for item in items if item.nodeid in self.place), key=lambda item: self.place[item.nodeid]
-        )
+        places = {item: self._place_of(item.nodeid) for item in items}
+        items[:] = sorted((item for item in items if places[item] >= 0), key=lambda item: places[item])
+
+    def _place_of(self, nodeid: str) -> int:
+        return self.place.get(nodeid, self.place.get(nodeid.split("::")[0], -1))
 
     def pytest_runtest_logstart(self, nodeid: str) -> None:
         self.pipe.send(("test", nodeid))
@@ -439,6 +441,8 @@ class Copies:
     def __init__(self, folder: Path) -> None:
         self.clean, self.tree = folder / "clean", folder / "tree"
         self.cache, self.other_cache = folder / f"cache-{kernels_digest()}", folder / "other_cache"
+        self.warm = folder / f"warm-{kernels_digest()}"
+        self.cache.mkdir(exist_ok=True)
         shutil.rmtree(self.clean, ignore_errors=True)
         ignore = shutil.ignore_patterns("__pycache__", "*.pyc", "_build")
         for name in ("src", "tests", "docs", "tools", "studies", "benchmarks"):
@@ -488,6 +492,17 @@ def attempt(
     return found | {"seconds": round(found["seconds"] + spent, 1)}
 
 
+def attempt_with(files: list[str], fault: Mutation, copies: Copies, limit: float) -> dict[str, Any]:
+    """Try a fault against whole files of tests, whatever is known of what they run."""
+    kernels = kernel_names(fault)
+    cache = copies.cache_without(kernels) if kernels else copies.cache
+    compiling = COMPILING if kernels else 0.0
+    nothing = Tests({}, {})
+    return outcome(
+        copies.fresh(fault), files, nothing, "compiled", cache, limit + compiling, compiling + limit
+    )
+
+
 def warm(copies: Copies, compiled: Tests) -> None:
     """Fill the cache of machine code, and see that the tests pass where there is no fault."""
     kept = [
@@ -495,10 +510,14 @@ def warm(copies: Copies, compiled: Tests) -> None:
         for name in compiled.ran
         if name.startswith(("tests/unit/tracking/", "tests/unit/identification/"))
     ]
-    found = outcome(copies.fresh(), kept, compiled, "compiled", copies.cache, math.inf, math.inf)
+    pass_without_fault(kept, copies, compiled)
+
+
+def pass_without_fault(tests: list[str], copies: Copies, known: Tests) -> None:
+    """What fails without a fault catches nothing."""
+    found = outcome(copies.fresh(), tests, known, "compiled", copies.cache, math.inf, math.inf)
     print(f"without a fault: {found}", flush=True)
     if found["caught"]:
-        shutil.rmtree(copies.cache, ignore_errors=True)
         sys.exit("The tests fail without any fault. Mend that first.")
 
 
@@ -514,23 +533,28 @@ def try_all(options: argparse.Namespace) -> None:
     alone = (folder / "lock").open("w")
     fcntl.flock(alone, fcntl.LOCK_EX)  # one run at a time: the copies lie in one place
     copies = Copies(folder)
-    if not copies.cache.exists():
+    if options.tests:
+        pass_without_fault(options.tests, copies, compiled)
+    elif not copies.warm.exists():
         warm(copies, compiled)
+        copies.warm.touch()
     tried = 0
     for number, entry in enumerate(entries):
         fault = faults.get(entry["mutant"])
         if fault is None or (options.package and fault.package != options.package):
+            continue
+        if options.only and number not in options.only:
             continue
         stale = fault.digest != entry["digest"]
         again = options.survivors and not entry.get("caught", False)
         if ("caught" in entry and not stale and not again) or tried == options.count:
             continue
         tried += 1
-        entry.update(
-            place=fault.place,
-            digest=fault.digest,
-            **attempt(fault, copies, compiled, interpreted, options.limit),
-        )
+        if options.tests:
+            found = attempt_with(options.tests, fault, copies, options.limit)
+        else:
+            found = attempt(fault, copies, compiled, interpreted, options.limit)
+        entry.update(place=fault.place, digest=fault.digest, **found)
         word = "caught" if entry["caught"] else "SURVIVED"
         print(
             f"{number:3d} {word} {entry['seconds']:5.1f} s {fault.place} {fault.key} [{entry['by']}]",
@@ -561,6 +585,8 @@ def main() -> None:
     trying = verbs.add_parser("try")
     trying.add_argument("--survivors", action="store_true", help="those that nothing has caught, again")
     trying.add_argument("--package", help="only faults of this package")
+    trying.add_argument("--only", nargs="*", type=int, help="only the faults of these numbers")
+    trying.add_argument("--tests", nargs="*", help="against these files of tests, and not all that run it")
     trying.add_argument("--count", type=int, default=-1, help="stop after so many")
     trying.add_argument("--limit", type=float, default=LIMIT, help="processor time for a fault [s]")
     options = parser.parse_args()

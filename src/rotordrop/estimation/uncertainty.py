@@ -256,7 +256,7 @@ def _numbers(problem: ImpactFit, candidate: Candidate, duration: float) -> tuple
     gaps = problem.replica.bearing_rows(problem.vector, candidate.theta, rest)[:, 0]
     force, stress = drop_numbers(result)
     # a draw's own vertical zero is no motion: orbits are compared from the rest position
-    orbit = result.displacement[::step] + rest
+    orbit = result.displacement[::step] - rest
     return np.stack([force[0], force[1], stress[0], stress[1], gaps]), orbit
 
 

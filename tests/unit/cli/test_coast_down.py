@@ -25,6 +25,7 @@ from rotordrop.simulation.case import CentredStart
 from rotordrop.simulation.checkpoint import work_folder
 from rotordrop.simulation.coast_down import simulate_coast_down
 from rotordrop.simulation.coast_down_case import CoastDownCase
+from rotordrop.simulation.coast_down_file import load_coast_down, open_samples
 from rotordrop.spectrum.coast_down import analyse_coast_down
 from rotordrop.spectrum.frequency_path import FrequencyPath
 
@@ -71,6 +72,40 @@ def test_a_coast_down_says_whether_the_first_window_held_the_maximum(coast, caps
     assert all(maximum["within_first_0.2_s"] for maximum in found["maxima"])
     assert found["windows"]["end"] == pytest.approx([0.2, 1.0, 2.0, 2.5])
     assert found["contacts"]["NDE"] > 3
+
+
+def test_every_number_of_a_coast_down_is_that_of_its_samples(coast):
+    """Windows against the samples of the file, the largest values and the energies against the windows."""
+    found, result = json.loads(coast["json"].read_text()), load_coast_down(coast["h5"])
+    samples = open_samples(coast["h5"])
+    count = len(samples.speed)
+    time = np.arange(count) / samples.sampling_rate
+    assert 1.0 / found["output_step_s"] == pytest.approx(samples.sampling_rate)
+    assert found["initial_speed_rad_s"] == pytest.approx(2.0 * np.pi * 60.0)
+    windows = found["windows"]
+    peaks = np.array(windows["peak"])  # window, bearing, quantity
+    late = np.array(windows["start"]) > 0.19
+    assert len(found["maxima"]) == peaks[0].size
+    for maximum in found["maxima"]:
+        b = found["bearings"].index(maximum["bearing"])
+        of_windows = peaks[:, b, found["quantities"].index(maximum["quantity"])]
+        for value, peak in ((maximum["value"], of_windows), (maximum["largest_later"], of_windows[late])):
+            assert value == pytest.approx(peak.max(), rel=1e-2)  # a peak lies between two samples
+        at = int(np.argmax(of_windows))
+        assert windows["start"][at] <= maximum["time_s"] <= windows["end"][at]
+        if maximum["quantity"] == "indentation":  # into the race, which gives way: the rotor went further
+            radius = np.hypot(*np.asarray(samples.planes[maximum["bearing"]][0:count]).T)
+            beyond = radius[time <= 0.2].max() - samples.air_gap[maximum["bearing"]]
+            assert 0.0 < maximum["value"] < beyond < 10.0 * maximum["value"]
+            assert maximum["time_s"] == pytest.approx(time[int(np.argmax(radius))], abs=5e-4)
+    for end, speed in zip(windows["end"], windows["speed"], strict=True):
+        assert speed == pytest.approx(np.interp(end, time, np.abs(samples.speed)), rel=1e-4)
+    for b, name in enumerate(found["bearings"]):
+        assert sum(window[b] for window in windows["contacts"]) == found["contacts"][name]
+        assert found["contact_energy_J"][name] == pytest.approx(result.contact_energy[b])
+    assert sum(windows["dissipated"]) == pytest.approx(found["dissipated_J"], rel=1e-6)
+    assert sum(found["contact_energy_J"].values()) < found["dissipated_J"]
+    assert abs(found["energy_residual_J"]) < 1e-3 * found["energy_scale_J"]
 
 
 def test_an_unfinished_run_is_not_taken_for_another(coast, machine, capsys):

@@ -51,6 +51,35 @@ def test_air_gap_and_largest_displacement_are_those_of_the_estimate(machine, rec
     assert "above the rest of the last 1 s" in signal.centre
 
 
+def test_the_found_gap_is_handed_on_with_its_interval(machine, record):
+    """The interval is that of a normal error on both sides; a search may not leave it."""
+    signal = recorded_coast_down(machine, record)
+    for name, gap in signal.air_gap.items():
+        found = with_found_air_gaps(machine, signal).bearing(name).air_gap
+        half = 1.6448536 * signal.air_gap_error[name]
+        assert float(found) == gap and found.status == "estimated"
+        assert found.interval_90 == pytest.approx((gap - half, gap + half), rel=1e-6)
+        assert (found.lower, found.upper) == pytest.approx((gap - half, gap + half), rel=1e-6)
+    rough = replace(signal, air_gap_error=dict(signal.air_gap))
+    for name, gap in signal.air_gap.items():
+        assert with_found_air_gaps(machine, rough).bearing(name).air_gap.lower == 0.5 * gap
+
+
+def test_the_speed_counts_from_power_off(machine, record):
+    """One that was given by hand says from where the rotor fell, not how it slowed down."""
+    signal = recorded_coast_down(machine, record)
+    time, speed = record.measured_speed
+    np.testing.assert_array_equal(signal.speed, speed)
+    assert np.ptp(time - signal.speed_time) < 1e-9
+    falling = signal.start_time + np.arange(len(signal.planes["DE"])) / signal.sampling_rate
+    off = time[0] - signal.speed_time[0]
+    assert record.time[record.time >= off][0] - off == pytest.approx(falling[0], abs=1e-9)
+    assert signal.profile is not None
+    assert signal.profile.speed_at([0.0])[0] == pytest.approx(2.0 * np.pi * 60.0, rel=2e-3)
+    by_hand = recorded_coast_down(machine, replace(record, speed_by_hand=True))
+    assert (by_hand.speed, by_hand.speed_time, by_hand.profile) == (None, None, None)
+
+
 def test_the_levitated_position_does_not_matter(machine, record):
     aside = recorded_coast_down(machine, displaced(record, 30e-6))
     plain = recorded_coast_down(machine, record)

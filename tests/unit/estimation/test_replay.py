@@ -34,10 +34,22 @@ LOADS = ("peak_force_N", "mean_force_0p15_0p2_N", "peak_stress_Pa", "mean_stress
 
 
 @pytest.fixture(scope="module")
-def replayed(known: Machine, synthetic: SyntheticDrop) -> Estimate:
+def fitted() -> dict[str, Any]:
+    """Problem and unknowns from which the draws of the replay were made."""
+    return {}
+
+
+@pytest.fixture(scope="module")
+def replayed(known: Machine, synthetic: SyntheticDrop, fitted: dict[str, Any]) -> Estimate:
     """The recorded drop replayed from its owner's guesses, with few starts and hardly a draw."""
+
+    def drawing(problem: Any, x: Any, covariance: Any, **options: Any) -> Any:
+        fitted.update(problem=problem, x=x)
+        return uncertainty.draw_drops(problem, x, covariance, **options)
+
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("rotordrop.estimation.replay.FRICTION_DRAWS", 2)
+        patch.setattr("rotordrop.estimation.replay.draw_drops", drawing)
         method = Replay(starts=2, draws=2, threads=2)
         return estimate_drop(known, synthetic.record, synthetic.tail, method=method)
 
@@ -87,6 +99,20 @@ def test_few_draws_give_no_interval_and_say_why(document: dict[str, Any], replay
         assert all("interval_90" not in entry[field] for field in LOADS)
         assert entry["not_stated"] == dict.fromkeys(LOADS, reason)
     assert any("64 are needed for intervals" in words for words in document["warnings"])
+
+
+def test_draws_of_the_rest_position_fall_on_one_path(replayed: Estimate, fitted: dict[str, Any]) -> None:
+    """A vertical zero that is off moves rest and fall alike: seen from rest, nothing moves before contact."""
+    problem = fitted["problem"]
+    best = uncertainty.best_candidate(problem, fitted["x"])
+    initial = problem.replica.initial
+    _, orbit = uncertainty._numbers(problem, best, 6e-3)
+    for height in range(initial.unknowns.rest.start + 1, initial.unknowns.rest.stop, 2):
+        column = initial.covariance[:, height]
+        drawn = replace(best, fall=best.fall + column / math.sqrt(column[height]))
+        assert drawn.fall[height] - best.fall[height] > 5e-6
+        _, other = uncertainty._numbers(problem, drawn, 6e-3)
+        assert np.max(np.abs(other - orbit)) < 0.05e-6
 
 
 def test_the_drop_is_simulated_at_both_limits_of_the_air_gap(replayed: Estimate) -> None:

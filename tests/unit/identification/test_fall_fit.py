@@ -62,3 +62,14 @@ def test_without_readings_the_prior_is_left(
     vertical = np.std(sensing.at_bearings(zeros)[..., 1], axis=0)
     assert sigma[fit.unknowns.rest][1::2] == pytest.approx(vertical, rel=0.03)
     assert sigma[fit.unknowns.shift] == pytest.approx(0.02, rel=0.1)
+
+
+def test_the_estimate_is_where_no_step_leads_away(
+    initial: InitialState, sensing: Sensing, model: DropModel
+) -> None:
+    """Not where the first step ends: gains, decay and release enter as products."""
+    fit = fit_of(initial, sensing, model, 5e-6)
+    estimate, covariance, _ = fit.solve()
+    residual, jacobian = fit.linearised(estimate)
+    step = covariance @ jacobian.T @ residual
+    assert np.max(np.abs(step) / np.sqrt(np.diag(covariance))) < 0.05

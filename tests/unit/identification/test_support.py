@@ -164,6 +164,18 @@ def test_directions_and_the_rest_hold_the_whole_covariance(replica: Replica) -> 
     assert product == pytest.approx(replica.initial.covariance / np.outer(scale, scale), abs=1e-8)
 
 
+def test_a_direction_moves_the_start_as_its_unknowns_do(replica: Replica) -> None:
+    directions, mean = influential_directions(replica), replica.initial.mean
+    for k in range(directions.unknowns.shape[1]):
+        step = 1e-3 * directions.unknowns[:, k]
+        (ahead, turned), (behind, back) = replica.start_state(mean + step), replica.start_state(mean - step)
+        for found, slope in (
+            (directions.states[:, k], 500.0 * (ahead - behind)),
+            (directions.unbalances[..., k], 500.0 * (turned - back)),
+        ):
+            assert np.linalg.norm(found - slope) < 0.02 * np.linalg.norm(slope), k
+
+
 def test_what_the_directions_leave_moves_the_bearings_little(replica: Replica) -> None:
     directions = influential_directions(replica)
     place, shape = replica.model.layout.modal_y, replica.model.parameters.bearing_shape

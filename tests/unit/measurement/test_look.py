@@ -164,6 +164,36 @@ def test_the_bundled_drop_with_and_without_its_machine(machine):
     jsonschema.validate(alone.as_json(), look_schema())
 
 
+def test_every_number_of_the_document_is_that_of_what_was_seen(machine):
+    seen = look(example_record_path("lp400_drop_060"), machine=machine)
+    written = json.loads(json.dumps(seen.as_json(), allow_nan=False))
+    assert written["speed_rad_per_s"] == pytest.approx(2.0 * np.pi * 60.0, rel=2e-3)
+    assert [(one["name"], one["plane"]) for one in written["channels"]] == [
+        (sensor.name, sensor.bearing) for sensor in machine.sensors
+    ]
+    (drop,) = written["drops"]
+    assert drop["release_s"] == seen.drops[0].release == pytest.approx(0.0, abs=2e-3)
+    for entry, plane in zip(written["planes"], seen.planes, strict=True):
+        assert entry["beyond_air_gap_m"] == pytest.approx(
+            entry["largest_displacement_m"] - entry["air_gap_m"]
+        )
+        assert (entry["plane"], entry["largest_displacement_m"]) == (plane.plane, plane.largest)
+        assert entry["largest_displacement_time_s"] == plane.largest_time
+        assert entry["position_index"] == plane.position_index
+        assert entry["velocity_index"] == plane.velocity_index
+    names = ("plane", "time", "azimuth", "depth", "approach", "rebound")
+    keys = ("plane", "time_s", "azimuth_rad", "depth_m", "approach_m_per_s", "rebound_m_per_s")
+    assert len(written["impacts"]) == len(seen.impacts) > 4
+    for entry, impact in zip(written["impacts"], seen.impacts, strict=True):
+        assert tuple(entry[key] for key in keys) == tuple(getattr(impact, name) for name in names)
+    first = next(hit for hit in written["impacts"] if hit["plane"] == "DE")
+    # The remanent lift makes the fall through the gap longer and slower than a free one.
+    gap = next(one["air_gap_m"] for one in written["planes"] if one["plane"] == "DE")
+    assert np.sqrt(2.0 * gap / G) < first["time_s"] - drop["release_s"] < 1.5 * np.sqrt(2.0 * gap / G)
+    assert 0.5 * np.sqrt(2.0 * gap * G) < first["approach_m_per_s"] < 1.05 * np.sqrt(2.0 * gap * G)
+    assert [one["event"] for one in written["timeline"]] == [words for _, words in seen.timeline()]
+
+
 def test_the_command_writes_page_and_json_and_needs_no_compiler(tmp_path, capsys):
     record = str(example_record_path("lp400_drop_060"))
     page, file = tmp_path / "look.html", tmp_path / "look.json"
