@@ -50,3 +50,16 @@ JsonOption = Annotated[
 ]
 
 ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite what stands there already.")]
+
+ProfileOption = Annotated[
+    Path | None, typer.Option("--profile", metavar="FILE", help="Channel map of the recorder.")
+]
+
+PlanesOption = Annotated[
+    list[str] | None,
+    typer.Option("--map", metavar="PLANE", help='A plane and its channels: "NDE: X1 0 deg, Y1 90 deg".'),
+]
+
+ReportOption = Annotated[
+    Path | None, typer.Option("--report", metavar="FILE", help="Write the report, one offline HTML file.")
+]

@@ -64,7 +64,6 @@ _ORDER = (
     "log",
     "synthesize",
     "score",
-    "bench",
     "fingerprint",
 )
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rotordrop.cli._options import JsonOption, MachineArgument
+from rotordrop.cli._options import JsonOption, MachineArgument, ProfileOption
 from rotordrop.cli._output import deliver, progress_bar, require_places
 from rotordrop.cli._recordings import require_own_content, require_own_names, tails_of
 from rotordrop.errors import ConsistencyError
@@ -35,9 +35,7 @@ def calibrate(
             "--tail", metavar="FILE", help="Settled tail: one for all drops, or one for each in order."
         ),
     ] = None,
-    profile: Annotated[
-        Path | None, typer.Option("--profile", metavar="FILE", help="Channel map of the recorder.")
-    ] = None,
+    profile: ProfileOption = None,
     tail_profile: Annotated[
         Path | None,
         typer.Option("--tail-profile", metavar="FILE", help="Channel map of the recorder of the tails."),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rotordrop.cli._options import JsonOption
+from rotordrop.cli._options import JsonOption, PlanesOption, ProfileOption
 from rotordrop.cli._output import deliver
 from rotordrop.errors import UsageError
 
@@ -35,13 +35,8 @@ def clearance(
         Path | None,
         typer.Option("--output", "-o", metavar="FILE", help="Write the machine file with the measured gaps."),
     ] = None,
-    mapping: Annotated[
-        list[str] | None,
-        typer.Option("--map", metavar="PLANE", help='A plane and its channels: "NDE: X1 0 deg, Y1 90 deg".'),
-    ] = None,
-    profile: Annotated[
-        Path | None, typer.Option("--profile", metavar="FILE", help="Channel map of the recorder.")
-    ] = None,
+    mapping: PlanesOption = None,
+    profile: ProfileOption = None,
     json: JsonOption = None,
 ) -> None:
     """Measure the air gap of every touchdown bearing by a lift check, and its wear by two."""

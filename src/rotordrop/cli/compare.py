@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rotordrop.cli._options import JsonOption, quantity
+from rotordrop.cli._options import JsonOption, ReportOption, quantity
 from rotordrop.cli._output import deliver, require_places
 from rotordrop.errors import UsageError
 
@@ -35,9 +35,7 @@ def compare(
             help='Scatter of the peak force between equal drops (1 s.d.), "400 N", to judge speeds.',
         ),
     ] = None,
-    report: Annotated[
-        Path | None, typer.Option("--report", metavar="FILE", help="Write the report, one offline HTML file.")
-    ] = None,
+    report: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
     """Compare several drops: which was worst, and how sure that is."""

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rotordrop.cli._options import JsonOption, MachineArgument
+from rotordrop.cli._options import JsonOption, MachineArgument, ProfileOption
 from rotordrop.cli._output import deliver, progress_bar, require_places
 from rotordrop.cli._recordings import require_own_content, require_own_names, tails_of
 from rotordrop.errors import ConsistencyError, UsageError
@@ -48,9 +48,7 @@ def estimate(
         typer.Option("--fixed", metavar="FILE", help="Replay: use the support of this earlier estimate."),
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="One pass; for a calibrated machine.")] = False,
-    profile: Annotated[
-        Path | None, typer.Option("--profile", metavar="FILE", help="Channel map of the recorder.")
-    ] = None,
+    profile: ProfileOption = None,
     tail_profile: Annotated[
         Path | None,
         typer.Option("--tail-profile", metavar="FILE", help="Channel map of the recorder of the tails."),

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from rotordrop.cli._options import JsonOption, quantity
+from rotordrop.cli._options import JsonOption, PlanesOption, ProfileOption, ReportOption, quantity
 from rotordrop.cli._output import deliver
 
 
@@ -27,16 +27,9 @@ def look(
         float | None,
         typer.Option(parser=quantity("speed"), metavar="SPEED", help='Speed at the drop, "9000 rpm".'),
     ] = None,
-    mapping: Annotated[
-        list[str] | None,
-        typer.Option("--map", metavar="PLANE", help='A plane and its channels: "NDE: X1 0 deg, Y1 90 deg".'),
-    ] = None,
-    profile: Annotated[
-        Path | None, typer.Option("--profile", metavar="FILE", help="Channel map of the recorder.")
-    ] = None,
-    report: Annotated[
-        Path | None, typer.Option("--report", metavar="FILE", help="Write the report, one offline HTML file.")
-    ] = None,
+    mapping: PlanesOption = None,
+    profile: ProfileOption = None,
+    report: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
     """Look at a recorded drop: what was read, its quality, what happened when, impacts, whirl, indices."""

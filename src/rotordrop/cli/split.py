@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from rotordrop.cli._options import MachineArgument
+from rotordrop.cli._options import MachineArgument, ProfileOption
 from rotordrop.cli._output import console, require_places
 
 
@@ -20,9 +20,7 @@ def split(
     folder: Annotated[
         Path, typer.Option("--output", "-o", metavar="FOLDER", help="Where the records go, as HDF5.")
     ],
-    profile: Annotated[
-        Path | None, typer.Option("--profile", metavar="FILE", help="Channel map of the recorder.")
-    ] = None,
+    profile: ProfileOption = None,
 ) -> None:
     """Cut a recording with several drops into one record for each; no sample is changed."""
     from rotordrop.machine import load_machine

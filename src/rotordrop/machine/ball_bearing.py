@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -12,7 +12,8 @@ from pydantic import Field, Strict
 from rotordrop.estimated import Estimated
 from rotordrop.machine.catalog import BallComplement, CatalogueBearing, PreloadClass, find_bearing
 from rotordrop.machine.clearance import CLASSES, ClearanceClass, clearance_range
-from rotordrop.machine.description import Description, Misfit, Text
+from rotordrop.machine.description import Misfit, Text
+from rotordrop.machine.race_bearing import Oddity, RaceBearing
 from rotordrop.machine.values import (
     Angle,
     Conformity,
@@ -29,6 +30,7 @@ from rotordrop.machine.values import (
     default,
     follows,
 )
+from rotordrop.units import format_quantity
 
 BallMaterial = Literal["silicon nitride", "steel"]
 
@@ -55,7 +57,7 @@ _CLEARANCE = ("clearance", "clearance_class")
 _PRELOAD_CLASSES = ("light", "medium", "heavy")
 
 
-class BallBearing(Description):
+class BallBearing(RaceBearing):
     """A ball bearing: an angular-contact pair under preload, or one or two rows with radial clearance.
 
     A row of deep grooves has no contact angle of its own: the clearance leaves it one, and the load zone.
@@ -369,6 +371,25 @@ class BallBearing(Description):
         """Outer radius of what spins with the inner race [m], and why."""
         radius = 0.5 * (self.pitch_diameter.value - 0.6 * self.ball_diameter.value)
         return radius, "steel ring from the bore to 0.6 ball diameters inside the pitch circle"
+
+    def oddities(self, bore_radius: float) -> Iterator[Oddity]:
+        """A preload beyond the heavy class, balls far from the bore."""
+        entry, preload = self.catalogue_entry(), self.preload.value
+        if entry is not None and entry.preload and preload > entry.preload["heavy"]:
+            heavy = entry.preload["heavy"]
+            text = (
+                f"the preload of {format_quantity(preload, 'force')} exceeds the heavy class of "
+                f"{entry.designation}, {format_quantity(heavy, 'force')}; check that it is the force of one "
+                "row"
+            )
+            yield "preload", preload, heavy, text
+        pitch, least, most = self.pitch_diameter.value, 2.0 * bore_radius, 6.0 * bore_radius
+        if not least <= pitch <= most:
+            limit = least if pitch < least else most
+            shown, bound = (format_quantity(number, "length") for number in (pitch, limit))
+            side = f"{'above' if pitch > most else 'below'} {bound}"
+            look = "where no machine is known; the balls run outside of the bore"
+            yield "pitch diameter", pitch, limit, f"pitch diameter {shown} lies {side}, {look}"
 
     def reason(self, name: str) -> str:
         """Say why a value that was left out is what it is."""

@@ -27,7 +27,7 @@ def doubts(machine: Machine) -> tuple[Doubt, ...]:
     found = list(unusual_values(machine))
     for bearing in machine.touchdown_bearings:
         found += [*_air_gap(bearing), *_rotor_radius(machine, bearing), *_friction(bearing)]
-        found += [*_damping(bearing), *_preload(bearing)]
+        found += [*_damping(bearing), *_oddities(bearing)]
     return tuple(found)
 
 
@@ -86,17 +86,9 @@ def _damping(bearing: TouchdownBearing) -> Iterator[Doubt]:
     yield _doubt("bearing damping", bearing, time, least if time < least else most, text)
 
 
-def _preload(bearing: TouchdownBearing) -> Iterator[Doubt]:
-    entry = bearing.bearing.catalogue_entry()
-    if entry is None or not entry.preload:
-        return
-    preload, heavy = bearing.bearing.preload.value, entry.preload["heavy"]
-    if preload > heavy:
-        text = (
-            f"the preload of {format_quantity(preload, 'force')} exceeds the heavy class of "
-            f"{entry.designation}, {format_quantity(heavy, 'force')}; check that it is the force of one row"
-        )
-        yield _doubt("preload", bearing, preload, heavy, text)
+def _oddities(bearing: TouchdownBearing) -> Iterator[Doubt]:
+    for kind, value, limit, text in bearing.bearing.oddities(bearing.bore_radius.value):
+        yield _doubt(kind, bearing, value, limit, text)
 
 
 def _length(value: float) -> str:

@@ -226,9 +226,6 @@ def _of_the_amb(machine: Machine, amb: ActiveMagneticBearing) -> Iterator[Doubt]
 
 def _of_the_ring(machine: Machine, bearing: TouchdownBearing) -> Iterator[Doubt]:
     radius, race = bearing.bore_radius.value, bearing.race
-    pitch = bearing.bearing.pitch_diameter.value
-    look = "the balls run outside of the bore"
-    yield from _outside("pitch diameter", bearing.name, pitch, 2.0 * radius, 6.0 * radius, "length", look)
     reach = math.sqrt(race.inertia.value / race.mass.value)
     text_of_ring = (
         f"inertia over mass of the race puts its mass at a radius of {_length(reach)}, and its bore has "

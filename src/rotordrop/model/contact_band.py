@@ -15,8 +15,10 @@ from rotordrop.machine import Machine
 from rotordrop.model.assembly import RotorFE, build_rotor_fe
 from rotordrop.model.bearing_numbers import numbers_of
 from rotordrop.model.modes import free_free_modes, rigid_modes
+from rotordrop.model.parameters import contact_law_of
 from rotordrop.model.reduction import Reduction
 from rotordrop.model.statics import bearing_load_shares
+from rotordrop.physics.contact import contact_tangent
 
 PEAK_OVER_WEIGHT = 10.0
 """Usual ratio of the largest force of a drop to the static load [1]: 11 to 17 on machines of 13 to 130 kg."""
@@ -28,9 +30,9 @@ def contact_frequency(machine: Machine, fe: RotorFE | None = None) -> float:
     rigid = rigid_modes(fe)
     found = []
     for bearing, share in zip(machine.touchdown_bearings, bearing_load_shares(machine, fe), strict=True):
-        force, exponent = PEAK_OVER_WEIGHT * float(share), float(bearing.contact.exponent)
-        depth = (force / float(bearing.contact.stiffness)) ** (1.0 / exponent)
-        stiffness = 1.0 / (depth / (exponent * force) + 1.0 / numbers_of(bearing).tangent_stiffness(force))
+        force = PEAK_OVER_WEIGHT * float(share)
+        contact = contact_tangent(contact_law_of(bearing.contact), force)
+        stiffness = 1.0 / (1.0 / contact + 1.0 / numbers_of(bearing).tangent_stiffness(force))
         rotor = float(np.sum(rigid[2 * (bearing.node - 1)] ** 2))
         found.append(math.sqrt(stiffness * (rotor + 1.0 / float(bearing.support.mass))) / (2.0 * math.pi))
     return max(found)

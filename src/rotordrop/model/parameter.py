@@ -167,10 +167,17 @@ class Parameter:
             ratio = float(support.stiffness_horizontal) / float(support.stiffness)
             return Estimated(value=ratio, status="default")
         value: object = part
-        for name in ("bearing.preload" if self.path == "preload" else self.path).split("."):
+        if self.path == "preload":
+            assert isinstance(part, TouchdownBearing)
+            return getattr(part.bearing, "preload", NO_PRELOAD)
+        for name in self.path.split("."):
             value = getattr(value, name)
         assert isinstance(value, Estimated)
         return value
+
+
+NO_PRELOAD = Estimated(value=0.0, status="default", source="this kind of bearing has none", unit="N")
+"""What a bearing without rows to press against each other has: no unknown."""
 
 
 @dataclass(frozen=True, kw_only=True)

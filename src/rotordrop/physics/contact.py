@@ -51,6 +51,7 @@ def contact_force(law: Array, delta: float, delta_dot: float) -> tuple[float, fl
 
     Notes
     -----
+    λ sets the coefficient of restitution, e ≈ 1 − λ v at a small impact speed v (Hunt & Crossley 1975).
     Source: Neisi 2020, eq. (8). Differs from the paper: the printed "and" of the zero branch is read as "or",
     so the force never pulls.
     """

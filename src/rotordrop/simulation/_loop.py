@@ -142,6 +142,8 @@ def crossing_fraction(
     scratch: Array,
 ) -> float:
     """Fraction of a step at which the indentation changes sign, by bisection on the dense output."""
+    # Bisection, not Newton: the normal speed may pass zero within the step, and thirty halvings are few
+    # against the right-hand sides of a step.
     low = 0.0
     high = 1.0
     for _ in range(30):
@@ -202,6 +204,7 @@ def log_contacts(
             running[b, RUN_IN_CONTACT] = n_log
         row = int(running[b, RUN_IN_CONTACT]) - 1
         if 0 <= row < log.shape[0]:
+            # Impulse and loss by Simpson's rule within the step: the output grid is coarser than an impact.
             middle = 0.5 * (begin + end)
             if middle != scratch_time:
                 dense_output((middle - t) / h, h, y, k, tab, scratch)
@@ -327,6 +330,8 @@ def integrate_drop(  # noqa: C901, PLR0915  one compiled loop
             dense_output((times[done] - t) / step, step, y, k, tab, states[done])
             done += 1
         n_log = log_contacts(t, step, y, y_new, k, tab, p, running, log, n_log, scratch)
+        # PI control (Gustafsson): the error of the step before damps the swing between steps too long and too
+        # short that every opening of a contact starts.
         growth = GROW
         log_error = LOG_SMALLEST_ERROR
         if error > 0.0:
@@ -335,6 +340,7 @@ def integrate_drop(  # noqa: C901, PLR0915  one compiled loop
         log_previous = max(log_error, LOG_SMALLEST_ERROR)
         h = min(step * growth, largest_step) if step >= h else h
         t = t_new
+        # The last stage is the first of the next step, also where a contact opens: forces are continuous.
         for i in range(n):
             y[i] = y_new[i]
             k[0, i] = k[6, i]

@@ -84,6 +84,7 @@ def contact_state(
     delta = e_r - bearing[L.AIR_GAP]
     if delta <= 0.0:
         return delta, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    # Unit vectors instead of angles: no branch at an azimuth, no sign to set by hand.
     nx = ux / e_r
     ny = uy / e_r
     delta_dot = vx * nx + vy * ny
@@ -133,6 +134,7 @@ def add_rotor_accelerations(
     Returns the power dissipated by modal damping and the power put in by unbalance and spin-up [W].
     """
     s, c = sine_cosine(y[p.rotor_at[L.ROTOR_ANGLE]])
+    # The unbalance pulls outwards with ω² and, while the rotor slows down, backwards with its deceleration.
     w2 = omega * omega
     along = w2 * c + omega_dot * s
     across = w2 * s - omega_dot * c

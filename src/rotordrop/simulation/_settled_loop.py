@@ -60,6 +60,8 @@ def damp_races(
     for b in range(p.bearing.shape[0]):
         race = p.rotor_at[L.N_COORDINATES] + p.bearing_at[b, L.RACE]
         for i in range(race, race + 2):
+            # The right-hand side has taken the damping at the velocity assumed; found is the velocity at
+            # which it would have been right.
             assumed = y[i] + h * d[i]
             found = (y[i] + half * (d[i] + d_new[i] + rates[i] * assumed)) / (1.0 + half * rates[i])
             d_new[i] -= rates[i] * (found - assumed)

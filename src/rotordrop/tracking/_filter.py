@@ -45,6 +45,8 @@ def scalar_update(
     The covariance takes the Joseph form, written out for a scalar, which stays symmetric and positive.
     ``row`` (n,) is the measurement's derivative by the estimate, ``gain`` (n,) receives the Kalman gain.
     """
+    # Readings have independent noise, so they are taken one at a time and no matrix is inverted: S, the
+    # variance of the innovation, is a number.
     n = mean.shape[0]
     for i in range(n):
         gain[i] = 0.0
@@ -56,6 +58,8 @@ def scalar_update(
     S = variance
     for j in range(n):
         S += row[j] * gain[j]
+    # The short form P − K h P would do on paper; where a reading is much sharper than what is known, it takes
+    # the difference of two nearly equal numbers, and a variance may come out negative.
     inverse = 1.0 / S
     for i in range(n):
         spread = gain[i]
@@ -196,11 +200,16 @@ def forward_pass(
             y[:] = 0.0
             y[:s] = at[:s]
             propagate(times[i - 1], y, theta, targets, p, settings, F, impulses)
+            # Around a reference the model is an affine map, the same for prediction and for smoothing, so the
+            # passes are Gauss-Newton steps of one least-squares problem. The mean itself, propagated, would
+            # be linearised elsewhere than the smoother's, and each pass would solve another problem.
             if with_reference:
                 deviation = mean[: s + n_p] - at[: s + n_p]
                 mean[:s] = y[:s] + np.dot(F, deviation)
             else:
                 mean[:s] = y[:s]
+            # Only the dynamic states move; parameters and sensor errors are constants (but for their drift),
+            # so of the whole covariance s rows and columns change.
             head = np.dot(F, np.ascontiguousarray(P[: s + n_p]))
             P[:s] = head
             P[:s, :s] = np.dot(np.ascontiguousarray(head[:, : s + n_p]), F.T)
@@ -239,6 +248,7 @@ def forward_pass(
             if keep:
                 rows[i, c] = row
                 gains[i, c] = gain
+        # Rounding leaves P lopsided by a little, and sample by sample the error would grow.
         symmetrise(P)
         means[i] = mean
         if covariances.shape[1] > 0:
@@ -307,6 +317,8 @@ def backward_pass(
     n_t, n = means.shape
     s = transitions.shape[1]
     columns = transitions.shape[2]
+    # λ and Λ gather what all later innovations say of the present estimate, in the manner of a gradient and
+    # its curvature. That way no covariance is inverted, and a parameter known exactly does no harm.
     lam = final_score
     Lam = final_information
     seen = np.empty(n, dtype=np.int64)
@@ -331,6 +343,7 @@ def backward_pass(
             score = np.dot(gain, lam)
             weight = klk + 1.0 / S
             count = 0
+            # A reading sees one plane and its own sensor errors: most of its row is zero.
             for a in range(n):
                 if row[a] != 0.0:
                     seen[count] = a

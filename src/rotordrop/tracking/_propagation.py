@@ -92,6 +92,7 @@ def update_powers(k: int, value: float, targets: ParameterTargets, powers: Array
 @kernel
 def bounded_value(k: int, theta: float, targets: ParameterTargets, step: float) -> float:
     """Parameter ``k`` as the model takes it: within its bounds, then a step on, and no longer a logarithm."""
+    # The step comes after the bounds: at its bound a parameter keeps a slope and can be led back.
     within = min(max(theta, targets.lower[k]), targets.upper[k]) + step
     return exp(within) if targets.logarithmic[k] != 0 else within
 
@@ -316,12 +317,14 @@ def propagate(
     for step in range(settings.substeps):
         now = t + step * h
         rk4_step(now, h, y, p, k, trial, work)
+        # The Jacobian of the middle serves the whole substep to second order, though it changes within it.
         middle = k[4].copy()
         drop_jacobian_parts(now + 0.5 * h, middle, p, J, g, touching)
         gather_entries(J, entries, places, starts)
         # at every substep: position and gap must see the same contact, or the gap looks too well known
         if columns > s:
             parameter_jacobian(now + 0.5 * h, middle, theta, targets, p, k[0], k[1], work, B)
+        # What the contact law gets wrong is a share of what it gives; process noise is scaled by the impulse.
         for b in range(p.bearing.shape[0]):
             contact_at(b, middle, p, contact)
             impulses[b] += h * contact[1]
@@ -343,6 +346,9 @@ def add_process_noise(
 ) -> None:
     """Add unknown impulses at the bearings, noise of the spins and drift of the parameters to ``P``."""
     m, n_q, i_w = p.eigenvalue.shape[0], p.rotor_at[L.N_COORDINATES], p.rotor_at[L.ROTOR_SPEED]
+    # Process noise enters where the model errs: as an impulse between rotor and race, equal and opposite.
+    # White noise on every state would let the filter explain a record by motions that nothing can cause.
+    # ``g`` is the velocity that a unit impulse gives; modes have unit mass.
     g = np.empty(m + 1)
     place = np.empty(m + 1, dtype=np.int64)
     for b in range(p.bearing.shape[0]):
@@ -356,9 +362,11 @@ def add_process_noise(
             for i in range(m + 1):
                 for j in range(m + 1):
                     P[place[i], place[j]] += sigma * sigma * g[i] * g[j]
+        # Of an unknown impulse friction passes on about a tenth to the spin of the race.
         spin = settings.spin_noise + sigma * p.bearing[b, L.BORE_RADIUS] / p.bearing[b, L.RACE_INERTIA] * 0.1
         P[p.bearing_at[b, L.RACE_SPIN], p.bearing_at[b, L.RACE_SPIN]] += spin * spin
     P[i_w, i_w] += settings.speed_noise * settings.speed_noise
     s = p.rotor_at[L.N_DYNAMIC]
+    # a random walk: its variance grows with time
     for k in range(drift.shape[0]):
         P[s + k, s + k] += drift[k] * drift[k] * settings.dt
