@@ -64,6 +64,7 @@ _ORDER = (
     "log",
     "synthesize",
     "score",
+    "bench",
     "fingerprint",
 )
 

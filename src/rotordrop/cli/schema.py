@@ -1,4 +1,4 @@
-"""Print the JSON Schema of a machine, an estimate or a look.
+"""Print the JSON Schema of a file, an estimate or a look.
 
 Editors that know the first complete and check a machine file while one types; programs that read an estimate
 find its fields in the second.
@@ -21,13 +21,17 @@ class Document(StrEnum):
     """Documents with a published schema."""
 
     machine = "machine"
+    violations = "violations"
     estimate = "estimate"
     look = "look"
 
 
 def schema(
     document: Annotated[
-        Document, typer.Argument(help="A machine file, or what 'rotordrop estimate --json' writes.")
+        Document,
+        typer.Argument(
+            help="A machine file, violations for 'synthesize', or what 'rotordrop estimate --json' writes."
+        ),
     ] = Document.machine,
     output: Annotated[
         Path | None,
@@ -35,9 +39,11 @@ def schema(
     ] = None,
     force: ForceOption = False,
 ) -> None:
-    """Print the JSON Schema of a machine file or of an estimate, for editors and programs."""
+    """Print the JSON Schema of a file or of an estimate, for editors and programs."""
     if document is Document.machine:
         from rotordrop.machine import machine_schema as schema_of
+    elif document is Document.violations:
+        from rotordrop.synthesis.violations import violations_schema as schema_of
     elif document is Document.look:
         from rotordrop.measurement.look.schema import look_schema as schema_of
     else:

@@ -54,7 +54,10 @@ def synthesize(
     bits: Annotated[int, typer.Option(metavar="NUMBER", help="Bits of the converter; 0 for none.")] = 16,
     violation: Annotated[
         str,
-        typer.Option(metavar="NAME", help="What the estimator's model cannot represent; 'list' names all."),
+        typer.Option(
+            metavar="NAME|FILE",
+            help="What the estimator's model cannot represent, by name ('list' names all) or as .toml file.",
+        ),
     ] = "none",
     fault: Annotated[
         str | None, typer.Option(metavar="NAME", help="A deliberate mistake in the file; 'list' names all.")
@@ -65,7 +68,7 @@ def synthesize(
     """Make simulated recordings of drops; the hidden truth goes into a folder of its own."""
     from rotordrop.synthesis import FAULTS, VIOLATIONS
 
-    if _listed(violation, VIOLATIONS) or _listed(fault, FAULTS):
+    if (not violation.endswith(".toml") and _listed(violation, VIOLATIONS)) or _listed(fault, FAULTS):
         return
     from rotordrop.machine import load_machine
     from rotordrop.synthesis import SensorChain, hidden_machine, synthesize_drop, write_synthetic

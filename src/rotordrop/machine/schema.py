@@ -20,21 +20,36 @@ _ATTRIBUTE = re.compile(r"^(\w[\w, ]*) : .*\n((?:    .*\n?)+)", re.MULTILINE)
 
 def machine_schema() -> dict[str, Any]:
     """Give the JSON Schema (draft 2020-12) of a machine file."""
-    schema = Machine.model_json_schema()
+    schema = _described(Machine)
+    _add_shaft_table(schema["$defs"]["Rotor"])
+    _add_shorthand(schema["$defs"])
+    return _finished(schema, "rotordrop machine file")
+
+
+def description_schema(kind: type[Description], title: str) -> dict[str, Any]:
+    """Give the JSON Schema (draft 2020-12) of a file that holds another description."""
+    return _finished(_described(kind), title)
+
+
+def _described(root: type[Description]) -> dict[str, Any]:
+    schema = root.model_json_schema()
     parts = schema["$defs"]
-    described: list[type[Description]] = [Machine, *_parts(Description)]
-    for description in described:
+    for description in [root, *_parts(Description)]:
         name = description.__name__
-        if description is Machine or name in parts:
-            _describe(schema if description is Machine else parts[name], description)
-    _add_shaft_table(parts["Rotor"])
-    _add_shorthand(parts)
+        if description is root or name in parts:
+            _describe(schema if description is root else parts[name], description)
+    return schema
+
+
+def _finished(schema: dict[str, Any], title: str) -> dict[str, Any]:
+    """Let physical values refer to their kinds, and give dialect and title."""
+    parts = schema["$defs"]
     kinds: set[str] = set()
     _refer(schema, kinds)
     for kind in sorted(kinds):
         parts[f"{kind}_number"] = _number(kind)
         parts[kind] = _value(kind)
-    return {"$schema": _DIALECT, "title": "rotordrop machine file"} | {
+    return {"$schema": _DIALECT, "title": title} | {
         key: value for key, value in schema.items() if key != "title"
     }
 

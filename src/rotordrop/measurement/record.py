@@ -196,6 +196,7 @@ def record_of(
     if not sensors:
         raise RecordError("the machine has no sensors; describe them in [[sensors]] of the machine file")
     matched = match_sensors(recording, sensors, profile, place)
+    matched, thinned = _at_one_rate(matched)
     time, rate = _shared_clock(matched, place)
     rounded = (
         ("time stamps are rounded; an even clock was put behind them",) if _repeats(matched[0].time) else ()
@@ -220,9 +221,34 @@ def record_of(
         path=path,
         sha256=sha256,
         metadata=recording.metadata,
-        notes=(*recording.notes, *notes, *(rounded if np.all(np.diff(time) > 0.0) else ())),
+        notes=(*recording.notes, *thinned, *notes, *(rounded if np.all(np.diff(time) > 0.0) else ())),
         warnings=(*recording.warnings, *spoken, *(pulses.warnings if pulses else ())),
     )
+
+
+def _at_one_rate(channels: tuple[Channel, ...]) -> tuple[tuple[Channel, ...], tuple[str, ...]]:
+    """Take every k-th sample of channels sampled k times as fast as the slowest, whose clock they share.
+
+    Nothing is filtered or interpolated: what is kept was read. Channels whose clocks do not meet are left for
+    `_shared_clock` to refuse.
+    """
+    steps = [_step(channel.time) for channel in channels]
+    slowest = max(steps)
+    slow = channels[steps.index(slowest)].time
+    kept, notes = [], []
+    for channel, step in zip(channels, steps, strict=True):
+        times = round(slowest / step) if step > 0.0 else 1
+        thin = channel.time[::times][: len(slow)]
+        meets = len(thin) == len(slow) and float(np.max(np.abs(thin - slow), initial=0.0)) <= 1e-3 * slowest
+        if times < 2 or not meets:
+            kept.append(channel)
+            continue
+        kept.append(replace(channel, time=thin, values=channel.values[::times][: len(slow)]))
+        notes.append(
+            f"{channel.label} is sampled {times} times as fast as the slowest sensor; every {times}th sample "
+            "is used"
+        )
+    return tuple(kept), tuple(notes)
 
 
 def _shared_clock(channels: tuple[Channel, ...], place: str) -> tuple[Array, float]:

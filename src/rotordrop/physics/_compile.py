@@ -27,7 +27,7 @@ _CONSTANTS = (_PACKAGE / "model" / "layout.py", _PACKAGE / "physics" / "elementa
 
 
 def _kernel_sources() -> list[Path]:
-    folders = ("physics", "model", "simulation", "tracking")
+    folders = ("physics", "model", "simulation", "synthesis", "tracking")
     files = (file for folder in folders for file in sorted((_PACKAGE / folder).glob("*.py")))
     return [file for file in files if file in _CONSTANTS or _MARK in file.read_text(encoding="utf-8")]
 

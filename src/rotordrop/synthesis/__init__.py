@@ -12,7 +12,7 @@ from rotordrop.synthesis.recording import SyntheticDrop, synthesize_drop
 from rotordrop.synthesis.score import score_estimate
 from rotordrop.synthesis.sensor_chain import SensorChain
 from rotordrop.synthesis.truth import Truth, read_truth
-from rotordrop.synthesis.violations import VIOLATIONS, Violations
+from rotordrop.synthesis.violations import VIOLATIONS, Violations, load_violations
 
 __all__ = [
     "FAULTS",
@@ -24,6 +24,7 @@ __all__ = [
     "Truth",
     "Violations",
     "hidden_machine",
+    "load_violations",
     "read_truth",
     "score_estimate",
     "synthesize_drop",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,8 @@ from rotordrop.model.parameters import DropModel, build_drop_model
 from rotordrop.model.reduction import Reduction
 from rotordrop.simulation.case import LevitatedStart
 from rotordrop.synthesis.random_streams import stream
-from rotordrop.synthesis.violations import Violations, named_violations, violated
+from rotordrop.synthesis.structure import structure_rows, violated, without_structure
+from rotordrop.synthesis.violations import Violations, named_violations
 
 Array = NDArray[np.float64]
 
@@ -46,6 +47,8 @@ class HiddenMachine:
         What breaks the estimator's assumptions.
     model : DropModel
         The true machine, ready to be simulated.
+    structure : ndarray, shape (B, C), or None
+        Structures of its bearings that no model of a drop has; None without any.
     """
 
     machine: Machine
@@ -53,6 +56,7 @@ class HiddenMachine:
     seed: int
     violations: Violations
     model: DropModel = field(repr=False)
+    structure: Array | None = field(default=None, repr=False)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,17 +98,28 @@ def hidden_machine(
     seed : int
         Seed of the draw; the same seed gives the same machine.
     violations : str or Violations
-        What the estimator's model cannot represent, by name from `VIOLATIONS` or in full.
+        What the estimator's model cannot represent, by name from `VIOLATIONS`, by the path of a case file
+        (.toml), or in full.
     drawn : bool
         False takes the description itself for the truth.
     reduction : Reduction
         Basis of the true rotor.
     """
     broken = named_violations(violations)
+    broken.check_names(machine)
     true = machine.with_values(_drawn_values(machine, stream(seed, "machine"))) if drawn else machine
     true = violated(true, broken)
     model = build_drop_model(true, reduction)
-    return HiddenMachine(machine=true, known=machine, seed=seed, violations=broken, model=model)
+    rows = structure_rows(true, broken)
+    acts = broken.unbalance_jump is not None or not without_structure(rows)
+    return HiddenMachine(
+        machine=true,
+        known=machine,
+        seed=seed,
+        violations=broken,
+        model=model,
+        structure=rows if acts else None,
+    )
 
 
 def drop_conditions(hidden: HiddenMachine, speed: float, seed: int, *, jitter: bool = True) -> DropConditions:
@@ -117,6 +132,9 @@ def drop_conditions(hidden: HiddenMachine, speed: float, seed: int, *, jitter: b
     remanent = share * np.column_stack(
         [random.uniform(-0.03, 0.03, magnets), random.uniform(0.05, 0.3, magnets)]
     )
+    magnet = hidden.violations.magnets
+    if magnet.remanent_lift is not None:
+        remanent[:, 1] = float(magnet.remanent_lift) * share
     gap = min(float(bearing.air_gap) for bearing in hidden.machine.touchdown_bearings)
     radius = np.minimum(LARGEST_ORBIT, 0.05 * gap) * random.uniform(0.3, 1.0, magnets)
     start = LevitatedStart(
@@ -126,6 +144,8 @@ def drop_conditions(hidden: HiddenMachine, speed: float, seed: int, *, jitter: b
         remanence_time_constant=float(random.uniform(1.5e-3, 2.5e-3)),
         orbit=radius * np.exp(2j * math.pi * random.uniform(0.0, 1.0, magnets)),
     )
+    if magnet.remanence_time is not None:
+        start = replace(start, remanence_time_constant=float(magnet.remanence_time))
     late = float(random.uniform(-LARGEST_JITTER, LARGEST_JITTER))
     return DropConditions(speed=speed, start=start, jitter=late if jitter else 0.0)
 

@@ -55,10 +55,10 @@ def write_synthetic(
     paths = []
     for kind in formats:
         paths.append(folder / f"{stem}.{kind}")
-        _write_record(drop.record, paths[-1])
+        write_record(drop.record, paths[-1])
     if drop.tail is not None:
         paths.append(folder / f"{stem}_tail.csv")
-        _write_record(drop.tail, paths[-1])
+        write_record(drop.tail, paths[-1])
     paths.append(folder / TRUTH_FOLDER / f"{stem}.json")
     write_json(paths[-1], {**drop.truth, "name": stem})
     if histories:
@@ -67,7 +67,8 @@ def write_synthetic(
     return tuple(paths)
 
 
-def _write_record(record: Record, path: Path) -> None:
+def write_record(record: Record, path: Path) -> None:
+    """Write a record, as HDF5 where the file ends so, else as text."""
     recording = recording_of(
         record.time,
         record.signals,

@@ -37,3 +37,10 @@ def true_motion(
     angle[~floating] = np.interp(time[~floating], result.time, states[:, layout.rotor_angle])
     speed = np.interp(time, result.time, result.speed)
     return amplitudes, angle, speed
+
+
+def housing_motion(result: DropResult, time: Array) -> Array:
+    """Displacement of the supports [m], shape (N, B, 2), at times from power-off [s]; at rest before it."""
+    moved = result.support_displacement.reshape(len(result.time), -1)
+    found = [np.interp(time, result.time, column) for column in moved.T]
+    return np.stack(found, axis=-1).reshape(len(time), *result.support_displacement.shape[1:])

@@ -11,21 +11,23 @@ from numpy.typing import NDArray
 from rotordrop._version import __version__
 from rotordrop.measurement.record import Record
 from rotordrop.simulation.case import DropCase
-from rotordrop.simulation.drop import simulate_drop
 from rotordrop.simulation.result import DropResult
 from rotordrop.synthesis.event import LARGEST_JITTER, DropConditions, HiddenMachine, drop_conditions
-from rotordrop.synthesis.motion import true_motion
+from rotordrop.synthesis.hidden_drop import true_drop
+from rotordrop.synthesis.hidden_rest import hidden_rest
+from rotordrop.synthesis.motion import housing_motion, true_motion
 from rotordrop.synthesis.random_streams import stream
 from rotordrop.synthesis.sensor_chain import (
-    OVERSAMPLING,
     SensorChain,
     SensorErrors,
+    directions,
     drawn_errors,
+    oversampling,
     readings,
     speed_readings,
     true_rows,
 )
-from rotordrop.synthesis.settled import Swing, settled_coordinates, swinging_amplitudes
+from rotordrop.synthesis.settled import Swing, swinging_amplitudes
 from rotordrop.synthesis.true_values import true_histories, true_values
 
 Array = NDArray[np.float64]
@@ -110,10 +112,10 @@ def synthesize_drop(
         start=conditions.start,
         tolerance=tolerance,
     )
-    result = simulate_drop(hidden.model, case)
-    errors = drawn_errors(chain, len(hidden.machine.sensors), stream(hidden.seed, "sensors"))
+    result = true_drop(hidden.model, hidden.structure, case, hidden.violations.unbalance_jump)
+    errors = _true_errors(hidden, chain)
     record = _record(hidden, result, conditions, chain, errors, seed, before, duration, name)
-    rest = settled_coordinates(hidden.model)
+    rest = hidden_rest(hidden.model, hidden.structure)
     swing = _drawn_swing(hidden, stream(seed, "swing"))
     truth = true_values(hidden, result, conditions, chain, errors, rest, name)
     return SyntheticDrop(
@@ -126,10 +128,26 @@ def synthesize_drop(
 
 
 def _violated_chain(chain: SensorChain, hidden: HiddenMachine) -> SensorChain:
-    broken = hidden.violations
-    corner = broken.anti_alias_frequency or chain.anti_alias_frequency
-    shift = chain.plane_shift + broken.sensor_plane_shift
-    return replace(chain, plane_shift=shift, anti_alias_frequency=corner)
+    corner = hidden.violations.sensors.anti_alias_frequency
+    return chain if corner is None else replace(chain, anti_alias_frequency=float(corner))
+
+
+def _true_errors(hidden: HiddenMachine, chain: SensorChain) -> SensorErrors:
+    """Errors of the sensors of a hidden machine: those of its chain, and what is violated beside."""
+    sensors = hidden.machine.sensors
+    errors = drawn_errors(chain, len(sensors), stream(hidden.seed, "sensors"))
+    broken = [hidden.violations.of_sensor(sensor.name) for sensor in sensors]
+    random = stream(hidden.seed, "cross axis")
+    drawn = random.uniform(0.5, 1.0, len(sensors)) * random.choice([-1.0, 1.0], len(sensors))
+    alone = [hidden.violations.sensor.get(sensor.name) for sensor in sensors]
+    exact = [one is not None and "cross_axis" in one.model_fields_set for one in alone]
+    return replace(
+        errors,
+        plane_shift=errors.plane_shift + np.array([float(v.plane_shift) for v in broken]),
+        cross_axis=np.array([float(v.cross_axis) for v in broken]) * np.where(exact, 1.0, drawn),
+        follows_housing=np.array([float(v.follows_housing) for v in broken]),
+        time_constant=np.array([float(v.time_constant) for v in broken]),
+    )
 
 
 def _record(
@@ -143,13 +161,16 @@ def _record(
     duration: float,
     name: str,
 ) -> Record:
-    dense = OVERSAMPLING if chain.anti_alias_frequency is not None else 1
+    dense = oversampling(chain, errors)
     rate = chain.sampling_rate
     start, stop = -round(before * rate), round(duration * rate)
     time = np.arange(start * dense, stop * dense + 1) / (rate * dense)
     amplitudes, angle, speed = true_motion(hidden, result, conditions, time - conditions.jitter)
-    rows = true_rows(hidden.machine, hidden.model.basis, chain, errors)
-    signals = readings(amplitudes @ rows.T, time, angle, chain, errors, stream(seed, "noise"))
+    rows = true_rows(hidden.machine, hidden.model.basis, errors)
+    along = amplitudes @ rows.T - _with_housing(
+        hidden, errors, housing_motion(result, time - conditions.jitter)
+    )
+    signals = readings(along, time, angle, chain, errors, stream(seed, "noise"))
     time, speed = time[::dense], speed[::dense]
     when, read = speed_readings(time, speed, chain, stream(seed, "tacho"))
     return Record(
@@ -162,6 +183,14 @@ def _record(
         speed_readings=read,
         metadata=_metadata(hidden, name),
     )
+
+
+def _with_housing(hidden: HiddenMachine, errors: SensorErrors, supports: Array) -> Array:
+    """Motion of the sensors along their own directions [m], shape (N, S), from that of the supports."""
+    names = [bearing.name for bearing in hidden.machine.touchdown_bearings]
+    at = [names.index(sensor.bearing) for sensor in hidden.machine.sensors]
+    along = np.einsum("nsa,sa->ns", supports[:, at], directions(hidden.machine, errors))
+    return np.asarray(errors.follows_housing * along)
 
 
 def _drawn_swing(hidden: HiddenMachine, random: np.random.Generator) -> Swing:
@@ -186,9 +215,13 @@ def _tail(
     slow = replace(chain, sampling_rate=TAIL_RATE, anti_alias_frequency=None)
     time = np.arange(round(TAIL_DURATION * TAIL_RATE)) / TAIL_RATE
     amplitudes = swinging_amplitudes(hidden.model, rest, swing, time)
-    rows = true_rows(hidden.machine, hidden.model.basis, chain, errors)
+    rows = true_rows(hidden.machine, hidden.model.basis, errors)
     angle = np.full(len(time), random.uniform(0.0, 2.0 * np.pi))
-    signals = readings(amplitudes @ rows.T, TAIL_START + time, angle, slow, errors, random)
+    supports = rest[hidden.model.layout.support].reshape(-1, 2)
+    along = amplitudes @ rows.T - _with_housing(hidden, errors, supports[None])
+    # a swing of some hertz is no matter for a lag that a drop survives
+    prompt = replace(errors, time_constant=np.zeros(len(errors.gain)))
+    signals = readings(along, TAIL_START + time, angle, slow, prompt, random)
     return Record(
         time=TAIL_START + time,
         signals=signals,

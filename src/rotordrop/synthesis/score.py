@@ -72,17 +72,19 @@ def score_estimate(
     Returns
     -------
     dict
-        ``method`` and ``consistent`` (what the estimate says of itself); ``drop`` and
-        ``bearings.<name>.<quantity>``, each with ``estimate``, ``truth``, ``error``, ``relative_error``
-        and, where an interval was given, ``covered`` and ``half_width``; ``impacts`` per bearing where
-        the estimate lists impacts; ``coverage`` over all intervals.
+        ``method`` and ``consistent`` (what the estimate says of itself); ``drop``,
+        ``bearings.<name>.<quantity>`` and ``structure.<path>``, each with ``estimate``, ``truth``, ``error``,
+        ``relative_error`` and, where an interval was given, ``covered`` and ``half_width``; ``impacts`` per
+        bearing where the estimate lists impacts; ``coverage`` over all intervals.
     """
     known = _truth(truth)
     found = _one_drop(_estimate(estimate), known, drop)
     bearings = {name: _bearing_scores(found, known, name) for name in known.bearing_names}
     whole = _drop_scores(found, known)
+    structure = _structure_scores(found, known)
     impacts = {name: score for name in known.bearing_names if (score := _impact_scores(found, known, name))}
     every = [*whole.values(), *(score for scores in bearings.values() for score in scores.values())]
+    every += structure.values()
     if not every:
         raise UsageError(
             f"the estimate holds none of the quantities of the truth {known.name!r}: it has "
@@ -91,12 +93,13 @@ def score_estimate(
     return {
         "name": known.name,
         "method": found.get("method"),
-        "consistent": _at(found, "consistency.consistent"),
+        "consistent": found.get("consistent", _at(found, "consistency.consistent")),
         "drop": {name: score.as_json() for name, score in whole.items()},
         "bearings": {
             name: {path: score.as_json() for path, score in scores.items()}
             for name, scores in bearings.items()
         },
+        "structure": {path: score.as_json() for path, score in structure.items()},
         "impacts": impacts,
         "coverage": _coverage(every),
     }
@@ -162,6 +165,14 @@ def _drop_scores(estimate: Estimate, truth: Truth) -> dict[str, Score]:
         if score is not None:
             scores[name] = score
     return scores
+
+
+def _structure_scores(estimate: Estimate, truth: Truth) -> dict[str, Score]:
+    """Scores of structures by path, where the estimate has ``structure.<path>``."""
+    listed = estimate.get("structure")
+    listed = listed if isinstance(listed, Mapping) else {}
+    scores = {path: _score(listed.get(path), true) for path, true in truth.structure.items()}
+    return {path: score for path, score in scores.items() if score is not None}
 
 
 def _at(fields: Any, path: str) -> Any:

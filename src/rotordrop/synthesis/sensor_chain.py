@@ -112,6 +112,14 @@ class SensorErrors:
         True minus stated direction [rad].
     runout_1x, runout_2x : ndarray
         Complex amplitude of the runout [m] at rotor angle zero.
+    plane_shift : ndarray
+        How much nearer to the middle of the rotor the sensor stands than stated [m].
+    cross_axis : ndarray
+        Reading per displacement a quarter turn ahead of the sensor's direction [1].
+    follows_housing : ndarray
+        Share of the motion of the bearing's housing that the sensor moves with [1].
+    time_constant : ndarray
+        Time constant of first order with which the reading follows [s].
     """
 
     gain: Array
@@ -119,6 +127,10 @@ class SensorErrors:
     angle: Array
     runout_1x: NDArray[np.complex128]
     runout_2x: NDArray[np.complex128]
+    plane_shift: Array
+    cross_axis: Array
+    follows_housing: Array
+    time_constant: Array
 
 
 def drawn_errors(chain: SensorChain, sensors: int, random: np.random.Generator) -> SensorErrors:
@@ -134,21 +146,38 @@ def drawn_errors(chain: SensorChain, sensors: int, random: np.random.Generator) 
         angle=angle,
         runout_1x=chain.runout_1x * size[0] * turn[0],
         runout_2x=chain.runout_2x * size[1] * turn[1],
+        plane_shift=np.full(sensors, chain.plane_shift),
+        cross_axis=np.zeros(sensors),
+        follows_housing=np.zeros(sensors),
+        time_constant=np.zeros(sensors),
     )
 
 
-def true_rows(machine: Machine, basis: RotorBasis, chain: SensorChain, errors: SensorErrors) -> Array:
+def directions(machine: Machine, errors: SensorErrors) -> Array:
+    """Reading per displacement in x and in y of every sensor before its gain, shape (S, 2) [1]."""
+    angle = np.array([float(sensor.angle) for sensor in machine.sensors]) + errors.angle
+    polarity = np.array([sensor.polarity for sensor in machine.sensors])
+    c, s = np.array([(math.cos(a), math.sin(a)) for a in angle]).T
+    across = errors.cross_axis
+    return np.asarray(polarity[:, None] * np.column_stack([c - across * s, s + across * c]))
+
+
+def true_rows(machine: Machine, basis: RotorBasis, errors: SensorErrors) -> Array:
     """Displacement along every true sensor per modal amplitude, shape (S, 2m): x amplitudes, then y."""
     positions = np.asarray(machine.rotor.node_positions)
-    middle = 0.5 * (positions[0] + positions[-1])
     rows = []
-    for sensor, wrong in zip(machine.sensors, errors.angle, strict=True):
-        place = positions[sensor.node - 1]
-        place = place + math.copysign(chain.plane_shift, middle - place)
+    for place, (x, y) in zip(true_places(machine, errors), directions(machine, errors), strict=True):
         shape = shape_at(positions, basis, place)
-        angle = float(sensor.angle) + wrong
-        rows.append(sensor.polarity * np.concatenate([math.cos(angle) * shape, math.sin(angle) * shape]))
+        rows.append(np.concatenate([x * shape, y * shape]))
     return np.array(rows)
+
+
+def true_places(machine: Machine, errors: SensorErrors) -> Array:
+    """Distance of every sensor from node 1 [m], shape (S,)."""
+    positions = np.asarray(machine.rotor.node_positions)
+    places = positions[[sensor.node - 1 for sensor in machine.sensors]]
+    middle = 0.5 * (positions[0] + positions[-1])
+    return np.asarray(places + errors.plane_shift * np.copysign(1.0, middle - places))
 
 
 def shape_at(positions: Array, basis: RotorBasis, place: float) -> Array:
@@ -184,7 +213,7 @@ def readings(
     Parameters
     ----------
     along : ndarray, shape (M, S)
-        True displacement along the sensors [m]; M = N without filter, else five times as dense.
+        True displacement along the sensors [m]; M = N without filter or lag, else five times as dense.
     time : ndarray, shape (M,)
         Record time [s].
     angle : ndarray, shape (M,)
@@ -193,12 +222,35 @@ def readings(
     turn = np.exp(1j * angle)[:, None]
     signal = errors.gain * along + errors.offset
     signal = signal + (errors.runout_1x * turn + errors.runout_2x * turn**2).real
+    signal = lagging(signal, errors.time_constant, chain.sampling_rate * oversampling(chain, errors))
     phase = random.uniform(0.0, 2.0 * np.pi, along.shape[1])
     signal = signal + chain.hum * np.cos(2.0 * np.pi * chain.hum_frequency * time[:, None] + phase)
     if chain.anti_alias_frequency is not None:
-        signal = _filtered(signal, chain)[::OVERSAMPLING]
+        signal = _filtered(signal, chain)
+    signal = signal[:: oversampling(chain, errors)]
     signal = signal + chain.noise * random.standard_normal(signal.shape)
     return quantised(signal, chain)
+
+
+def oversampling(chain: SensorChain, errors: SensorErrors) -> int:
+    """How much denser than the samples a signal is made before it passes filter or lag."""
+    filtered = chain.anti_alias_frequency is not None or bool(np.any(errors.time_constant > 0.0))
+    return OVERSAMPLING if filtered else 1
+
+
+def lagging(signal: Array, time_constant: Array, rate: float) -> Array:
+    """Signals (N, S) that follow with a lag of first order [s]; exact for straight lines between samples."""
+    from scipy.signal import lfilter, lfilter_zi
+
+    signal = signal.copy()
+    for i in np.flatnonzero(time_constant > 0.0):
+        step = 1.0 / (rate * time_constant[i])
+        keeps = math.exp(-step)
+        newest = 1.0 - (1.0 - keeps) / step
+        upper, lower = [newest, 1.0 - keeps - newest], [1.0, -keeps]
+        settled = lfilter_zi(upper, lower) * signal[0, i]
+        signal[:, i] = lfilter(upper, lower, signal[:, i], zi=settled)[0]
+    return signal
 
 
 def quantised(signal: Array, chain: SensorChain) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,33 +50,74 @@ def settled_coordinates(model: DropModel) -> Array:
 
     The lowest energy near the rotor lying straight down, by Newton steps damped until the energy falls.
     """
-    n_q = model.layout.n_coordinates
-    parameters = model.parameters._replace(flags=np.zeros(L.N_FLAGS, dtype=np.int64))
+    parameters = without_magnets(model)
     mass = coordinate_masses(model)
     state = model.at_rest()
     state[model.layout.modal_y] = _guess(model)
+    n_q = model.layout.n_coordinates
+
+    def completed(coordinates: Array) -> Array:
+        return np.concatenate([coordinates, state[n_q:]])
+
+    return lowest_energy(
+        state[:n_q],
+        mass,
+        float(np.max(np.abs(parameters.gravity))),
+        lambda q: _energy(completed(q), parameters),
+        lambda q: _force_and_stiffness(model, parameters, mass, completed(q)),
+        model.machine.name,
+    )
+
+
+def without_magnets(model: DropModel) -> KernelParameters:
+    """Parameters of a machine whose magnets no longer act and whose rotor does not turn."""
+    return model.parameters._replace(flags=np.zeros(L.N_FLAGS, dtype=np.int64))
+
+
+def lowest_energy(
+    start: Array,
+    mass: Array,
+    weight: float,
+    energy_at: Callable[[Array], float],
+    force_and_stiffness: Callable[[Array], tuple[Array, Array]],
+    name: str,
+) -> Array:
+    """Coordinates of lowest energy near a start, by Newton steps damped until the energy falls.
+
+    Parameters
+    ----------
+    start, mass : ndarray, shape (n,)
+        Coordinates to begin with, and the mass behind each.
+    weight : float
+        Largest generalised weight, which sets the scale of the damping.
+    energy_at, force_and_stiffness : callable
+        Potential energy [J], and the force left over (n,) with the tangent stiffness (n, n).
+    name : str
+        Name of the machine, for the message when none is found.
+    """
     # Damping by mass holds a step back by the energy it costs, so that no step needs a limit of its own: not
     # that of a heavy rotor, which sags far, nor one that nothing holds, as of a rotor just off its race.
-    least = float(np.max(np.abs(parameters.gravity))) / float(np.max(np.abs(state[:n_q])))
-    rounding = 1e-12 * _energy(state, parameters)
-    damping, energy = LEAST_DAMPING * least, _energy(state, parameters)
+    least = weight / float(np.max(np.abs(start)))
+    place, energy = start, energy_at(start)
+    rounding = 1e-12 * energy
+    damping = LEAST_DAMPING * least
     for _ in range(MOST_ITERATIONS):
-        force, stiffness = _force_and_stiffness(model, parameters, mass, state)
+        force, stiffness = force_and_stiffness(place)
         step = np.linalg.solve(stiffness + damping * np.diag(mass), force)
-        trial = state.copy()
-        trial[:n_q] += step
-        if _energy(trial, parameters) > energy + abs(rounding):
+        trial = place + step
+        tried = energy_at(trial)
+        if tried > energy + abs(rounding):
             damping = max(4.0 * damping, least)
             continue
-        state, energy = trial, _energy(trial, parameters)
+        place, energy = trial, tried
         moved = float(np.max(np.abs(step)))
         if damping <= LEAST_DAMPING * least and moved < max(
-            SMALLEST_CHANGE, 1e-12 * float(np.max(np.abs(state[:n_q])))
+            SMALLEST_CHANGE, 1e-12 * float(np.max(np.abs(place)))
         ):
-            return state[:n_q]
+            return place
         damping = max(0.1 * damping, LEAST_DAMPING * least)
     raise SimulationError(
-        f"no position of rest was found for the rotor of {model.machine.name!r} in {MOST_ITERATIONS} "
+        f"no position of rest was found for the rotor of {name!r} in {MOST_ITERATIONS} "
         f"iterations; the last step still moved it by {moved:.3g} √kg m. Check that its touchdown bearings "
         "carry it (rotordrop check shows the load shares)"
     )
@@ -129,6 +171,6 @@ def swinging_amplitudes(model: DropModel, coordinates: Array, swing: Swing, time
     nodes = [bearing.node for bearing in model.machine.touchdown_bearings]
     positions = np.asarray(model.fe.node_positions)[np.array(nodes) - 1]
     per_end = rigid_amplitudes(model, positions, np.eye(len(nodes)))
-    x = (depth * np.sin(angle)) @ per_end.T
+    x = coordinates[layout.modal_x] + (depth * np.sin(angle)) @ per_end.T
     y = rest + (depth * (1.0 - np.cos(angle))) @ per_end.T
     return np.hstack([x, y])

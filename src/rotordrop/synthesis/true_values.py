@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from rotordrop.simulation.result import DropResult
 from rotordrop.synthesis.event import DropConditions, HiddenMachine
 from rotordrop.synthesis.motion import true_motion
 from rotordrop.synthesis.sensor_chain import SensorChain, SensorErrors
+from rotordrop.synthesis.true_structure import true_structure, turned_supports, violated_kinds
 
 Array = NDArray[np.float64]
 
@@ -48,7 +48,9 @@ def true_values(
     }
     values |= _loads(result)
     values |= _motion(hidden, result, rest)
-    values |= machine_truth(hidden.machine)
+    values |= machine_truth(hidden.machine) | turned_supports(hidden)
+    values["structure"] = true_structure(hidden, conditions, errors)
+    values["violated"] = list(violated_kinds(hidden.violations))
     values |= _conditions(conditions, hidden)
     values |= _sensors(chain, errors)
     values["violations"] = _violations(hidden)
@@ -220,7 +222,10 @@ def _sensors(chain: SensorChain, errors: SensorErrors) -> dict[str, Any]:
         "sensor_gain": errors.gain.tolist(),
         "sensor_offset_m": errors.offset.tolist(),
         "sensor_angle_error_rad": errors.angle.tolist(),
-        "sensor_plane_shift_m": chain.plane_shift,
+        "sensor_plane_shift_m": errors.plane_shift.tolist(),
+        "sensor_cross_axis": errors.cross_axis.tolist(),
+        "sensor_follows_housing": errors.follows_housing.tolist(),
+        "sensor_time_constant_s": errors.time_constant.tolist(),
         "noise_rms_m": chain.noise,
         "hum_50hz_m": chain.hum,
         "runout_1x_m": np.abs(errors.runout_1x).tolist(),
@@ -231,7 +236,7 @@ def _sensors(chain: SensorChain, errors: SensorErrors) -> dict[str, Any]:
 
 
 def _violations(hidden: HiddenMachine) -> dict[str, Any]:
-    return asdict(hidden.violations) | {"machine_seed": hidden.seed}
+    return hidden.violations.values() | {"machine_seed": hidden.seed}
 
 
 def true_histories(

@@ -53,6 +53,11 @@ class Truth:
         found |= {load.field: self._of_bearing(bearing, (load.truth,), load.truth_unit) for load in LOADS}
         return {path: value for path, value in found.items() if value is not None}
 
+    @property
+    def structure(self) -> dict[str, float]:
+        """True values of structures beyond the usual model [SI], by path such as ``"NDE.support.cubic"``."""
+        return {path: float(value) for path, value in self.values.get("structure", {}).items()}
+
     def _of_bearing(self, bearing: str, place: tuple[str, ...], unit: float = 1.0) -> float | None:
         """A value of one bearing [SI]; None where this truth does not have it."""
         value = self.values.get(place[0])

@@ -1,99 +1,145 @@
-"""Ways in which a hidden machine breaks what an estimator takes for granted."""
+"""Ways in which a hidden machine breaks what an estimator takes for granted, by name or from a case file."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import os
+from pathlib import Path
+from typing import Any
+
+from pydantic import Field
 
 from rotordrop.errors import UsageError
-from rotordrop.machine import Machine, TouchdownBearing
-from rotordrop.physics.contact import contact_law, stiffness_of_exponent
+from rotordrop.machine import Machine
+from rotordrop.machine.description import Channel, Name
+from rotordrop.machine.loading import load_description
+from rotordrop.machine.schema import description_schema
+from rotordrop.synthesis.violation_parts import (
+    BearingViolations,
+    ChainViolation,
+    MagnetViolation,
+    RotorViolation,
+    SensorViolation,
+    UnbalanceJump,
+)
 
-TYPICAL_CONTACT_FORCE = 1500.0
-"""Force [N] at which a contact with another exponent is as deep as the one it replaces."""
 
-
-@dataclass(frozen=True, kw_only=True)
-class Violations:
+class Violations(BearingViolations):
     """What is true of the hidden machine and unknown to the estimator.
 
     Attributes
     ----------
-    contact_stiffness, contact_damping, race_inertia : float
-        Factors on the drawn values [1].
-    contact_exponent : float, optional
-        Another exponent of the contact [1]; equally deep at 1500 N.
-    horizontal_support : float
-        Horizontal over vertical support stiffness [1].
-    stribeck_speed, static_friction : float
-        Factors on the Stribeck speed and on the static friction coefficient [1].
-    sensor_plane_shift : float
-        Every sensor plane lies this much nearer to the middle of the rotor than stated [m].
-    anti_alias_frequency : float, optional
-        Corner frequency of a filter before the sampling [Hz] that nobody mentions.
+    support, foundation, contact, race, friction, gap, balls, centre : Violation
+        At every touchdown bearing.
+    bearing : dict of str to BearingViolations
+        At one touchdown bearing, before what is said for all.
+    sensors : ChainViolation
+        At every sensor.
+    sensor : dict of str to SensorViolation
+        At one sensor, before what is said for all.
+    magnets : MagnetViolation
+        The magnets.
+    rotor : RotorViolation
+        The rotor.
+    unbalance_jump : UnbalanceJump, optional
+        An unbalance that comes during the drop.
     """
 
-    contact_stiffness: float = 1.0
-    contact_damping: float = 1.0
-    race_inertia: float = 1.0
-    contact_exponent: float | None = None
-    horizontal_support: float = 1.0
-    stribeck_speed: float = 1.0
-    static_friction: float = 1.0
-    sensor_plane_shift: float = 0.0
-    anti_alias_frequency: float | None = None
+    bearing: dict[Name, BearingViolations] = Field(default_factory=dict, description="By name of the bearing")
+    sensors: ChainViolation = ChainViolation()
+    sensor: dict[Channel, SensorViolation] = Field(default_factory=dict, description="By name of the sensor")
+    magnets: MagnetViolation = MagnetViolation()
+    rotor: RotorViolation = RotorViolation()
+    unbalance_jump: UnbalanceJump | None = None
+
+    def of_bearing(self, name: str) -> BearingViolations:
+        """What holds at one bearing: what is said of it, then what is said of all."""
+        own = self.bearing.get(name)
+        parts = {
+            key: _over(getattr(self, key), getattr(own, key) if own else None)
+            for key in BearingViolations.model_fields
+        }
+        return BearingViolations(**parts)
+
+    def of_sensor(self, name: str) -> SensorViolation:
+        """What holds at one sensor: what is said of it, then what is said of all."""
+        every = {key: getattr(self.sensors, key) for key in self.sensors.model_fields_set}
+        every.pop("anti_alias_frequency", None)
+        found: SensorViolation = _over(SensorViolation(**every), self.sensor.get(name))
+        return found
+
+    def check_names(self, machine: Machine) -> None:
+        """Refuse names of bearings and sensors that the machine does not have, and a node outside it."""
+        for what, named, there in (
+            ("bearing", self.bearing, [b.name for b in machine.touchdown_bearings]),
+            ("sensor", self.sensor, [s.name for s in machine.sensors]),
+        ):
+            for name in named:
+                if name not in there:
+                    raise UsageError(
+                        f"the violations name the {what} {name!r}, which the machine does not have; "
+                        f"it has {', '.join(there)}"
+                    )
+        nodes = len(machine.rotor.node_positions)
+        if self.unbalance_jump is not None and self.unbalance_jump.node > nodes:
+            raise UsageError(
+                f"the unbalance comes at node {self.unbalance_jump.node}, outside the rotor; its nodes are 1 "
+                f"to {nodes}"
+            )
+
+
+def _over(every: Any, own: Any) -> Any:
+    """Violations of one part: its own values before those of all parts."""
+    if own is None:
+        return every
+    given = {key: getattr(every, key) for key in every.model_fields_set}
+    given |= {key: getattr(own, key) for key in own.model_fields_set}
+    return type(every)(**given)
+
+
+def _of(**parts: Any) -> Violations:
+    return Violations.model_validate(parts)
 
 
 VIOLATIONS: dict[str, Violations] = {
     "none": Violations(),
-    "contact stiffness +25 %": Violations(contact_stiffness=1.25),
-    "contact stiffness -25 %": Violations(contact_stiffness=0.75),
-    "contact exponent 1.5": Violations(contact_exponent=1.5),
-    "contact damping +50 %": Violations(contact_damping=1.5),
-    "race inertia +25 %": Violations(race_inertia=1.25),
-    "race inertia -25 %": Violations(race_inertia=0.75),
-    "sharper friction": Violations(stribeck_speed=0.2, static_friction=1.3),
-    "anisotropic support 0.6": Violations(horizontal_support=0.6),
-    "sensor planes 30 mm off": Violations(sensor_plane_shift=0.03),
-    "anti-alias filter": Violations(anti_alias_frequency=4000.0),
+    "contact stiffness +25 %": _of(contact={"stiffness": 1.25}),
+    "contact stiffness -25 %": _of(contact={"stiffness": 0.75}),
+    "contact exponent 1.5": _of(contact={"exponent": 1.5}),
+    "contact damping +50 %": _of(contact={"damping": 1.5}),
+    "race inertia +25 %": _of(race={"inertia": 1.25}),
+    "race inertia -25 %": _of(race={"inertia": 0.75}),
+    "sharper friction": _of(friction={"stribeck_speed": 0.2, "static": 1.3}),
+    "anisotropic support 0.6": _of(support={"stiffness_ratio": 0.6}),
+    "sensor planes 30 mm off": _of(sensors={"plane_shift": "30 mm"}),
+    "anti-alias filter": _of(sensors={"anti_alias_frequency": "4 kHz"}),
 }
 
 
+def load_violations(path: str | os.PathLike[str]) -> Violations:
+    """Read violations from a TOML file; every refusal says where and what to do.
+
+    Raises
+    ------
+    MachineFileError
+        When the file cannot be used; the message holds file, line, column, the value and the way out.
+    """
+    return load_description(Violations, Path(path))
+
+
+def violations_schema() -> dict[str, Any]:
+    """Give the JSON Schema (draft 2020-12) of a file of violations."""
+    return description_schema(Violations, "rotordrop violations of a hidden machine")
+
+
 def named_violations(choice: str | Violations) -> Violations:
-    """The violations of a name, or the violations themselves."""
+    """The violations of a name or of a case file (.toml), or the violations themselves."""
     if isinstance(choice, Violations):
         return choice
+    if choice.endswith(".toml"):
+        return load_violations(choice)
     if choice not in VIOLATIONS:
-        raise UsageError(f"unknown violation {choice!r}; choose one of {', '.join(map(repr, VIOLATIONS))}")
+        raise UsageError(
+            f"unknown violation {choice!r}; choose one of {', '.join(map(repr, VIOLATIONS))}, or give a "
+            ".toml file"
+        )
     return VIOLATIONS[choice]
-
-
-def violated(machine: Machine, violations: Violations) -> Machine:
-    """The machine with the violations of its mechanics; those of the sensors belong to the sensor chain."""
-    values: dict[str, float] = {}
-    for bearing in machine.touchdown_bearings:
-        values |= {
-            f"{bearing.name}.{path}": value for path, value in _of_bearing(bearing, violations).items()
-        }
-    return machine.with_values(values) if values else machine
-
-
-def _of_bearing(bearing: TouchdownBearing, violations: Violations) -> Mapping[str, float]:
-    v, contact, support = violations, bearing.contact, bearing.support
-    stiffness = float(contact.stiffness) * v.contact_stiffness
-    values: dict[str, float] = {}
-    if v.contact_exponent is not None:
-        law = contact_law(stiffness, float(contact.exponent), float(contact.damping))
-        stiffness = stiffness_of_exponent(law, TYPICAL_CONTACT_FORCE, v.contact_exponent)
-        values["contact.exponent"] = v.contact_exponent
-    factors = {
-        "contact.damping": (float(contact.damping), v.contact_damping),
-        "race.inertia": (float(bearing.race.inertia), v.race_inertia),
-        "friction.stribeck_speed": (float(bearing.friction.stribeck_speed), v.stribeck_speed),
-        "friction.static": (float(bearing.friction.static), v.static_friction),
-        "support.stiffness_horizontal": (float(support.stiffness_horizontal), v.horizontal_support),
-    }
-    values |= {path: value * factor for path, (value, factor) in factors.items() if factor != 1.0}
-    if stiffness != float(contact.stiffness):
-        values["contact.stiffness"] = stiffness
-    return values

@@ -35,7 +35,7 @@ def test_the_summary_says_that_nothing_was_measured(tmp_path, capsys):
     assert "Simulated recordings of LP-400 gas turbine, low-pressure rotor (not measured)" in out
     assert f"written: {tmp_path / 'synthetic_100Hz.h5'}" in out.replace("\n", "")
     truth = json.loads((tmp_path / "truth" / "synthetic_100Hz.json").read_text())
-    assert truth["violations"]["contact_exponent"] == 1.5
+    assert truth["violations"]["contact"]["exponent"] == 1.5
     assert truth["contact"][0]["n"] == 1.5
 
 

@@ -95,8 +95,9 @@ def test_a_violation_changes_what_it_names_at_every_bearing(known, hidden, name,
 def test_another_exponent_is_as_deep_at_a_typical_force(known, hidden):
     broken = hidden_machine(known, 3, "contact exponent 1.5")
     for true, plain in zip(broken.machine.touchdown_bearings, hidden.machine.touchdown_bearings, strict=True):
+        typical = 5.0 * 0.5 * 9.81 * known.rotor.mass
         depths = [
-            (1500.0 / float(b.contact.stiffness)) ** (1 / float(b.contact.exponent)) for b in (true, plain)
+            (typical / float(b.contact.stiffness)) ** (1 / float(b.contact.exponent)) for b in (true, plain)
         ]
         assert float(true.contact.exponent) == 1.5
         assert depths[0] == pytest.approx(depths[1], rel=1e-12)
@@ -105,7 +106,9 @@ def test_another_exponent_is_as_deep_at_a_typical_force(known, hidden):
 def test_violations_of_the_sensors_leave_the_machine_alone(known, hidden):
     for name in ("sensor planes 30 mm off", "anti-alias filter", "none"):
         assert machine_truth(hidden_machine(known, 3, name).machine) == machine_truth(hidden.machine)
-    assert VIOLATIONS["sensor planes 30 mm off"] == Violations(sensor_plane_shift=0.03)
+    assert VIOLATIONS["sensor planes 30 mm off"] == Violations.model_validate(
+        {"sensors": {"plane_shift": "30 mm"}}
+    )
 
 
 def test_an_unknown_violation_names_those_there_are(known):

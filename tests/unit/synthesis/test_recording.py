@@ -165,7 +165,7 @@ def test_a_shifted_plane_reads_what_is_there(known):
         synthesize_drop(h, SPEED, 8, sensor_chain=PERFECT, duration=0.05, tail=False)
         for h in (plain, shifted)
     )
-    assert two.truth["sensor_plane_shift_m"] == 0.03
+    assert two.truth["sensor_plane_shift_m"] == [0.03] * 4
     assert two.truth["peak_force_N"] == one.truth["peak_force_N"]
     difference = np.max(np.abs(two.record.signals - one.record.signals))
     assert 2e-6 < difference < 6e-5
@@ -211,6 +211,10 @@ def test_hum_and_runout_have_their_frequencies():
         angle=np.zeros(1),
         runout_1x=np.array([2e-6 + 0j]),
         runout_2x=np.array([3e-6j]),
+        plane_shift=np.zeros(1),
+        cross_axis=np.zeros(1),
+        follows_housing=np.zeros(1),
+        time_constant=np.zeros(1),
     )
     read = readings(zero, time, 2 * np.pi * turns * time, chain, errors, np.random.default_rng(1))[:, 0]
     size = 2.0 * np.abs(np.fft.rfft(read)) / count

@@ -1,0 +1,155 @@
+"""Score estimators on a fixed set of simulated drops.
+
+The drops are made on demand and their truth is hidden. Anybody's estimator can be scored: it needs one JSON
+file for each drop.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rotordrop.cli._options import JsonOption
+from rotordrop.cli._output import deliver, progress_bar
+from rotordrop.errors import UsageError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from rotordrop.synthesis.bench import BenchScores
+
+
+class Action(StrEnum):
+    """What to do with the bench."""
+
+    list = "list"
+    make = "make"
+    score = "score"
+
+
+def bench(
+    action: Annotated[
+        Action,
+        typer.Argument(
+            metavar="ACTION", help="list: name the drops; make: make what is missing; score: score estimates."
+        ),
+    ],
+    folder: Annotated[
+        Path | None, typer.Argument(metavar="FOLDER", help="Folder of the bench.", show_default=False)
+    ] = None,
+    estimates: Annotated[
+        Path | None,
+        typer.Argument(metavar="ESTIMATES", help="Folder with NAME.json for each drop.", show_default=False),
+    ] = None,
+    only: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="A drop, a family or a rotor; repeatable. All by default."),
+    ] = None,
+    every: Annotated[
+        bool, typer.Option("--all-quantities", help="Also show each parameter by itself.")
+    ] = False,
+    json_file: JsonOption = None,
+) -> None:
+    """Make drops whose truth is hidden, 5 kg to 6 t, and score anybody's estimates of them."""
+    if action is Action.list:
+        _list(only or [], json_file)
+        return
+    if folder is None:
+        raise UsageError(f"'bench {action}' needs the folder of the bench, as in 'bench {action} dropbench'")
+    if action is Action.make:
+        _make(folder, only or [], json_file)
+        return
+    if estimates is None:
+        raise UsageError(
+            f"'bench score' needs the folder of the estimates too, as in 'bench score {folder} estimates'"
+        )
+    _score(folder, estimates, only or [], every, json_file)
+
+
+def _list(only: list[str], json_file: Path | None) -> None:
+    from rotordrop.synthesis.bench import VERSION
+    from rotordrop.synthesis.bench.make import chosen_drops
+
+    drops = chosen_drops(only)
+
+    def summarise(out: Console) -> None:
+        out.print(f"DropBench, version {VERSION}: {len(drops)} drops")
+        for drop in drops:
+            kinds = " + ".join(kind for kind, _ in drop.departures)
+            out.print(
+                f"{drop.name}  {drop.rotor:>6}  {drop.speed:>4g} Hz  {drop.family}"
+                + (f": {kinds}" if kinds else "")
+                + ("" if drop.sampling_rate == 20e3 else f": {drop.sampling_rate / 1e3:g} kHz"),
+                highlight=False,
+            )
+
+    deliver({"bench_version": VERSION, "drops": [vars(drop) for drop in drops]}, json_file, summarise)
+
+
+def _make(folder: Path, only: list[str], json_file: Path | None) -> None:
+    from rotordrop.synthesis.bench import make_bench
+    from rotordrop.synthesis.bench.make import chosen_drops
+
+    with progress_bar("making drops") as report:
+        made = make_bench(folder, only, report)
+    asked = len(chosen_drops(only))
+
+    def summarise(out: Console) -> None:
+        out.print(f"{len(made)} drops made, {asked - len(made)} were there (simulated, not measured)")
+        out.print(f"for estimators: {folder / 'drops'}; hidden truth, not for them: {folder / 'truth'}")
+
+    deliver({"made": made, "there": asked - len(made)}, json_file, summarise)
+
+
+def _score(folder: Path, estimates: Path, only: list[str], every: bool, json_file: Path | None) -> None:
+    from rotordrop.synthesis.bench import score_bench
+
+    scores = score_bench(folder, estimates, only)
+
+    def summarise(out: Console) -> None:
+        out.print(_table(scores, every))
+        flagged = sum(drop["consistent"] is False for drop in scores.drops)
+        out.print(f"{len(scores.drops)} drops, {flagged} whose estimate calls itself not consistent.")
+        for name, why in scores.unscored.items():
+            out.print(f"{name}: no number: {why}")
+
+    deliver(scores.as_json(), json_file, summarise)
+
+
+SHOWN = ("peak_force_N", "peak_stress_Pa", "mean_force_0p15_0p2_N", "air_gap_m", "parameters", "structure")
+
+
+def _table(scores: BenchScores, every: bool) -> Any:
+    from rich import box
+    from rich.table import Table
+
+    from rotordrop.synthesis.bench import VERSION
+
+    table = Table(title=f"DropBench, version {VERSION}", title_justify="left", box=box.SIMPLE_HEAD)
+    for column in ("family", "quantity"):
+        table.add_column(column)
+    for column in ("values", "missing", "median", "90 %", "worst", "> 10 %", "covered", "± (90 %)"):
+        table.add_column(column, justify="right")
+    family = ""
+    for row in scores.rows:
+        if not every and row.quantity not in SHOWN:
+            continue
+        shares = (row.median, row.ninetieth, row.worst, row.lost, row.covered, row.half_width)
+        table.add_row(
+            row.family if row.family != family else "",
+            row.quantity,
+            str(row.values),
+            str(row.missing),
+            *map(_percent, shares),
+        )
+        family = row.family
+    return table
+
+
+def _percent(share: float | None) -> str:
+    from rotordrop.cli.score import percent
+
+    return "" if share is None else percent(share)

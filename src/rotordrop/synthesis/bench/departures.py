@@ -1,0 +1,178 @@
+"""What the machines of the bench have and their descriptions do not, in the measure of the machine."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from rotordrop.machine import Machine
+from rotordrop.model.statics import bearing_load_shares
+from rotordrop.physics.contact import contact_law, contact_tangent, depth_at
+
+Parts = dict[str, dict[str, Any]]
+
+SLIGHT, LARGE = 0, 1
+"""Sizes of a departure: as many machines have it, and as only some do."""
+
+PEAK_LOADS = 10.0
+"""A typical peak force over the static load of a bearing [1]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Measures:
+    """Typical sizes of a machine, of its bearing with the larger load."""
+
+    weight: float
+    support_stiffness: float
+    support_mass: float
+    gap: float
+    surface_speed: float
+    race_mass: float
+    length: float
+    contact: Any
+
+    @property
+    def support_frequency(self) -> float:
+        """Natural frequency of support mass on support spring [Hz]."""
+        return math.sqrt(self.support_stiffness / self.support_mass) / (2.0 * math.pi)
+
+
+def _measures(machine: Machine, speed: float) -> _Measures:
+    shares = [float(share) for share in bearing_load_shares(machine)]
+    bearing = machine.touchdown_bearings[shares.index(max(shares))]
+    contact = bearing.contact
+    return _Measures(
+        weight=max(shares),
+        support_stiffness=float(bearing.support.stiffness),
+        support_mass=float(bearing.support.mass),
+        gap=float(bearing.air_gap),
+        surface_speed=speed * float(bearing.bore_radius),
+        race_mass=float(bearing.race.mass),
+        length=machine.rotor.node_positions[-1],
+        contact=contact_law(float(contact.stiffness), float(contact.exponent), float(contact.damping)),
+    )
+
+
+def _si(value: float, unit: str) -> str:
+    return f"{value:.6g} {unit}".strip()
+
+
+def _axes(m: _Measures, size: int) -> Parts:
+    ratio = (0.8, 0.65)[size]
+    return {"support": {"axes_angle": "30 deg", "stiffness_ratio": ratio, "damping_ratio": ratio}}
+
+
+def _hardening(m: _Measures, size: int) -> Parts:
+    force = _si(PEAK_LOADS * m.weight, "N")
+    return {"support": {"hardening": (0.15, 0.5)[size], "hardening_force": force, "hardening_radial": True}}
+
+
+def _slip(m: _Measures, size: int) -> Parts:
+    travel = _si(m.weight / m.support_stiffness, "m")
+    return {"support": {"slip_force": _si((0.2, 0.6)[size] * m.weight, "N"), "slip_travel": travel}}
+
+
+def _foundation(m: _Measures, size: int) -> Parts:
+    mass, frequency = (20.0, 9.0)[size] * m.support_mass, 0.35 * m.support_frequency
+    across = 0.8 * frequency
+    return {
+        "foundation": {
+            "mass": _si(mass, "kg"),
+            "frequency": _si(frequency, "Hz"),
+            "frequency_horizontal": _si(across, "Hz"),
+        }
+    }
+
+
+def _contact_law(m: _Measures, size: int) -> Parts:
+    """Softer when light, stiffer when heavy, as a race that is not round comes to bear."""
+    softer, stiffer = ((1.25, 0.95), (1.6, 0.85))[size]
+    points = [(1.0, softer), (PEAK_LOADS, 1.0), (4.0 * PEAK_LOADS, stiffer)]
+    law = [
+        {
+            "depth": _si(factor * float(depth_at(m.contact, loads * m.weight)), "m"),
+            "force": _si(loads * m.weight, "N"),
+        }
+        for loads, factor in points
+    ]
+    return {"contact": {"law": law}}
+
+
+def _tilt(m: _Measures, size: int) -> Parts:
+    stiffness = (4.0, 1.5)[size] * float(contact_tangent(m.contact, PEAK_LOADS * m.weight))
+    frequency = math.sqrt(stiffness / (0.5 * m.race_mass)) / (2.0 * math.pi)
+    return {"race": {"tilt_stiffness": _si(stiffness, "N/m"), "tilt_frequency": _si(frequency, "Hz")}}
+
+
+def _drift(m: _Measures, size: int) -> Parts:
+    return {"gap": {"drift": _si(-(0.01, 0.04)[size] * m.gap, "m"), "drift_time": "0.2 s"}}
+
+
+def _heat(m: _Measures, size: int) -> Parts:
+    heat = 0.1 * m.weight * m.surface_speed * 0.1
+    return {"gap": {"closing": _si((0.01, 0.04)[size] * m.gap, "m"), "heat": _si(heat, "J")}}
+
+
+def _centres(m: _Measures, size: int) -> Parts:
+    return {"centre": {"x": _si((0.04, 0.1)[size] * m.gap, "m"), "y": _si(-(0.03, 0.07)[size] * m.gap, "m")}}
+
+
+def _planes(m: _Measures, size: int) -> Parts:
+    return {"sensors": {"plane_shift": _si((0.005, 0.02)[size] * m.length, "m")}}
+
+
+DEPARTURES: dict[str, Callable[[_Measures, int], Parts]] = {
+    "turned or unequal support axes": _axes,
+    "hardening support": _hardening,
+    "hysteretic support": _slip,
+    "foundation mode": _foundation,
+    "contact exponent": lambda m, size: {"contact": {"exponent": (1.25, 1.5)[size]}},
+    "contact law": _contact_law,
+    "race tilt": _tilt,
+    "friction": lambda m, size: {"friction": {"dynamic": (0.23, 0.3)[size]}},
+    "gap drift": _drift,
+    "thermal gap": _heat,
+    "ball phase": lambda m, size: {"balls": {"turn": True}},
+    "bearing centres": _centres,
+    "sensor lag": lambda m, size: {"sensors": {"time_constant": ("16 us", "80 us")[size]}},
+    "cross-axis sensitivity": lambda m, size: {"sensors": {"cross_axis": (0.01, 0.05)[size]}},
+    "sensor planes": _planes,
+    "bracket on the housing": lambda m, size: {"sensors": {"follows_housing": (0.1, 0.3)[size]}},
+    "anti-alias filter": lambda m, size: {"sensors": {"anti_alias_frequency": ("8 kHz", "4 kHz")[size]}},
+    "long remanence": lambda m, size: {"magnets": {"remanence_time": ("10 ms", "50 ms")[size]}},
+    "unbalance": lambda m, size: {"rotor": {"unbalance": (1.5, 3.0)[size]}},
+    "Young's modulus": lambda m, size: {"rotor": {"youngs_modulus": (0.99, 0.97)[size]}},
+}
+"""Every departure by the name of its kind, in the order of the list of drops."""
+
+
+def departures(machine: Machine, speed: float, kinds: tuple[tuple[str, int], ...]) -> Parts:
+    """Violations of a machine [file units] that hold all the departures named, each in its size.
+
+    Parameters
+    ----------
+    machine : Machine
+        The machine as its owner knows it.
+    speed : float
+        Speed of the drop [rad/s].
+    kinds : tuple of (str, int)
+        Names from `DEPARTURES`, or "unbalance jump", and sizes.
+    """
+    m = _measures(machine, speed)
+    parts: Parts = {}
+    for kind, size in kinds:
+        found = _jump(machine, size) if kind == "unbalance jump" else DEPARTURES[kind](m, size)
+        for part, keys in found.items():
+            parts[part] = parts.get(part, {}) | keys
+    if "centre" in parts:  # the bearings stand apart from each other, or nothing would change
+        parts["bearing"] = {machine.touchdown_bearings[0].name: {"centre": parts.pop("centre")}}
+    return parts
+
+
+def _jump(machine: Machine, size: int) -> Parts:
+    """A piece comes off in the middle of the rotor at the first contact."""
+    amount = (4.0, 15.0)[size] * sum(float(unbalance.amount) for unbalance in machine.unbalances)
+    node = (len(machine.rotor.node_positions) + 1) // 2
+    return {"unbalance_jump": {"node": node, "amount": _si(amount, "kg m")}}

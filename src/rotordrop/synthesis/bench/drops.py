@@ -1,0 +1,117 @@
+"""The list of DropBench: which drops there are, from which seeds; fixed for a version."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import cycle
+
+from rotordrop.synthesis.bench.departures import DEPARTURES, LARGE, SLIGHT
+from rotordrop.synthesis.bench.rotors import ROTORS
+
+VERSION = "1"
+"""Changes whenever a drop of the list does; scores of different versions are not comparable."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BenchDrop:
+    """One drop of the bench.
+
+    Attributes
+    ----------
+    name : str
+        Name, which says nothing of what is hidden.
+    family : str
+        What is scored together.
+    rotor : str
+        Rotor, by its name in `ROTORS`.
+    speed : float
+        Speed at power-off [Hz].
+    machine_seed, drop_seed : int
+        Seeds of the hidden machine and of the drop.
+    departures : tuple of (str, int)
+        Kinds and sizes of what the description of the machine does not have.
+    tail : bool
+        Whether the settled tail was recorded.
+    sampling_rate : float
+        Samples per second [Hz].
+    """
+
+    name: str
+    family: str
+    rotor: str
+    speed: float
+    machine_seed: int
+    drop_seed: int
+    departures: tuple[tuple[str, int], ...] = ()
+    tail: bool = True
+    sampling_rate: float = 20e3
+
+
+SPEEDS: dict[str, tuple[float, ...]] = {
+    "5 kg": (550.0, 320.0, 150.0),
+    "13 kg": (500.0, 260.0, 120.0),
+    "30 kg": (300.0, 180.0, 80.0),
+    "60 kg": (120.0, 210.0, 60.0),
+    "140 kg": (180.0, 110.0, 60.0),
+    "500 kg": (115.0, 70.0, 40.0),
+    "1.6 t": (80.0, 50.0, 30.0),
+    "6 t": (50.0, 35.0, 20.0),
+}
+"""Speeds at which each rotor is dropped, in turn [Hz]."""
+
+PAIRS: tuple[tuple[str, ...], ...] = (
+    ("turned or unequal support axes", "cross-axis sensitivity"),
+    ("sensor lag", "foundation mode"),
+    ("hardening support", "long remanence"),
+    ("bracket on the housing", "turned or unequal support axes"),
+    ("friction", "unbalance"),
+    ("contact law", "sensor planes"),
+)
+TRIPLES: tuple[tuple[str, ...], ...] = (
+    ("turned or unequal support axes", "cross-axis sensitivity", "sensor lag"),
+    ("foundation mode", "hysteretic support", "cross-axis sensitivity"),
+    ("hardening support", "turned or unequal support axes", "Young's modulus"),
+    ("bracket on the housing", "long remanence", "thermal gap"),
+    ("sensor lag", "sensor planes", "bearing centres"),
+    ("foundation mode", "turned or unequal support axes", "sensor lag"),
+)
+RATES = (10e3, 50e3, 100e3)
+
+
+def _listed() -> tuple[BenchDrop, ...]:
+    found: list[BenchDrop] = []
+    speeds = {rotor: cycle(values) for rotor, values in SPEEDS.items()}
+    rotors = cycle(ROTORS)
+
+    def add(family: str, rotor: str, machine_seed: int, **more: object) -> None:
+        number = len(found) + 1
+        found.append(
+            BenchDrop(
+                name=f"drop_{number:03d}",
+                family=family,
+                rotor=rotor,
+                speed=next(speeds[rotor]),
+                machine_seed=machine_seed,
+                drop_seed=9000 + number,
+                **more,  # type: ignore[arg-type]
+            )
+        )
+
+    for i, rotor in enumerate(ROTORS):
+        add("right", rotor, 700 + i)
+        add("right, without tail", rotor, 700 + i, tail=False)
+    for size, word in ((SLIGHT, "slight"), (LARGE, "large")):
+        for i, kind in enumerate((*DEPARTURES, "unbalance jump")):
+            add(f"one departure, {word}", next(rotors), 800 + 100 * size + i, departures=((kind, size),))
+        next(rotors)  # else each kind would meet one rotor in both sizes
+    for i, kinds in enumerate(PAIRS):
+        add("two departures", next(rotors), 1000 + i, departures=tuple((kind, SLIGHT) for kind in kinds))
+    for i, kinds in enumerate(TRIPLES):
+        add("three departures", next(rotors), 1100 + i, departures=tuple((kind, SLIGHT) for kind in kinds))
+    for i, rate in enumerate(RATES):
+        add("other sampling rates", next(rotors), 1200 + i, sampling_rate=rate)
+    return tuple(found)
+
+
+DROPS: tuple[BenchDrop, ...] = _listed()
+"""All drops of the bench, in order."""

@@ -1,0 +1,120 @@
+"""Make the recordings of the bench on demand; what is there already stays."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rotordrop.atomic_file import write_json
+from rotordrop.errors import OutputError, UsageError
+from rotordrop.machine.saving import save_machine
+from rotordrop.synthesis.bench.departures import departures
+from rotordrop.synthesis.bench.drops import DROPS, VERSION, BenchDrop
+from rotordrop.synthesis.bench.rotors import bench_rotor
+from rotordrop.synthesis.event import hidden_machine
+from rotordrop.synthesis.files import write_record
+from rotordrop.synthesis.recording import SyntheticDrop, synthesize_drop
+from rotordrop.synthesis.sensor_chain import SensorChain
+from rotordrop.synthesis.violations import Violations
+
+DURATION = 0.3
+LATEST_CONTACT = 0.1
+"""A drop counts when the rotor has touched every bearing within this time of power-off [s]."""
+
+DROPS_FOLDER = "drops"
+TRUTH_FOLDER = "truth"
+
+
+def bench_recording(drop: BenchDrop) -> SyntheticDrop:
+    """Simulate and record one drop of the bench; the same bits wherever the probe drop has the same."""
+    machine = bench_rotor(drop.rotor)
+    speed = 2.0 * math.pi * drop.speed
+    broken = Violations.model_validate(departures(machine, speed, drop.departures))
+    hidden = hidden_machine(machine, drop.machine_seed, broken)
+    largest = max(float(bearing.air_gap) for bearing in hidden.machine.touchdown_bearings)
+    chain = SensorChain(sampling_rate=drop.sampling_rate, full_scale=max(600e-6, 2.0 * largest))
+    return synthesize_drop(
+        hidden, speed, drop.drop_seed, sensor_chain=chain, duration=DURATION, tail=drop.tail, name=drop.name
+    )
+
+
+def happened(made: SyntheticDrop) -> bool:
+    """Whether every bearing was reached within `LATEST_CONTACT`."""
+    first = [made.result.contacts.of_bearing(b).start for b in range(len(made.result.bearing_names))]
+    return all(len(start) > 0 and float(np.min(start)) <= LATEST_CONTACT for start in first)
+
+
+def chosen_drops(only: Iterable[str]) -> tuple[BenchDrop, ...]:
+    """Drops by name, by family or by rotor; all without any."""
+    wanted = list(only)
+    if not wanted:
+        return DROPS
+    known = {key for drop in DROPS for key in (drop.name, drop.family, drop.rotor)}
+    for key in wanted:
+        if key not in known:
+            families = ", ".join(repr(f) for f in dict.fromkeys(drop.family for drop in DROPS))
+            raise UsageError(
+                f"the bench has no drop {key!r}; name one of {DROPS[0].name} to {DROPS[-1].name}, a rotor "
+                f"such as {DROPS[0].rotor!r}, or a family: {families}"
+            )
+    return tuple(drop for drop in DROPS if {drop.name, drop.family, drop.rotor} & set(wanted))
+
+
+def make_bench(
+    folder: str | Path,
+    only: Iterable[str] = (),
+    report: Callable[[str, float], None] = lambda name, share: None,
+) -> list[str]:
+    """Make what is missing of the bench and give the names of the drops made.
+
+    Parameters
+    ----------
+    folder : path-like
+        ``drops/NAME`` gets machine file, recording and tail; ``truth/NAME.json`` the truth, written last: a
+        drop that has it is complete.
+    only : iterable of str
+        Names of drops, families or rotors; all when empty.
+    report : callable
+        Told the name of each drop and the share that is done.
+    """
+    folder = Path(folder)
+    drops = chosen_drops(only)
+    missing = [drop for drop in drops if not truth_path(folder, drop.name).is_file()]
+    for i, drop in enumerate(missing):
+        report(drop.name, i / len(missing))
+        _make(drop, folder)
+    return [drop.name for drop in missing]
+
+
+def truth_path(folder: Path, name: str) -> Path:
+    """Where the truth of a drop stands."""
+    return folder / TRUTH_FOLDER / f"{name}.json"
+
+
+def _make(drop: BenchDrop, folder: Path) -> None:
+    made = bench_recording(drop)
+    if not happened(made):
+        raise UsageError(
+            f"{drop.name} of version {VERSION} is no drop here: a bearing was not reached within "
+            f"{LATEST_CONTACT:g} s. Your computer rounds differently ('rotordrop fingerprint'); leave it out"
+        )
+    place = folder / DROPS_FOLDER / drop.name
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+        (folder / TRUTH_FOLDER).mkdir(exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"cannot make the folder {place}: {error.strerror}; name another one") from error
+    save_machine(bench_rotor(drop.rotor), place / "machine.toml")
+    write_record(made.record, place / "record.csv")
+    if made.tail is not None:
+        write_record(made.tail, place / "tail.csv")
+    truth: dict[str, Any] = made.truth | {
+        "bench_version": VERSION,
+        "family": drop.family,
+        "rotor": drop.rotor,
+    }
+    write_json(truth_path(folder, drop.name), truth)

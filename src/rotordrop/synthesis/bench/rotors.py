@@ -1,0 +1,119 @@
+"""Rotors of the bench, 5 kg to 6 t, as their owners know them: nominal values and guesses with ranges."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+
+from rotordrop.machine import Machine, example_machine, loads_machine
+
+MASS_AT_ONE = 32.7
+"""Mass [kg] of the scaled rotor whose touchdown bearings have a bore of 60 mm."""
+
+
+def scaled_rotor(mass: float, slenderness: float, overhang: float) -> Machine:
+    """A rotor with a disc and an overhung wheel, scaled to about a mass [kg].
+
+    Lengths go with the cube root of the mass, speeds against it, so that stresses and speeds at the surface
+    are those of rotors that are built; the air gap goes with the root of the length.
+
+    Parameters
+    ----------
+    mass : float
+        Mass of the rotor [kg].
+    slenderness : float
+        Lengths over those of the plain rotor of this mass; diameters shrink so that the mass stays [1].
+    overhang : float
+        Share of the discs' mass that sits outside the bearings, at the DE [1].
+    """
+    k = (mass / MASS_AT_ONE) ** (1.0 / 3.0)
+    long, wide = k * slenderness, k * slenderness**-0.5
+    wheel, disc = 4.3 * k**3 * overhang, 4.3 * k**3 * (1.0 - overhang)
+    discs = "".join(
+        f"""
+[[rotor.discs]]
+node = {node}
+mass = "{m:.6g} kg"
+polar_inertia = "{m * (0.083 * k) ** 2:.6g} kg m^2"
+diametral_inertia = "{m * (0.068 * k) ** 2:.6g} kg m^2"
+"""
+        for node, m in ((11, disc), (21, wheel))
+        if m > 0.0
+    )
+    ends = _bearing("NDE", 3, k, 1.0) + _bearing("DE", 19, k, 2.5)
+    magnets = "".join(f'[[ambs]]\nname = "{n}"\nnode = {i}\n' for n, i in (("NDE", 5), ("DE", 17)))
+    sensors = "".join(
+        f'[[sensors]]\nname = "{end}{side}"\nnode = {node}\nangle = "{angle} deg"\n'
+        for end, node in (("NDE", 4), ("DE", 18))
+        for side, angle in (("A", 135), ("B", 45))
+    )
+    return loads_machine(
+        f"""
+name = "bench rotor of {mass:g} kg (invented)"
+notes = ["gaps, supports, preload, contact, friction: nominal values or first guesses, not measured"]
+speed = {{ nominal = "{300.0 / k:.6g} Hz", aero_time_constant = "8 s" }}
+balance_grade = {{ grade = "G 1", at_speed = "{300.0 / k:.6g} Hz" }}
+
+[rotor]
+sections = [{{ length = "{720.0 * long:.8g} mm", elements = 20, outer_diameter = "{80.0 * wide:.8g} mm" }}]
+{discs}
+{ends}
+{magnets}
+{sensors}
+"""
+    )
+
+
+def _guess(value: float, unit: str, spread: float) -> str:
+    low, high = value / spread, value * spread
+    return (
+        f'{{ guess = "{value:.6g} {unit}", range = ["{low:.6g} {unit}", "{high:.6g} {unit}"], '
+        'source = "first guess" }'
+    )
+
+
+def _bearing(name: str, node: int, k: float, stiffer: float) -> str:
+    return f"""
+[[touchdown_bearings]]
+name = "{name}"
+node = {node}
+air_gap = {_guess(250.0 * k**0.5, "um", 1.3)}
+bore_radius = "{30.0 * k:.8g} mm"
+
+[touchdown_bearings.bearing]
+ball_diameter = "{9.525 * k:.8g} mm"
+ball_count = 21
+pitch_diameter = "{85.0 * k:.8g} mm"
+contact_angle = "15 deg"
+preload = {_guess(150.0 * k**2, "N", 1.45)}
+
+[touchdown_bearings.contact]
+stiffness = {_guess(0.8e9 * k**0.9, "N/m^1.111", 1.7)}
+
+[touchdown_bearings.friction]
+dynamic = {{ guess = 0.1, range = [0.05, 0.2], source = "only the range is known" }}
+
+[touchdown_bearings.support]
+mass = {_guess(25.0 * k**3, "kg", 2.0)}
+stiffness = {_guess(0.8e8 * k * stiffer, "N/m", 2.0)}
+damping_ratio = {{ guess = 0.03, range = [0.012, 0.08], source = "first guess" }}
+"""
+
+
+ROTORS: dict[str, Callable[[], Machine]] = {
+    "5 kg": lambda: scaled_rotor(5.0, 1.0, 0.0),
+    "13 kg": lambda: example_machine("small"),
+    "30 kg": lambda: scaled_rotor(30.0, 1.2, 0.3),
+    "60 kg": lambda: example_machine("lp400"),
+    "140 kg": lambda: scaled_rotor(140.0, 1.3, 0.0),
+    "500 kg": lambda: scaled_rotor(500.0, 1.0, 0.4),
+    "1.6 t": lambda: scaled_rotor(1600.0, 1.2, 0.0),
+    "6 t": lambda: scaled_rotor(6000.0, 1.0, 0.2),
+}
+"""Rotors by the name the list of drops uses."""
+
+
+@lru_cache(maxsize=len(ROTORS))
+def bench_rotor(name: str) -> Machine:
+    """A rotor of the bench, as its owner knows it."""
+    return ROTORS[name]()

@@ -1,0 +1,203 @@
+"""Score the estimates of a whole bench into one table: errors and coverage of every quantity by family."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rotordrop.errors import UsageError
+from rotordrop.model.parameter_table import LOADS, published
+from rotordrop.synthesis.bench.drops import VERSION
+from rotordrop.synthesis.bench.make import chosen_drops, truth_path
+from rotordrop.synthesis.score import score_estimate
+from rotordrop.synthesis.truth import Truth, read_truth
+
+LOST = 0.1
+"""A peak force wrong by more than this share is lost [1]."""
+
+EVERY = "all drops"
+STRUCTURE = "structure"
+PARAMETERS = "parameters"
+
+
+@dataclass(frozen=True, kw_only=True)
+class BenchRow:
+    """One quantity over the drops of one family; relative errors are those of absolute size [1].
+
+    Attributes
+    ----------
+    family, quantity : str
+        What is pooled; the quantity is a field of an estimate, or ``parameters`` or ``structure`` for all of
+        them together.
+    values, missing : int
+        Values scored, and values that the estimates do not have.
+    median, ninetieth, worst : float or None
+        Of the relative error [1].
+    covered : float or None
+        Share of the 90 % intervals that hold the truth [1].
+    half_width : float or None
+        Median of half the interval over the truth [1].
+    lost : float or None
+        Share of values that are wrong by more than 10 % or missing [1].
+    """
+
+    family: str
+    quantity: str
+    values: int
+    missing: int
+    median: float | None
+    ninetieth: float | None
+    worst: float | None
+    covered: float | None
+    half_width: float | None
+    lost: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class BenchScores:
+    """Scores of an estimator over the bench.
+
+    Attributes
+    ----------
+    rows : tuple of BenchRow
+        All families and quantities.
+    drops : tuple of dict
+        What was scored of each drop: name, family, rotor, whether the estimate called itself consistent, and
+        the errors of its peaks.
+    unscored : dict of str to str
+        Drops without a usable estimate, with the reason; they count as missing values.
+    """
+
+    rows: tuple[BenchRow, ...]
+    drops: tuple[dict[str, Any], ...]
+    unscored: dict[str, str]
+
+    def as_json(self) -> dict[str, Any]:
+        """Everything, ready for JSON."""
+        return {
+            "bench_version": VERSION,
+            "rows": [asdict(row) for row in self.rows],
+            "drops": list(self.drops),
+            "unscored": self.unscored,
+        }
+
+
+def score_bench(folder: str | Path, estimates: str | Path, only: Iterable[str] = ()) -> BenchScores:
+    """Compare estimates with the hidden truth of the drops of a bench.
+
+    Parameters
+    ----------
+    folder : path-like
+        Folder of the bench, as `make_bench` left it.
+    estimates : path-like
+        Folder with ``NAME.json`` for each drop: the JSON of ``rotordrop estimate``, or at least
+        ``{"bearings": {"NDE": {"peak_force_N": {"value": …, "interval_90": [low, high]}}}}``.
+    only : iterable of str
+        Names of drops, families or rotors; all that were made when empty.
+    """
+    folder, estimates, wanted = Path(folder), Path(estimates), list(only)
+    made = [drop for drop in chosen_drops(wanted) if truth_path(folder, drop.name).is_file()]
+    if not made:
+        raise UsageError(
+            f"{folder} holds no drop of the bench; make some with 'rotordrop bench make {folder}'"
+        )
+    if not estimates.is_dir():
+        raise UsageError(f"{estimates} is no folder; give the one with the estimates, NAME.json each")
+    entries, drops, unscored = [], [], {}
+    for drop in made:
+        truth = read_truth(truth_path(folder, drop.name))
+        _refuse_another_version(truth)
+        scored = _scored(estimates / f"{drop.name}.json", truth)
+        if isinstance(scored, str):
+            unscored[drop.name], scored = scored, {}
+        found = _entries(scored, truth)
+        entries += [(drop.family, *entry) for entry in found]
+        drops.append(_summary(drop.name, drop.family, drop.rotor, scored))
+    return BenchScores(rows=_rows(entries), drops=tuple(drops), unscored=unscored)
+
+
+def _refuse_another_version(truth: Truth) -> None:
+    version = truth.values.get("bench_version")
+    if version != VERSION:
+        raise UsageError(
+            f"{truth.path} is of version {version!r} of the bench, this is version {VERSION!r}; make the "
+            "bench again in another folder"
+        )
+
+
+def _scored(file: Path, truth: Truth) -> dict[str, Any] | str:
+    """Scores of one estimate, or why there are none."""
+    if not file.is_file():
+        return f"there is no {file.name}"
+    try:
+        return score_estimate(file, truth)
+    except UsageError as error:
+        return str(error)
+
+
+Entry = tuple[str, Mapping[str, Any] | None]
+
+
+def _entries(scored: Mapping[str, Any], truth: Truth) -> list[Entry]:
+    """Every value that an estimate of a drop should have, with its score or None."""
+    loads = [load.field for load in LOADS]
+    listed: list[Entry] = []
+    for name in truth.bearing_names:
+        mine = scored.get("bearings", {}).get(name, {})
+        listed += [(field, mine.get(field)) for field in [*loads, "air_gap_m"]]
+        for field in published():
+            if field in mine and field != "air_gap_m":
+                listed += [(field, mine[field]), (PARAMETERS, mine[field])]
+    listed += [(STRUCTURE, score) for score in scored.get("structure", {}).values()]
+    return listed
+
+
+def _summary(name: str, family: str, rotor: str, scored: Mapping[str, Any]) -> dict[str, Any]:
+    peaks = {
+        bearing: fields["peak_force_N"]["relative_error"]
+        for bearing, fields in scored.get("bearings", {}).items()
+        if "peak_force_N" in fields
+    }
+    return {
+        "name": name,
+        "family": family,
+        "rotor": rotor,
+        "consistent": scored.get("consistent"),
+        "peak_errors": peaks,
+    }
+
+
+def _rows(entries: list[tuple[str, str, Mapping[str, Any] | None]]) -> tuple[BenchRow, ...]:
+    families = [EVERY, *dict.fromkeys(family for family, *_ in entries)]
+    quantities = dict.fromkeys(quantity for _, quantity, _ in entries)
+    rows = []
+    for family in families:
+        for quantity in quantities:
+            chosen = [s for f, q, s in entries if q == quantity and family in (EVERY, f)]
+            if chosen:
+                rows.append(_row(family, quantity, chosen))
+    return tuple(rows)
+
+
+def _row(family: str, quantity: str, scores: list[Mapping[str, Any] | None]) -> BenchRow:
+    there = [score for score in scores if score is not None]
+    errors = np.abs([score["relative_error"] for score in there if score.get("relative_error") is not None])
+    covered = [score["covered"] for score in there if score.get("covered") is not None]
+    widths = [score["half_width"] for score in there if score.get("half_width") is not None]
+    missing = len(scores) - len(there)
+    return BenchRow(
+        family=family,
+        quantity=quantity,
+        values=len(there),
+        missing=missing,
+        median=float(np.median(errors)) if len(errors) else None,
+        ninetieth=float(np.quantile(errors, 0.9)) if len(errors) else None,
+        worst=float(np.max(errors)) if len(errors) else None,
+        covered=float(np.mean(covered)) if covered else None,
+        half_width=float(np.median(widths)) if widths else None,
+        lost=float((np.sum(errors > LOST) + missing) / len(scores)),
+    )

@@ -1,0 +1,173 @@
+"""What violations make of a machine: other values, and structures that no estimator's model has."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.physics.contact import contact_law, stiffness_of_exponent
+from rotordrop.synthesis import _hidden_rhs as H
+from rotordrop.synthesis.violation_parts import BearingViolations, ContactViolation
+from rotordrop.synthesis.violations import Violations
+
+Array = NDArray[np.float64]
+
+TYPICAL_LOADS = 5.0
+"""Force over the mean load of a bearing at which a contact with another exponent is as deep as before [1]."""
+
+
+def violated(machine: Machine, violations: Violations) -> Machine:
+    """The machine with those violations that are other values of what it has already."""
+    values: dict[str, float] = {}
+    weight = machine.rotor.mass * float(machine.gravity)
+    typical = TYPICAL_LOADS * weight / len(machine.touchdown_bearings)
+    for bearing in machine.touchdown_bearings:
+        mine = _of_bearing(bearing, violations.of_bearing(bearing.name), typical)
+        values |= {f"{bearing.name}.{path}": value for path, value in mine.items()}
+    factor = float(violations.rotor.unbalance)
+    if factor != 1.0:
+        for index, unbalance in enumerate(machine.unbalances):
+            values[f"unbalance.{index}.amount"] = factor * float(unbalance.amount)
+    machine = machine.with_values(values) if values else machine
+    return _with_youngs_modulus(machine, float(violations.rotor.youngs_modulus))
+
+
+def _with_youngs_modulus(machine: Machine, factor: float) -> Machine:
+    if factor == 1.0:
+        return machine
+    rotor = machine.rotor
+    materials = {name: rotor.material_named(name) for name in {e.material for e in rotor.elements}}
+    softer = {
+        name: material.changed(youngs_modulus=f"{factor * float(material.youngs_modulus)!r} Pa")
+        for name, material in materials.items()
+    }
+    return machine.completed_with({"rotor": rotor.changed(materials={**rotor.materials, **softer})})
+
+
+def _of_bearing(bearing: TouchdownBearing, v: BearingViolations, typical: float) -> Mapping[str, float]:
+    contact, support, friction = bearing.contact, bearing.support, bearing.friction
+    stiffness = float(contact.stiffness) * float(v.contact.stiffness)
+    values: dict[str, float] = {}
+    if v.contact.exponent is not None:
+        law = contact_law(stiffness, float(contact.exponent), float(contact.damping))
+        exponent = float(v.contact.exponent)
+        stiffness = stiffness_of_exponent(law, typical, exponent)
+        values["contact.exponent"] = exponent
+    dynamic = float(friction.dynamic) if v.friction.dynamic is None else float(v.friction.dynamic)
+    factors = {
+        "contact.damping": (float(contact.damping), float(v.contact.damping)),
+        "race.inertia": (float(bearing.race.inertia), float(v.race.inertia)),
+        "friction.stribeck_speed": (float(friction.stribeck_speed), float(v.friction.stribeck_speed)),
+        "friction.dynamic": (float(friction.dynamic), dynamic / float(friction.dynamic)),
+        "friction.static": (
+            float(friction.static),
+            dynamic / float(friction.dynamic) * float(v.friction.static),
+        ),
+        "support.stiffness_horizontal": (
+            float(support.stiffness_horizontal),
+            float(v.support.stiffness_ratio),
+        ),
+        "support.damping_horizontal": (float(support.damping_horizontal), float(v.support.damping_ratio)),
+    }
+    values |= {path: value * factor for path, (value, factor) in factors.items() if factor != 1.0}
+    if stiffness != float(contact.stiffness):
+        values["contact.stiffness"] = stiffness
+    if v.balls.first_ball_angle is not None:
+        values["bearing.first_ball_angle"] = float(v.balls.first_ball_angle)
+    return values
+
+
+def no_structure() -> Array:
+    """Row of a bearing without any structure, shape (C,)."""
+    row = np.zeros(H.N_COLUMNS)
+    row[[H.AXIS_COSINE, H.SLIP_TRAVEL, H.GAP_DRIFT_TIME, H.GAP_HEAT]] = 1.0
+    return row
+
+
+def without_structure(rows: Array) -> bool:
+    """Whether rows of structures (B, C) hold none."""
+    return bool(np.array_equal(rows, np.tile(no_structure(), (len(rows), 1))))
+
+
+def structure_rows(machine: Machine, violations: Violations) -> Array:
+    """Structures of all bearings, shape (B, C), for the kernels of the hidden machine."""
+    return np.array(
+        [
+            structure_row(bearing, violations.of_bearing(bearing.name))
+            for bearing in machine.touchdown_bearings
+        ]
+    )
+
+
+def structure_row(bearing: TouchdownBearing, v: BearingViolations) -> Array:
+    """Structures of one bearing, shape (C,) [SI]; the bearing is the true one."""
+    row = no_structure()
+    support, gap, foundation = v.support, v.gap, v.foundation
+    angle = float(support.axes_angle)
+    if angle != 0.0:
+        row[[H.AXIS_COSINE, H.AXIS_SINE]] = math.cos(angle), math.sin(angle)
+    deflection = float(support.hardening_force) / float(bearing.support.stiffness)
+    row[H.HARDENING] = float(support.hardening) / deflection**2
+    row[H.RADIAL] = float(support.hardening_radial and row[H.HARDENING] > 0.0)
+    if float(support.slip_force) > 0.0:
+        row[[H.SLIP_FORCE, H.SLIP_TRAVEL]] = float(support.slip_force), float(support.slip_travel)
+    if foundation.mass is not None and foundation.frequency is not None:
+        row[H.FOUNDATION_COMPLIANCE] = 1.0 / float(foundation.mass)
+        across = foundation.frequency_horizontal or foundation.frequency
+        for frequency, square, decay in (
+            (across, H.FOUNDATION_SQUARE_X, H.FOUNDATION_DECAY_X),
+            (foundation.frequency, H.FOUNDATION_SQUARE_Y, H.FOUNDATION_DECAY_Y),
+        ):
+            w = 2.0 * math.pi * float(frequency)
+            row[square], row[decay] = w * w, 2.0 * float(foundation.damping_ratio) * w
+    if v.race.tilt_stiffness is not None and v.race.tilt_frequency is not None:
+        w = 2.0 * math.pi * float(v.race.tilt_frequency)
+        row[H.TILT_COMPLIANCE] = w * w / float(v.race.tilt_stiffness)
+        row[H.TILT_SQUARE], row[H.TILT_DECAY] = w * w, 2.0 * float(v.race.tilt_damping_ratio) * w
+    row[[H.CENTRE_X, H.CENTRE_Y]] = float(v.centre.x), float(v.centre.y)
+    if float(gap.drift) != 0.0:
+        row[[H.GAP_DRIFT, H.GAP_DRIFT_TIME]] = float(gap.drift), float(gap.drift_time)
+    if float(gap.closing) != 0.0:
+        row[[H.GAP_CLOSING, H.GAP_HEAT]] = float(gap.closing), float(gap.heat)
+    if v.balls.turn:
+        row[H.CAGE_RATIO] = _cage_ratio(bearing)
+    _put_law(row, v.contact, float(bearing.contact.damping))
+    return row
+
+
+def _cage_ratio(bearing: TouchdownBearing) -> float:
+    """Turn of the cage per turn of the inner race: half of 1 - D_w cos α / D_pw."""
+    balls = bearing.bearing
+    share = float(balls.ball_diameter) * math.cos(float(balls.contact_angle)) / float(balls.pitch_diameter)
+    return 0.5 * (1.0 - share)
+
+
+def _put_law(row: Array, contact: ContactViolation, damping: float) -> None:
+    """Write the pieces of a law, a power of the depth each, into the row of a bearing."""
+    points = [(float(p.depth), float(p.force)) for p in contact.law]
+    row[H.LAW_PIECES] = max(len(points) - 1, 0)
+    for i, ((d1, f1), (d2, f2)) in enumerate(pairwise(points)):
+        exponent = math.log(f2 / f1) / math.log(d2 / d1)
+        at = H.LAW + i * H.LAW_WIDTH
+        row[at : at + H.LAW_WIDTH] = f1 / d1**exponent, exponent, damping, d2
+
+
+def support_matrices(bearing: TouchdownBearing, v: BearingViolations) -> dict[str, Any]:
+    """True stiffness and damping of a support in x and y [N/m], [N s/m]: K_xx, K_xy, K_yy and so on."""
+    angle = float(v.support.axes_angle)
+    c, s = (math.cos(angle), math.sin(angle)) if angle != 0.0 else (1.0, 0.0)
+    support, found = bearing.support, {}
+    for letter, first, second in (
+        ("K", float(support.stiffness_horizontal), float(support.stiffness)),
+        ("C", float(support.damping_horizontal), float(support.damping)),
+    ):
+        found[f"{letter}_xx"] = c * c * first + s * s * second
+        found[f"{letter}_xy"] = c * s * (first - second)
+        found[f"{letter}_yy"] = s * s * first + c * c * second
+    return found

@@ -1,0 +1,96 @@
+"""Estimates of the drops of a bench by this package, one process each, and their table.
+
+Usage: python studies/dropbench/estimates.py BENCH ESTIMATES [--only NAME ...] [--limit SECONDS]
+
+BENCH is a folder of 'rotordrop bench make'. Estimates that are there already stay; a drop that the estimator
+refuses leaves NAME.txt with its reason. Stops by itself after the limit; call it again to go on. Writes
+``results/scores.json`` and ``results/table.md`` over all estimates there are.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from rotordrop.synthesis.bench import VERSION, score_bench
+from rotordrop.synthesis.bench.make import chosen_drops
+
+HERE = Path(__file__).parent
+SHOWN = ("peak_force_N", "peak_stress_Pa", "mean_force_0p15_0p2_N", "air_gap_m", "parameters")
+
+
+def estimated(bench: Path, out: Path, name: str) -> float:
+    """Estimate one drop; processor time it took [s]."""
+    place = bench / "drops" / name
+    tail = ["--tail", str(place / "tail.csv")] if (place / "tail.csv").is_file() else []
+    call = ["estimate", str(place / "machine.toml"), str(place / "record.csv"), *tail]
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run(
+        [sys.executable, "-m", "rotordrop", *call, "--json", str(out / f"{name}.json")],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    if not (out / f"{name}.json").is_file():
+        (out / f"{name}.txt").write_text(f"exit code {done.returncode}\n{done.stderr}")
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def table(bench: Path, out: Path, names: list[str]) -> tuple[str, dict[str, Any]]:
+    """The table of all estimates there are, as text, and the scores behind it."""
+    scores = score_bench(bench, out, names)
+    lines = [
+        f"DropBench, version {VERSION}: {len(scores.drops)} drops.",
+        "",
+        "| family | quantity | values | missing | median | 90 % | worst | > 10 % | covered | half width |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for row in scores.rows:
+        if row.quantity in SHOWN:
+            shares = (row.median, row.ninetieth, row.worst, row.lost, row.covered, row.half_width)
+            cells = ["" if s is None else f"{100 * s:.1f} %" for s in shares]
+            lines.append(
+                f"| {row.family} | {row.quantity} | {row.values} | {row.missing} | {' | '.join(cells)} |"
+            )
+    lines += ["", "| drop | family | consistent | errors of the peak force |", "| --- | --- | --- | --- |"]
+    for drop in scores.drops:
+        errors = ", ".join(f"{name} {100 * e:+.1f} %" for name, e in drop["peak_errors"].items())
+        why = scores.unscored.get(drop["name"], "")
+        lines.append(f"| {drop['name']} | {drop['family']} | {drop['consistent']} | {errors or why} |")
+    return "\n".join(lines) + "\n", scores.as_json()
+
+
+def main() -> None:
+    """Estimate what is missing, then score all there is."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("bench", type=Path)
+    parser.add_argument("estimates", type=Path)
+    parser.add_argument("--only", action="append", default=[])
+    parser.add_argument("--limit", type=float, default=float("inf"))
+    arguments = parser.parse_args()
+    out = arguments.estimates
+    out.mkdir(parents=True, exist_ok=True)
+    started = time.monotonic()
+    names = [drop.name for drop in chosen_drops(arguments.only)]
+    for name in names:
+        done = (out / f"{name}.json").is_file() or (out / f"{name}.txt").is_file()
+        if done or time.monotonic() - started > arguments.limit:
+            continue
+        print(f"{name}: {estimated(arguments.bench, out, name):.0f} s of processor time", flush=True)
+    there = [n for n in names if (out / f"{n}.json").is_file() or (out / f"{n}.txt").is_file()]
+    text, scores = table(arguments.bench, out, there)
+    (HERE / "results").mkdir(exist_ok=True)
+    (HERE / "results" / "table.md").write_text(text)
+    (HERE / "results" / "scores.json").write_text(json.dumps(scores, indent=1) + "\n")
+    print(text)
+
+
+if __name__ == "__main__":
+    main()

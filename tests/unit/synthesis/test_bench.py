@@ -1,0 +1,202 @@
+"""DropBench: a list that stays, recordings that come back the same, a table that counts what is missing."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+
+import pytest
+
+from rotordrop.cli.app import run
+from rotordrop.errors import UsageError
+from rotordrop.machine import load_machine
+from rotordrop.synthesis import Violations, read_truth
+from rotordrop.synthesis.bench import DROPS, VERSION, make_bench, score_bench
+from rotordrop.synthesis.bench.departures import departures
+from rotordrop.synthesis.bench.make import chosen_drops
+from rotordrop.synthesis.bench.rotors import ROTORS, bench_rotor
+from rotordrop.synthesis.true_structure import KINDS, violated_kinds
+
+MADE = ("drop_004", "drop_034")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    path = tmp_path_factory.mktemp("bench")
+    assert make_bench(path, MADE) == list(MADE)
+    return path
+
+
+def test_the_list_of_a_version_is_fixed():
+    """A change of the list or of a rotor asks for another version, here too."""
+    digest = hashlib.sha256(repr(DROPS).encode())
+    for drop in DROPS:
+        parts = departures(bench_rotor(drop.rotor), 2.0 * math.pi * drop.speed, drop.departures)
+        digest.update(repr(parts).encode())
+    for rotor in ROTORS:
+        machine = bench_rotor(rotor)
+        numbers = [machine.rotor.mass, *machine.rotor.node_positions]
+        for b in machine.touchdown_bearings:
+            numbers += [
+                float(v) for v in (b.air_gap, b.support.mass, b.support.stiffness, b.contact.stiffness)
+            ]
+        digest.update(" ".join(f"{number:.6g}" for number in numbers).encode())
+    assert (VERSION, digest.hexdigest()[:16]) == ("1", "ae372e470c71aac1")
+
+
+def test_the_list_spans_what_it_promises():
+    assert len({drop.name for drop in DROPS}) == len(DROPS) >= 60
+    assert (min(d.speed for d in DROPS), max(d.speed for d in DROPS)) == (20.0, 550.0)
+    masses = {name: bench_rotor(name).rotor.mass for name in ROTORS}
+    for name, mass in masses.items():
+        stated = float(name.split()[0]) * (1000.0 if name.endswith(" t") else 1.0)
+        assert mass == pytest.approx(stated, rel=0.08), name
+    assert min(masses.values()) < 5.2 < 5800.0 < max(masses.values())
+    assert {drop.rotor for drop in DROPS} == set(ROTORS)
+    assert {drop.sampling_rate for drop in DROPS} == {10e3, 20e3, 50e3, 100e3}
+    kinds = [kind for drop in DROPS for kind, _ in drop.departures]
+    unused = {"contact stiffness", "contact damping", "race inertia"}  # values, drawn with every machine
+    assert set(kinds) == set(KINDS) - unused
+    assert {len(drop.departures) for drop in DROPS} == {0, 1, 2, 3}
+    seeds = {(drop.machine_seed, drop.drop_seed) for drop in DROPS}
+    assert len(seeds) == len(DROPS)
+
+
+@pytest.mark.parametrize("drop", DROPS, ids=lambda drop: drop.name)
+def test_a_hidden_machine_has_the_departures_of_the_list(drop):
+    parts = departures(bench_rotor(drop.rotor), 2.0 * math.pi * drop.speed, drop.departures)
+    broken = Violations.model_validate(parts)
+    assert set(violated_kinds(broken)) == {kind for kind, _ in drop.departures}
+    broken.check_names(bench_rotor(drop.rotor))
+
+
+def test_no_drop_says_what_is_hidden(folder):
+    """Estimators get machine, recording and tail; the truth stands elsewhere."""
+    files = sorted(str(p.relative_to(folder / "drops")) for p in (folder / "drops").rglob("*.*"))
+    assert files == [
+        "drop_004/machine.toml",
+        "drop_004/record.csv",
+        "drop_034/machine.toml",
+        "drop_034/record.csv",
+        "drop_034/tail.csv",
+    ]
+    for file in (folder / "drops").rglob("*.*"):
+        text = file.read_text().lower()
+        for word in ("violat", "departure", "remanence", "truth", "seed"):
+            assert word not in text, (file, word)
+    assert load_machine(folder / "drops/drop_034/machine.toml") == bench_rotor("13 kg")
+
+
+def test_what_is_there_stays_and_what_was_cut_off_comes_back_the_same(folder):
+    record = folder / "drops/drop_004/record.csv"
+    truth = folder / "truth/drop_004.json"
+    before, when = (record.read_bytes(), truth.read_bytes()), record.stat().st_mtime_ns
+    assert make_bench(folder, MADE) == []
+    assert record.stat().st_mtime_ns == when
+    truth.unlink()
+    record.write_text("half")
+    assert make_bench(folder, MADE) == ["drop_004"]
+    assert (record.read_bytes(), truth.read_bytes()) == before
+
+
+def test_the_truth_says_where_it_belongs(folder):
+    truth = read_truth(folder / "truth/drop_034.json")
+    assert truth.values["bench_version"] == VERSION
+    assert truth.values["violated"] == ["long remanence"]
+    assert truth.structure["remanence.time_constant"] == 0.01
+    assert all(rows[0][0] < 0.1 for rows in truth.values["contact_intervals_0_0p25_s"].values())
+
+
+def _estimates(folder, factor=1.0, half=0.02):
+    """Estimates that are the truth times a factor, in the least form that is scored."""
+    for name in MADE:
+        truth = read_truth(folder.parent / "bench_truth" / f"{name}.json")
+        bearings = {}
+        for bearing in truth.bearing_names:
+            peak = factor * truth.values["peak_force_N"][bearing]
+            interval = [peak * (1.0 - half), peak * (1.0 + half)]
+            bearings[bearing] = {"peak_force_N": {"value": peak, "interval_90": interval}}
+        (folder / f"{name}.json").write_text(json.dumps({"consistent": True, "bearings": bearings}))
+
+
+@pytest.fixture
+def estimates(folder, tmp_path):
+    (tmp_path / "bench_truth").symlink_to(folder / "truth")
+    place = tmp_path / "estimates"
+    place.mkdir()
+    return place
+
+
+def _row(scores, quantity, family="all drops"):
+    return next(r for r in scores.rows if (r.family, r.quantity) == (family, quantity))
+
+
+def test_true_estimates_have_no_error(folder, estimates):
+    _estimates(estimates)
+    row = _row(score_bench(folder, estimates), "peak_force_N")
+    assert (row.values, row.missing, row.covered, row.lost) == (4, 0, 1.0, 0.0)
+    assert row.worst == pytest.approx(0.0, abs=1e-12)
+    assert row.half_width == pytest.approx(0.02)
+
+
+def test_a_wrong_and_a_missing_estimate_are_lost(folder, estimates):
+    _estimates(estimates, factor=1.15)
+    (estimates / "drop_034.json").unlink()
+    assert [drop["consistent"] for drop in score_bench(folder, estimates, MADE[:1]).drops] == [True]
+    scores = score_bench(folder, estimates)
+    assert scores.unscored == {"drop_034": "there is no drop_034.json"}
+    row = _row(scores, "peak_force_N")
+    assert (row.values, row.missing, row.covered, row.lost) == (2, 2, 0.0, 1.0)
+    assert row.median == pytest.approx(0.15)
+    assert _row(scores, "peak_force_N", "right, without tail").missing == 0
+    assert _row(scores, "air_gap_m").missing == 4
+    assert [drop["consistent"] for drop in scores.drops] == [True, None]
+
+
+def test_the_table_is_printed_and_written(folder, estimates, tmp_path, capsys):
+    _estimates(estimates)
+    file = tmp_path / "scores.json"
+    assert run(["bench", "score", str(folder), str(estimates), "--json", str(file)]) == 0
+    out = capsys.readouterr().out
+    assert "DropBench, version 1" in out
+    assert "2 drops, 0 whose estimate calls itself not consistent." in out
+    assert json.loads(file.read_text())["bench_version"] == "1"
+
+
+def test_another_version_is_refused(folder, estimates, tmp_path):
+    (tmp_path / "old/truth").mkdir(parents=True)
+    old = json.loads((folder / "truth/drop_004.json").read_text()) | {"bench_version": "0"}
+    (tmp_path / "old/truth/drop_004.json").write_text(json.dumps(old))
+    with pytest.raises(
+        UsageError, match="is of version '0' of the bench, this is version '1'; make the bench"
+    ):
+        score_bench(tmp_path / "old", estimates)
+
+
+def test_an_unknown_drop_names_what_there_is():
+    with pytest.raises(
+        UsageError, match=r"no drop 'drop_999'; name one of drop_001 to drop_\d+, a rotor .* '5 kg'"
+    ):
+        chosen_drops(["drop_999"])
+    assert {drop.rotor for drop in chosen_drops(["6 t"])} == {"6 t"}
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (["make"], "'bench make' needs the folder of the bench"),
+        (["score", "x"], "'bench score' needs the folder of the estimates too"),
+        (["score", "x", "y"], "x holds no drop of the bench; make some with 'rotordrop bench make x'"),
+    ],
+)
+def test_a_call_without_folders_says_what_it_needs(call, message, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert run(["bench", *call]) == 64
+    assert message in capsys.readouterr().err.replace("\n", " ")
+
+
+def test_the_list_is_printed_without_making_anything(capsys):
+    assert run(["bench", "list", "--only", "two departures"]) == 0
+    out = capsys.readouterr().out
+    assert out.count("two departures: ") == 6

@@ -1,0 +1,236 @@
+"""Case files of violations: what they may hold, what they refuse, and what becomes of sensors and magnets."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rotordrop.errors import MachineFileError, UsageError
+from rotordrop.synthesis import Violations, hidden_machine, load_violations, score_estimate, synthesize_drop
+from rotordrop.synthesis.event import drop_conditions
+from rotordrop.synthesis.sensor_chain import PERFECT, lagging
+from rotordrop.synthesis.true_structure import KINDS, violated_kinds
+from rotordrop.synthesis.violations import violations_schema
+
+SPEED = 2.0 * np.pi * 60.0
+
+CASE = """
+[support]
+axes_angle = "30 deg"
+stiffness_ratio = 0.65
+
+[bearing.DE.foundation]
+mass = "400 kg"
+frequency = "85 Hz"
+
+[[contact.law]]
+depth = "1 um"
+force = "90 N"
+[[contact.law]]
+depth = "4 um"
+force = "1.6 kN"
+
+[sensors]
+time_constant = "80 us"
+
+[unbalance_jump]
+node = 33
+amount = "600 g mm"
+"""
+
+
+def violations(**parts):
+    return Violations.model_validate(parts)
+
+
+def test_a_case_file_says_what_is_violated(tmp_path, known):
+    path = tmp_path / "case.toml"
+    path.write_text(CASE)
+    case = load_violations(path)
+    assert float(case.of_bearing("NDE").support.axes_angle) == pytest.approx(np.pi / 6)
+    assert case.of_bearing("NDE").foundation.mass is None
+    assert float(case.of_bearing("DE").foundation.mass) == 400.0
+    assert case.values()["contact"]["law"][1] == {"depth": pytest.approx(4e-6), "force": 1600.0}
+    assert violated_kinds(case) == (
+        "turned or unequal support axes",
+        "foundation mode",
+        "contact law",
+        "sensor lag",
+        "unbalance jump",
+    )
+    assert hidden_machine(known, 3, str(path)).violations == case
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('[support]\naxes_angel = "3 deg"', r"2:1: support.axes_angel: unknown key .* mean 'axes_angle'"),
+        ("[support]\naxes_angle = 30", r"2:14: support.axes_angle: 30 has no unit; an angle needs one"),
+        ("[support]\nhardening = 0.5", r"support.hardening: 'hardening' needs 'hardening_force' beside it"),
+        ('[foundation]\nfrequency = "85 Hz"', r"'frequency' needs 'mass' beside it; add it or leave"),
+        ('[foundation]\nmass = "-4 kg"\nfrequency = "85 Hz"', r"foundation.mass: -4.00 kg is not allowed"),
+        ('[gap]\ndrift = "-10 um"', r"gap.drift: 'drift' needs 'drift_time' beside it"),
+        ("[sensors]\ncross_axis = 0.7", r"sensors.cross_axis: 0.700 is not allowed here; at most 0.5"),
+        ('[[contact.law]]\ndepth = "1 um"\nforce = "9 N"', r"a law has 2 to 9 points, not 1"),
+        (CASE.replace("1.6 kN", "80 N"), r"force 80 at point 2 does not exceed 90 before it; order"),
+        (CASE + "\n[contact]\nexponent = 1.5", r"the contact has both 'law' and 'exponent'"),
+        ('[unbalance_jump]\namount = "3 g mm"', r"unbalance_jump.node: 'node' is missing; add it"),
+    ],
+)  # fmt: skip
+def test_a_case_file_is_refused_with_place_value_and_way_out(text, message, tmp_path):
+    path = tmp_path / "case.toml"
+    path.write_text(text)
+    with pytest.raises(MachineFileError, match=message):
+        load_violations(path)
+
+
+def test_a_missing_case_file_is_named(tmp_path):
+    with pytest.raises(MachineFileError, match="cannot read the case file: No such file"):
+        load_violations(tmp_path / "none.toml")
+
+
+@pytest.mark.parametrize(
+    ("parts", "message"),
+    [
+        ({"bearing": {"XX": {"gap": {}}}}, "the bearing 'XX', which the machine does not have; it has NDE"),
+        ({"sensor": {"S1": {"cross_axis": 0.1}}}, "the sensor 'S1', which the machine does not have"),
+        ({"unbalance_jump": {"node": 999, "amount": "1 g mm"}}, "at node 999, outside the rotor; its nodes"),
+    ],
+)  # fmt: skip
+def test_names_the_machine_does_not_have_are_refused(known, parts, message):
+    with pytest.raises(UsageError, match=message):
+        hidden_machine(known, 3, violations(**parts))
+
+
+def test_the_schema_knows_every_key_and_unit():
+    schema = violations_schema()
+    assert set(schema["properties"]) == set(Violations.model_fields)
+    parts = schema["$defs"]
+    assert parts["SupportViolation"]["properties"]["axes_angle"]["$ref"] == "#/$defs/angle"
+    assert "lag the deflection" in parts["SupportViolation"]["properties"]["slip_force"]["description"]
+    for keys in KINDS.values():
+        for key in keys:
+            part, name = key.split(".")
+            field = Violations.model_fields[part].annotation
+            fields = getattr(field, "model_fields", None) or field.__args__[0].model_fields
+            assert name in fields, key
+
+
+@pytest.fixture(scope="module")
+def perfect(known):
+    return _recorded(known)
+
+
+def _recorded(known, chain=PERFECT, **parts):
+    hidden = hidden_machine(known, 3, violations(**parts), drawn=False)
+    return synthesize_drop(hidden, SPEED, 8, sensor_chain=chain, duration=0.03)
+
+
+def test_cross_axis_sensitivity_reads_the_motion_across(known, perfect):
+    name = known.sensors[0].name
+    drop = _recorded(known, sensor={name: {"cross_axis": 0.02}})
+    angle = [float(s.angle) for s in known.sensors[:2]]
+    assert known.sensors[0].node == known.sensors[1].node
+    sign = np.sign(np.sin(angle[1] - angle[0]))
+    for record, plain in ((drop.record, perfect.record), (drop.tail, perfect.tail)):
+        extra = record.signals - plain.signals
+        polarity = known.sensors[0].polarity * known.sensors[1].polarity * sign
+        assert extra[:, 0] == pytest.approx(0.02 * polarity * plain.signals[:, 1], abs=1e-12)
+        assert np.max(np.abs(extra[:, 1:])) == 0.0
+    assert drop.truth["structure"][f"sensors.{name}.cross_axis"] == 0.02
+
+
+def test_cross_axis_of_all_sensors_is_drawn_for_each(known):
+    drop = _recorded(known, sensors={"cross_axis": 0.02})
+    drawn = np.array(drop.truth["sensor_cross_axis"])
+    assert len(set(drawn)) == len(drawn)
+    assert np.all((np.abs(drawn) >= 0.01) & (np.abs(drawn) <= 0.02))
+
+
+def test_a_bracket_on_the_housing_takes_its_motion_off_the_reading(known, perfect):
+    drop = _recorded(known, sensors={"follows_housing": 0.3})
+    x = [i for i, s in enumerate(known.sensors) if abs(np.sin(float(s.angle))) < 1e-9]
+    y = [i for i in range(len(known.sensors)) if i not in x]
+    layout_of = {b.name: k for k, b in enumerate(known.touchdown_bearings)}
+    extra = drop.record.signals - perfect.record.signals
+    time, at = drop.result.time, drop.record.time - drop.truth["t_off_in_record_s"]
+    inside = (at > 0.0) & (at < time[-1])
+    for i in y or range(len(known.sensors)):
+        sensor = known.sensors[i]
+        moved = drop.result.support_displacement[:, layout_of[sensor.bearing]]
+        along = np.array([np.cos(float(sensor.angle)), np.sin(float(sensor.angle))])
+        expected = -0.3 * sensor.polarity * np.interp(at[inside], time, moved @ along)
+        assert extra[inside, i] == pytest.approx(expected, abs=1e-12)
+        assert np.max(np.abs(expected)) > 1e-7
+
+
+def test_a_lag_delays_a_slow_signal_by_its_time_constant():
+    rate, tau, f = 100e3, 80e-6, 500.0
+    time = np.arange(20_000) / rate
+    signal = np.column_stack([np.sin(2 * np.pi * f * time)] * 2)
+    lagged = lagging(signal, np.array([tau, 0.0]), rate)
+    assert np.array_equal(lagged[:, 1], signal[:, 1])
+    response = 1.0 / (1.0 + 2j * np.pi * f * tau)
+    expected = np.imag(response * np.exp(2j * np.pi * f * time))
+    late = time > 20 * tau
+    assert lagged[late, 0] == pytest.approx(expected[late], abs=2e-4)
+
+
+@pytest.mark.parametrize("rate", [10e3, 100e3])
+def test_a_lagging_sensor_reads_the_shaft_of_a_while_ago(known, rate):
+    """At any sampling rate: the reading plus time constant times its slope is what the shaft does."""
+    chain = replace(PERFECT, sampling_rate=rate)
+    lagged, plain = (_recorded(known, chain, **v) for v in ({"sensors": {"time_constant": "80 us"}}, {}))
+    read, shaft = lagged.record.signals, plain.record.signals
+    falling = (plain.record.time > 1e-3) & (plain.record.time < 4e-3)
+    back = read + 80e-6 * np.gradient(read, 1.0 / rate, axis=0)
+    assert back[falling] == pytest.approx(shaft[falling], abs=0.05e-6)
+    assert np.max(np.abs(read - shaft)[falling]) > 1e-6
+    assert np.array_equal(lagged.result.state, plain.result.state)
+
+
+def test_remanence_unbalance_and_friction_leave_their_ranges(known):
+    v = violations(
+        magnets={"remanence_time": "50 ms", "remanent_lift": 0.3},
+        rotor={"unbalance": 1.6},
+        friction={"dynamic": 0.28},
+    )
+    hidden, plain = hidden_machine(known, 3, v), hidden_machine(known, 3)
+    start, other = (drop_conditions(h, SPEED, 5).start for h in (hidden, plain))
+    assert start.remanence_time_constant == 0.05
+    share = hidden.machine.rotor.mass * 9.81 / len(hidden.machine.ambs)
+    assert start.remanent_force[:, 1] == pytest.approx(0.3 * share)
+    assert np.array_equal(start.remanent_force[:, 0], other.remanent_force[:, 0])
+    for mine, drawn in zip(hidden.machine.unbalances, plain.machine.unbalances, strict=True):
+        assert float(mine.amount) == pytest.approx(1.6 * float(drawn.amount))
+    for mine, drawn in zip(hidden.machine.touchdown_bearings, plain.machine.touchdown_bearings, strict=True):
+        assert float(mine.friction.dynamic) == pytest.approx(0.28)
+        ratio = float(drawn.friction.static) / float(drawn.friction.dynamic)
+        assert float(mine.friction.static) == pytest.approx(0.28 * ratio)
+
+
+def test_the_truth_holds_what_structures_are(known):
+    drop = _recorded(
+        known,
+        support={"axes_angle": "30 deg", "stiffness_ratio": 0.65},
+        bearing={"DE": {"foundation": {"mass": "400 kg", "frequency": "85 Hz"}}},
+    )
+    structure, truth = drop.truth["structure"], drop.truth
+    for b in known.touchdown_bearings:
+        k = float(b.support.stiffness)
+        xx, xy, yy = k * (0.65 * 0.75 + 0.25), -0.35 * k * np.sqrt(3.0) / 4.0, k * (0.65 * 0.25 + 0.75)
+        assert structure[f"{b.name}.support.coupling"] == pytest.approx(xy / np.sqrt(xx * yy))
+        assert truth["support_stiffness"][b.name] == pytest.approx(yy)
+        assert truth["support_anisotropy"][b.name] == pytest.approx(xx / yy)
+    assert structure["NDE.support.foundation_share"] == 0.0
+    mass = float(known.touchdown_bearings[1].support.mass)
+    assert structure["DE.support.foundation_share"] == pytest.approx(mass / 400.0)
+    assert truth["violated"] == ["turned or unequal support axes", "foundation mode"]
+    found = {
+        "structure": {"DE.support.foundation_frequency": {"value": 540.0, "interval_90": [500.0, 560.0]}}
+    }
+    scored = score_estimate(found, truth)
+    assert scored["structure"]["DE.support.foundation_frequency"]["covered"] is True
+    assert scored["coverage"] == {"intervals": 1, "covered": 1, "fraction": 1.0}
