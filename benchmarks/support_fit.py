@@ -21,7 +21,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from rotordrop.estimation.recorded_fall import RecordedFall, recorded_fall
+from rotordrop.identification.evidence import Evidence, read_evidence
 from rotordrop.identification.replica import build_replica
 from rotordrop.identification.support import SupportFit, fit_support, impact_problem
 from rotordrop.machine import example_machine
@@ -34,20 +34,20 @@ SPEED = 2.0 * math.pi * 60.0
 UNTIL = 0.06
 
 
-def fallen() -> RecordedFall:
+def fallen() -> Evidence:
     """The steps before the fit."""
     known = example_machine("lp400")
     drop = synthesize_drop(hidden_machine(known, SEED), SPEED, SEED)
-    return recorded_fall(known, drop.record, drop.tail)
+    return read_evidence(build_drop_model(known), drop.record, drop.tail)
 
 
-def fit(fall: RecordedFall, threads: int) -> SupportFit:
+def fit(evidence: Evidence, threads: int) -> SupportFit:
     """One fit as the replay makes it."""
     coarse, fine = (
-        impact_problem(build_replica(fall.record, fall.rest, fall.initial, model, until=UNTIL))
-        for model in (build_drop_model(fall.model.machine, "quick"), fall.model)
+        impact_problem(build_replica(evidence, model, until=UNTIL))
+        for model in (build_drop_model(evidence.model.machine, "quick"), evidence.model)
     )
-    return fit_support(coarse, fine, fall.later_contact, starts=STARTS, threads=threads)
+    return fit_support(coarse, fine, evidence.latest_first_contact, starts=STARTS, threads=threads)
 
 
 def main() -> None:
@@ -57,12 +57,12 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--threads", type=int, default=2)
     options = parser.parse_args()
-    fall = fallen()
-    fit(fall, options.threads)
+    evidence = fallen()
+    fit(evidence, options.threads)
     walls, processors = [], []
     for _ in range(options.rounds):
         wall, processor = time.perf_counter(), time.process_time()
-        found = fit(fall, options.threads)
+        found = fit(evidence, options.threads)
         walls.append(time.perf_counter() - wall)
         processors.append(time.process_time() - processor)
         print(f"wall {walls[-1]:.2f} s, processor {processors[-1]:.2f} s", flush=True)

@@ -29,8 +29,9 @@ from common import (
 from numpy.typing import NDArray
 
 from rotordrop.estimated import IdentifiedValue
-from rotordrop.estimation.recorded_fall import RecordedFall, recorded_fall
 from rotordrop.identification.air_gap import identify_air_gap
+from rotordrop.identification.evidence import Evidence, read_evidence
+from rotordrop.identification.evidence import known as present
 from rotordrop.identification.replica import build_replica
 from rotordrop.identification.support import (
     LONGEST_WINDOW,
@@ -49,15 +50,14 @@ Array = NDArray[np.float64]
 UNTIL = 0.06
 
 
-def supports_of(fall: RecordedFall) -> tuple[SupportFit, dict[str, IdentifiedValue], ImpactFit, Array]:
+def supports_of(evidence: Evidence) -> tuple[SupportFit, dict[str, IdentifiedValue], ImpactFit, Array]:
     """Supports as the replay finds them, but for the sweep of the friction, which is known here."""
-    quick = build_drop_model(fall.model.machine, "quick")
+    quick = build_drop_model(evidence.model.machine, "quick")
     coarse, fine = (
-        impact_problem(build_replica(fall.record, fall.rest, fall.initial, model, until=UNTIL))
-        for model in (quick, fall.model)
+        impact_problem(build_replica(evidence, model, until=UNTIL)) for model in (quick, evidence.model)
     )
-    found = fit_support(coarse, fine, fall.later_contact)
-    longest = fall.later_contact + LONGEST_WINDOW
+    found = fit_support(coarse, fine, evidence.latest_first_contact)
+    longest = evidence.latest_first_contact + LONGEST_WINDOW
     friction = found.values[fine.vector.paths[fine.vector.friction]]
     problem, x, covariance = refit_with_friction(fine, found.search.best, friction, longest=longest)
     return found, identified_values(problem, x, covariance), problem, x
@@ -69,12 +69,13 @@ def one(seed: int, hertz: float) -> dict[str, Any]:
     hidden = hidden_machine(known, seed)
     drop = synthesize_drop(hidden, radians(hertz), seed, sensor_chain=WITHOUT_ZERO_AND_GAIN_ERRORS)
     began, used = time.perf_counter(), time.process_time()
-    fall = recorded_fall(with_right_sensors(informed(known, hidden)), drop.record, drop.tail)
-    found, values, problem, x = supports_of(fall)
+    model = build_drop_model(with_right_sensors(informed(known, hidden)))
+    evidence = read_evidence(model, drop.record, drop.tail)
+    found, values, problem, x = supports_of(evidence)
     best = found.search.best
     rows = problem.replica.bearing_rows(problem.vector, x[: len(problem.vector)])
-    settled = replace(fall.model, parameters=fall.model.parameters._replace(bearing=rows))
-    gap = identify_air_gap(fall.rest, settled, fall.initial.sensing)
+    settled = replace(evidence.model, parameters=evidence.model.parameters._replace(bearing=rows))
+    gap = identify_air_gap(present(evidence.rest), settled, present(evidence.sensing))
     bearings = {}
     for b, bearing in enumerate(hidden.machine.touchdown_bearings):
         entry: dict[str, Any] = {
@@ -96,7 +97,7 @@ def one(seed: int, hertz: float) -> dict[str, Any]:
         "speed_Hz": hertz,
         "bearings": bearings,
         "misfit": best.misfit,
-        "window_after_later_contact_ms": 1e3 * (best.window - fall.later_contact),
+        "window_after_later_contact_ms": 1e3 * (best.window - evidence.latest_first_contact),
         "ended_early": found.search.ended_early or found.coarse.ended_early,
         "wall_s": time.perf_counter() - began,
         "processor_s": time.process_time() - used,

@@ -24,10 +24,9 @@ import numpy as np
 from common import informed, known_machine, radians, size_of, speed_of, value_of, write
 from numpy.typing import NDArray
 
-from rotordrop.estimation.recorded_fall import recorded_fall
 from rotordrop.estimation.uncertainty import best_candidate, seen_at_bearings, whole_drop
-from rotordrop.identification.air_gap import SettledRest, find_rest
-from rotordrop.identification.evidence import read_evidence
+from rotordrop.identification.evidence import Evidence, read_evidence
+from rotordrop.identification.evidence import known as present
 from rotordrop.identification.initial_state import InitialState, fit_initial_state
 from rotordrop.identification.modal_expansion import ExpandedState, expand_initial_state
 from rotordrop.identification.replica import build_replica
@@ -35,8 +34,7 @@ from rotordrop.identification.sensing import build_sensing
 from rotordrop.identification.support import impact_problem
 from rotordrop.machine import Machine
 from rotordrop.measurement.record import Record
-from rotordrop.model.parameters import DropModel
-from rotordrop.model.static_sag import sag_of_model
+from rotordrop.model.parameters import DropModel, build_drop_model
 from rotordrop.simulation.case import DropCase, StateStart
 from rotordrop.simulation.drop import simulate_drop
 from rotordrop.simulation.result import DropResult
@@ -61,17 +59,22 @@ def true_machine(known: Machine, hidden: HiddenMachine) -> Machine:
     return informed(known, hidden, supports=True).with_values(values)
 
 
-def by_fit(
-    machine: Machine, model: DropModel, record: Record, rest: SettledRest
-) -> tuple[InitialState, DropResult, Array]:
+def by_fit(evidence: Evidence) -> tuple[InitialState, DropResult, Array]:
     """Replay from the fit over the fall, and its orbit at the bearings as the sensors would show it."""
-    evidence, sensing = read_evidence(model, record), build_sensing(model, record.sensors)
-    gaps = rest.radius - sag_of_model(model).total
-    initial = fit_initial_state(evidence, rest, gaps, model, sensing)
-    problem = impact_problem(build_replica(record, rest, initial, model, until=EARLY))
+    initial = present(evidence.fall)
+    problem = impact_problem(build_replica(evidence, evidence.model, until=EARLY))
     central = best_candidate(problem, problem.prior_mean)
     result = whole_drop(problem, central, duration=DURATION, tolerance=TOLERANCE)
     return initial, result, seen_at_bearings(problem, central, result)
+
+
+def with_gap(evidence: Evidence, gaps: Array) -> Evidence:
+    """The evidence with other air gaps, and so another rest position."""
+    gap = present(evidence.gap)
+    rest = replace(gap.rest, radius=gaps + gap.sag.total)
+    other = replace(gap, value=gaps, rest=rest)
+    fall = fit_initial_state(evidence, other, present(evidence.sensing))
+    return replace(evidence, rest=rest, gap=other, fall=fall)
 
 
 def by_expansion(model: DropModel, start: ExpandedState, speed: float, angle: float) -> DropResult:
@@ -122,14 +125,13 @@ def one(seed: int, hertz: float) -> dict[str, Any]:
     drop = synthesize_drop(hidden, radians(hertz), seed, conditions=conditions)
     assert drop.tail is not None
     machine = true_machine(known, hidden)
-    fall = recorded_fall(machine, drop.record, drop.tail)
-    model, gaps = fall.model, [value_of(b, "air_gap") for b in hidden.machine.touchdown_bearings]
-    settled = replace(fall.rest, radius=np.array(gaps) + sag_of_model(model).total)
+    evidence = read_evidence(build_drop_model(machine), drop.record, drop.tail)
+    model = evidence.model
+    gaps = np.array([value_of(b, "air_gap") for b in hidden.machine.touchdown_bearings])
     found: dict[str, tuple[DropResult, Array]] = {}
-    initial, result, _ = by_fit(machine, model, drop.record, settled)
+    initial, result, _ = by_fit(with_gap(evidence, gaps))
     found["fit"] = result, result.displacement
-    tail_rest = find_rest(drop.record, drop.tail, build_sensing(model, drop.record.sensors))
-    _, result, _ = by_fit(machine, model, drop.record, tail_rest)
+    _, result, _ = by_fit(evidence)
     found["fit, gap from tail"] = result, result.displacement
     along = initial.deviation_of(drop.record) + initial.settled
     for name, record in (("expansion", drop.record), ("paper", in_bearing_planes(drop.record, machine))):

@@ -26,7 +26,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rotordrop.estimation.tracked import FINE_BASIS, drop_problem, prepare
+from rotordrop.estimation.tracked import FINE_BASIS, drop_problem
+from rotordrop.identification.evidence import read_evidence
 from rotordrop.machine import example_machine
 from rotordrop.model.parameters import build_drop_model
 from rotordrop.synthesis import hidden_machine, synthesize_drop
@@ -277,7 +278,8 @@ def study(seed: int, hz: float, members: int = 300) -> dict[str, Any]:
     drop = synthesize_drop(hidden, 2.0 * math.pi * hz, seed)
     machine = hidden.machine.model_copy(update={"sensors": example_machine("lp400").sensors})
     problem = drop_problem(
-        build_drop_model(machine, FINE_BASIS), prepare(machine, drop.record, drop.tail, "x")
+        build_drop_model(machine, FINE_BASIS),
+        read_evidence(build_drop_model(machine), drop.record, drop.tail),
     )
     settings = PassSettings(impulse=1e-3, share=0.01)
     result: dict[str, Any] = {"seed": seed, "speed_Hz": hz}

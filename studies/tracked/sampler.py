@@ -26,7 +26,8 @@ for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.estimation.tracked import COARSE_BASIS, _first_contact, drop_problem, prepare
+from rotordrop.estimation.tracked import COARSE_BASIS, _first_contact, drop_problem
+from rotordrop.identification.evidence import read_evidence
 from rotordrop.machine import example_machine
 from rotordrop.model.parameters import build_drop_model
 from rotordrop.synthesis import hidden_machine, synthesize_drop
@@ -81,9 +82,9 @@ def study(seed: int, draws: int, window: float, threads: int = 2) -> dict[str, A
     """Standard deviations of the linearised fit beside those of the weighted draws."""
     drop = synthesize_drop(hidden_machine(example_machine("lp400"), seed), 2.0 * math.pi * 60.0, seed)
     machine = example_machine("lp400")
-    prepared = prepare(machine, drop.record, drop.tail, "sampled")
-    problem = steady(drop_problem(build_drop_model(machine, COARSE_BASIS), prepared, window + 0.01))
-    schedule = shifted(BLIND_SCHEDULE, _first_contact(prepared))
+    evidence = read_evidence(build_drop_model(machine), drop.record, drop.tail)
+    problem = steady(drop_problem(build_drop_model(machine, COARSE_BASIS), evidence, window + 0.01))
+    schedule = shifted(BLIND_SCHEDULE, _first_contact(evidence))
     last = Stage(until=window, impulse=2e-3, share=0.02, passes=4)
     fitted = track([problem], (*(s for s in schedule if s.until < window), last)).smoothed[0]
     settings = PassSettings(impulse=last.impulse, share=last.share)

@@ -94,7 +94,6 @@ def estimate_drops(
     """
     from rotordrop.errors import UsageError
     from rotordrop.estimation.record_facts import facts_of
-    from rotordrop.estimation.tracked import settled_tail
 
     if not isinstance(method, Tracked | Replay):
         raise UsageError(f"the method is {method!r}; expected Tracked(...) or Replay(...).")
@@ -102,7 +101,7 @@ def estimate_drops(
         raise UsageError(f"{len(tails)} tails for {len(records)} records; expected one, or None, for each.")
     stems = names or [r.path.stem if r.path else f"drop_{i + 1}" for i, r in enumerate(records)]
     facts = [
-        facts_of(machine, record, settled_tail(record, tail), stem)
+        facts_of(machine, record, tail, stem)
         for record, tail, stem in zip(records, tails, stems, strict=True)
     ]
     if isinstance(method, Replay):
@@ -112,9 +111,12 @@ def estimate_drops(
             replay_drop(machine, record, tail, method, one, name=stem, progress=progress)
             for record, tail, stem, one in zip(records, tails, stems, facts, strict=True)
         )
-    from rotordrop.estimation.tracked import followed_drops, prepare
+    from rotordrop.estimation.tracked import followed_drops
     from rotordrop.estimation.tracked_estimate import estimate_of
+    from rotordrop.identification.evidence import read_evidence
+    from rotordrop.model.parameters import build_drop_model
 
-    prepared = [prepare(machine, r, t, n) for r, t, n in zip(records, tails, stems, strict=True)]
-    drops = followed_drops(machine, prepared, quick=method.quick, progress=progress)
+    model = build_drop_model(machine)
+    evidence = [read_evidence(model, r, t, name=n) for r, t, n in zip(records, tails, stems, strict=True)]
+    drops = followed_drops(machine, evidence, quick=method.quick, progress=progress)
     return tuple(estimate_of(drop, method, one) for drop, one in zip(drops, facts, strict=True))

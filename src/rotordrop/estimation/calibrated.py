@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError, UsageError
 from rotordrop.estimated import NINETY, Estimated, IdentifiedValue, Verdict
-from rotordrop.estimation.tracked import prepare, track_drops
+from rotordrop.estimation.tracked import track_drops
 from rotordrop.estimation.tracked_loads import INCONSISTENT_WIDENING
 from rotordrop.estimation.tracked_parameters import (
     NOT_DETERMINED,
@@ -19,10 +19,12 @@ from rotordrop.estimation.tracked_parameters import (
     model_error,
     parameter_widening,
 )
+from rotordrop.identification.evidence import read_evidence
 from rotordrop.machine import CalibrationDrop, CalibrationOrigin, Machine
 from rotordrop.measurement.record import Record
 from rotordrop.model.parameter import Parameter
 from rotordrop.model.parameter_table import parameter, row_of, rows, separating_measurement
+from rotordrop.model.parameters import build_drop_model
 from rotordrop.model.statics import bearing_load_shares
 from rotordrop.model.unknowns import typical_depth
 from rotordrop.tracking.consistency import Check, consistency_checks
@@ -130,8 +132,9 @@ def calibrate_machine(
         The machine with estimates, what the records determine and what not.
     """
     stems = list(names or [r.path.stem if r.path else f"drop_{i + 1}" for i, r in enumerate(records)])
-    prepared = [prepare(machine, r, t, n) for r, t, n in zip(records, tails, stems, strict=True)]
-    tracked = track_drops(machine, prepared, calibrate_only=True, progress=progress)
+    model = build_drop_model(machine)
+    evidence = [read_evidence(model, r, t, name=n) for r, t, n in zip(records, tails, stems, strict=True)]
+    tracked = track_drops(machine, evidence, calibrate_only=True, progress=progress)
     checks = {
         name: consistency_checks(problem, smoothed, 1.0)
         for name, problem, smoothed in zip(stems, tracked.problems, tracked.smoothed, strict=True)

@@ -8,6 +8,7 @@ from rotordrop.errors import RecordError
 from rotordrop.machine import Machine
 from rotordrop.measurement.quality import Finding, check_record, refuse_unusable
 from rotordrop.measurement.record import Record
+from rotordrop.measurement.settled import resting_record
 from rotordrop.measurement.simulated import is_simulated
 
 NO_TAIL = "no settled tail: the air gap rests on its prior and on the contacts; give one with --tail"
@@ -36,6 +37,16 @@ class RecordFacts:
         return tuple(dict.fromkeys((*self.warnings, *further)))
 
 
+def _still(machine: Machine, record: Record, tail: Record | None) -> Record | None:
+    """The settled tail given, or that of a record which reaches standstill; None where there is neither."""
+    if tail is not None:
+        return tail
+    try:
+        return resting_record(record, None, machine)
+    except RecordError:
+        return None
+
+
 def _findings(machine: Machine, record: Record, tail: Record | None) -> tuple[Finding, ...]:
     """What the gate finds; a lost sensor keeps it from looking, but not the twin from following."""
     try:
@@ -58,10 +69,11 @@ def facts_of(machine: Machine, record: Record, tail: Record | None, name: str) -
     RecordError
         If the gate finds that results would be wrong.
     """
-    findings = _findings(machine, record, tail)
+    still = _still(machine, record, tail)
+    findings = _findings(machine, record, still)
     refuse_unusable(findings, name)
     warnings = [finding.message for finding in findings if finding.severity == "warning"]
-    if tail is None:
+    if still is None:
         warnings.append(NO_TAIL)
     origin = machine.calibration
     if origin is not None:

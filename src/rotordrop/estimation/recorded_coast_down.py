@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError, RecordError
 from rotordrop.estimated import NINETY, Estimated
-from rotordrop.identification.air_gap import identify_air_gap, rest_at_end
-from rotordrop.identification.sensing import build_sensing, displacements_along
+from rotordrop.identification.air_gap import AirGap, identify_air_gap, rest_at_end
+from rotordrop.identification.evidence import Evidence, Missing, known, read_evidence
+from rotordrop.identification.sensing import Sensing, displacements_along
 from rotordrop.machine import Machine
-from rotordrop.measurement.events import find_drop_instant
 from rotordrop.measurement.record import Record
 from rotordrop.model.assembly import build_rotor_fe
 from rotordrop.model.bearing_numbers import numbers_of
@@ -37,15 +37,13 @@ def recorded_coast_down(machine: Machine, record: Record) -> CoastDownSignal:
     record : Record
         The coast-down; one that ends at rest shows centre and air gap.
     """
-    off = float(find_drop_instant(record, machine))
-    model = build_drop_model(machine, "quick")
-    sensing = build_sensing(model, record.sensors)
+    evidence = read_evidence(build_drop_model(machine), record)
+    off, names = evidence.power_off.value, evidence.model.bearing_names
+    sensing = known(evidence.sensing)
     falling = record.time >= off
-    along = displacements_along(record)[falling]
-    moved = sensing.at_bearings(along - sensing.settled_bend)
-    names = model.bearing_names
+    moved = sensing.at_bearings(displacements_along(record)[falling] - sensing.settled_bend)
     try:
-        gap = identify_air_gap(rest_at_end(record, sensing), model, sensing)
+        gap = _air_gap(evidence, sensing)
         moved[..., 0] -= gap.rest.sideways
         gaps, errors = gap.value, dict(zip(names, map(float, gap.standard_error), strict=True))
         centre = (
@@ -68,6 +66,13 @@ def recorded_coast_down(machine: Machine, record: Record) -> CoastDownSignal:
         speed=speed,
         recorded=True,
     )
+
+
+def _air_gap(evidence: Evidence, sensing: Sensing) -> AirGap:
+    """Air gaps by the rest at standstill, or by where the rotor lies at the end while the shaft still turns."""
+    if not isinstance(evidence.gap, Missing):
+        return evidence.gap
+    return identify_air_gap(rest_at_end(evidence.record, sensing), evidence.model, sensing)
 
 
 def with_found_air_gaps(machine: Machine, signal: CoastDownSignal) -> Machine:

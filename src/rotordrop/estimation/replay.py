@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from rotordrop.estimated import Estimated, IdentifiedValue
 from rotordrop.estimation.agreement import Agreement, compare_orbits, spread_horizon
+from rotordrop.estimation.assumptions import evidence_assumptions
 from rotordrop.estimation.estimate import Estimate, ReplaySteps, Verdict
 from rotordrop.estimation.fixed_values import (
     Document,
@@ -24,7 +25,6 @@ from rotordrop.estimation.fixed_values import (
 from rotordrop.estimation.later_motion import later_motion
 from rotordrop.estimation.methods import Replay
 from rotordrop.estimation.record_facts import RecordFacts
-from rotordrop.estimation.recorded_fall import RecordedFall, measured_drop, recorded_fall
 from rotordrop.estimation.replay_estimate import (
     Replayed,
     replay_bearings,
@@ -40,7 +40,9 @@ from rotordrop.estimation.uncertainty import (
     whole_drop,
 )
 from rotordrop.identification.air_gap import AirGap, identify_air_gap
+from rotordrop.identification.evidence import Evidence, known, read_evidence
 from rotordrop.identification.friction import FrictionSweep, sweep_friction
+from rotordrop.identification.initial_state import InitialState
 from rotordrop.identification.replica import build_replica
 from rotordrop.identification.support import (
     LONGEST_WINDOW,
@@ -133,50 +135,49 @@ def replay_drop(
     """
     say = progress or (lambda text, share: None)
     document, origin = ({}, "") if method.fixed is None else read_fixed(method.fixed)
-    known = machine_with_fixed(machine, document, origin) if origin else machine
+    start = machine_with_fixed(machine, document, origin) if origin else machine
     say("air gap, speed, initial state, first contact", 0.0)
-    fall = recorded_fall(known, record, tail)
-    impacts = _taken_over(fall, document) if origin else _first_impacts(fall, method, say)
-    gap = _steady_gap(fall, impacts)
+    evidence = read_evidence(build_drop_model(start), record, tail, name=name)
+    initial = known(evidence.fall)
+    impacts = _taken_over(evidence, document) if origin else _first_impacts(evidence, method, say)
+    gap = _steady_gap(evidence, impacts)
     say("replay of the whole drop", STAGES["replay"])
-    replayed = _replay(impacts, fall, gap, _draws(impacts, fall, method, say))
-    found = replay_parameters(known, impacts.values, gap, impacts.friction)
+    replayed = _replay(impacts, evidence, gap, _draws(impacts, evidence, method, say))
+    found = replay_parameters(start, impacts.values, gap, impacts.friction)
     later = later_motion(
-        replayed.result.bearing_names,
-        *measured_drop(fall, np.inf),
-        DURATION,
-        float(np.mean(fall.initial.noise)),
+        replayed.result.bearing_names, *evidence.measured(np.inf), DURATION, float(np.mean(initial.noise))
     )
     return Estimate(
         name=name,
         method=method,
         machine=machine,
         record=record,
-        drop_instant=fall.instant,
-        speed=fall.speed.initial,
+        drop_instant=evidence.power_off,
+        speed=evidence.speed.initial,
         until=DURATION,
         verdict=Verdict.OPEN_LOOP,
-        bearings=replay_bearings(known, fall, gap, found, replayed),
+        bearings=replay_bearings(start, evidence, gap, found, replayed),
         parameters=found,
         agreement=_agreement(replayed, gap),
-        replay=_steps(known, fall, impacts, gap, replayed, origin),
+        replay=_steps(start, evidence, impacts, gap, replayed, origin),
         later=later,
         findings=facts.findings,
         warnings=facts.warnings_with(
-            *_warnings(fall, impacts, replayed.draws), *(one.sentence() for one in later if one.larger)
+            *_warnings(evidence, initial, impacts, replayed.draws),
+            *(one.sentence() for one in later if one.larger),
         ),
-        notes=_notes(fall, gap),
+        notes=_notes(evidence, gap),
         simulated_record=facts.simulated,
     )
 
 
 def _steps(
-    machine: Machine, fall: RecordedFall, impacts: Impacts, gap: AirGap, replayed: Replayed, origin: str
+    machine: Machine, evidence: Evidence, impacts: Impacts, gap: AirGap, replayed: Replayed, origin: str
 ) -> ReplaySteps:
     result, draws = replayed.result, replayed.draws
     return ReplaySteps(
-        speed=fall.speed,
-        contacts=fall.contacts,
+        speed=evidence.speed,
+        contacts=known(evidence.contacts),
         friction=impacts.friction,
         correlations=() if impacts.support is None else impacts.support.correlations,
         speed_time=result.time,
@@ -186,16 +187,20 @@ def _steps(
         rejected=None if draws is None else draws.rejected,
         identified=_identified_machine(machine, impacts, gap),
         document=steps_document(
-            fall, gap, impacts.support, impacts.friction, draws, result.bearing_names, float(result.speed[-1])
+            evidence,
+            gap,
+            impacts.support,
+            impacts.friction,
+            draws,
+            result.bearing_names,
+            float(result.speed[-1]),
         ),
     )
 
 
-def _taken_over(fall: RecordedFall, document: Document) -> Impacts:
+def _taken_over(evidence: Evidence, document: Document) -> Impacts:
     """Supports and friction of an earlier estimate, with their own uncertainty."""
-    problem = impact_problem(
-        build_replica(fall.record, fall.rest, fall.initial, fall.model, until=IDENTIFIED_UNTIL)
-    )
+    problem = impact_problem(build_replica(evidence, evidence.model, until=IDENTIFIED_UNTIL))
     covariance = np.diag(problem.prior_sigma**2)
     paths = problem.vector.paths
     for pair in fixed_correlations(document):
@@ -212,18 +217,18 @@ def _taken_over(fall: RecordedFall, document: Document) -> Impacts:
     )
 
 
-def _first_impacts(fall: RecordedFall, method: Replay, say: Progress) -> Impacts:
+def _first_impacts(evidence: Evidence, method: Replay, say: Progress) -> Impacts:
     """Supports by least squares on the first impacts, then the sweep of the friction."""
-    quick = build_drop_model(fall.model.machine, "quick")
+    quick = build_drop_model(evidence.model.machine, "quick")
     coarse, fine = (
-        impact_problem(build_replica(fall.record, fall.rest, fall.initial, model, until=IDENTIFIED_UNTIL))
-        for model in (quick, fall.model)
+        impact_problem(build_replica(evidence, model, until=IDENTIFIED_UNTIL))
+        for model in (quick, evidence.model)
     )
     begin, end = STAGES["supports"], STAGES["friction"]
     support = fit_support(
         coarse,
         fine,
-        fall.later_contact,
+        evidence.latest_first_contact,
         starts=method.starts,
         threads=method.threads,
         progress=lambda text, share: say(f"supports: {text}", begin + (end - begin) * share),
@@ -236,8 +241,8 @@ def _first_impacts(fall: RecordedFall, method: Replay, say: Progress) -> Impacts
         np.clip(best.x + root @ random.standard_normal(len(best.x)), *fine.bounds)
         for _ in range(FRICTION_DRAWS)
     ]
-    friction = sweep_friction(fine, best.x, fall.first_contact, draws=points, threads=method.threads)
-    longest = fall.later_contact + LONGEST_WINDOW
+    friction = sweep_friction(fine, best.x, evidence.earliest_contact, draws=points, threads=method.threads)
+    longest = evidence.latest_first_contact + LONGEST_WINDOW
     problem, x, covariance = refit_with_friction(
         fine, best, friction.value, longest=longest, threads=method.threads
     )
@@ -251,18 +256,18 @@ def _first_impacts(fall: RecordedFall, method: Replay, say: Progress) -> Impacts
     )
 
 
-def _steady_gap(fall: RecordedFall, impacts: Impacts) -> AirGap:
+def _steady_gap(evidence: Evidence, impacts: Impacts) -> AirGap:
     """Air gap with the sag of the identified supports.
 
     Within the fit the gap follows the sag of every trial, so that it has come to rest with the supports.
     """
-    model, problem = fall.model, impacts.problem
+    model, problem = evidence.model, impacts.problem
     rows = problem.replica.bearing_rows(problem.vector, impacts.x[: len(problem.vector)])
     settled = replace(model, parameters=model.parameters._replace(bearing=rows))
-    return identify_air_gap(fall.rest, settled, fall.initial.sensing)
+    return identify_air_gap(known(evidence.rest), settled, known(evidence.sensing))
 
 
-def _replay(impacts: Impacts, fall: RecordedFall, gap: AirGap, draws: Draws | None) -> Replayed:
+def _replay(impacts: Impacts, evidence: Evidence, gap: AirGap, draws: Draws | None) -> Replayed:
     """The whole drop with the identified values, for the air gap and for its two limits."""
     problem = impacts.problem
     central = best_candidate(problem, impacts.x)
@@ -271,7 +276,7 @@ def _replay(impacts: Impacts, fall: RecordedFall, gap: AirGap, draws: Draws | No
         whole_drop(problem, central, duration=DURATION, gap_change=limit - gap.value)
         for limit in (gap.lower, gap.upper)
     )
-    time, measured = measured_drop(fall, DURATION)
+    time, measured = evidence.measured(DURATION)
     return Replayed(
         result=simulated,
         middle=seen_at_bearings(problem, central, simulated),
@@ -283,7 +288,7 @@ def _replay(impacts: Impacts, fall: RecordedFall, gap: AirGap, draws: Draws | No
     )
 
 
-def _draws(impacts: Impacts, fall: RecordedFall, method: Replay, say: Progress) -> Draws | None:
+def _draws(impacts: Impacts, evidence: Evidence, method: Replay, say: Progress) -> Draws | None:
     if method.draws < 2:
         return None
     begin = STAGES["draws"]
@@ -291,7 +296,7 @@ def _draws(impacts: Impacts, fall: RecordedFall, method: Replay, say: Progress) 
         impacts.problem,
         impacts.x,
         impacts.covariance,
-        window=fall.later_contact + KEPT_UNTIL if impacts.support is not None else 0.0,
+        window=evidence.latest_first_contact + KEPT_UNTIL if impacts.support is not None else 0.0,
         duration=DURATION,
         count=method.draws,
         threads=method.threads,
@@ -334,10 +339,10 @@ def _identified_machine(machine: Machine, impacts: Impacts, gap: AirGap) -> Mach
     return machine.with_values(values)
 
 
-def _notes(fall: RecordedFall, gap: AirGap) -> tuple[str, ...]:
+def _notes(evidence: Evidence, gap: AirGap) -> tuple[str, ...]:
     zero = ", ".join(f"{1e6 * z:.3g}" for z in gap.zero_sigma)
     return (
-        *([fall.speed.note] if fall.speed.note else []),
+        *evidence_assumptions(evidence),
         "the settled tail cannot tell air gap from vertical sensor zero: a zero that is 1 µm off reads as 1 "
         "µm of "
         f"air gap (standard error {zero} µm); the fall height, and so the force, is hardly touched by it",
@@ -346,8 +351,10 @@ def _notes(fall: RecordedFall, gap: AirGap) -> tuple[str, ...]:
     )
 
 
-def _warnings(fall: RecordedFall, impacts: Impacts, draws: Draws | None) -> tuple[str, ...]:
-    said = [*fall.instant.notes, *fall.initial.notes]
+def _warnings(
+    evidence: Evidence, initial: InitialState, impacts: Impacts, draws: Draws | None
+) -> tuple[str, ...]:
+    said = [*evidence.power_off.notes, *initial.notes]
     if impacts.support is not None:
         search = impacts.support.search
         if search.ended_early:

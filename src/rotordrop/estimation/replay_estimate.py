@@ -21,12 +21,13 @@ from rotordrop.estimation.bearing_drop import (
     simulated_bearings,
 )
 from rotordrop.estimation.estimate import FittedParameter
-from rotordrop.estimation.recorded_fall import RecordedFall
 from rotordrop.estimation.tracked_loads import MODEL_FORCE_SIGMA, MODEL_MEAN_FORCE_SIGMA, MODEL_STRESS_SIGMA
 from rotordrop.estimation.tracked_parameters import equivalent_stiffness, published_values, static_friction
 from rotordrop.estimation.uncertainty import FEWEST_DRAWS, Draws, interval
 from rotordrop.identification.air_gap import AirGap as IdentifiedGap
+from rotordrop.identification.evidence import Evidence, known
 from rotordrop.identification.friction import FrictionSweep
+from rotordrop.identification.modal_expansion import expand_initial_state
 from rotordrop.identification.support import SupportFit
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.model.parameter import Step
@@ -66,21 +67,21 @@ class Replayed:
 
 def replay_bearings(
     machine: Machine,
-    fall: RecordedFall,
+    evidence: Evidence,
     gap: IdentifiedGap,
     found: tuple[FittedParameter, ...],
     replayed: Replayed,
 ) -> tuple[BearingDrop, ...]:
     """Everything about every bearing: histories of the replay, loads with intervals, identified values."""
     return tuple(
-        _bearing(machine.touchdown_bearings[b], fall, gap, found, replayed, simulated, b)
+        _bearing(machine.touchdown_bearings[b], evidence, gap, found, replayed, simulated, b)
         for b, simulated in enumerate(simulated_bearings(replayed.result))
     )
 
 
 def _bearing(
     bearing: TouchdownBearing,
-    fall: RecordedFall,
+    evidence: Evidence,
     gap: IdentifiedGap,
     found: tuple[FittedParameter, ...],
     replayed: Replayed,
@@ -94,14 +95,14 @@ def _bearing(
     def shown(label: str, displacement: Array, role: Any = "simulated") -> Motion:
         return Motion(label=label, time=replayed.result.time, displacement=displacement[:, b], role=role)
 
-    contact, draws = fall.contacts[b], _enough(replayed.draws)
+    contact, draws = known(evidence.contacts)[b], _enough(replayed.draws)
     seen = deepest(measured, contact.start, contact.end, 0.0)
     values = published_values(bearing.name, found)
     values["friction.static"] = static_friction(
         float(bearing.friction.static) / float(bearing.friction.dynamic), values["friction.dynamic"]
     )
     values["equivalent_stiffness_N_per_m"] = equivalent_stiffness(
-        bearing, float(fall.model.load_shares[b]), values["support.stiffness_N_per_m"]
+        bearing, float(evidence.model.load_shares[b]), values["support.stiffness_N_per_m"]
     )
     means = {
         name: _mean(simulated.values[name], None if draws is None else sample(draws)[:, b], model)
@@ -224,7 +225,7 @@ def _friction(bearing: TouchdownBearing, sweep: FrictionSweep | None) -> Identif
 
 
 def steps_document(
-    fall: RecordedFall,
+    evidence: Evidence,
     gap: IdentifiedGap,
     support: SupportFit | None,
     friction: FrictionSweep | None,
@@ -234,15 +235,15 @@ def steps_document(
 ) -> dict[str, Any]:
     """Initial state, speed law, settled rest and search of a replay, ready for the published document."""
     return {
-        "speed": _speed(fall, end_speed),
-        "initial_state": _initial(fall, names),
+        "speed": _speed(evidence, end_speed),
+        "initial_state": _initial(evidence, names),
         "identification": _identification(support, friction, draws),
         "settled": {name: _settled(gap, b) for b, name in enumerate(names)},
     }
 
 
-def _speed(fall: RecordedFall, end_speed: float) -> dict[str, Any]:
-    fit = fall.speed
+def _speed(evidence: Evidence, end_speed: float) -> dict[str, Any]:
+    fit = evidence.speed
     known = np.isfinite(fit.aero_time_constant.value)
     profile = fit.profile_time_constant
     return {
@@ -265,8 +266,13 @@ def _settled(gap: IdentifiedGap, b: int) -> dict[str, float]:
     }
 
 
-def _initial(fall: RecordedFall, names: tuple[str, ...]) -> dict[str, Any]:
-    initial, expanded = fall.initial, fall.expanded
+def _initial(evidence: Evidence, names: tuple[str, ...]) -> dict[str, Any]:
+    initial = known(evidence.fall)
+    along = initial.deviation_of(evidence.record) + initial.settled
+    # The paper's start, beside ours: two rigid modes from the samples around power-off.
+    expanded = expand_initial_state(
+        evidence.record.time, along, initial.drop_instant, evidence.model, initial.sensing
+    )
 
     def by_bearing(values: Any) -> dict[str, list[float]]:
         return {name: [float(v) for v in values[b]] for b, name in enumerate(names)}

@@ -10,16 +10,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.errors import IdentificationError, RecordError
+from rotordrop.errors import IdentificationError
 from rotordrop.estimation.tracked_parameters import UNSURE_GAP
-from rotordrop.identification.air_gap import STANDSTILL
-from rotordrop.identification.evidence import Evidence, read_evidence
-from rotordrop.identification.first_reach import reach_at_first_contact
+from rotordrop.identification.evidence import Evidence, Missing
 from rotordrop.machine import Machine
-from rotordrop.measurement.axes import sees_both_directions, sensor_polarity
-from rotordrop.measurement.events import DropInstant
-from rotordrop.measurement.power_off import PowerOff
-from rotordrop.measurement.record import Record
+from rotordrop.measurement.axes import sees_both_directions
 from rotordrop.model.contact_band import reduction_for_contact
 from rotordrop.model.parameters import DropModel, build_drop_model
 from rotordrop.model.reduction import Reduction
@@ -64,28 +59,6 @@ NOISE_FACTORS = (0.5, 1.0, 2.0, 4.0, 8.0)
 NOISE_WINDOW = 0.06
 """Part of the drop on which the size of the unknown impulses is judged [s]."""
 
-LONG_RECORD, TAIL_SPAN = 20.0, 2.0
-"""Length of a record that may hold its own settled tail, and of that tail [s]."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Preparation:
-    """A record made ready: power-off found, tail averaged."""
-
-    name: str
-    evidence: Evidence
-    tail_level: Array | None
-
-    @property
-    def record(self) -> Record:
-        """The recording."""
-        return self.evidence.record
-
-    @property
-    def instant(self) -> DropInstant | PowerOff:
-        """Power-off in record time."""
-        return self.evidence.power_off
-
 
 @dataclass(frozen=True, kw_only=True)
 class TrackedDrop:
@@ -93,8 +66,8 @@ class TrackedDrop:
 
     Attributes
     ----------
-    prepared : Preparation
-        The record made ready.
+    evidence : Evidence
+        What the record says beside the contacts.
     problem, smoothed : DropProblem, Smoothed
         The estimation problem and its smoothed estimate; hundreds of megabytes.
     forces : ForceHistory
@@ -107,7 +80,7 @@ class TrackedDrop:
         Number of drops that were fitted together.
     """
 
-    prepared: Preparation
+    evidence: Evidence
     problem: DropProblem
     smoothed: Smoothed
     forces: ForceHistory
@@ -126,59 +99,17 @@ class TrackedDrop:
         return all(check.passed for check in self.checks if check.name == DIRECTIONS)
 
 
-def prepare(
-    machine: Machine,
-    record: Record,
-    tail: Record | None,
-    name: str,
-    instant: DropInstant | PowerOff | None = None,
-) -> Preparation:
-    """Find power-off and average the settled tail of a record."""
-    tail = settled_tail(record, tail)
-    if record.speed_readings is None:
-        raise IdentificationError(
-            f"the record {name} has no rotor speed; expected one. Map it with a profile."
-        )
-    model = build_drop_model(machine, COARSE_BASIS)
-    polarity = sensor_polarity(record.sensors)
-    return Preparation(
-        name=name,
-        evidence=read_evidence(model, record, power_off=instant),
-        tail_level=None if tail is None else np.asarray(tail.signals).mean(axis=0) * polarity,
-    )
-
-
-def settled_tail(record: Record, tail: Record | None) -> Record | None:
-    """The tail given, or the last seconds of a record until standstill; None where there is neither."""
-    if tail is not None or record.duration < LONG_RECORD or record.measured_speed is None:
-        return tail
-    last = _last_seconds(record, TAIL_SPAN)
-    assert last.speed is not None
-    return last if np.nanmax(np.abs(last.speed)) < STANDSTILL else None
-
-
-def _last_seconds(record: Record, span: float) -> Record:
-    keep = record.time >= record.time[-1] - span
-    return replace(
-        record,
-        time=record.time[keep],
-        signals=record.signals[keep],
-        speed=None if record.speed is None else record.speed[keep],
-    )
-
-
-def drop_problem(model: DropModel, prepared: Preparation, until: float = WINDOW) -> DropProblem:
-    """Estimation problem of a prepared record; without a tail the gaps start where the first forces act."""
-    problem = build_problem(model, recorded_drop(prepared, until), until=until)
-    if prepared.tail_level is None:
-        _start_gaps(problem, prepared)
+def drop_problem(model: DropModel, evidence: Evidence, until: float = WINDOW) -> DropProblem:
+    """Estimation problem of a record; without a tail the gaps start where the first forces act."""
+    problem = build_problem(model, recorded_drop(evidence, until), until=until)
+    if isinstance(evidence.settled_level, Missing):
+        _start_gaps(problem, evidence)
     return problem
 
 
-def recorded_drop(prepared: Preparation, until: float = WINDOW) -> RecordedDrop:
+def recorded_drop(evidence: Evidence, until: float = WINDOW) -> RecordedDrop:
     """What the record says, as the filter takes it."""
-    evidence = prepared.evidence
-    readings = evidence.readings(until)
+    readings, level = evidence.readings(until), evidence.settled_level
     return RecordedDrop(
         time=evidence.time[: len(readings)],
         readings=readings,
@@ -186,28 +117,21 @@ def recorded_drop(prepared: Preparation, until: float = WINDOW) -> RecordedDrop:
         initial_speed=evidence.speed.initial,
         initial_speed_error=evidence.speed.initial_error,
         speed=evidence.measured_speed(until),
-        tail_level=prepared.tail_level,
+        tail_level=None if isinstance(level, Missing) else level,
     )
 
 
-def _start_gaps(problem: DropProblem, prepared: Preparation) -> None:
+def _start_gaps(problem: DropProblem, evidence: Evidence) -> None:
     """Let unsure air gaps begin at the reach of the first contact; their prior uncertainty stays.
 
     From a gap that is tens of micrometres off, the first impacts come at the wrong time and the filter may
-    settle at a wrong machine.
+    settle at a wrong machine. Where no first force shows, the value of the machine file has to do.
     """
-    gaps = [
-        problem.n_dynamic + [u.path for u in problem.unknowns].index(f"{name}.air_gap")
-        for name in problem.model.bearing_names
-    ]
+    if isinstance(evidence.reach, Missing):
+        return
+    gaps = problem.gap_entries
     unsure = problem.covariance[gaps, gaps] > UNSURE_GAP**2
-    if not unsure.any() or not isinstance(prepared.instant, DropInstant):
-        return
-    try:
-        reached = reach_at_first_contact(prepared.record, problem.model, prepared.instant)
-    except (IdentificationError, RecordError):  # too few sensors for it: the prior has to do
-        return
-    for entry, found, moved in zip(gaps, reached, unsure & np.isfinite(reached), strict=True):
+    for entry, found, moved in zip(gaps, evidence.reach, unsure & np.isfinite(evidence.reach), strict=True):
         if moved:
             problem.mean[entry] = problem.start[entry] = found
 
@@ -223,7 +147,7 @@ def is_calibrated(machine: Machine) -> bool:
 
 def track_drops(
     machine: Machine,
-    prepared: Sequence[Preparation],
+    evidence: Sequence[Evidence],
     *,
     quick: bool = False,
     calibrate_only: bool = False,
@@ -235,21 +159,21 @@ def track_drops(
     calibrated machine needs the finer one only (with ``quick``, a single pass of it).
     """
     until = BLIND_SCHEDULE[-1].until + 0.01 if calibrate_only else WINDOW
-    prepared = _tail_first(prepared)
+    evidence = _tail_first(evidence)
     fine_model = build_drop_model(machine, _basis(machine, FINE_BASIS, FINE_REACH))
-    fine = [drop_problem(fine_model, item, until) for item in prepared]
+    fine = [drop_problem(fine_model, item, until) for item in evidence]
     if is_calibrated(machine) and not calibrate_only:
         schedule = QUICK_SCHEDULE if quick else CALIBRATED_SCHEDULE
-        return _not_lost(track(fine, schedule, progress=progress), prepared)
+        return _not_lost(track(fine, schedule, progress=progress), evidence)
     coarse_model = build_drop_model(_seen_at_the_ends(machine), _basis(machine, COARSE_BASIS, COARSE_REACH))
-    coarse = [drop_problem(coarse_model, _with_sensors_of(coarse_model, item), until) for item in prepared]
-    contact = max(_first_contact(item) for item in prepared)
+    coarse = [drop_problem(coarse_model, _with_sensors_of(coarse_model, item), until) for item in evidence]
+    contact = max(_first_contact(item) for item in evidence)
     first = _from_guesses(coarse, contact, progress)
     references = [
         transferred(one, two, drop.means) for one, two, drop in zip(coarse, fine, first.smoothed, strict=True)
     ]
     schedule = shifted(CALIBRATION_SCHEDULE if calibrate_only else FINE_SCHEDULE, contact)
-    return _not_lost(track(fine, schedule, references=references, progress=progress), prepared)
+    return _not_lost(track(fine, schedule, references=references, progress=progress), evidence)
 
 
 def _basis(machine: Machine, least: Reduction, reach: float) -> Reduction:
@@ -275,19 +199,11 @@ def _seen_at_the_ends(machine: Machine) -> Machine:
     return machine.model_copy(update={"sensors": tuple(s for s in machine.sensors if s.node in ends)})
 
 
-def _with_sensors_of(model: DropModel, prepared: Preparation) -> Preparation:
-    """A prepared record with the channels of a model's sensors."""
-    sensors, record = model.machine.sensors, prepared.record
-    if len(sensors) == len(record.sensors):
-        return prepared
-    names = [sensor.name for sensor in sensors]
-    columns = [c for c, sensor in enumerate(record.sensors) if sensor.name in names]
-    tail = prepared.tail_level
-    return replace(
-        prepared,
-        evidence=prepared.evidence.of_channels(columns),
-        tail_level=None if tail is None else tail[columns],
-    )
+def _with_sensors_of(model: DropModel, evidence: Evidence) -> Evidence:
+    """The evidence with the channels of a model's sensors."""
+    names = [sensor.name for sensor in model.machine.sensors]
+    columns = [c for c, sensor in enumerate(evidence.record.sensors) if sensor.name in names]
+    return evidence if len(columns) == len(evidence.record.sensors) else evidence.of_channels(columns)
 
 
 def _from_guesses(coarse: Sequence[DropProblem], contact: float, progress: Progress | None) -> TrackedDrops:
@@ -299,16 +215,18 @@ def _from_guesses(coarse: Sequence[DropProblem], contact: float, progress: Progr
     return min(found, again, key=lambda fit: (any(fit.diverged), max(fit.noise_factors), max(fit.nis)))
 
 
-def _tail_first(prepared: Sequence[Preparation]) -> list[Preparation]:
+def _tail_first(evidence: Sequence[Evidence]) -> list[Evidence]:
     """The drops with a known tail on the first of them, from which the machine is handed on to the others."""
-    known = next((item.tail_level for item in prepared if item.tail_level is not None), None)
-    first = prepared[0] if prepared[0].tail_level is not None else replace(prepared[0], tail_level=known)
-    return [first, *prepared[1:]]
+    first, *others = evidence
+    levels = [item.settled_level for item in evidence if not isinstance(item.settled_level, Missing)]
+    if levels and isinstance(first.settled_level, Missing):
+        first = replace(first, settled_level=levels[0])
+    return [first, *others]
 
 
-def _not_lost(tracked: TrackedDrops, prepared: Sequence[Preparation]) -> TrackedDrops:
+def _not_lost(tracked: TrackedDrops, evidence: Sequence[Evidence]) -> TrackedDrops:
     """The drops, if the filter followed all of them to the end: a part of a drop says nothing of its peak."""
-    for item, problem, smoothed in zip(prepared, tracked.problems, tracked.smoothed, strict=True):
+    for item, problem, smoothed in zip(evidence, tracked.problems, tracked.smoothed, strict=True):
         done, samples = smoothed.filtered.done, len(smoothed.filtered.means)
         if done < samples:
             raise IdentificationError(
@@ -320,8 +238,8 @@ def _not_lost(tracked: TrackedDrops, prepared: Sequence[Preparation]) -> Tracked
     return tracked
 
 
-def _first_contact(item: Preparation) -> float:
-    return max(item.instant.contact - item.instant.value, 0.002)
+def _first_contact(item: Evidence) -> float:
+    return max(item.power_off.contact - item.power_off.value, 0.002)
 
 
 def best_noise_factor(problem: DropProblem, smoothed: Smoothed, stage: Stage) -> float:
@@ -352,11 +270,11 @@ def best_noise_factor(problem: DropProblem, smoothed: Smoothed, stage: Stage) ->
 
 
 def tracked_drop(
-    prepared: Preparation, problem: DropProblem, smoothed: Smoothed, noise_factor: float, drops: int = 1
+    evidence: Evidence, problem: DropProblem, smoothed: Smoothed, noise_factor: float, drops: int = 1
 ) -> TrackedDrop:
     """Forces and checks of one smoothed drop."""
     return TrackedDrop(
-        prepared=prepared,
+        evidence=evidence,
         problem=problem,
         smoothed=smoothed,
         forces=force_history(problem, smoothed),
@@ -368,7 +286,7 @@ def tracked_drop(
 
 def followed_drops(
     machine: Machine,
-    prepared: Sequence[Preparation],
+    evidence: Sequence[Evidence],
     *,
     quick: bool = False,
     progress: Progress | None = None,
@@ -377,9 +295,9 @@ def followed_drops(
 
     Each is given away with its arrays, so that no more than one is kept when its result has been made.
     """
-    tracked = track_drops(machine, prepared, quick=quick, progress=progress)
-    count = len(prepared)
-    waiting = list(zip(prepared, tracked.problems, tracked.smoothed, tracked.noise_factors, strict=True))
+    tracked = track_drops(machine, evidence, quick=quick, progress=progress)
+    count = len(evidence)
+    waiting = list(zip(evidence, tracked.problems, tracked.smoothed, tracked.noise_factors, strict=True))
     del tracked
     while waiting:
         item, problem, smoothed, needed = waiting.pop(0)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError
 from rotordrop.estimated import IdentifiedValue
+from rotordrop.estimation.assumptions import twin_assumptions
 from rotordrop.estimation.bearing_drop import BearingDrop
 from rotordrop.estimation.estimate import (
     CrossCheck,
@@ -89,16 +90,16 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
         its numbers have no limit then.
     """
     drop, check = _cross_checked(drop, method)
-    problem, prepared = drop.problem, drop.prepared
+    problem, evidence = drop.problem, drop.evidence
     judged = _judge(drop, check)
     later = _later(drop, judged)
     quick = (QUICK.format("" if judged.check else "without the independent cross-check and "),)
     return Estimate(
-        name=prepared.name,
+        name=evidence.name,
         method=method,
         machine=problem.model.machine,
-        record=prepared.record,
-        drop_instant=prepared.instant,
+        record=evidence.record,
+        drop_instant=evidence.power_off,
         speed=float(problem.mean[problem.model.layout.rotor_speed]),
         until=float(problem.time[-1]),
         verdict=judged.verdict,
@@ -113,9 +114,13 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
         later=later,
         findings=facts.findings,
         warnings=facts.warnings_with(
-            *prepared.instant.notes, *(one.sentence() for one in later if one.larger)
+            *evidence.power_off.notes, *(one.sentence() for one in later if one.larger)
         ),
-        notes=(*(check.note for check in drop.checks if check.note), *(quick if method.quick else ())),
+        notes=(
+            *twin_assumptions(evidence, problem),
+            *(check.note for check in drop.checks if check.note),
+            *(quick if method.quick else ()),
+        ),
         simulated_record=facts.simulated,
     )
 
@@ -175,7 +180,7 @@ def _refuse_unchecked(drop: TrackedDrop) -> None:
     if len(failed) == 1:  # the directions themselves: the model fits what is seen
         return
     raise IdentificationError(
-        f"the model does not fit the record {drop.prepared.name} "
+        f"the model does not fit the record {drop.evidence.name} "
         f"({'; '.join(check.message for check in failed)}), and "
         "nothing can check its force; expected a model that fits, or both directions in two planes. "
         "Calibrate on drops with all sensors, estimate without --quick, or leave this drop out."
@@ -240,7 +245,7 @@ def _measured(drop: TrackedDrop, judged: _Judgement, readings: Array) -> Array:
 
 
 def _later(drop: TrackedDrop, judged: _Judgement) -> tuple[LaterMotion, ...]:
-    evidence = drop.prepared.evidence
+    evidence = drop.evidence
     return later_motion(
         drop.problem.model.bearing_names,
         evidence.time,

@@ -20,11 +20,8 @@ from rotordrop.model.static_sag import StaticSag, sag_of_model
 
 Array = NDArray[np.float64]
 
-STANDSTILL = 2.0 * np.pi * 0.5
-"""Shaft speed below which the rotor counts as standing still [rad/s]."""
-
-SHORTEST_TAIL = 0.5
-"""Length of settled record needed at least [s]."""
+SHORTEST_TAIL = 0.2
+"""Length of settled record needed at least [s]: some five swings."""
 
 BLOCK = 0.5
 """Length of the blocks whose means give the lower and upper limit [s]: some fifteen swings."""
@@ -111,23 +108,20 @@ class AirGap:
         return np.asarray(np.sqrt(self.zero_sigma**2 + self.gain_sigma**2 + self.rest.standard_error**2))
 
 
-def find_rest(record: Record, tail: Record | None, sensing: Sensing) -> SettledRest:
-    """Where the rotor rests: from a record of the tail, or from the standstill at the end of the record.
+def find_rest(still: Record, sensing: Sensing) -> SettledRest:
+    """Where the rotor rests in a record of standstill alone.
 
     Raises
     ------
     IdentificationError
-        If neither holds a rotor at rest.
+        If the rotor is not at rest in it, or it is too short.
     """
-    source = record if tail is None else tail
-    keep = _settled_samples(record) if tail is None else np.ones(len(tail.time), dtype=np.bool_)
-    time, along = source.time[keep], displacements_along(source)[keep]
-    if time[-1] - time[0] < 0.9 * SHORTEST_TAIL:
+    if still.duration < 0.9 * SHORTEST_TAIL:
         raise IdentificationError(
-            f"{source.name}: {time[-1] - time[0]:.3g} s of settled rotor; at least {SHORTEST_TAIL:g} s are "
+            f"{still.name}: {still.duration:.3g} s of settled rotor; at least {SHORTEST_TAIL:g} s are "
             "needed for the air gap. Record longer after standstill."
         )
-    return _rest(source.name, time, along, sensing)
+    return _rest(still.name, still.time, displacements_along(still), sensing)
 
 
 def rest_at_end(record: Record, sensing: Sensing) -> SettledRest:
@@ -148,29 +142,6 @@ def rest_at_end(record: Record, sensing: Sensing) -> SettledRest:
             f"centre scatters by {_microns(rest.spread)} µm; expected less than {MOST_SPREAD:.0%} of it"
         )
     return rest
-
-
-def _settled_samples(record: Record) -> NDArray[np.bool_]:
-    """Samples after the shaft came to rest, for good."""
-    if record.speed is None or record.speed_by_hand:
-        raise IdentificationError(
-            f"{record.name} has no measured shaft speed, so it cannot be seen where the rotor stands still. "
-            "Give the settled tail as a record of its own (--tail)."
-        )
-    turning = np.flatnonzero(np.abs(record.speed) > STANDSTILL)
-    first = int(turning[-1]) + 1 if len(turning) else 0
-    rest = record.time[-1] - record.time[first] if first < len(record.time) else 0.0
-    if rest < SHORTEST_TAIL:
-        last_speed = float(record.speed[-1]) / (2.0 * np.pi)
-        raise IdentificationError(
-            f"{record.name} ends at {record.time[-1]:.4g} s with the shaft turning at {last_speed:.4g} Hz, "
-            "before the "
-            f"rotor has settled; the air gap needs {SHORTEST_TAIL:g} s of standstill. Record until "
-            "standstill, or give the settled tail as a record of its own (--tail)."
-        )
-    keep = np.zeros(len(record.time), dtype=np.bool_)
-    keep[first:] = True
-    return keep
 
 
 def _rest(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,35 +11,40 @@ from numpy.typing import NDArray
 from rotordrop.identification.free_fall import FreeFall, sagging_amplitudes
 from rotordrop.identification.sensing import Sensing
 from rotordrop.machine import Machine
+from rotordrop.measurement.fall import REMANENT_SHARE, REMANENT_TIME
 from rotordrop.model.parameters import DropModel
+from rotordrop.model.unknowns import smallest_gap
 
 Array = NDArray[np.float64]
 
 BENDING_MODES = 3
-BENDING_SIGMA = 0.3e-6
-"""Free bending of the rotor at power-off beside sag and orbit, at the sensors [m]."""
+BENDING_SIGMA = 1.1e-3
+"""Free bending of the rotor at power-off beside sag and orbit, at the sensors, over the air gap [1]."""
 
-HIGHER_SIGMA = 0.02e-6
-"""The same for modes beyond the third bending mode [m]."""
+HIGHER_SIGMA = 7e-5
+"""The same for modes beyond the third bending mode [1]."""
 
-POSITION_SIGMA = 100e-6
-VELOCITY_SIGMA = 0.05
+POSITION_SIGMA = 0.36
+"""How far off the centre a rotor levitates, over the air gap [1]: a magnet need not hold it in the middle."""
+
+VELOCITY_SIGMA = 0.7
+"""Velocity at power-off over that of a free fall through the air gap [1]."""
+
 RUNOUT_SIGMA = 0.3e-6
-REMANENT_SHARE = (0.15, 0.2)
-"""Remanent lift over static lift: expected, and its standard deviation [1]."""
+"""Runout of a sensor track at 1X [m], a quality of its surface whatever the size of the machine."""
 
 SIDEWAYS_SHARE = 0.05
-REMANENT_TIME = (2e-3, 0.4)
-"""Time constant of the remanent force: expected [s], and the standard deviation of its logarithm."""
+"""Sideways remanent force over static lift, standard deviation [1]."""
 
-TURNING_FORCE_SIGMA = 300.0
-"""Synchronous force of a magnetic bearing [N]."""
+TURNING_FORCE_SIGMA = 0.5
+"""Synchronous force of a magnetic bearing over the weight of the rotor [1]."""
 
 ORBIT_SIGMA = 0.15e-6
 """Error of the orbit before the drop, carried on to power-off [m]."""
 
-SIDEWAYS_REST_SIGMA = 1.5e-6
-"""How far beside the lowest point the resting rotor may lie [m]."""
+SIDEWAYS_REST_SIGMA = 5e-3
+"""How far beside the lowest point the resting rotor may lie, over the air gap [1]: a race turns on its balls
+before the shaft slides in it, and the starting friction of a ball bearing holds up this slope."""
 
 ITERATIONS = 8
 
@@ -157,10 +163,12 @@ class FallFit:
         sag = sagging_amplitudes(model)
         mean[m + 2 : 2 * m] = sag[2:]
         mean[fall.one], sigma[fall.one] = 1.0, 1e-9
-        position, velocity = _modal_sigmas(model, self.sensing.rows, fall.speed)
+        gap = smallest_gap(model.machine)
+        position, velocity = _modal_sigmas(model, self.sensing.rows, fall.speed, gap)
         sigma[fall.displacement] = np.tile(position, 2)
         sigma[fall.velocity] = np.tile(velocity, 2)
-        lift = float(np.sum(model.load_shares)) / max(fall.n_magnets, 1)
+        weight = float(np.sum(model.load_shares))
+        lift = weight / max(fall.n_magnets, 1)
         mean[fall.remanent] = np.tile([0.0, REMANENT_SHARE[0] * lift], fall.n_magnets)
         sigma[fall.remanent] = np.tile([SIDEWAYS_SHARE * lift, REMANENT_SHARE[1] * lift], fall.n_magnets)
         nodes = unbalance_nodes(model.machine)
@@ -169,9 +177,9 @@ class FallFit:
         sigma[u.runout] = RUNOUT_SIGMA
         mean[u.decay], sigma[u.decay] = np.log(REMANENT_TIME[0]), REMANENT_TIME[1]
         sigma[u.shift] = 1e3 * max(instant_error, 1e-6)
-        sigma[u.turning] = TURNING_FORCE_SIGMA
+        sigma[u.turning] = TURNING_FORCE_SIGMA * weight
         zero = np.sqrt(np.sum((self.sensing.to_bearings[:, 1, :] * self.sensing.offset_sigma) ** 2, axis=1))
-        sigma[u.rest] = np.column_stack([np.full(len(zero), SIDEWAYS_REST_SIGMA), zero]).ravel()
+        sigma[u.rest] = np.column_stack([np.full(len(zero), SIDEWAYS_REST_SIGMA * gap), zero]).ravel()
         return mean, sigma
 
     def _prior_root(self, sigma: Array) -> Array:
@@ -281,8 +289,13 @@ class FallFit:
         return np.asarray(self.settled + at_rest @ current[self.unknowns.rest])
 
 
-def _modal_sigmas(model: DropModel, rows: Array, speed: float) -> tuple[Array, Array]:
-    """Prior standard deviations of amplitudes and their velocities, shape (m,), beside sag and orbit."""
+def _modal_sigmas(model: DropModel, rows: Array, speed: float, gap: float) -> tuple[Array, Array]:
+    """Prior standard deviations of amplitudes and their velocities, shape (m,), beside sag and orbit.
+
+    A mode is bounded by what it may move at the sensors and the bearings, wherever it moves most: a mode that
+    hardly shows there could otherwise take up anything. Without the AMB planes the sag is not known, and the
+    bending has room for it.
+    """
     eigenvalues = model.parameters.eigenvalue
     m = len(eigenvalues)
     seen = np.vstack([np.hypot(rows[:, :m], rows[:, m:]), np.abs(model.parameters.bearing_shape)])
@@ -291,8 +304,9 @@ def _modal_sigmas(model: DropModel, rows: Array, speed: float) -> tuple[Array, A
     natural = np.sqrt(np.maximum(eigenvalues, 0.0))
     free = 1.0 if len({amb.node for amb in model.machine.ambs}) >= 2 else 30.0
     low = np.arange(m) < 2 + BENDING_MODES
-    position = np.where(low, free * BENDING_SIGMA, HIGHER_SIGMA) / reach
+    position = np.where(low, free * BENDING_SIGMA, HIGHER_SIGMA) * gap / reach
     velocity = position * np.maximum(abs(speed), np.where(low, 0.3, 0.05) * natural)
     weight = np.sqrt(model.fe.total_mass)
-    position[:2], velocity[:2] = POSITION_SIGMA * weight, VELOCITY_SIGMA * weight
+    falling = math.sqrt(2.0 * gap * float(model.machine.gravity))
+    position[:2], velocity[:2] = POSITION_SIGMA * gap * weight, VELOCITY_SIGMA * falling * weight
     return position, velocity

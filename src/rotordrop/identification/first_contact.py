@@ -13,8 +13,8 @@ from rotordrop.measurement.preprocess import local_polynomial
 
 Array = NDArray[np.float64]
 
-CLEAR = 1.5e-6
-"""How far the rotor must come out of the air gap circle to count as out, against noise [m]."""
+CLEAR = 6e-3
+"""How far the rotor must come out of the air gap circle to count as out, over the gap [1], against noise."""
 
 APPROACH = 1.5e-3
 """Stretch before the contact from which the impact speed is taken [s]."""
@@ -106,16 +106,16 @@ def contact_intervals(time: Array, radius: Array, gap: float) -> Array:
     radius : ndarray, shape (N,)
         Distance of the rotor from the bearing centre [m].
     gap : float
-        Air gap [m]; a contact begins `CLEAR` beyond it and ends as far inside, against noise.
+        Air gap [m]; a contact begins a share `CLEAR` beyond it and ends as far inside, against noise.
     """
     intervals = []
-    k, outside = 0, radius > gap + CLEAR
+    k, outside = 0, radius > (1.0 + CLEAR) * gap
     while k < len(time):
         begins = np.flatnonzero(outside[k:])
         if not len(begins):
             break
         first = k + int(begins[0])
-        back = np.flatnonzero(radius[first:] < gap - CLEAR)
+        back = np.flatnonzero(radius[first:] < (1.0 - CLEAR) * gap)
         if not len(back):
             intervals.append((_crossing(time, radius - gap, first), float(time[-1])))
             break
@@ -128,7 +128,7 @@ def contact_intervals(time: Array, radius: Array, gap: float) -> Array:
 def _first_contact(
     time: Array, radius: Array, gap: float, mass: float, gravity: float, noise: float
 ) -> FirstContact:
-    outside = (radius > gap + CLEAR) & (time > 0.0)
+    outside = (radius > (1.0 + CLEAR) * gap) & (time > 0.0)
     if not outside.any():
         raise IdentificationError(
             f"the rotor comes to {1e6 * float(radius.max()):.4g} µm from the bearing centre at most and "
@@ -136,7 +136,7 @@ def _first_contact(
             f"the air gap of {1e6 * gap:.4g} µm. Check the settled tail and the gain of the sensors."
         )
     first = int(np.argmax(outside))
-    back = np.flatnonzero(radius[first:] < gap - CLEAR)
+    back = np.flatnonzero(radius[first:] < (1.0 - CLEAR) * gap)
     if not len(back):
         raise IdentificationError(
             f"the rotor stays beyond the air gap of {1e6 * gap:.4g} µm from {1e3 * time[first]:.4g} ms to "
@@ -195,12 +195,12 @@ def corrected_stiffness(duration: float, mass: float, speed: float, gravity: flo
     """Stiffness [N/m] from the contact duration with gravity: ``T = (2/ω)(π − atan(ω v0/g))``.
 
     Source: motion of a mass that hits a spring with v0 [m/s] under its weight; tends to eq. (17) of Neisi
-    2020 for ω v0 ≫ g.
+    2020 for ω v0 ≫ g. A mass that is not seen to approach, for noise, counts as laid down (v0 = 0).
     """
     from scipy.optimize import brentq
 
     def excess(omega: float) -> float:
-        return (2.0 / omega) * (math.pi - math.atan(omega * speed / gravity)) - duration
+        return (2.0 / omega) * (math.pi - math.atan(omega * max(speed, 0.0) / gravity)) - duration
 
     omega = brentq(excess, 0.9 * math.pi / duration, 2.1 * math.pi / duration)
     return float(mass * omega**2)

@@ -194,16 +194,18 @@ def _jacobian(
     problem: Misfit, point: Point, window: float, chosen: NDArray[np.bool_], pool: Executor | None
 ) -> Array:
     def column(k: int) -> Array:
-        x = point.x.copy()
-        step = problem.step[k]
-        if x[k] + step > problem.bounds[1][k]:
-            step = -step
-        x[k] += step
+        inward = -1.0 if point.x[k] + problem.step[k] > problem.bounds[1][k] else 1.0
         try:
-            moved = problem.residual(x, window)
+            return slope(k, inward * problem.step[k])
         except IdentificationError:
-            return np.zeros_like(point.residual)
-        return np.asarray((moved - point.residual) / step)
+            # A simulation that does not get through says nothing of this unknown; a zero column would say
+            # that it has no effect, and leave it at its prior with the error of one that was fitted.
+            return slope(k, -inward * problem.step[k])
+
+    def slope(k: int, step: float) -> Array:
+        x = point.x.copy()
+        x[k] += step
+        return np.asarray((problem.residual(x, window) - point.residual) / step)
 
     if point.cost >= WORST:
         return np.zeros((1, len(point.x)))

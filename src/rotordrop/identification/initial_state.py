@@ -9,28 +9,33 @@ it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError
-from rotordrop.identification.air_gap import SettledRest
-from rotordrop.identification.evidence import Evidence
+from rotordrop.estimated import NINETY
+from rotordrop.identification.air_gap import AirGap, SettledRest
 from rotordrop.identification.fall_fit import FallFit, FallReadings, Unknowns, unbalance_nodes
 from rotordrop.identification.free_fall import FreeFall, build_free_fall
 from rotordrop.identification.sensing import Sensing, displacements_along
 from rotordrop.machine.sensor import Sensor
 from rotordrop.measurement.axes import along_sensors
+from rotordrop.measurement.events import DropInstant
 from rotordrop.measurement.levitated import LevitatedModel
 from rotordrop.measurement.record import Record
 from rotordrop.measurement.speed import RotorAngle
-from rotordrop.model.parameters import DropModel
+
+if TYPE_CHECKING:
+    from rotordrop.identification.evidence import Evidence
 
 Array = NDArray[np.float64]
 
-CLEARANCE_KEPT = 8e-6
-"""The fall ends when the rotor has come this close to the air gap [m]."""
+CLEARANCE_KEPT = 0.03
+"""The fall ends when the rotor has come this close to the air gap, over the gap [1]: a zero of the sensors
+that is off looks like another gap."""
 
 FEWEST_SAMPLES = 12
 
@@ -125,6 +130,17 @@ class InitialState:
         """Displacements along the sensors from rest, hum and 2X runout taken off [m], shape (N, S)."""
         return deviations(record, self.rest_along, self.levitated, self.angle)
 
+    def refined(self, instant: DropInstant) -> DropInstant:
+        """Power-off as this fit leaves it."""
+        error = self.drop_instant_error
+        return replace(
+            instant,
+            value=self.drop_instant,
+            standard_error=error,
+            interval_90=(self.drop_instant - NINETY * error, self.drop_instant + NINETY * error),
+            method=f"{instant.method}; refined by the fit of the initial state",
+        )
+
     def square_root(self) -> Array:
         """Matrix L with L Lᵀ the covariance, shape (n, n); a draw is ``mean + L @ standard_normal``."""
         return covariance_root(self.covariance)
@@ -160,7 +176,7 @@ def end_of_fall(time: Array, place: Array, gaps: Array) -> float:
         Air gaps [m].
     """
     radius = np.hypot(place[..., 0], place[..., 1])
-    near = np.any(radius > gaps - CLEARANCE_KEPT, axis=1) & (time > 0.0)
+    near = np.any(radius > (1.0 - CLEARANCE_KEPT) * gaps, axis=1) & (time > 0.0)
     if not near.any():
         raise IdentificationError(
             f"the rotor comes within {1e6 * float(np.min(gaps - radius.max(axis=0))):.0f} µm of the air gap "
@@ -170,21 +186,19 @@ def end_of_fall(time: Array, place: Array, gaps: Array) -> float:
     return float(time[int(np.argmax(near)) - 1])
 
 
-def fit_initial_state(
-    evidence: Evidence, rest: SettledRest, gaps: Array, model: DropModel, sensing: Sensing
-) -> InitialState:
+def fit_initial_state(evidence: Evidence, gap: AirGap, sensing: Sensing) -> InitialState:
     """Initial state by a fit over the fall, with covariance.
 
     Parameters
     ----------
     evidence : Evidence
-        Readings from before power-off to the first contact at least, power-off and the levitated motion.
-    rest : SettledRest
-        Rest position; displacements count from it, so that zero errors of the sensors drop out.
-    gaps : ndarray, shape (B,)
-        Air gaps [m], to see where the fall ends.
-    model, sensing
-        The rotor and what the sensors see of it.
+        Readings from before power-off to the first contact at least, power-off, the levitated motion, and the
+        model of the rotor.
+    gap : AirGap
+        Air gaps, to see where the fall ends, and the rest position, from which displacements count, so that
+        zero errors of the sensors drop out.
+    sensing : Sensing
+        What the sensors see of the rotor.
 
     Raises
     ------
@@ -197,29 +211,22 @@ def fit_initial_state(
     Source: own method after Neisi 2020, section 3.1. Differs from the paper: the paper expands the state at
     one instant in the rigid modes.
     """
-    record, levitated = evidence.record, evidence.levitated
+    record, levitated, model, rest = evidence.record, evidence.levitated, evidence.model, gap.rest
     if levitated is None:
         raise IdentificationError(
             f"{record.name} begins with the fall; expected the levitated rotor before it. Record with "
             "pre-trigger."
         )
-    time = evidence.time
-    along = displacements_along(record)
-    shifted = along - rest.along + settled_along(rest, sensing)
-    end = end_of_fall(time, sensing.at_bearings(shifted), gaps)
-    inside = (time > 0.0) & (time <= end)
-    if int(inside.sum()) < FEWEST_SAMPLES:
-        raise IdentificationError(
-            f"{record.name}: {int(inside.sum())} samples between power-off and the first contact at "
-            f"{1e3 * end:.3g} ms; at "
-            f"least {FEWEST_SAMPLES} are needed for the initial state. Sample faster, or check the air gap."
-        )
+    settled = settled_along(rest, sensing)
+    shifted = displacements_along(record) - rest.along + settled
+    end = end_of_fall(evidence.time, sensing.at_bearings(shifted), gap.value)
+    inside = (evidence.time > 0.0) & (evidence.time <= end)
+    _check_samples(record, inside, end)
     fall = build_free_fall(model, evidence.speed.initial, unbalance_nodes(model.machine))
     readings = _fall_readings(evidence, levitated, rest, inside)
-    known_to = evidence.power_off.standard_error
-    problem = FallFit(fall, sensing, readings, settled_along(rest, sensing), model, known_to)
+    problem = FallFit(fall, sensing, readings, settled, model, evidence.power_off.standard_error)
     mean, covariance, misfit = problem.solve()
-    shift = 1e-3 * mean[problem.unknowns.shift]
+    shift = problem.unknowns.shift
     return InitialState(
         fall=fall,
         sensing=sensing,
@@ -230,30 +237,35 @@ def fit_initial_state(
         unknowns=problem.unknowns,
         mean=mean,
         covariance=covariance * max(misfit, 1.0),
-        settled=problem.settled,
-        drop_instant=evidence.power_off.value + float(shift),
-        drop_instant_error=float(1e-3 * np.sqrt(covariance[problem.unknowns.shift, problem.unknowns.shift])),
-        end=end - float(shift),
+        settled=settled,
+        drop_instant=evidence.power_off.value + 1e-3 * float(mean[shift]),
+        drop_instant_error=float(1e-3 * np.sqrt(covariance[shift, shift])),
+        end=end - 1e-3 * float(mean[shift]),
         noise=readings.noise,
         misfit=misfit,
         samples=int(inside.sum()),
-        notes=_notes(model, misfit),
+        notes=_notes(misfit),
     )
 
 
-def _notes(model: DropModel, misfit: float) -> tuple[str, ...]:
-    notes = []
-    if len({amb.node for amb in model.machine.ambs}) < 2:
-        notes.append(
-            "the AMB planes are not given: the gravity sag of the levitated rotor, which moves first peaks "
-            "by several percent, could not be computed"
+def _check_samples(record: Record, inside: NDArray[np.bool_], end: float) -> None:
+    if int(inside.sum()) < FEWEST_SAMPLES:
+        raise IdentificationError(
+            f"{record.name}: {int(inside.sum())} samples between power-off and the first contact at "
+            f"{1e3 * end:.3g} ms; at "
+            f"least {FEWEST_SAMPLES} are needed for the initial state. Sample faster, or check the air gap."
         )
-    if misfit > 2.0:
-        notes.append(
-            f"the fall deviates from a free rotor by {misfit**0.5:.1f} times the sensor noise; expected "
-            "about 1. Check nodes and angles of the sensors"
-        )
-    return tuple(notes)
+    if not np.isfinite(record.signals[inside]).all():
+        raise IdentificationError(f"{record.name}: readings are missing between power-off and first contact")
+
+
+def _notes(misfit: float) -> tuple[str, ...]:
+    if misfit <= 2.0:
+        return ()
+    return (
+        f"the fall deviates from a free rotor by {misfit**0.5:.1f} times the sensor noise; expected about 1. "
+        "Check nodes and angles of the sensors",
+    )
 
 
 def deviations(record: Record, rest: Array, levitated: LevitatedModel, angle: RotorAngle) -> Array:

@@ -8,12 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError
-from rotordrop.identification.air_gap import SettledRest
+from rotordrop.identification.evidence import Evidence, known
 from rotordrop.identification.free_fall import MAGNET_FORCES, FreeFall, build_free_fall, kernel_state
 from rotordrop.identification.initial_state import InitialState
 from rotordrop.identification.parameter_vector import ParameterVector, with_bearing
 from rotordrop.identification.sensing import Sensing, build_sensing
-from rotordrop.measurement.record import Record
 from rotordrop.model import layout as L
 from rotordrop.model.layout import KernelParameters
 from rotordrop.model.parameters import DropModel
@@ -165,36 +164,35 @@ class Replica:
         return state, unbalance
 
 
-def build_replica(
-    record: Record, rest: SettledRest, initial: InitialState, model: DropModel, *, until: float
-) -> Replica:
+def build_replica(evidence: Evidence, model: DropModel, *, until: float) -> Replica:
     """Make a recorded drop ready to be run again and again.
 
     Parameters
     ----------
-    record, rest, initial
-        The record, its rest position and its initial state.
+    evidence : Evidence
+        The record, its initial state and its rest.
     model : DropModel
         The model to run; may be of a coarser reduction than that of the initial state.
     until : float
         Last time that will be compared [s from power-off].
     """
+    initial, radius = known(evidence.fall), known(evidence.rest).radius
     own = initial if model.basis is initial.fall.model.basis else transferred(initial, model)
     start = max(initial.end - LEAD, 0.0)
     fall = own.fall
     state, remanent, unbalance = kernel_state(fall, own.state_at(start), fall.speed * start)
-    time = record.time - initial.drop_instant
+    time = evidence.record.time - initial.drop_instant
     keep = (time > start + 1e-9) & (time <= until)
     return Replica(
         model=replace(model, parameters=drop_parameters(model, own, remanent, unbalance)),
         sensing=own.sensing,
         initial=own,
-        radius=rest.radius,
+        radius=radius,
         race_sag=sag_of_model(model).race,
         start=start,
         state=state,
         time=time[keep],
-        deviation=own.deviation_of(record)[keep],
+        deviation=own.deviation_of(evidence.record)[keep],
         noise=own.noise,
         scale=error_scale(model),
     )

@@ -25,11 +25,12 @@ if TYPE_CHECKING:
 _KNOTS = 1e-4
 """Spacing of the knots between which a force runs straight [s]."""
 
-_BEND = 300.0
-"""Standard deviation of the change of slope at a knot [N per knot], about a half sine of 4 kN in 1 ms."""
+_BEND = 0.5
+"""Standard deviation of the change of slope at a knot over the weight of the rotor [1 per knot]: about a half
+sine of seven times the weight in 1 ms."""
 
-_SIZE = 5e3
-"""Standard deviation of a force [N]."""
+_SIZE = 8.5
+"""Standard deviation of a force over the weight of the rotor [1]."""
 
 _LEAST_SHARE = 0.15
 """A contact force counts from this share of the largest, and from three standard errors."""
@@ -129,8 +130,9 @@ def early_forces(record: Record, machine: Machine, drop: DropInstant, *, span: f
         [np.zeros_like(table[:1]), np.cumsum(0.5 * GRID * (table[1:] + table[:-1]), axis=0)]
     )
     columns = _columns(ramp, time, knots, record)
+    weight = rotor.mass * float(machine.gravity)
     force, error = _regularised(
-        columns, deviation, drop.levitated.noise * gain, len(knots), len(rotor.force_rows)
+        columns, deviation, drop.levitated.noise * gain, weight, (len(knots), len(rotor.force_rows))
     )
     names = tuple(bearing.name for bearing in machine.touchdown_bearings)
     return EarlyForces(time=knots, force=force, error=error, bearings=names)
@@ -157,15 +159,20 @@ def _columns(ramp: np.ndarray, time: Array, knots: Array, record: Record) -> Arr
 
 
 def _regularised(
-    columns: Array, deviation: Array, noise: Array, knots: int, bearings: int
+    columns: Array, deviation: Array, noise: Array, weight: float, shape: tuple[int, int]
 ) -> tuple[Array, Array]:
-    """Forces, shape (K, B, 2), with little change of slope, and their standard error, shape (K, B)."""
-    weight = np.tile(1.0 / noise, len(deviation))
-    weighted = columns * weight[:, None]
-    bend = np.diff(np.eye(knots), 2, axis=0) / _BEND
-    prior = np.kron(np.eye(2 * bearings), bend.T @ bend + np.eye(knots) / _SIZE**2)
+    """Forces, shape (K, B, 2), with little change of slope, and their standard error, shape (K, B).
+
+    Two integrations lie between a force and a reading, so fast changes of a force hardly show in it; without
+    a prior on them they would be all noise. The weight [N] of the rotor sets their size.
+    """
+    knots, bearings = shape
+    accuracy = np.tile(1.0 / noise, len(deviation))
+    weighted = columns * accuracy[:, None]
+    bend = np.diff(np.eye(knots), 2, axis=0) / (_BEND * weight)
+    prior = np.kron(np.eye(2 * bearings), bend.T @ bend + np.eye(knots) / (_SIZE * weight) ** 2)
     normal = np.linalg.inv(weighted.T @ weighted + prior)
-    solution = normal @ (weighted.T @ (deviation.reshape(-1) * weight))
+    solution = normal @ (weighted.T @ (deviation.reshape(-1) * accuracy))
     error = np.sqrt(np.diag(normal)).reshape(2, bearings, knots)
     force = solution.reshape(2, bearings, knots).transpose(2, 1, 0)
     return force, np.max(error, axis=0).T

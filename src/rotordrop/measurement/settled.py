@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotordrop.errors import RecordError
-from rotordrop.measurement.axes import along_sensors, planar_of, sensor_planes
+from rotordrop.measurement.axes import along_sensors, planar_of
+from rotordrop.measurement.events import with_whole_planes
 from rotordrop.measurement.recording import Array
 from rotordrop.units import format_quantity
 
@@ -62,10 +63,10 @@ def settled_tail(record: Record, machine: Machine) -> SettledTail:
         When the record does not reach standstill; says how fast or how far the shaft still moves.
     """
     start = _standstill_begins(record)
-    planes = sensor_planes(record.sensors)
     gap = min(float(bearing.air_gap) for bearing in machine.touchdown_bearings)
     keep = record.time >= start
-    path = planar_of(along_sensors(record.signals[keep], record.sensors), planes)
+    whole, planes = with_whole_planes(record)
+    path = planar_of(along_sensors(whole.signals[keep], whole.sensors), planes)
     time = record.time[keep]
     block = max(int(_BLOCK * record.sampling_rate), 4)
     count = len(time) // block
@@ -88,6 +89,24 @@ def settled_tail(record: Record, machine: Machine) -> SettledTail:
         mean=np.mean(record.signals[keep][first:], axis=0),
         swing=_swing(path[first:]),
     )
+
+
+def resting_record(record: Record, tail: Record | None, machine: Machine) -> Record:
+    """The settled part of a tail given, or of a record that reaches standstill.
+
+    Raises
+    ------
+    RecordError
+        When neither shows a rotor at rest.
+    """
+    if tail is None and record.measured_speed is None:
+        raise RecordError(
+            f"{record.name} has no measured shaft speed, so it cannot be seen where the rotor stands still; "
+            "give the readings at standstill as a tail (--tail)"
+        )
+    source = record if tail is None else tail
+    found = settled_tail(source, machine)
+    return source.window(found.start, found.end)
 
 
 def _standstill_begins(record: Record) -> float:

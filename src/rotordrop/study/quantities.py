@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.machine import Machine
+from rotordrop.physics.whirl_spells import WhirlSpell, whirl_spells
 from rotordrop.simulation.result import DropResult
-from rotordrop.spectrum.whirl_spells import WhirlSpell, whirl_spells
 from rotordrop.units import si_unit
 
 Array = NDArray[np.float64]

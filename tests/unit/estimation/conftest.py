@@ -12,9 +12,11 @@ from rotordrop.estimation import estimate_drop
 from rotordrop.estimation.estimate import Estimate
 from rotordrop.estimation.methods import Tracked
 from rotordrop.estimation.record_facts import facts_of
-from rotordrop.estimation.tracked import TrackedDrop, followed_drops, prepare
+from rotordrop.estimation.tracked import TrackedDrop, followed_drops
 from rotordrop.estimation.tracked_estimate import estimate_of
+from rotordrop.identification.evidence import read_evidence
 from rotordrop.machine import Machine, example_machine
+from rotordrop.model.parameters import build_drop_model
 from rotordrop.synthesis import HiddenMachine, SyntheticDrop, hidden_machine, synthesize_drop
 
 SPEED = 2.0 * math.pi * 60.0
@@ -111,7 +113,7 @@ def informed(known: Machine, hidden: HiddenMachine) -> Machine:
 @pytest.fixture(scope="session")
 def workshop(calibrated: Machine, synthetic: SyntheticDrop) -> TrackedDrop:
     """The drop followed over its 0.2 s by the drop model of a calibrated machine, with its filter."""
-    item = prepare(calibrated, synthetic.record, synthetic.tail, "hidden_060")
+    item = read_evidence(build_drop_model(calibrated), synthetic.record, synthetic.tail, name="hidden_060")
     return next(iter(followed_drops(calibrated, [item])))
 
 

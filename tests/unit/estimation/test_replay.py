@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -243,17 +242,8 @@ def test_an_unknown_method_is_named(known: Machine, synthetic: SyntheticDrop) ->
 
 
 def test_a_record_that_ends_before_standstill_needs_a_tail(known: Machine, synthetic: SyntheticDrop) -> None:
-    with pytest.raises(
-        IdentificationError, match=r"shaft turning at 5\d\.\d+ Hz, before the rotor has settled"
-    ):
+    with pytest.raises(IdentificationError, match=r"the shaft still turns at 5\d\.\d+ Hz at .*--tail"):
         estimate_drop(known, synthetic.record, method=Replay())
-    without = replace(synthetic.record, speed=None)
-    with pytest.raises(IdentificationError, match=r"no measured shaft speed.*--tail"):
-        from rotordrop.identification.air_gap import find_rest
-        from rotordrop.identification.sensing import build_sensing
-        from rotordrop.model.parameters import build_drop_model
-
-        find_rest(without, None, build_sensing(build_drop_model(known, "quick"), without.sensors))
 
 
 def test_fixed_that_lacks_a_support_is_refused(

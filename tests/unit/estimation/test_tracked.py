@@ -25,13 +25,10 @@ from rotordrop.estimation.estimate import Estimate, Verdict
 from rotordrop.estimation.record_facts import RecordFacts, facts_of
 from rotordrop.estimation.schema import estimate_schema
 from rotordrop.estimation.tracked import (
-    Preparation,
     TrackedDrop,
     _tail_first,
     drop_problem,
     followed_drops,
-    prepare,
-    settled_tail,
     track_drops,
     tracked_drop,
 )
@@ -49,6 +46,7 @@ from rotordrop.estimation.tracked_loads import (
     with_interval,
 )
 from rotordrop.estimation.tracked_parameters import gap_of_record, is_lost
+from rotordrop.identification.evidence import Evidence, Missing, read_evidence
 from rotordrop.machine import Machine, example_machine, load_machine
 from rotordrop.measurement.examples import example_record_path
 from rotordrop.measurement.power_off import PowerOff
@@ -205,7 +203,7 @@ def test_vertical_impulse_carries_the_weight(workshop: TrackedDrop) -> None:
     assert up - weight == pytest.approx(mass * (speed(last) - speed(first)), abs=0.003 * weight)
 
 
-def followed(machine: Machine, item: Preparation) -> tuple[TrackedDrop, Estimate]:
+def followed(machine: Machine, item: Evidence) -> tuple[TrackedDrop, Estimate]:
     fit = track_drops(machine, [item], quick=True)
     drop = tracked_drop(item, fit.problems[0], fit.smoothed[0], 1.0)
     facts = RecordFacts(findings=(), warnings=(), simulated=True)
@@ -221,7 +219,9 @@ def test_a_gap_in_the_record_and_a_lost_channel_are_lived_with(
     signals[start : start + 40] = np.nan
     signals[:, 1] = np.nan
     worse = replace(record, signals=signals)
-    item = prepare(calibrated, worse, synthetic.tail, "worse", quick.drop_instant)
+    item = read_evidence(
+        build_drop_model(calibrated), worse, synthetic.tail, name="worse", power_off=quick.drop_instant
+    )
     inside, drop = followed(calibrated, item)
     assert drop.verdict is Verdict.ONE_DIRECTION and not drop.cross_check
     assert "no independent cross-check is possible" in drop.sentence
@@ -270,8 +270,8 @@ def test_without_tail_and_levitated_part_less_is_known(
         method="given",
         notes=(),
     )
-    item = prepare(calibrated, cut, None, "cut", instant)
-    assert item.evidence.levitated is None
+    item = read_evidence(build_drop_model(calibrated), cut, name="cut", power_off=instant)
+    assert item.levitated is None
     inside, drop = followed(calibrated, item)
     assert_right(drop, synthetic, factor=2.0)
     offsets = slice(inside.problem.n_dynamic + len(inside.problem.unknowns) + 4, None)
@@ -315,7 +315,7 @@ def test_sensor_planes_elsewhere_than_stated_are_flagged_and_intervals_widened(
 def test_a_record_without_speed_is_refused(calibrated: Machine, synthetic: SyntheticDrop) -> None:
     mute = replace(synthetic.record, speed=None, speed_time=None, speed_readings=None)
     with pytest.raises(IdentificationError, match="the record mute has no rotor speed; expected one"):
-        prepare(calibrated, mute, None, "mute")
+        read_evidence(build_drop_model(calibrated), mute, name="mute")
 
 
 def test_as_many_tails_as_records_are_needed(calibrated: Machine, synthetic: SyntheticDrop) -> None:
@@ -338,7 +338,7 @@ def test_gaps_without_a_tail_start_where_the_first_forces_act(
     known: Machine, synthetic: SyntheticDrop
 ) -> None:
     model = build_drop_model(known, "quick")
-    item = prepare(known, synthetic.record, None, "start")
+    item = read_evidence(build_drop_model(known), synthetic.record)
     started = drop_problem(model, item)
     for name in BEARINGS:
         entry = started.n_dynamic + [u.path for u in started.unknowns].index(f"{name}.air_gap")
@@ -349,13 +349,14 @@ def test_gaps_without_a_tail_start_where_the_first_forces_act(
 
 
 def test_a_tail_of_any_drop_serves_the_whole_chain(known: Machine, synthetic: SyntheticDrop) -> None:
-    without = prepare(known, synthetic.record, None, "one")
-    having = prepare(known, synthetic.record, synthetic.tail, "two")
+    model = build_drop_model(known)
+    without = read_evidence(model, synthetic.record)
+    having = read_evidence(model, synthetic.record, synthetic.tail)
     first, second = _tail_first([without, having])
-    assert first.tail_level is not None
-    np.testing.assert_array_equal(first.tail_level, having.tail_level)
+    assert not isinstance(first.settled_level, Missing)
+    np.testing.assert_array_equal(first.settled_level, having.settled_level)
     assert second is having
-    assert _tail_first([without, without])[0].tail_level is None
+    assert isinstance(_tail_first([without, without])[0].settled_level, Missing)
 
 
 @pytest.mark.parametrize(
@@ -484,17 +485,6 @@ def test_an_estimate_keeps_no_array_of_the_filter(workshop: TrackedDrop, tracked
     assert kept < 10e6 < 0.1 * workshop.smoothed.filtered.covariances.nbytes
 
 
-def test_a_record_until_standstill_holds_its_own_tail(synthetic: SyntheticDrop) -> None:
-    time = np.arange(0.0, 25.0, 1e-3)
-    signals = np.ones((len(time), synthetic.record.signals.shape[1]))
-    standing = replace(synthetic.record, time=time, signals=signals, speed=np.where(time < 21.0, 300.0, 0.1))
-    own = settled_tail(standing, None)
-    assert own is not None and own.time[0] == pytest.approx(time[-1] - 2.0)
-    assert settled_tail(standing, synthetic.tail) is synthetic.tail
-    assert settled_tail(replace(standing, speed=np.full(len(time), 5.0)), None) is None
-    assert settled_tail(synthetic.record, None) is None
-
-
 def test_a_magnitude_has_no_interval_below_zero() -> None:
     assert with_interval(100.0, 200.0).interval_90 == pytest.approx((0.0, 100.0 + NINETY * 200.0))
     assert with_interval(-5.0, 1.0).interval_90 == pytest.approx((-5.0 - NINETY, -5.0 + NINETY))
@@ -529,7 +519,7 @@ def test_the_cross_check_of_the_late_mean_has_the_time_its_name_says(
 
 
 def test_several_drops_are_given_out_one_by_one(calibrated: Machine, synthetic: SyntheticDrop) -> None:
-    item = prepare(calibrated, synthetic.record, synthetic.tail, "one")
+    item = read_evidence(build_drop_model(calibrated), synthetic.record, synthetic.tail)
     drops = followed_drops(calibrated, [item, replace(item, name="two")], quick=True)
     kept = [weakref.ref(drop.smoothed) for drop in drops]
     gc.collect()
@@ -540,8 +530,8 @@ def test_a_third_sensor_plane_of_a_long_rotor_is_no_loss() -> None:
     """1.8 m, 130 kg, a plane at mid-span: from guesses NIS was 13 and air gaps 185 and 152 µm."""
     machine = load_machine(Path(__file__).parents[2] / "machines" / "long_rotor.toml")
     made = synthesize_drop(hidden_machine(machine, 1), 2.0 * math.pi * 120.0, 10, duration=0.1, name="long")
-    prepared = prepare(machine, made.record, made.tail, "long")
-    fit = track_drops(machine, [prepared], calibrate_only=True)
+    evidence = read_evidence(build_drop_model(machine), made.record, made.tail)
+    fit = track_drops(machine, [evidence], calibrate_only=True)
     assert not beside_the_record(fit), (fit.nis, fit.noise_factors)
     problem, smoothed = fit.problems[0], fit.smoothed[0]
     assert problem.n_channels == 6

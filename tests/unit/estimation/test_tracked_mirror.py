@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rotordrop.estimation.tracked import COARSE_BASIS, prepare, recorded_drop
+from rotordrop.estimation.tracked import COARSE_BASIS, recorded_drop
+from rotordrop.identification.evidence import read_evidence
 from rotordrop.machine import Machine
 from rotordrop.model.parameters import build_drop_model
 from rotordrop.synthesis import SyntheticDrop
@@ -32,7 +33,7 @@ def mirrored(machine: Machine) -> Machine:
 
 def first_impacts(machine: Machine, drop: SyntheticDrop, spin: float) -> ForceHistory:
     """Forces over the first impacts."""
-    seen = recorded_drop(prepare(machine, drop.record, drop.tail, "drop"), UNTIL)
+    seen = recorded_drop(read_evidence(build_drop_model(machine), drop.record, drop.tail), UNTIL)
     turned = replace(seen, initial_speed=spin * seen.initial_speed, speed=spin * seen.speed)
     problem = build_problem(build_drop_model(machine, COARSE_BASIS), turned, until=UNTIL)
     smoothed = smooth(forward(problem, PassSettings(impulse=3e-3, share=0.03)), watched=problem.watched)

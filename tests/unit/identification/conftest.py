@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 
 from rotordrop.estimated import Estimated
-from rotordrop.identification.air_gap import SettledRest, find_rest, identify_air_gap
-from rotordrop.identification.evidence import Evidence, read_evidence
-from rotordrop.identification.initial_state import InitialState, fit_initial_state
+from rotordrop.identification.air_gap import SettledRest
+from rotordrop.identification.evidence import Evidence, known, read_evidence
+from rotordrop.identification.initial_state import InitialState
 from rotordrop.identification.replica import Replica, build_replica
 from rotordrop.identification.sensing import Sensing, build_sensing
 from rotordrop.identification.support import ImpactFit, impact_problem
 from rotordrop.machine import Machine, example_machine
-from rotordrop.measurement.events import DropInstant, find_drop_instant
 from rotordrop.model.parameters import DropModel, build_drop_model
 from rotordrop.model.reduction import Reduction
 from rotordrop.synthesis import SyntheticDrop, hidden_machine, synthesize_drop
@@ -57,29 +56,23 @@ def sensing(model: DropModel, drop: SyntheticDrop) -> Sensing:
 
 
 @pytest.fixture(scope="session")
-def instant(drop: SyntheticDrop, truth: Machine) -> DropInstant:
-    return find_drop_instant(drop.record, truth)
+def evidence(drop: SyntheticDrop, model: DropModel) -> Evidence:
+    return read_evidence(model, drop.record, drop.tail)
 
 
 @pytest.fixture(scope="session")
-def evidence(drop: SyntheticDrop, model: DropModel, instant: DropInstant) -> Evidence:
-    return read_evidence(model, drop.record, power_off=instant)
+def rest(evidence: Evidence) -> SettledRest:
+    return known(evidence.rest)
 
 
 @pytest.fixture(scope="session")
-def rest(drop: SyntheticDrop, sensing: Sensing) -> SettledRest:
-    return find_rest(drop.record, drop.tail, sensing)
+def initial(evidence: Evidence) -> InitialState:
+    return known(evidence.fall)
 
 
 @pytest.fixture(scope="session")
-def initial(rest: SettledRest, evidence: Evidence, model: DropModel, sensing: Sensing) -> InitialState:
-    gaps = identify_air_gap(rest, model, sensing).value
-    return fit_initial_state(evidence, rest, gaps, model, sensing)
-
-
-@pytest.fixture(scope="session")
-def replica(drop: SyntheticDrop, rest: SettledRest, initial: InitialState, model: DropModel) -> Replica:
-    return build_replica(drop.record, rest, initial, model, until=0.045)
+def replica(evidence: Evidence, model: DropModel) -> Replica:
+    return build_replica(evidence, model, until=0.045)
 
 
 @pytest.fixture(scope="session")

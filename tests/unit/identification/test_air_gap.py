@@ -7,11 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rotordrop.errors import IdentificationError
+from rotordrop.errors import IdentificationError, RecordError
 from rotordrop.identification.air_gap import SettledRest, find_rest, identify_air_gap
 from rotordrop.identification.sensing import Sensing
+from rotordrop.machine import Machine
 from rotordrop.measurement.axes import sensor_directions
 from rotordrop.measurement.record import Record
+from rotordrop.measurement.settled import resting_record
 from rotordrop.model.parameters import DropModel
 from rotordrop.model.static_sag import sag_of_model
 from rotordrop.synthesis import SyntheticDrop
@@ -42,7 +44,7 @@ def test_vertical_zero_of_the_sensors_reads_like_a_gap(
     assert drop.tail is not None
     up = sensor_directions(drop.tail.sensors)[:, 1]
     shifted = replace(drop.tail, signals=drop.tail.signals - 5e-6 * up)
-    gap = identify_air_gap(find_rest(drop.record, shifted, sensing), model, sensing)
+    gap = identify_air_gap(find_rest(shifted, sensing), model, sensing)
     assert gap.value == pytest.approx(gaps(model) + 5e-6, abs=0.1e-6)
 
 
@@ -55,7 +57,7 @@ def test_sway_does_not_lift_the_rest_position(
     radius = rest.radius
     place = np.stack([np.outer(np.sin(angle), radius), np.outer(-np.cos(angle), radius)], axis=-1)
     along = np.einsum("sbc,tbc->ts", sensing.from_bearings, place) + sensing.settled_bend
-    swaying = find_rest(drop.record, replace(drop.tail, time=time, signals=along), sensing)
+    swaying = find_rest(replace(drop.tail, time=time, signals=along), sensing)
     assert swaying.radius == pytest.approx(radius, abs=1e-9)
     assert swaying.sway == pytest.approx(0.12 * radius, rel=0.01)
     resting = -sensing.from_bearings[..., 1] @ radius + sensing.settled_bend
@@ -75,33 +77,35 @@ def test_limits_enclose_the_gap_and_zero_error_dominates(
     assert gap.standard_error == pytest.approx([10e-6, 10e-6], rel=0.1)
 
 
-def test_record_that_ends_while_the_shaft_turns_is_refused(drop: SyntheticDrop, sensing: Sensing) -> None:
-    with pytest.raises(IdentificationError, match=r"ends at 0.06 s with the shaft turning at .* Hz.*--tail"):
-        find_rest(drop.record, None, sensing)
+def test_record_that_ends_while_the_shaft_turns_is_no_rest(drop: SyntheticDrop, truth: Machine) -> None:
+    with pytest.raises(RecordError, match=r"shaft still turns at .* Hz .* ends at 0.06 s; .*--tail"):
+        resting_record(drop.record, None, truth)
 
 
-def test_record_without_speed_is_refused(drop: SyntheticDrop, sensing: Sensing) -> None:
-    with pytest.raises(IdentificationError, match=r"has no measured shaft speed.*--tail"):
-        find_rest(replace(drop.record, speed=None), None, sensing)
+def test_record_without_speed_is_no_rest(drop: SyntheticDrop, truth: Machine) -> None:
+    silent = replace(drop.record, speed=None, speed_time=None, speed_readings=None)
+    with pytest.raises(RecordError, match=r"has no measured shaft speed.*--tail"):
+        resting_record(silent, None, truth)
 
 
-def test_standstill_at_the_end_of_the_record_serves_as_tail(drop: SyntheticDrop, sensing: Sensing) -> None:
+def test_standstill_at_the_end_of_the_record_serves_as_tail(drop: SyntheticDrop, truth: Machine) -> None:
     assert drop.tail is not None
-    count = len(drop.tail.time)
-    speed = np.where(np.arange(count) < 1000, 5.0, 0.0)
-    whole = replace(drop.tail, speed=speed)
-    assert find_rest(whole, None, sensing).start == pytest.approx(float(drop.tail.time[1000]))
+    time = drop.tail.time
+    whole = replace(
+        drop.tail, speed_time=time, speed_readings=np.where(np.arange(len(time)) < 1000, 5.0, 0.0)
+    )
+    assert resting_record(whole, None, truth).time[0] == pytest.approx(float(time[1000]), abs=0.11)
 
 
 def test_short_tail_is_refused(drop: SyntheticDrop, sensing: Sensing) -> None:
     assert drop.tail is not None
-    short: Record = drop.tail.window(float(drop.tail.time[0]), float(drop.tail.time[0]) + 0.2)
-    with pytest.raises(IdentificationError, match=r"0.2 s of settled rotor; at least 0.5 s"):
-        find_rest(drop.record, short, sensing)
+    short: Record = drop.tail.window(float(drop.tail.time[0]), float(drop.tail.time[0]) + 0.1)
+    with pytest.raises(IdentificationError, match=r"0.1 s of settled rotor; at least 0.2 s"):
+        find_rest(short, sensing)
 
 
 def test_levitated_rotor_is_no_rest(drop: SyntheticDrop, sensing: Sensing) -> None:
     assert drop.tail is not None
     floating = replace(drop.tail, signals=-drop.tail.signals)
     with pytest.raises(IdentificationError, match=r"not at rest on its bearings: mean height 2\d\d"):
-        find_rest(drop.record, floating, sensing)
+        find_rest(floating, sensing)

@@ -57,6 +57,12 @@ def test_correction_vanishes_without_gravity() -> None:
     )
 
 
+@pytest.mark.parametrize("speed", [0.0, -2e-3])
+def test_a_mass_laid_down_bounces_for_a_whole_period(speed: float) -> None:
+    """A grazing contact, whose approach noise makes a departure, ended in a bare ValueError."""
+    assert corrected_stiffness(2e-3, 40.0, speed, 9.81) == pytest.approx(40.0 * (2.0 * math.pi / 2e-3) ** 2)
+
+
 def test_standard_error_follows_from_the_timing() -> None:
     time, radius, _, _ = spring_contact(5e7)
     place = np.stack([radius, np.zeros_like(radius)], axis=-1)[:, None, :]

@@ -168,3 +168,22 @@ def test_first_start_is_the_centre_and_the_others_fill_the_box() -> None:
     assert np.all(starts[:, 1] == 2.0)
     assert np.ptp(starts[:, 0]) > 0.7 and np.ptp(starts[:, 2]) > 2.8
     assert np.all(np.abs(starts[:, 0] - 1.0) <= 0.5)
+
+
+@dataclass
+class Broken(Linear):
+    """A simulation that does not get through above where the fit stands in the first unknown."""
+
+    def residual(self, x: Array, window: float) -> Array:
+        if x[0] > 0.5:
+            raise IdentificationError("too stiff to integrate")
+        return super().residual(x, window)
+
+
+def test_a_simulation_that_fails_on_one_side_leaves_the_slope_of_the_other() -> None:
+    """A zero column said that the unknown has no effect: it stayed at its prior, with the prior's error."""
+    problem = Broken()
+    fit = fit_window(problem, problem.prior_mean.copy(), 30.0, iterations=1)
+    assert fit.covariance[0, 0] == pytest.approx(
+        problem.posterior()[1][0, 0] * max(fit.misfit, 1.0), rel=1e-4
+    )

@@ -7,6 +7,7 @@ import pytest
 from scipy.signal import butter, sosfilt
 
 from rotordrop.measurement import check_record
+from rotordrop.measurement.quality.recorder import check_filters
 
 
 def filtered(signals, rate, corner, kind):
@@ -34,6 +35,16 @@ def test_ac_coupling(corner, whole_drop, machine):
     )
     assert found.kind == "AC coupling"
     assert "cannot rise" in found.message
+
+
+@pytest.mark.parametrize("size", [0.15, 1.0, 4.0])
+def test_filters_are_found_whatever_the_size_of_the_air_gap(size, whole_drop):
+    """A reading at rest of less than 50 µm was not looked at: a machine with a small gap passed."""
+    for kind, corner in (("AC coupling", 1.0), ("recorder low-pass", 100.0)):
+        signals = size * filtered(whole_drop.signals, 20e3, corner, "high" if corner == 1.0 else "low")
+        found = check_filters(replace(whole_drop, signals=signals), 0.0)
+        assert [finding.kind for finding in found] == [kind]
+    assert check_filters(replace(whole_drop, signals=size * whole_drop.signals), 0.0) == []
 
 
 @pytest.mark.parametrize("span", [2e-3, 20e-3, 50e-3])

@@ -18,8 +18,9 @@ from rotordrop.estimation.estimate import CrossCheck, Estimate, Verdict
 from rotordrop.estimation.later_motion import LaterMotion
 from rotordrop.estimation.methods import Tracked
 from rotordrop.estimation.record_facts import facts_of
-from rotordrop.estimation.tracked import COARSE_BASIS, drop_problem, prepare, tracked_drop
+from rotordrop.estimation.tracked import COARSE_BASIS, drop_problem, tracked_drop
 from rotordrop.estimation.tracked_estimate import estimate_of
+from rotordrop.identification.evidence import read_evidence
 from rotordrop.machine import example_machine
 from rotordrop.measurement.quality.finding import Finding
 from rotordrop.measurement.record import read_record
@@ -43,10 +44,10 @@ def estimate() -> Estimate:
         record = read_record(path, machine)
     with resources.as_file(folder.joinpath("drop_060_tail.csv")) as path:
         tail = read_record(path, machine)
-    prepared = prepare(machine, record, tail, "drop_060")
-    problem = drop_problem(build_drop_model(machine, COARSE_BASIS), prepared, until=0.02)
+    evidence = read_evidence(build_drop_model(machine), record, tail, name="drop_060")
+    problem = drop_problem(build_drop_model(machine, COARSE_BASIS), evidence, until=0.02)
     smoothed = track([problem], CALIBRATED_SCHEDULE[:1]).smoothed[0]
-    drop = tracked_drop(prepared, problem, smoothed, 1.0)
+    drop = tracked_drop(evidence, problem, smoothed, 1.0)
     return estimate_of(drop, Tracked(), facts_of(machine, record, tail, "drop_060"))
 
 

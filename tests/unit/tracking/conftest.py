@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rotordrop.estimation.tracked import COARSE_BASIS, Preparation, drop_problem, prepare
+from rotordrop.estimation.tracked import COARSE_BASIS, drop_problem
+from rotordrop.identification.evidence import Evidence, read_evidence
 from rotordrop.machine import Machine, example_machine
 from rotordrop.measurement.examples import example_record_path
 from rotordrop.measurement.record import read_record
@@ -27,21 +28,21 @@ def model(lp400: Machine) -> DropModel:
 
 
 @pytest.fixture(scope="session")
-def prepared(lp400: Machine) -> Preparation:
+def prepared(lp400: Machine) -> Evidence:
     """The bundled record with its power-off and its settled tail."""
     record = read_record(example_record_path("lp400_drop_060"), lp400)
     tail = read_record(example_record_path("lp400_drop_060_tail"), lp400)
-    return prepare(lp400, record, tail, "drop_060")
+    return read_evidence(build_drop_model(lp400), record, tail, name="drop_060")
 
 
 @pytest.fixture(scope="session")
-def flight(model: DropModel, prepared: Preparation) -> DropProblem:
+def flight(model: DropModel, prepared: Evidence) -> DropProblem:
     """The first 3 ms of it: free flight, without any contact."""
     return drop_problem(model, prepared, until=0.003)
 
 
 @pytest.fixture(scope="session")
-def impacts(model: DropModel, prepared: Preparation) -> DropProblem:
+def impacts(model: DropModel, prepared: Evidence) -> DropProblem:
     """The first 25 ms of it, with the first impacts at both bearings."""
     return drop_problem(model, prepared, until=0.025)
 

@@ -11,7 +11,8 @@ import pytest
 
 from rotordrop.errors import IdentificationError
 from rotordrop.estimated import NINETY, Estimated
-from rotordrop.estimation.tracked import COARSE_BASIS, drop_problem, prepare, recorded_drop
+from rotordrop.estimation.tracked import COARSE_BASIS, drop_problem, recorded_drop
+from rotordrop.identification.evidence import Missing, read_evidence
 from rotordrop.machine import Machine
 from rotordrop.measurement.record import read_record
 from rotordrop.model.parameter_table import parameter
@@ -26,6 +27,8 @@ from rotordrop.tracking.problem import (
     settled_displacement,
 )
 from rotordrop.tracking.transfer import transferred
+
+NO_TAIL = Missing(reason="none was given")
 
 
 def unknown_of(machine: Machine, path: str):
@@ -137,7 +140,7 @@ def test_sensors_start_from_what_the_machine_says(lp400, prepared):
         }
     )
     problem = drop_problem(
-        build_drop_model(known, COARSE_BASIS), replace(prepared, tail_level=None), until=0.003
+        build_drop_model(known, COARSE_BASIS), replace(prepared, settled_level=NO_TAIL), until=0.003
     )
     gain = problem.n_dynamic + len(problem.unknowns)
     offset = gain + problem.n_channels
@@ -162,11 +165,11 @@ def test_the_rotor_starts_where_the_sensors_see_it_with_its_computed_sag(flight)
 def test_a_record_without_speed_is_refused(model, prepared):
     mute = replace(prepared.record, speed=None, speed_time=None, speed_readings=None)
     with pytest.raises(IdentificationError, match=r"the record drop_060 has no rotor speed.*profile"):
-        prepare(model.machine, mute, None, "drop_060")
+        read_evidence(model, mute, name="drop_060")
 
 
 def test_the_noise_of_the_levitated_part_is_that_of_the_channels(flight, prepared):
-    noise = prepared.evidence.noise(0.003)
+    noise = prepared.noise(0.003)
     np.testing.assert_allclose(flight.variances, noise**2 + NOISE_FLOOR**2)
     assert np.all((noise > 0.2e-6) & (noise < 1e-6))
 
@@ -177,7 +180,7 @@ def test_the_noise_of_the_levitated_part_is_that_of_the_channels(flight, prepare
 @pytest.fixture(scope="module")
 def loose(model, prepared):
     """The problem before the tail is used."""
-    return drop_problem(model, replace(prepared, tail_level=None), until=0.003)
+    return drop_problem(model, replace(prepared, settled_level=NO_TAIL), until=0.003)
 
 
 def height_at_sensors(problem, theta):
@@ -246,12 +249,9 @@ def test_a_single_sensor_in_a_plane_cannot_tell_height_from_aside(lp400, prepare
     record = prepared.record
     prepared = replace(
         prepared,
-        evidence=replace(
-            prepared.evidence,
-            record=replace(record, signals=record.signals[:, :3].copy(), sensors=three.sensors),
-            levitated=prepared.evidence.levitated.of_channels(range(3)),
-        ),
-        tail_level=None,
+        record=replace(record, signals=record.signals[:, :3].copy(), sensors=three.sensors),
+        levitated=prepared.levitated.of_channels(range(3)),
+        settled_level=NO_TAIL,
     )
     problem = drop_problem(build_drop_model(three, COARSE_BASIS), prepared, until=0.003)
     mean, covariance = problem.mean.copy(), problem.covariance.copy()
@@ -270,17 +270,19 @@ def test_a_single_sensor_in_a_plane_cannot_tell_height_from_aside(lp400, prepare
     assert covariance[lost, lost] > 3.0 * covariance[seen, seen]
 
 
-def test_a_tail_at_the_end_of_a_long_record_is_found(lp400, prepared):
-    record = prepared.record
-    step = 1e-3
-    time = np.arange(0.0, 30.0, step)
-    level = np.array([1e-6, -2e-6, 3e-6, -4e-6])
-    signals = np.where(time[:, None] > 27.0, level, 1.0)
-    long = replace(record, time=time, signals=signals, speed=np.zeros_like(time))
-    found = prepare(lp400, long, None, "long", instant=prepared.instant)
-    np.testing.assert_allclose(found.tail_level, level)
-    short = prepare(lp400, record, None, "short", instant=prepared.instant)
-    assert short.tail_level is None
+def test_the_settled_level_is_that_of_the_lowest_point_of_the_sway(lp400, prepared):
+    """A rotor that sways along its race by 40 µm lies higher in the mean than at the bottom."""
+    sensing, rest = prepared.sensing, prepared.rest
+    time = np.arange(3000) * 1e-3
+    angle = 0.14 * np.sin(2.0 * np.pi * 29.0 * time)
+    place = np.stack([np.outer(np.sin(angle), rest.radius), np.outer(-np.cos(angle), rest.radius)], axis=-1)
+    along = np.einsum("sbc,tbc->ts", sensing.from_bearings, place) + sensing.settled_bend
+    still = {"speed": None, "speed_time": None, "speed_readings": None}
+    tail = replace(prepared.record, time=time, signals=along, sampling_rate=1e3, **still)
+    found = read_evidence(build_drop_model(lp400), prepared.record, tail)
+    bottom = sensing.from_bearings[..., 1] @ -rest.radius + sensing.settled_bend
+    np.testing.assert_allclose(found.settled_level, bottom, atol=2e-8)
+    assert np.abs(along.mean(axis=0) - bottom).max() > 0.9e-6
 
 
 # what the record says
@@ -290,7 +292,7 @@ def test_a_tail_at_the_end_of_a_long_record_is_found(lp400, prepared):
 def fast(lp400):
     """A short drop at 150 Hz and what it says."""
     path = Path(__file__).parents[1] / "measurement" / "recordings" / "drop_150_short.h5"
-    return prepare(lp400, read_record(path, lp400), None, "fast")
+    return read_evidence(build_drop_model(lp400), read_record(path, lp400), name="fast")
 
 
 def test_hum_at_60_hz_is_no_noise_of_the_twin(lp400, fast):
@@ -298,7 +300,8 @@ def test_hum_at_60_hz_is_no_noise_of_the_twin(lp400, fast):
     record = fast.record
     hum = 1.5e-6 * np.cos(2.0 * np.pi * 60.0 * record.time[:, None] + np.arange(4))
     noisy = replace(record, signals=record.signals + hum)
-    found, plain = (recorded_drop(prepare(lp400, one, None, "fast"), 0.1) for one in (noisy, record))
+    model = build_drop_model(lp400)
+    found, plain = (recorded_drop(read_evidence(model, one), 0.1) for one in (noisy, record))
     np.testing.assert_allclose(found.noise, plain.noise, rtol=0.02)
     assert np.abs(found.readings - plain.readings).max() < 0.25e-6
 
@@ -311,7 +314,8 @@ def test_a_speed_given_by_hand_is_no_reading_after_power_off(lp400, fast):
         speed_readings=np.full(2, 2.0 * np.pi * 150.2),
         speed_by_hand=True,
     )
-    found, plain = (recorded_drop(prepare(lp400, one, None, "fast"), 0.1) for one in (nominal, fast.record))
+    model = build_drop_model(lp400)
+    found, plain = (recorded_drop(read_evidence(model, one), 0.1) for one in (nominal, fast.record))
     assert np.all(np.isnan(found.speed)) and np.any(np.isfinite(plain.speed))
     assert found.initial_speed == pytest.approx(plain.initial_speed, abs=0.1)  # the orbit says it
 

@@ -6,21 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rotordrop.measurement.look.motion import FALLEN, GRAVITY, Motion, Path, slope
+from rotordrop.measurement.events import FALLEN_SHARE
+from rotordrop.measurement.look.motion import GRAVITY, Motion, Path, slope
 from rotordrop.measurement.record import Record
 from rotordrop.measurement.recording import Array
-
-STANDSTILL = 2 * np.pi * 0.5
-"""Slower than this counts as standstill [rad/s]."""
+from rotordrop.measurement.settled import STANDSTILL
+from rotordrop.physics.whirl_spells import whirl_spells
 
 _NEAR = 0.85
 """An impact turns the rotor back at this share of the gap or beyond."""
 
-_AT_REST = 0.3
-"""Angle by which a rotor that does not whirl yet or any more may move [rad]."""
-
-_TURN_BACK = np.pi / 2
-"""A whirl that runs back by this angle has ended [rad]."""
+_FOLLOWED = 2e-4
+"""Time between the angles by which a whirl is followed [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +49,7 @@ class Impact:
 
 @dataclass(frozen=True, kw_only=True)
 class Whirl:
-    """A spell in which the rotor runs round the bearing by a full turn or more.
+    """A spell in which the rotor runs round the bearing by two turns or more.
 
     Attributes
     ----------
@@ -133,11 +130,11 @@ def _release(motion: Motion, start: int, stop: int) -> float | None:
     """When a fall of gravity began that reached a share of the gap where it did; None where nothing fell."""
     begun = []
     for path in motion.paths:
-        sunk = path.levitated[1] - path.position[start - 1 : stop, 1] > FALLEN * path.gap
+        sunk = path.levitated[1] - path.position[start - 1 : stop, 1] > FALLEN_SHARE * path.gap
         if not sunk.any():
             return None
         fallen = float(motion.time[start - 1 + int(np.argmax(sunk))])
-        begun.append(fallen - float(np.sqrt(2.0 * FALLEN * path.gap / GRAVITY)))
+        begun.append(fallen - float(np.sqrt(2.0 * FALLEN_SHARE * path.gap / GRAVITY)))
     return max(min(begun), float(motion.time[0]))
 
 
@@ -208,47 +205,12 @@ def whirls_of(motion: Motion, drop: Drop) -> tuple[Whirl, ...]:
 
 def _whirls(motion: Motion, path: Path, drop: Drop) -> list[Whirl]:
     inside = np.flatnonzero((motion.time >= drop.release) & (motion.time <= drop.end))
-    step = max(int(2e-4 * motion.rate), 1)
-    chosen = inside[::step]
-    if len(chosen) < 3:
-        return []
-    angle = np.unwrap(np.arctan2(path.position[chosen, 1], path.position[chosen, 0]))
-    spells = [_moving(angle, a, b) for a, b in _one_way(angle) if abs(angle[b] - angle[a]) >= 2 * np.pi]
-    return [_whirl(path, motion.time[chosen[[a, b]]], float(angle[b] - angle[a])) for a, b in spells]
-
-
-def _whirl(path: Path, times: Array, swept: float) -> Whirl:
-    start, end, turns = float(times[0]), float(times[1]), swept / (2 * np.pi)
-    return Whirl(plane=path.name, start=start, end=end, turns=turns, frequency=abs(turns) / (end - start))
-
-
-def _moving(angle: Array, a: int, b: int) -> tuple[int, int]:
-    """The stretch without the rest before and after it, where the angle hardly changes."""
-    part = angle[a : b + 1]
-    begun = np.flatnonzero(np.abs(part - part[0]) < _AT_REST)
-    ended = np.flatnonzero(np.abs(part - part[-1]) < _AT_REST)
-    return a + int(begun[-1]), a + int(ended[0])
-
-
-def _one_way(angle: Array) -> list[tuple[int, int]]:
-    """Stretches between the turning points at which the angle runs back by `_TURN_BACK`."""
-    values = angle.tolist()
-    spells: list[tuple[int, int]] = []
-    start = high = low = 0
-    sense = 0
-    for i, value in enumerate(values):
-        high = i if value > values[high] else high
-        low = i if value < values[low] else low
-        if sense >= 0 and values[high] - value > _TURN_BACK:
-            spells.append((start, high))
-            start, sense, low = high, -1, i
-            high = i
-        elif sense <= 0 and value - values[low] > _TURN_BACK:
-            spells.append((start, low))
-            start, sense, high = low, 1, i
-            low = i
-    spells.append((start, high if sense > 0 else low if sense < 0 else len(values) - 1))
-    return [(a, b) for a, b in spells if b > a]
+    chosen = inside[:: max(int(_FOLLOWED * motion.rate), 1)]
+    spells = whirl_spells(motion.time[chosen], path.position[chosen], path.gap)
+    return [
+        Whirl(plane=path.name, start=s.start, end=s.end, turns=s.turns, frequency=abs(s.frequency))
+        for s in spells
+    ]
 
 
 def standstill_of(record: Record) -> float | None:

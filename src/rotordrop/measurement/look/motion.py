@@ -9,13 +9,11 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import RecordError
 from rotordrop.measurement.axes import along_sensors, planar_of, sensor_planes
+from rotordrop.measurement.events import FALLEN_SHARE
 from rotordrop.measurement.record import Record
 from rotordrop.measurement.recording import Array
 
 GRAVITY = 9.81
-FALLEN = 0.35
-"""A rotor this share of the gap below its levitated position has been dropped."""
-
 SMOOTHING = 1e-3
 """Window of velocities [s]."""
 
@@ -133,7 +131,7 @@ def _first_fall(raw: Array, rate: float) -> tuple[int, int]:
             f"nothing falls in the record: the shaft strays by {1e6 * float(np.min(reach)):.3g} µm and moved "
             f"by {1e6 * float(np.max(usual)):.3g} µm in its first 10 ms; check that it begins before the drop"
         )
-    moved = np.min(away / reach, axis=1) > FALLEN
+    moved = np.min(away / reach, axis=1) > FALLEN_SHARE
     sunk = int(np.argmax(moved))
     back = int(np.sqrt(2.0 * float(np.max(reach)) / GRAVITY) * rate) + int(3e-3 * rate)
     return max(sunk - back, first), sunk

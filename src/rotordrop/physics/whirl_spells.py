@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.physics.whirl import circling_spells
-
 Array = NDArray[np.float64]
 
 LEAST_TURNS = 2.0
 """Turns without turning back from which circling counts as whirl [1]."""
+TURN_BACK = 0.5 * math.pi
+"""Angle by which a whirl that has ended runs back [rad]."""
 LEAST_RADIUS = 0.5
 """Share of the air gap outside of which a rotor may circle [1]; in flight through the middle it does not."""
 
@@ -33,6 +33,11 @@ class WhirlSpell:
     start: float
     end: float
     frequency: float
+
+    @property
+    def turns(self) -> float:
+        """Turns, with the sign of the frequency [1]."""
+        return self.frequency * self.duration
 
     @property
     def duration(self) -> float:
@@ -56,19 +61,43 @@ def whirl_spells(time: Array, orbit: Array, air_gap: float, *, spin: float = 1.0
 
     Notes
     -----
-    Source: own definition, see `rotordrop.physics.whirl.circling_spells`: at least two turns in one sense
-    outside of half the air gap. A pendulum motion at the bottom swings back and is none.
+    Source: own definition: at least two turns in one sense outside of half the air gap; going back by less
+    than a quarter turn (a bounce) does not end a stretch, coming nearer to the centre does, because there the
+    angle says nothing. A pendulum motion at the bottom swings back and is none. Told without compiled code,
+    which a first look at a record must not wait for.
     """
-    x, y = (np.ascontiguousarray(orbit[:, axis], dtype=np.float64) for axis in range(2))
-    found = np.empty((0, 3))
-    while (count := circling_spells(x, y, LEAST_RADIUS * air_gap, LEAST_TURNS, found)) > len(found):
-        found = np.empty((count, 3))
+    outside = np.hypot(orbit[:, 0], orbit[:, 1]) >= LEAST_RADIUS * air_gap
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], outside, [False]]).astype(np.int8)))
     sense = math.copysign(1.0, spin)
     spells = []
-    for first, last, _ in found:
-        whole = slice(int(first), int(last) + 1)
-        spells.append(_steady(time[whole], np.unwrap(np.arctan2(y[whole], x[whole])), sense))
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        angle = np.unwrap(np.arctan2(orbit[begin:end, 1], orbit[begin:end, 0]))
+        for first, last in _one_way(angle):
+            if abs(angle[last] - angle[first]) >= 2.0 * math.pi * LEAST_TURNS:
+                part = slice(first, last + 1)
+                spells.append(_steady(time[begin:end][part], angle[part], sense))
     return tuple(spells)
+
+
+def _one_way(angle: Array) -> list[tuple[int, int]]:
+    """Stretches between the turning points from which the angle runs back by a quarter turn."""
+    values = angle.tolist()
+    stretches: list[tuple[int, int]] = []
+    start = high = low = 0
+    sense = 0
+    for i, value in enumerate(values):
+        high = i if value > values[high] else high
+        low = i if value < values[low] else low
+        if sense >= 0 and values[high] - value > TURN_BACK:
+            stretches.append((start, high))
+            start, sense, low = high, -1, i
+            high = i
+        elif sense <= 0 and value - values[low] > TURN_BACK:
+            stretches.append((start, low))
+            start, sense, high = low, 1, i
+            low = i
+    stretches.append((start, high if sense > 0 else low if sense < 0 else len(values) - 1))
+    return [(a, b) for a, b in stretches if b > a]
 
 
 def _steady(time: Array, angle: Array, sense: float) -> WhirlSpell:

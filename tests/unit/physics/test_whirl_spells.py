@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rotordrop.spectrum.whirl_spells import whirl_spells
+from rotordrop.physics.whirl_spells import whirl_spells
 
 GAP = 250e-6
 TIME = np.arange(0.0, 0.2, 5e-5)

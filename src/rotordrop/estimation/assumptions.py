@@ -1,0 +1,89 @@
+"""What stands in for facts that a record or a machine file does not give: each said, with number and unit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from rotordrop.estimated import NINETY
+from rotordrop.identification.evidence import Evidence, Missing, strongest_slowing
+from rotordrop.tracking.problem import DropProblem, rough_noise
+from rotordrop.units import format_quantity
+
+
+def evidence_assumptions(evidence: Evidence) -> Iterator[str]:
+    """What every method takes where the record does not say."""
+    machine = evidence.model.machine
+    if evidence.speed.note:
+        yield f"speed: {evidence.speed.note}"
+    if evidence.record.measured_speed is None:
+        most = format_quantity(strongest_slowing(evidence.model), "speed")
+        yield (
+            "the speed was not measured after power-off: the rotor angle, and with it the 2X runout, is that "
+            f"of a rotor that loses anything from nothing to {most} a second"
+        )
+    if len({amb.node for amb in machine.ambs}) < 2:
+        yield (
+            "the AMB planes are not given: the gravity sag of the levitated rotor, which moves first peaks "
+            "by several percent, is taken as 0 µm"
+        )
+
+
+def twin_assumptions(evidence: Evidence, problem: DropProblem) -> tuple[str, ...]:
+    """What the tracked twin takes beside that: noise, settled level, first air gaps, drag of the air."""
+    return (
+        *evidence_assumptions(evidence),
+        *_noise(evidence, problem),
+        *_level(evidence),
+        *_gaps(evidence, problem),
+        *_air(problem),
+    )
+
+
+def _noise(evidence: Evidence, problem: DropProblem) -> Iterator[str]:
+    """Channels whose noise the levitated part does not tell."""
+    until = float(problem.time[-1])
+    known, rough = evidence.noise(until), rough_noise(problem.readings)
+    for c, sensor in enumerate(problem.model.machine.sensors):
+        if np.isfinite(known[c]):
+            continue
+        size = format_quantity(math.sqrt(float(problem.variances[c])), "length")
+        origin = "the roughness of its readings" if np.isfinite(rough[c]) else "what is usual"
+        yield f"{sensor.name}: no levitated readings tell its noise; {size} (rms) is taken from {origin}"
+
+
+def _level(evidence: Evidence) -> Iterator[str]:
+    if isinstance(evidence.rest, Missing) and not isinstance(evidence.settled_level, Missing):
+        yield (
+            "the settled level is the mean over the tail and not the lowest point of the sway, which could "
+            f"not be told: {evidence.rest.reason}"
+        )
+
+
+def _gaps(evidence: Evidence, problem: DropProblem) -> Iterator[str]:
+    """Where the search for the air gaps begins without a tail, and why there."""
+    if not isinstance(evidence.settled_level, Missing):
+        return
+    names = problem.model.bearing_names
+    reach = evidence.reach
+    for b, (name, entry) in enumerate(zip(names, problem.gap_entries, strict=True)):
+        begin = format_quantity(float(problem.start[entry]), "length")
+        sigma = math.sqrt(float(problem.covariance[entry, entry]))
+        within = format_quantity(NINETY * sigma, "length")
+        moved = not isinstance(reach, Missing) and problem.start[entry] == reach[b]
+        origin = "the reach of the first force" if moved else "the machine file"
+        why = f" ({reach.reason})" if isinstance(reach, Missing) else ""
+        yield f"{name}: without a tail the air gap begins at {begin} ± {within} (90 %), by {origin}{why}"
+
+
+def _air(problem: DropProblem) -> Iterator[str]:
+    if problem.model.machine.speed.aero_time_constant is not None:
+        return
+    unknown = next(u for u in problem.unknowns if u.path == "speed.aero_time_constant")
+    low, value, high = (math.exp(unknown.mean + k * NINETY * unknown.sigma) for k in (-1.0, 0.0, 1.0))
+    yield (
+        "the machine file has no speed.aero_time_constant: the drag of the air begins at a time constant of "
+        f"{value:.3g} s (90 %: {low:.2g} to {high:.2g} s)"
+    )
