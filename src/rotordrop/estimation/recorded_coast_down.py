@@ -69,7 +69,7 @@ def recorded_coast_down(machine: Machine, record: Record) -> CoastDownSignal:
 
 
 def _air_gap(evidence: Evidence, sensing: Sensing) -> AirGap:
-    """Air gaps by the rest at standstill, or by where the rotor lies at the end while the shaft still turns."""
+    """Air gaps by the rest at standstill, or by where the rotor lies at the end of a record."""
     if not isinstance(evidence.gap, Missing):
         return evidence.gap
     return identify_air_gap(rest_at_end(evidence.record, sensing), evidence.model, sensing)

@@ -31,7 +31,7 @@ _RISEN = 0.75
 """A rest that comes back to this share of its depth within the record leaks away."""
 
 _ALIKE = 0.15
-"""Channels that leak away do so alike, within this share of their depth: swings and bounces are on top [1]."""
+"""Channels that leak away do so alike, within this share of their depth; swings come on top [1]."""
 
 _SUNK, _DEEP = 0.03, 0.5
 """A rotor at rest reads more than the first share of its whole motion in some channel, and the channels that
