@@ -18,9 +18,7 @@ if TYPE_CHECKING:
     from rotordrop.measurement.examples import example_record_path as example_record_path
     from rotordrop.measurement.levitated import LevitatedModel as LevitatedModel
     from rotordrop.measurement.levitated import fit_levitated as fit_levitated
-    from rotordrop.measurement.levitated import without_hum as without_hum
     from rotordrop.measurement.preprocess import local_polynomial as local_polynomial
-    from rotordrop.measurement.preprocess import velocity as velocity
     from rotordrop.measurement.profile import Profile as Profile
     from rotordrop.measurement.profile import load_profile as load_profile
     from rotordrop.measurement.profile import save_profile as save_profile
@@ -44,8 +42,8 @@ _PUBLIC = {
     "contacts": ("EarlyForces", "FirstContact", "early_forces", "first_contacts"),
     "events": ("DropInstant", "find_drop_instant"),
     "examples": ("example_record_names", "example_record_path"),
-    "levitated": ("LevitatedModel", "fit_levitated", "without_hum"),
-    "preprocess": ("local_polynomial", "velocity"),
+    "levitated": ("LevitatedModel", "fit_levitated"),
+    "preprocess": ("local_polynomial",),
     "profile": ("Profile", "load_profile", "save_profile"),
     "quality": ("Finding", "check_record", "refuse_unusable"),
     "record": ("Record", "read_record", "save_record"),

@@ -136,15 +136,3 @@ def planar(record: Record) -> tuple[Array, tuple[int, ...]]:
 def planar_of(along: Array, planes: Sequence[Plane]) -> Array:
     """Displacement (x, y) in each plane, shape (..., P, 2), from displacements along sensors (..., S)."""
     return np.stack([along[..., list(plane.columns)] @ plane.to_planar.T for plane in planes], axis=-2)
-
-
-def plane_disagreement(record: Record) -> dict[int, float]:
-    """How far more than two sensors of a plane contradict each other [m rms], by node."""
-    along = along_sensors(record.signals, record.sensors)
-    result: dict[int, float] = {}
-    for plane in sensor_planes(record.sensors):
-        readings = along[:, list(plane.columns)]
-        if readings.shape[1] > 2:
-            rest = readings - (readings @ plane.to_planar.T) @ plane.directions.T
-            result[plane.node] = float(np.sqrt(np.mean(np.std(rest, axis=0) ** 2)))
-    return result

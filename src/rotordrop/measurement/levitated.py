@@ -227,13 +227,3 @@ def _solved(design: Array, signals: Array) -> tuple[Array, Array]:
         own, scatter = _solved(design[known[:, c]], signals[known[:, c], c : c + 1])
         solution[:, c], noise[c] = own[:, 0], scatter[0]
     return np.asarray(solution), np.asarray(noise, dtype=np.float64)
-
-
-def without_hum(record: Record, model: LevitatedModel) -> Record:
-    """Take the mains hum found in the levitated part off the whole record."""
-    if model.hum is None:
-        return record
-    note = f"mains hum of {model.hum:g} Hz taken off"
-    return replace(
-        record, signals=record.signals - model.hum_readings(record.time), notes=(*record.notes, note)
-    )

@@ -8,35 +8,6 @@ from rotordrop.errors import RecordError
 from rotordrop.measurement.recording import Array
 
 
-def velocity(values: Array, rate: float, *, width: float = 1e-3, order: int = 2) -> Array:
-    """Velocity by a Savitzky–Golay filter along the first axis.
-
-    Parameters
-    ----------
-    values : array, shape (N, ...)
-        Displacement [m].
-    rate : float
-        Sampling rate [Hz].
-    width : float
-        Width of the window [s].
-    order : int
-        Order of the local polynomial.
-
-    Returns
-    -------
-    array, shape (N, ...)
-        Velocity [m/s]; less certain within half a window of the ends.
-    """
-    from scipy.signal import savgol_filter
-
-    samples = max(round(width * rate) // 2 * 2 + 1, order + 2 - order % 2)
-    if samples > len(values):
-        raise RecordError(
-            f"a velocity window of {width:g} s has {samples} samples; the record has {len(values)}"
-        )
-    return np.asarray(savgol_filter(values, samples, order, deriv=1, delta=1.0 / rate, axis=0))
-
-
 def acceleration(values: Array, rate: float, *, width: float = 1e-3) -> Array:
     """Acceleration [m/s²] by a Savitzky–Golay filter of order 3 along the first axis, shape of `values`."""
     from scipy.signal import savgol_filter

@@ -4,24 +4,9 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import RecordError
-from rotordrop.measurement import local_polynomial, velocity
-from rotordrop.measurement.preprocess import acceleration
+from rotordrop.measurement import local_polynomial
 
 RATE = 20000.0
-
-
-def test_velocity_is_exact_for_a_parabola():
-    time = np.arange(200) / RATE
-    path = np.column_stack([3e-4 * time - 4.9 * time**2, 1e-3 * time])
-    np.testing.assert_allclose(
-        velocity(path, RATE), np.column_stack([3e-4 - 9.8 * time, np.full(200, 1e-3)]), atol=1e-12
-    )
-    np.testing.assert_allclose(acceleration(path, RATE), np.tile([-9.8, 0.0], (200, 1)), atol=1e-7)
-
-
-def test_a_velocity_window_longer_than_the_record_is_refused():
-    with pytest.raises(RecordError, match=r"window of 0.001 s has 21 samples; the record has 10"):
-        velocity(np.zeros(10), RATE)
 
 
 def test_both_sides_of_the_drop_give_a_far_better_velocity_than_a_difference():
