@@ -236,6 +236,10 @@ def _keeping(
 
 def _allowance(problem: ImpactFit, covariance: Array, count: int) -> float:
     """By how much the cost of a draw may exceed the best: what a linear model would give, four times over."""
+    # Draws of a linear model exceed the best cost by a chi-square with as many degrees of freedom as the
+    # record determines: the unknowns, less what their priors decide. The covariance they are drawn from is
+    # widened, which its square multiplies; the rest is room for a cost that bends with every impact, and for
+    # five standard deviations where hardly anything is determined.
     by_prior = float(np.sum(np.diag(covariance) / problem.prior_sigma**2))
     return 4.0 * WIDENING**2 * max(count - by_prior, 1.0) + 25.0
 

@@ -160,6 +160,8 @@ def _rest(
             f"gap and a swing below {largest_sway:.0%} of it. Check polarity and angles of the sensors, or "
             "give a later tail (--tail)."
         )
+    # A rotor that sways along its race is lifted: its mean height is above the lowest point, its mean radius
+    # is not. Gap and rest follow from the radius, and the mean readings are let down by the difference.
     blocks = max(1, int((time[-1] - time[0]) / BLOCK + 0.1))
     means = np.array([part.mean(axis=0) for part in np.array_split(radius, blocks)])
     mean = radius.mean(axis=0)

@@ -185,6 +185,8 @@ class FallFit:
     def _prior_root(self, sigma: Array) -> Array:
         """Rows of the prior: states beside what unbalance and magnets hold on the orbit."""
         u, fall = self.unknowns, self.fall
+        # What unbalance and turning magnet forces hold on the orbit is no free bending: the prior is on the
+        # difference, so a flexible rotor that circles far out at power-off pays nothing for it.
         root = np.diag(1.0 / sigma)
         states = slice(0, 4 * fall.n_modes)
         orbit = fall.synchronous() / sigma[states, None]
@@ -260,6 +262,7 @@ class FallFit:
         sensors = np.arange(u.n_sensors)
         jacobian[1, sensors, u.gain.start + sensors] = rate
         jacobian[1, sensors, u.runout.start + u.n_sensors + sensors] = speed
+        # A later power-off carries the measured orbit on; the unknown state is the one at power-off.
         jacobian[0, :, u.shift] = -1e-3 * e.orbit_velocity
         jacobian[1, :, u.shift] = -1e-3 * e.orbit_acceleration
         first = (

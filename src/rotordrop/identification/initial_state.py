@@ -222,6 +222,8 @@ def fit_initial_state(evidence: Evidence, gap: AirGap, sensing: Sensing) -> Init
     end = end_of_fall(evidence.time, sensing.at_bearings(shifted), gap.value)
     inside = (evidence.time > 0.0) & (evidence.time <= end)
     _check_samples(record, inside, end)
+    # Deviations from rest, not readings, are compared: zeros of the sensors are in both and drop out, and
+    # what is left of them is an error of the rest position, which is one of the unknowns.
     fall = build_free_fall(model, evidence.speed.initial, unbalance_nodes(model.machine))
     readings = _fall_readings(evidence, levitated, rest, inside)
     problem = FallFit(fall, sensing, readings, settled, model, evidence.power_off.standard_error)

@@ -29,7 +29,8 @@ LARGEST_STEP = 1e-3
 MOST_STEPS = 400_000
 LOG_ROWS = 400
 LEAD = 1e-4
-"""Time before the end of the free fall at which the simulation starts [s]."""
+"""Time before the end of the free fall at which the simulation starts [s]: the fall is linear and known in
+closed form, so only what follows it has to be integrated again and again."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -162,6 +162,9 @@ def _released(since: Array, height: Array, gravity: float) -> tuple[float, float
     Unknown are the height of each plane, the release, and the share of the lift that remained, which has a
     prior; what ringing and orbit add counts as noise of the size that is left over, correlated over the fall.
     """
+    # Height and velocity at the first sample are unknown, but a rotor at rest has a release with no velocity:
+    # the linear term of the parabola is gravity times the time of it, so the fall dates its own beginning.
+    # Lift that remains delays the fall like a later release would; only its prior tells the two apart.
     count, planes = height.shape
     expected, doubt = REMANENT_SHARE
     tau, value = REMANENT_TIME[0], 0.0
