@@ -74,6 +74,16 @@ def test_a_package_without_a_place_is_found(tmp_path):
     assert "utils" in done.stdout
 
 
+def test_a_page_that_asks_for_balls_is_found(tmp_path):
+    _skeleton(tmp_path)
+    (tmp_path / "src" / "rotordrop" / "report" / "__init__.py").write_text(
+        "import rotordrop.physics.ball_bearing\n"
+    )
+    done = check(tmp_path)
+    assert done.returncode != 0
+    assert "states its own numbers" in done.stdout
+
+
 def test_numba_in_a_second_file_is_found(tmp_path):
     _skeleton(tmp_path)
     (tmp_path / "src" / "rotordrop" / "simulation" / "__init__.py").write_text("import numba\n")
@@ -99,3 +109,5 @@ def _skeleton(folder: Path) -> None:
         (root / name / "__init__.py").write_text("")
     (root / "__init__.py").write_text("")
     (root / "physics" / "_compile.py").write_text("import numba\n")
+    for name in ("ball_bearing", "ball_bearing_response"):
+        (root / "physics" / f"{name}.py").write_text("")
