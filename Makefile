@@ -9,7 +9,7 @@ OUTPUT := output/demo
 MACHINE := src/rotordrop/machine/examples/lp400.toml
 RECORDS := src/rotordrop/examples/lp400
 
-.PHONY: help demo test arithmetic lint docs bench lock clean
+.PHONY: help demo test arithmetic lint docs bench lock wheelhouse offline clean
 .DEFAULT_GOAL := help
 
 help: ## list the commands
@@ -53,8 +53,24 @@ lock: $(READY) ## renew requirements.lock from pyproject.toml
 	@$(BIN)/uv pip compile pyproject.toml --extra dev --universal --python-version 3.11 --upgrade --quiet \
 		--generate-hashes --no-emit-index-url --no-annotate --no-header >> requirements.lock
 
+wheelhouse: $(READY) ## collect into the folder wheelhouse what an installation without a network needs
+	@rm -rf wheelhouse
+	@$(BIN)/python -m pip download --quiet --disable-pip-version-check --only-binary :all: --require-hashes \
+		-r requirements.lock -d wheelhouse
+	@$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation -w wheelhouse .
+	@echo "Copy this folder with wheelhouse to a computer of the same kind and with the same Python; there: make offline"
+
+offline: ## make .venv from the folder wheelhouse, without a network
+	@test -n "$$(ls wheelhouse/rotordrop-*.whl 2>/dev/null)" || \
+		{ echo "there is no folder wheelhouse here; make it with 'make wheelhouse' where there is a network" >&2; exit 1; }
+	@"$(PYTHON)" -m venv .venv
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-index --find-links wheelhouse \
+		--require-hashes -r requirements.lock
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-index --no-deps wheelhouse/rotordrop-*.whl
+	@echo "Installed: .venv/bin/rotordrop"
+
 clean: ## remove what was built, the virtual environment included
-	rm -rf .venv output build dist docs/_build docs/generated
+	rm -rf .venv wheelhouse output build dist docs/_build docs/generated
 
 $(READY): requirements.lock pyproject.toml
 	@if [ -z "$(PYTHON)" ]; then \

@@ -5,6 +5,7 @@ Prints the verdict; writes the numbers as JSON and an offline report on request.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
     from rotordrop.estimation.estimate import Estimate
     from rotordrop.machine import Machine
+    from rotordrop.report.origin import Origin
 
 
 class Method(StrEnum):
@@ -57,6 +59,7 @@ def estimate(
         Path | None,
         typer.Option("--report", metavar="FILE", help="Write the report, one offline HTML file per drop."),
     ] = None,
+    operator: Annotated[str, typer.Option("--operator", metavar="NAME", help="Who, for the report.")] = "",
     json: JsonOption = None,
 ) -> None:
     """Estimate touchdown-bearing force and stress from recorded drops."""
@@ -81,7 +84,12 @@ def estimate(
     chosen = Tracked(quick=quick) if method is Method.tracked else Replay(fixed=fixed)
     with progress_bar("estimating") as progress:
         estimates = estimate_drops(description, read, tails, method=chosen, progress=progress)
-    _write(estimates, reports, json)
+    used = [
+        ("machine file", machine),
+        *(("record", path) for path in records),
+        *(("tail", path) for path in tail or []),
+    ]
+    _write(estimates, reports, json, _origin(used, operator))
 
 
 def _report_places(report: Path | None, records: Sequence[Path]) -> list[Path]:
@@ -103,13 +111,26 @@ def _require_calibrated(description: Machine, file: Path) -> None:
         )
 
 
-def _write(estimates: Sequence[Estimate], reports: list[Path], json: Path | None) -> None:
+def _origin(used: Sequence[tuple[str, Path]], operator: str) -> Origin:
+    from rotordrop.report.origin import Origin, UsedFile, command_line, now
+    from rotordrop.simulation.fingerprint import fingerprint
+
+    return Origin(
+        command=command_line(sys.argv[1:]),
+        files=tuple(UsedFile.of(role, path) for role, path in used),
+        operator=operator,
+        made=now(),
+        fingerprint=fingerprint(),
+    )
+
+
+def _write(estimates: Sequence[Estimate], reports: list[Path], json: Path | None, origin: Origin) -> None:
     from rotordrop.estimation.document import combined, estimate_document
     from rotordrop.report.estimate_page import estimate_page
     from rotordrop.report.page import write_page
     from rotordrop.report.terminal import print_summary
 
-    pages = [estimate_page(estimate) for estimate in estimates]
+    pages = [estimate_page(estimate, origin) for estimate in estimates]
     for page, place in zip(pages, reports, strict=False):
         write_page(page, place)
 

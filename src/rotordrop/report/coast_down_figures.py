@@ -13,6 +13,7 @@ from rotordrop.estimation.bearing_drop import AirGap
 from rotordrop.report.style import (
     BAND_FILL,
     COLOURS,
+    LOG_LABELS,
     MICRO,
     SERIES,
     add_gap_limits,
@@ -176,7 +177,7 @@ def statistics_figure(result: CoastDownResult) -> go.Figure:
             top = scale * float(np.max(result.windows.peak[..., 0]))
             figure.update_yaxes(range=[-0.15 * top, 1.1 * top], row=row)
         else:
-            figure.update_yaxes(type="log", dtick="D2", row=row)
+            figure.update_yaxes(type="log", row=row, **LOG_LABELS)
         figure.update_yaxes(title_text=axis_title(plain(label), unit), row=row, col=1)
     figure.update_xaxes(title_text=TIME, row=len(_SHOWN))
     return fit_legend(figure)
@@ -256,6 +257,6 @@ def coast_down_speed_figure(result: CoastDownResult) -> go.Figure:
         )
     if result.standstill_time is not None:
         figure.add_vline(x=result.standstill_time, line={"color": SERIES[4], "width": 1, "dash": "dash"})
-    figure.update_yaxes(title_text=f"{axis_title('speed', 'Hz')}, × 60 in rpm", type="log")
+    figure.update_yaxes(title_text=f"{axis_title('speed', 'Hz')}, × 60 in rpm", type="log", **LOG_LABELS)
     figure.update_xaxes(title_text=TIME)
     return fit_legend(figure)

@@ -11,7 +11,17 @@ from numpy.typing import NDArray
 
 from rotordrop.model.campbell import CampbellDiagram
 from rotordrop.model.critical_speeds import CriticalSpeedMap
-from rotordrop.report.style import INK, MUTED, SERIES, axis_title, fit_legend, panels, plain, single
+from rotordrop.report.style import (
+    INK,
+    LOG_LABELS,
+    MUTED,
+    SERIES,
+    axis_title,
+    fit_legend,
+    panels,
+    plain,
+    single,
+)
 
 Array = NDArray[np.float64]
 TURN = 2.0 * math.pi
@@ -56,7 +66,7 @@ def critical_speed_figure(found: CriticalSpeedMap) -> go.Figure:
     figure.update_xaxes(
         title_text=axis_title("equivalent stiffness", "N/m"), type="log", exponentformat="power", dtick=1
     )
-    figure.update_yaxes(type="log", range=[1.0, math.log10(1000.0)], dtick="D2")
+    figure.update_yaxes(type="log", range=[1.0, math.log10(1000.0)], **LOG_LABELS)
     what = "natural frequency" if found.whirl == "standstill" else "critical speed"
     figure.update_yaxes(title_text=axis_title(what, "Hz"), col=1)
     return fit_legend(figure)

@@ -21,6 +21,9 @@ from rotordrop.report.time_panels import Panel, time_panels
 
 EARLY = 0.04
 """Window [s] around the first contacts that gets figures of its own."""
+AROUND_PEAK = (2e-3, 4e-3)
+"""Stretch before and after a peak [s] that gets a figure of its own."""
+
 MEGA = 1e-6
 PER_TURN = 1.0 / (2.0 * math.pi)
 CARRIED = (
@@ -102,6 +105,13 @@ def _force(bearings: Sequence[BearingDrop], loads: Mapping[str, float]) -> Secti
                 caption=f"The same force in the first {1e3 * EARLY:.0f} ms.",
             )
         )
+        hardest = [[row[0].around(*AROUND_PEAK)] for row in rows]
+        figures.append(
+            Figure(
+                chart=time_panels(hardest, 1.0, "N", from_zero=True, from_power_off=False),
+                caption="The same force around its peak, where the 90 % interval can be seen.",
+            )
+        )
     return Section(heading="Bearing force", figures=tuple(figures))
 
 
@@ -140,7 +150,8 @@ def _impacts(bearings: Sequence[BearingDrop]) -> Section:
     force = hit[0].impact_force
     figure = Figure(
         chart=impact_figure(hit, force=force),
-        caption=f"Peak {force} of every impact over its place on the race; −90° is the bottom.",
+        caption=f"Peak {force} of every impact where it hit the race, seen from the last bearing; −90° is "
+        "the bottom, the distance from the centre is the force, the bar its 90 % interval.",
     )
     table = impact_table(hit, force=force)
     return Section(heading="Impacts", statements=reasons, figures=(figure,), tables=(table,))

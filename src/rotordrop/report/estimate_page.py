@@ -8,7 +8,7 @@ import numpy as np
 
 from rotordrop._version import __version__
 from rotordrop.estimation.bearing_drop import History
-from rotordrop.estimation.estimate import CrossCheck, Estimate, Innovations, ReplaySteps
+from rotordrop.estimation.estimate import CrossCheck, Estimate, FittedParameter, Innovations, ReplaySteps
 from rotordrop.estimation.methods import Replay
 from rotordrop.report.content import (
     SIMULATED_RECORD,
@@ -22,7 +22,9 @@ from rotordrop.report.content import (
 from rotordrop.report.drop_sections import drop_sections, speed_figure, static_limit_statement
 from rotordrop.report.estimate_numbers import headline_card, identified_table
 from rotordrop.report.innovations import innovations_figure, nis_figure, whiteness_figure
-from rotordrop.report.machine_sections import defaults_section, weight_shares
+from rotordrop.report.inspection import assumptions_section, inspection_section, limits_section
+from rotordrop.report.machine_sections import defaults_section, drawing_section, weight_shares
+from rotordrop.report.origin import Origin, event_date
 from rotordrop.report.parameters import ParameterRow, parameter_figure, parameter_table
 from rotordrop.report.quantity import Quantity, written
 from rotordrop.report.record_quality import quality_statements, record_quality_section
@@ -41,13 +43,15 @@ PRIOR_NOTE = (
 )
 
 
-def estimate_page(estimate: Estimate) -> ReportContent:
+def estimate_page(estimate: Estimate, origin: Origin | None = None) -> ReportContent:
     """Build the report on one recorded drop, followed or replayed.
 
     Parameters
     ----------
     estimate : Estimate
-        Everything the page says comes from it.
+        Everything the page says of the drop comes from it.
+    origin : Origin, optional
+        Who made it, when, by which command, from which files.
     """
     speed = Quantity(value=estimate.speed, kind="speed", digits=4)
     replayed = isinstance(estimate.method, Replay)
@@ -59,7 +63,7 @@ def estimate_page(estimate: Estimate) -> ReportContent:
         verdict=_verdict(estimate),
         cards=tuple(headline_card(b, certain=estimate.consistent) for b in estimate.bearings),
         summary=(identified_table(estimate.bearings, taken_over=fixed, certain=estimate.consistent),),
-        facts=_facts(estimate),
+        facts=(*_facts(estimate), *(origin or Origin()).facts(estimate.record.sha256)),
         sections=_sections(estimate),
     )
 
@@ -107,6 +111,7 @@ def _facts(estimate: Estimate) -> tuple[tuple[str, str], ...]:
         ("machine", machine.name if path is None else f"{machine.name} ({path.name})"),
         ("record", estimate.name if record.path is None else record.path.name),
         ("SHA-256", record.sha256 or "not from a file"),
+        *((("event", event),) if (event := event_date(record)) else ()),
         ("power-off", f"{power_off.text} in record time (90 %: {power_off.interval_text})"),
         ("method", _method(estimate)),
         *(() if estimate.replay is None else (("intervals", _draws(estimate.replay)),)),
@@ -146,7 +151,11 @@ def _sections(estimate: Estimate) -> tuple[Section, ...]:
         *_speed(estimate),
         *_consistency(estimate),
         *_cross_check(estimate.cross_check),
+        inspection_section(estimate),
+        limits_section(estimate),
         record_quality_section(estimate.findings),
+        drawing_section(estimate.machine),
+        assumptions_section(),
         *defaults_section(estimate.machine),
     )
 
@@ -158,7 +167,7 @@ def _parameters(estimate: Estimate) -> Section:
         kind = one.row.display_kind
         rows[one.scope].append(
             ParameterRow(
-                name=one.path,
+                name=spoken(one),
                 prior=Quantity.of(one.prior, kind),
                 estimate=Quantity.of(one.estimate, kind, range_only=not estimate.consistent),
                 verdict=one.estimate.status,
@@ -184,6 +193,13 @@ def _parameters(estimate: Estimate) -> Section:
         else ()
     )
     return Section(heading="Parameters", text=text, figures=(figure,), tables=tuple(tables))
+
+
+def spoken(one: FittedParameter) -> str:
+    """Name of an unknown for people: what it belongs to, and what it is."""
+    if one.row.owner == "unbalance":
+        return f"{one.row.label} of unbalance {int(one.owner) + 1}" if one.owner.isdigit() else one.row.label
+    return f"{one.owner}: {one.row.label}" if one.owner else one.row.label
 
 
 def _sensors(estimate: Estimate) -> Table:

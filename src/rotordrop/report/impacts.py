@@ -11,10 +11,10 @@ import plotly.graph_objects as go
 from rotordrop.estimation.bearing_drop import BearingDrop, Impact
 from rotordrop.report.content import Table
 from rotordrop.report.quantity import Quantity
-from rotordrop.report.style import axis_title, panels, single
+from rotordrop.report.style import MUTED, axis_title, panels, single
 
 LISTED = 24
-LATE, EARLY, INTERVAL = "#9cc3e8", "#0b3d73", "#7a8896"
+LATE, EARLY, INTERVAL, RING = "#9cc3e8", "#0b3d73", "#5b6875", "#cbd4dc"
 
 
 def impact_table(bearings: Sequence[BearingDrop], *, force: str, listed: int = LISTED) -> Table:
@@ -61,22 +61,26 @@ def impact_table(bearings: Sequence[BearingDrop], *, force: str, listed: int = L
     )
 
 
-def tick_spacing(span: float) -> float:
-    """Distance of azimuth ticks [°] for azimuths that span an angle [rad]: three labels at least."""
-    return next((step for step in (15.0, 30.0, 45.0) if math.degrees(span) <= 6.0 * step), 90.0)
-
-
 def impact_figure(bearings: Sequence[BearingDrop], *, force: str) -> go.Figure:
-    """Draw the peak force of every impact over its azimuth, the earlier the darker, with known intervals."""
-    figure = panels([bearing.name for bearing in bearings], height=310)
+    """Draw the peak force of every impact round the race as it was hit, with known intervals.
+
+    The distance from the centre is the force, on the same scale for all bearings; the earlier the darker.
+    """
+    figure = panels([bearing.name for bearing in bearings], height=420, spacing=0.1)
     impacts = [impact for bearing in bearings for impact in bearing.impacts]
     latest = max(impact.peak_time for impact in impacts)
+    highest = max((impact.peak_force.interval_90 or (0.0, impact.peak_force.value))[1] for impact in impacts)
+    rings = ring_forces(highest)
     for column, bearing in enumerate(bearings, start=1):
+        _add_rings(figure, rings, column)
         _add_impacts(figure, bearing.impacts, column)
-    figure.update_xaxes(title_text=axis_title("azimuth from +x, −90° at the bottom", "°"))
-    figure.update_xaxes(tick0=0, dtick=tick_spacing(np.ptp([impact.azimuth for impact in impacts])))
-    figure.update_yaxes(title_text=axis_title(f"peak {force}", "N"), col=1)
-    figure.update_yaxes(rangemode="tozero")
+        reach = 1.12 * rings[-1]
+        anchor = "x" if column == 1 else f"x{column}"
+        figure.update_yaxes(scaleanchor=anchor, constrain="domain", range=[-reach, reach], col=column)
+        figure.update_xaxes(constrain="domain", range=[-reach, reach], col=column)
+    bare = {"showticklabels": False, "ticks": "", "showgrid": False, "showline": False}
+    figure.update_xaxes(title_text=axis_title(f"peak {force}, from the centre", "N"), **bare)
+    figure.update_yaxes(**bare)
     figure.update_layout(
         coloraxis={
             "colorscale": [[0.0, EARLY], [1.0, LATE]],
@@ -92,28 +96,68 @@ def impact_figure(bearings: Sequence[BearingDrop], *, force: str) -> go.Figure:
     return figure
 
 
+def ring_forces(highest: float) -> list[float]:
+    """Forces of the rings [N]: three to five round numbers, the last above the highest force."""
+    step = 10.0 ** math.floor(math.log10(highest))
+    step = next(size * step for size in (0.2, 0.5, 1.0, 2.0, 5.0) if highest <= 5.0 * size * step)
+    return [step * number for number in range(1, math.ceil(highest / step) + 1)]
+
+
+def _add_rings(figure: go.Figure, rings: Sequence[float], column: int) -> None:
+    """Rings of equal force with their numbers, and azimuths every 45 degrees."""
+    axes = {"xref": "x" if column == 1 else f"x{column}", "yref": "y" if column == 1 else f"y{column}"}
+    line = {"color": RING, "width": 1}
+    at = math.radians(67.5)  # between two azimuths, where no number stands
+    for force in rings:
+        ends = {"x0": -force, "x1": force, "y0": -force, "y1": force}
+        figure.add_shape(type="circle", line=line, layer="below", **ends, **axes)
+        place = {"x": force * math.cos(at), "y": force * math.sin(at)}
+        words = f"{force:,.6g}".replace(",", "\u202f")
+        figure.add_annotation(text=words, showarrow=False, font={"size": 11, "color": MUTED}, **place, **axes)
+    for degrees in range(0, 360, 45):
+        x, y = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+        figure.add_shape(
+            type="line", x0=0, y0=0, x1=rings[-1] * x, y1=rings[-1] * y, line=line, layer="below", **axes
+        )
+        words = f"{degrees if degrees <= 180 else degrees - 360}°".replace("-", "−")
+        figure.add_annotation(
+            x=1.06 * rings[-1] * x,
+            y=1.06 * rings[-1] * y,
+            text=words,
+            showarrow=False,
+            font={"size": 11},
+            **axes,
+        )
+
+
 def _add_impacts(figure: go.Figure, impacts: Sequence[Impact], column: int) -> None:
     force = np.array([impact.peak_force.value for impact in impacts])
+    azimuth = np.array([impact.azimuth for impact in impacts])
     time = np.array([1e3 * impact.peak_time for impact in impacts])
-    limits = np.array([impact.peak_force.interval_90 or (np.nan, np.nan) for impact in impacts]).reshape(
-        -1, 2
-    )
-    known = np.all(np.isfinite(limits), axis=1)
-    error = {
-        "type": "data",
-        "symmetric": False,
-        "array": single(np.where(known, limits[:, 1] - force, 0.0)),
-        "arrayminus": single(np.where(known, force - limits[:, 0], 0.0)),
-        "thickness": 1,
-        "width": 3,
-        "color": INTERVAL,  # else it would be taken from the marker's, which is a row of numbers
-        "visible": bool(known.any()),
-    }
+    bars: list[list[float]] = []
+    for impact in impacts:
+        if impact.peak_force.interval_90 is not None:
+            bars += [[limit, impact.azimuth] for limit in impact.peak_force.interval_90]
+            bars.append([math.nan, math.nan])
+    if bars:
+        limit, at = np.array(bars).T
+        figure.add_trace(
+            go.Scatter(
+                x=single(limit * np.cos(at)),
+                y=single(limit * np.sin(at)),
+                mode="lines",
+                line={"color": INTERVAL, "width": 1.4},
+                showlegend=False,
+                hoverinfo="skip",
+                name="90 % interval",
+            ),
+            row=1,
+            col=column,
+        )
     figure.add_trace(
         go.Scatter(
-            x=single(np.degrees([impact.azimuth for impact in impacts])),
-            y=single(force),
-            error_y=error,
+            x=single(force * np.cos(azimuth)),
+            y=single(force * np.sin(azimuth)),
             mode="markers",
             marker={
                 "color": single(time),
@@ -121,9 +165,11 @@ def _add_impacts(figure: go.Figure, impacts: Sequence[Impact], column: int) -> N
                 "size": 8,
                 "line": {"color": "#ffffff", "width": 0.6},
             },
-            customdata=single(time),
+            customdata=np.stack([force, np.degrees(azimuth), time], axis=1).astype(np.float32),
             showlegend=False,
-            hovertemplate="%{y:.0f} N at %{x:.0f}°, %{customdata:.2f} ms<extra></extra>",
+            name="impacts",
+            hovertemplate="%{customdata[0]:.0f} N at %{customdata[1]:.0f}°, "
+            "%{customdata[2]:.2f} ms<extra></extra>",
         ),
         row=1,
         col=column,

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from rotordrop._version import __version__
-from rotordrop.report.content import Card, Cell, Figure, KeyFigure, ReportContent, Section, Statement, Table
-from rotordrop.report.machine_sections import defaults_section
+from rotordrop.report.content import Card, Cell, KeyFigure, ReportContent, Statement, Table
+from rotordrop.report.machine_sections import defaults_section, drawing_section
 from rotordrop.report.quantity import Quantity
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def machine_content(
             _mode_table(summary),
             *(() if drawn else tables),
         ),
-        sections=(_drawing(machine), *open_values) if drawn else (),
+        sections=(drawing_section(machine), *open_values) if drawn else (),
     )
 
 
@@ -153,13 +153,6 @@ def _mode_table(summary: MachineSummary) -> Table:
 def _frequencies(values: Iterable[float], count: int) -> list[Quantity]:
     listed = [float(value) for value in values]
     return [Quantity(value=value, kind="frequency") for value in listed + [math.nan] * (count - len(listed))]
-
-
-def _drawing(machine: Machine) -> Section:
-    from rotordrop.report.rotor_drawing import rotor_figure
-
-    caption = "The rotor to scale. Bearings, AMBs and sensors stand at their nodes."
-    return Section(heading="Rotor", figures=(Figure(chart=rotor_figure(machine), caption=caption),))
 
 
 def machine_json(

@@ -39,6 +39,14 @@ def friction_section(machine: Machine) -> Section:
     return Section(heading="Friction law", figures=(figure,))
 
 
+def drawing_section(machine: Machine) -> Section:
+    """The rotor to scale with everything that sits on it."""
+    from rotordrop.report.rotor_drawing import rotor_figure
+
+    caption = "The rotor to scale. Bearings, AMBs and sensors stand at their nodes."
+    return Section(heading="Rotor", figures=(Figure(chart=rotor_figure(machine), caption=caption),))
+
+
 def defaults_section(machine: Machine) -> tuple[Section, ...]:
     """Values of the machine that were defaulted or inferred, with the reason; empty where all were given."""
     tables = tuple(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
@@ -14,6 +15,7 @@ from rotordrop.report.style import (
     MICRO,
     MILLI,
     axis_title,
+    compared_style,
     fit_legend,
     line_style,
     panels,
@@ -40,8 +42,9 @@ def orbit_figure(bearings: Sequence[BearingMotions | BearingDrop]) -> go.Figure:
     """
     figure = panels([b.name for b in bearings], height=470, spacing=0.12)
     for column, bearing in enumerate(bearings, start=1):
-        for motion in bearing.motions:
-            _add_orbit(figure, motion, column)
+        compared = len(bearing.motions) > 1
+        for motion in sorted(bearing.motions, key=lambda one: compared and one.role == "measured"):
+            _add_orbit(figure, motion, column, compared_style(motion.role) if compared else None)
         _add_circle(figure, bearing, column)
         anchor, reach = "x" if column == 1 else f"x{column}", _reach(bearing)
         figure.update_yaxes(scaleanchor=anchor, constrain="domain", range=[-reach, reach], row=1, col=column)
@@ -51,7 +54,7 @@ def orbit_figure(bearings: Sequence[BearingMotions | BearingDrop]) -> go.Figure:
     return fit_legend(figure)
 
 
-def _add_orbit(figure: go.Figure, motion: Motion, column: int) -> None:
+def _add_orbit(figure: go.Figure, motion: Motion, column: int, line: dict[str, Any] | None) -> None:
     x, y = motion.displacement[:, 0], motion.displacement[:, 1]
     radius = np.hypot(x, y)
     chosen = peak_indices(x, y, radius, blocks=ORBIT_BLOCKS)
@@ -65,7 +68,7 @@ def _add_orbit(figure: go.Figure, motion: Motion, column: int) -> None:
             name=label,
             legendgroup=label,
             showlegend=column == 1,
-            line=line_style(motion.role),
+            line=line or line_style(motion.role),
             hovertemplate=f"x %{{x:.1f}} µm, y %{{y:.1f}} µm at %{{customdata:.2f}} ms<extra>{label}</extra>",
         ),
         row=1,

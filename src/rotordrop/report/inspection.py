@@ -1,0 +1,127 @@
+"""What to do next at the machine, and why: a suggestion from the numbers of one drop, never an acceptance."""
+
+from __future__ import annotations
+
+from rotordrop.estimation.bearing_drop import BearingDrop
+from rotordrop.estimation.estimate import Estimate
+from rotordrop.machine.ball_bearing import STATIC_STRESS
+from rotordrop.report.content import Section, Statement, Table
+from rotordrop.report.quantity import Quantity
+
+SCOPE = (
+    "A suggestion from this drop alone. How many drops a set of touchdown bearings may take, and what is "
+    "inspected after each, is for maker and operator to agree (ISO 14839-5:2022, condition monitoring and "
+    "inspection); no such limit was given here."
+)
+
+
+def inspection_section(estimate: Estimate) -> Section:
+    """Suggest the next step of inspection, the gravest reason first."""
+    return Section(
+        heading="Suggested inspection",
+        text=(SCOPE,),
+        statements=(*_reasons(estimate), _lift_check(estimate)),
+    )
+
+
+def _reasons(estimate: Estimate) -> list[Statement]:
+    found = []
+    if not estimate.consistent:
+        found.append(
+            Statement(
+                level="bad",
+                text="Before anything is concluded from force or stress: check machine file and record "
+                "against each other (data quality, sensors, air gap), and estimate again. The loads of this "
+                "drop are known as ranges only.",
+            )
+        )
+    found += [_indented(bearing) for bearing in estimate.bearings if _highest(bearing) >= STATIC_STRESS]
+    found += [
+        Statement(
+            level="warning",
+            text=f"{one.bearing}: look at the rest of the record before the next start. The rotor went "
+            f"further out at {one.later_time:.3g} s than in the part that was estimated, so that the largest "
+            "load may not be among these numbers.",
+        )
+        for one in estimate.later
+        if one.larger
+    ]
+    return found
+
+
+def _highest(bearing: BearingDrop) -> float:
+    return (bearing.peak_stress.interval_90 or (0.0, bearing.peak_stress.value))[1]
+
+
+def _indented(bearing: BearingDrop) -> Statement:
+    highest = Quantity(value=_highest(bearing), kind="pressure", digits=3).text
+    limit = Quantity(value=STATIC_STRESS, kind="pressure").text
+    return Statement(
+        level="warning",
+        text=f"{bearing.name}: look at balls and raceways for indentations before the next start. The peak "
+        f"stress may be as high as {highest}; from {limit} on ISO 76 expects a permanent indentation of a "
+        "ten-thousandth of the ball diameter.",
+    )
+
+
+def _lift_check(estimate: Estimate) -> Statement:
+    gaps = "; ".join(
+        f"{bearing.name} {Quantity.of(bearing.values['air_gap_m'], 'length').text}"
+        if "air_gap_m" in bearing.values
+        else f"{bearing.name} {1e6 * bearing.air_gap.upper:.0f} µm"
+        for bearing in estimate.bearings
+        if bearing.air_gap is not None
+    )
+    return Statement(
+        text="At the next standstill: a lift check (push the rotor round its touchdown bearings, record it, "
+        f"'rotordrop clearance'). A gap that differs from the one found here ({gaps}) is wear or a sensor "
+        "that has moved; turning each bearing by hand shows whether it still runs."
+    )
+
+
+def limits_section(estimate: Estimate) -> Section:
+    """What the numbers were compared with, and where each limit comes from."""
+    rows = [
+        (
+            "stress at which ISO 76 defines the static load rating of ball bearings",
+            Quantity(value=STATIC_STRESS, kind="pressure"),
+            "information; no acceptance limit was given",
+        )
+    ]
+    if estimate.innovations is not None:
+        low, high = estimate.innovations.limits
+        rows.append(
+            (
+                "mean normalised innovation squared of a model that fits its record",
+                Quantity(value=high, kind="dimensionless", interval_90=(low, high), range_only=True),
+                "whether single numbers are stated",
+            )
+        )
+    rows += [
+        (
+            f"difference from the independent cross-check, {check.name}",
+            Quantity(value=check.accuracy, kind="share", digits=2),
+            "its known accuracy; beyond it a warning is given",
+        )
+        for check in estimate.cross_check
+        if not check.replaced
+    ]
+    table = Table(columns=("limit", "value", "what it decides"), rows=tuple(rows), caption="Limits used")
+    return Section(heading="Limits used", tables=(table,))
+
+
+ASSUMED = (
+    "The rotor is linear: beam elements, reduced to its lowest modes and its shapes under bearing loads.",
+    "Rotor and touchdown bearings move in the planes of the bearings; tilt of the races and axial motion are "
+    "left out.",
+    "The contact of rotor and race follows a Hertzian law with losses, friction a Stribeck law; their "
+    "parameters are among the unknowns.",
+    "The magnets carry nothing after power-off but a decaying remanent force.",
+    "Parameters the record does not determine keep their prior, inside every interval of force and stress.",
+)
+"""What every estimate takes for granted."""
+
+
+def assumptions_section() -> Section:
+    """What the estimate takes for granted."""
+    return Section(heading="Assumptions", statements=tuple(Statement(text=text) for text in ASSUMED))

@@ -1,0 +1,93 @@
+"""Where a report comes from: who made it, when, by which command, from which files, on which arithmetic."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from rotordrop.measurement.record import Record, sha256_of
+
+EVENT_KEYS = (
+    "start",
+    "event_time",
+    "event time",
+    "trigger_time",
+    "trigger time",
+    "trigger",
+    "date",
+    "recorded",
+    "time",
+)
+"""Header entries of recorders that say when the drop was."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class UsedFile:
+    """A file that went into a result: what for, its name, and the SHA-256 of its bytes."""
+
+    role: str
+    name: str
+    sha256: str
+
+    @classmethod
+    def of(cls, role: str, path: Path) -> UsedFile:
+        """Take the hash of a file."""
+        return cls(role=role, name=path.name, sha256=sha256_of(path))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Origin:
+    """What a report says of its own making, beside the result.
+
+    Attributes
+    ----------
+    command : str
+        The command, or the lines of Python, that make the same numbers again.
+    files : tuple of UsedFile
+        Machine, record, tail and whatever else was read.
+    operator : str
+        Who made it; empty where nobody said.
+    made : str
+        When, in UTC.
+    fingerprint : str
+        That of the arithmetic of this computer; empty where it was not taken.
+    """
+
+    command: str = ""
+    files: tuple[UsedFile, ...] = ()
+    operator: str = ""
+    made: str = ""
+    fingerprint: str = ""
+
+    def facts(self, told_of: str = "") -> tuple[tuple[str, str], ...]:
+        """Lines for a report; what is not known is left out, and the file of a hash that was told of."""
+        told = [("report made", self.made), ("by", self.operator), ("command", self.command)]
+        told += [
+            (file.role, f"{file.name}, SHA-256 {file.sha256}")
+            for file in self.files
+            if file.sha256 != told_of
+        ]
+        told.append(("arithmetic", f"fingerprint {self.fingerprint[:16]}" if self.fingerprint else ""))
+        return tuple((name, text) for name, text in told if text)
+
+
+def now() -> str:
+    """Give this minute in UTC, as a report writes it."""
+    return datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
+
+
+def command_line(arguments: Sequence[str]) -> str:
+    """The command as it can be typed again."""
+    return shlex.join(["rotordrop", *arguments])
+
+
+def event_date(record: Record) -> str:
+    """When the recorder says the drop was; empty where its header does not tell."""
+    told: Mapping[str, str] = {str(key).strip().lower(): str(value) for key, value in record.metadata.items()}
+    for key in EVENT_KEYS:
+        if any(sign.isdigit() for sign in told.get(key, "")):
+            return told[key][:40]
+    return ""
