@@ -113,6 +113,10 @@ def _score(folder: Path, estimates: Path, only: list[str], every: bool, json_fil
         out.print(_table(scores, every))
         flagged = sum(drop["consistent"] is False for drop in scores.drops)
         out.print(f"{len(scores.drops)} drops, {flagged} whose estimate calls itself not consistent.")
+        out.print(
+            f"Of {scores.departures} departures {scores.named_rightly} were named; "
+            f"{scores.named_wrongly} estimates name one that was not there."
+        )
         for name, why in scores.unscored.items():
             out.print(f"{name}: no number: {why}")
 

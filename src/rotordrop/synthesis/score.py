@@ -72,7 +72,8 @@ def score_estimate(
     Returns
     -------
     dict
-        ``method`` and ``consistent`` (what the estimate says of itself); ``drop``,
+        ``method`` and ``consistent`` (what the estimate says of itself); ``named``, what it says the machine
+        has beyond the usual model, and ``violated``, what it has; ``drop``,
         ``bearings.<name>.<quantity>`` and ``structure.<path>``, each with ``estimate``, ``truth``, ``error``,
         ``relative_error`` and, where an interval was given, ``covered`` and ``half_width``; ``impacts`` per
         bearing where the estimate lists impacts; ``coverage`` over all intervals.
@@ -99,6 +100,8 @@ def score_estimate(
             name: {path: score.as_json() for path, score in scores.items()}
             for name, scores in bearings.items()
         },
+        "named": [entry["name"] for entry in _listed(found, "structure") if "name" in entry],
+        "violated": list(known.values.get("violated", [])),
         "structure": {path: score.as_json() for path, score in structure.items()},
         "impacts": impacts,
         "coverage": _coverage(every),
@@ -168,11 +171,16 @@ def _drop_scores(estimate: Estimate, truth: Truth) -> dict[str, Score]:
 
 
 def _structure_scores(estimate: Estimate, truth: Truth) -> dict[str, Score]:
-    """Scores of structures by path, where the estimate has ``structure.<path>``."""
-    listed = estimate.get("structure")
-    listed = listed if isinstance(listed, Mapping) else {}
+    """Scores of structures by path, where the estimate lists them among its ``parameters``."""
+    listed = {entry.get("path"): entry.get("estimate") for entry in _listed(estimate, "parameters")}
     scores = {path: _score(listed.get(path), true) for path, true in truth.structure.items()}
     return {path: score for path, score in scores.items() if score is not None}
+
+
+def _listed(estimate: Estimate, key: str) -> list[Mapping[str, Any]]:
+    """Entries of a list of an estimate; none where it has no such list."""
+    listed = estimate.get(key)
+    return [entry for entry in listed if isinstance(entry, Mapping)] if isinstance(listed, list) else []
 
 
 def _at(fields: Any, path: str) -> Any:

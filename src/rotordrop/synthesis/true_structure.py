@@ -13,12 +13,12 @@ from rotordrop.synthesis.violation_parts import BearingViolations
 from rotordrop.synthesis.violations import Violations
 
 KINDS: dict[str, tuple[str, ...]] = {
-    "turned or unequal support axes": (
+    "turned support axes": (
         "support.axes_angle",
         "support.stiffness_ratio",
         "support.damping_ratio",
     ),
-    "hardening support": ("support.hardening",),
+    "cubic support": ("support.hardening",),
     "hysteretic support": ("support.slip_force",),
     "foundation mode": ("foundation.mass",),
     "contact stiffness": ("contact.stiffness",),
@@ -34,12 +34,12 @@ KINDS: dict[str, tuple[str, ...]] = {
     "bearing centres": ("centre.x", "centre.y"),
     "sensor lag": ("sensors.time_constant",),
     "cross-axis sensitivity": ("sensors.cross_axis",),
-    "sensor planes": ("sensors.plane_shift",),
-    "bracket on the housing": ("sensors.follows_housing",),
+    "sensor planes elsewhere": ("sensors.plane_shift",),
+    "brackets that follow the housing": ("sensors.follows_housing",),
     "anti-alias filter": ("sensors.anti_alias_frequency",),
     "long remanence": ("magnets.remanence_time", "magnets.remanent_lift"),
-    "unbalance": ("rotor.unbalance",),
-    "Young's modulus": ("rotor.youngs_modulus",),
+    "unbalance beyond its grade": ("rotor.unbalance",),
+    "rotor stiffness": ("rotor.youngs_modulus",),
     "unbalance jump": ("unbalance_jump.node",),
 }
 """Names of the kinds of violations, with the keys of a case file that make them."""

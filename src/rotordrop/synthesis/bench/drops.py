@@ -60,20 +60,20 @@ SPEEDS: dict[str, tuple[float, ...]] = {
 """Speeds at which each rotor is dropped, in turn [Hz]."""
 
 PAIRS: tuple[tuple[str, ...], ...] = (
-    ("turned or unequal support axes", "cross-axis sensitivity"),
+    ("turned support axes", "cross-axis sensitivity"),
     ("sensor lag", "foundation mode"),
-    ("hardening support", "long remanence"),
-    ("bracket on the housing", "turned or unequal support axes"),
-    ("friction", "unbalance"),
-    ("contact law", "sensor planes"),
+    ("cubic support", "long remanence"),
+    ("brackets that follow the housing", "turned support axes"),
+    ("friction", "unbalance beyond its grade"),
+    ("contact law", "sensor planes elsewhere"),
 )
 TRIPLES: tuple[tuple[str, ...], ...] = (
-    ("turned or unequal support axes", "cross-axis sensitivity", "sensor lag"),
+    ("turned support axes", "cross-axis sensitivity", "sensor lag"),
     ("foundation mode", "hysteretic support", "cross-axis sensitivity"),
-    ("hardening support", "turned or unequal support axes", "Young's modulus"),
-    ("bracket on the housing", "long remanence", "thermal gap"),
-    ("sensor lag", "sensor planes", "bearing centres"),
-    ("foundation mode", "turned or unequal support axes", "sensor lag"),
+    ("cubic support", "turned support axes", "rotor stiffness"),
+    ("brackets that follow the housing", "long remanence", "thermal gap"),
+    ("sensor lag", "sensor planes elsewhere", "bearing centres"),
+    ("foundation mode", "turned support axes", "sensor lag"),
 )
 RATES = (10e3, 50e3, 100e3)
 

@@ -66,8 +66,8 @@ class BenchScores:
     rows : tuple of BenchRow
         All families and quantities.
     drops : tuple of dict
-        What was scored of each drop: name, family, rotor, whether the estimate called itself consistent, and
-        the errors of its peaks.
+        What was scored of each drop: name, family, rotor, whether the estimate called itself consistent, what
+        it named and what was there, and the errors of its peaks.
     unscored : dict of str to str
         Drops without a usable estimate, with the reason; they count as missing values.
     """
@@ -76,10 +76,28 @@ class BenchScores:
     drops: tuple[dict[str, Any], ...]
     unscored: dict[str, str]
 
+    @property
+    def named_rightly(self) -> int:
+        """Departures that estimates named, of those that were there."""
+        return sum(len(set(drop["named"]) & set(drop["violated"])) for drop in self.drops)
+
+    @property
+    def departures(self) -> int:
+        """Departures that were there in the drops estimated."""
+        return sum(len(drop["violated"]) for drop in self.drops)
+
+    @property
+    def named_wrongly(self) -> int:
+        """Drops whose estimate named a departure that was not there."""
+        return sum(bool(set(drop["named"]) - set(drop["violated"])) for drop in self.drops)
+
     def as_json(self) -> dict[str, Any]:
         """Everything, ready for JSON."""
         return {
             "bench_version": VERSION,
+            "departures": self.departures,
+            "named_rightly": self.named_rightly,
+            "named_wrongly": self.named_wrongly,
             "rows": [asdict(row) for row in self.rows],
             "drops": list(self.drops),
             "unscored": self.unscored,
@@ -167,6 +185,8 @@ def _summary(name: str, family: str, rotor: str, scored: Mapping[str, Any]) -> d
         "family": family,
         "rotor": rotor,
         "consistent": scored.get("consistent"),
+        "named": scored.get("named", []),
+        "violated": scored.get("violated", []),
         "peak_errors": peaks,
     }
 
