@@ -30,6 +30,7 @@ from rotordrop.measurement.quality.motion import (
     first_motion,
     no_drop,
 )
+from rotordrop.measurement.quality.rail import check_rail
 from rotordrop.measurement.quality.recorder import check_again, check_filters, check_speed_signal
 from rotordrop.measurement.quality.tail import check_tail
 
@@ -110,7 +111,8 @@ def _check_motion(record: Record, machine: Machine, tail: Record | None) -> list
         levitated = fit_levitated(record, coarse.instant - _MARGIN, speed=coarse.speed)
     except RecordError as error:
         return [no_drop(error, record)]
-    findings += [*check_filters(record, coarse.instant), *check_again(record)]
+    # a high-pass bends a rest into what looks like a rail; what a filter explains is none
+    findings += [*check_filters(record, coarse.instant), *check_again(record)] or check_rail(record)
     if stops(findings):
         return findings
     findings += check_levitated(levitated, record)

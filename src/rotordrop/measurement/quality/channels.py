@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.measurement.quality.finding import Finding
+from rotordrop.measurement.quality.rail import zeroed
 from rotordrop.measurement.quality.recorder import bridged
 from rotordrop.measurement.recording import Array
 from rotordrop.units import format_quantity
@@ -44,7 +45,7 @@ def check_channels(record: Record) -> list[Finding]:
         if moves[index] == 0 or moves[index] < DEAD_SHARE * typical:
             findings.append(_dead(sensor.name, values, float(moves[index]), typical))
             continue
-        checks = (_stuck, _clipped, _spikes, _coarse, bridged)
+        checks = (zeroed, _stuck, _clipped, _spikes, _coarse, bridged)
         findings += [found for check in checks if (found := check(record, sensor.name, values)) is not None]
     return findings
 
