@@ -57,7 +57,7 @@ def whirl_spells(time: Array, orbit: Array, air_gap: float, *, spin: float = 1.0
     air_gap : float
         Air gap of the bearing [m].
     spin : float
-        Rotor speed, of which the sign counts: positive from x to y.
+        Rotor speed [rad/s], of which the sign counts: positive from x to y.
 
     Notes
     -----
