@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from rotordrop.estimation import tracked, tracked_estimate
+from rotordrop.estimation import simulated_coast_down, tracked, tracked_estimate
 from rotordrop.estimation.bearing_drop import Motion, deepest
 from rotordrop.estimation.calibrated import CONFOUNDED, _confounded, _values
 from rotordrop.estimation.document import _heading
 from rotordrop.estimation.estimate import Verdict
 from rotordrop.estimation.later_motion import RESOLVED, later_motion
+from rotordrop.estimation.recorded_fall import measured_drop
 from rotordrop.estimation.tracked import NOISE_FACTORS, best_noise_factor
 from rotordrop.estimation.tracked_loads import twin_impacts
 from rotordrop.estimation.tracked_parameters import (
@@ -288,3 +290,41 @@ def test_a_twin_that_fits_stands_whether_it_was_cross_checked_or_not(
     judged = tracked_estimate._judge(drop, check)
     assert judged.verdict is verdict and judged.widening == widening
     assert seen == [(consistent, widening)] and judged.given_way == (False, False)
+
+
+def test_a_measured_drop_counts_its_time_from_power_off() -> None:
+    time = np.arange(0.0, 2.0, 1e-3)
+    initial = SimpleNamespace(
+        drop_instant=1.2005,
+        settled=np.array([1.0, 2.0]),
+        deviation_of=lambda record: np.column_stack([record.time, -record.time]),
+        sensing=SimpleNamespace(at_bearings=lambda along: along[:, None, :]),
+    )
+    fall: Any = SimpleNamespace(initial=initial, record=SimpleNamespace(time=time))
+    since, moved = measured_drop(fall, 0.2)
+    assert (len(since), since[0], since[-1]) == (200, pytest.approx(0.5e-3), pytest.approx(0.1995))
+    assert moved[:, 0, 0] == pytest.approx(since + 1.2005 + 1.0)
+    assert moved[:, 0, 1] == pytest.approx(2.0 - since - 1.2005)
+
+
+def test_a_simulated_coast_down_is_seen_where_the_sensors_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At the nodes of the sensors if the file holds all of them, at the bearings otherwise."""
+    machine = example_machine("lp400")
+    nodes = {sensor.bearing: f"node {sensor.node}" for sensor in machine.sensors}
+    assert set(nodes) == {"NDE", "DE"}
+    planes = {name: name for name in (*nodes, *nodes.values())}
+    samples: Any = SimpleNamespace(
+        planes=planes,
+        air_gap={"NDE": 1e-4, "DE": 2e-4},
+        speed=np.linspace(300.0, 200.0, 5000),
+        sampling_rate=1e3,
+    )
+    result: Any = SimpleNamespace(standstill_time=None, maxima=tuple)
+    monkeypatch.setattr(simulated_coast_down, "load_coast_down", lambda path: result)
+    monkeypatch.setattr(simulated_coast_down, "open_samples", lambda path: samples)
+    seen = simulated_coast_down.simulated_coast_down(Path("c.h5"), machine)
+    assert dict(seen.planes) == nodes and seen.air_gap == samples.air_gap
+    assert dict(simulated_coast_down.simulated_coast_down(Path("c.h5")).planes) == {n: n for n in nodes}
+    del planes[nodes["DE"]]
+    assert set(simulated_coast_down.simulated_coast_down(Path("c.h5"), machine).planes) == set(nodes)
+    assert seen.profile.speed_at([0.0])[0] == pytest.approx(300.0) and not seen.recorded

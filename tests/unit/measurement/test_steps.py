@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rotordrop.errors import RecordError
 from rotordrop.measurement.events import _first
 from rotordrop.measurement.look.motion import _floating
 from rotordrop.measurement.quality.motion import _strongest_line
+from rotordrop.measurement.unpacking import MEMORY, UNPACKED_PER_BYTE, refuse_bomb
 
 RATE = 5000.0
 
@@ -65,3 +67,17 @@ def test_a_line_stands_out_at_fifty_times_the_median_power(over_median: float, f
     assert (line is not None) == found
     if line is not None:
         assert line[0] == pytest.approx(300.3, abs=0.2) and line[1] == pytest.approx(1.0)
+
+
+def test_what_a_small_file_may_unpack_to_fits_twice_into_the_memory_of_its_reader() -> None:
+    """Once as the library holds it, once as it is handed over; a large file may hold 200 times its size."""
+    half = MEMORY // 2 // 8
+    refuse_bomb(half, 1000, "small.mat")
+    with pytest.raises(
+        RecordError, match=rf"small\.mat claims {half + 1} samples in 1000 bytes; it is damaged"
+    ):
+        refuse_bomb(half + 1, 1000, "small.mat")
+    size = MEMORY
+    refuse_bomb(UNPACKED_PER_BYTE * size // 8, size, "large.mat")
+    with pytest.raises(RecordError, match=r"large\.mat claims"):
+        refuse_bomb(UNPACKED_PER_BYTE * size // 8 + 1, size, "large.mat")
