@@ -16,7 +16,6 @@ from rotordrop.estimation.calibrated import CONFOUNDED, _confounded, _values
 from rotordrop.estimation.document import _heading
 from rotordrop.estimation.estimate import Verdict
 from rotordrop.estimation.later_motion import RESOLVED, later_motion
-from rotordrop.estimation.recorded_fall import measured_drop
 from rotordrop.estimation.tracked import NOISE_FACTORS, best_noise_factor
 from rotordrop.estimation.tracked_loads import twin_impacts
 from rotordrop.estimation.tracked_parameters import (
@@ -203,7 +202,7 @@ def test_the_rest_of_the_record_counts_above_the_noise_of_the_sensors(
     monkeypatch.setattr(tracked_estimate, "_measured", lambda *_: np.ones((400, 2, 2)))
     evidence = SimpleNamespace(time=time, readings=lambda until: np.zeros((400, 4)))
     drop: Any = SimpleNamespace(
-        prepared=SimpleNamespace(evidence=evidence),
+        evidence=evidence,
         problem=SimpleNamespace(model=problem.model, time=time[:200], variances=problem.variances),
     )
     judged: Any = None
@@ -290,21 +289,6 @@ def test_a_twin_that_fits_stands_whether_it_was_cross_checked_or_not(
     judged = tracked_estimate._judge(drop, check)
     assert judged.verdict is verdict and judged.widening == widening
     assert seen == [(consistent, widening)] and judged.given_way == (False, False)
-
-
-def test_a_measured_drop_counts_its_time_from_power_off() -> None:
-    time = np.arange(0.0, 2.0, 1e-3)
-    initial = SimpleNamespace(
-        drop_instant=1.2005,
-        settled=np.array([1.0, 2.0]),
-        deviation_of=lambda record: np.column_stack([record.time, -record.time]),
-        sensing=SimpleNamespace(at_bearings=lambda along: along[:, None, :]),
-    )
-    fall: Any = SimpleNamespace(initial=initial, record=SimpleNamespace(time=time))
-    since, moved = measured_drop(fall, 0.2)
-    assert (len(since), since[0], since[-1]) == (200, pytest.approx(0.5e-3), pytest.approx(0.1995))
-    assert moved[:, 0, 0] == pytest.approx(since + 1.2005 + 1.0)
-    assert moved[:, 0, 1] == pytest.approx(2.0 - since - 1.2005)
 
 
 def test_a_simulated_coast_down_is_seen_where_the_sensors_are(monkeypatch: pytest.MonkeyPatch) -> None:
