@@ -46,8 +46,8 @@ def test_the_head_names_the_drop(
     assert document["record_sha256"] == synthetic.record.sha256
     assert document["speed_Hz"] == pytest.approx(60.0, abs=0.05)
     off = float(synthetic.truth["t_off_in_record_s"])
-    assert document["drop_instant_s"] == workshop.evidence.instant.value == pytest.approx(off, abs=5e-4)
-    assert tuple(document["drop_instant_interval_90_s"]) == workshop.evidence.instant.interval_90
+    assert document["drop_instant_s"] == workshop.evidence.power_off.value == pytest.approx(off, abs=5e-4)
+    assert tuple(document["drop_instant_interval_90_s"]) == workshop.evidence.power_off.interval_90
     assert document["estimated_until_s"] == workshop.problem.time[-1] == pytest.approx(0.2, abs=1e-4)
     assert (document["method"], document["quick"], document["simulated_record"]) == ("tracked", False, True)
     judged = document["consistency"]
