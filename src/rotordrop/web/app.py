@@ -238,8 +238,10 @@ def _asked_window(folder: Path, request: Request) -> tuple[Traces, list[int], fl
 
 @lru_cache(maxsize=64)
 def _traces_of(folder: Path) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads((folder / "page.json").read_text(encoding="utf-8"))["traces"]
-    return found
+    found: dict[str, Any] = json.loads((folder / "page.json").read_text(encoding="utf-8"))
+    if "traces" not in found:
+        raise NotThereError("this result has no histories")
+    return dict(found["traces"])
 
 
 def _number(request: Request, name: str, usual: float) -> float:

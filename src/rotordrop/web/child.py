@@ -1,4 +1,4 @@
-"""The child process of the page: sets its own limits, reads the files of a job, looks or estimates.
+"""The child process of the page: sets its own limits, reads the files of a job, computes.
 
 It writes what it is at into the state file and what it found into a folder that appears whole; it answers to
 nobody, so that neither page nor server has to be there when it ends.
@@ -10,6 +10,7 @@ import os
 import sys
 import time
 import tomllib
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -24,9 +25,9 @@ if TYPE_CHECKING:
     from rotordrop.machine import Machine
     from rotordrop.measurement.record import Record
 
-MEMORY: dict[str, int] = {"look": 2 * 2**30, "estimate": 8 * 2**30}
+MEMORY: dict[str, int] = {"look": 2 * 2**30, "estimate": 8 * 2**30, "waterfall": 8 * 2**30}
 MEMORY_PER_BYTE = 40
-CPU_S: dict[str, int] = {"look": 300, "estimate": 4 * 3600}
+CPU_S: dict[str, int] = {"look": 300, "estimate": 4 * 3600, "waterfall": 4 * 3600}
 BETWEEN_WORDS_S = 0.3
 
 
@@ -39,7 +40,7 @@ def main(order: dict[str, Any]) -> None:
         _limit(job, verb)
         made = job.path / f"{verb}.part-{told['run']}"
         made.mkdir()
-        (_look if verb == "look" else _estimate)(job, made, told)
+        _WORK[verb](job, made, told)
         publish(job, verb, told["run"], made)
         ended = {"state": "done", "fraction": 1.0, "stage": ""}
     except RotordropError as error:
@@ -140,37 +141,59 @@ def _look(job: Job, made: Path, told: dict[str, Any]) -> None:
     write_look(replace(seen, record=named(seen.record, job, "record")), job, made, options)
 
 
-def _estimate(job: Job, made: Path, told: dict[str, Any]) -> None:
-    from rotordrop.estimation import Replay, Tracked, estimate_drop
-    from rotordrop.web.drawn import write_estimate
-
-    last = [0.0]
+def _told_progress(job: Job, verb: Verb, told: dict[str, Any]) -> Callable[[str, float], None]:
+    """A function that keeps stage and share in the state file, now and then."""
+    running, last = state_of(job, verb) or told, [0.0]
 
     def progress(stage: str, fraction: float) -> None:
         now = time.monotonic()
         if now - last[0] >= BETWEEN_WORDS_S:
             last[0] = now
-            write_json(
-                state_file(job, "estimate"), {**running, "stage": stage, "fraction": round(fraction, 4)}
-            )
+            write_json(state_file(job, verb), {**running, "stage": stage, "fraction": round(fraction, 4)})
 
-    running = state_of(job, "estimate") or told
-    options = told["options"]
-    progress("reading machine and record", 0.0)
+    return progress
+
+
+def _machine_and_record(job: Job) -> tuple[Machine, Record]:
     machine = machine_of(job)
     if machine is None:
-        raise UsageError("an estimate needs the machine file; drop it on the page beside the record")
+        raise UsageError("this needs the machine file; drop it on the page beside the record")
     record = record_of(job, machine, "record")
     if record is None:
         raise UsageError("no record was sent; drop one on the page")
+    return machine, record
+
+
+def _estimate(job: Job, made: Path, told: dict[str, Any]) -> None:
+    from rotordrop.estimation import Replay, Tracked, estimate_drop
+    from rotordrop.web.drawn import write_estimate
+
+    progress = _told_progress(job, "estimate", told)
+    progress("reading machine and record", 0.0)
+    machine, record = _machine_and_record(job)
+    options, tail = told["options"], record_of(job, machine, "tail")
     method = Replay() if options.get("method") == "replay" else Tracked(quick=bool(options.get("quick")))
-    estimate = estimate_drop(
-        machine,
-        record,
-        record_of(job, machine, "tail"),
-        method=method,
-        name=job.read()["name"],
-        progress=progress,
-    )
+    name = job.read()["name"]
+    estimate = estimate_drop(machine, record, tail, method=method, name=name, progress=progress)
     progress("drawing", 1.0)
     write_estimate(estimate, job, made, options)
+
+
+def _waterfall(job: Job, made: Path, told: dict[str, Any]) -> None:
+    from rotordrop.estimation.recorded_coast_down import recorded_coast_down, with_found_air_gaps
+    from rotordrop.spectrum.coast_down import analyse_coast_down
+    from rotordrop.spectrum.machine_candidates import machine_candidates
+    from rotordrop.web.drawn import write_waterfall
+
+    progress = _told_progress(job, "waterfall", told)
+    progress("reading machine and record", 0.0)
+    machine, record = _machine_and_record(job)
+    signal = recorded_coast_down(machine, record)
+    planes = {name: name for name in signal.planes}
+    candidates = machine_candidates(with_found_air_gaps(machine, signal), planes)
+    found = analyse_coast_down(signal, candidates, progress=progress)
+    progress("drawing", 1.0)
+    write_waterfall(found, machine, record, made)
+
+
+_WORK = {"look": _look, "estimate": _estimate, "waterfall": _waterfall}

@@ -26,8 +26,11 @@ from rotordrop.web.workspace import Job
 if TYPE_CHECKING:
     from rotordrop.estimation.bearing_drop import BearingDrop
     from rotordrop.estimation.estimate import Estimate
+    from rotordrop.machine import Machine
     from rotordrop.measurement.look import Look
+    from rotordrop.measurement.record import Record
     from rotordrop.report.time_panels import Panel
+    from rotordrop.spectrum.coast_down import CoastDownAnalysis
 
 Array = NDArray[np.float64]
 SYSTEMS: tuple[System, ...] = ("SI", "US")
@@ -110,6 +113,29 @@ def write_estimate(estimate: Estimate, job: Job, made: Path, options: Mapping[st
             "python": estimate_lines(job.read()["files"], options, [b.name for b in estimate.bearings]),
         },
     )
+
+
+def write_waterfall(found: CoastDownAnalysis, machine: Machine, record: Record, made: Path) -> None:
+    """Write the frequencies of a coast-down: their document and the report that shows them."""
+    from rotordrop.measurement.simulated import is_simulated
+    from rotordrop.report.content import SIMULATED_RECORD
+    from rotordrop.report.page import write_page
+    from rotordrop.report.waterfall_page import waterfall_page
+
+    content = waterfall_page(
+        found,
+        title=f"Frequencies of a coast-down of {machine.name}",
+        facts=(
+            ("machine", machine.name),
+            ("record", f"{record.path.name if record.path else record.name}"),
+            ("SHA-256", record.sha256),
+            ("centre of the bearings", found.signal.centre),
+        ),
+        simulated=SIMULATED_RECORD if is_simulated(record) else "",
+    )
+    write_page(content, made / "report.html")
+    write_json(made / "document.json", found.as_json())
+    write_json(made / "page.json", content_json(content))
 
 
 def _origin(job: Job, options: Mapping[str, Any]) -> Origin:

@@ -23,10 +23,10 @@ from typing import Any, Literal, TypeAlias
 from rotordrop.atomic_file import write_json
 from rotordrop.web.workspace import Job, Workspace
 
-Verb: TypeAlias = Literal["look", "estimate"]
+Verb: TypeAlias = Literal["look", "estimate", "waterfall"]
 Key: TypeAlias = tuple[str, Verb]
-VERBS: tuple[Verb, ...] = ("look", "estimate")
-AT_ONCE: dict[Verb, int] = {"look": 2, "estimate": max(1, (os.cpu_count() or 2) // 2)}
+VERBS: tuple[Verb, ...] = ("look", "estimate", "waterfall")
+AT_ONCE: dict[Verb, int] = {"look": 2, "estimate": max(1, (os.cpu_count() or 2) // 2), "waterfall": 1}
 """Computations of one verb that run beside each other; others wait."""
 
 _PROGRAM = (

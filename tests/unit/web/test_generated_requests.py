@@ -56,7 +56,7 @@ BODIES = [
 def _filled(template: str, job: str, generator: random.Random) -> str:
     parts = {
         "job": [job, job, job, "0" * 16, *ODD],
-        "verb": ["look", "look", "estimate", *ODD],
+        "verb": ["look", "look", "estimate", "waterfall", *ODD],
         "role": ["machine", "record", "tail", "beside", *ODD],
         "name": ["page.js", "page.css", *ODD],
         "ticket": ["a", *ODD],

@@ -66,10 +66,26 @@ def test_a_record_alone_is_looked_at_with_the_gap_given(served, files):
     assert document["speed_rad_per_s"] == pytest.approx(2 * np.pi * 60)
 
 
-def test_an_estimate_without_a_machine_says_what_is_missing(served, files):
+@pytest.mark.slow
+def test_a_waterfall_has_its_report_and_document_and_no_histories(served, files):
+    job = served.new_job(files)
+    served.order(f"/api/jobs/{job}/waterfall")
+    assert served.settled(job, "waterfall", 540)["state"] == "done"
+    document = served.ask("GET", f"/api/jobs/{job}/waterfall/document").told
+    assert set(document["planes"]) == {"NDE", "DE"}
+    address = served.order(f"/api/jobs/{job}/waterfall/report").told["address"]
+    report = served.ask("GET", address)
+    assert report.headers["content-security-policy"].startswith("sandbox allow-scripts")
+    assert "Frequencies of a coast-down of LP-400" in report.text
+    window = served.ask("GET", f"/api/jobs/{job}/waterfall/window?column=x0")
+    assert (window.status, window.text) == (404, "this result has no histories")
+
+
+@pytest.mark.parametrize("verb", ["estimate", "waterfall"])
+def test_what_needs_a_machine_says_so(served, files, verb):
     job = served.new_job({"record": files["record"]})
-    served.order(f"/api/jobs/{job}/estimate", {"method": "tracked"})
-    state = served.settled(job, "estimate")
+    served.order(f"/api/jobs/{job}/{verb}", {"method": "tracked"})
+    state = served.settled(job, verb)
     assert (state["state"], "needs the machine file" in state["error"]) == ("failed", True)
 
 
@@ -190,6 +206,14 @@ def test_no_finished_job_is_lost_whenever_server_or_child_is_killed(tmp_path, fi
     (job.path / "files" / "record.h5").write_bytes(files["record"].read_bytes())
     entry = {"name": "a.h5", "stored": "record.h5", "bytes": 1, "sha256": ""}
     job.write({**job.read(), "files": {"record": entry}})
+    runner, begun = Runner(space), time.monotonic()
+    runner.ask(job, "look", {})
+    while state_of(job, "look")["state"] == "running":
+        runner.tend()
+        time.sleep(0.02)
+    usual = min(
+        time.monotonic() - begun, 4.0
+    )  # so that deaths fall into all parts of a look, on any computer
     published = 0
     for turn in range(100):
         before = published_run(job, "look")
@@ -197,7 +221,7 @@ def test_no_finished_job_is_lost_whenever_server_or_child_is_killed(tmp_path, fi
             [sys.executable, "-c", _KILLED_SERVER, str(tmp_path)],
             env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
         )
-        time.sleep(generator.uniform(0.3, 2.2))
+        time.sleep(usual * generator.uniform(0.1, 1.3))
         if turn % 2 and (job.path / "look.process").is_file():
             with contextlib.suppress(ProcessLookupError, ValueError):
                 os.killpg(int((job.path / "look.process").read_text()), signal.SIGKILL)

@@ -284,21 +284,24 @@ function say(text, level, ...more) {
 }
 
 function showStatus() {
-  const { states } = state.job, look = states.look, estimate = states.estimate;
-  const running = [estimate, look].find((one) => one && ["waiting", "running"].includes(one.state));
+  const { states } = state.job, { look, estimate, waterfall } = states;
+  const running = [estimate, waterfall, look].find((one) => one && ["waiting", "running"].includes(one.state));
   by("estimate").disabled = Boolean(running) || !state.job.files.machine || !state.look;
   by("estimate").title = state.job.files.machine ? "Estimate force and stress" : "An estimate needs the machine file";
   by("report").disabled = by("document").disabled = !(estimate && estimate.result);
+  by("waterfall").disabled = !(waterfall && waterfall.result) && by("estimate").disabled;
+  by("waterfall").textContent = waterfall && waterfall.result ? "Waterfall ↗" : "Waterfall";
+  by("waterfall").title = "Frequencies of the coast-down, found and named; needs a record to standstill, or nearly";
   if (running) {
-    const verb = running === estimate ? "estimate" : "look", share = running.fraction || 0;
+    const verb = Object.keys(states).find((one) => states[one] === running), share = running.fraction || 0;
     const stage = running.state === "waiting" ? "waiting for another computation" : running.stage || (verb === "look" ? "reading and checking the record" : "compiling and preparing");
     const left = share > 0.05 && share < 0.98 ? `, about ${Math.max(1, Math.round((running.spent * (1 - share)) / share))} s left in this stage` : "";
     const bar = make("progress", { max: 1, "aria-label": stage, ...(share > 0 ? { value: share } : {}) });
-    say(`${verb === "estimate" ? "Estimating" : "Looking"}: ${stage} (${Math.round(running.spent)} s${left})`, "notice", bar,
+    say(`${{ look: "Looking", estimate: "Estimating", waterfall: "Waterfall" }[verb]}: ${stage} (${Math.round(running.spent)} s${left})`, "notice", bar,
       make("button", { text: "Cancel", id: "cancel", on: { click: async () => { state.job = await server.cancel(state.job.id, verb); await refresh(); } } }));
     return true;
   }
-  const failed = [estimate, look].find((one) => one && one.state === "failed");
+  const failed = [waterfall, estimate, look].find((one) => one && one.state === "failed");
   if (failed) { say(failed.error, "bad"); }
   else if (state.estimate) {
     say(state.estimate.verdict[0].text, state.estimate.verdict[0].level, ...state.estimate.cards.map(({ title, figures: [first] }) => {
@@ -408,10 +411,17 @@ click("open", openFiles); click("open2", openFiles); click("help", () => by("key
 by("files").addEventListener("change", () => { chooseFiles(by("files").files); by("files").value = ""; });
 by("jobs").addEventListener("change", () => listJobs(by("jobs").value).catch(lost));
 click("estimate", async () => { state.job = await server.begin(state.job.id, "estimate", { method: by("method").value }); await refresh(); });
-click("report", async () => {
+async function openReport(verb) {
   const opened = window.open("about:blank");
-  const address = await server.reportAddress(state.job.id);
+  const address = await server.reportAddress(state.job.id, verb);
   if (opened) { opened.opener = null; opened.location = address; } else { location.assign(address); }
+}
+click("report", () => openReport("estimate"));
+click("waterfall", async () => {
+  const { waterfall } = state.job.states;
+  if (waterfall && waterfall.result) { await openReport("waterfall"); return; }
+  state.job = await server.begin(state.job.id, "waterfall", {});
+  await refresh();
 });
 click("document", async () => keep(new Blob([await server.documentText(state.job.id, "estimate")], { type: "application/json" }), `${state.job.name}.json`));
 click("remove", () => by("sure").showModal());

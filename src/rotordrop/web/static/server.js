@@ -31,7 +31,7 @@ export const begin = async (id, verb, options) => (await ask("POST", `/api/jobs/
 export const cancel = async (id, verb) => (await ask("POST", result(id, verb, "cancel"))).json();
 export const page = async (id, verb) => (await ask("GET", result(id, verb, "page"))).json();
 export const documentText = async (id, verb) => (await ask("GET", result(id, verb, "document"))).text();
-export const reportAddress = async (id) => (await (await ask("POST", result(id, "estimate", "report"))).json()).address;
+export const reportAddress = async (id, verb) => (await (await ask("POST", result(id, verb, "report"))).json()).address;
 
 function question(columns, start, end, points) {
   const asked = new URLSearchParams();
