@@ -14,13 +14,17 @@ if TYPE_CHECKING:
     from rotordrop.errors import RotordropError as RotordropError
     from rotordrop.estimated import Estimated as Estimated
     from rotordrop.estimated import IdentifiedValue as IdentifiedValue
+    from rotordrop.estimation import Replay as Replay
+    from rotordrop.estimation import Tracked as Tracked
     from rotordrop.estimation import estimate_drop as estimate_drop
+    from rotordrop.estimation import estimate_drops as estimate_drops
     from rotordrop.estimation.calibrated import calibrate_machine as calibrate_machine
     from rotordrop.machine import Machine as Machine
     from rotordrop.machine import example_machine as example_machine
     from rotordrop.machine import load_machine as load_machine
     from rotordrop.machine import machine_schema as machine_schema
     from rotordrop.machine import save_machine as save_machine
+    from rotordrop.machine.catalog import find_bearing as find_bearing
     from rotordrop.measurement import Record as Record
     from rotordrop.measurement import check_record as check_record
     from rotordrop.measurement import example_record_path as example_record_path
@@ -52,10 +56,14 @@ _PUBLIC = {
     "PlacedStart": "rotordrop.simulation.case",
     "Record": "rotordrop.measurement",
     "RotordropError": "rotordrop.errors",
+    "Replay": "rotordrop.estimation",
+    "Tracked": "rotordrop.estimation",
     "build_drop_model": "rotordrop.model.parameters",
     "calibrate_machine": "rotordrop.estimation.calibrated",
     "check_record": "rotordrop.measurement",
     "estimate_drop": "rotordrop.estimation",
+    "estimate_drops": "rotordrop.estimation",
+    "find_bearing": "rotordrop.machine.catalog",
     "example_machine": "rotordrop.machine",
     "example_record_path": "rotordrop.measurement",
     "format_quantity": "rotordrop.units",

@@ -12,7 +12,7 @@ import re
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import lru_cache
-from typing import Any
+from typing import Any, SupportsFloat, overload
 
 from rotordrop.errors import UsageError
 
@@ -175,6 +175,66 @@ def parse_quantity(text: object, kind: str) -> float:
     if kind == "contact_stiffness":
         return _contact_stiffness(number, unit, text)
     return _convert(number, unit, text, kind, wanted)
+
+
+def in_si(value: object, kind: str, name: str) -> float:
+    """Give a number in SI units: a text is read with its unit, a float is in SI units already.
+
+    A whole number of a speed is refused unless it is zero: who writes ``speed=60`` means Hz or rpm.
+
+    Examples
+    --------
+    >>> in_si("60 rpm", "frequency", "speed")
+    1.0
+    """
+    if isinstance(value, str):
+        return parse_quantity(value, kind)
+    wanted = _kind(kind)
+    if isinstance(value, bool) or not isinstance(value, SupportsFloat):
+        raise UsageError(
+            f"{name} is {value!r}; expected a text such as {wanted.example!r}, or a number [{wanted.unit}]"
+        )
+    if kind == "speed" and isinstance(value, int) and value != 0:
+        raise UsageError(
+            f"{name} = {value} has no unit; write '{value} Hz' or '{value} rpm' (a float is taken as rad/s)"
+        )
+    return float(value)
+
+
+class InSI:
+    """Field of a frozen dataclass that takes a text with a unit or a number in SI units.
+
+    Parameters
+    ----------
+    kind : str
+        Kind of quantity, one of `KINDS`.
+    default : float, optional
+        Value when the field is left out [SI unit of the kind].
+    """
+
+    def __init__(self, kind: str, default: float | None = None) -> None:
+        self.kind, self.default = kind, default
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        """Keep the name of the field, for messages."""
+        self.name = name
+
+    @overload
+    def __get__(self, instance: None, owner: type) -> float: ...
+    @overload
+    def __get__(self, instance: object, owner: type) -> float: ...
+    def __get__(self, instance: object | None, owner: type) -> float:
+        """Give the number, or the default to the dataclass that asks for it."""
+        if instance is not None:
+            value: float = instance.__dict__[self.name]
+            return value
+        if self.default is None:
+            raise AttributeError(self.name)
+        return self.default
+
+    def __set__(self, instance: object, value: float | str) -> None:
+        """Read what was given."""
+        instance.__dict__[self.name] = in_si(value, self.kind, self.name)
 
 
 def split_quantity(text: str) -> tuple[float, str]:

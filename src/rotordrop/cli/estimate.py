@@ -60,10 +60,24 @@ def estimate(
         typer.Option("--report", metavar="FILE", help="Write the report, one offline HTML file per drop."),
     ] = None,
     operator: Annotated[str, typer.Option("--operator", metavar="NAME", help="Who, for the report.")] = "",
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="Write force, stress, displacement, ball load against time: .h5, .csv, .mat, .parquet.",
+        ),
+    ] = None,
+    data: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Write every table and figure of the report as CSV."),
+    ] = None,
     json: JsonOption = None,
 ) -> None:
     """Estimate touchdown-bearing force and stress from recorded drops."""
     from rotordrop.estimation import Replay, Tracked, estimate_drops
+    from rotordrop.estimation.histories import require_format
     from rotordrop.machine import load_machine
     from rotordrop.measurement.record import read_record
 
@@ -76,28 +90,36 @@ def estimate(
     require_own_content(records)
     if quick and method is Method.tracked:
         _require_calibrated(description, machine)
-    reports = _report_places(report, records)
-    require_places(json, *reports)
+    reports, outputs = _places(report, records), _places(output, records)
+    if output is not None:
+        require_format(output)
+    require_places(json, *reports, *outputs)
     read = [read_record(path, description, profile=profile) for path in records]
     of_tails = tail_profile or profile
     tails = tails_of(tail or [], len(read), lambda path: read_record(path, description, profile=of_tails))
     chosen = Tracked(quick=quick) if method is Method.tracked else Replay(fixed=fixed)
     with progress_bar("estimating") as progress:
         estimates = estimate_drops(description, read, tails, method=chosen, progress=progress)
+    folders = _places(data, records)
+    for made, place in zip(estimates, outputs, strict=False):
+        made.save(place)
+    for made, place in zip(estimates, folders, strict=False):
+        made.data(place)
     used = [
         ("machine file", machine),
         *(("record", path) for path in records),
         *(("tail", path) for path in tail or []),
     ]
-    _write(estimates, reports, json, _origin(used, operator))
+    _write(estimates, reports, [*outputs, *folders], json, _origin(used, operator))
 
 
-def _report_places(report: Path | None, records: Sequence[Path]) -> list[Path]:
-    if report is None:
+def _places(named: Path | None, records: Sequence[Path]) -> list[Path]:
+    """The file or folder named, or one for each of several records."""
+    if named is None:
         return []
     if len(records) == 1:
-        return [report]
-    return [report.with_name(f"{report.stem}_{record.stem}{report.suffix}") for record in records]
+        return [named]
+    return [named.with_name(f"{named.stem}_{record.stem}{named.suffix}") for record in records]
 
 
 def _require_calibrated(description: Machine, file: Path) -> None:
@@ -124,7 +146,9 @@ def _origin(used: Sequence[tuple[str, Path]], operator: str) -> Origin:
     )
 
 
-def _write(estimates: Sequence[Estimate], reports: list[Path], json: Path | None, origin: Origin) -> None:
+def _write(
+    estimates: Sequence[Estimate], reports: list[Path], others: list[Path], json: Path | None, origin: Origin
+) -> None:
     from rotordrop.estimation.document import combined, estimate_document
     from rotordrop.report.estimate_page import estimate_page
     from rotordrop.report.page import write_page
@@ -139,6 +163,8 @@ def _write(estimates: Sequence[Estimate], reports: list[Path], json: Path | None
             print_summary(page, out)
         for place in reports:
             out.print(f"Report: {place}")
+        for place in others:
+            out.print(f"Histories: {place}" if place.suffix else f"Tables and figures: {place}")
 
     documents = [estimate_document(estimate) for estimate in estimates]
     deliver(combined(documents, [estimate.name for estimate in estimates]), json, summarise)

@@ -10,7 +10,7 @@ from rotordrop.estimation.methods import Replay as Replay
 from rotordrop.estimation.methods import Tracked as Tracked
 
 if TYPE_CHECKING:
-    from rotordrop.estimation.estimate import Estimate
+    from rotordrop.estimation.estimate import Estimate, Estimates
     from rotordrop.machine import Machine
     from rotordrop.measurement.record import Record
 
@@ -66,20 +66,22 @@ def estimate_drop(
 def estimate_drops(
     machine: Machine,
     records: Sequence[Record],
-    tails: Sequence[Record | None],
+    tails: Sequence[Record | None] | None = None,
     *,
     method: Method = FOLLOWED,
     names: Sequence[str] | None = None,
     progress: Progress | None = None,
-) -> tuple[Estimate, ...]:
+) -> Estimates:
     """Estimate several recorded drops of one machine; tracked ones share its parameters in one fit.
+
+    The result is a tuple with one table of all drops, ``.to_dataframe()``.
 
     Parameters
     ----------
     machine : Machine
         The machine, calibrated or with guesses.
     records, tails : sequence of Record
-        The drops and their settled tails (None where there is none).
+        The drops and their settled tails (None where there is none, or left out).
     method : Tracked or Replay
         How, with options.
     names : sequence of str, optional
@@ -93,10 +95,12 @@ def estimate_drops(
         As for `estimate_drop`; nothing is computed before every record has passed the gate.
     """
     from rotordrop.errors import UsageError
+    from rotordrop.estimation.estimate import Estimates
     from rotordrop.estimation.record_facts import facts_of
 
     if not isinstance(method, Tracked | Replay):
         raise UsageError(f"the method is {method!r}; expected Tracked(...) or Replay(...).")
+    tails = [None] * len(records) if tails is None else tails
     if len(tails) != len(records):
         raise UsageError(f"{len(tails)} tails for {len(records)} records; expected one, or None, for each.")
     stems = names or [r.path.stem if r.path else f"drop_{i + 1}" for i, r in enumerate(records)]
@@ -107,7 +111,7 @@ def estimate_drops(
     if isinstance(method, Replay):
         from rotordrop.estimation.replay import replay_drop
 
-        return tuple(
+        return Estimates(
             replay_drop(machine, record, tail, method, one, name=stem, progress=progress)
             for record, tail, stem, one in zip(records, tails, stems, facts, strict=True)
         )
@@ -119,4 +123,4 @@ def estimate_drops(
     model = build_drop_model(machine)
     evidence = [read_evidence(model, r, t, name=n) for r, t, n in zip(records, tails, stems, strict=True)]
     drops = followed_drops(machine, evidence, quick=method.quick, progress=progress)
-    return tuple(estimate_of(drop, method, one) for drop, one in zip(drops, facts, strict=True))
+    return Estimates(estimate_of(drop, method, one) for drop, one in zip(drops, facts, strict=True))

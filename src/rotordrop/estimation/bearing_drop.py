@@ -219,6 +219,8 @@ class BearingDrop:
         Magnitude of the ball force on the race [N] and largest Hertz stress at the inner race [Pa].
     force_band, stress_band : Band or None
         Their 90 % bands.
+    force_vector : ndarray, shape (T, 2), or None
+        Ball force on the race (x, y) [N] at the times of the force, where its direction is known.
     preload_stress : float or None
         Stress of the preload alone [Pa].
     peak_force, peak_stress : Peak
@@ -245,6 +247,7 @@ class BearingDrop:
     at_gap_limits: tuple[Motion, ...] = ()
     force_band: Band | None = None
     stress_band: Band | None = None
+    force_vector: Array | None = None
     preload_stress: float | None = None
     values: Mapping[str, IdentifiedValue] = field(default_factory=dict)
     missing: Mapping[str, str] = field(default_factory=dict)
@@ -295,6 +298,7 @@ def _simulated_bearing(result: DropResult, b: int) -> BearingDrop:
         motions=(motion,),
         air_gap=AirGap.of(gap),
         force=force,
+        force_vector=result.bearing_force[:, b],
         stress=stress,
         preload_stress=float(result.max_stress[0, b]) if free else None,
         peak_force=highest(force, "N", Origin.SIMULATION),

@@ -7,14 +7,18 @@ is made.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Any
+from html import escape
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.atomic_file import write_json
 from rotordrop.estimated import Correlation, IdentifiedValue
 from rotordrop.estimation.agreement import Agreement
 from rotordrop.estimation.bearing_drop import BearingDrop
@@ -30,6 +34,11 @@ from rotordrop.measurement.quality.finding import Finding
 from rotordrop.measurement.record import Record
 from rotordrop.model.parameter import Parameter
 from rotordrop.tracking.consistency import Check
+from rotordrop.units import format_quantity
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 Array = NDArray[np.float64]
 
@@ -191,7 +200,7 @@ class ReplaySteps:
     document: Mapping[str, Any]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Estimate:
     """Force and stress of one recorded drop, with everything a page or a document says of it.
 
@@ -288,3 +297,140 @@ class Estimate:
             if one.name == name:
                 return one
         raise KeyError(f"no bearing {name!r}; the machine has {', '.join(b.name for b in self.bearings)}")
+
+    def ball_loads(self, bearing: str) -> Array:
+        """Load of every ball of a bearing [N], shape (T, rows, Z), at the times of its force."""
+        from rotordrop.estimation.histories import loads_of_balls
+
+        return loads_of_balls(self, bearing)
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """Histories as a table with columns (bearing, quantity) against time [s]; units in ``attrs``."""
+        from rotordrop.estimation.histories import as_dataframe
+
+        return as_dataframe(self)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Histories as a labelled data set with units and long names (needs ``rotordrop[xarray]``)."""
+        from rotordrop.estimation.histories import as_dataset
+
+        return as_dataset(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The estimate as the command line writes it as JSON."""
+        from rotordrop.estimation.document import estimate_document
+
+        return estimate_document(self)
+
+    def save(self, path: str | Path) -> None:
+        """Write the numbers (``.json``) or histories (``.h5``, ``.nc``, ``.csv``, ``.mat``, ``.parquet``).
+
+        Raises
+        ------
+        OutputError
+            If the suffix names no format, or the file cannot be written.
+        """
+        if Path(path).suffix.lower() == ".json":
+            write_json(path, self.to_dict())
+            return
+        from rotordrop.estimation.histories import write_histories
+
+        write_histories(self, path)
+
+    @property
+    def figures(self) -> Mapping[str, Any]:
+        """Figures of the report by name, such as ``"force"`` and ``"displacement NDE"``; plotly figures."""
+        found: Mapping[str, Any] = _above("rotordrop.report.estimate_page", "estimate_figures")(self)
+        return found
+
+    def report(self, path: str | Path) -> None:
+        """Write the report, one offline HTML file."""
+        page = _above("rotordrop.report.estimate_page", "estimate_page")(self)
+        _above("rotordrop.report.page", "write_page")(page, path)
+
+    def data(self, folder: str | Path) -> None:
+        """Write every table and figure of the report as CSV into a folder."""
+        page = _above("rotordrop.report.estimate_page", "estimate_page")(self)
+        _above("rotordrop.report.data_files", "write_data")(page, folder)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row per bearing with peaks, intervals and air gap, for a table of many drops [SI]."""
+        return [_row(self, bearing) for bearing in self.bearings]
+
+    def __repr__(self) -> str:
+        """Drop, machine and the peak force of every bearing."""
+        return (
+            f"<Estimate {self.name} of {self.machine.name}: {'; '.join(self._peaks())}. {self.verdict.value}>"
+        )
+
+    def _peaks(self) -> list[str]:
+        return [f"{b.name} {_peak_text(b.peak_force.known)}" for b in self.bearings]
+
+    def _repr_html_(self) -> str:
+        return summary_html([self])
+
+
+class Estimates(tuple[Estimate, ...]):
+    """Estimates of several drops; a tuple with one table."""
+
+    __slots__ = ()
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """One row per drop and bearing: verdict, peaks with intervals, air gap [SI]."""
+        import pandas
+
+        return pandas.DataFrame([row for estimate in self for row in estimate.rows()])
+
+    def _repr_html_(self) -> str:
+        return summary_html(self)
+
+
+def summary_html(estimates: Iterable[Estimate]) -> str:
+    """A small table of drops and bearings for a notebook; names from files are escaped."""
+    head = "".join(f"<th>{text}</th>" for text in ("drop", "bearing", "peak force", "peak stress", "verdict"))
+    rows = []
+    for estimate in estimates:
+        for bearing in estimate.bearings:
+            cells = (
+                estimate.name,
+                bearing.name,
+                _peak_text(bearing.peak_force.known),
+                _peak_text(bearing.peak_stress.known, "pressure"),
+                estimate.verdict.value,
+            )
+            rows.append("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>")
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
+
+
+def _peak_text(known: IdentifiedValue, kind: str = "force") -> str:
+    text = format_quantity(known.value, kind)
+    if known.interval_90 is None:
+        return text
+    low, high = (format_quantity(value, kind) for value in known.interval_90)
+    return f"{text} (90 %: {low} to {high})"
+
+
+def _row(estimate: Estimate, bearing: BearingDrop) -> dict[str, Any]:
+    row: dict[str, Any] = {
+        "drop": estimate.name,
+        "bearing": bearing.name,
+        "consistent": estimate.consistent,
+        "speed [Hz]": estimate.speed / (2.0 * math.pi),
+    }
+    numbers = {
+        "peak force [N]": bearing.peak_force.known,
+        "peak stress [Pa]": bearing.peak_stress.known,
+        "air gap [m]": bearing.values.get("air_gap_m"),
+    }
+    for name, known in numbers.items():
+        low, high = (known.interval_90 if known else None) or (math.nan, math.nan)
+        row |= {name: known.value if known else math.nan, f"{name} 5 %": low, f"{name} 95 %": high}
+    return row
+
+
+def _above(module: str, name: str) -> Any:
+    """Something of the layer above: pages draw from estimates; who holds one asks it for its page.
+
+    The only place where a lower layer reaches up; by name, so that nothing here depends on how pages look.
+    """
+    return getattr(import_module(module), name)

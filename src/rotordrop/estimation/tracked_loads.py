@@ -268,6 +268,7 @@ def bearing_drop(
         air_gap=AirGap(lower=low, upper=high),
         force=loads.force,
         force_band=loads.force_band,
+        force_vector=forces.force[:, b] if loads.peak_force.origin is Origin.TWIN else None,
         stress=loads.stress,
         stress_band=loads.stress_band,
         preload_stress=float(loads.stress.values[0]),

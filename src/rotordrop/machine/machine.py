@@ -163,6 +163,15 @@ class Machine(Description):
         nodes = self.rotor.node_positions
         return min(self.touchdown_bearings, key=lambda b: abs(nodes[b.node - 1] - nodes[node - 1])).name
 
+    def __repr__(self) -> str:
+        """Name, mass and parts."""
+        bearings = ", ".join(bearing.name for bearing in self.touchdown_bearings)
+        nodes = len(self.rotor.node_positions)
+        return (
+            f"<Machine {self.name}: rotor of {self.rotor.mass:.4g} kg with {nodes} nodes, "
+            f"touchdown bearings {bearings}, {len(self.ambs)} AMBs, {len(self.sensors)} sensors>"
+        )
+
     @property
     def source_path(self) -> Path | None:
         """File the machine was read from."""
@@ -176,8 +185,10 @@ class Machine(Description):
         names = ", ".join(bearing.name for bearing in self.touchdown_bearings)
         raise UsageError(f"the machine has no touchdown bearing {name!r}; there are {names}")
 
-    def with_values(self, values: Mapping[str, float | Estimated]) -> Machine:
-        """Give the same machine with other values, by path such as ``"NDE.support.stiffness"`` [SI].
+    def with_values(self, values: Mapping[str, float | str | Estimated]) -> Machine:
+        """Give the same machine with other values, by path such as ``"NDE.support.stiffness"``.
+
+        A number is in SI units, a text has its own: ``{"NDE.air_gap": "350 um"}``.
 
         What follows from a changed value (the horizontal support, say) follows again. Unbalances are counted
         from 0, as in `unbalances`: ``"unbalance.0.amount"``.

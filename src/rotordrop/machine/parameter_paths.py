@@ -10,6 +10,7 @@ from rotordrop.errors import UsageError
 from rotordrop.estimated import Estimated
 from rotordrop.machine.description import Description
 from rotordrop.machine.provenance import kind_of, physical_of
+from rotordrop.units import in_si
 
 if TYPE_CHECKING:
     from rotordrop.machine.machine import Machine
@@ -17,14 +18,14 @@ if TYPE_CHECKING:
 _Changes = dict[str, Any]
 
 
-def changed_machine_parts(machine: Machine, values: Mapping[str, float | Estimated]) -> dict[str, Any]:
+def changed_machine_parts(machine: Machine, values: Mapping[str, float | str | Estimated]) -> dict[str, Any]:
     """Give the top-level parts of a machine that change with the given values."""
     tree: _Changes = {}
     for path, value in values.items():
         _graft(
             tree,
             _resolved(machine, path),
-            value if isinstance(value, Estimated) else Estimated(value=float(value)),
+            value if isinstance(value, Estimated) else Estimated(value=_number(machine, path, value)),
         )
     parts: dict[str, Any] = {}
     for key, branch in tree.items():
@@ -35,6 +36,11 @@ def changed_machine_parts(machine: Machine, values: Mapping[str, float | Estimat
         except ValueError as error:
             raise UsageError(_refusal(error, values)) from error
     return parts
+
+
+def _number(machine: Machine, path: str, value: float | str) -> float:
+    """The number of a value given by path: a text is read with its unit, a number is in SI units already."""
+    return in_si(value, kind_of_path(machine, path), path)
 
 
 def kind_of_path(machine: Machine, path: str) -> str:
@@ -54,14 +60,18 @@ def kind_of_path(machine: Machine, path: str) -> str:
     return kind
 
 
-def _refusal(error: ValueError, values: Mapping[str, float | Estimated]) -> str:
+def _refusal(error: ValueError, values: Mapping[str, float | str | Estimated]) -> str:
     from pydantic import ValidationError
 
-    stated = ", ".join(f"{path} = {float(value):g}" for path, value in values.items())
+    stated = ", ".join(f"{path} = {_shown(value)}" for path, value in values.items())
     if isinstance(error, ValidationError):
         reasons = "; ".join(str(e["msg"]).removeprefix("Value error, ") for e in error.errors())
         return f"cannot set {stated} (SI units): {reasons}"
     return f"cannot set {stated} (SI units): {error}"
+
+
+def _shown(value: float | str | Estimated) -> str:
+    return value if isinstance(value, str) else f"{float(value):g}"
 
 
 def _graft(tree: _Changes, keys: tuple[Any, ...], value: Estimated) -> None:

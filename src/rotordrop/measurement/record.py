@@ -6,9 +6,10 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rotordrop.errors import RecordError
 from rotordrop.machine import Machine
@@ -33,7 +34,7 @@ ROUNDING_SLACK = 0.05
 """How far a stamp may be off beyond half its resolution, for the fit of the even clock [1]."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Record:
     """Readings of the displacement sensors over a drop, with the shaft speed.
 
@@ -93,6 +94,87 @@ class Record:
         for array in (self.time, self.signals, self.speed, self.speed_time, self.speed_readings, self.marks):
             if array is not None:
                 array.setflags(write=False)
+
+    @classmethod
+    def from_arrays(
+        cls,
+        machine: Machine,
+        time: ArrayLike | str,
+        signals: Mapping[str, ArrayLike] | ArrayLike,
+        *,
+        unit: str | Mapping[str, str],
+        speed: str | tuple[ArrayLike, str] | None = None,
+        time_unit: str = "s",
+        start: str = "0 s",
+    ) -> Record:
+        """Make a record of arrays.
+
+        Parameters
+        ----------
+        machine : Machine
+            Names the sensors, and says which way each reads.
+        time : array_like, shape (N,), or str
+            Time of the samples in ``time_unit``, or the sampling rate, such as "20 kHz".
+        signals : mapping or array_like, shape (N, S)
+            Readings by the name of the sensor, or one column for every sensor of the machine in its order.
+        unit : str or mapping
+            Unit of the readings, such as "um" or "mV", of all or by the name of the sensor.
+        speed : str or tuple, optional
+            "60 Hz" given by hand, or readings with their unit, ``(array, "rpm")``.
+        time_unit, start : str
+            Unit of the times; first instant where a sampling rate is given.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from rotordrop import Record, example_machine
+        >>> machine = example_machine("paper")
+        >>> record = Record.from_arrays(machine, "20 kHz", np.zeros((100, 4)), unit="um", speed="60 Hz")
+        >>> record.sampling_rate
+        20000.0
+        """
+        from rotordrop.measurement.arrays import record_from_arrays
+
+        return record_from_arrays(
+            machine, time, signals, unit=unit, speed=speed, time_unit=time_unit, start=start
+        )
+
+    @classmethod
+    def from_dataframe(
+        cls,
+        machine: Machine,
+        frame: Any,
+        *,
+        unit: str | Mapping[str, str] | None = None,
+        speed: str | None = None,
+        profile: Profile | None = None,
+    ) -> Record:
+        """Make a record of a table with named columns, such as a pandas data frame.
+
+        Parameters
+        ----------
+        machine : Machine
+            Names the sensors.
+        frame : data frame
+            Columns named as in a recorded file, "X1 [um]"; a column "time [s]", or times as the index. A
+            column such as "speed [rpm]" is the shaft speed.
+        unit : str or mapping, optional
+            Unit of the columns that do not name one, of all or by column.
+        speed : str, optional
+            Speed given by hand, such as "60 Hz".
+        profile : Profile, optional
+            Which column is which sensor, where the names differ.
+        """
+        from rotordrop.measurement.arrays import record_from_dataframe
+
+        return record_from_dataframe(machine, frame, unit=unit, speed=speed, profile=profile)
+
+    def __repr__(self) -> str:
+        """Name, length, rate and channels."""
+        return (
+            f"<Record {self.name}: {self.duration:.4g} s at {self.sampling_rate:g} Hz, "
+            f"{', '.join(self.channel_names)}, {'with' if self.speed is not None else 'no'} speed>"
+        )
 
     @property
     def channel_names(self) -> tuple[str, ...]:

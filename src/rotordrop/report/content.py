@@ -77,10 +77,11 @@ class Table:
 
 @dataclass(frozen=True, kw_only=True)
 class Figure:
-    """A plotly figure with the sentence that tells what is to be seen in it."""
+    """A plotly figure with the sentence that tells what is to be seen in it, and a name to ask for it by."""
 
     chart: go.Figure
     caption: str
+    name: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,3 +125,9 @@ class ReportContent:
     cards: tuple[Card, ...] = ()
     summary: tuple[Table, ...] = ()
     sections: tuple[Section, ...] = field(default=())
+
+    @property
+    def figures(self) -> dict[str, go.Figure]:
+        """Figures by name, in the order of the page."""
+        found = [figure for section in self.sections for figure in section.figures]
+        return {figure.name or f"figure {k + 1}": figure.chart for k, figure in enumerate(found)}

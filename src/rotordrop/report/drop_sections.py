@@ -95,6 +95,7 @@ def _force(bearings: Sequence[BearingDrop], loads: Mapping[str, float]) -> Secti
         Figure(
             chart=time_panels(rows, 1.0, "N", from_zero=True),
             caption="Magnitude of the ball force on the race, instantaneous (Neisi 2020, Fig. 15).",
+            name="force",
         )
     ]
     if max(bearing.force.time[-1] for bearing in bearings) > EARLY:
@@ -103,6 +104,7 @@ def _force(bearings: Sequence[BearingDrop], loads: Mapping[str, float]) -> Secti
             Figure(
                 chart=time_panels(early, 1.0, "N", from_zero=True),
                 caption=f"The same force in the first {1e3 * EARLY:.0f} ms.",
+                name="force, first contacts",
             )
         )
         hardest = [[row[0].around(*AROUND_PEAK)] for row in rows]
@@ -110,6 +112,7 @@ def _force(bearings: Sequence[BearingDrop], loads: Mapping[str, float]) -> Secti
             Figure(
                 chart=time_panels(hardest, 1.0, "N", from_zero=True, from_power_off=False),
                 caption="The same force around its peak, where the 90 % interval can be seen.",
+                name="force, around its peak",
             )
         )
     return Section(heading="Bearing force", figures=tuple(figures))
@@ -121,10 +124,12 @@ def _stress(bearings: Sequence[BearingDrop], speed: float) -> Section:
     history = Figure(
         chart=time_panels(rows, MEGA, "MPa"),
         caption="Largest Hertz stress of all balls at the inner race, instantaneous.",
+        name="stress",
     )
     box = Figure(
         chart=stress_box_figure(boxes),
         caption="Distribution of the stress within the drop; dashed in the box: mean (Neisi 2020, Fig. 16).",
+        name="stress distribution",
     )
     return Section(heading="Hertz stress", figures=(history, box), tables=(stress_table(boxes),))
 
@@ -152,6 +157,7 @@ def _impacts(bearings: Sequence[BearingDrop]) -> Section:
         chart=impact_figure(hit, force=force),
         caption=f"Peak {force} of every impact where it hit the race, seen from the last bearing; −90° is "
         "the bottom, the distance from the centre is the force, the bar its 90 % interval.",
+        name="impacts",
     )
     table = impact_table(hit, force=force)
     return Section(heading="Impacts", statements=reasons, figures=(figure,), tables=(table,))
@@ -164,6 +170,7 @@ def motion_section(bearings: Sequence[BearingMotions | BearingDrop], origin: str
             chart=displacement_figure(bearing),
             caption=f"Displacement of the rotor in the {bearing.name} touchdown bearing, {origin}; "
             "vertical above, horizontal below (Neisi 2020, Figs 7 and 8).",
+            name=f"displacement {bearing.name}",
         )
         for bearing in bearings
     ]
@@ -173,6 +180,7 @@ def motion_section(bearings: Sequence[BearingMotions | BearingDrop], origin: str
     pair = Figure(
         chart=time_panels(rows, MICRO, "µm", height=250, together=True),
         caption="All bearings side by side; the panels zoom together (Neisi 2020, Fig. 13).",
+        name="displacement",
     )
     carried = any(isinstance(b, BearingDrop) and b.motions[0].role == "measured" for b in bearings)
     text = (*text, *((CARRIED,) if carried else ()))
@@ -213,6 +221,7 @@ def _first_contact(bearings: Sequence[BearingDrop], tables: tuple[Table, ...]) -
         chart=first_contact_figure(bearings),
         caption="Vertical displacement around the first contact: t₁ first touch, t₂ lift-off, T the time "
         "between; indentation counts from the air gap, support included (Neisi 2020, Fig. 10).",
+        name="first contact",
     )
     return Section(heading="First contact", figures=(figure,), tables=tables)
 
@@ -223,6 +232,7 @@ def orbit_section(bearings: Sequence[BearingMotions | BearingDrop]) -> Section:
         chart=orbit_figure(bearings),
         caption="Path of the rotor centre against the clearance circle; x to the right, y up, seen from the "
         "last bearing (Neisi 2020, Fig. 12).",
+        name="orbit",
     )
     limits = any(bearing.at_gap_limits for bearing in bearings)
     rows = [
@@ -242,6 +252,7 @@ def orbit_section(bearings: Sequence[BearingMotions | BearingDrop]) -> Section:
         if limits
         else "Distance of the rotor from the bearing centre; above the air gap the rotor indents the race "
         "(Neisi 2020, Fig. 14).",
+        name="radial displacement",
     )
     return Section(heading="Orbit", figures=(orbit, radial))
 

@@ -68,6 +68,11 @@ def estimate_page(estimate: Estimate, origin: Origin | None = None) -> ReportCon
     )
 
 
+def estimate_figures(estimate: Estimate) -> dict[str, object]:
+    """Figures of the page by name."""
+    return dict(estimate_page(estimate).figures)
+
+
 def _verdict(estimate: Estimate) -> tuple[Statement, ...]:
     """What model and record say of each other first, then warnings, notes and limits."""
     told = [f for f in estimate.findings if f.message not in estimate.warnings]
@@ -185,6 +190,7 @@ def _parameters(estimate: Estimate) -> Section:
         chart=parameter_figure(rows["machine"]),
         caption="Estimates with 90 % intervals over their priors, both relative to the prior's centre. Where "
         "the blue bar is as wide as the grey one, the record says nothing about the parameter.",
+        name="parameters",
     )
     taken = steps is not None and steps.fixed
     text = (
@@ -244,16 +250,19 @@ def _innovations(found: Innovations) -> tuple[Figure, ...]:
         Figure(
             chart=innovations_figure(found.time, found.values, found.channels, found.deviation),
             caption="What each reading says beyond the prediction from all readings before it.",
+            name="innovations",
         ),
         Figure(
             chart=nis_figure(found.time, square, found.limits),
             caption="Innovations squared over what the filter expects: one where model and noise are right.",
+            name="innovations squared",
         ),
         Figure(
             chart=whiteness_figure(
                 np.nan_to_num(normalised), found.channels, float(found.time[1] - found.time[0])
             ),
             caption="Autocorrelation of the innovations; a correct model leaves none.",
+            name="whiteness",
         ),
     )
 
@@ -374,5 +383,7 @@ def _speed(estimate: Estimate) -> tuple[Section, ...]:
         f"Aerodynamic time constant {constant.text} ({constant.interval_text or constant.status}); "
         f"a plain exponential through the record, friction included, has {profile}."
     )
-    figure = Figure(chart=speed_figure(histories), caption="Speed of the rotor, measured and simulated.")
+    figure = Figure(
+        chart=speed_figure(histories), caption="Speed of the rotor, measured and simulated.", name="speed"
+    )
     return (Section(heading="Speed", text=(text,), figures=(figure,)),)

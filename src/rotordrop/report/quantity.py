@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from rotordrop.estimated import Estimated, IdentifiedValue
-from rotordrop.units import KINDS
+from rotordrop.units import KINDS, si_unit
 
 System: TypeAlias = Literal["SI", "US"]
 
@@ -118,6 +118,12 @@ class Quantity:
             digits=digits,
             range_only=range_only,
         )
+
+    @property
+    def si_unit(self) -> str:
+        """SI unit of the value; empty for a pure number."""
+        own = {"dimension": "m", "duration": "s", "short_time": "s"}.get(self.kind)
+        return own or (si_unit(self.kind) if self.kind in KINDS else "")
 
     @property
     def unit(self) -> str:

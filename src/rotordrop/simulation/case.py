@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import SimulationError
 from rotordrop.model.reduction import Reduction
+from rotordrop.units import InSI
 
 Array = NDArray[np.float64]
 SpinMode: TypeAlias = Literal["dynamic", "prescribed", "function of speed", "coasting", "constant"]
@@ -78,7 +79,7 @@ Start: TypeAlias = CentredStart | PlacedStart | StateStart | LevitatedStart
 
 @dataclass(frozen=True, kw_only=True)
 class DropCase:
-    """One drop to simulate.
+    """One drop to simulate; speed and times are floats in SI units, or texts such as ``"60 Hz"``.
 
     Attributes
     ----------
@@ -105,15 +106,15 @@ class DropCase:
         Bound of the number of steps [1].
     """
 
-    speed: float
-    duration: float = 0.2
-    output_step: float = 1e-5
+    speed: InSI = InSI("speed")  # noqa: RUF009 - a descriptor, read by the dataclass
+    duration: InSI = InSI("time", 0.2)  # noqa: RUF009
+    output_step: InSI = InSI("time", 1e-5)  # noqa: RUF009
     tolerance: float = 1e-6
     reduction: str | Reduction = "accurate"
     start: Start = field(default_factory=CentredStart)
     spin: SpinMode = "dynamic"
     integrator: IntegratorName = "tsit5"
-    largest_step: float = 1e-3
+    largest_step: InSI = InSI("time", 1e-3)  # noqa: RUF009
     most_steps: int = 50_000_000
 
     def __post_init__(self) -> None:

@@ -10,12 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.atomic_file import new_hdf5
-from rotordrop.errors import SimulationError
+from rotordrop.errors import SimulationError, UsageError
+from rotordrop.physics.ball_bearing import bearing_constants
+from rotordrop.physics.ball_loads import ball_loads
 from rotordrop.physics.hertz import LineContact
 from rotordrop.simulation.certificate import Certificate, refined_peak
+from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
     import xarray
+
+    from rotordrop.machine import Machine
 
 Array = NDArray[np.float64]
 
@@ -59,7 +64,7 @@ class ContactLog:
         return len(self.bearing)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class DropResult:
     """One simulated drop. Axes: time T, bearing B, last axis (x, y).
 
@@ -123,8 +128,40 @@ class DropResult:
     certificate: Certificate
     line_contacts: tuple[LineContact, ...]
 
-    def peak_contact_pressure(self, bearing: int) -> tuple[float, float, float]:
+    def index_of(self, bearing: int | str) -> int:
+        """Place of a bearing, given by name or by number from 0.
+
+        Raises
+        ------
+        UsageError
+            If there is no such bearing; names those there are.
+        """
+        if isinstance(bearing, str) and bearing in self.bearing_names:
+            return self.bearing_names.index(bearing)
+        if isinstance(bearing, int) and -len(self.bearing_names) <= bearing < len(self.bearing_names):
+            return bearing
+        raise UsageError(
+            f"there is no touchdown bearing {bearing!r}; there are {', '.join(self.bearing_names)}"
+        )
+
+    def ball_loads(self, machine: Machine, bearing: int | str) -> Array:
+        """Load of every ball of a bearing [N], shape (T, rows, Z); of the `machine` that was simulated."""
+        b = self.index_of(bearing)
+        described = machine.bearing(self.bearing_names[b])
+        moved = self.race_displacement[:, b] - self.support_displacement[:, b]
+        return ball_loads(bearing_constants(described.bearing), moved)
+
+    def __repr__(self) -> str:
+        """Machine, speed, length, peaks and outcome."""
+        peaks = "; ".join(f"{n} {self.peak_force(b)[0]:.4g} N" for b, n in enumerate(self.bearing_names))
+        speed = format_quantity(self.initial_speed, "speed")
+        return (
+            f"<DropResult {self.machine_name} from {speed}, {self.time[-1]:.4g} s: {peaks}. {self.outcome}>"
+        )
+
+    def peak_contact_pressure(self, bearing: int | str) -> tuple[float, float, float]:
         """Largest Hertz pressure of rotor on race [Pa], half width of the contact then [m], time [s]."""
+        bearing = self.index_of(bearing)
         force, time = refined_peak(self.time, self.contact_force[:, bearing])
         line = self.line_contacts[bearing]
         return float(line.maximum_pressure(force)), float(line.half_width(force)), time
@@ -135,9 +172,9 @@ class DropResult:
         x, y = self.bearing_force[..., 0], self.bearing_force[..., 1]
         return np.asarray(np.sqrt(x * x + y * y))
 
-    def peak_force(self, bearing: int) -> tuple[float, float]:
-        """Peak ball force on a race [N] and its time [s]."""
-        return refined_peak(self.time, self.bearing_force_magnitude[:, bearing])
+    def peak_force(self, bearing: int | str) -> tuple[float, float]:
+        """Peak ball force on a race [N] and its time [s], by name or number of the bearing."""
+        return refined_peak(self.time, self.bearing_force_magnitude[:, self.index_of(bearing)])
 
     def at_nodes(self, nodes: list[int] | tuple[int, ...]) -> Array:
         """Rotor displacement [m] at any nodes (numbered from 1), shape (T, len(nodes), 2)."""
@@ -152,8 +189,14 @@ class DropResult:
 
         variables = {}
         for name, axes, unit, text in HISTORIES:
+            axes = tuple("state_name" if axis == "state" else axis for axis in axes)
             variables[name] = (axes, getattr(self, name), {"units": unit, "long_name": text})
-        coordinates = {"time": self.time, "bearing": list(self.bearing_names), "axis": ["x", "y"]}
+        coordinates = {
+            "time": ("time", self.time, {"units": "s", "long_name": "time from power-off"}),
+            "bearing": list(self.bearing_names),
+            "axis": ["x", "y"],
+            "state_name": list(self.state_names),
+        }
         attributes = {"machine": self.machine_name, "outcome": self.outcome, "tolerance": self.tolerance}
         return xarray.Dataset(variables, coords=coordinates, attrs=attributes)
 

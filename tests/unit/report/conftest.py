@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
+from importlib import resources
+
 import numpy as np
 import pytest
 
+from rotordrop.estimation.estimate import Estimate
+from rotordrop.estimation.methods import Tracked
+from rotordrop.estimation.record_facts import facts_of
+from rotordrop.estimation.tracked import COARSE_BASIS, drop_problem, tracked_drop
+from rotordrop.estimation.tracked_estimate import estimate_of
+from rotordrop.identification.evidence import read_evidence
+from rotordrop.machine import example_machine
+from rotordrop.measurement.record import read_record
+from rotordrop.model.parameters import build_drop_model
 from rotordrop.physics.hertz import LineContact
 from rotordrop.simulation.certificate import Certificate
 from rotordrop.simulation.result import ContactLog, DropResult
+from rotordrop.tracking.calibration import CALIBRATED_SCHEDULE, track
 
 GAPS = (275e-6, 285e-6)
 TIME = np.linspace(0.0, 0.2, 4001)
@@ -67,3 +79,19 @@ def drop_result() -> DropResult:
         ),
         line_contacts=(LineContact(radius=4.0, length=0.032, compliance=8.7e-12),) * 2,
     )
+
+
+@pytest.fixture(scope="session")
+def estimate() -> Estimate:
+    """The first 20 ms of the bundled record, in one coarse pass."""
+    machine = example_machine("lp400")
+    folder = resources.files("rotordrop").joinpath("examples", "lp400")
+    with resources.as_file(folder.joinpath("drop_060.h5")) as path:
+        record = read_record(path, machine)
+    with resources.as_file(folder.joinpath("drop_060_tail.csv")) as path:
+        tail = read_record(path, machine)
+    evidence = read_evidence(build_drop_model(machine), record, tail, name="drop_060")
+    problem = drop_problem(build_drop_model(machine, COARSE_BASIS), evidence, until=0.02)
+    smoothed = track([problem], CALIBRATED_SCHEDULE[:1]).smoothed[0]
+    drop = tracked_drop(evidence, problem, smoothed, 1.0)
+    return estimate_of(drop, Tracked(), facts_of(machine, record, tail, "drop_060"))

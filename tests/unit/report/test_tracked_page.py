@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import replace
-from importlib import resources
 from typing import Any
 
 import numpy as np
@@ -16,39 +15,14 @@ from rotordrop.estimation.bearing_drop import Origin
 from rotordrop.estimation.document import estimate_document
 from rotordrop.estimation.estimate import CrossCheck, Estimate, Verdict
 from rotordrop.estimation.later_motion import LaterMotion
-from rotordrop.estimation.methods import Tracked
-from rotordrop.estimation.record_facts import facts_of
-from rotordrop.estimation.tracked import COARSE_BASIS, drop_problem, tracked_drop
-from rotordrop.estimation.tracked_estimate import estimate_of
-from rotordrop.identification.evidence import read_evidence
-from rotordrop.machine import example_machine
 from rotordrop.measurement.quality.finding import Finding
-from rotordrop.measurement.record import read_record
 from rotordrop.measurement.simulated import is_simulated
-from rotordrop.model.parameters import build_drop_model
 from rotordrop.report.content import Table
 from rotordrop.report.drop_sections import drop_sections
 from rotordrop.report.estimate_page import cross_check_statements, estimate_page, spoken
 from rotordrop.report.page import render_page
 from rotordrop.report.quantity import Quantity
-from rotordrop.tracking.calibration import CALIBRATED_SCHEDULE, track
 from rotordrop.tracking.consistency import Check
-
-
-@pytest.fixture(scope="module")
-def estimate() -> Estimate:
-    """The first 20 ms of the bundled record, in one coarse pass."""
-    machine = example_machine("lp400")
-    folder = resources.files("rotordrop").joinpath("examples", "lp400")
-    with resources.as_file(folder.joinpath("drop_060.h5")) as path:
-        record = read_record(path, machine)
-    with resources.as_file(folder.joinpath("drop_060_tail.csv")) as path:
-        tail = read_record(path, machine)
-    evidence = read_evidence(build_drop_model(machine), record, tail, name="drop_060")
-    problem = drop_problem(build_drop_model(machine, COARSE_BASIS), evidence, until=0.02)
-    smoothed = track([problem], CALIBRATED_SCHEDULE[:1]).smoothed[0]
-    drop = tracked_drop(evidence, problem, smoothed, 1.0)
-    return estimate_of(drop, Tracked(), facts_of(machine, record, tail, "drop_060"))
 
 
 def table(estimate: Estimate, heading: str, number: int = 0) -> Table:

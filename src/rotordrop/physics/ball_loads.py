@@ -1,0 +1,73 @@
+"""Load of every single ball of a bearing: from the displacement of its race, or from the force on it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.physics.ball_bearing import BearingConstants
+
+Array = NDArray[np.float64]
+
+_STEPS = 60
+_LONGEST_STEP = 20e-6
+"""Longest step [m] of the search for a displacement: a fraction of what any ball gives way under load."""
+
+
+def ball_loads(constants: BearingConstants, displacement: Array) -> Array:
+    """Load of every ball [N], shape (T, rows, Z), of a race displaced (x, y) from the outer ring [m], (T, 2).
+
+    Source: Neisi 2020, eqs. (2)–(6), ball by ball.
+    """
+    angles = constants.row_ball_angles
+    radial = (
+        constants.radial_offset
+        + displacement[:, 0, None, None] * np.cos(angles)
+        + displacement[:, 1, None, None] * np.sin(angles)
+    )
+    approach = np.maximum(np.hypot(radial, constants.axial_offset) - constants.groove_distance, 0.0)
+    return np.asarray(constants.ball_stiffness * approach * np.sqrt(approach))
+
+
+def displacement_under(constants: BearingConstants, force: Array) -> Array:
+    """Displacement of the race (x, y) [m], (T, 2), at which its balls push back with a force [N], (T, 2).
+
+    Damped Newton steps for all instants at once. ``force`` is the force *on* the race; balls push against its
+    displacement. Without preload and without force a race may be anywhere in its play: it is left in the
+    centre. Source: equilibrium of Neisi 2020, eqs. (2)–(6).
+    """
+    angles = constants.row_ball_angles.reshape(-1)
+    cosine, sine = np.cos(angles), np.sin(angles)
+    wanted = -np.asarray(force, dtype=np.float64)
+    size = np.hypot(wanted[:, 0], wanted[:, 1])
+    found = constants.radial_play * wanted / np.maximum(size, 1e-12)[:, None]
+    for _ in range(_STEPS):
+        radial = constants.radial_offset + np.outer(found[:, 0], cosine) + np.outer(found[:, 1], sine)
+        distance = np.hypot(radial, constants.axial_offset)
+        approach = np.maximum(distance - constants.groove_distance, 0.0)
+        load = constants.ball_stiffness * approach * np.sqrt(approach)
+        share = radial / distance
+        push = load * share
+        stiffness = 1.5 * constants.ball_stiffness * np.sqrt(approach) * share * share
+        stiffness += load * (1.0 - share * share) / distance
+        k_xx, k_xy, k_yy = (
+            stiffness @ (cosine * cosine),
+            stiffness @ (cosine * sine),
+            stiffness @ (sine * sine),
+        )
+        floor = 1e-9 * (k_xx + k_yy) + 1.0
+        k_xx, k_yy = k_xx + floor, k_yy + floor
+        miss = wanted - np.stack([push @ cosine, push @ sine], axis=1)
+        determinant = k_xx * k_yy - k_xy * k_xy
+        step = np.stack(
+            [k_yy * miss[:, 0] - k_xy * miss[:, 1], k_xx * miss[:, 1] - k_xy * miss[:, 0]], axis=1
+        )
+        step /= determinant[:, None]
+        length = np.hypot(step[:, 0], step[:, 1])
+        step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(length, 1e-30))[:, None]
+        found = found + step
+        if math.sqrt(float(np.max(length, initial=0.0))) < 1e-7:
+            break
+    return found

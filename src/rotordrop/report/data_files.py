@@ -1,0 +1,106 @@
+"""Every table and every figure of a report as CSV files."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Iterator
+from itertools import zip_longest
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rotordrop.atomic_file import write_text
+from rotordrop.report.content import Cell, ReportContent, Table
+from rotordrop.report.quantity import Quantity
+
+
+def write_data(content: ReportContent, folder: str | Path) -> list[Path]:
+    """Write the tables and figures of a report as CSV into a folder, which is made; give the files.
+
+    Quantities are in SI units, with the ends of their interval where they have one. A figure becomes pairs of
+    columns, x and y of every line as it is drawn.
+    """
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    written: list[Path] = []
+    for name, rows in _all(content):
+        stem = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_").lower()[:60] or "table"
+        path, k = folder / f"{stem}.csv", 2
+        while path in written:
+            path, k = folder / f"{stem}_{k}.csv", k + 1
+        text = io.StringIO()
+        csv.writer(text, lineterminator="\n").writerows(rows)
+        write_text(path, text.getvalue())
+        written.append(path)
+    return written
+
+
+def _all(content: ReportContent) -> Iterator[tuple[str, list[list[str]]]]:
+    for table in content.summary:
+        yield f"table {table.caption or table.columns[0] or 'summary'}", _table(table)
+    for section in content.sections:
+        for table in section.tables:
+            yield f"table {table.caption or section.heading}", _table(table)
+    for name, chart in content.figures.items():
+        rows = _figure(chart)
+        if rows:
+            yield f"figure {name}", rows
+
+
+def _table(table: Table) -> list[list[str]]:
+    """Heading and rows; a column of quantities gets its unit and, where one of them has it, its interval."""
+    columns = [_column(head, [row[k] for row in table.rows]) for k, head in enumerate(table.columns)]
+    flat = [part for column in columns for part in column]
+    return [list(row) for row in zip(*flat, strict=True)]
+
+
+def _column(head: str, cells: list[Cell]) -> list[list[str]]:
+    """One column, or three with the ends of the intervals, heading first."""
+    quantities = [cell for cell in cells if isinstance(cell, Quantity)]
+    kinds = {cell.kind for cell in quantities}
+    unit = f" [{quantities[0].si_unit}]" if len(kinds) == 1 and quantities[0].si_unit else ""
+    mixed = len(kinds) > 1
+    values = [head + unit, *(_text(cell, mixed) for cell in cells)]
+    if not any(cell.interval_90 for cell in quantities):
+        return [values]
+    ends = []
+    for k, name in ((0, "5 %"), (1, "95 %")):
+        ends.append([f"{head} {name}{unit}", *(_end(cell, k) for cell in cells)])
+    return [values, *ends]
+
+
+def _text(cell: Cell, with_unit: bool) -> str:
+    if isinstance(cell, str):
+        return cell
+    unit = f" {cell.si_unit}" if with_unit and cell.si_unit else ""
+    return "" if cell.value != cell.value else f"{cell.value:.9g}{unit}"
+
+
+def _end(cell: Cell, k: int) -> str:
+    known = isinstance(cell, Quantity) and cell.interval_90 is not None
+    return f"{cell.interval_90[k]:.9g}" if known else ""  # type: ignore[union-attr, index]
+
+
+def _figure(chart: Any) -> list[list[str]]:
+    columns: list[list[str]] = []
+    for trace in chart.data:
+        if getattr(trace, "x", None) is None or getattr(trace, "y", None) is None:
+            continue
+        for axis in ("x", "y"):
+            title = _axis_title(chart, trace, axis)
+            values = np.asarray(getattr(trace, axis)).ravel()
+            columns.append([f"{trace.name or 'line'}: {title}", *(_plain(value) for value in values)])
+    return [list(row) for row in zip_longest(*columns, fillvalue="")]
+
+
+def _axis_title(chart: Any, trace: Any, axis: str) -> str:
+    reference = getattr(trace, f"{axis}axis", None) or axis
+    layout = chart.layout[f"{axis}axis{reference[1:]}"]
+    return str(layout.title.text or axis)
+
+
+def _plain(value: Any) -> str:
+    return f"{value:.9g}" if isinstance(value, int | float | np.number) else str(value)

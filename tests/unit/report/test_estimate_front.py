@@ -1,0 +1,119 @@
+"""What Python asks of an estimate: tables, data sets, files, figures and pages by name."""
+
+import csv
+
+import h5py
+import numpy as np
+import pytest
+from scipy.io import loadmat
+
+from rotordrop.errors import OutputError
+from rotordrop.estimation.bearing_drop import Origin
+from rotordrop.estimation.estimate import Estimates
+from rotordrop.physics.ball_bearing import bearing_constants
+from rotordrop.report.estimate_page import estimate_page
+
+
+def test_the_data_set_has_units_and_selects_by_name(estimate):
+    data = estimate.to_xarray()
+    force = data["force"].sel(bearing="DE")
+    drop = estimate.bearing("DE")
+    np.testing.assert_array_equal(force, drop.force.values)
+    assert data["force"].attrs == {"units": "N", "long_name": "ball force on the race"}
+    assert data["time"].attrs["units"] == "s"
+    assert float(data["stress_upper"].sel(bearing="NDE").max()) >= estimate.bearing("NDE").peak_stress.value
+    assert float(force.sel(time=float(force.time[40]), method="nearest")) == drop.force.values[40]
+
+
+def test_the_table_of_histories_and_that_of_drops_hold_the_same_peaks(estimate):
+    frame = estimate.to_dataframe()
+    assert frame.attrs["units"]["stress"] == "Pa"
+    assert frame["NDE", "force"].max() == estimate.bearing("NDE").force.values.max()
+    rows = Estimates([estimate, estimate]).to_dataframe()
+    assert list(rows["bearing"]) == ["NDE", "DE", "NDE", "DE"]
+    peak = estimate.bearing("DE").peak_force
+    assert rows["peak force [N]"][1] == peak.value
+    assert rows["peak force [N] 95 %"][1] == peak.interval_90[1]
+
+
+@pytest.mark.parametrize("suffix", [".h5", ".nc", ".csv", ".mat"])
+def test_histories_are_written_and_read_back(estimate, tmp_path, suffix):
+    path = tmp_path / f"histories{suffix}"
+    estimate.save(path)
+    wanted = estimate.bearing("DE").force.values
+    if suffix in (".h5", ".nc"):
+        with h5py.File(path) as file:
+            found = file["force"][:, list(file["bearing"].asstr()).index("DE")]
+            assert file["force"].attrs["units"] == "N"
+    elif suffix == ".mat":
+        content = loadmat(path, simplify_cells=True)
+        found = content["b_DE"]["force"]
+        assert content["units"]["stress"] == "Pa"
+    else:
+        with path.open(encoding="utf-8") as stream:
+            rows = list(csv.reader(stream))
+        found = [float(row[rows[0].index("DE force [N]")]) for row in rows[1:]]
+    np.testing.assert_allclose(found, wanted, rtol=1e-8)
+
+
+def test_a_format_nobody_knows_is_refused(estimate, tmp_path):
+    with pytest.raises(OutputError, match=r"'\.xls' is not a format of histories; write one of \.h5"):
+        estimate.save(tmp_path / "histories.xls")
+
+
+def test_parquet_is_written_or_says_what_it_needs(estimate, tmp_path):
+    path = tmp_path / "histories.parquet"
+    try:
+        from pyarrow import parquet
+    except ModuleNotFoundError:
+        with pytest.raises(OutputError, match=r"Parquet needs a package .* rotordrop\[parquet\]"):
+            estimate.save(path)
+        return
+    estimate.save(path)
+    np.testing.assert_array_equal(
+        parquet.read_table(path)["DE force [N]"], estimate.bearing("DE").force.values
+    )
+
+
+def test_figures_are_asked_for_by_name_and_are_those_of_the_page(estimate):
+    figures = estimate.figures
+    assert {"force", "stress", "impacts", "displacement NDE", "orbit", "parameters"} <= set(figures)
+    drawn = np.asarray(figures["force"].data[0].y, dtype=float)
+    assert drawn.max() > 0.0
+    named = [figure.name for section in estimate_page(estimate).sections for figure in section.figures]
+    assert all(named)
+    assert len(set(named)) == len(named)
+
+
+def test_page_numbers_and_data_are_written(estimate, tmp_path):
+    estimate.report(tmp_path / "page.html")
+    assert "Touchdown-bearing force" in (tmp_path / "page.html").read_text(encoding="utf-8")
+    estimate.save(tmp_path / "numbers.json")
+    assert '"bearings"' in (tmp_path / "numbers.json").read_text(encoding="utf-8")
+    estimate.data(tmp_path / "data")
+    files = {path.name for path in (tmp_path / "data").iterdir()}
+    assert {"figure_force.csv", "figure_stress.csv", "table_parameters_of_the_machine.csv"} <= files
+    with (tmp_path / "data" / "figure_force.csv").open(encoding="utf-8") as stream:
+        rows = list(csv.reader(stream))
+    assert len(rows) > 10
+    assert len({len(row) for row in rows}) == 1
+
+
+def test_ball_loads_agree_with_the_largest_and_with_the_force(estimate):
+    drop = estimate.bearing("DE")
+    assert drop.peak_force.origin is Origin.TWIN
+    loads = estimate.ball_loads("DE")
+    bearing = estimate.machine.bearing("DE").bearing
+    assert loads.shape == (len(drop.force.time), 2, bearing.ball_count)
+    coefficient = bearing_constants(bearing).stress_coefficient_inner
+    stress = coefficient * loads.max(axis=(1, 2)) ** (1.0 / 3.0)
+    at = int(np.argmax(drop.force.values))
+    assert stress[at] == pytest.approx(drop.stress.values[at], rel=0.02)
+
+
+def test_it_is_shown_in_one_line_and_as_a_small_table(estimate):
+    assert repr(estimate).startswith(f"<Estimate drop_060 of {estimate.machine.name}: NDE ")
+    assert len(repr(estimate)) < 400
+    page = estimate._repr_html_()
+    assert page.count("<tr>") == 3
+    assert "peak force" in page
