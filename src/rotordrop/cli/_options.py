@@ -49,6 +49,16 @@ JsonOption = Annotated[
     ),
 ]
 
+DataOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--data",
+        metavar="FOLDER",
+        help="Write every table and figure of the report as CSV.",
+        show_default=False,
+    ),
+]
+
 ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite what stands there already.")]
 
 ProfileOption = Annotated[

@@ -38,7 +38,7 @@ BROKEN_PIPE = 141
 _OUTPUTS = ("json", "json_file", "report", "output")
 """Parameters of the verbs that name files to write; other paths are read."""
 
-_NEITHER = ("target", "folder")
+_NEITHER = ("target", "folder", "data")
 """Parameters that name a folder to fill, or a file that is never replaced unasked."""
 
 _NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO, errno.EBADF)
@@ -47,9 +47,12 @@ _ORDER = (
     "init",
     "schema",
     "bearings",
+    "import-rotor",
+    "export-rotor",
     "check",
     "simulate",
     "critical-speeds",
+    "unbalance-response",
     "coast-down",
     "profile",
     "look",
@@ -66,6 +69,7 @@ _ORDER = (
     "score",
     "bench",
     "fingerprint",
+    "doctor",
 )
 
 # Typer carries its own copy of click in new versions and uses the installed one in old versions.

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rotordrop.cli._options import JsonOption, ReportOption, quantity
+from rotordrop.cli._options import DataOption, JsonOption, ReportOption, quantity
 from rotordrop.cli._output import deliver, require_places
 from rotordrop.errors import UsageError
 
@@ -36,6 +36,7 @@ def compare(
         ),
     ] = None,
     report: ReportOption = None,
+    data: DataOption = None,
     json: JsonOption = None,
 ) -> None:
     """Compare several drops: which was worst, and how sure that is."""
@@ -56,6 +57,10 @@ def compare(
     page = compare_page(drops, machine_name=", ".join(sorted(machines - {""})), drop_scatter=drop_scatter)
     if report is not None:
         write_page(page, report)
+    if data is not None:
+        from rotordrop.report.csv_files import write_data
+
+        write_data(page, data)
 
     def summarise(out: Console) -> None:
         print_summary(page, out)

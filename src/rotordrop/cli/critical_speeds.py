@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from rotordrop.cli._options import JsonOption, MachineArgument, quantity
+from rotordrop.cli._options import DataOption, JsonOption, MachineArgument, quantity
 from rotordrop.cli._output import deliver, progress_bar, require_places
 
 BEYOND_NOMINAL = 1.1
@@ -42,6 +42,7 @@ def critical_speeds(
     report: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write the report as one HTML file.")
     ] = None,
+    data: DataOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """Show critical speeds on supports of any stiffness, and damped modes against the speed."""
@@ -70,4 +71,8 @@ def critical_speeds(
     page = critical_speeds_page(described, maps, diagrams)
     if report is not None:
         write_page(page, report)
+    if data is not None:
+        from rotordrop.report.csv_files import write_data
+
+        write_data(page, data)
     deliver(critical_speeds_json(maps, diagrams), json_file, lambda out: print_summary(page, out))

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rotordrop.cli._options import JsonOption, MachineArgument, ProfileOption
+from rotordrop.cli._options import DataOption, JsonOption, MachineArgument, ProfileOption
 from rotordrop.cli._output import deliver, progress_bar, require_places
 from rotordrop.cli._recordings import require_own_content, require_own_names, tails_of
 from rotordrop.errors import ConsistencyError, UsageError
@@ -69,10 +69,7 @@ def estimate(
             help="Write force, stress, displacement, ball load against time: .h5, .csv, .mat, .parquet.",
         ),
     ] = None,
-    data: Annotated[
-        Path | None,
-        typer.Option(metavar="FOLDER", help="Write every table and figure of the report as CSV."),
-    ] = None,
+    data: DataOption = None,
     json: JsonOption = None,
 ) -> None:
     """Estimate touchdown-bearing force and stress from recorded drops."""

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rotordrop.cli._interruption import interruptible
-from rotordrop.cli._options import JsonOption, MachineArgument, quantity
+from rotordrop.cli._options import DataOption, JsonOption, MachineArgument, quantity
 from rotordrop.cli._output import deliver, require_places
 from rotordrop.cli._start import levitated_start, placed_start
 from rotordrop.errors import UsageError
@@ -111,6 +111,7 @@ def simulate(
     report: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write the report as one HTML file.")
     ] = None,
+    data: DataOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """Simulate a drop and show forces, stresses and contacts of every touchdown bearing."""
@@ -150,4 +151,8 @@ def simulate(
         result.save(output)
     if report is not None:
         write_page(page, report)
+    if data is not None:
+        from rotordrop.report.csv_files import write_data
+
+        write_data(page, data)
     deliver(simulation_numbers(result), json_file, lambda out: print_summary(page, out))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rotordrop.cli._options import JsonOption
+from rotordrop.cli._options import DataOption, JsonOption
 from rotordrop.cli._output import console, deliver, progress_bar, require_places
 from rotordrop.errors import UsageError
 
@@ -66,6 +66,7 @@ def study(
     report: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write the report as one HTML file.")
     ] = None,
+    data: DataOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """Compute many drops and show how force, stress and whirl are spread."""
@@ -92,6 +93,10 @@ def study(
         save_results(results, output)
     if report is not None:
         write_page(page, report)
+    if data is not None:
+        from rotordrop.report.csv_files import write_data
+
+        write_data(page, data)
     deliver(study_numbers(results, by or ()), json_file, lambda out: print_summary(page, out))
 
 

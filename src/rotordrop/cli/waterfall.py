@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rotordrop.cli._options import JsonOption, MachineArgument, quantity
+from rotordrop.cli._options import DataOption, JsonOption, MachineArgument, quantity
 from rotordrop.cli._output import deliver, progress_bar, require_places
 from rotordrop.errors import UsageError
 
@@ -78,6 +78,7 @@ def waterfall(
     report: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write the report as one HTML file.")
     ] = None,
+    data: DataOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """Find and name the frequencies of a coast-down, and say whether 0.2 s held the maximum."""
@@ -122,6 +123,10 @@ def waterfall(
         write_findings(found, output)
     if report is not None:
         write_page(page, report)
+    if data is not None:
+        from rotordrop.report.csv_files import write_data
+
+        write_data(page, data)
     deliver(found.as_json(), json_file, lambda out: print_summary(page, out))
 
 

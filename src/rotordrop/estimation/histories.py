@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from rotordrop.atomic_file import atomic_path, new_hdf5
 from rotordrop.errors import OutputError, UsageError
 from rotordrop.estimation.bearing_drop import BearingDrop
-from rotordrop.physics.ball_bearing import bearing_constants
-from rotordrop.physics.ball_loads import ball_loads, displacement_under
+from rotordrop.model.bearing_numbers import numbers_of
 
 if TYPE_CHECKING:
     import pandas
@@ -93,8 +92,7 @@ def _columns(bearing: BearingDrop, machine: Machine, time: Array) -> Iterator[Co
 
 def _largest_load(bearing: BearingDrop, machine: Machine) -> Array:
     """Load of the most loaded ball [N], from its stress."""
-    constants = bearing_constants(machine.bearing(bearing.name).bearing)
-    return np.asarray((bearing.stress.values / constants.stress_coefficient_inner) ** 3)
+    return numbers_of(machine.bearing(bearing.name)).load_of_stress(bearing.stress.values)
 
 
 def loads_of_balls(estimate: Estimate, name: str) -> Array:
@@ -111,8 +109,7 @@ def loads_of_balls(estimate: Estimate, name: str) -> Array:
             f"the loads of single balls at {name} are not known: its force comes from the "
             f"{bearing.peak_force.origin}, which gives no direction; take the largest load"
         )
-    constants = bearing_constants(estimate.machine.bearing(name).bearing)
-    return ball_loads(constants, displacement_under(constants, bearing.force_vector))
+    return numbers_of(estimate.machine.bearing(name)).element_loads_under(bearing.force_vector)
 
 
 def as_dataframe(estimate: Estimate) -> pandas.DataFrame:

@@ -30,6 +30,7 @@ from rotordrop.identification.friction import FrictionSweep
 from rotordrop.identification.modal_expansion import expand_initial_state
 from rotordrop.identification.support import SupportFit
 from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.model.bearing_numbers import numbers_of
 from rotordrop.model.parameter import Step
 from rotordrop.model.parameter_table import parameter, rows
 from rotordrop.simulation.result import DropResult
@@ -104,8 +105,13 @@ def _bearing(
     values["equivalent_stiffness_N_per_m"] = equivalent_stiffness(
         bearing, float(evidence.model.load_shares[b]), values["support.stiffness_N_per_m"]
     )
+    inferred = numbers_of(bearing).stress_sigma
     means = {
-        name: _mean(simulated.values[name], None if draws is None else sample(draws)[:, b], model)
+        name: _mean(
+            simulated.values[name],
+            None if draws is None else sample(draws)[:, b],
+            math.hypot(model, inferred) if name == "mean_stress_Pa" else model,
+        )
         for name, sample, model in MEANS
         if name in simulated.values
     }
@@ -127,7 +133,9 @@ def _bearing(
             simulated.peak_force, None if draws is None else draws.peak_force[:, b], MODEL_FORCE_SIGMA
         ),
         peak_stress=_peak(
-            simulated.peak_stress, None if draws is None else draws.peak_stress[:, b], MODEL_STRESS_SIGMA
+            simulated.peak_stress,
+            None if draws is None else draws.peak_stress[:, b],
+            math.hypot(MODEL_STRESS_SIGMA, inferred),
         ),
         values={**values, **means},
         missing={} if draws is not None else dict.fromkeys(loads, reason),

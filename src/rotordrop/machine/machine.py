@@ -172,6 +172,8 @@ class Machine(Description):
             f"touchdown bearings {bearings}, {len(self.ambs)} AMBs, {len(self.sensors)} sensors>"
         )
 
+    __str__ = __repr__
+
     @property
     def source_path(self) -> Path | None:
         """File the machine was read from."""

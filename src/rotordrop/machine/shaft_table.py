@@ -1,4 +1,4 @@
-"""Shaft sections from a CSV table."""
+"""Shaft sections from a table: CSV, a spreadsheet, or as other programs print it."""
 
 from __future__ import annotations
 
@@ -23,6 +23,27 @@ _COLUMNS = {
     "material": None,
     "part": None,
 }
+_ALIASES = {
+    alias: name
+    for name, aliases in {
+        "length": "l len länge laenge element_length elem_length",
+        "position": "z x axial_position location lage",
+        "outer_diameter": "od da d outer_dia outside_dia outside_diameter stiffness_od stiff_od diameter "
+        "stiffness_outer_diameter aussendurchmesser außendurchmesser",
+        "inner_diameter": "id di inner_dia inside_dia inside_diameter stiffness_id stiff_id bore "
+        "innendurchmesser",
+        "layer_diameter": "mass_od mass_outer_diameter mass_diameter massendurchmesser",
+        "layer_density": "mass_density mass_rho",
+        "material": "material_name matl mat werkstoff",
+        "part": "comment remark description bemerkung",
+    }.items()
+    for alias in aliases.split()
+}
+"""What programs and people call a column."""
+_NUMBERS = ("ele", "element", "el", "elem", "no", "nr", "station", "sta", "sub", "subele", "mass_id", "layer")
+"""Columns that only count or say nothing here; passed over."""
+_MASS_DENSITY = 7850.0
+"""Density of what a mass diameter adds where the table gives none [kg/m³]: steel."""
 _HEADING = re.compile(r"^\s*([^\[\]()]+?)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*$")
 
 
@@ -31,13 +52,15 @@ SECTION_LINE = "_line"
 
 
 def read_shaft_table(path: Path) -> dict[str, Any]:
-    """Read shaft sections from a CSV file, as the tables of a machine file would give them.
+    """Read shaft sections from a CSV file or a spreadsheet, as a machine file would give them.
 
     The first line names the columns with their units, such as ``position [mm]``. Either ``position`` says
     where each node lies, the row describing the shaft from there to the next one (the last row holds the end
-    only), or ``length`` gives every section its length.
+    only), or ``length`` gives every section its length. Columns may be called as other programs do: ``L``,
+    ``OD``, ``ID``, ``Mass OD``; units may stand in brackets or in a row below the names. Without a density,
+    what a mass diameter adds is steel.
     """
-    lines = _text(path).splitlines()
+    lines = (_sheet(path) if path.suffix.lower() in (".xlsx", ".xlsm") else _text(path)).splitlines()
     rows = [(number, line) for number, line in enumerate(lines, start=1) if line.strip() and line[0] != "#"]
     if len(rows) < 2:
         raise MachineFileError(
@@ -45,13 +68,61 @@ def read_shaft_table(path: Path) -> dict[str, Any]:
         )
     separator = _separator(rows[0][1])
     cells = [(number, next(csv.reader([line], delimiter=separator))) for number, line in rows]
-    table = _Table(path, [text.strip() for text in cells[0][1]], rows[0][0])
-    described = [table.row(number, row) for number, row in cells[1:]]
+    headings = [text.strip() for text in cells[0][1]]
+    if _are_units(cells[1][1]):
+        units = [*cells.pop(1)[1], *([""] * len(headings))]
+        headings = [
+            f"{name} [{_bare(unit)}]" if _bare(unit) else name
+            for name, unit in zip(headings, units, strict=False)
+        ]
+    table = _Table(path, headings, rows[0][0])
+    described = [_with_layer(table.row(number, row)) for number, row in cells[1:]]
     if "position" in table.names:
         return _by_position(described, table)
     if "length" in table.names:
         return {"sections": described}
     raise table.error("the shaft table needs a column 'position [mm]' or 'length [mm]'", rows[0][0])
+
+
+def _bare(unit: str) -> str:
+    return unit.strip().strip("[]()-").strip()
+
+
+def _are_units(cells: list[str]) -> bool:
+    """Whether a row below the names holds units only."""
+    said = [_bare(cell) for cell in cells if _bare(cell)]
+    return bool(said) and all(
+        cell.lower() in ("mm", "m", "cm", "in", "inch", "kg/m^3", "kg/m3", "kg/m³") for cell in said
+    )
+
+
+def _with_layer(row: dict[str, Any]) -> dict[str, Any]:
+    """Bring a mass diameter to a layer: none where it is that of the shaft, steel without a density."""
+    layer, outer = row.get("layer_diameter"), row.get("outer_diameter")
+    if layer is None or outer is None:
+        return row
+    if abs(layer.value - outer.value) < 1e-9 or layer.value == 0.0:
+        return {key: value for key, value in row.items() if key not in ("layer_diameter", "layer_density")}
+    return {"layer_density": Estimated(value=_MASS_DENSITY)} | row
+
+
+def _sheet(path: Path) -> str:
+    """The first sheet of a workbook as text with tabs."""
+    try:
+        import openpyxl
+    except ModuleNotFoundError:
+        raise MachineFileError(
+            "spreadsheets need a package that is not installed; install rotordrop[io], or save it as CSV",
+            file=path,
+        ) from None
+    try:
+        book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+    except Exception as error:  # a damaged workbook fails in as many ways as zip and XML can
+        raise MachineFileError(f"cannot read the spreadsheet: {error}", file=path) from error
+    rows = book.worksheets[0].iter_rows(values_only=True)
+    lines = ["\t".join("" if cell is None else str(cell) for cell in row) for row in rows]
+    book.close()
+    return "\n".join(line.rstrip("\t") for line in lines)
 
 
 class _Table:
@@ -63,13 +134,14 @@ class _Table:
         self.units: list[str] = []
         for column, heading in enumerate(headings):
             match = _HEADING.match(heading)
-            name = (match.group(1) if match else heading).strip().lower().replace(" ", "_")
-            if name not in _COLUMNS:
+            name = (match.group(1) if match else heading).strip(" .:,").lower().replace(" ", "_")
+            name = _ALIASES.get(name, name)
+            if name not in _COLUMNS and name not in _NUMBERS:
                 raise self.error(
                     unknown_key(name, tuple(_COLUMNS)).replace("key", "column", 1), line, column + 1
                 )
             unit = (match.group(2) if match else None) or ""
-            if _COLUMNS[name] is not None and not unit:
+            if _COLUMNS.get(name) is not None and not unit:
                 raise self.error(
                     f"the column {heading!r} has no unit; write for example '{name.replace('_', ' ')} [mm]'",
                     line,
@@ -88,7 +160,7 @@ class _Table:
             )
         values: dict[str, Any] = {SECTION_LINE: number}
         for index, (name, unit, cell) in enumerate(zip(self.names, self.units, cells, strict=False)):
-            if cell.strip():
+            if cell.strip() and name in _COLUMNS:
                 values[name] = self._cell(name, unit, cell.strip(), number, index + 1)
         return values
 

@@ -121,7 +121,7 @@ def _columns(signals: Mapping[str, ArrayLike] | ArrayLike, names: list[str]) -> 
 
 def _unit_of(name: str, unit: str | Mapping[str, str]) -> str:
     said = unit.get(name, "") if isinstance(unit, Mapping) else unit
-    if not isinstance(said, str) or not said:
+    if not said:
         raise UsageError(f"the unit of {name} is {said!r}; say it, for example unit='um'")
     return known_unit(said) or said
 

@@ -17,6 +17,7 @@ from rotordrop.physics.timoshenko import Section
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
+    from rotordrop.machine.rotor import Rotor
 
 Array = NDArray[np.float64]
 
@@ -169,7 +170,11 @@ def assemble(
 
 def build_rotor_fe(machine: Machine) -> RotorFE:
     """Finite elements of a machine's rotor: shaft, layers, discs (Neisi 2020, eq. (1))."""
-    rotor = machine.rotor
+    return rotor_fe(machine.rotor)
+
+
+def rotor_fe(rotor: Rotor) -> RotorFE:
+    """Finite elements of a rotor alone. Source: Neisi 2020, eq. (1)."""
     sections = []
     for element in rotor.elements:
         outer = float(element.outer_diameter)

@@ -29,6 +29,7 @@ from rotordrop.physics.ball_bearing import (
     preload_of_offset,
 )
 from rotordrop.physics.ball_bearing_response import bearing_response, simple_radial_stiffness
+from rotordrop.physics.ball_loads import ball_loads, displacement_under
 from rotordrop.physics.ball_set import ball_set_entries, balls_of, loose_race_seat, static_deflection
 from rotordrop.physics.hertz import compliance
 from rotordrop.units import format_quantity
@@ -64,6 +65,18 @@ class BallNumbers(BearingNumbers):
     def play(self) -> float:
         """Radial play [m], half the clearance of deep grooves."""
         return self.constants.radial_play
+
+    def element_loads(self, moved: Array) -> Array:
+        """Load of every ball [N]."""
+        return ball_loads(self.constants, moved)
+
+    def element_loads_under(self, force: Array) -> Array:
+        """Load of every ball [N] where they push the race with a force."""
+        return ball_loads(self.constants, displacement_under(self.constants, force))
+
+    def load_of_stress(self, stress: Array) -> Array:
+        """Load [N] of the ball with a stress at the inner race."""
+        return np.asarray((stress / self.constants.stress_coefficient_inner) ** 3)
 
     @property
     def drag_diameter(self) -> float:

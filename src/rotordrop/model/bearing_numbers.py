@@ -166,6 +166,18 @@ class BearingNumbers(ABC):
         """Relative standard deviation [1] of its stress at a force, by what is inferred of it."""
         return 0.0
 
+    def element_loads(self, moved: Array) -> Array:
+        """Load of every rolling element [N], (T, rows, Z), of a race moved (x, y) [m], (T, 2); none here."""
+        return np.zeros((len(moved), 0, 0))
+
+    def element_loads_under(self, force: Array) -> Array:
+        """The same under a force of the elements on the race (x, y) [N], (T, 2); none here."""
+        return np.zeros((len(force), 0, 0))
+
+    def load_of_stress(self, stress: Array) -> Array:
+        """Load [N] of the element whose largest Hertz stress is given [Pa]; NaN without rolling elements."""
+        return np.full_like(stress, np.nan)
+
     def rolling_elements(self) -> RollingElements | None:
         """What defects may show in a spectrum; None without rolling elements."""
         return None

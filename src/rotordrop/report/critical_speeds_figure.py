@@ -13,6 +13,7 @@ from rotordrop.model.campbell import CampbellDiagram
 from rotordrop.model.critical_speeds import CriticalSpeedMap
 from rotordrop.report.style import (
     INK,
+    LIMIT,
     LOG_LABELS,
     MUTED,
     SERIES,
@@ -94,7 +95,7 @@ def _add_stiffness_lines(figure: go.Figure, found: CriticalSpeedMap, column: int
             )
 
 
-def campbell_figure(diagram: CampbellDiagram, highest: float) -> go.Figure:
+def campbell_figure(diagram: CampbellDiagram, highest: float, nominal: float | None = None) -> go.Figure:
     """Draw damped frequencies and damping ratios against the rotor speed.
 
     Parameters
@@ -103,6 +104,8 @@ def campbell_figure(diagram: CampbellDiagram, highest: float) -> go.Figure:
         Lines that keep their shape from speed to speed.
     highest : float
         Highest frequency drawn [Hz].
+    nominal : float, optional
+        Nominal speed, for an upright line [rad/s].
 
     Returns
     -------
@@ -135,7 +138,11 @@ def campbell_figure(diagram: CampbellDiagram, highest: float) -> go.Figure:
             )
         shown.add(direction)
     _add_own_speed(figure, diagram, highest)
-    figure.update_xaxes(title_text=axis_title("rotor speed", "Hz"))
+    if nominal is not None:
+        for column in (1, 2):
+            line = {"color": LIMIT, "width": 1.2, "dash": "dash"}
+            figure.add_vline(x=nominal / TURN, line=line, row=1, col=column)
+    figure.update_xaxes(title_text=axis_title("rotor speed, × 60 in rpm", "Hz"))
     figure.update_yaxes(title_text=axis_title("frequency", "Hz"), range=[0.0, highest], col=1)
     figure.update_yaxes(title_text=axis_title("damping ratio", "%"), rangemode="tozero", col=2)
     return fit_legend(figure)

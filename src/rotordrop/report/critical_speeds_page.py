@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotordrop._version import __version__
-from rotordrop.model.campbell import CampbellDiagram, Crossing
+from rotordrop.model.campbell import CampbellDiagram
 from rotordrop.model.critical_speeds import CriticalSpeedMap
+from rotordrop.model.separation import Separation, amplification_factor, separations
 from rotordrop.report.content import Card, Figure, KeyFigure, ReportContent, Section, Statement, Table
 from rotordrop.report.critical_speeds_figure import campbell_figure, critical_speed_figure, mode_shape_figure
 from rotordrop.report.machine_sections import defaults_section
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
 
 TURN = 2.0 * math.pi
 HIGHEST = 1000.0
-NEAR_NOMINAL = 0.05
-"""Distance of a critical speed from the nominal speed, as a share of it, below which a reader is warned."""
 SHAPES = 6
 AT_LINES = {
     "tangent": "bearings' tangent stiffness, supports without mass",
@@ -56,7 +55,7 @@ def critical_speeds_page(
         verdict=_verdict(machine, maps["standstill"], diagrams),
         cards=_cards(maps["standstill"]),
         facts=(("machine", machine.name), ("rotordrop", __version__)),
-        summary=(line_table(maps["standstill"]), crossing_table(diagrams)),
+        summary=(line_table(maps["standstill"]), crossing_table(diagrams, float(machine.speed.nominal))),
         sections=(
             *(_map_section(found) for found in maps.values()),
             *(_campbell_section(machine, diagram) for diagram in diagrams.values()),
@@ -93,22 +92,28 @@ def _verdict(
             speeds = ", ".join(f"{c.speed / TURN:.1f}" for c in forward)
             text = f"{_held(name)}: forward or mixed modes meet the rotor's own speed at {speeds} Hz"
             statements.append(Statement(text=f"{text}, up to the nominal speed."))
-        statements += [_near_nominal(name, c, top) for c in diagram.crossings if _is_near(c, top)]
+        statements += _margins(name, diagram, top)
     return tuple(statements)
 
 
-def _is_near(crossing: Crossing, nominal: float) -> bool:
-    return crossing.direction != "backward" and abs(crossing.speed - nominal) <= NEAR_NOMINAL * nominal
+def _margins(name: str, diagram: CampbellDiagram, nominal: float) -> list[Statement]:
+    """One problem per critical speed that is nearer to the nominal speed than API 617 asks for."""
+    return [_too_near(name, one, nominal) for one in separations(diagram, nominal, nominal) if not one.met]
 
 
-def _near_nominal(name: str, crossing: Crossing, nominal: float) -> Statement:
-    apart = abs(crossing.speed / nominal - 1.0)
+def _too_near(name: str, one: Separation, nominal: float) -> Statement:
+    crossing = one.crossing
     return Statement(
         text=f"{_held(name)}: a {crossing.direction} mode meets the rotor's own speed at "
-        f"{crossing.speed / TURN:.1f} Hz, {apart:.1%} from the nominal speed of {nominal / TURN:.1f} Hz, "
-        f"with a damping ratio of {crossing.damping_ratio:.2%}.",
-        level="warning",
+        f"{_speed_text(crossing.speed)}, {one.margin:.1%} from the nominal speed of {_speed_text(nominal)}, "
+        f"with a damping ratio of {crossing.damping_ratio:.2%} and an amplification factor of "
+        f"{one.factor:.1f}; API 617 asks for {one.required:.1%}.",
+        level="warning" if name == "free-free" else "bad",
     )
+
+
+def _speed_text(speed: float) -> str:
+    return f"{speed / TURN:.1f} Hz ({60.0 * speed / TURN:.0f} rpm)"
 
 
 def _held(name: str) -> str:
@@ -155,23 +160,34 @@ def line_table(found: CriticalSpeedMap) -> Table:
     )
 
 
-def crossing_table(diagrams: Mapping[str, CampbellDiagram]) -> Table:
-    """Critical speeds with damping: where a line of a Campbell diagram meets the rotor's own speed."""
-    rows = tuple(
-        (
-            name,
-            Quantity(value=crossing.speed, kind="speed", digits=4),
-            crossing.direction,
-            f"{100.0 * crossing.damping_ratio:.2f} %",
-        )
-        for name, diagram in diagrams.items()
-        for crossing in diagram.crossings
-    )
+def crossing_table(diagrams: Mapping[str, CampbellDiagram], nominal: float) -> Table:
+    """Critical speeds with damping, amplification factor and margin from the nominal speed [rad/s]."""
+    rows = []
+    for name, diagram in diagrams.items():
+        judged = {id(one.crossing): one for one in separations(diagram, nominal, nominal)}
+        for crossing in diagram.crossings:
+            one = judged.get(id(crossing))
+            rows.append(
+                (
+                    name,
+                    Quantity(value=crossing.speed, kind="speed", digits=4),
+                    crossing.direction,
+                    f"{100.0 * crossing.damping_ratio:.2f} %",
+                    f"{amplification_factor(crossing.damping_ratio):.1f}",
+                    "–" if one is None else f"{100.0 * one.margin:.1f} %",
+                    "–" if one is None else f"{100.0 * one.required:.1f} %",
+                    "–" if one is None else one.verdict,
+                )
+            )
     return Table(
-        columns=("rotor held by", "critical speed", "direction", "damping ratio"),
-        rows=rows,
-        caption="Critical speeds with damping",
-        note="Unbalance excites forward modes, and backward ones only on unequal supports.",
+        columns=(
+            *("rotor held by", "critical speed", "direction", "damping ratio"),
+            *("amplification", "margin", "required", "API 617"),
+        ),
+        rows=tuple(rows),
+        caption="Critical speeds with damping and separation margins",
+        note="Unbalance excites forward modes, and backward ones only on unequal supports. Amplification "
+        "1/(2ζ); margin from the nominal speed as a share of it; required by API 617, part 1.",
     )
 
 
@@ -181,6 +197,7 @@ def _map_section(found: CriticalSpeedMap) -> Section:
         caption=f"Undamped {_WHIRL_WORDS[found.whirl]} against the equivalent stiffness of bearing and "
         "support in series, equal at all bearings (Neisi 2020, Fig. 19). Vertical: the machine's own "
         "stiffness, full by the tangent of the ball forces with preload, dashed by the simple formula.",
+        name=f"map {found.whirl}",
     )
     text = (
         "Right: the support's mass sits between bearing and support spring; it adds modes of its own and "
@@ -199,13 +216,15 @@ def _campbell_section(machine: Machine, diagram: CampbellDiagram) -> Section:
     bearings = [(b.name, nodes[b.node - 1]) for b in machine.touchdown_bearings]
     figures = (
         Figure(
-            chart=campbell_figure(diagram, HIGHEST),
+            chart=campbell_figure(diagram, HIGHEST, float(machine.speed.nominal)),
             caption="Damped frequencies and damping ratios against the rotor speed; circles: critical "
-            "speeds.",
+            "speeds; dashed upright: nominal speed.",
+            name=f"campbell {diagram.suspension}",
         ),
         Figure(
             chart=mode_shape_figure(diagram, bearings, SHAPES),
             caption="Shapes of the lowest modes at the lowest speed, in the plane of the largest deflection.",
+            name=f"shapes {diagram.suspension}",
         ),
     )
     return Section(heading=f"{_held(diagram.suspension)}: Campbell diagram and shapes", figures=figures)
@@ -248,10 +267,15 @@ def _campbell_json(diagram: CampbellDiagram) -> dict[str, Any]:
                 "line": crossing.line,
                 "direction": crossing.direction,
                 "damping_ratio": crossing.damping_ratio,
+                "amplification_factor": _finite(amplification_factor(crossing.damping_ratio)),
             }
             for crossing in diagram.crossings
         ],
     }
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def _table(values: Any) -> Any:

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from rotordrop.atomic_file import new_hdf5
 from rotordrop.errors import SimulationError, UsageError
-from rotordrop.physics.ball_bearing import bearing_constants
-from rotordrop.physics.ball_loads import ball_loads
+from rotordrop.model.bearing_numbers import numbers_of
 from rotordrop.physics.hertz import LineContact
 from rotordrop.simulation.certificate import Certificate, refined_peak
 from rotordrop.units import format_quantity
@@ -147,9 +146,8 @@ class DropResult:
     def ball_loads(self, machine: Machine, bearing: int | str) -> Array:
         """Load of every ball of a bearing [N], shape (T, rows, Z); of the `machine` that was simulated."""
         b = self.index_of(bearing)
-        described = machine.bearing(self.bearing_names[b])
         moved = self.race_displacement[:, b] - self.support_displacement[:, b]
-        return ball_loads(bearing_constants(described.bearing), moved)
+        return numbers_of(machine.bearing(self.bearing_names[b])).element_loads(moved)
 
     def __repr__(self) -> str:
         """Machine, speed, length, peaks and outcome."""

@@ -81,8 +81,9 @@ def test_figures_are_asked_for_by_name_and_are_those_of_the_page(estimate):
     drawn = np.asarray(figures["force"].data[0].y, dtype=float)
     assert drawn.max() > 0.0
     named = [figure.name for section in estimate_page(estimate).sections for figure in section.figures]
-    assert all(named)
-    assert len(set(named)) == len(named)
+    told = [name for name in named if name]
+    assert len(set(told)) == len(told)
+    assert len(figures) == len(named)
 
 
 def test_page_numbers_and_data_are_written(estimate, tmp_path):

@@ -21,7 +21,7 @@ def write_data(content: ReportContent, folder: str | Path) -> list[Path]:
     """Write the tables and figures of a report as CSV into a folder, which is made; give the files.
 
     Quantities are in SI units, with the ends of their interval where they have one. A figure becomes pairs of
-    columns, x and y of every line as it is drawn.
+    columns, x and y of every line as it is drawn; a picture has its value as a third.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
@@ -89,10 +89,14 @@ def _figure(chart: Any) -> list[list[str]]:
     for trace in chart.data:
         if getattr(trace, "x", None) is None or getattr(trace, "y", None) is None:
             continue
-        for axis in ("x", "y"):
-            title = _axis_title(chart, trace, axis)
-            values = np.asarray(getattr(trace, axis)).ravel()
-            columns.append([f"{trace.name or 'line'}: {title}", *(_plain(value) for value in values)])
+        values = {axis: np.asarray(getattr(trace, axis)).ravel() for axis in ("x", "y")}
+        if getattr(trace, "z", None) is not None:
+            height = np.asarray(trace.z)
+            values["x"], values["y"] = (grid.ravel() for grid in np.meshgrid(values["x"], values["y"]))
+            values["z"] = height.ravel()
+        for axis, along in values.items():
+            title = "value" if axis == "z" else _axis_title(chart, trace, axis)
+            columns.append([f"{trace.name or 'line'}: {title}", *(_plain(value) for value in along)])
     return [list(row) for row in zip_longest(*columns, fillvalue="")]
 
 

@@ -1,0 +1,118 @@
+"""Say what is installed, missing and cached.
+
+Looks only at this computer; nothing is changed and nothing is sent.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+from importlib.metadata import PackageNotFoundError, requires, version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotordrop._version import __version__
+from rotordrop.cli._options import JsonOption
+from rotordrop.cli._output import deliver
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+EXTRAS = {
+    "io": ("recordings of TDMS, UFF and Excel, shaft tables of Excel", ("npTDMS", "pyuff", "openpyxl")),
+    "xarray": ("to_xarray(), to_dataframe()", ("xarray", "h5netcdf")),
+    "parquet": ("histories as Parquet", ("pyarrow",)),
+    "postgres": ("a log of drops in PostgreSQL", ("psycopg",)),
+    "cluster": ("studies on a Dask cluster", ("distributed",)),
+}
+"""What an extra is for, and its packages."""
+
+
+def doctor(json_file: JsonOption = None) -> None:
+    """Say what is installed, what is missing, and whether compiled code is cached."""
+    found = examined()
+
+    def summarise(out: Console) -> None:
+        out.print(f"rotordrop {found['rotordrop']}, Python {found['python']}, {found['system']}")
+        for name, one in found["packages"].items():
+            if one is None:
+                out.print(f"problem: {name} is missing; install rotordrop again: pip install rotordrop")
+        out.print(
+            f"{sum(one is not None for one in found['packages'].values())} packages it needs are there."
+        )
+        for extra, one in found["extras"].items():
+            lost = ", ".join(name for name, number in one["packages"].items() if number is None)
+            state = f"missing: {lost}; pip install 'rotordrop[{extra}]'" if lost else "installed"
+            out.print(f"extra {extra} ({one['for']}): {state}")
+        for line in _cache_lines(found["cache"]):
+            out.print(line)
+        out.print(f"{found['cores']} cores; threads of linear algebra: {found['threads'] or 'as it likes'}")
+
+    deliver(found, json_file, summarise)
+
+
+def examined() -> dict[str, Any]:
+    """Everything the command says, ready for JSON."""
+    return {
+        "rotordrop": __version__,
+        "python": platform.python_version(),
+        "executable": sys.executable,
+        "system": platform.platform(),
+        "packages": {name: _version(name) for name in _needed()},
+        "extras": {
+            extra: {"for": text, "packages": {name: _version(name) for name in names}}
+            for extra, (text, names) in EXTRAS.items()
+        },
+        "cache": _cache(),
+        "cores": os.cpu_count() or 1,
+        "threads": os.environ.get("OPENBLAS_NUM_THREADS"),
+    }
+
+
+def _needed() -> list[str]:
+    """Names of the packages that rotordrop cannot do without."""
+    try:
+        stated = requires("rotordrop") or []
+    except PackageNotFoundError:
+        return ["numpy", "scipy", "numba", "pydantic", "pint", "h5py", "plotly", "jinja2", "typer", "rich"]
+    return [_bare(text) for text in stated if "extra ==" not in text]
+
+
+def _bare(requirement: str) -> str:
+    letters = (k for k, letter in enumerate(requirement) if not (letter.isalnum() or letter in "-_."))
+    return requirement[: next(letters, len(requirement))]
+
+
+def _version(name: str) -> str | None:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None
+
+
+def _cache() -> dict[str, Any]:
+    """Where compiled code is kept, whether it can be written, and how much of it is there."""
+    from rotordrop.physics._compile import cache_folder
+
+    folder = Path(cache_folder())
+    files = list(folder.rglob("*.nbc")) if folder.is_dir() else []
+    nearest = next(parent for parent in (folder, *folder.parents) if parent.exists())
+    return {
+        "folder": str(folder),
+        "writable": os.access(nearest, os.W_OK),
+        "kernels": len(files),
+        "bytes": sum(file.stat().st_size for file in files),
+    }
+
+
+def _cache_lines(cache: dict[str, Any]) -> list[str]:
+    if not cache["writable"]:
+        return [
+            f"problem: {cache['folder']} cannot be written; every run compiles again, for a minute or two. "
+            "Name another folder in NUMBA_CACHE_DIR"
+        ]
+    if not cache["kernels"]:
+        return [f"compiled code is not cached yet in {cache['folder']}; the first run takes a minute or two"]
+    size = cache["bytes"] / 1e6
+    return [f"compiled code is cached: {cache['kernels']} kernels, {size:.1f} MB, in {cache['folder']}"]

@@ -1,0 +1,212 @@
+"""A machine from the dozen numbers that one has, or from a rotor of another program: guesses else."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from rotordrop.errors import UsageError
+from rotordrop.machine.catalog import find_bearing
+from rotordrop.machine.machine import Machine
+from rotordrop.machine.rotor import Rotor
+from rotordrop.units import InSI, format_quantity, in_si
+
+STEEL_DENSITY, STEEL_MODULUS = 7850.0, 206e9
+_ELEMENTS = 16
+_CLOSEST = 0.02
+"""Least distance of two nodes of the beam, as a share of its length [1]."""
+_SUPPORTS = {"stiff": (1e9, 2e8, 5e9), "soft": (2e7, 3e6, 1e8)}
+"""Guess and range of the stiffness of a support that is only called stiff or soft [N/m]."""
+_GAP_RANGE, _SUPPORT_RANGE = 1.2, 2.0
+_SUPPORT_MASS = (0.5, 0.1, 2.5)
+"""Guess and range of the mass of a support as a share of the rotor's mass [1]."""
+MODES_KNOWN_TO = 0.3
+"""What the bending frequencies of a beam in place of the rotor are known to [1]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimpleMachine:
+    """What is known of a machine when no drawing is at hand; texts with units, or numbers in SI units.
+
+    Attributes
+    ----------
+    mass, length, centre : float
+        Mass [kg] and length [m] of the rotor, and its centre of mass [m from its NDE end].
+    bearings, sensors : tuple of float
+        Two planes of touchdown bearings and two of sensors [m from the NDE end].
+    sensor_angle : float
+        Direction of the first sensor of each plane, from +x [rad]; the second stands 90° before it.
+    designation : str
+        Designation of the touchdown bearings.
+    gap : float
+        Radial air gap [m], known to about a fifth.
+    speed : float
+        Nominal speed [rad/s].
+    grade : str
+        Balance grade, such as "G 2.5".
+    support : str
+        "stiff", "soft" or a stiffness such as "1e8 N/m".
+    preload : str, optional
+        Preload of the bearings, where their designation leaves it open.
+    name : str
+        Name of the machine.
+    """
+
+    mass: InSI = InSI("mass")  # noqa: RUF009 - a descriptor, read by the dataclass
+    centre: InSI = InSI("length")  # noqa: RUF009
+    length: InSI = InSI("length")  # noqa: RUF009
+    bearings: tuple[float | str, float | str]
+    sensors: tuple[float | str, float | str]
+    sensor_angle: InSI = InSI("angle")  # noqa: RUF009
+    designation: str
+    gap: InSI = InSI("length")  # noqa: RUF009
+    speed: InSI = InSI("speed")  # noqa: RUF009
+    grade: str
+    support: Literal["stiff", "soft"] | str
+    preload: str | None = None
+    name: str = "my machine"
+
+
+def simple_machine(known: SimpleMachine) -> Machine:
+    """A machine of twelve numbers: a beam of that mass, length and centre of mass stands for the rotor.
+
+    Both halves of the beam have the stiffness of a steel cylinder and densities that put the centre of mass
+    where it is. The magnets stand at the sensors. What is not known stands as guesses with ranges.
+
+    Raises
+    ------
+    UsageError
+        If the numbers do not fit together; names the one.
+    """
+    planes = _planes(known.bearings, known.length, "bearings")
+    sensed = _planes(known.sensors, known.length, "sensors")
+    positions = beam_nodes(known.length, [*planes, *sensed])
+    node = {place: positions.index(place) + 1 for place in (*planes, *sensed)}
+    notes = (
+        "made of twelve numbers: a beam of the rotor's mass and length stands for the rotor",
+        f"its bending frequencies are known to about ± {100 * MODES_KNOWN_TO:.0f} %, inertias as a beam's",
+        "the planes of the magnets are taken to be those of the sensors",
+    )
+    return drafted_machine(
+        rotor=Rotor.model_validate(_beam(known, positions)),
+        bearings=[("NDE", node[planes[0]]), ("DE", node[planes[1]])],
+        sensors=[("NDE", node[sensed[0]]), ("DE", node[sensed[1]])],
+        known=known,
+        notes=notes,
+    )
+
+
+def drafted_machine(
+    *,
+    rotor: Rotor,
+    bearings: Sequence[tuple[str, int]],
+    sensors: Sequence[tuple[str, int]],
+    known: SimpleMachine,
+    notes: Sequence[str],
+) -> Machine:
+    """A machine of a rotor with bearings and sensors at its nodes, the rest as ``known`` and guesses."""
+    try:
+        entry = find_bearing(known.designation)
+    except LookupError as error:
+        raise UsageError(str(error)) from None
+    bearing: dict[str, Any] = {"designation": known.designation}
+    if known.preload is not None:
+        bearing["preload"] = known.preload
+    described = {
+        "air_gap": _guess(known.gap, known.gap / _GAP_RANGE, known.gap * _GAP_RANGE, "m"),
+        "bore_radius": f"{0.5 * entry.bore!r} m",
+        "bearing": bearing,
+        "support": _support(known.support, rotor.mass),
+    }
+    degrees = math.degrees(known.sensor_angle)
+    return Machine.model_validate(
+        {
+            "name": known.name,
+            "notes": list(notes),
+            "speed": {"nominal": f"{known.speed / (2.0 * math.pi):.12g} Hz"},
+            "rotor": rotor,
+            "balance_grade": {
+                "grade": known.grade,
+                "at_speed": f"{known.speed / (2.0 * math.pi):.12g} Hz",
+            },
+            "touchdown_bearings": [described | {"name": name, "node": node} for name, node in bearings],
+            "ambs": [{"name": name, "node": node} for name, node in sensors],
+            "sensors": [
+                {"name": f"{name}_{letter}", "node": node, "angle": f"{degrees - turn:.12g} deg"}
+                for name, node in sensors
+                for letter, turn in (("A", 0.0), ("B", 90.0))
+            ],
+        }
+    )
+
+
+def beam_nodes(length: float, planes: Sequence[float]) -> list[float]:
+    """Nodes of a beam [m]: ends, middle, every plane, and even ones that are not too close to these."""
+    fixed = sorted({0.0, 0.5 * length, length, *planes})
+    even = [length * k / _ELEMENTS for k in range(1, _ELEMENTS)]
+    free = [place for place in even if min(abs(place - one) for one in fixed) > _CLOSEST * length]
+    return sorted({*fixed, *free})
+
+
+def _planes(given: tuple[float | str, float | str], length: float, name: str) -> tuple[float, float]:
+    first, second = (in_si(place, "length", name) for place in given)
+    if not 0.0 <= first < second <= length:
+        raise UsageError(
+            f"{name}: {_mm(first)} and {_mm(second)} are no two planes of a rotor of {_mm(length)}; "
+            "give both from its NDE end, the NDE one first"
+        )
+    return first, second
+
+
+def _beam(known: SimpleMachine, positions: list[float]) -> dict[str, Any]:
+    """Two halves of one diameter; their densities carry mass and centre of mass."""
+    share = 2.0 * known.centre / known.length - 0.5  # of the mass in the half at the DE
+    if not 0.02 < share < 0.98:
+        raise UsageError(
+            f"the centre of mass at {_mm(known.centre)} is too far from the middle of a rotor of "
+            f"{_mm(known.length)} for a beam; expected {_mm(0.26 * known.length)} to "
+            f"{_mm(0.74 * known.length)}: describe the rotor by sections"
+        )
+    area = known.mass / (STEEL_DENSITY * known.length)
+    diameter = f"{math.sqrt(4.0 * area / math.pi)!r} m"
+    middle = positions.index(0.5 * known.length) + 1
+    halves = (("NDE_half", 1.0 - share, 1, middle), ("DE_half", share, middle, len(positions)))
+    return {
+        "material": "NDE_half",
+        "materials": {
+            name: {
+                "youngs_modulus": f"{STEEL_MODULUS!r} Pa",
+                "poisson_ratio": 0.3,
+                "density": f"{part * known.mass / (0.5 * known.length * area)!r} kg/m^3",
+            }
+            for name, part, _, _ in halves
+        },
+        "node_positions": tuple(positions),
+        "sections": [
+            {"part": name, "nodes": [first, last], "outer_diameter": diameter, "material": name}
+            for name, _, first, last in halves
+        ],
+    }
+
+
+def _support(said: str, mass: float) -> dict[str, Any]:
+    if said in _SUPPORTS:
+        guess, low, high = _SUPPORTS[said]
+    else:
+        guess = in_si(said, "stiffness", "support")
+        low, high = guess / _SUPPORT_RANGE, guess * _SUPPORT_RANGE
+    share, lowest, highest = _SUPPORT_MASS
+    return {
+        "stiffness": _guess(guess, low, high, "N/m"),
+        "mass": _guess(share * mass, lowest * mass, highest * mass, "kg"),
+    }
+
+
+def _guess(value: float, low: float, high: float, unit: str) -> dict[str, Any]:
+    return {"guess": f"{value:.6g} {unit}", "range": [f"{low:.6g} {unit}", f"{high:.6g} {unit}"]}
+
+
+def _mm(value: float) -> str:
+    return format_quantity(value, "length")

@@ -1,0 +1,39 @@
+"""What the doctor says of this computer, and of one on which something is missing."""
+
+import json
+
+from rotordrop.cli import doctor
+from rotordrop.cli.app import run
+
+
+def test_it_names_what_is_installed(capsys):
+    assert run(["doctor", "--json", "-"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["packages"]["numpy"]
+    assert all(found["packages"].values())
+    assert set(found["extras"]) == {"io", "xarray", "parquet", "postgres", "cluster"}
+
+
+def test_a_missing_package_and_a_missing_extra_are_told_with_the_way_out(capsys, monkeypatch):
+    known = doctor._version
+    monkeypatch.setattr(doctor, "_version", lambda name: None if name in ("pint", "npTDMS") else known(name))
+    assert run(["doctor"]) == 0
+    out = capsys.readouterr().out
+    assert "problem: pint is missing; install rotordrop again" in out
+    assert "missing: npTDMS; pip install 'rotordrop[io]'" in out
+
+
+def test_an_empty_cache_and_one_that_cannot_be_written_are_told_apart():
+    empty = {"folder": "/there", "writable": True, "kernels": 0, "bytes": 0}
+    assert doctor._cache_lines(empty) == [
+        "compiled code is not cached yet in /there; the first run takes a minute or two"
+    ]
+    assert "cannot be written" in doctor._cache_lines(empty | {"writable": False})[0]
+    full = doctor._cache_lines(empty | {"kernels": 12, "bytes": 3_400_000})[0]
+    assert full == "compiled code is cached: 12 kernels, 3.4 MB, in /there"
+
+
+def test_requirements_lose_their_versions():
+    assert doctor._bare("npTDMS>=1.9") == "npTDMS"
+    assert doctor._bare("tree-sitter-toml>=0.7") == "tree-sitter-toml"
+    assert doctor._bare("psycopg[binary]>=3.1") == "psycopg"

@@ -1,0 +1,134 @@
+"""Rotors of ROSS: read, written and read back; what has no counterpart is refused or told."""
+
+import json
+import math
+
+import pytest
+
+from rotordrop.cli.app import run
+from rotordrop.errors import MachineFileError
+from rotordrop.machine import example_machine, load_machine
+from rotordrop.machine.other_programs import read_rotor
+from rotordrop.machine.ross_files import Spring, read_ross, write_ross
+from rotordrop.model.assembly import rotor_fe
+from rotordrop.model.modes import modes_on_springs
+
+STEEL = {"name": "Steel", "rho": 7810.0, "E": 211e9, "G_s": 81.2e9}
+
+
+def shaft(n, L=0.25, od=0.05, material=STEEL, **more):
+    sizes = {"idl": 0.0, "odl": od, "idr": 0.0, "odr": od}
+    return {"n": n, "L": L, "material": material, "tag": f"Shaft Element {n}", **sizes, **more}
+
+
+def disc(n):
+    tag = f"Disk {n}"
+    return {"n": n, "m": 32.58972765304033, "Id": 0.17808928257067666, "Ip": 0.32956362089137037, "tag": tag}
+
+
+def published():
+    """The rotor of the documentation of ROSS, `rotor_example`."""
+    content = {"ross_version": "2.3.0", "parameters": {}}
+    content |= {f"ShaftElement_{n}": shaft(n) for n in range(6)}
+    content |= {f"DiskElement_{n}": disc(n) for n in (2, 4)}
+    bearing = {"kxx": [1e6], "kyy": [0.8e6], "cxx": [0], "cyy": [0]}
+    return content | {f"BearingElement_{n}": {"n": n, "tag": f"Bearing {n}", **bearing} for n in (0, 6)}
+
+
+@pytest.fixture
+def written(tmp_path):
+    def write(content, name="rotor.json"):
+        path = tmp_path / name
+        path.write_text(json.dumps(content), encoding="utf-8")
+        return path
+
+    return write
+
+
+def test_the_published_rotor_has_the_frequencies_that_ross_2_3_computes(written):
+    imported = read_ross(written(published()))
+    assert imported.source == "ROSS 2.3.0"
+    assert imported.rotor.mass == pytest.approx(88.18180401658343, rel=1e-12)
+    assert [spring.node for spring in imported.springs] == [1, 7]
+    # ROSS 2.3.0, run_modal at standstill with 1e8 N/m in both directions of both bearings [Hz]
+    found = modes_on_springs(rotor_fe(imported.rotor), {1: 1e8, 7: 1e8}, 5).frequency
+    assert found == pytest.approx([19.634, 75.766, 250.759, 360.631, 651.153], rel=3e-5)
+
+
+@pytest.mark.parametrize("suffix", [".json", ".toml"])
+@pytest.mark.parametrize("name", ["paper", "lp400", "small"])
+def test_a_rotor_goes_to_ross_and_back_without_loss(tmp_path, name, suffix):
+    rotor = example_machine(name).rotor
+    springs = (Spring(node=2, name="AMB", stiffness=(1e6, 2e6), damping=(10.0, 20.0)),)
+    write_ross(rotor, tmp_path / f"back{suffix}", springs)
+    back = read_rotor(tmp_path / f"back{suffix}")
+    assert back.springs == springs
+    assert back.rotor.node_positions == pytest.approx(rotor.node_positions, rel=1e-12)
+    for one, other in zip(rotor.elements, back.rotor.elements, strict=True):
+        for key in ("outer_diameter", "inner_diameter", "density", "youngs_modulus", "layer_density"):
+            assert getattr(other, key) == pytest.approx(getattr(one, key), rel=1e-12)
+        assert other.poisson_ratio == pytest.approx(one.poisson_ratio, rel=1e-12)
+        assert (other.layer_diameter or 0.0) == pytest.approx(one.layer_diameter or 0.0, rel=1e-12)
+    assert [d.mass.value for d in back.rotor.discs] == [d.mass.value for d in rotor.discs]
+    assert back.rotor.mass == pytest.approx(rotor.mass, rel=1e-12)
+
+
+def test_a_soft_element_around_the_shaft_is_a_layer(written):
+    soft = STEEL | {"name": "soft sleeve", "E": 7e3, "G_s": 2.7e3}
+    sleeve = shaft(1, od=0.08, material=soft, tag="sleeve") | {"idl": 0.05, "idr": 0.05}
+    rotor = read_ross(written(published() | {"ShaftElement_sleeve": sleeve})).rotor
+    element = rotor.elements[1]
+    assert (element.layer_diameter, element.layer_density) == pytest.approx((0.08, 7810.0))
+    extra = 7810.0 * math.pi / 4 * (0.08**2 - 0.05**2) * 0.25
+    assert rotor.mass == pytest.approx(88.18180401658343 + extra, rel=1e-12)
+
+
+def test_cones_keep_their_mass_and_are_told(written):
+    cone = shaft(0) | {"odl": 0.04, "odr": 0.06}
+    imported = read_ross(written(published() | {"ShaftElement_0": cone}))
+    assert "conical elements stand as 8 cylinders each" in imported.notes
+    assert imported.springs[1].node == len(imported.rotor.node_positions) == 14
+    volume = math.pi / 4 * 0.25 * (0.04**2 + 0.04 * 0.06 + 0.06**2) / 3
+    whole = math.pi / 4 * 0.25 * 0.05**2
+    assert imported.rotor.mass == pytest.approx(88.18180401658343 + 7810.0 * (volume - whole), rel=2e-4)
+
+
+def test_what_is_left_out_or_switched_is_told(written):
+    seal = {"n": 3, "kxx": [1.0]}
+    stiff = shaft(2, shear_effects=False)
+    imported = read_ross(written(published() | {"SealElement_1": seal, "ShaftElement_2": stiff}))
+    assert "1 SealElement left out" in imported.notes
+    assert "the source switched shear effects off; it acts here" in imported.notes
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ({"parameters": {}}, "there is no ShaftElement in it"),
+        (published() | {"ShaftElement_x": shaft(9)}, "do not follow each other from node 0 on"),
+        (published() | {"DiskElement_x": {"n": 2, "m": 1.0}}, "no 'Id' in an element"),
+        (
+            published() | {"ShaftElement_x": shaft(1, od=0.08, material=STEEL | {"name": "Al", "E": 70e9})},
+            "different materials lie around each other at node 1",
+        ),
+        (published() | {"ShaftElement_2": shaft(2, material="unobtainium")}, "'unobtainium' is only named"),
+    ],
+)
+def test_what_is_no_rotor_is_refused(written, content, message):
+    with pytest.raises(MachineFileError, match=message):
+        read_ross(written(content))
+
+
+def test_the_command_makes_a_machine_of_it_and_gives_it_back(written, tmp_path, capsys):
+    source, machine, back = written(published()), tmp_path / "machine.toml", tmp_path / "back.toml"
+    assert run(["import-rotor", str(source), "-o", str(machine)]) == 0
+    assert "on the bearings of the source" in capsys.readouterr().out
+    assert [bearing.node for bearing in load_machine(machine).touchdown_bearings] == [1, 7]
+    assert run(["export-rotor", str(machine), "-o", str(back)]) == 0
+    assert read_ross(back).rotor.mass == pytest.approx(88.18180401658343, rel=1e-12)
+
+
+def test_the_command_refuses_what_is_no_rotor(tmp_path, capsys):
+    (tmp_path / "rotor.pdf").write_text("x")
+    assert run(["import-rotor", str(tmp_path / "rotor.pdf")]) == 2
+    assert "'.pdf' is no format of a rotor" in capsys.readouterr().err

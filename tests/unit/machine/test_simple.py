@@ -1,0 +1,127 @@
+"""A machine of twelve numbers, and shaft tables as other programs call their columns."""
+
+import math
+
+import pytest
+
+from rotordrop.cli.app import run
+from rotordrop.errors import UsageError
+from rotordrop.machine import load_machine, loads_machine, machine_text
+from rotordrop.machine.other_programs import read_rotor
+from rotordrop.machine.simple import SimpleMachine, simple_machine
+from rotordrop.model.machine_summary import summarise_machine
+
+NUMBERS = {
+    "mass": "60 kg",
+    "length": "1.1 m",
+    "centre": "520 mm",
+    "bearings": ("110 mm", "980 mm"),
+    "sensors": ("180 mm", "900 mm"),
+    "sensor_angle": "135 deg",
+    "designation": "XCB71914-E",
+    "gap": "0.25 mm",
+    "speed": "9000 rpm",
+    "grade": "G 2.5",
+    "support": "stiff",
+}
+
+
+def test_mass_and_centre_of_mass_are_those_given_and_planes_are_nodes():
+    machine = simple_machine(SimpleMachine(**NUMBERS))
+    assert machine.rotor.mass == pytest.approx(60.0)
+    assert machine.rotor.centre_of_gravity == pytest.approx(0.52)
+    nodes = machine.rotor.node_positions
+    assert [nodes[b.node - 1] for b in machine.touchdown_bearings] == pytest.approx([0.11, 0.98])
+    assert [nodes[s.node - 1] for s in machine.sensors] == pytest.approx([0.18, 0.18, 0.9, 0.9])
+    assert [math.degrees(s.angle.value) for s in machine.sensors[:2]] == pytest.approx([135.0, 45.0])
+    assert machine.touchdown_bearings[0].air_gap.range == pytest.approx((0.25e-3 / 1.2, 0.3e-3), rel=1e-5)
+    loads = [bearing.load for bearing in summarise_machine(machine).bearings]
+    weight = 60.0 * 9.81
+    assert loads == pytest.approx([weight * 0.46 / 0.87, weight * 0.41 / 0.87], rel=1e-6)
+
+
+def test_its_bending_is_that_of_the_beam():
+    """Uniform free-free beam, first bending (4.730)² √(EI/ρA)/(2π L²), less what shear takes."""
+    machine = simple_machine(SimpleMachine(**(NUMBERS | {"centre": "550 mm"})))
+    d = machine.rotor.elements[0].outer_diameter
+    area = math.pi / 4 * d * d
+    slender = 4.730041**2 / (2 * math.pi * 1.1**2) * math.sqrt(206e9 * math.pi / 64 * d**4 / (7850.0 * area))
+    found = summarise_machine(machine).free_free[0]
+    assert 0.96 * slender < found < slender
+
+
+def test_the_file_reads_back_as_the_same_machine():
+    machine = simple_machine(SimpleMachine(**NUMBERS))
+    assert loads_machine(machine_text(machine)) == machine
+    assert any("± 30 %" in note for note in machine.notes)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            {"bearings": ("980 mm", "110 mm")},
+            r"bearings: 980 mm and 110 mm are no two planes of a rotor of 1\.10 m",
+        ),
+        ({"sensors": ("100 mm", "1.2 m")}, r"sensors: 100 mm and 1\.20 m are no two planes"),
+        ({"centre": "900 mm"}, r"centre of mass at 900 mm is too far from the middle of a rotor of 1\.10 m"),
+        ({"mass": 60}, None),
+        ({"mass": "60"}, "'60' has no unit"),
+        ({"support": "firm"}, "'firm' does not begin with a number"),
+        ({"designation": "hello"}, "no bearing 'hello'"),
+    ],
+)
+def test_numbers_that_do_not_fit_are_named(change, message):
+    if message is None:
+        assert simple_machine(SimpleMachine(**(NUMBERS | change))).rotor.mass == pytest.approx(60.0)
+        return
+    with pytest.raises(UsageError, match=message):
+        simple_machine(SimpleMachine(**(NUMBERS | change)))
+
+
+def test_the_command_takes_options_and_asks_for_the_rest(tmp_path, monkeypatch):
+    asked = []
+
+    def answer(question, **_):
+        asked.append(question)
+        return "soft"
+
+    monkeypatch.setattr("typer.prompt", answer)
+    said = {key: ", ".join(value) if isinstance(value, tuple) else value for key, value in NUMBERS.items()}
+    options = [f"--{key.replace('_', '-')}={value}" for key, value in said.items() if key != "support"]
+    target = tmp_path / "machine.toml"
+    assert run(["init", "--simple", str(target), *options]) == 0
+    assert len(asked) == 1
+    assert "support of the touchdown bearings" in asked[0]
+    assert load_machine(target).touchdown_bearings[0].support.stiffness.range == pytest.approx((3e6, 1e8))
+
+
+def test_numbers_without_simple_are_refused(capsys, tmp_path):
+    assert run(["init", str(tmp_path / "m.toml"), "--mass", "60 kg"]) == 64
+    assert "numbers of a machine belong to --simple" in capsys.readouterr().err
+
+
+DYROBES = "Ele,L,OD,ID,Mass OD,Material\n,mm,mm,mm,mm,\n1,100,60,0,60,\n2,300,80,20,100,\n3,100,60,0,60,\n"
+
+
+def test_a_table_as_programs_print_it(tmp_path):
+    path = tmp_path / "shaft.csv"
+    path.write_text(DYROBES, encoding="utf-8")
+    rotor = read_rotor(path).rotor
+    middle = rotor.elements[1]
+    assert rotor.node_positions == pytest.approx((0.0, 0.1, 0.4, 0.5))
+    assert (middle.outer_diameter, middle.inner_diameter, middle.layer_diameter) == pytest.approx(
+        (0.08, 0.02, 0.1)
+    )
+    assert middle.layer_density == 7850.0
+    assert rotor.elements[0].layer_diameter is None
+
+
+def test_a_spreadsheet_is_the_same_table(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for line in DYROBES.splitlines():
+        book.active.append([float(cell) if cell.isdigit() else cell or None for cell in line.split(",")])
+    book.save(tmp_path / "shaft.xlsx")
+    (tmp_path / "shaft.csv").write_text(DYROBES, encoding="utf-8")
+    assert read_rotor(tmp_path / "shaft.xlsx").rotor == read_rotor(tmp_path / "shaft.csv").rotor
