@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from rotordrop.model.parameter import Parameter
 from rotordrop.model.parameter_table import LOADS, rows
+from rotordrop.model.structure_table import STRUCTURE
 
 INTRODUCTION = """\
 # Parameters
@@ -28,6 +29,12 @@ drift is a random walk per square root of a second in the same measure; where tw
 holds late in a drop.
 """
 
+STRUCTURE_TEXT = """\
+Unknowns only of a machine whose description names them; the estimate adds them where a record asks for it
+([extensions](../tracked_twin.md#beyond-the-usual-model)). Of those of a sensor, the column of a guess is the
+share of one sensor; what the sensors of a plane, or all of them, have in common has a prior of its own.
+"""
+
 OWNERS = {
     "bearing": "Of a touchdown bearing",
     "sensor": "Of a sensor",
@@ -42,6 +49,7 @@ def parameter_page() -> str:
     parts = [INTRODUCTION]
     for owner, title in OWNERS.items():
         parts += [f"## {title}", "", *_priors(tuple(rows(owner))), ""]  # type: ignore[arg-type]
+    parts += ["## Beyond the usual model", "", STRUCTURE_TEXT, *_priors(STRUCTURE), ""]
     parts += ["## In the estimate", "", *_published(), ""]
     parts += ["## What tells two of them apart", "", *_separated(), ""]
     return "\n".join(parts)

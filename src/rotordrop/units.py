@@ -61,6 +61,7 @@ KINDS: dict[str, Kind] = {
     "contact_stiffness": Kind(
         unit="N/m^n", example="1.05e9 N/m^1.11", scales=((1e9, "GN/mⁿ"), (1e6, "MN/mⁿ"), (1.0, "N/mⁿ"))
     ),
+    "cubic_term": Kind(unit="1/m^2", example="3e8 1/m^2", scales=((1e6, "1/mm²"),)),
     "contact_damping": Kind(unit="s/m", example="0.1 s/m", scales=((1.0, "s/m"),)),
     "voltage": Kind(unit="V", example="5 V", scales=_metric("V", "k", "", "m", "µ")),
     "voltage_sensitivity": Kind(unit="V/m", example="8 mV/um", scales=((1e3, "mV/µm"),)),

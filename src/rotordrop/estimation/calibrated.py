@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +11,10 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError, UsageError
 from rotordrop.estimated import NINETY, Estimated, IdentifiedValue, Verdict
+from rotordrop.estimation.document import structure_json
+from rotordrop.estimation.estimate import Structure
+from rotordrop.estimation.structure import BEYOND_GRADE_SOURCE
+from rotordrop.estimation.structure_sentence import structure_of
 from rotordrop.estimation.tracked import track_drops
 from rotordrop.estimation.tracked_loads import INCONSISTENT_WIDENING
 from rotordrop.estimation.tracked_parameters import (
@@ -79,6 +83,8 @@ class Calibration:
         Consistency checks of each drop.
     consistent : bool
         Whether all checks of all drops passed.
+    structure : tuple of Structure
+        What the machine has beyond the usual model; empty where that does.
     """
 
     machine: Machine
@@ -88,6 +94,7 @@ class Calibration:
     checks: dict[str, tuple[Check, ...]]
     consistent: bool
     nis: dict[str, float]
+    structure: tuple[Structure, ...] = ()
 
     def sentence(self) -> str:
         """The outcome in words."""
@@ -99,10 +106,11 @@ class Calibration:
             f"{found} of {len(self.identifiability)} parameters are determined by {len(self.checks)} drop(s)"
             f", {weakly} more weakly"
         )
+        found_too = "".join(f" {one.sentence}" for one in self.structure)
         if self.consistent:
-            return f"{text}; the model is consistent with all of them."
+            return f"{text}; the model is consistent with all of them.{found_too}"
         bad = [name for name, checks in self.checks.items() if not all(check.passed for check in checks)]
-        return f"{text}; the model is not consistent with {', '.join(bad)}: intervals are doubled."
+        return f"{text}; the model is not consistent with {', '.join(bad)}: intervals are doubled.{found_too}"
 
 
 def calibrate_machine(
@@ -134,7 +142,8 @@ def calibrate_machine(
     stems = list(names or [r.path.stem if r.path else f"drop_{i + 1}" for i, r in enumerate(records)])
     model = build_drop_model(machine)
     evidence = [read_evidence(model, r, t, name=n) for r, t, n in zip(records, tails, stems, strict=True)]
-    tracked = track_drops(machine, evidence, calibrate_only=True, progress=progress)
+    found = track_drops(machine, evidence, calibrate_only=True, progress=progress)
+    machine, tracked = found.machine, found.fit
     checks = {
         name: consistency_checks(problem, smoothed, 1.0)
         for name, problem, smoothed in zip(stems, tracked.problems, tracked.smoothed, strict=True)
@@ -151,17 +160,45 @@ def calibrate_machine(
     known = _as_known(at_fitted_exponents(machine, values), identifiability)
     beside = "" if consistent else " (not consistent with them)"  # for people: nothing reads a source
     source = f"calibrated on {', '.join(stems)}{beside}"
+    fitted = machine_values(bearings, known, source)
+    said = values | _of_drop(problem, mean, covariance)
     drops = [CalibrationDrop(name=n, sha256=r.sha256) for n, r in zip(stems, records, strict=True)]
     origin = CalibrationOrigin(drops=tuple(drops), consistent=consistent)
     return Calibration(
-        machine=_possible(machine, machine_values(bearings, known, source), stems).calibrated_on(origin),
+        machine=_possible(_with_unbalance(machine, said), fitted, stems).calibrated_on(origin),
         values=values,
         identifiability=identifiability,
         confounded=_confounded(problem, covariance),
         checks=checks,
         consistent=consistent,
         nis=dict(zip(stems, tracked.nis, strict=True)),
+        structure=tuple(structure_of(one, machine, said) for one in found.kept),
     )
+
+
+def _of_drop(problem: DropProblem, mean: Array, covariance: Array) -> dict[str, IdentifiedValue]:
+    """What was found of the last drop alone: unbalance, remanent lift, drag of the air."""
+    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    first = problem.n_dynamic
+    return {
+        unknown.path: identified(unknown, float(mean[first + k]), float(sigma[first + k]))
+        for k, unknown in enumerate(problem.unknowns)
+        if unknown.scope == "drop"
+    }
+
+
+def _with_unbalance(machine: Machine, said: Mapping[str, IdentifiedValue]) -> Machine:
+    """The machine with an unbalance as large as the one found where that is beyond the described one.
+
+    What was described then is the width of a prior, and no amount that a simulation could use.
+    """
+    amounts = {}
+    for i, unbalance in enumerate(machine.unbalances):
+        along = [said[f"unbalance.{i}.{part}"].value for part in ("cosine", "sine")]
+        if unbalance.amount.source == BEYOND_GRADE_SOURCE:
+            found = Estimated(value=math.hypot(*along), status="guess", source=BEYOND_GRADE_SOURCE)
+            amounts[f"unbalance.{i}.amount"] = found
+    return machine.with_values(amounts) if amounts else machine
 
 
 def _possible(machine: Machine, fitted: dict[str, Estimated], drops: Sequence[str]) -> Machine:
@@ -347,6 +384,7 @@ def calibration_json(calibration: Calibration) -> dict[str, object]:
             for name, checks in calibration.checks.items()
         },
         "consistent": calibration.consistent,
+        "structure": structure_json(calibration.structure),
         "nis": {name: value if math.isfinite(value) else None for name, value in calibration.nis.items()},
         "sentence": calibration.sentence(),
     }

@@ -13,7 +13,7 @@ from rotordrop._version import __version__
 from rotordrop.estimated import IdentifiedValue
 from rotordrop.estimation.agreement import Agreement
 from rotordrop.estimation.bearing_drop import BearingDrop, Impact, Peak
-from rotordrop.estimation.estimate import Estimate, ReplaySteps
+from rotordrop.estimation.estimate import Estimate, ReplaySteps, Structure
 from rotordrop.estimation.methods import Replay
 from rotordrop.identification.first_contact import FirstContact
 from rotordrop.simulation.fingerprint import fingerprint
@@ -29,6 +29,7 @@ def estimate_document(estimate: Estimate) -> dict[str, Any]:
         "notes": list(estimate.notes),
         "consistency": _consistency(estimate),
         "bearings": {bearing.name: bearing_entry(bearing) for bearing in estimate.bearings},
+        "structure": structure_json(estimate.structure),
         "cross_check": [_cross_check(one) for one in estimate.cross_check],
         "later_motion": [{**asdict(one), "larger": one.larger} for one in estimate.later],
         "parameters": [
@@ -94,6 +95,14 @@ def _consistency(estimate: Estimate) -> dict[str, Any]:
         "process_noise_factor": estimate.noise_factor,
         "checks": [asdict(check) for check in estimate.checks],
     }
+
+
+def structure_json(structure: Sequence[Structure]) -> list[dict[str, Any]]:
+    """What a machine has beyond the usual model, ready for JSON."""
+    return [
+        {"name": one.name, "log_likelihood_rise": _finite(one.gain), "sentence": one.sentence}
+        for one in structure
+    ]
 
 
 def _cross_check(one: Any) -> dict[str, Any]:

@@ -47,6 +47,7 @@ class Verdict(Enum):
     """What model and record say of each other; the values are the sentences a reader sees first."""
 
     CONSISTENT = "The model is consistent with the record."
+    EXTENDED = "With an extension of the usual model, the model is consistent with the record."
     ONE_DIRECTION = (
         "Not every plane shows both directions: forces across the missing one rest on the model alone. "
         "Intervals are 2 × as wide, and no independent cross-check is possible."
@@ -67,7 +68,7 @@ class Verdict(Enum):
     @property
     def holds(self) -> bool:
         """Whether single numbers may be relied on within their intervals."""
-        return self in (Verdict.CONSISTENT, Verdict.ONE_DIRECTION, Verdict.OPEN_LOOP)
+        return self not in (Verdict.HELD, Verdict.GIVEN_WAY)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,7 +126,27 @@ class FittedParameter:
     @property
     def scope(self) -> str:
         """Whether it belongs to the machine or to this drop alone."""
-        return "machine" if self.row.owner == "bearing" else "drop"
+        return "machine" if self.row.owner in ("bearing", "sensor", "rotor") else "drop"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Structure:
+    """Something the machine has beyond the usual model, as far as the record says.
+
+    Attributes
+    ----------
+    name : str
+        What it is called.
+    gain : float
+        Rise of the logarithm of the marginal likelihood that it brought [1]; infinite where the model without
+        it needed larger unknown impulses.
+    sentence : str
+        What was found, with intervals.
+    """
+
+    name: str
+    gain: float
+    sentence: str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -230,6 +251,8 @@ class Estimate:
         Every unknown with prior and estimate.
     sensors : tuple of SensorErrors
         Gain, offset and noise of every sensor; empty for a replay.
+    structure : tuple of Structure
+        What the machine has beyond the usual model; empty where that does.
     cross_check : tuple of CrossCheck
         Comparisons with the estimate without contact law; empty where none was made.
     innovations : Innovations or None
@@ -262,6 +285,7 @@ class Estimate:
     parameters: tuple[FittedParameter, ...]
     checks: tuple[Check, ...] = ()
     sensors: tuple[SensorErrors, ...] = ()
+    structure: tuple[Structure, ...] = ()
     cross_check: tuple[CrossCheck, ...] = ()
     innovations: Innovations | None = None
     nis: float | None = None
@@ -283,7 +307,8 @@ class Estimate:
     def sentence(self) -> str:
         """The verdict, with what failed."""
         failed = "; ".join(check.message for check in self.checks if not check.passed)
-        return f"{self.verdict.value} {failed[:1].upper()}{failed[1:]}." if failed else self.verdict.value
+        said = " ".join((self.verdict.value, *(one.sentence for one in self.structure)))
+        return f"{said} {failed[:1].upper()}{failed[1:]}." if failed else said
 
     def bearing(self, name: str) -> BearingDrop:
         """What happened at the bearing of a name.

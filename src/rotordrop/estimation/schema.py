@@ -94,6 +94,15 @@ _CONSISTENCY = closed(
     process_noise_factor=MAYBE,
     checks={"type": "array", "items": _CHECK},
 )
+_STRUCTURE = closed(
+    {},
+    name={**TEXT, "description": "Something the machine has beyond the usual model."},
+    log_likelihood_rise={
+        **MAYBE,
+        "description": "Of the readings, by it; null where the model without it needed larger impulses.",
+    },
+    sentence=TEXT,
+)
 _CROSS_CHECK = closed(
     {},
     name=TEXT,
@@ -208,6 +217,7 @@ _DROP = closed(
     notes=TEXTS,
     consistency=_CONSISTENCY,
     bearings=by_name({"$ref": "#/$defs/bearing"}),
+    structure={"type": "array", "items": _STRUCTURE},
     cross_check={"type": "array", "items": _CROSS_CHECK},
     later_motion={"type": "array", "items": _LATER},
     parameters={"type": "array", "items": _PARAMETER},

@@ -11,6 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError
+from rotordrop.estimation.structure_search import (
+    FIRST_OTHER_START,
+    PATIENT,
+    USUAL,
+    Candidate,
+    Kept,
+    found_sensors,
+    found_structure,
+)
 from rotordrop.estimation.tracked_parameters import UNSURE_GAP
 from rotordrop.identification.evidence import Evidence, Missing
 from rotordrop.machine import Machine
@@ -32,7 +41,7 @@ from rotordrop.tracking.calibration import (
 )
 from rotordrop.tracking.consistency import DIRECTIONS, Check, consistency_checks
 from rotordrop.tracking.forces import ForceHistory, force_history
-from rotordrop.tracking.problem import DropProblem, RecordedDrop, build_problem
+from rotordrop.tracking.problem import DropProblem, Fall, RecordedDrop, build_problem
 from rotordrop.tracking.smoother import PassSettings, Smoothed, forward
 from rotordrop.tracking.transfer import transferred
 
@@ -59,6 +68,12 @@ NOISE_FACTORS = (0.5, 1.0, 2.0, 4.0, 8.0)
 NOISE_WINDOW = 0.06
 """Part of the drop on which the size of the unknown impulses is judged [s]."""
 
+START_SPREAD = 0.8
+"""Spread of other starts, in standard deviations of the prior [1]."""
+
+FALL_SHARE = 1.7e-7
+"""Largest unknown impulse per 50 µs while the rotor falls, over its weight [s]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class TrackedDrop:
@@ -78,6 +93,8 @@ class TrackedDrop:
         Size of the unknown impulses over the usual one [1].
     drops : int
         Number of drops that were fitted together.
+    kept : tuple of Kept
+        Extensions of the usual model that the readings paid for.
     """
 
     evidence: Evidence
@@ -87,6 +104,7 @@ class TrackedDrop:
     checks: tuple[Check, ...]
     noise_factor: float
     drops: int = 1
+    kept: tuple[Kept, ...] = ()
 
     @property
     def consistent(self) -> bool:
@@ -104,7 +122,10 @@ def drop_problem(model: DropModel, evidence: Evidence, until: float = WINDOW) ->
     problem = build_problem(model, recorded_drop(evidence, until), until=until)
     if isinstance(evidence.settled_level, Missing):
         _start_gaps(problem, evidence)
-    return problem
+    if model.machine.remanence_time_constant is None:
+        return problem
+    weight = model.machine.rotor.mass * float(model.machine.gravity)
+    return replace(problem, fall=Fall(end=_first_contact(evidence), impulse=FALL_SHARE * weight))
 
 
 def recorded_drop(evidence: Evidence, until: float = WINDOW) -> RecordedDrop:
@@ -152,28 +173,120 @@ def track_drops(
     quick: bool = False,
     calibrate_only: bool = False,
     progress: Progress | None = None,
-) -> TrackedDrops:
+) -> Candidate:
     """Follow recorded drops of one machine with the drop model.
 
     From guesses, a coarse basis finds the parameters in growing windows and a finer one refines them; a
-    calibrated machine needs the finer one only (with ``quick``, a single pass of it).
+    calibrated machine needs the finer one only (with ``quick``, a single pass of it). What ends beside the
+    record is tried with extensions of the usual model; the machine that comes back has those that were kept.
     """
-    until = BLIND_SCHEDULE[-1].until + 0.01 if calibrate_only else WINDOW
-    evidence = _tail_first(evidence)
-    fine_model = build_drop_model(machine, _basis(machine, FINE_BASIS, FINE_REACH))
-    fine = [drop_problem(fine_model, item, until) for item in evidence]
+    search = _Search(evidence=tuple(_tail_first(evidence)), calibrate_only=calibrate_only, progress=progress)
     if is_calibrated(machine) and not calibrate_only:
         schedule = QUICK_SCHEDULE if quick else CALIBRATED_SCHEDULE
-        return _not_lost(track(fine, schedule, progress=progress), evidence)
-    coarse_model = build_drop_model(_seen_at_the_ends(machine), _basis(machine, COARSE_BASIS, COARSE_REACH))
-    coarse = [drop_problem(coarse_model, _with_sensors_of(coarse_model, item), until) for item in evidence]
-    contact = max(_first_contact(item) for item in evidence)
-    first = _from_guesses(coarse, contact, progress)
-    references = [
-        transferred(one, two, drop.means) for one, two, drop in zip(coarse, fine, first.smoothed, strict=True)
-    ]
-    schedule = shifted(CALIBRATION_SCHEDULE if calibrate_only else FINE_SCHEDULE, contact)
-    return _not_lost(track(fine, schedule, references=references, progress=progress), evidence)
+        found = Candidate(machine=machine, fit=track(search.problems(machine), schedule, progress=progress))
+        if quick or not found.beside:
+            return search.not_lost(found)
+        usual = Candidate(machine=machine, fit=search.from_guesses(machine, USUAL))
+    else:
+        usual = Candidate(machine=machine, fit=search.first_fit(machine))
+        if not usual.beside:
+            usual = found_sensors(usual, search.judge, search.look)
+        found = search.refined(usual) if not usual.beside else usual
+    if found.beside and not found.kept:
+        extended = found_structure(usual, search.from_guesses, search.look)
+        if found is usual:
+            found = search.refined(extended)
+        elif extended.fit is not usual.fit:
+            found = min(found, search.refined(extended), key=lambda one: one.rank)
+    return search.not_lost(found)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Search:
+    """Fits of machines to the same drops: a coarse basis finds the parameters, a finer one refines them."""
+
+    evidence: tuple[Evidence, ...]
+    calibrate_only: bool
+    progress: Progress | None
+
+    @property
+    def until(self) -> float:
+        """End of the window [s]."""
+        return BLIND_SCHEDULE[-1].until + 0.01 if self.calibrate_only else WINDOW
+
+    @property
+    def contact(self) -> float:
+        """Time of the latest first contact after power-off [s]."""
+        return max(_first_contact(item) for item in self.evidence)
+
+    def problems(self, machine: Machine) -> list[DropProblem]:
+        """The drops with the finer basis."""
+        model = build_drop_model(machine, _basis(machine, FINE_BASIS, FINE_REACH))
+        return [drop_problem(model, item, self.until) for item in self.evidence]
+
+    def coarse(self, machine: Machine) -> list[DropProblem]:
+        """The drops with the coarse basis."""
+        model = build_drop_model(_seen_at_the_ends(machine), _basis(machine, COARSE_BASIS, COARSE_REACH))
+        items = [_with_sensors_of(model, item) for item in self.evidence]
+        return [drop_problem(model, item, self.until) for item in items]
+
+    def first_fit(self, machine: Machine) -> TrackedDrops:
+        """First fit of a machine of which only guesses are known; a failed one is repeated patiently."""
+        return _from_guesses(self.coarse(machine), self.contact, self.progress)
+
+    def from_guesses(self, machine: Machine, attempt: int) -> TrackedDrops:
+        """Fit of a machine by the coarse basis, from its guesses or, in later attempts, from other starts."""
+        schedule = PATIENT_SCHEDULE if attempt == PATIENT else BLIND_SCHEDULE
+        problems = self.coarse(machine)
+        if attempt >= FIRST_OTHER_START:
+            problems = [_started_elsewhere(problem, attempt) for problem in problems]
+        return track(problems, shifted(schedule, self.contact))
+
+    def judge(self, known: TrackedDrops, machine: Machine) -> float:
+        """Negative logarithm of the likelihood with another machine, drop by drop, linearised at a fit."""
+        problems = self.coarse(machine)
+        last = BLIND_SCHEDULE[-1]
+        settings = PassSettings(impulse=last.impulse, share=last.share)
+        total = 0.0
+        for problem, reference in zip(problems, _carried(known, problems), strict=True):
+            result = forward(problem, settings, reference=reference, samples=len(reference), smoothing=False)
+            lost = result.done < len(reference)
+            total += math.inf if lost else result.negative_log_likelihood
+        return total
+
+    def look(self, known: TrackedDrops, machine: Machine, passes: int) -> TrackedDrops:
+        """Passes with another machine over the first window whole, linearised at a fit that is known."""
+        problems = self.coarse(machine)
+        last = shifted((replace(BLIND_SCHEDULE[-1], passes=passes),), self.contact)
+        return track(problems, last, references=_carried(known, problems))
+
+    def refined(self, first: Candidate) -> Candidate:
+        """The same machine with the finer basis, from what the coarse one found."""
+        fine = self.problems(first.machine)
+        schedule = shifted(CALIBRATION_SCHEDULE if self.calibrate_only else FINE_SCHEDULE, self.contact)
+        fit = track(fine, schedule, references=_carried(first.fit, fine), progress=self.progress)
+        return replace(first, fit=fit)
+
+    def not_lost(self, found: Candidate) -> Candidate:
+        """What was found, if the filter followed all drops to the end."""
+        return replace(found, fit=_not_lost(found.fit, self.evidence))
+
+
+def _started_elsewhere(problem: DropProblem, attempt: int) -> DropProblem:
+    """The problem with its unknowns starting at another place of their prior, one for each attempt."""
+    start, chosen = problem.start.copy(), problem.parameter_slice
+    sigma = np.array([unknown.sigma for unknown in problem.unknowns])
+    start[chosen] += START_SPREAD * sigma * np.random.default_rng(attempt).standard_normal(len(sigma))
+    bounds = np.array([unknown.bounds for unknown in problem.unknowns])
+    start[chosen] = np.clip(start[chosen], bounds[:, 0], bounds[:, 1])
+    start[problem.gap_entries] = problem.start[problem.gap_entries]
+    return replace(problem, start=start)
+
+
+def _carried(known: TrackedDrops, problems: Sequence[DropProblem]) -> list[Array]:
+    """Trajectories of a fit in the coordinates of other problems of the same drops."""
+    drops = zip(known.problems, problems, known.smoothed, strict=True)
+    return [transferred(one, two, drop.means) for one, two, drop in drops]
 
 
 def _basis(machine: Machine, least: Reduction, reach: float) -> Reduction:
@@ -270,7 +383,12 @@ def best_noise_factor(problem: DropProblem, smoothed: Smoothed, stage: Stage) ->
 
 
 def tracked_drop(
-    evidence: Evidence, problem: DropProblem, smoothed: Smoothed, noise_factor: float, drops: int = 1
+    evidence: Evidence,
+    problem: DropProblem,
+    smoothed: Smoothed,
+    noise_factor: float,
+    drops: int = 1,
+    kept: tuple[Kept, ...] = (),
 ) -> TrackedDrop:
     """Forces and checks of one smoothed drop."""
     return TrackedDrop(
@@ -281,6 +399,7 @@ def tracked_drop(
         checks=consistency_checks(problem, smoothed, noise_factor),
         noise_factor=noise_factor,
         drops=drops,
+        kept=kept,
     )
 
 
@@ -295,13 +414,13 @@ def followed_drops(
 
     Each is given away with its arrays, so that no more than one is kept when its result has been made.
     """
-    tracked = track_drops(machine, evidence, quick=quick, progress=progress)
-    count = len(evidence)
+    found = track_drops(machine, evidence, quick=quick, progress=progress)
+    tracked, count, kept = found.fit, len(evidence), found.kept
     waiting = list(zip(evidence, tracked.problems, tracked.smoothed, tracked.noise_factors, strict=True))
-    del tracked
+    del tracked, found
     while waiting:
         item, problem, smoothed, needed = waiting.pop(0)
         factor = 1.0 if quick else best_noise_factor(problem, smoothed, FINE_SCHEDULE[-1])
         factor = max(factor, needed) if needed > 1.0 else factor
-        yield tracked_drop(item, problem, smoothed, factor, count)
+        yield tracked_drop(item, problem, smoothed, factor, count, kept)
         del problem, smoothed

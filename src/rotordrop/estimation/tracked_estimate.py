@@ -17,11 +17,13 @@ from rotordrop.estimation.estimate import (
     FittedParameter,
     Innovations,
     SensorErrors,
+    Structure,
     Verdict,
 )
 from rotordrop.estimation.later_motion import LaterMotion, later_motion
 from rotordrop.estimation.methods import Tracked
 from rotordrop.estimation.record_facts import RecordFacts
+from rotordrop.estimation.structure_sentence import structure_of
 from rotordrop.estimation.tracked import TrackedDrop
 from rotordrop.estimation.tracked_loads import (
     INCONSISTENT_WIDENING,
@@ -107,6 +109,7 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
         parameters=judged.parameters,
         checks=drop.checks,
         sensors=judged.sensors,
+        structure=_structure(drop, judged),
         cross_check=_comparisons(drop, judged),
         innovations=_innovations(drop),
         nis=drop.smoothed.filtered.nis,
@@ -123,6 +126,12 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
         ),
         simulated_record=facts.simulated,
     )
+
+
+def _structure(drop: TrackedDrop, judged: _Judgement) -> tuple[Structure, ...]:
+    values = {parameter.path: parameter.estimate for parameter in judged.parameters}
+    machine = drop.problem.model.machine
+    return tuple(structure_of(kept, machine, values) for kept in drop.kept)
 
 
 def _cross_checked(drop: TrackedDrop, method: Tracked) -> tuple[TrackedDrop, InputEstimate | None]:
@@ -163,6 +172,8 @@ def _judge(drop: TrackedDrop, check: InputEstimate | None) -> _Judgement:
     if not fits and check is not None:
         given_way = [_gives_way(drop, found, check, b) for b in range(len(given_way))]
     verdict = Verdict.CONSISTENT if drop.consistent else Verdict.ONE_DIRECTION
+    if drop.consistent and drop.kept:
+        verdict = Verdict.EXTENDED
     if not fits:
         verdict = Verdict.GIVEN_WAY if any(given_way) else Verdict.HELD
     return _Judgement(

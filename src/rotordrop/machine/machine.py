@@ -21,7 +21,7 @@ from rotordrop.machine.sensor import Sensor, check_sensors_resolve_motion
 from rotordrop.machine.speed import SpeedDescription
 from rotordrop.machine.touchdown_bearing import TouchdownBearing
 from rotordrop.machine.unbalance import BalanceGrade, Unbalance, from_grade
-from rotordrop.machine.values import Acceleration, default
+from rotordrop.machine.values import Acceleration, PositiveTime, default
 
 RESERVED_NAMES = ("speed", "unbalance", "rotor", "gravity", "sensors", "ambs", "machine", "calibration")
 
@@ -45,6 +45,8 @@ class Machine(Description):
         Touchdown bearings, any number, NDE first.
     ambs : tuple of ActiveMagneticBearing
         Radial active magnetic bearings.
+    remanence_time_constant : Estimated, optional
+        Time in which the remanent force of the magnets decays [s]; 2 ms, to a factor of two, when left out.
     sensors : tuple of Sensor
         Displacement sensors.
     speed : SpeedDescription
@@ -64,6 +66,9 @@ class Machine(Description):
     unbalances: tuple[Unbalance, ...] = ()
     touchdown_bearings: tuple[TouchdownBearing, ...] = Field(min_length=1)
     ambs: tuple[ActiveMagneticBearing, ...] = ()
+    remanence_time_constant: PositiveTime | None = Field(
+        default=None, description="Time in which the remanent force of the magnets decays"
+    )
     sensors: tuple[Sensor, ...] = ()
     calibration: CalibrationOrigin | None = Field(
         default=None, description="Drops it was calibrated on, written by 'rotordrop calibrate'"

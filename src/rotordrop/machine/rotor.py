@@ -20,6 +20,7 @@ from rotordrop.machine.values import (
     NonNegative,
     NonNegativeLength,
     Physical,
+    Positive,
     PositiveLength,
     PositiveMass,
     default,
@@ -200,11 +201,16 @@ class Rotor(Description):
         Discs and point masses.
     modal_damping : Estimated
         Damping ratio of the free-free flexible modes [1].
+    stiffness_factor : Estimated, optional
+        Bending stiffness over the one that sections and materials give [1].
     """
 
     material: Name = Field(default="steel", description="Material of all sections that name no other")
     materials: dict[Name, Material] = Field(default_factory=dict, description="Materials by name")
     modal_damping: NonNegative = default(0.005, "0.5 % of critical on every free-free flexible mode")
+    stiffness_factor: Positive | None = Field(
+        default=None, description="Bending stiffness over the one that sections and materials give"
+    )
     node_positions: NodePositions = Field(
         default=(), validate_default=False, description="Position of every node, for sections given by nodes"
     )

@@ -8,7 +8,16 @@ from typing import Literal
 from pydantic import Field
 
 from rotordrop.machine.description import Channel, Misfit, Name, Placed
-from rotordrop.machine.values import Angle, Length, NonNegativeLength, Positive, Sensitivity, default
+from rotordrop.machine.values import (
+    Angle,
+    Length,
+    NonNegativeLength,
+    Number,
+    Positive,
+    PositiveTime,
+    Sensitivity,
+    default,
+)
 
 LEAST_PLANE_DISTANCE = 1e-3
 """Sensor planes closer than this [m] count as one."""
@@ -37,6 +46,14 @@ class Sensor(Placed):
         Name of the touchdown bearing at this end; the nearest when left out.
     position_error : Estimated
         Standard uncertainty of the axial position [m].
+    time_constant : Estimated, optional
+        Time by which the reading lags behind, first order [s].
+    cross_axis : Estimated, optional
+        Reading per displacement across, in the direction turned by +90° [1].
+    follows_housing : Estimated, optional
+        Part of the motion of the bearing housing that the bracket of the sensor makes too [1].
+    plane_offset : Estimated, optional
+        How far the sensor stands from its node, towards higher nodes [m].
     lost : bool
         Whether the sensor gave no readings; the machine then goes without it.
     """
@@ -55,6 +72,16 @@ class Sensor(Placed):
         description="Touchdown bearing at this end; the nearest when left out",
     )
     position_error: NonNegativeLength = default(1e-3, "standard uncertainty of the axial position")
+    time_constant: PositiveTime | None = Field(
+        default=None, description="Time by which the reading lags behind, first order"
+    )
+    cross_axis: Number | None = Field(default=None, description="Reading per displacement across")
+    follows_housing: Number | None = Field(
+        default=None, description="Part of the motion of the bearing housing that the bracket makes too"
+    )
+    plane_offset: Length | None = Field(
+        default=None, description="How far the sensor stands from its node, towards higher nodes"
+    )
     lost: bool = Field(default=False, description="A sensor without readings; left out of everything")
 
 

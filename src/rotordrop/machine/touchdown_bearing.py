@@ -17,8 +17,11 @@ from rotordrop.machine.values import (
     ContactDamping,
     ContactExponent,
     ContactStiffness,
+    Coupling,
+    CubicTerm,
     Damping,
     NonNegative,
+    Positive,
     PositiveInertia,
     PositiveLength,
     PositiveMass,
@@ -174,6 +177,15 @@ class Support(Description):
         The same in the horizontal direction; equal to the vertical ones when left out.
     damping_ratio_horizontal : Estimated, optional
         In place of the horizontal damping.
+    coupling : Estimated, optional
+        Coupling of x and y over the geometric mean of horizontal and vertical stiffness [1]: principal axes
+        that are turned.
+    cubic : Estimated, optional
+        Cubic term k₃ of the spring, F = K h (1 + k₃ h²) along x and along y [1/m²].
+    foundation_share : Estimated, optional
+        Support mass over modal mass of a foundation that gives way under the support [1].
+    foundation_frequency, foundation_damping_ratio : Estimated, optional
+        Natural frequency [rad/s] and damping ratio [1] of that foundation.
     """
 
     mass: PositiveMass = default(
@@ -186,6 +198,19 @@ class Support(Description):
     stiffness_horizontal: Stiffness = follows("equal to the vertical one")
     damping_horizontal: Damping = follows("from the damping ratio, or equal to the vertical one")
     damping_ratio_horizontal: NonNegative | None = Field(default=None, description="")
+    coupling: Coupling | None = Field(
+        default=None, description="Coupling of x and y over the geometric mean of both stiffnesses"
+    )
+    cubic: CubicTerm | None = Field(default=None, description="Cubic term k3 of F = K h (1 + k3 h^2)")
+    foundation_share: NonNegative | None = Field(
+        default=None, description="Support mass over modal mass of a foundation that gives way"
+    )
+    foundation_frequency: PositiveSpeed | None = Field(
+        default=None, description="Natural frequency of that foundation"
+    )
+    foundation_damping_ratio: Positive | None = Field(
+        default=None, description="Damping ratio of that foundation"
+    )
 
     displaces: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "damping": ("damping_ratio",),
@@ -202,6 +227,14 @@ class Support(Description):
                     f"the support has both 'damping{end}' and 'damping_ratio{end}'; keep one of them",
                     (f"damping_ratio{end}",),
                 )
+        parts = ("foundation_share", "foundation_frequency", "foundation_damping_ratio")
+        given = [name for name in parts if getattr(self, name) is not None]
+        if given and len(given) < len(parts):
+            missing = next(name for name in parts if name not in given)
+            raise Misfit(
+                f"the support has {given[0]!r} but no {missing!r}; a foundation needs {', '.join(parts)}",
+                (given[0],),
+            )
 
     def left_out(self) -> dict[str, Any]:
         """Let damping follow its ratio and the horizontal values follow the vertical ones."""

@@ -175,13 +175,14 @@ def build_rotor_fe(machine: Machine) -> RotorFE:
 
 def rotor_fe(rotor: Rotor) -> RotorFE:
     """Finite elements of a rotor alone. Source: Neisi 2020, eq. (1)."""
+    factor = 1.0 if rotor.stiffness_factor is None else float(rotor.stiffness_factor)
     sections = []
     for element in rotor.elements:
         outer = float(element.outer_diameter)
         section = timoshenko.round_section(
             outer,
             float(element.inner_diameter),
-            float(element.youngs_modulus),
+            factor * float(element.youngs_modulus),
             float(element.poisson_ratio),
             float(element.density),
         )

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.physics import ball_set, contact
+from rotordrop.physics import ball_set, contact, support
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -47,7 +47,15 @@ GROOVE_DISTANCE = BALL_SET + ball_set.GROOVE_DISTANCE
 RADIAL_OFFSET = BALL_SET + ball_set.RADIAL_OFFSET
 AXIAL_OFFSET = BALL_SET + ball_set.AXIAL_OFFSET
 STRESS_COEFFICIENT = BALL_SET + ball_set.STRESS_COEFFICIENT
-N_BEARING_COLUMNS = BALL_SET_END
+SUPPORT_FORM = BALL_SET_END
+SUPPORT_FORM_END = SUPPORT_FORM + support.N_ENTRIES
+SUPPORT_COUPLING = SUPPORT_FORM + support.COUPLING
+SUPPORT_CUBIC = SUPPORT_FORM + support.CUBIC
+FOUNDATION_SHARE = SUPPORT_FORM + support.FOUNDATION_SHARE
+FOUNDATION_SPEED = SUPPORT_FORM + support.FOUNDATION_SPEED
+FOUNDATION_DAMPING = SUPPORT_FORM + support.FOUNDATION_DAMPING
+N_BEARING_COLUMNS = SUPPORT_FORM_END
+FOUNDATION_STATES = 4
 
 # Entries of `KernelParameters.spin`.
 POLAR_INERTIA = 0
@@ -148,13 +156,17 @@ class StateLayout:
     n_modes, n_bearings : int
         Modes per plane, touchdown bearings.
     bearing_own, magnet_own : tuple of int
-        Number of further states of each touchdown bearing and of each AMB; empty where none has any.
+        Number of further states of each touchdown bearing and of each AMB; empty where none has any. Those
+        of a bearing are displacement (x, y) and velocity (x, y) of its foundation.
+    sensor_own : int
+        Number of sensors that lag behind, each with the reading that it has got to [m].
     """
 
     n_modes: int
     n_bearings: int
     bearing_own: tuple[int, ...] = ()
     magnet_own: tuple[int, ...] = ()
+    sensor_own: int = 0
 
     @property
     def n_coordinates(self) -> int:
@@ -216,9 +228,14 @@ class StateLayout:
         return slice(self.race_spin.stop, self.race_spin.stop + sum(self.bearing_own) + sum(self.magnet_own))
 
     @property
+    def sensors(self) -> slice:
+        """What sensors that lag behind have got to; only the filter moves them."""
+        return slice(self.own.stop, self.own.stop + self.sensor_own)
+
+    @property
     def rotor_speed(self) -> int:
         """Index of the rotor speed."""
-        return int(self.own.stop)
+        return int(self.sensors.stop)
 
     @property
     def rotor_angle(self) -> int:
@@ -241,7 +258,7 @@ class StateLayout:
         kinds = np.full(self.size, AUDIT, dtype=np.int64)
         kinds[: self.n_coordinates] = POSITION
         kinds[self.velocities] = VELOCITY
-        kinds[self.own] = INTERNAL
+        kinds[self.own.start : self.sensors.stop] = INTERNAL
         kinds[self.race_spin] = SPIN
         kinds[self.rotor_speed] = SPIN
         kinds[self.rotor_angle] = ANGLE
@@ -282,7 +299,7 @@ class StateLayout:
         coordinates = modal + ends
         rates = [f"{name} velocity" for name in coordinates]
         spins = [f"race {name} spin" for name in bearing_names]
-        own = [f"further state {k + 1}" for k in range(self.own.stop - self.own.start)]
+        own = [f"further state {k + 1}" for k in range(self.sensors.stop - self.own.start)]
         return (
             *coordinates,
             *rates,

@@ -9,11 +9,11 @@ from enum import Enum
 from typing import Literal
 
 from rotordrop.estimated import Estimated
-from rotordrop.machine import TouchdownBearing
+from rotordrop.machine import Rotor, TouchdownBearing
 from rotordrop.machine.sensor import Sensor
 from rotordrop.units import si_unit
 
-Owner = Literal["bearing", "sensor", "unbalance", "magnet", "drop"]
+Owner = Literal["bearing", "sensor", "unbalance", "magnet", "drop", "rotor"]
 
 
 class Role(Enum):
@@ -52,7 +52,7 @@ class Rule(Enum):
 class Entry:
     """An entry of the kernel that a parameter sets: array of `KernelParameters`, column, and how."""
 
-    array: Literal["bearing", "unbalance", "magnet", "spin"]
+    array: Literal["bearing", "unbalance", "magnet", "spin", "modes"]
     column: int
     rule: Rule = Rule.VALUE
 
@@ -65,7 +65,7 @@ class Parameter:
     ----------
     path : str
         Path below its owner, such as ``"support.stiffness"`` of a touchdown bearing.
-    owner : {"bearing", "sensor", "unbalance", "magnet", "drop"}
+    owner : {"bearing", "sensor", "unbalance", "magnet", "drop", "rotor"}
         What has such a parameter; all drops share those of bearings and sensors.
     label : str
         Name for people.
@@ -109,6 +109,11 @@ class Parameter:
         a key.
     taken_over : {"needed", "welcome", "no"}
         Whether an earlier estimate must have, or may have, it to stand for the identification.
+    common_sigma : float
+        For a value of each sensor: prior standard deviation of what the sensors of a group have in common,
+        where it differs from that of one of them.
+    group : {"plane", "machine"}
+        Sensors that have it in common.
     separated_by : dict
         What measurement would tell it from another parameter, by the path of the other.
     """
@@ -137,6 +142,8 @@ class Parameter:
     field: str = ""
     truth: tuple[str, ...] = ()
     taken_over: Literal["needed", "welcome", "no"] = "no"
+    common_sigma: float = 0.0
+    group: Literal["plane", "machine"] = "machine"
     separated_by: dict[str, str] = dataclasses.field(default_factory=dict)
 
     @property
@@ -151,6 +158,8 @@ class Parameter:
 
     def path_of(self, owner: str) -> str:
         """Path in the machine: ``"NDE.support.stiffness"``, ``"sensors.X1.gain"``, ``"unbalance.0.sine"``."""
+        if self.owner == "rotor":
+            return f"rotor.{self.path}"
         group = {"sensor": "sensors.", "unbalance": "unbalance."}.get(self.owner, "")
         return f"{group}{owner}.{self.path}" if owner else self.path
 
@@ -158,6 +167,13 @@ class Parameter:
         """The value, or the limit of the model it lies beyond."""
         lowest = -math.inf if self.lower is None else self.lower
         return min(max(value, lowest), math.inf if self.upper is None else self.upper)
+
+    def stated(self, part: TouchdownBearing | Sensor | Rotor) -> Estimated | None:
+        """The value as the description has it; None where it leaves it out."""
+        value: object = part
+        for name in self.path.split("."):
+            value = getattr(value, name)
+        return value if isinstance(value, Estimated) else None
 
     def described(self, part: TouchdownBearing | Sensor) -> Estimated:
         """The value as the machine description has it, of a bearing or a sensor."""

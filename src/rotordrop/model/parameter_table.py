@@ -10,6 +10,7 @@ from collections.abc import Iterator
 
 from rotordrop.model import layout as L
 from rotordrop.model.parameter import Entry, Load, Owner, Parameter, Role, Rule, Step
+from rotordrop.model.structure_table import STRUCTURE
 
 
 def _bearing(*columns: int) -> tuple[Entry, ...]:
@@ -324,7 +325,7 @@ TABLE: tuple[Parameter, ...] = (
 )
 """The rows; those of a bearing in the order in which the estimators hold them."""
 
-_BY_PATH = {(row.owner, row.path): row for row in TABLE}
+_BY_PATH = {(row.owner, row.path): row for row in (*TABLE, *STRUCTURE)}
 
 
 def parameter(path: str, owner: Owner = "bearing") -> Parameter:
@@ -342,6 +343,8 @@ def row_of(path: str) -> Parameter:
     owner, _, rest = path.partition(".")
     if owner == "sensors":
         return _BY_PATH["sensor", rest.rpartition(".")[2]]
+    if owner == "rotor":
+        return _BY_PATH["rotor", rest]
     return _BY_PATH.get(("bearing", path)) or _BY_PATH["bearing", rest]
 
 

@@ -21,6 +21,7 @@ from rotordrop.physics import aerodynamics
 from rotordrop.physics.contact import contact_law
 from rotordrop.physics.elementary import sine_cosine
 from rotordrop.physics.linear_algebra import product
+from rotordrop.physics.support import PRESENT
 
 Array = NDArray[np.float64]
 
@@ -77,7 +78,12 @@ def build_drop_model(machine: Machine, reduction: str | Reduction = "accurate") 
     nodes = tuple(bearing.node for bearing in machine.touchdown_bearings)
     basis = reduce_rotor(fe, reduction, nodes)
     shares = np.asarray(bearing_load_shares(machine), dtype=np.float64)
-    layout = L.StateLayout(n_modes=basis.shapes.shape[1], n_bearings=len(nodes))
+    layout = L.StateLayout(
+        n_modes=basis.shapes.shape[1],
+        n_bearings=len(nodes),
+        bearing_own=_foundation_states(machine),
+        sensor_own=sum(sensor.time_constant is not None for sensor in machine.sensors),
+    )
     return DropModel(
         machine=machine,
         fe=fe,
@@ -86,6 +92,11 @@ def build_drop_model(machine: Machine, reduction: str | Reduction = "accurate") 
         layout=layout,
         load_shares=shares,
     )
+
+
+def _foundation_states(machine: Machine) -> tuple[int, ...]:
+    gives_way = [b.support.foundation_share is not None for b in machine.touchdown_bearings]
+    return tuple(L.FOUNDATION_STATES * int(one) for one in gives_way) if any(gives_way) else ()
 
 
 def _rows(basis: RotorBasis, nodes: list[int]) -> Array:
@@ -208,4 +219,14 @@ def bearing_row(bearing: TouchdownBearing, static_load: float) -> Array:
     row[L.SUPPORT_STIFFNESS_Y] = float(support.stiffness)
     row[L.SUPPORT_DAMPING_X] = float(support.damping_horizontal)
     row[L.SUPPORT_DAMPING_Y] = float(support.damping)
+    form = {
+        L.SUPPORT_COUPLING: support.coupling,
+        L.SUPPORT_CUBIC: support.cubic,
+        L.FOUNDATION_SHARE: support.foundation_share,
+        L.FOUNDATION_SPEED: support.foundation_frequency,
+        L.FOUNDATION_DAMPING: support.foundation_damping_ratio,
+    }
+    for column, value in form.items():
+        row[column] = 0.0 if value is None else float(value)
+    row[L.SUPPORT_FORM + PRESENT] = float(any(value is not None for value in form.values()))
     return row

@@ -13,6 +13,7 @@ from rotordrop.model import layout as L
 from rotordrop.model.bearing_numbers import numbers_of
 from rotordrop.model.parameters import DropModel
 from rotordrop.physics.contact import depth_at
+from rotordrop.physics.support import PRESENT
 
 Array = NDArray[np.float64]
 
@@ -65,7 +66,22 @@ def static_sag(rows: Array, race: Array, loads: Array) -> StaticSag:
     """
     laws = rows[:, L.CONTACT : L.CONTACT_END]
     indentation = np.array([depth_at(law, float(load)) for law, load in zip(laws, loads, strict=True)])
-    return StaticSag(indentation=indentation, race=race, support=loads / rows[:, L.SUPPORT_STIFFNESS_Y])
+    support = np.array([support_sag(row, float(load)) for row, load in zip(rows, loads, strict=True)])
+    return StaticSag(indentation=indentation, race=race, support=support)
+
+
+def support_sag(row: Array, load: float) -> float:
+    """Deflection [m] of a support under a static load [N], its foundation included."""
+    sag = load / float(row[L.SUPPORT_STIFFNESS_Y])
+    if row[L.SUPPORT_FORM + PRESENT] == 0.0:
+        return sag
+    cubic = float(row[L.SUPPORT_CUBIC])
+    coupled = sag / (1.0 - float(row[L.SUPPORT_COUPLING]) ** 2)
+    deflection = coupled / (1.0 + cubic * sag**2)  # next order: a few parts in ten thousand of 3 µm
+    speed, share = float(row[L.FOUNDATION_SPEED]), max(float(row[L.FOUNDATION_SHARE]), 0.0)
+    if share == 0.0:
+        return deflection
+    return deflection + load * share / (float(row[L.SUPPORT_MASS_Y]) * speed**2)
 
 
 def sag_of_model(model: DropModel) -> StaticSag:

@@ -11,10 +11,13 @@ import numpy as np
 
 from rotordrop.estimated import NINETY, Estimated
 from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.machine.sensor import Sensor
+from rotordrop.model import layout as L
 from rotordrop.model.bearing_numbers import Measure, numbers_of
 from rotordrop.model.parameter import Entry, Parameter, Rule
 from rotordrop.model.parameter_table import parameter, rows
 from rotordrop.model.parameters import DropModel, contact_law_of
+from rotordrop.model.structure_table import structure_rows
 from rotordrop.physics.contact import depth_at
 
 Scope = Literal["machine", "drop"]
@@ -22,6 +25,12 @@ Scope = Literal["machine", "drop"]
 TYPICAL_LOADS = 5.0
 """Contact force at whose indentation the stiffness keeps its meaning when the exponent differs, over the mean
 static load of a bearing [1]: impacts that say something of the contact have it and more."""
+
+TURNED_ANISOTROPY = 0.4
+"""Prior standard deviation of the logarithm of horizontal over vertical stiffness of turned axes."""
+
+PEAK_LOADS = 10.0
+"""Force of a hard impact over the mean static load of a bearing [1]: where a cubic term counts."""
 
 CENTRED = 1e-6
 """Distance of value and middle of its range, in standard deviations, below which they are one [1]."""
@@ -57,6 +66,10 @@ class Unknown:
     published : callable, optional
         The published value [SI] of the number that is estimated, where they differ: preload for the axial
         offset of the ball rows, anisotropy for its ratio to the one described.
+    common_variance : float
+        Prior covariance with the same unknown of the other sensors of its group.
+    limits : tuple of float, optional
+        Bounds that depend on the machine, in the measure of the mean; those of the row when left out.
     """
 
     parameter: Parameter
@@ -67,6 +80,8 @@ class Unknown:
     start: float | None = None
     calibrated: bool = False
     published: Callable[[float], float] | None = None
+    common_variance: float = 0.0
+    limits: tuple[float, float] | None = None
 
     @property
     def path(self) -> str:
@@ -86,7 +101,7 @@ class Unknown:
     @property
     def scope(self) -> Scope:
         """Whether all drops of a machine share it."""
-        return "machine" if self.parameter.owner == "bearing" else "drop"
+        return "machine" if self.parameter.owner in ("bearing", "sensor", "rotor") else "drop"
 
     @property
     def drift(self) -> float:
@@ -103,6 +118,8 @@ class Unknown:
     def bounds(self) -> tuple[float, float]:
         """Between what the model follows it, in the measure it is estimated in."""
         row = self.parameter
+        if self.limits is not None:
+            return self.limits
         if row.reach is not None:
             return self.mean - math.log(row.reach), self.mean + math.log(row.reach)
         low, high = (
@@ -243,6 +260,7 @@ def typical_depth(bearing: TouchdownBearing, load: float) -> float:
 def _anisotropy(row: Parameter, bearing: TouchdownBearing, index: int) -> Unknown:
     """Horizontal over vertical stiffness, estimated by its ratio to the one described."""
     described = row.described(bearing)
+    turned = bearing.support.coupling is not None and bearing.support.coupling.status != "estimated"
 
     def ratio(theta: float) -> float:
         return float(described) * math.exp(theta)
@@ -251,7 +269,7 @@ def _anisotropy(row: Parameter, bearing: TouchdownBearing, index: int) -> Unknow
         parameter=row,
         owner=bearing.name,
         mean=0.0,
-        sigma=prior(row, described).sigma,
+        sigma=TURNED_ANISOTROPY if turned else prior(row, described).sigma,
         targets=tuple(Target(entry=entry, row=index) for entry in row.entries),
         published=ratio,
     )
@@ -314,8 +332,16 @@ def drop_unknowns(model: DropModel) -> Iterator[Unknown]:
         for row in rows("magnet"):
             yield _of_drop(row, amb.name, 0.0, row.guess_sigma * share, a)
     if machine.ambs:
-        yield _of_drop(parameter("remanence.time_constant", "drop"), "", math.log(2e-3))
+        yield _remanence_time(machine)
     yield _of_drop(parameter("speed.aero_time_constant", "drop"), "", math.log(aero_time_constant(machine)))
+
+
+def _remanence_time(machine: Machine) -> Unknown:
+    row, described = parameter("remanence.time_constant", "drop"), machine.remanence_time_constant
+    if described is None:
+        return _of_drop(row, "", math.log(2e-3))
+    known = prior(row, described)
+    return _of_drop(row, "", known.mean, known.sigma)
 
 
 def _of_drop(row: Parameter, owner: str, mean: float, sigma: float | None = None, index: int = 0) -> Unknown:
@@ -334,6 +360,67 @@ def aero_time_constant(machine: Machine) -> float:
     return 10.0 if constant is None else float(constant)
 
 
+def structure_unknowns(model: DropModel) -> Iterator[Unknown]:
+    """Unknowns beyond the usual model: those that the machine description names."""
+    machine = model.machine
+    for index, bearing in enumerate(machine.touchdown_bearings):
+        for row in structure_rows("bearing"):
+            if (quantity := row.stated(bearing)) is not None:
+                yield _of_structure(row, bearing.name, quantity, index, *_cubic_scale(model, row, index))
+    for index, sensor in enumerate(machine.sensors):
+        for row in structure_rows("sensor"):
+            if (quantity := row.stated(sensor)) is not None:
+                known = _of_structure(row, sensor.name, quantity, index)
+                yield known if known.calibrated else _in_common(known, machine, sensor)
+    for row in structure_rows("rotor"):
+        if (quantity := row.stated(machine.rotor)) is not None:
+            yield _of_structure(row, "", quantity, 0)
+
+
+def _of_structure(
+    row: Parameter,
+    owner: str,
+    quantity: Estimated,
+    index: int,
+    scale: float = 1.0,
+    limits: tuple[float, float] | None = None,
+) -> Unknown:
+    known = prior(row, quantity, scale=scale)
+    return Unknown(
+        parameter=row,
+        owner=owner,
+        mean=known.mean,
+        sigma=known.sigma,
+        start=known.start,
+        targets=tuple(
+            Target(entry=e, row=index, factor=1.0 / float(quantity) if e.rule is Rule.RATIO else 1.0)
+            for e in row.entries
+        ),
+        calibrated=quantity.status == "estimated",
+        limits=limits,
+    )
+
+
+def _cubic_scale(
+    model: DropModel, row: Parameter, index: int
+) -> tuple[float] | tuple[float, tuple[float, float]]:
+    """Scale of a cubic term, and its limits: hard impacts at most double the stiffness, or take a fifth."""
+    if row.path != "support.cubic":
+        return (1.0,)
+    load = PEAK_LOADS * float(np.mean(model.load_shares))
+    scale = (float(model.parameters.bearing[index, L.SUPPORT_STIFFNESS_Y]) / load) ** 2
+    return scale, (-0.2 * scale, 2.0 * scale)
+
+
+def _in_common(one: Unknown, machine: Machine, sensor: Sensor) -> Unknown:
+    """The unknown of a sensor with what is known of it and the sensors of its group together."""
+    row = one.parameter
+    group = [s for s in machine.sensors if row.group == "machine" or s.node == sensor.node]
+    own, count = one.sigma**2, len([s for s in group if row.stated(s) is not None])
+    common = row.common_sigma**2 - own / count
+    return replace(one, sigma=math.sqrt(own + common), common_variance=common)
+
+
 def all_unknowns(model: DropModel) -> tuple[Unknown, ...]:
     """Every unknown, machine first, then those of the drop."""
     of_bearings = (
@@ -341,4 +428,4 @@ def all_unknowns(model: DropModel) -> tuple[Unknown, ...]:
         for index in range(len(model.machine.touchdown_bearings))
         for unknown in bearing_unknowns(model, index)
     )
-    return (*of_bearings, *drop_unknowns(model))
+    return (*of_bearings, *structure_unknowns(model), *drop_unknowns(model))

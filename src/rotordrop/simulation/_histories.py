@@ -9,11 +9,18 @@ from numpy.typing import NDArray
 
 from rotordrop.model import layout as L
 from rotordrop.model.layout import KernelParameters
+from rotordrop.physics import support
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
 from rotordrop.physics.ball_set import ball_set_energy, ball_set_force, ball_set_load
 from rotordrop.physics.contact import contact_energy
 from rotordrop.simulation._loop import contact_at
-from rotordrop.simulation._rhs import modal_parts, project, race_deflection, relative_motion
+from rotordrop.simulation._rhs import (
+    modal_parts,
+    project,
+    race_deflection,
+    relative_motion,
+    support_deflection,
+)
 
 Array = NDArray[np.float64]
 
@@ -67,6 +74,24 @@ def node_displacements(states: Array, shapes: Array) -> Array:
 
 
 @lean_kernel
+def support_form_energy(b: int, y: Array, p: KernelParameters) -> float:
+    """Energy [J] that the form of a support adds to that of a plain one, its foundation included."""
+    h, own = p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.BEARING_OWN]
+    row = p.bearing[b]
+    form = row[L.SUPPORT_FORM : L.SUPPORT_FORM_END]
+    k_x, k_y = row[L.SUPPORT_STIFFNESS_X], row[L.SUPPORT_STIFFNESS_Y]
+    x, z, _vx, _vz = support_deflection(b, y, p)
+    energy = support.support_energy(form, k_x, k_y, x, z)
+    energy -= 0.5 * (k_x * y[h] ** 2 + k_y * y[h + 1] ** 2)
+    if own >= 0 and form[support.FOUNDATION_SHARE] > 0.0:
+        mass = row[L.SUPPORT_MASS_Y] / form[support.FOUNDATION_SHARE]
+        for axis in range(2):
+            u, v = y[own + axis], y[own + 2 + axis]
+            energy += 0.5 * mass * (v * v + form[support.FOUNDATION_SPEED] ** 2 * u * u)
+    return energy
+
+
+@lean_kernel
 def stored_energy(y: Array, p: KernelParameters, with_rotor_spin: bool) -> float:
     """Energy [J] of a state: motion, bending, contacts, balls, supports, gravity and spin."""
     n_q = p.rotor_at[L.N_COORDINATES]
@@ -92,6 +117,8 @@ def stored_energy(y: Array, p: KernelParameters, with_rotor_spin: bool) -> float
         energy += (
             0.5 * row[L.SUPPORT_STIFFNESS_X] * y[h] ** 2 + 0.5 * row[L.SUPPORT_STIFFNESS_Y] * y[h + 1] ** 2
         )
+        if row[L.SUPPORT_FORM + support.PRESENT] != 0.0:
+            energy += support_form_energy(b, y, p)
         energy += 0.5 * row[L.RACE_INERTIA] * y[p.bearing_at[b, L.RACE_SPIN]] ** 2
     if with_rotor_spin:
         energy += 0.5 * p.spin[L.POLAR_INERTIA] * y[p.rotor_at[L.ROTOR_SPEED]] ** 2

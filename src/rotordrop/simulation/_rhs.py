@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rotordrop.model import layout as L
 from rotordrop.model.layout import KernelParameters
-from rotordrop.physics import aerodynamics
+from rotordrop.physics import aerodynamics, support
 from rotordrop.physics._compile import inner_kernel, lean_kernel
 from rotordrop.physics.aerodynamics import exponential_deceleration, speed_dependent_deceleration
 from rotordrop.physics.ball_set import ball_set_force
@@ -68,6 +68,16 @@ def race_deflection(b: int, y: Array, p: KernelParameters) -> tuple[float, float
     """Displacement [m] of the race of one bearing relative to its support, x and y."""
     r, h = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT]
     return y[r] - y[h], y[r + 1] - y[h + 1]
+
+
+@inner_kernel
+def support_deflection(b: int, y: Array, p: KernelParameters) -> tuple[float, float, float, float]:
+    """Deflection [m] and its rate [m/s] of a support, x and y, against the foundation if that gives way."""
+    n_q, h, own = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.BEARING_OWN]
+    x, z, vx, vz = y[h], y[h + 1], y[n_q + h], y[n_q + h + 1]
+    if own < 0:
+        return x, z, vx, vz
+    return x - y[own], z - y[own + 1], vx - y[own + 2], vz - y[own + 3]
 
 
 @inner_kernel
@@ -184,6 +194,37 @@ def add_magnet_forces(t: float, y: Array, p: KernelParameters, dy: Array) -> flo
     return put_in
 
 
+@lean_kernel
+def add_support_form(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
+    """Add what the form of a support changes: its force, and the motion of its foundation.
+
+    Returns what is dissipated beyond the dampers of the plain support [W].
+    """
+    n_q, h, own = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.BEARING_OWN]
+    row = p.bearing[b]
+    x, z, vx, vz = support_deflection(b, y, p)
+    k_x, k_y = row[L.SUPPORT_STIFFNESS_X], row[L.SUPPORT_STIFFNESS_Y]
+    c_x, c_y = row[L.SUPPORT_DAMPING_X], row[L.SUPPORT_DAMPING_Y]
+    form = row[L.SUPPORT_FORM : L.SUPPORT_FORM_END]
+    F_x, F_y = support.support_force(form, k_x, k_y, c_x, c_y, x, z, vx, vz)
+    sx, sy = y[n_q + h], y[n_q + h + 1]
+    dy[n_q + h] += (c_x * sx + k_x * y[h] - F_x) / row[L.SUPPORT_MASS_X]
+    dy[n_q + h + 1] += (c_y * sy + k_y * y[h + 1] - F_y) / row[L.SUPPORT_MASS_Y]
+    dissipated = c_x * (vx * vx - sx * sx) + c_y * (vz * vz - sy * sy)
+    if own < 0:
+        return dissipated
+    speed, share = form[support.FOUNDATION_SPEED], max(form[support.FOUNDATION_SHARE], 0.0)
+    damping, mobility = 2.0 * form[support.FOUNDATION_DAMPING] * speed, share / row[L.SUPPORT_MASS_Y]
+    for axis in range(2):
+        force = F_x if axis == 0 else F_y
+        u, v = y[own + axis], y[own + 2 + axis]
+        dy[own + axis] = v
+        dy[own + 2 + axis] = mobility * force - speed * speed * u - damping * v
+        if mobility > 0.0:
+            dissipated += damping * v * v / mobility
+    return dissipated
+
+
 @inner_kernel
 def bearing_accelerations(
     b: int, y: Array, omega: float, p: KernelParameters, dy: Array, work: Array
@@ -237,6 +278,8 @@ def bearing_accelerations(
     dy[n_q + h + 1] = (F_y - row[L.SUPPORT_DAMPING_Y] * sy - row[L.SUPPORT_STIFFNESS_Y] * y[h + 1]) / row[
         L.SUPPORT_MASS_Y
     ]
+    if row[L.SUPPORT_FORM + support.PRESENT] != 0.0:
+        dissipated += add_support_form(b, y, p, dy)
     dy[spin] = (torque * row[L.BORE_RADIUS] - drag) / row[L.RACE_INERTIA]
     return -torque * row[L.ROTOR_RADIUS], dissipated
 

@@ -13,13 +13,18 @@ from numpy.typing import NDArray
 
 from rotordrop.model import layout as L
 from rotordrop.model.layout import KernelParameters
-from rotordrop.physics import aerodynamics, contact
+from rotordrop.physics import aerodynamics, contact, support
 from rotordrop.physics._compile import kernel
 from rotordrop.physics.ball_set import ball_set_gradient
 from rotordrop.physics.elementary import sine_cosine, tanh
 from rotordrop.physics.friction import stribeck_gradient
 from rotordrop.physics.spin import surface_speed
-from rotordrop.simulation._rhs import aerodynamic_deceleration, race_deflection, relative_motion
+from rotordrop.simulation._rhs import (
+    aerodynamic_deceleration,
+    race_deflection,
+    relative_motion,
+    support_deflection,
+)
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -164,6 +169,42 @@ def _spread(place: int, factor: float, g: Array, b: int, p: KernelParameters, J:
 
 
 @kernel
+def _support_form_jacobian(b: int, y: Array, p: KernelParameters, J: Array) -> None:
+    """Add the derivative of `add_support_form`."""
+    n_q, h, own = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.BEARING_OWN]
+    row = p.bearing[b]
+    form = row[L.SUPPORT_FORM : L.SUPPORT_FORM_END]
+    x, z, _vx, _vz = support_deflection(b, y, p)
+    k_xx, k_xy, k_yy = support.support_tangent(
+        form, row[L.SUPPORT_STIFFNESS_X], row[L.SUPPORT_STIFFNESS_Y], x, z
+    )
+    mobility = max(form[support.FOUNDATION_SHARE], 0.0) / row[L.SUPPORT_MASS_Y]
+    for i in range(2):
+        m_h = row[L.SUPPORT_MASS_X + i]
+        J[n_q + h + i, h + i] += row[L.SUPPORT_STIFFNESS_X + i] / m_h
+        J[n_q + h + i, n_q + h + i] += row[L.SUPPORT_DAMPING_X + i] / m_h
+        for j in range(2):
+            k, c = k_xy, 0.0
+            if i == j:
+                k = k_xx if i == 0 else k_yy
+                c = row[L.SUPPORT_DAMPING_X + i]
+            J[n_q + h + i, h + j] -= k / m_h
+            J[n_q + h + i, n_q + h + j] -= c / m_h
+            if own >= 0:
+                J[n_q + h + i, own + j] += k / m_h
+                J[n_q + h + i, own + 2 + j] += c / m_h
+                J[own + 2 + i, h + j] += mobility * k
+                J[own + 2 + i, n_q + h + j] += mobility * c
+                J[own + 2 + i, own + j] -= mobility * k
+                J[own + 2 + i, own + 2 + j] -= mobility * c
+        if own >= 0:
+            speed = form[support.FOUNDATION_SPEED]
+            J[own + i, own + 2 + i] = 1.0
+            J[own + 2 + i, own + i] -= speed * speed
+            J[own + 2 + i, own + 2 + i] -= 2.0 * form[support.FOUNDATION_DAMPING] * speed
+
+
+@kernel
 def _bearing_jacobian(b: int, y: Array, p: KernelParameters, J: Array, g: Array) -> bool:
     n_q = p.rotor_at[L.N_COORDINATES]
     r, h, spin = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.RACE_SPIN]
@@ -190,6 +231,8 @@ def _bearing_jacobian(b: int, y: Array, p: KernelParameters, J: Array, g: Array)
         J[hold, race] += C_b / m_h
         J[hold, hold] -= (C_b + row[L.SUPPORT_DAMPING_X + i]) / m_h
         J[hold, h + i] -= row[L.SUPPORT_STIFFNESS_X + i] / m_h
+    if row[L.SUPPORT_FORM + support.PRESENT] != 0.0:
+        _support_form_jacobian(b, y, p, J)
     F = math.sqrt(F_x * F_x + F_y * F_y)
     half = 0.5 * row[L.DRAG_COEFFICIENT] * row[L.PITCH_DIAMETER] / row[L.RACE_INERTIA]
     level = tanh(y[spin] / row[L.DRAG_SPEED])

@@ -10,6 +10,7 @@ Bryson–Frazier smoother: it needs no inverse of a covariance.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from rotordrop.model import layout as L
 from rotordrop.model.layout import KernelParameters
 from rotordrop.physics._compile import kernel
-from rotordrop.physics.elementary import sine_cosine
+from rotordrop.physics.elementary import exp, sine_cosine
 from rotordrop.tracking._propagation import (
     FilterSettings,
     ParameterTargets,
@@ -34,6 +35,94 @@ IntArray = NDArray[np.int64]
 LARGEST_VARIANCE = 1e20
 LARGEST_DEFLECTION = 1e-3
 SIGN_WIDTH = math.sqrt(0.5 * math.pi)
+
+
+class SensorForm(NamedTuple):
+    """What sensors do beyond gain, offset and runout; T terms, G sensors that lag behind, s dynamic.
+
+    A sensor sees ``(its row + Σ value of the unknown · row of the term) · state``: ``term`` (T, 2) holds
+    sensor and unknown, ``term_row`` (T, s) its row. ``lag`` (G, 2) holds for each sensor the state with what
+    it has got to and the unknown that is the logarithm of its time constant, between ``shortest`` and
+    ``longest`` (G,); ``lag_row`` (G, s) is what it sees. All are empty for plain sensors.
+    """
+
+    term: IntArray
+    term_row: Array
+    lag: IntArray
+    lag_row: Array
+    shortest: Array
+    longest: Array
+
+
+@kernel
+def seen_by(c: int, at: Array, sensor_row: Array, form: SensorForm, s: int) -> float:
+    """Displacement [m] that sensor ``c`` sees of a state, with the terms of its form."""
+    seen = 0.0
+    for j in range(s):
+        seen += sensor_row[j] * at[j]
+    for t in range(form.term.shape[0]):
+        if form.term[t, 0] == c:
+            along = 0.0
+            for j in range(s):
+                along += form.term_row[t, j] * at[j]
+            seen += at[s + form.term[t, 1]] * along
+    return seen
+
+
+@kernel
+def lag_step(before: Array, after: Array, form: SensorForm, dt: float, F: Array) -> None:
+    """Advance what the sensors have got to by one sample, in ``after`` (s + P,) and ``F`` (s, s + P).
+
+    A first-order lag follows a straight line between two samples exactly, so that no time constant, however
+    short, asks for a shorter step. ``before`` (s + P,) is state and unknowns at the sample before.
+    """
+    s = F.shape[0]
+    for c in range(form.lag.shape[0]):
+        i, k = form.lag[c, 0], form.lag[c, 1]
+        q = dt / exp(min(max(before[s + k], form.shortest[c]), form.longest[c]))
+        a = exp(-q)
+        b = (1.0 - a) / q
+        first = seen_by(c, before, form.lag_row[c], form, s)
+        last = seen_by(c, after, form.lag_row[c], form, s)
+        F[i, :] = 0.0
+        _add_seen(c, i, before, form, b - a, F)
+        _add_seen_after(c, i, after, form, 1.0 - b, F)
+        F[i, i] += a
+        F[i, s + k] += a * q * before[i] + (b - a - a * q) * first - (b - a) * last
+        after[i] = a * before[i] + (b - a) * first + (1.0 - b) * last
+
+
+@kernel
+def _add_seen(c: int, i: int, at: Array, form: SensorForm, weight: float, F: Array) -> None:
+    """Add to row ``i`` of ``F`` the derivative of what sensor ``c`` saw at the sample before."""
+    s = F.shape[0]
+    for j in range(s):
+        F[i, j] += weight * form.lag_row[c, j]
+    for t in range(form.term.shape[0]):
+        if form.term[t, 0] == c:
+            along = 0.0
+            for j in range(s):
+                F[i, j] += weight * at[s + form.term[t, 1]] * form.term_row[t, j]
+                along += form.term_row[t, j] * at[j]
+            F[i, s + form.term[t, 1]] += weight * along
+
+
+@kernel
+def _add_seen_after(c: int, i: int, at: Array, form: SensorForm, weight: float, F: Array) -> None:
+    """Add to row ``i`` of ``F`` the derivative of what sensor ``c`` sees now, by way of the state now."""
+    s, columns = F.shape
+    row = form.lag_row[c].copy()
+    for t in range(form.term.shape[0]):
+        if form.term[t, 0] == c:
+            along = 0.0
+            for j in range(s):
+                row[j] += at[s + form.term[t, 1]] * form.term_row[t, j]
+                along += form.term_row[t, j] * at[j]
+            F[i, s + form.term[t, 1]] += weight * along
+    for j in range(s):
+        if row[j] != 0.0:
+            for e in range(columns):
+                F[i, e] += weight * row[j] * F[j, e]
 
 
 @kernel
@@ -75,12 +164,13 @@ def scalar_update(
 
 @kernel
 def measurement_row(
-    c: int, at: Array, angle: float, sensor_row: Array, first: int, n_c: int, row: Array
+    c: int, at: Array, angle: float, sensor_row: Array, first: int, n_c: int, form: SensorForm, row: Array
 ) -> float:
     """Reading of sensor ``c`` predicted at an estimate [m] and its derivative ``row`` (n,).
 
     The reading is ``(1 + gain error) · (sensor row · state) + offset + runout at the rotor angle``. The gains
-    begin at ``first``, the offsets, cosines and sines follow, ``n_c`` of each.
+    begin at ``first``, the offsets, cosines and sines follow, ``n_c`` of each. A sensor that lags behind
+    reads its own state, and its terms act on what it lags behind of.
     """
     row[:] = 0.0
     k = first + c
@@ -91,6 +181,16 @@ def measurement_row(
     growth = 1.0 + at[k]
     for j in range(sensor_row.shape[0]):
         row[j] = growth * sensor_row[j]
+    if form.lag.shape[0] == 0:
+        s = sensor_row.shape[0]
+        for t in range(form.term.shape[0]):
+            if form.term[t, 0] == c:
+                along, unknown = 0.0, s + form.term[t, 1]
+                for j in range(s):
+                    along += form.term_row[t, j] * at[j]
+                    row[j] += growth * at[unknown] * form.term_row[t, j]
+                row[unknown] = growth * along
+                seen += at[unknown] * along
     row[k] = seen
     row[k + n_c] = 1.0
     row[k + 2 * n_c] = cosine
@@ -136,6 +236,7 @@ def forward_pass(
     targets: ParameterTargets,
     p: KernelParameters,
     settings: FilterSettings,
+    form: SensorForm,
     reference: Array,
     means: Array,
     covariances: Compact,
@@ -158,6 +259,8 @@ def forward_pass(
         Displacement along each sensor's direction from the dynamic state.
     variances, speed_variance : ndarray (C,), float
         Noise variance of the readings [m²] and of the speed [rad²/s²].
+    form : SensorForm
+        What the sensors do beyond gain, offset and runout.
     reference : ndarray, shape (M, n)
         Trajectory to linearise at for the first M samples; the filter's own mean afterwards.
     means, covariances : ndarray, shapes (N, n), (N, n, n) or (N, 0, 0)
@@ -186,6 +289,7 @@ def forward_pass(
     row = np.empty(n)
     gain = np.empty(n)
     theta = mean[s : s + n_p].copy()
+    moved = np.empty(s + n_p)
     keep = transitions.shape[0] > 0
     smoothing = p.bearing[:, L.SMOOTHING_SPEED].copy()
     for i in range(times.shape[0]):
@@ -200,6 +304,11 @@ def forward_pass(
             y[:] = 0.0
             y[:s] = at[:s]
             propagate(times[i - 1], y, theta, targets, p, settings, F, impulses)
+            if form.lag.shape[0] > 0:
+                moved[:s] = y[:s]
+                moved[s:] = theta
+                lag_step(at[: s + n_p], moved, form, settings.dt, F)
+                y[:s] = moved[:s]
             # Around a reference the model is an affine map, the same for prediction and for smoothing, so the
             # passes are Gauss-Newton steps of one least-squares problem. The mean itself, propagated, would
             # be linearised elsewhere than the smoother's, and each pass would solve another problem.
@@ -215,7 +324,8 @@ def forward_pass(
             P[:s, :s] = np.dot(np.ascontiguousarray(head[:, : s + n_p]), F.T)
             P[s:, :s] = head[:, s:].T
             drift = targets.late_drift if times[i] > settings.learning_end else targets.drift
-            add_process_noise(P, p, settings, impulses, drift)
+            largest = settings.fall_impulse if times[i] < settings.fall_end else np.inf
+            add_process_noise(P, p, settings, impulses, drift, largest)
             if keep:
                 transitions[i] = F
         elif keep:
@@ -233,11 +343,11 @@ def forward_pass(
                 variance = variances[c]
                 if i < reference.shape[0]:
                     at = reference[i]
-                    predicted = measurement_row(c, at, at[i_a], sensor_rows[c], s + n_p, n_c, row)
+                    predicted = measurement_row(c, at, at[i_a], sensor_rows[c], s + n_p, n_c, form, row)
                     for j in range(n):
                         predicted += row[j] * (mean[j] - at[j])
                 else:
-                    predicted = measurement_row(c, mean, mean[i_a], sensor_rows[c], s + n_p, n_c, row)
+                    predicted = measurement_row(c, mean, mean[i_a], sensor_rows[c], s + n_p, n_c, form, row)
             else:
                 variance = speed_variance
                 row[:] = 0.0

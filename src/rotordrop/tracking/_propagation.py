@@ -26,6 +26,7 @@ ON_MAGNET = 2
 ON_UNBALANCE = 3
 SCALE_BEARING = 4
 AT_TYPICAL_DEPTH = 5
+SCALE_MODES = 6
 
 
 class ParameterTargets(NamedTuple):
@@ -36,7 +37,7 @@ class ParameterTargets(NamedTuple):
     standard deviation of the random walk of each parameter per square root of a second, ``late_drift`` the
     same later in a drop; ``plane_shape`` (U, m) mode shapes of the planes. Beyond ``lower`` and ``upper``
     (P,) the model takes the bound: what drifts without being seen must not make it unstable. ``mean`` (P,)
-    is the prior mean.
+    is the prior mean. ``eigenvalue`` (m,) are those of the rotor as described.
     """
 
     target: IntArray
@@ -49,6 +50,7 @@ class ParameterTargets(NamedTuple):
     lower: Array
     upper: Array
     mean: Array
+    eigenvalue: Array
 
 
 class FilterSettings(NamedTuple):
@@ -57,7 +59,7 @@ class FilterSettings(NamedTuple):
     ``impulse`` is the standard deviation of an unknown impulse per sample at each bearing and axis,
     ``share`` the same as a fraction of the contact impulse, ``spin_noise`` that of the race spins per
     sample [rad/s], ``speed_noise`` that of the rotor speed [rad/s]. After ``learning_end`` [s] the late
-    drift of the parameters holds.
+    drift of the parameters holds. Before ``fall_end`` [s] no unknown impulse is larger than ``fall_impulse``.
     """
 
     dt: float
@@ -67,6 +69,8 @@ class FilterSettings(NamedTuple):
     spin_noise: float
     speed_noise: float
     learning_end: float
+    fall_end: float
+    fall_impulse: float
 
 
 @kernel
@@ -118,6 +122,9 @@ def write_values(values: Array, powers: Array, targets: ParameterTargets, p: Ker
             p.spin[column] = value
         elif kind == ON_MAGNET:
             p.magnet[row, column] = value
+        elif kind == SCALE_MODES:
+            for j in range(p.eigenvalue.shape[0]):
+                p.eigenvalue[j] = value * targets.eigenvalue[j]
         else:
             if not cleared:
                 p.unbalance_cos[:] = 0.0
@@ -302,7 +309,7 @@ def propagate(
     entries = np.empty(s * s)
     places = np.empty(s * s, dtype=np.int64)
     starts = np.empty(s + 1, dtype=np.int64)
-    k = np.empty((5, n))
+    k = np.zeros((5, n))  # what a sensor has got to stays: `lag_step` moves it
     trial = np.empty(n)
     work = np.empty((2, p.balls.shape[2]))
     contact = np.empty(6)
@@ -342,9 +349,12 @@ def propagate(
 
 @kernel
 def add_process_noise(
-    P: Array, p: KernelParameters, settings: FilterSettings, impulses: Array, drift: Array
+    P: Array, p: KernelParameters, settings: FilterSettings, impulses: Array, drift: Array, largest: float
 ) -> None:
-    """Add unknown impulses at the bearings, noise of the spins and drift of the parameters to ``P``."""
+    """Add unknown impulses at the bearings, noise of the spins and drift of the parameters to ``P``.
+
+    ``largest`` is the largest standard deviation of an unknown impulse [N s].
+    """
     m, n_q, i_w = p.eigenvalue.shape[0], p.rotor_at[L.N_COORDINATES], p.rotor_at[L.ROTOR_SPEED]
     # Process noise enters where the model errs: as an impulse between rotor and race, equal and opposite.
     # White noise on every state would let the filter explain a record by motions that nothing can cause.
@@ -352,7 +362,7 @@ def add_process_noise(
     g = np.empty(m + 1)
     place = np.empty(m + 1, dtype=np.int64)
     for b in range(p.bearing.shape[0]):
-        sigma = settings.impulse + settings.share * impulses[b]
+        sigma = min(settings.impulse + settings.share * impulses[b], largest)
         for axis in range(2):
             for k in range(m):
                 g[k] = -p.bearing_shape[b, k]

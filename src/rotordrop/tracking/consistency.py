@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.model.structure_table import STRUCTURE
 from rotordrop.tracking.calibration import FITTING_NIS
 from rotordrop.tracking.problem import DropProblem
 from rotordrop.tracking.smoother import Smoothed, parameter_sample
@@ -162,7 +163,7 @@ def _farthest(problem: DropProblem, smoothed: Smoothed, scope: str) -> tuple[str
     """Unknown of a scope that went farthest from its prior, and how far in standard deviations [1]."""
     theta = smoothed.means[parameter_sample(smoothed)][problem.parameter_slice]
     departures = [
-        (0.0 if u.parameter.spin_up_only else abs(t - u.mean) / u.sigma, u.path)
+        (0.0 if u.parameter.spin_up_only or u.parameter in STRUCTURE else abs(t - u.mean) / u.sigma, u.path)
         for t, u in zip(theta, problem.unknowns, strict=True)
         if u.scope == scope
     ]

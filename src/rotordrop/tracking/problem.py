@@ -17,6 +17,7 @@ from rotordrop.model.unknowns import Unknown, all_unknowns, sensor_prior, smalle
 from rotordrop.physics import aerodynamics
 from rotordrop.tracking import _filter as F
 from rotordrop.tracking import _propagation as P
+from rotordrop.tracking.sensor_form import begin_caught_up, rest_terms, sensor_form, share_in_groups
 from rotordrop.tracking.unknowns import parameter_targets
 
 Array = NDArray[np.float64]
@@ -38,6 +39,8 @@ NOISE_FLOOR = 0.1e-6
 USUAL_NOISE = 1e-6
 TAIL_VERTICAL_SIGMA = 0.7e-6
 TAIL_HORIZONTAL_SIGMA = 25e-6
+OWN_SIGMA = (0.3e-6, 0.3e-6, 1e-4, 1e-4)
+"""How far a foundation may be from rest at power-off, displacement [m] and velocity [m/s], x and y."""
 SMOOTHED_FRICTION_SPEED = 0.15
 """Sliding speed [m/s] below which the filter smooths friction: the spin of a race is not known better, so the
 mean of the friction law over what is possible is what a linearisation may use."""
@@ -73,6 +76,18 @@ class RecordedDrop:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Fall:
+    """The fall before the first contact: its end [s] and the largest unknown impulse per 50 µs in it [N s].
+
+    Nothing acts on a falling rotor but its weight and what is left of the magnets. Larger impulses would
+    explain a lift that lasts longer than usual.
+    """
+
+    end: float
+    impulse: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class DropProblem:
     """One recorded drop with all the filter needs; N samples, C channels, n estimated, s dynamic.
 
@@ -92,6 +107,10 @@ class DropProblem:
         Prior at the first sample.
     start : ndarray, shape (n,)
         Where the first pass begins: the prior mean with the guesses of the machine file.
+    sensor_form : SensorForm
+        What the sensors do beyond gain, offset and runout.
+    fall : Fall, optional
+        The fall, where the lift of the magnets may last longer than usual.
     """
 
     model: DropModel
@@ -106,6 +125,18 @@ class DropProblem:
     mean: Array
     start: Array
     covariance: Array
+    sensor_form: F.SensorForm
+    fall: Fall | None = None
+
+    @property
+    def reading_rows(self) -> Array:
+        """What the readings show of the dynamic state, shape (C, s): what a sensor that lags has got to."""
+        lagging = self.sensor_form.lag
+        if len(lagging) == 0:
+            return self.sensor_rows
+        rows = np.zeros_like(self.sensor_rows)
+        rows[np.arange(len(lagging)), lagging[:, 0]] = 1.0
+        return rows
 
     @property
     def n_dynamic(self) -> int:
@@ -215,6 +246,7 @@ def build_problem(
         mean=mean,
         start=_start(mean, model, unknowns),
         covariance=covariance,
+        sensor_form=sensor_form(model, unknowns, rows),
     )
     if drop.tail_level is not None:
         apply_tail(problem, drop.tail_level, problem.start, problem.covariance.copy())
@@ -301,7 +333,12 @@ def _prior(
         known = sensor_prior(parameter("offset", "sensor"), sensor.offset, gap)
         mean[offset], sigma[offset] = known.mean, known.sigma
     sigma[s + n_p + 2 * n_c :] = RUNOUT_SIGMA
-    return mean, np.diag(sigma**2)
+    sigma[layout.own] = np.resize(OWN_SIGMA, layout.own.stop - layout.own.start)
+    covariance = np.diag(sigma**2)
+    share_in_groups(model, unknowns, covariance[s : s + n_p, s : s + n_p])
+    if layout.sensor_own:
+        begin_caught_up(layout, rows, mean, covariance)
+    return mean, covariance
 
 
 def _start(mean: Array, model: DropModel, unknowns: tuple[Unknown, ...]) -> Array:
@@ -396,8 +433,9 @@ def apply_tail(problem: DropProblem, tail_level: Array, mean: Array, covariance:
         trial = theta.copy()
         trial[k] += problem.targets.step[k]
         slopes[:, k] = (settled_displacement(problem, trial) - height) / problem.targets.step[k]
-    angles = np.array([float(sensor.angle) for sensor in problem.model.machine.sensors])
-    nodes = np.array([sensor.node for sensor in problem.model.machine.sensors])
+    model = problem.model
+    angles = np.array([float(sensor.angle) for sensor in model.machine.sensors])
+    nodes = np.array([sensor.node for sensor in model.machine.sensors])
     gain_scratch = np.empty(len(mean))
     for node in np.unique(nodes):
         chosen = np.flatnonzero((nodes == node) & np.isfinite(tail_level))
@@ -408,6 +446,9 @@ def apply_tail(problem: DropProblem, tail_level: Array, mean: Array, covariance:
             predicted, observed = 0.0, 0.0
             for weight, c in zip(weights, chosen, strict=True):
                 along = np.sin(angles[c]) * height[c]
+                for k, per_unit in rest_terms(model, problem.unknowns, c, float(height[c])):
+                    along += theta[k] * per_unit
+                    row[start + k] += weight * (1.0 + mean[start + n_p + c]) * per_unit
                 growth = 1.0 + mean[start + n_p + c]
                 predicted += weight * (growth * along + mean[start + n_p + n_c + c])
                 observed += weight * tail_level[c]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rotordrop.model import layout as L
 from rotordrop.tracking import _filter as F
 from rotordrop.tracking import _propagation as P
-from rotordrop.tracking.problem import DropProblem, private_copy
+from rotordrop.tracking.problem import DropProblem, Fall, private_copy
 
 Array = NDArray[np.float64]
 Compact = NDArray[np.float32]
@@ -51,10 +51,11 @@ class PassSettings:
     speed_noise: float = 1e-3
     learning_end: float = 0.05
 
-    def for_sampling(self, dt: float, fastest: float = 0.0) -> P.FilterSettings:
+    def for_sampling(self, dt: float, fastest: float = 0.0, fall: Fall | None = None) -> P.FilterSettings:
         """Settings of the kernel for a sample distance [s]; noise grows with the square root of time.
 
         ``fastest`` is the highest natural frequency of the model [rad/s]; it sets a least number of steps.
+        ``fall`` limits the unknown impulses before the first contact.
         """
         growth = np.sqrt(dt / 50e-6)
         return P.FilterSettings(
@@ -65,6 +66,8 @@ class PassSettings:
             spin_noise=self.spin_noise * growth,
             speed_noise=self.speed_noise * growth,
             learning_end=self.learning_end,
+            fall_end=-math.inf if fall is None else fall.end,
+            fall_impulse=math.inf if fall is None else fall.impulse * growth,
         )
 
 
@@ -160,12 +163,13 @@ def forward(
         problem.time[:count],
         np.ascontiguousarray(problem.readings[:count]),
         problem.speed[:count],
-        problem.sensor_rows,
+        problem.reading_rows,
         problem.variances,
         problem.speed_variance,
         problem.targets,
         private_copy(problem.model.parameters),
-        settings.for_sampling(dt, fastest_frequency(problem)),
+        settings.for_sampling(dt, fastest_frequency(problem), problem.fall),
+        problem.sensor_form,
         np.zeros((0, n)) if reference is None else np.ascontiguousarray(reference[:count]),
         result.means,
         result.covariances,

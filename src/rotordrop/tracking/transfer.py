@@ -28,7 +28,13 @@ def transferred(coarse: DropProblem, fine: DropProblem, means: Array) -> Array:
         result[:, two.velocity_of(target)] = means[:, one.velocity_of(source)]
     # spins and parameters do not depend on the basis
     own, wanted = coarse.n_dynamic + len(coarse.unknowns), fine.n_dynamic + len(fine.unknowns)
-    result[:, two.velocities.stop : wanted] = means[:, one.velocities.stop : own]
+    result[:, two.race_spin] = means[:, one.race_spin]
+    if one.bearing_own == two.bearing_own:
+        result[:, two.own] = means[:, one.own]
+    result[:, two.rotor_speed : two.n_dynamic] = means[:, one.rotor_speed : one.n_dynamic]
+    _carry_unknowns(coarse, fine, means, result)
+    if two.sensor_own:
+        result[:, two.sensors] = result[:, : two.n_dynamic] @ fine.sensor_rows.T
     result[:, wanted:] = fine.mean[wanted:]
     names = [sensor.name for sensor in coarse.model.machine.sensors]
     for c, sensor in enumerate(fine.model.machine.sensors):
@@ -37,3 +43,12 @@ def transferred(coarse: DropProblem, fine: DropProblem, means: Array) -> Array:
             source = own + kinds * coarse.n_channels + names.index(sensor.name)
             result[:, wanted + kinds * fine.n_channels + c] = means[:, source]
     return result
+
+
+def _carry_unknowns(coarse: DropProblem, fine: DropProblem, means: Array, result: Array) -> None:
+    """Carry the unknowns by name; what the coarse problem does not have begins at what is known of it."""
+    source = {unknown.path: k for k, unknown in enumerate(coarse.unknowns)}
+    for k, unknown in enumerate(fine.unknowns):
+        at = source.get(unknown.path)
+        values = fine.start[fine.n_dynamic + k] if at is None else means[:, coarse.n_dynamic + at]
+        result[:, fine.n_dynamic + k] = values

@@ -14,6 +14,7 @@ _KIND_OF_ARRAY = {
     "spin": P.ON_SPIN,
     "magnet": P.ON_MAGNET,
     "unbalance": P.ON_UNBALANCE,
+    "modes": P.SCALE_MODES,
 }
 _KIND_OF_RULE = {Rule.SCALE: P.SCALE_BEARING, Rule.AT_TYPICAL_DEPTH: P.AT_TYPICAL_DEPTH}
 
@@ -43,4 +44,5 @@ def parameter_targets(model: DropModel, unknowns: tuple[Unknown, ...]) -> P.Para
         lower=np.array([u.bounds[0] for u in unknowns]),
         upper=np.array([u.bounds[1] for u in unknowns]),
         mean=np.array([u.begin for u in unknowns]),
+        eigenvalue=model.parameters.eigenvalue,
     )

@@ -204,7 +204,7 @@ def test_vertical_impulse_carries_the_weight(workshop: TrackedDrop) -> None:
 
 
 def followed(machine: Machine, item: Evidence) -> tuple[TrackedDrop, Estimate]:
-    fit = track_drops(machine, [item], quick=True)
+    fit = track_drops(machine, [item], quick=True).fit
     drop = tracked_drop(item, fit.problems[0], fit.smoothed[0], 1.0)
     facts = RecordFacts(findings=(), warnings=(), simulated=True)
     return drop, estimate_of(drop, Tracked(quick=True), facts)
@@ -531,7 +531,7 @@ def test_a_third_sensor_plane_of_a_long_rotor_is_no_loss() -> None:
     machine = load_machine(Path(__file__).parents[2] / "machines" / "long_rotor.toml")
     made = synthesize_drop(hidden_machine(machine, 1), 2.0 * math.pi * 120.0, 10, duration=0.1, name="long")
     evidence = read_evidence(build_drop_model(machine), made.record, made.tail)
-    fit = track_drops(machine, [evidence], calibrate_only=True)
+    fit = track_drops(machine, [evidence], calibrate_only=True).fit
     assert not beside_the_record(fit), (fit.nis, fit.noise_factors)
     problem, smoothed = fit.problems[0], fit.smoothed[0]
     assert problem.n_channels == 6

@@ -70,6 +70,7 @@ def test_a_layer_slows_the_rotor(paper):
         node_positions = paper.rotor.node_positions
         discs = paper.rotor.discs
         modal_damping = paper.rotor.modal_damping
+        stiffness_factor = None
         elements = tuple(type(e)(**{**e.__dict__, "layer_diameter": None}) for e in paper.rotor.elements)
 
     class Machine:

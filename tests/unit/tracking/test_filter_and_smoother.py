@@ -52,7 +52,7 @@ class PlainFilter:
         whole = np.eye(n)
         whole[:s, : s + n_p] = F
         noise = np.zeros((n, n))
-        P.add_process_noise(noise, p, self.numbers, impulses, problem.targets.drift)
+        P.add_process_noise(noise, p, self.numbers, impulses, problem.targets.drift, np.inf)
         self.matrices.append(whole)
         return np.concatenate([y[:s], mean[s:]]), whole @ covariance @ whole.T + noise
 

@@ -76,6 +76,7 @@ def scales(problem: DropProblem) -> np.ndarray:
     ):
         scale[part] = size
         scale[layout.velocity_of(part)] = 3e3 * size
+    scale[layout.own] = np.resize([1e-6, 1e-6, 3e-3, 3e-3], layout.own.stop - layout.own.start)
     return np.concatenate([scale, [unknown.sigma for unknown in problem.unknowns]])
 
 
@@ -170,7 +171,7 @@ def test_process_noise_is_an_impulse_between_rotor_and_race(flight):
     covariance, impulses = np.zeros((n, n)), np.array([0.5, 0.0])
     numbers = PassSettings(impulse=2e-3, share=0.1, spin_noise=0.2, speed_noise=0.03).for_sampling(DT)
     drift = np.arange(len(flight.unknowns), dtype=float)
-    P.add_process_noise(covariance, p, numbers, impulses, drift)
+    P.add_process_noise(covariance, p, numbers, impulses, drift, np.inf)
     expected = np.zeros((n, n))
     for b, sigma in enumerate((2e-3 + 0.1 * 0.5, 2e-3)):
         for axis, part in enumerate((layout.modal_x, layout.modal_y)):

@@ -1,0 +1,114 @@
+"""What a machine may have beyond the usual model: each extension a few values its description then names."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from rotordrop.estimated import NINETY, Estimated
+from rotordrop.machine import Machine
+
+Values = dict[str, Estimated]
+
+
+def _guess(value: float) -> Estimated:
+    return Estimated(value=value, status="guess")
+
+
+def _of_bearings(**values: float) -> Callable[[Machine], Values]:
+    def named(machine: Machine) -> Values:
+        names = [bearing.name for bearing in machine.touchdown_bearings]
+        return {f"{name}.support.{key}": _guess(value) for name in names for key, value in values.items()}
+
+    return named
+
+
+def _of_sensors(key: str, value: float) -> Callable[[Machine], Values]:
+    def named(machine: Machine) -> Values:
+        return {f"sensors.{sensor.name}.{key}": _guess(value) for sensor in machine.sensors}
+
+    return named
+
+
+FOUNDATION_FREQUENCY = 0.4
+"""Natural frequency of a foundation over that of the support on it, to begin with [1]."""
+
+
+def _foundation(machine: Machine) -> Values:
+    values = _of_bearings(foundation_share=0.02, foundation_damping_ratio=0.03)(machine)
+    for bearing in machine.touchdown_bearings:
+        own = math.sqrt(float(bearing.support.stiffness) / float(bearing.support.mass))
+        values[f"{bearing.name}.support.foundation_frequency"] = _guess(FOUNDATION_FREQUENCY * own)
+    return values
+
+
+USUAL_REMANENCE, REMANENCE_SIGMA = 2e-3, 1.2
+"""Time in which a remanent force usually decays [s], and the standard deviation of its logarithm."""
+
+
+def _remanence(machine: Machine) -> Values:
+    if not machine.ambs:
+        return {}
+    reach = math.exp(NINETY * REMANENCE_SIGMA)
+    long = (USUAL_REMANENCE / reach, USUAL_REMANENCE * reach)
+    return {"remanence_time_constant": Estimated(value=USUAL_REMANENCE, status="guess", range=long)}
+
+
+BEYOND_GRADE = 3.0
+"""Factor on the unbalance that the grade permits [1]."""
+BEYOND_GRADE_SOURCE = "beyond the described one, as the record asked for"
+
+
+def _unbalance(machine: Machine) -> Values:
+    if any(unbalance.amount.source == BEYOND_GRADE_SOURCE for unbalance in machine.unbalances):
+        return {}
+    return {
+        f"unbalance.{i}.amount": Estimated(
+            value=BEYOND_GRADE * float(unbalance.amount), status="guess", source=BEYOND_GRADE_SOURCE
+        )
+        for i, unbalance in enumerate(machine.unbalances)
+    }
+
+
+def _modulus(machine: Machine) -> Values:
+    return {"rotor.stiffness_factor": _guess(1.0)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Extension:
+    """Something a machine may have beyond the usual model.
+
+    Attributes
+    ----------
+    name : str
+        What it is called.
+    values : callable
+        Values that the description of a machine then names, neutral ones to begin with.
+    of_sensors : bool
+        Whether it belongs to the sensors: it may then be there although the usual model fits.
+    """
+
+    name: str
+    values: Callable[[Machine], Values]
+    of_sensors: bool = False
+
+    def added_to(self, machine: Machine) -> Machine:
+        """The machine with this extension."""
+        return machine.with_values(self.values(machine))
+
+
+EXTENSIONS: tuple[Extension, ...] = (
+    Extension(name="turned support axes", values=_of_bearings(coupling=0.0)),
+    Extension(name="cubic support", values=_of_bearings(cubic=0.0)),
+    Extension(name="foundation mode", values=_foundation),
+    Extension(name="sensor lag", values=_of_sensors("time_constant", 1e-5), of_sensors=True),
+    Extension(name="cross-axis sensitivity", values=_of_sensors("cross_axis", 0.0), of_sensors=True),
+    Extension(
+        name="brackets that follow the housing", values=_of_sensors("follows_housing", 0.0), of_sensors=True
+    ),
+    Extension(name="sensor planes elsewhere", values=_of_sensors("plane_offset", 0.0), of_sensors=True),
+    Extension(name="long remanence", values=_remanence),
+    Extension(name="unbalance beyond its grade", values=_unbalance),
+    Extension(name="rotor stiffness", values=_modulus),
+)

@@ -1,0 +1,96 @@
+"""A support beyond mass on two springs: turned axes, a cubic term, a foundation that gives way.
+
+A form is a short array of numbers that only this module reads; the columns of `rotordrop.model.layout` hold
+it. It says how the force of a support differs from the plain one, ``k_x x + c_x ẋ`` and ``k_y y + c_y ẏ``.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.physics._compile import inner_kernel
+
+Array = NDArray[np.float64]
+
+# Entries of a form; SI units. All at zero is the plain support.
+PRESENT = 0
+COUPLING = 1
+CUBIC = 2
+FOUNDATION_SHARE = 3
+FOUNDATION_SPEED = 4
+FOUNDATION_DAMPING = 5
+N_ENTRIES = 6
+
+LARGEST_SOFTENING = 0.3
+"""Part of the linear force that a softening cubic term may take away [1]: the slope stays positive."""
+
+
+@inner_kernel
+def support_force(
+    form: Array, k_x: float, k_y: float, c_x: float, c_y: float, x: float, y: float, v_x: float, v_y: float
+) -> tuple[float, float]:
+    """Force [N] of spring and damper of a support against a deflection.
+
+    Parameters
+    ----------
+    form : ndarray, shape (6,)
+        Whether there is one, coupling κ [1], cubic term [1/m²], support mass over foundation mass [1],
+        natural frequency [rad/s] and damping ratio [1] of the foundation.
+    k_x, k_y, c_x, c_y : float
+        Stiffness [N/m] and damping [N s/m] along x and y.
+    x, y, v_x, v_y : float
+        Deflection [m] and its rate [m/s], against the foundation where that gives way.
+
+    Returns
+    -------
+    tuple of float
+        Force along x and y [N].
+
+    Notes
+    -----
+    Source: linear elasticity, ``k_xy = κ √(k_x k_y)``, which is positive for every ``|κ| < 1``; the cubic
+    term is the first one of a symmetric spring, Duffing 1918. Not validated.
+    """
+    k_c = form[COUPLING] * math.sqrt(k_x * k_y)
+    f_x = k_x * x * (1.0 + cubic_share(form[CUBIC], x)) + k_c * y + c_x * v_x
+    f_y = k_y * y * (1.0 + cubic_share(form[CUBIC], y)) + k_c * x + c_y * v_y
+    return f_x, f_y
+
+
+@inner_kernel
+def cubic_share(cubic: float, u: float) -> float:
+    """Part [1] by which the cubic term [1/m²] adds to the linear force at a deflection [m].
+
+    Source: Duffing 1918; a softening one ends where the spring would pull.
+    """
+    return max(cubic * u * u, -LARGEST_SOFTENING)
+
+
+@inner_kernel
+def support_tangent(form: Array, k_x: float, k_y: float, x: float, y: float) -> tuple[float, float, float]:
+    """Slope [N/m] of the force of a support along x, across, and along y, at a deflection [m].
+
+    Source: `support_force`, differentiated.
+    """
+    k_c = form[COUPLING] * math.sqrt(k_x * k_y)
+    return k_x * _cubic_slope(form[CUBIC], x), k_c, k_y * _cubic_slope(form[CUBIC], y)
+
+
+@inner_kernel
+def _cubic_slope(cubic: float, u: float) -> float:
+    share = cubic * u * u
+    return 1.0 + 3.0 * share if share > -LARGEST_SOFTENING else 1.0 - LARGEST_SOFTENING
+
+
+@inner_kernel
+def support_energy(form: Array, k_x: float, k_y: float, x: float, y: float) -> float:
+    """Energy [J] stored in the springs of a support at a deflection [m].
+
+    Source: integral of `support_force` from the middle, where the cubic term is not at its limit.
+    """
+    k_c = form[COUPLING] * math.sqrt(k_x * k_y)
+    quartic = 0.25 * form[CUBIC]
+    return 0.5 * (k_x * x * x + k_y * y * y) + k_c * x * y + quartic * (k_x * x**4 + k_y * y**4)

@@ -1,0 +1,190 @@
+"""Which extension is kept, and what it says: the rule on made-up likelihoods, sentences on made-up values."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rotordrop.errors import IdentificationError
+from rotordrop.estimated import IdentifiedValue
+from rotordrop.estimation.document import structure_json
+from rotordrop.estimation.estimate import Verdict
+from rotordrop.estimation.structure import EXTENSIONS
+from rotordrop.estimation.structure_search import (
+    FIRST_OTHER_START,
+    PENALTY,
+    Candidate,
+    Kept,
+    found_sensors,
+    found_structure,
+)
+from rotordrop.estimation.structure_sentence import derived, soft_axis, soft_over_stiff, structure_of
+from rotordrop.machine import Machine, example_machine
+from rotordrop.model.parameters import build_drop_model
+from rotordrop.model.unknowns import all_unknowns
+
+
+@pytest.fixture(scope="module")
+def lp400() -> Machine:
+    return example_machine("lp400")
+
+
+def fit_of(improbability: float, nis: float, factor: float = 1.0) -> Any:
+    filtered = SimpleNamespace(negative_log_likelihood=improbability)
+    return SimpleNamespace(
+        smoothed=(SimpleNamespace(filtered=filtered),),
+        nis=(nis,),
+        noise_factors=(factor,),
+        diverged=(False,),
+    )
+
+
+def has(machine: Machine) -> frozenset[str]:
+    """Extensions that a machine has, by the values its description names."""
+    bearing, sensor = machine.touchdown_bearings[0].support, machine.sensors[0]
+    marks = {
+        "turned support axes": bearing.coupling,
+        "cubic support": bearing.cubic,
+        "foundation mode": bearing.foundation_share,
+        "sensor lag": sensor.time_constant,
+        "cross-axis sensitivity": sensor.cross_axis,
+        "brackets that follow the housing": sensor.follows_housing,
+        "sensor planes elsewhere": sensor.plane_offset,
+        "long remanence": machine.remanence_time_constant,
+        "rotor stiffness": machine.rotor.stiffness_factor,
+    }
+    return frozenset(name for name, value in marks.items() if value is not None)
+
+
+class Record:
+    """A record by the improbability it gives to machines with certain extensions."""
+
+    def __init__(self, table: dict[frozenset[str], Any], usual: Any, back: Any = None) -> None:
+        self.table, self.usual, self.back = table, usual, back
+        self.attempts: list[int] = []
+
+    def fit(self, machine: Machine, attempt: int) -> Any:
+        self.attempts.append(attempt)
+        return self.table.get(has(machine), self.usual)
+
+    def look(self, _known: Any, machine: Machine, _passes: int) -> Any:
+        found = self.table.get(has(machine), self.usual)
+        return self.back if self.back is not None and not has(machine) else found
+
+
+AXES, CUBIC = frozenset({"turned support axes"}), frozenset({"cubic support"})
+
+
+def names(found: Candidate) -> list[str]:
+    return [kept.extension.name for kept in found.kept]
+
+
+def test_the_extension_that_the_readings_pay_for_is_kept(lp400):
+    usual = fit_of(1000.0, 3.0)
+    record = Record({AXES: fit_of(500.0, 0.9), CUBIC: fit_of(700.0, 1.1)}, usual)
+    found = found_structure(Candidate(machine=lp400, fit=usual), record.fit, record.look)
+    assert names(found) == ["turned support axes"] and found.kept[0].gain == pytest.approx(500.0)
+    assert has(found.machine) == AXES
+
+
+def test_what_pays_less_than_the_penalty_is_not_named(lp400):
+    usual = fit_of(1000.0, 3.0)
+    record = Record({AXES: fit_of(1000.0 - 0.9 * PENALTY, 3.0)}, usual)
+    found = found_structure(Candidate(machine=lp400, fit=usual), record.fit, record.look)
+    assert names(found) == [] and found.machine == lp400
+
+
+def test_an_extension_that_only_led_to_a_better_start_is_not_named(lp400):
+    """The usual model, given the place that the extension has found, follows the record as well."""
+    usual, better = fit_of(1000.0, 3.0), fit_of(505.0, 0.95)
+    record = Record({AXES: fit_of(500.0, 0.9)}, usual, back=better)
+    found = found_structure(Candidate(machine=lp400, fit=usual), record.fit, record.look)
+    assert names(found) == [] and found.fit is better
+
+
+def test_a_second_extension_comes_on_top_of_the_first(lp400):
+    usual = fit_of(1000.0, 3.0)
+    record = Record(
+        {AXES: fit_of(600.0, 1.6), CUBIC: fit_of(800.0, 2.0), AXES | CUBIC: fit_of(300.0, 0.9)}, usual
+    )
+    found = found_structure(Candidate(machine=lp400, fit=usual), record.fit, record.look)
+    assert names(found) == ["turned support axes", "cubic support"]
+    assert [kept.gain for kept in found.kept] == pytest.approx([400.0, 300.0])
+
+
+def test_likelihoods_compare_at_equal_unknown_impulses_only(lp400):
+    """A structure that follows the record with eight times the impulses is no better for its likelihood."""
+    usual = fit_of(1000.0, 3.0)
+    record = Record({AXES: fit_of(100.0, 0.98, factor=8.0), CUBIC: fit_of(700.0, 1.1)}, usual)
+    found = found_structure(Candidate(machine=lp400, fit=usual), record.fit, record.look)
+    assert names(found) == ["cubic support"]
+
+
+def test_where_nothing_helps_other_starts_are_tried_until_one_does(lp400):
+    usual = fit_of(1000.0, 3.0)
+    record = Record({}, usual)
+
+    def fit(machine: Machine, attempt: int) -> Any:
+        if attempt == FIRST_OTHER_START:
+            raise IdentificationError("lost")
+        return fit_of(400.0, 0.9) if attempt == FIRST_OTHER_START + 1 else record.fit(machine, attempt)
+
+    found = found_structure(Candidate(machine=lp400, fit=usual), fit, record.look)
+    assert names(found) == [] and found.fit.nis == (0.9,)
+    assert max(record.attempts) < FIRST_OTHER_START
+
+
+def test_what_sensors_do_is_looked_for_beside_a_model_that_fits(lp400):
+    usual = fit_of(1000.0, 0.92)
+    cross = frozenset({"cross-axis sensitivity"})
+    record = Record({cross: fit_of(880.0, 0.9), AXES: fit_of(500.0, 0.8)}, usual)
+
+    def judge(known: Any, machine: Machine) -> float:
+        return record.look(known, machine, 1).smoothed[0].filtered.negative_log_likelihood
+
+    found = found_sensors(Candidate(machine=lp400, fit=usual), judge, record.look)
+    assert names(found) == ["cross-axis sensitivity"] and found.kept[0].gain == pytest.approx(120.0)
+    record = Record({AXES: fit_of(500.0, 0.8)}, usual)
+    assert found_sensors(Candidate(machine=lp400, fit=usual), judge, record.look).kept == ()
+
+
+# sentences
+
+
+@pytest.mark.parametrize(("turn", "ratio"), [(30.0, 0.65), (-20.0, 0.8), (80.0, 0.5)])
+def test_the_soft_axis_is_that_of_the_stiffness_matrix(turn, ratio):
+    c, s = math.cos(math.radians(turn)), math.sin(math.radians(turn))
+    axes = np.array([[c, -s], [s, c]])
+    k = axes @ np.diag([ratio, 1.0]) @ axes.T
+    coupling = k[0, 1] / math.sqrt(k[0, 0] * k[1, 1])
+    assert soft_axis(k[0, 0] / k[1, 1], coupling) == pytest.approx(turn, abs=1e-9)
+    assert soft_over_stiff(k[0, 0] / k[1, 1], coupling) == pytest.approx(ratio, rel=1e-9)
+
+
+def test_a_derived_number_has_the_interval_of_what_it_follows_from():
+    one, two = (
+        IdentifiedValue(value=v, interval_90=(v - half, v + half)) for v, half in ((3.0, 0.3), (4.0, 0.4))
+    )
+    assert derived(lambda a, b: a + b, one, two) == pytest.approx((7.0, 6.5, 7.5))
+
+
+@pytest.mark.parametrize("extension", EXTENSIONS, ids=lambda one: one.name)
+def test_every_extension_says_what_was_found_with_its_interval(lp400, extension):
+    machine = extension.added_to(lp400)
+    values = {
+        u.path: IdentifiedValue(value=u.value_of(u.begin), interval_90=(0.9 * u.begin, 1.1 * u.begin + 1e-6))
+        for u in all_unknowns(build_drop_model(machine, "quick"))
+    }
+    said = structure_of(Kept(extension=extension, gain=math.inf), machine, values)
+    assert said.sentence.startswith("Found: ") and " to " in said.sentence
+    assert structure_json([said]) == [
+        {"name": extension.name, "log_likelihood_rise": None, "sentence": said.sentence}
+    ]
+
+
+def test_consistent_with_an_extension_holds():
+    assert Verdict.EXTENDED.holds and not Verdict.HELD.holds and not Verdict.GIVEN_WAY.holds
