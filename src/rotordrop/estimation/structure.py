@@ -18,7 +18,10 @@ def _guess(value: float) -> Estimated:
 
 def _of_bearings(**values: float) -> Callable[[Machine], Values]:
     def named(machine: Machine) -> Values:
-        names = [bearing.name for bearing in machine.touchdown_bearings]
+        bearings = machine.touchdown_bearings
+        if any(getattr(b.support, key) is not None for b in bearings for key in values):
+            return {}
+        names = [bearing.name for bearing in bearings]
         return {f"{name}.support.{key}": _guess(value) for name in names for key, value in values.items()}
 
     return named
@@ -26,6 +29,8 @@ def _of_bearings(**values: float) -> Callable[[Machine], Values]:
 
 def _of_sensors(key: str, value: float) -> Callable[[Machine], Values]:
     def named(machine: Machine) -> Values:
+        if any(getattr(sensor, key) is not None for sensor in machine.sensors):
+            return {}
         return {f"sensors.{sensor.name}.{key}": _guess(value) for sensor in machine.sensors}
 
     return named
@@ -37,7 +42,7 @@ FOUNDATION_FREQUENCY = 0.4
 
 def _foundation(machine: Machine) -> Values:
     values = _of_bearings(foundation_share=0.02, foundation_damping_ratio=0.03)(machine)
-    for bearing in machine.touchdown_bearings:
+    for bearing in machine.touchdown_bearings if values else ():
         own = math.sqrt(float(bearing.support.stiffness) / float(bearing.support.mass))
         values[f"{bearing.name}.support.foundation_frequency"] = _guess(FOUNDATION_FREQUENCY * own)
     return values
@@ -48,7 +53,7 @@ USUAL_REMANENCE, REMANENCE_SIGMA = 2e-3, 1.2
 
 
 def _remanence(machine: Machine) -> Values:
-    if not machine.ambs:
+    if not machine.ambs or machine.remanence_time_constant is not None:
         return {}
     reach = math.exp(NINETY * REMANENCE_SIGMA)
     long = (USUAL_REMANENCE / reach, USUAL_REMANENCE * reach)
@@ -72,7 +77,7 @@ def _unbalance(machine: Machine) -> Values:
 
 
 def _modulus(machine: Machine) -> Values:
-    return {"rotor.stiffness_factor": _guess(1.0)}
+    return {} if machine.rotor.stiffness_factor is not None else {"rotor.stiffness_factor": _guess(1.0)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,7 +89,8 @@ class Extension:
     name : str
         What it is called.
     values : callable
-        Values that the description of a machine then names, neutral ones to begin with.
+        Values that the description of a machine then names, neutral ones to begin with; none where it names
+        them already.
     of_sensors : bool
         Whether it belongs to the sensors: it may then be there although the usual model fits.
     """

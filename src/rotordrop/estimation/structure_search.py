@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import reduce
 
 from rotordrop.errors import IdentificationError
 from rotordrop.estimation.structure import EXTENSIONS, Extension
@@ -142,8 +143,7 @@ def _other_starts(best: Candidate, fit: Fit) -> Candidate:
 
 
 def _left(best: Candidate) -> list[Extension]:
-    have = {kept.extension.name for kept in best.kept}
-    return [one for one in EXTENSIONS if one.name not in have and one.values(best.machine)]
+    return [one for one in EXTENSIONS if one.values(best.machine)]
 
 
 def _tried(
@@ -179,7 +179,11 @@ def found_sensors(usual: Candidate, judge: Judge, look: Look) -> Candidate:
         Passes with another machine, linearised at what was found.
     """
     plain = judge(usual.fit, usual.machine)
-    extended = [(one, one.added_to(usual.machine)) for one in EXTENSIONS if one.of_sensors]
+    of_sensors = [one for one in EXTENSIONS if one.of_sensors and one.values(usual.machine)]
+    together = reduce(lambda machine, one: one.added_to(machine), of_sensors, usual.machine)
+    if plain - judge(usual.fit, together) < 0.5 * PENALTY:  # one pass in place of one for each
+        return usual
+    extended = [(one, one.added_to(usual.machine)) for one in of_sensors]
     gains = [plain - judge(usual.fit, machine) for _, machine in extended]
     if max(gains, default=0.0) < PENALTY:
         return usual

@@ -131,6 +131,7 @@ def test_a_support_without_form_is_the_plain_one_bit_by_bit(lp400):
 def test_an_extension_adds_unknowns_and_a_machine_file_holds_them(lp400, extension):
     extended = extension.added_to(lp400)
     assert loads_machine(machine_text(extended)) == extended
+    assert extension.values(lp400) and not extension.values(extended)  # what is named is not named anew
     usual = {u.path: u.sigma for u in all_unknowns(build_drop_model(lp400, COARSE_BASIS))}
     found = {u.path: u for u in all_unknowns(build_drop_model(extended, COARSE_BASIS))}
     assert set(usual) <= set(found)
