@@ -100,11 +100,14 @@ def found_structure(usual: Candidate, fit: Fit, look: Look) -> Candidate:
     best = usual
     for _ in range(MOST_EXTENSIONS):
         better = _best_extension(best, fit)
+        if better is best:
+            break
         best = _given_back(best, better, look)
         if (gain := gain_of(better, best)) < PENALTY:
             break
         kept = replace(better.kept[-1], gain=gain)
-        best = replace(better, kept=(*better.kept[:-1], kept))
+        better = replace(better, kept=(*better.kept[:-1], kept))
+        best = _given_back(better, better, look)  # the windows of a search leave it a few passes short
         if not best.beside:
             break
     return _other_starts(best, fit) if best.beside else best
@@ -122,8 +125,6 @@ def _best_extension(base: Candidate, fit: Fit) -> Candidate:
 
 def _given_back(base: Candidate, better: Candidate, look: Look) -> Candidate:
     """The base, or what it makes of the place that an extension has found."""
-    if better is base:
-        return base
     try:
         back = replace(base, fit=look(better.fit, base.machine, BACK_PASSES))
     except IdentificationError:

@@ -93,4 +93,5 @@ def support_energy(form: Array, k_x: float, k_y: float, x: float, y: float) -> f
     """
     k_c = form[COUPLING] * math.sqrt(k_x * k_y)
     quartic = 0.25 * form[CUBIC]
-    return 0.5 * (k_x * x * x + k_y * y * y) + k_c * x * y + quartic * (k_x * x**4 + k_y * y**4)
+    linear: float = 0.5 * (k_x * x * x + k_y * y * y) + k_c * x * y
+    return linear + quartic * (k_x * x**4 + k_y * y**4)

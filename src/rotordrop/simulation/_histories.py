@@ -81,7 +81,7 @@ def support_form_energy(b: int, y: Array, p: KernelParameters) -> float:
     form = row[L.SUPPORT_FORM : L.SUPPORT_FORM_END]
     k_x, k_y = row[L.SUPPORT_STIFFNESS_X], row[L.SUPPORT_STIFFNESS_Y]
     x, z, _vx, _vz = support_deflection(b, y, p)
-    energy = support.support_energy(form, k_x, k_y, x, z)
+    energy: float = support.support_energy(form, k_x, k_y, x, z)
     energy -= 0.5 * (k_x * y[h] ** 2 + k_y * y[h + 1] ** 2)
     if own >= 0 and form[support.FOUNDATION_SHARE] > 0.0:
         mass = row[L.SUPPORT_MASS_Y] / form[support.FOUNDATION_SHARE]

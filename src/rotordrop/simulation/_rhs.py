@@ -210,7 +210,7 @@ def add_support_form(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
     sx, sy = y[n_q + h], y[n_q + h + 1]
     dy[n_q + h] += (c_x * sx + k_x * y[h] - F_x) / row[L.SUPPORT_MASS_X]
     dy[n_q + h + 1] += (c_y * sy + k_y * y[h + 1] - F_y) / row[L.SUPPORT_MASS_Y]
-    dissipated = c_x * (vx * vx - sx * sx) + c_y * (vz * vz - sy * sy)
+    dissipated: float = c_x * (vx * vx - sx * sx) + c_y * (vz * vz - sy * sy)
     if own < 0:
         return dissipated
     speed, share = form[support.FOUNDATION_SPEED], max(form[support.FOUNDATION_SHARE], 0.0)

@@ -446,7 +446,7 @@ def apply_tail(problem: DropProblem, tail_level: Array, mean: Array, covariance:
             predicted, observed = 0.0, 0.0
             for weight, c in zip(weights, chosen, strict=True):
                 along = np.sin(angles[c]) * height[c]
-                for k, per_unit in rest_terms(model, problem.unknowns, c, float(height[c])):
+                for k, per_unit in rest_terms(model, problem.unknowns, int(c), float(height[c])):
                     along += theta[k] * per_unit
                     row[start + k] += weight * (1.0 + mean[start + n_p + c]) * per_unit
                 growth = 1.0 + mean[start + n_p + c]
