@@ -92,6 +92,6 @@ def support_energy(form: Array, k_x: float, k_y: float, x: float, y: float) -> f
     Source: integral of `support_force` from the middle, where the cubic term is not at its limit.
     """
     k_c = form[COUPLING] * math.sqrt(k_x * k_y)
-    quartic = 0.25 * form[CUBIC]
+    quartic: float = 0.25 * form[CUBIC]
     linear: float = 0.5 * (k_x * x * x + k_y * y * y) + k_c * x * y
     return linear + quartic * (k_x * x**4 + k_y * y**4)
