@@ -85,8 +85,8 @@ def gain_of(candidate: Candidate, before: Candidate) -> float:
 def found_structure(usual: Candidate, fit: Fit, look: Look) -> Candidate:
     """The best of the usual model and its extensions, one on top of the other while that pays.
 
-    An extension may have only led to a better start. So what it found is given back to the model without it,
-    and the rise of the likelihood counts from there.
+    The windows of a search leave it a few passes short, and an extension may have only led to a better start.
+    So the model without it is given what both have found, and the rise of the likelihood counts from there.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def found_structure(usual: Candidate, fit: Fit, look: Look) -> Candidate:
     look : callable
         Passes with another machine, linearised at what was found.
     """
-    best = usual
+    best = _given_back(usual, usual, look)
     for _ in range(MOST_EXTENSIONS):
         better = _best_extension(best, fit)
         if better is best:
@@ -107,7 +107,7 @@ def found_structure(usual: Candidate, fit: Fit, look: Look) -> Candidate:
             break
         kept = replace(better.kept[-1], gain=gain)
         better = replace(better, kept=(*better.kept[:-1], kept))
-        best = _given_back(better, better, look)  # the windows of a search leave it a few passes short
+        best = _given_back(better, better, look)
         if not best.beside:
             break
     return _other_starts(best, fit) if best.beside else best

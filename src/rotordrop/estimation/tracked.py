@@ -19,6 +19,7 @@ from rotordrop.estimation.structure_search import (
     Kept,
     found_sensors,
     found_structure,
+    improbability,
 )
 from rotordrop.estimation.tracked_parameters import UNSURE_GAP
 from rotordrop.identification.evidence import Evidence, Missing
@@ -67,6 +68,10 @@ WINDOW = 0.2
 NOISE_FACTORS = (0.5, 1.0, 2.0, 4.0, 8.0)
 NOISE_WINDOW = 0.06
 """Part of the drop on which the size of the unknown impulses is judged [s]."""
+
+MOST_REPEATS, SMALL_RISE = 6, 5.0
+"""Repeats of the first window of the finer basis with an extension, and the rise of the log likelihood that
+ends them [1]."""
 
 START_SPREAD = 0.8
 """Spread of other starts, in standard deviations of the prior [1]."""
@@ -264,12 +269,31 @@ class _Search:
         """The same machine with the finer basis, from what the coarse one found."""
         fine = self.problems(first.machine)
         schedule = shifted(CALIBRATION_SCHEDULE if self.calibrate_only else FINE_SCHEDULE, self.contact)
-        fit = track(fine, schedule, references=_carried(first.fit, fine), progress=self.progress)
+        references = _carried(first.fit, fine)
+        if first.kept:
+            references = _converged(fine, schedule[0], references)
+        fit = track(fine, schedule, references=references, progress=self.progress)
         return replace(first, fit=fit)
 
     def not_lost(self, found: Candidate) -> Candidate:
         """What was found, if the filter followed all drops to the end."""
         return replace(found, fit=_not_lost(found.fit, self.evidence))
+
+
+def _converged(problems: Sequence[DropProblem], stage: Stage, references: list[Array]) -> list[Array]:
+    """Trajectories after as many passes over a window as still raise the likelihood.
+
+    The finer basis may lie in the valley that the coarse one only came near: turned axes of a support were
+    found at one bearing by the coarse basis and at both by the finer one, some passes later.
+    """
+    least = math.inf
+    for _ in range(MOST_REPEATS):
+        fit = track(problems, (stage,), references=references)
+        references = [one.means for one in fit.smoothed]
+        if improbability(fit) > least - SMALL_RISE:
+            break
+        least = improbability(fit)
+    return references
 
 
 def _started_elsewhere(problem: DropProblem, attempt: int) -> DropProblem:
