@@ -175,12 +175,13 @@ def _histories(estimate: Estimate) -> tuple[list[dict[str, Any]], Array, dict[st
     columns: dict[str, Array] = {}
     names: list[dict[str, Any]] = []
     for b, bearing in enumerate(estimate.bearings):
-        told: dict[str, Any] = {}
+        told: dict[str, Any] = {"labels": {}}
         for motion in bearing.motions:
             role = "measured" if motion.role == "measured" else "estimated"
             if role in told:
                 continue
             told[role] = [f"{axis} {role} {b}" for axis in "xy"]
+            told["labels"][role] = motion.label
             for column, history in zip(told[role], (motion.horizontal, motion.vertical), strict=True):
                 columns[column] = _on(grid, history.time, history.values)
         if {"measured", "estimated"} <= told.keys():

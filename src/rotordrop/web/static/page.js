@@ -39,7 +39,7 @@ function motionPanel(index) {
     levels: (place.gap && !residual) ? gapLevels(place.gap, signal) : [],
     curves: (found, tone) => (residual
       ? place.residual.map((name, i) => ({ label: `residual ${"xy"[i]}`, colour: [tone.residual, tone.place2][i], values: found[name] }))
-      : pairs.map(([role, names]) => ({ label: role, colour: role === "estimated" ? faint(tone.estimated, 0.6) : tone.measured, width: role === "estimated" ? 3.5 : 1, values: component(found, names, signal) })))
+      : pairs.map(([role, names]) => ({ label: place.labels?.[role] || role, colour: role === "estimated" ? faint(tone.estimated, 0.6) : tone.measured, width: role === "estimated" ? 3.5 : 1, values: component(found, names, signal) })))
   };
 }
 
