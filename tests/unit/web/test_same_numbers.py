@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.unit.report.test_tracked_page import estimate as estimate
+from tests.unit.report.conftest import estimate as estimate
 
 from rotordrop.estimation.estimate import Estimate
 from rotordrop.model.parameter_table import LOADS, published
