@@ -88,6 +88,7 @@ def simple_machine(known: SimpleMachine) -> Machine:
         "made of twelve numbers: a beam of the rotor's mass and length stands for the rotor",
         f"its bending frequencies are known to about ± {100 * MODES_KNOWN_TO:.0f} %, inertias as a beam's",
         "the planes of the magnets are taken to be those of the sensors",
+        "estimates on it are not validated: where one does not fit its record, its ranges do not hold either",
     )
     return drafted_machine(
         rotor=Rotor.model_validate(_beam(known, positions)),
