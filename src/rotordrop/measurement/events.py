@@ -211,7 +211,7 @@ def coarse_drop(record: Record, machine: Machine, planes: tuple[Plane, ...]) -> 
     low = start - height > FALLEN_SHARE * gaps
     if not low.all(axis=1).any():
         _refuse_without_drop(record, height, start, gaps, deepest)
-    sunk = int(np.min(np.argmax(low, axis=0)))
+    sunk = sinking(low)
     fastest = float(np.max(start - height[sunk]))
     instant = record.time[sunk] - float(np.sqrt(2 * fastest / float(machine.gravity)))
     if instant < record.time[0] or record.time[sunk] - record.time[0] < first / record.sampling_rate:
@@ -226,6 +226,17 @@ def coarse_drop(record: Record, machine: Machine, planes: tuple[Plane, ...]) -> 
     far = np.hypot(*np.moveaxis(shape - np.mean(shape[:first], axis=0), -1, 0)) > NEAREST_CONTACT * gaps
     contact = first_sudden(record, shape, float(machine.gravity), instant, max(sunk, _first(far)))
     return CoarseDrop(instant=float(instant), sunk=float(record.time[sunk]), contact=contact, speed=speed)
+
+
+def sinking(low: NDArray[np.bool_]) -> int:
+    """First sample of the fall in which all planes (N, P) come to be low, at which any of them is.
+
+    A plane that circles widely while levitated, such as one between the bearings near a bending critical
+    speed, is low once a turn; what it did before all were low does not count.
+    """
+    both = int(np.argmax(low.all(axis=1)))
+    high = ~low[: both + 1]
+    return int(np.min(np.where(high.any(axis=0), both + 1 - np.argmax(high[::-1], axis=0), 0)))
 
 
 def _first(far: NDArray[np.bool_]) -> int:

@@ -16,6 +16,7 @@ from rotordrop.measurement.events import (
     find_drop_instant,
     first_sudden,
     gap_of,
+    sinking,
     with_whole_planes,
 )
 from rotordrop.measurement.fall import REMANENT_SHARE, REMANENT_TIME
@@ -103,7 +104,7 @@ def begins_with_fall(record: Record, machine: Machine) -> bool:
     sunk = height[:1] - height > FALLEN_SHARE * gaps
     if not sunk.all(axis=1).any():
         return False
-    fallen = float(record.time[int(np.min(np.argmax(sunk, axis=0)))] - record.time[0])
+    fallen = float(record.time[sinking(sunk)] - record.time[0])
     needed = float(np.sqrt(2.0 * FALLEN_SHARE * float(np.max(gaps)) / float(machine.gravity)))
     return fallen < needed + EARLIEST
 
@@ -126,9 +127,9 @@ def power_off_of_fall(record: Record, machine: Machine) -> PowerOff:
     shape = planar_of(along_sensors(whole.signals, whole.sensors), planes)
     height = shape[:, :, 1]
     gaps = np.array([gap_of(machine, plane) for plane in planes])
-    low = np.flatnonzero((height[0] - height > FALLEN_SHARE * gaps).any(axis=1))
+    low = height[0] - height > FALLEN_SHARE * gaps
     start = float(record.time[0])
-    contact = first_sudden(record, shape, gravity, start, int(low[0]))
+    contact = first_sudden(record, shape, gravity, start, sinking(low))
     chosen = record.time < contact - MARGIN
     count = int(np.count_nonzero(chosen))
     if count < FEWEST:

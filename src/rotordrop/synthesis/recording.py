@@ -22,6 +22,7 @@ from rotordrop.synthesis.sensor_chain import (
     SensorErrors,
     directions,
     drawn_errors,
+    fitted_to,
     oversampling,
     readings,
     speed_readings,
@@ -104,7 +105,7 @@ def synthesize_drop(
     SyntheticDrop
         Recording, tail, truth and histories.
     """
-    chain = _violated_chain(sensor_chain or SensorChain(), hidden)
+    chain = _violated_chain(fitted_to(sensor_chain or SensorChain(), hidden.known), hidden)
     conditions = conditions or drop_conditions(hidden, speed, seed)
     case = DropCase(
         speed=conditions.speed,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from rotordrop.model.reduction import RotorBasis
 
 Array = NDArray[np.float64]
 
+USUAL_FULL_SCALE = 600e-6
 OVERSAMPLING = 5
 FILTER_ORDER = 4
 
@@ -42,8 +43,9 @@ class SensorChain:
         Distance by which every sensor plane lies nearer to the middle of the rotor than stated [m].
     bits : int
         Bits of the converter; 0 for none.
-    full_scale : float
-        Largest reading [m], in both directions; readings beyond are clipped.
+    full_scale : float, optional
+        Largest reading [m], in both directions; readings beyond are clipped. By default 0.6 mm, or twice the
+        widest air gap where that is more.
     anti_alias_frequency : float, optional
         Corner frequency of a Butterworth filter of fourth order before the sampling [Hz].
     speed_interval : float
@@ -65,7 +67,7 @@ class SensorChain:
     angle_error: float = 0.0
     plane_shift: float = 0.0
     bits: int = 16
-    full_scale: float = 600e-6
+    full_scale: float | None = None
     anti_alias_frequency: float | None = None
     speed_interval: float = 0.01
     speed_noise: float = 2.0 * math.pi * 0.02
@@ -96,6 +98,14 @@ PERFECT = SensorChain(
     speed_resolution=0.0,
 )
 """Sensors without any error."""
+
+
+def fitted_to(chain: SensorChain, machine: Machine) -> SensorChain:
+    """The chain with a full scale that sees what a machine's rotor can do."""
+    if chain.full_scale is not None:
+        return chain
+    widest = max(float(bearing.air_gap) for bearing in machine.touchdown_bearings)
+    return replace(chain, full_scale=max(USUAL_FULL_SCALE, 2.0 * widest))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -257,7 +267,7 @@ def quantised(signal: Array, chain: SensorChain) -> Array:
     """Readings after clipping and rounding to the steps of the converter [m]."""
     if chain.bits == 0:
         return signal
-    step = 2.0 * chain.full_scale / 2.0**chain.bits
+    step = 2.0 * (chain.full_scale or USUAL_FULL_SCALE) / 2.0**chain.bits
     top = 2 ** (chain.bits - 1)
     return np.asarray(step * np.clip(np.round(signal / step), -top, top - 1))
 

@@ -392,7 +392,8 @@ def test_a_peak_far_from_the_cross_check_is_not_called_consistent(workshop: Trac
 def test_a_bearing_with_play_is_cross_checked_however_quick(workshop: TrackedDrop) -> None:
     model = workshop.problem.model
     first, *others = model.machine.touchdown_bearings
-    ball = first.bearing.model_copy(update={"clearance": Estimated(value=20e-6)})
+    play = {"clearance": Estimated(value=20e-6), "preload": Estimated(value=0.0)}
+    ball = first.bearing.model_copy(update=play)
     loose = (first.model_copy(update={"bearing": ball}), *others)
     machine = model.machine.model_copy(update={"touchdown_bearings": loose})
     drop = replace(workshop, problem=replace(workshop.problem, model=replace(model, machine=machine)))

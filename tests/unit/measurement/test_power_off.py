@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rotordrop.errors import RecordError
-from rotordrop.machine import example_machine
-from rotordrop.measurement.events import find_drop_instant, with_whole_planes
+from rotordrop.machine import example_machine, load_machine
+from rotordrop.measurement.events import find_drop_instant, sinking, with_whole_planes
 from rotordrop.measurement.power_off import PowerOff, find_power_off
 from rotordrop.synthesis import hidden_machine, synthesize_drop
+
+LONG_ROTOR = Path(__file__).parents[2] / "machines" / "long_rotor.toml"
 
 
 @pytest.fixture(scope="module")
@@ -68,3 +71,23 @@ def test_a_plane_that_lost_a_sensor_is_left_out(drop):
     one = replace(three, signals=three.signals[:, :1], sensors=three.sensors[:1])
     with pytest.raises(RecordError, match="has one sensor"):
         with_whole_planes(one)
+
+
+def test_a_plane_that_circles_widely_while_levitated_does_not_begin_the_fall():
+    """Between the bearings, near a bending critical speed, an orbit may be as wide as a third of the gap."""
+    low = np.zeros((1000, 3), dtype=bool)
+    low[10:700:7, 2] = True  # once a turn
+    low[800:, 0] = low[806:, 1] = low[792:, 2] = True
+    assert sinking(low) == 792
+    assert sinking(low[800:]) == 0
+    assert sinking(low[:, :2]) == 800
+
+
+def test_power_off_of_a_long_rotor_that_circles_widely_at_mid_span():
+    """Three planes, 217 micrometres from side to side at the third: taken for a record without levitation."""
+    machine = load_machine(LONG_ROTOR)
+    made = synthesize_drop(
+        hidden_machine(machine, 41), 2.0 * math.pi * 140.0, 4101, duration=0.05, tail=False, tolerance=1e-6
+    )
+    found = find_power_off(made.record, machine)
+    assert abs(found.value - made.truth["t_off_in_record_s"]) < 3.0 * found.standard_error < 1e-4

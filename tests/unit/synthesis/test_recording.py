@@ -6,11 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.scaled_machines import scaled_machine
 
 from rotordrop.measurement.axes import planar
 from rotordrop.synthesis import SensorChain, hidden_machine, synthesize_drop
 from rotordrop.synthesis.event import drop_conditions
-from rotordrop.synthesis.sensor_chain import PERFECT, SensorErrors, quantised, readings, shape_at
+from rotordrop.synthesis.sensor_chain import (
+    PERFECT,
+    SensorErrors,
+    fitted_to,
+    quantised,
+    readings,
+    shape_at,
+)
 from rotordrop.synthesis.settled import Swing, settled_coordinates, swinging_amplitudes
 
 SPEED = 2.0 * np.pi * 60.0
@@ -255,3 +263,17 @@ def test_a_plane_beside_the_rotor_is_refused(hidden):
     chain = replace(PERFECT, plane_shift=-2.0)
     with pytest.raises(UsageError, match=r"a sensor plane at .* mm lies outside the rotor"):
         synthesize_drop(hidden, SPEED, 8, sensor_chain=chain, duration=0.01, tail=False)
+
+
+def test_sensors_see_the_whole_gap_of_a_large_machine():
+    """A rotor of 6 t in gaps of 0.6 mm: the usual range of 0.6 mm would clip the contacts."""
+    machine = scaled_machine(6000.0)
+    gap = float(machine.touchdown_bearings[0].air_gap)
+    assert gap > 590e-6
+    assert fitted_to(SensorChain(), machine).full_scale == 2.0 * gap
+    assert fitted_to(SensorChain(full_scale=1e-4), machine).full_scale == 1e-4
+    assert fitted_to(SensorChain(), scaled_machine(60.0)).full_scale == 600e-6
+    made = synthesize_drop(
+        hidden_machine(machine, 5), 2.0 * np.pi * 40.0, 1, duration=0.03, tail=False, tolerance=1e-6
+    )
+    assert np.abs(made.record.signals).max() > 600e-6
