@@ -196,12 +196,11 @@ def track_drops(
         usual = Candidate(machine=machine, fit=search.first_fit(machine))
         if not usual.beside:
             usual = found_sensors(usual, search.judge, search.look)
-        found = search.refined(usual) if not usual.beside else usual
+        # First: the coarse basis alone may end beside a record that the finer one fits.
+        found = search.refined(usual)
     if found.beside and not found.kept:
         extended = found_structure(usual, search.from_guesses, search.look)
-        if found is usual:
-            found = search.refined(extended)
-        elif extended.fit is not usual.fit:
+        if extended.fit is not usual.fit:
             found = min(found, search.refined(extended), key=lambda one: one.rank)
     return search.not_lost(found)
 
