@@ -25,6 +25,7 @@ EXTRAS = {
     "parquet": ("histories as Parquet", ("pyarrow",)),
     "postgres": ("a log of drops in PostgreSQL", ("psycopg",)),
     "cluster": ("studies on a Dask cluster", ("distributed",)),
+    "serve": ("the page of 'rotordrop serve'", ("starlette", "uvicorn")),
 }
 """What an extra is for, and its packages."""
 

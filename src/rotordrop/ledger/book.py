@@ -115,7 +115,7 @@ class UsedShare:
         """The share in words."""
         who = f"{self.machine}, bearings {self.bearing_set}"
         if self.allowed_drops is None and self.allowed_seconds is None:
-            return f"{who}: {self.drops} drops; no limit given"
+            return f"{who}: {self.drops} {'drop' if self.drops == 1 else 'drops'}; no limit given"
         parts = []
         if self.allowed_drops is not None:
             share = self.drops / self.allowed_drops

@@ -10,7 +10,13 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, Strict
 
 from rotordrop.estimated import Estimated
-from rotordrop.machine.catalog import BallComplement, CatalogueBearing, PreloadClass, find_bearing
+from rotordrop.machine.catalog import (
+    PRELOAD_FACTOR,
+    BallComplement,
+    CatalogueBearing,
+    PreloadClass,
+    find_bearing,
+)
 from rotordrop.machine.clearance import CLASSES, ClearanceClass, clearance_range
 from rotordrop.machine.description import Misfit, Text
 from rotordrop.machine.race_bearing import Oddity, RaceBearing
@@ -326,7 +332,8 @@ class BallBearing(RaceBearing):
         force = entry.preload[preload_class]
         why, bounds = f"{entry.maker} catalogue, {preload_class} preload of {entry.designation}", None
         if entry.preload_basis:
-            why, bounds = f"{preload_class} preload {entry.preload_basis}", (0.5 * force, 2.0 * force)
+            why = f"{preload_class} preload {entry.preload_basis}"
+            bounds = (force / PRELOAD_FACTOR, PRELOAD_FACTOR * force)
         values["preload"] = Estimated(value=force, status=status, range=bounds, source=why, unit="N")
         return values
 

@@ -84,7 +84,10 @@ def _verdict(
     )
     statements += [static_limit_statement(bearing) for bearing in bearings]
     if machine is not None and machine.defaults_in_use:
-        text = f"{len(machine.defaults_in_use)} values of the machine are defaults; they are listed below."
+        text = (
+            f"{len(machine.defaults_in_use)} values of the machine are defaults; the report and "
+            "'rotordrop check --all' list them."
+        )
         statements.append(Statement(text=text, level="notice"))
     return tuple(statements)
 

@@ -199,7 +199,7 @@ def _score(entry: Any, truth: float) -> Score | None:
     relative = (value - truth) / truth if truth != 0.0 else None
     covered = half = None
     if interval is not None:
-        low, high = float(interval[0]), float(interval[1])
+        low, high = _ends(interval)
         covered = low <= truth <= high
         half = 0.5 * (high - low) / abs(truth) if truth != 0.0 else None
     return Score(
@@ -210,6 +210,14 @@ def _score(entry: Any, truth: float) -> Score | None:
         covered=covered,
         half_width=half,
     )
+
+
+def _ends(interval: Any) -> tuple[float, float]:
+    """Ends of an interval of an estimate, which somebody else's program may have written."""
+    numbers = isinstance(interval, list | tuple) and all(isinstance(end, int | float) for end in interval)
+    if not numbers or len(interval) != 2 or not interval[0] <= interval[1]:
+        raise UsageError(f"interval_90 is {interval!r}; expected two numbers, the lower one first, or none")
+    return float(interval[0]), float(interval[1])
 
 
 def _impact_scores(estimate: Estimate, truth: Truth, bearing: str) -> dict[str, Any]:
@@ -239,7 +247,7 @@ def _matching(listed: list[Any], row: Array) -> tuple[float, float, float, bool]
             continue
         entry = impact.get("peak_force_N", impact.get("peak_N"))
         interval = entry.get("interval_90") if isinstance(entry, Mapping) else None
-        low, high = interval if interval is not None else (math.nan, math.nan)
+        low, high = _ends(interval) if interval is not None else (math.nan, math.nan)
         if best is None or peak > best[0]:
             best = (peak, low, high, interval is not None)
     return best

@@ -78,7 +78,7 @@ def test_used_share_counts_drops_and_known_seconds(log):
         "LP-400, bearings 2026: 3 of 12 drops (25 %); 100 s of 400 s (25 %, 1 drops without duration left "
         "out), allowed by contract 17, section 4"
     )
-    assert free.sentence() == "other, bearings 2026: 1 drops; no limit given"
+    assert free.sentence() == "other, bearings 2026: 1 drop; no limit given"
     allow(log, "LP-400", "2026", drops=6, source="contract 18")
     assert used_shares(log)[0].sentence().startswith("LP-400, bearings 2026: 3 of 6 drops (50 %), allowed by")
 

@@ -150,6 +150,7 @@ def test_a_wrong_and_a_missing_estimate_are_lost(folder, estimates):
     assert [drop["consistent"] for drop in score_bench(folder, estimates, MADE[:1]).drops] == [True]
     scores = score_bench(folder, estimates)
     assert scores.unscored == {"drop_034": "there is no drop_034.json"}
+    assert (scores.departures, scores.named_rightly, scores.named_wrongly) == (1, 0, 1)
     row = _row(scores, "peak_force_N")
     assert (row.values, row.missing, row.covered, row.lost) == (2, 2, 0.0, 1.0)
     assert row.median == pytest.approx(0.15)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+import re
 
 import numpy as np
 import pytest
@@ -188,6 +189,17 @@ def test_what_is_no_truth_file_is_refused(tmp_path, content, message):
     file.write_text(content)
     with pytest.raises(UsageError, match=message):
         read_truth(file)
+
+
+@pytest.mark.parametrize("interval", [[None, None], [1.0], "1 to 2", [2.0, 1.0], [1.0, float("nan")]])
+def test_an_interval_that_is_none_is_refused_and_not_a_traceback(folder, interval):
+    truth = read_truth(folder / "truth" / "drop_060.json")
+    estimate = estimate_of(truth)
+    estimate["bearings"]["NDE"]["peak_force_N"]["interval_90"] = interval
+    with pytest.raises(
+        UsageError, match=rf"interval_90 is {re.escape(repr(interval))}; expected two numbers"
+    ):
+        score_estimate(estimate, truth)
 
 
 def test_what_is_no_estimate_is_refused(tmp_path, folder):

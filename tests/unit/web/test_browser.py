@@ -8,11 +8,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import quote
 
+import numpy as np
 import pytest
 from tests.unit.web.browser import CHROMIUM, Browser
 from tests.unit.web.serving import Served
 
-from rotordrop.web.workspace import Workspace
+from rotordrop.web.running import publish, result_folder, state_file
+from rotordrop.web.traces import write_traces
+from rotordrop.web.workspace import Job, Workspace
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here")
 
@@ -135,6 +138,61 @@ def test_an_estimate_from_the_button_to_the_report(browser, tmp_path, files):
         assert "consistent with the record" in words(browser, "#verdict")
         again = server.ask("GET", address)
         assert (again.status, "has been used" in again.text) == (404, True)
+
+
+def test_more_sensor_planes_than_bearings_are_drawn(browser, tmp_path, files):
+    with serving(tmp_path / "served") as server:
+        number = server.new_job(files)
+        server.order(f"/api/jobs/{number}/look")
+        assert server.settled(number, "look")["state"] == "done"
+        _with_a_third_plane_and_an_estimate(server.space.job(number))
+        browser.open(server.address)
+        browser.until("document.querySelectorAll('.panel canvas').length === 4")
+        orbits = "[...document.querySelectorAll('#orbits canvas')].map(c => c.ariaLabel.split(' ')[2]).join()"
+        assert browser.evaluate(orbits) == "NDE,DE"
+        browser.evaluate("document.getElementById('whole').click()")
+        browser.until("document.querySelectorAll('.panel canvas').length === 5")
+        assert browser.evaluate(orbits) == "NDE,DE,MID"
+        browser.evaluate("document.getElementById('early').click()")
+        browser.until("document.querySelectorAll('.panel canvas').length === 4")
+        assert browser.evaluate(orbits) == "NDE,DE"
+        quiet(browser)
+
+
+def _with_a_third_plane_and_an_estimate(job: Job) -> None:
+    """Add a plane between the bearings to what was seen, and an estimate of the two bearings."""
+    seen = result_folder(job, "look") / "page.json"
+    page = json.loads(seen.read_text())
+    page["places"].append({**page["places"][0], "name": "MID"})
+    seen.write_text(json.dumps(page))
+    made, time = job.path / "estimate.part", np.linspace(0.0, 0.2, 4001)
+    made.mkdir()
+    names = [f"{what} {b}" for what in ("x", "y", "force", "stress") for b in range(2)]
+    write_traces(made, "drop", time, {name: 1e-4 * np.sin(300.0 * time) for name in names})
+    places = [
+        {
+            "name": name,
+            "gap": [2.5e-4, 2.6e-4],
+            "measured": [f"x {b}", f"y {b}"],
+            "force": [f"force {b}"],
+            "stress": [f"stress {b}"],
+            "peaks": {"force": {"time": 0.01, "value": 1e-4, "interval_90": None}},
+        }
+        for b, name in enumerate(("NDE", "DE"))
+    ]
+    panel = {"title": "load", "axis": "load", "origin": "tracked", "band": None, "levels": []}
+    told = {
+        "traces": {"name": "drop", "columns": names, "start": 0.0, "end": 0.2},
+        "zero": 0.0,
+        "speed": 377.0,
+        "places": places,
+        "panels": {"force": [panel, panel], "stress": [panel, panel]},
+        "impacts": [],
+    }
+    (made / "page.json").write_text(json.dumps({**page, **told}))
+    publish(job, "estimate", "0" * 16, made)
+    state = {"state": "done", "run": "0" * 16, "fraction": 1.0, "options": {}}
+    state_file(job, "estimate").write_text(json.dumps(state))
 
 
 MARK = "window.stolen=1"

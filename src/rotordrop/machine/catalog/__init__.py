@@ -2,6 +2,7 @@
 
 from rotordrop.machine.catalog.designation import Designation, read_designation
 from rotordrop.machine.catalog.lookup import (
+    PRELOAD_FACTOR,
     BallComplement,
     CatalogueBearing,
     PreloadClass,
@@ -12,6 +13,7 @@ from rotordrop.machine.catalog.lookup import (
 )
 
 __all__ = [
+    "PRELOAD_FACTOR",
     "BallComplement",
     "CatalogueBearing",
     "Designation",

@@ -19,8 +19,8 @@ from rotordrop.machine.catalog.inference import infer_balls
 PreloadClass = Literal["light", "medium", "heavy"]
 _CLASSES: tuple[PreloadClass, ...] = ("light", "medium", "heavy")
 _UNSAID_ANGLE, _UNSAID_ANGLES = math.radians(25.0), (math.radians(15.0), math.radians(30.0))
-_PRELOAD_FACTOR = 2.0
-"""What the preload of a class of one maker is known to from that of others."""
+PRELOAD_FACTOR = 2.0
+"""Factor to which the preload of a class of one maker is known from that of others [1]."""
 _FAMILIES = ("B", "HCB", "XCB", "HS", "HC", "XC")
 _HYBRID_PRELOAD = 0.6
 """Preload of hybrid over steel bearings of one class in the catalogue [1]."""

@@ -83,7 +83,7 @@ class BenchScores:
 
     @property
     def departures(self) -> int:
-        """Departures that were there in the drops estimated."""
+        """Departures that were there; those of a drop without an estimate count."""
         return sum(len(drop["violated"]) for drop in self.drops)
 
     @property
@@ -134,7 +134,8 @@ def score_bench(folder: str | Path, estimates: str | Path, only: Iterable[str] =
             unscored[drop.name], scored = scored, {}
         found = _entries(scored, truth)
         entries += [(drop.family, *entry) for entry in found]
-        drops.append(_summary(drop.name, drop.family, drop.rotor, scored))
+        there = list(truth.values.get("violated", []))
+        drops.append(_summary(drop.name, drop.family, drop.rotor, scored) | {"violated": there})
     return BenchScores(rows=_rows(entries), drops=tuple(drops), unscored=unscored)
 
 
@@ -186,7 +187,6 @@ def _summary(name: str, family: str, rotor: str, scored: Mapping[str, Any]) -> d
         "rotor": rotor,
         "consistent": scored.get("consistent"),
         "named": scored.get("named", []),
-        "violated": scored.get("violated", []),
         "peak_errors": peaks,
     }
 

@@ -62,7 +62,8 @@ function loadPanel(kind) {
   };
 }
 
-const wanted = () => [...state.look.places.map((_, i) => motionPanel(i)), ...(state.estimate ? ["force", "stress"].map(loadPanel) : [])];
+// A look has one motion for every sensor plane, an estimate one for every bearing: their numbers may differ.
+const wanted = () => [...state[usesEstimate() ? "estimate" : "look"].places.map((_, i) => motionPanel(i)), ...(state.estimate ? ["force", "stress"].map(loadPanel) : [])];
 
 async function loadView() {
   const serial = ++state.serial, asked = wanted();
@@ -144,6 +145,8 @@ function drawStrip() {
     events: state.look.timeline.map(({ time, words }) => ({ time: time - zero(), words })) });
 }
 
+const motions = () => state.panels.filter((panel) => panel.id.startsWith("motion "));
+
 function orbitOf(index) {
   const panel = state.panels[index], place = state[panel.verb].places[index], forcePanel = state.panels.find((one) => one.id === "force");
   const paths = ["estimated", "measured"].filter((role) => place[role]).map((role) => ({ role, time: panel.time, x: panel.found[place[role][0]], y: panel.found[place[role][1]] }));
@@ -158,10 +161,11 @@ function orbitOf(index) {
 }
 
 function makeOrbits() {
-  const count = state.look.places.length, box = by("orbits");
-  if (box.childElementCount !== count) {
-    box.replaceChildren(...Array.from({ length: count }, (_, i) => {
-      const title = `Orbit ${state.look.places[i].name}`, named = { title };
+  const names = motions().map(({ verb }, i) => state[verb].places[i].name), box = by("orbits");
+  if (box.dataset.names !== names.join("\n")) {
+    box.dataset.names = names.join("\n");
+    box.replaceChildren(...names.map((name, i) => {
+      const title = `Orbit ${name}`, named = { title };
       return make("figure", { class: "orbit", of: [make("canvas", { role: "img" }), make("header", { of: [files(title, {
         csv: () => csv(state.panels[i]), svg: () => keepSvg(orbitPicture(orbitOf(i)), fileName(named)),
         png: () => keepPng(orbitPicture(orbitOf(i)), fileName(named)), python: () => python(state.panels[i].verb, `orbit ${i}`)
@@ -173,7 +177,7 @@ function makeOrbits() {
 
 function drawOrbits() {
   [...by("orbits").querySelectorAll("canvas")].forEach((canvas, i) => {
-    if (!state.panels[i]) { return; }
+    if (!motions()[i]) { return; }
     const told = orbitOf(i);
     drawOrbit(canvasPen(canvas), told);
     canvas.setAttribute("aria-label", `Orbit at ${told.name} in its clearance circle, ${told.paths.map((one) => one.role).join(" and ")}, ${told.impacts.length} impacts in the window`);
@@ -186,15 +190,14 @@ function readout() {
   by("clock").textContent = at === null ? "point at a trace" : `${units.timeText(at, state.view.to - state.view.from)} · record ${(at + zero()).toFixed(5)} s`;
   const value = (found, name) => (found[name] ? found[name][nearest(found.time, at)] : NaN);
   const force = state.panels.find((one) => one.id === "force"), stress = state.panels.find((one) => one.id === "stress");
-  for (let i = 0; i < state.look.places.length && state.panels[i]; i += 1) {
-    const { verb, found } = state.panels[i], place = state[verb].places[i], role = place.estimated ? "estimated" : "measured";
+  for (const [i, { verb, found }] of motions().entries()) {
+    const place = state[verb].places[i], role = place.estimated ? "estimated" : "measured";
     const [x, y] = at === null ? [NaN, NaN] : place[role].map((name) => value(found, name));
     const cells = [units.shown(x, "length", 4), units.shown(y, "length", 4), place.gap ? units.written(Math.hypot(x, y) / place.gap[1], 3) : "–"];
     if (state.estimate) {
       for (const [panel, kind] of [[force, "force"], [stress, "pressure"]]) {
-        const names = state.estimate.places[i][kind === "force" ? "force" : "stress"];
-        const inside = at !== null && verb === "estimate";
-        const [now, low, high] = names.map((name) => (inside ? value(panel.found, name) / units.factor(kind) : NaN));
+        const names = verb === "estimate" ? place[kind === "force" ? "force" : "stress"] : [];
+        const [now, low, high] = names.map((name) => (at !== null ? value(panel.found, name) / units.factor(kind) : NaN));
         cells.push(Number.isFinite(now) ? [`${units.written(now, 4)} ${units.unit(kind)}`, names[1] ? `${units.written(low, 3)} to ${units.written(high, 3)}` : ""] : "–");
       }
     }
