@@ -199,6 +199,20 @@ def require_place(path: str | os.PathLike[str]) -> None:
         raise OutputError(f"cannot write {path}: the folder {target.parent} is read-only; choose another")
 
 
+def make_folder(folder: Path) -> None:
+    """Make a folder for results, with those above it; one that is there is taken.
+
+    Raises
+    ------
+    OutputError
+        When there can be none.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"cannot make the folder {folder}: {error.strerror}; name another one") from error
+
+
 def _sync(path: Path) -> None:
     descriptor = os.open(path, os.O_RDONLY)
     try:

@@ -55,6 +55,7 @@ DataOption = Annotated[
         "--data",
         metavar="FOLDER",
         help="Write every table and figure of the report as CSV.",
+        file_okay=False,
         show_default=False,
     ),
 ]

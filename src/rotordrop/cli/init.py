@@ -127,12 +127,9 @@ def _copy_example(name: str, folder: Path, *, overwrite: bool) -> None:
     standing = [folder / file for file in contents if (folder / file).exists()]
     if standing and not overwrite:
         raise OutputError(f"{standing[0]} exists already; name another folder or add --force")
-    from rotordrop.atomic_file import atomic_path
+    from rotordrop.atomic_file import atomic_path, make_folder
 
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"cannot make the folder {folder}: {error.strerror}; name another one") from error
+    make_folder(folder)
     for file, content in contents.items():
         with atomic_path(folder / file) as temporary:
             temporary.write_bytes(content)

@@ -39,7 +39,6 @@ def serve(
         if open_page:
             typer.launch(address)
 
-    place.mkdir(parents=True, exist_ok=True)
     serve_page(place, port, announce)
 
 

@@ -18,11 +18,15 @@ def split(
     machine: MachineArgument,
     record: Annotated[Path, typer.Argument(metavar="RECORD", help="Recording with several drops.")],
     folder: Annotated[
-        Path, typer.Option("--output", "-o", metavar="FOLDER", help="Where the records go, as HDF5.")
+        Path,
+        typer.Option(
+            "--output", "-o", metavar="FOLDER", help="Where the records go, as HDF5.", file_okay=False
+        ),
     ],
     profile: ProfileOption = None,
 ) -> None:
     """Cut a recording with several drops into one record for each; no sample is changed."""
+    from rotordrop.atomic_file import make_folder
     from rotordrop.machine import load_machine
     from rotordrop.measurement.record import read_record, save_record
     from rotordrop.measurement.splitting import split_drops
@@ -32,7 +36,7 @@ def split(
     if len(parts) == 1:
         console().print(f"{record} holds one drop; nothing to split.")
         return
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     require_places(*places)
     for part, place in zip(parts, places, strict=True):
         save_record(part, place)

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from rotordrop.atomic_file import write_text
+from rotordrop.atomic_file import make_folder, write_text
 from rotordrop.report.content import Cell, ReportContent, Table
 from rotordrop.report.quantity import Quantity
 
@@ -24,7 +24,7 @@ def write_data(content: ReportContent, folder: str | Path) -> list[Path]:
     columns, x and y of every line as it is drawn; a picture has its value as a third.
     """
     folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     written: list[Path] = []
     for name, rows in _all(content):
         stem = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_").lower()[:60] or "table"

@@ -9,8 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.atomic_file import atomic_path, write_json
-from rotordrop.errors import OutputError
+from rotordrop.atomic_file import atomic_path, make_folder, write_json
 from rotordrop.measurement.record import Record
 from rotordrop.measurement.writers import recording_of, write_delimited, write_hdf5
 from rotordrop.synthesis.recording import SyntheticDrop
@@ -48,10 +47,7 @@ def write_synthetic(
         The files, the recording first.
     """
     folder, stem = Path(folder), name or str(drop.truth["name"])
-    try:
-        (folder / TRUTH_FOLDER).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"cannot make the folder {folder}: {error.strerror}; name another one") from error
+    make_folder(folder / TRUTH_FOLDER)
     paths = []
     for kind in formats:
         paths.append(folder / f"{stem}.{kind}")

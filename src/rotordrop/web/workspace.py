@@ -53,10 +53,26 @@ class Workspace:
     quota: int = QUOTA
 
     def prepare(self) -> None:
-        """Make the folder, for nobody else to read, and remove what a killed server left half written."""
-        self.jobs_folder.mkdir(parents=True, exist_ok=True)
-        with suppress(OSError):
-            self.path.chmod(0o700)
+        """Make the folder, for nobody else to read, and remove what a killed server left half written.
+
+        A folder that held other things before keeps its permissions; jobs and token are closed all the same.
+
+        Raises
+        ------
+        OutputError
+            When there can be no such folder.
+        """
+        try:
+            fresh = not self.path.exists() or not any(self.path.iterdir())
+            self.jobs_folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(
+                f"{self.path} cannot be the folder of the page: {error.strerror}; name another one with "
+                "--folder"
+            ) from error
+        for folder in (self.path, self.jobs_folder) if fresh else (self.jobs_folder,):
+            with suppress(OSError):
+                folder.chmod(0o700)
         for left in self.jobs_folder.glob("*/files/.*.part*"):
             left.unlink(missing_ok=True)
         for left in self.jobs_folder.glob("*.removed"):
@@ -70,7 +86,7 @@ class Workspace:
     def token(self) -> str:
         """Secret of the page, kept so that a page that is open outlives its server."""
         file = self.path / "token"
-        with suppress(OSError):
+        with suppress(OSError, ValueError):  # whatever is no token is replaced by one
             kept = file.read_text(encoding="ascii").strip()
             if re.fullmatch(r"[\w-]{43}", kept):
                 return kept

@@ -125,3 +125,20 @@ def _called(
         check=False,
         env=os.environ | {"PYTHONIOENCODING": encoding},
     )
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("unbalance-response", "machine.toml", "--data"),
+        ("estimate", "machine.toml", "record.csv", "--data"),
+        ("split", "machine.toml", "record.h5", "-o"),
+    ],
+)
+def test_a_file_is_no_folder_for_results_and_that_is_said_before_anything_is_computed(
+    tmp_path, capsys, words
+):
+    (tmp_path / "notes.txt").write_text("mine")
+    assert run([*words, str(tmp_path / "notes.txt")]) == 64
+    assert "notes.txt' is a file" in capsys.readouterr().err
+    assert (tmp_path / "notes.txt").read_text() == "mine"

@@ -12,7 +12,7 @@ import time
 
 import pytest
 
-from rotordrop.atomic_file import atomic_path, write_json, write_text
+from rotordrop.atomic_file import atomic_path, make_folder, write_json, write_text
 from rotordrop.errors import OutputError
 
 
@@ -244,3 +244,14 @@ def test_a_long_name_and_a_folder_without_permission_are_told(tmp_path):
 def test_a_name_of_another_encoding_does_not_stop_the_writing(tmp_path):
     write_text(tmp_path / "t.txt", "record \udcff.csv")
     assert (tmp_path / "t.txt").read_text() == "record ?.csv"
+
+
+def test_a_folder_is_made_with_those_above_it_and_one_that_cannot_be_is_named(tmp_path):
+    for _ in range(2):
+        make_folder(tmp_path / "a" / "b")
+    assert (tmp_path / "a" / "b").is_dir()
+    (tmp_path / "file").write_text("")
+    with pytest.raises(
+        OutputError, match=r"cannot make the folder .*file/deeper: Not a directory; name another"
+    ):
+        make_folder(tmp_path / "file" / "deeper")

@@ -16,6 +16,7 @@ import pytest
 from tests.unit.web.serving import Served
 
 from rotordrop import load_machine, look
+from rotordrop.cli.app import run
 from rotordrop.web import running
 from rotordrop.web.running import Runner, published_run, result_folder, state_of
 from rotordrop.web.workspace import Workspace
@@ -263,3 +264,28 @@ def test_the_first_page_comes_within_a_second_and_loads_no_compiler():
 def test_the_folder_of_the_page_is_the_users_own(served):
     assert (served.space.path.stat().st_mode & 0o077) == 0 or os.name != "posix"
     assert ((served.space.path / "token").stat().st_mode & 0o077) == 0 or os.name != "posix"
+
+
+@posix
+def test_a_folder_with_other_things_keeps_its_permissions_and_its_jobs_are_closed(tmp_path):
+    (tmp_path / "notes.txt").write_text("mine")
+    tmp_path.chmod(0o755)
+    space = Workspace(tmp_path)
+    space.prepare()
+    modes = [folder.stat().st_mode & 0o777 for folder in (space.path, space.jobs_folder)]
+    assert modes == [0o755, 0o700]
+
+
+def test_what_cannot_be_the_folder_is_named(tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    assert run(["serve", "--folder", str(tmp_path / "file"), "--port", "0"]) == 6
+    told = " ".join(capsys.readouterr().err.split())
+    assert "file cannot be the folder of the page: Not a directory; name another one with --folder" in told
+
+
+def test_a_damaged_token_is_replaced(tmp_path):
+    (tmp_path / "token").write_bytes(b"\xff\xfe")
+    space = Workspace(tmp_path)
+    made = space.token()
+    assert len(made) == 43
+    assert space.token() == made

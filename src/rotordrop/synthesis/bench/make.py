@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from rotordrop.atomic_file import write_json
-from rotordrop.errors import OutputError, UsageError
+from rotordrop.atomic_file import make_folder, write_json
+from rotordrop.errors import UsageError
 from rotordrop.machine.saving import save_machine
 from rotordrop.synthesis.bench.departures import departures
 from rotordrop.synthesis.bench.drops import DROPS, VERSION, BenchDrop
@@ -103,11 +103,8 @@ def _make(drop: BenchDrop, folder: Path) -> None:
             f"{LATEST_CONTACT:g} s. Your computer rounds differently ('rotordrop fingerprint'); leave it out"
         )
     place = folder / DROPS_FOLDER / drop.name
-    try:
-        place.mkdir(parents=True, exist_ok=True)
-        (folder / TRUTH_FOLDER).mkdir(exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"cannot make the folder {place}: {error.strerror}; name another one") from error
+    make_folder(place)
+    make_folder(folder / TRUTH_FOLDER)
     save_machine(bench_rotor(drop.rotor), place / "machine.toml")
     write_record(made.record, place / "record.csv")
     if made.tail is not None:
