@@ -98,7 +98,7 @@ def _make(folder: Path, only: list[str], json_file: Path | None) -> None:
     asked = len(chosen_drops(only))
 
     def summarise(out: Console) -> None:
-        out.print(f"{len(made)} drops made, {asked - len(made)} were there (simulated, not measured)")
+        out.print(f"drops made: {len(made)}, there already: {asked - len(made)} (simulated, not measured)")
         out.print(f"for estimators: {folder / 'drops'}; hidden truth, not for them: {folder / 'truth'}")
 
     deliver({"made": made, "there": asked - len(made)}, json_file, summarise)

@@ -27,7 +27,7 @@ def calibrate(
         list[Path], typer.Argument(metavar="RECORD...", help="Recorded drops of this machine.")
     ],
     output: Annotated[
-        Path, typer.Option("--output", metavar="FILE", help="Calibrated machine file to write (.toml).")
+        Path, typer.Option("--output", "-o", metavar="FILE", help="Calibrated machine file to write (.toml).")
     ],
     tail: Annotated[
         list[Path] | None,

@@ -82,6 +82,7 @@ def log(
         if machine is None:
             raise UsageError("an allowance belongs to a machine; name it with --machine")
         book.allow(where, machine, bearings, drops=drops, seconds=seconds, source=source)
+        _say_whose(machine, {drop.machine for drop in book.logged_drops(where).values()})
     found = book.logged_drops(where, machine=machine)
     shares = [share for share in book.used_shares(where) if machine in (None, share.machine)]
     if action is Action.export:
@@ -93,6 +94,15 @@ def log(
         "statement": book.STATEMENT,
     }
     deliver(content, json_file, lambda out: _summary(out, found, [share.sentence() for share in shares]))
+
+
+def _say_whose(machine: str, logged: set[str]) -> None:
+    """Say it when an allowance counts nothing so far: a name written otherwise would never count."""
+    if logged and machine not in logged:
+        console().print(
+            f"note: no drop of {machine!r} is in the log, only of {', '.join(sorted(map(repr, logged)))}; an "
+            "allowance counts drops of the machine of exactly its name"
+        )
 
 
 def _document(what: str | None) -> dict[str, Any]:

@@ -28,7 +28,7 @@ def synthesize(
             parser=quantity("speed"), metavar="SPEED", help='Speed at power-off, such as "60 Hz"; repeatable.'
         ),
     ],
-    folder: Annotated[Path, typer.Option("--output", metavar="FOLDER", help="Where the files go.")],
+    folder: Annotated[Path, typer.Option("--output", "-o", metavar="FOLDER", help="Where the files go.")],
     seed: Annotated[int, typer.Option(metavar="NUMBER", min=0, help="Seed of the hidden machine.")] = 0,
     first_drop: Annotated[
         int, typer.Option(metavar="NUMBER", min=0, help="Seed of the first drop; the next ones follow.")

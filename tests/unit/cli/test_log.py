@@ -52,6 +52,18 @@ def test_a_log_from_the_command_line(tmp_path, estimate, capsys):
     assert "drop 1 was removed" in capsys.readouterr().out
 
 
+def test_an_allowance_for_a_machine_of_another_name_is_told(tmp_path, estimate, capsys):
+    log = str(tmp_path / "drops.db")
+    assert run(["log", "add", log, estimate]) == 0
+    capsys.readouterr()
+    for machine, told in (("LP-40", True), ("LP-400", False)):
+        assert run(["log", "allow", log, "--machine", machine, "--drops", "10", "--source", "x"]) == 0
+        said = " ".join(capsys.readouterr().out.split())
+        assert (
+            f"no drop of {machine!r} is in the log, only of 'LP-400'; an allowance counts" in said
+        ) == told
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "message"),
     [
