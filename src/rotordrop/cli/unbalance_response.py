@@ -15,7 +15,6 @@ from rotordrop.cli._output import deliver, require_places
 from rotordrop.cli.critical_speeds import Held
 from rotordrop.errors import UsageError
 
-SPEEDS = 2001
 BEYOND = 1.5
 
 
@@ -35,10 +34,8 @@ def unbalance_response(
     json_file: JsonOption = None,
 ) -> None:
     """Show amplitude and phase under unbalance over the speed, with amplification factors and margins."""
-    import numpy as np
-
     from rotordrop.machine import load_machine
-    from rotordrop.model.unbalanced import machine_response
+    from rotordrop.model.unbalanced import resolved_response
     from rotordrop.report.csv_files import write_data
     from rotordrop.report.page import write_page
     from rotordrop.report.terminal import print_summary
@@ -50,7 +47,7 @@ def unbalance_response(
     if chosen is Held.free_free:
         raise UsageError("nothing holds a free rotor: choose 'AMBs' or 'touchdown bearings'")
     top = top_speed or BEYOND * float(described.speed.nominal)
-    response = machine_response(described, np.linspace(top / SPEEDS, top, SPEEDS), chosen.value)
+    response = resolved_response(described, top, chosen.value)
     page = unbalance_page(described, response)
     if report is not None:
         write_page(page, report)

@@ -12,6 +12,7 @@ from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
 from rotordrop.model.assembly import build_rotor_fe
 from rotordrop.model.reduction import Reduction, reduce_rotor
+from rotordrop.model.separation import response_peaks
 from rotordrop.model.suspension import suspension_of
 from rotordrop.model.whirl import unbalance_response
 
@@ -19,6 +20,12 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 REDUCTION = Reduction(modes=16, attachment=True)
+
+SPEEDS, PEAK_SPEEDS, CLOSEST = 2001, 81, 200
+"""Speeds of the even grid and across a sharp peak, and how many times closer two may lie than on the grid."""
+
+SHARP = 20.0
+"""Steps of the even grid in the half-power width of a peak below which it is sharp [1]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -105,6 +112,27 @@ def machine_response(machine: Machine, speeds: ArrayLike, suspension: str) -> Ma
         places=_places(machine),
         unbalance=known,
     )
+
+
+def resolved_response(machine: Machine, top: float, suspension: str) -> MachineResponse:
+    """Response up to a speed [rad/s], with more speeds wherever a peak is too sharp for an even grid.
+
+    Arguments as of `machine_response`. On an even grid alone a peak of lightly damped modes is too low and,
+    by its half-power width, too broad.
+    """
+    step = top / SPEEDS
+    grid = step * np.arange(1, SPEEDS + 1)
+    first = machine_response(machine, grid, suspension)
+    wanted = [grid]
+    for _, node in first.places:
+        for peak in response_peaks(first.speed, first.major_axis(node)):
+            width = peak.speed / peak.factor
+            if width < SHARP * step:
+                reach = max(width, 2.0 * step)
+                wanted.append(np.linspace(peak.speed - reach, peak.speed + reach, PEAK_SPEEDS))
+    finest = step / CLOSEST  # speeds nearer to each other would differ by rounding only
+    speeds = finest * np.unique(np.round(np.concatenate(wanted) / finest))
+    return machine_response(machine, speeds[(speeds > 0.0) & (speeds <= top)], suspension)
 
 
 def _places(machine: Machine) -> tuple[tuple[str, int], ...]:

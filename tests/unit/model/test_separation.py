@@ -16,7 +16,7 @@ from rotordrop.model.separation import (
     response_peaks,
     separations,
 )
-from rotordrop.model.unbalanced import machine_response, orbit_axis
+from rotordrop.model.unbalanced import machine_response, orbit_axis, resolved_response
 
 
 @pytest.mark.parametrize(
@@ -111,3 +111,19 @@ def test_the_command_shows_peaks_margins_and_figures(tmp_path, capsys):
 def test_a_free_rotor_has_no_response(capsys):
     assert run(["unbalance-response", str(example_path("small")), "--held", "free-free"]) == 64
     assert "nothing holds a free rotor" in capsys.readouterr().err
+
+
+def test_a_sharp_peak_has_the_height_and_width_of_a_grid_thirty_times_finer():
+    machine = example_machine("lp400")
+    top = 2.0 * np.pi * 825.0
+    found = resolved_response(machine, top, "touchdown bearings")
+    node = found.places[0][1]
+    peak = response_peaks(found.speed, found.major_axis(node))[0]
+    near = np.linspace(peak.speed - 60.0, peak.speed + 60.0, 4001)
+    fine = machine_response(machine, near, "touchdown bearings")
+    known = max(response_peaks(near, fine.major_axis(node)), key=lambda one: one.amplitude)
+    assert known.factor > 100.0
+    assert peak.amplitude == pytest.approx(known.amplitude, rel=5e-3)
+    assert peak.factor == pytest.approx(known.factor, rel=1e-2)
+    speeds = [one.speed for one in response_peaks(found.speed, found.major_axis(node))]
+    assert np.min(np.diff(speeds)) > 2.0 * np.pi
