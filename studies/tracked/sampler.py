@@ -31,7 +31,7 @@ from rotordrop.identification.evidence import read_evidence
 from rotordrop.machine import example_machine
 from rotordrop.model.parameters import build_drop_model
 from rotordrop.synthesis import hidden_machine, synthesize_drop
-from rotordrop.tracking.calibration import BLIND_SCHEDULE, Stage, shifted, track
+from rotordrop.tracking.calibration import BLIND_SCHEDULE, Stage, shifted, stage_settings, track
 from rotordrop.tracking.problem import DropProblem
 from rotordrop.tracking.smoother import PassSettings, forward
 
@@ -84,10 +84,10 @@ def study(seed: int, draws: int, window: float, threads: int = 2) -> dict[str, A
     machine = example_machine("lp400")
     evidence = read_evidence(build_drop_model(machine), drop.record, drop.tail)
     problem = steady(drop_problem(build_drop_model(machine, COARSE_BASIS), evidence, window + 0.01))
-    schedule = shifted(BLIND_SCHEDULE, _first_contact(evidence))
-    last = Stage(until=window, impulse=2e-3, share=0.02, passes=4)
+    schedule = shifted(BLIND_SCHEDULE, _first_contact(evidence), problem.fall_time)
+    last = Stage(until=window, force=0.14, share=0.02, passes=4)
     fitted = track([problem], (*(s for s in schedule if s.until < window), last)).smoothed[0]
-    settings = PassSettings(impulse=last.impulse, share=last.share)
+    settings = stage_settings(problem, last)
     samples = len(fitted.means)
     places = np.array(
         [problem.n_dynamic + k for k, u in enumerate(problem.unknowns) if u.path.endswith(SAMPLED)]

@@ -38,12 +38,13 @@ from rotordrop.tracking.calibration import (
     TrackedDrops,
     beside_the_record,
     shifted,
+    stage_settings,
     track,
 )
 from rotordrop.tracking.consistency import DIRECTIONS, Check, consistency_checks
 from rotordrop.tracking.forces import ForceHistory, force_history
-from rotordrop.tracking.problem import DropProblem, Fall, RecordedDrop, build_problem
-from rotordrop.tracking.smoother import PassSettings, Smoothed, forward
+from rotordrop.tracking.problem import DropProblem, Fall, RecordedDrop, build_problem, fall_time
+from rotordrop.tracking.smoother import Smoothed, forward
 from rotordrop.tracking.transfer import transferred
 
 Array = NDArray[np.float64]
@@ -58,16 +59,16 @@ COARSE_REACH, FINE_REACH = 2.25, 6.0
 at mid-span was lost at 2.1 and followed from 3.2 on, one of 1.1 m and 60 kg is followed at 2.4."""
 
 FINE_SCHEDULE: tuple[Stage, ...] = (
-    Stage(until=0.06, impulse=1e-3, share=0.01, passes=2),
-    Stage(until=0.1, impulse=1e-3, share=0.01, passes=1),
-    Stage(until=0.15, impulse=1e-3, share=0.01, passes=1),
-    Stage(until=0.2, impulse=1e-3, share=0.01, passes=2),
+    Stage(until=0.06, force=0.07, share=0.01, passes=2),
+    Stage(until=0.1, force=0.07, share=0.01, passes=1),
+    Stage(until=0.15, force=0.07, share=0.01, passes=1),
+    Stage(until=0.2, force=0.07, share=0.01, passes=2),
 )
 CALIBRATION_SCHEDULE = FINE_SCHEDULE[:1]
 WINDOW = 0.2
 NOISE_FACTORS = (0.5, 1.0, 2.0, 4.0, 8.0)
-NOISE_WINDOW = 0.06
-"""Part of the drop on which the size of the unknown impulses is judged [s]."""
+NOISE_WINDOW = 8.4
+"""Part of the drop on which the size of the unknown forces is judged, over the time of a free fall [1]."""
 
 MOST_REPEATS, SMALL_RISE = 6, 5.0
 """Repeats of the first window of the finer basis with an extension, and the rise of the log likelihood that
@@ -133,6 +134,11 @@ def drop_problem(model: DropModel, evidence: Evidence, until: float = WINDOW) ->
     return replace(problem, fall=Fall(end=_first_contact(evidence), impulse=FALL_SHARE * weight))
 
 
+def twin_problem(machine: Machine, evidence: Evidence, until: float = WINDOW) -> DropProblem:
+    """Estimation problem of a recorded drop in the basis that force and stress are taken from."""
+    return drop_problem(build_drop_model(machine, _basis(machine, FINE_BASIS, FINE_REACH)), evidence, until)
+
+
 def recorded_drop(evidence: Evidence, until: float = WINDOW) -> RecordedDrop:
     """What the record says, as the filter takes it."""
     readings, level = evidence.readings(until), evidence.settled_level
@@ -156,7 +162,7 @@ def _start_gaps(problem: DropProblem, evidence: Evidence) -> None:
     if isinstance(evidence.reach, Missing):
         return
     gaps = problem.gap_entries
-    unsure = problem.covariance[gaps, gaps] > UNSURE_GAP**2
+    unsure = problem.covariance[gaps, gaps] > (UNSURE_GAP * problem.mean[gaps]) ** 2
     for entry, found, moved in zip(gaps, evidence.reach, unsure & np.isfinite(evidence.reach), strict=True):
         if moved:
             problem.mean[entry] = problem.start[entry] = found
@@ -187,7 +193,7 @@ def track_drops(
     """
     search = _Search(evidence=tuple(_tail_first(evidence)), calibrate_only=calibrate_only, progress=progress)
     if is_calibrated(machine) and not calibrate_only:
-        schedule = QUICK_SCHEDULE if quick else CALIBRATED_SCHEDULE
+        schedule = search.shifted(machine, QUICK_SCHEDULE if quick else CALIBRATED_SCHEDULE)
         found = Candidate(machine=machine, fit=track(search.problems(machine), schedule, progress=progress))
         if quick or not found.beside:
             return search.not_lost(found)
@@ -213,10 +219,14 @@ class _Search:
     calibrate_only: bool
     progress: Progress | None
 
-    @property
-    def until(self) -> float:
+    def until(self, machine: Machine) -> float:
         """End of the window [s]."""
-        return BLIND_SCHEDULE[-1].until + 0.01 if self.calibrate_only else WINDOW
+        last = self.shifted(machine, BLIND_SCHEDULE[-1:])[0]
+        return last.until + 0.01 if self.calibrate_only else WINDOW
+
+    def shifted(self, machine: Machine, schedule: Sequence[Stage]) -> tuple[Stage, ...]:
+        """A schedule with its windows where the first contacts of the drops are."""
+        return shifted(schedule, self.contact, fall_time(machine))
 
     @property
     def contact(self) -> float:
@@ -226,17 +236,17 @@ class _Search:
     def problems(self, machine: Machine) -> list[DropProblem]:
         """The drops with the finer basis."""
         model = build_drop_model(machine, _basis(machine, FINE_BASIS, FINE_REACH))
-        return [drop_problem(model, item, self.until) for item in self.evidence]
+        return [drop_problem(model, item, self.until(machine)) for item in self.evidence]
 
     def coarse(self, machine: Machine) -> list[DropProblem]:
         """The drops with the coarse basis."""
         model = build_drop_model(_seen_at_the_ends(machine), _basis(machine, COARSE_BASIS, COARSE_REACH))
         items = [_with_sensors_of(model, item) for item in self.evidence]
-        return [drop_problem(model, item, self.until) for item in items]
+        return [drop_problem(model, item, self.until(machine)) for item in items]
 
     def first_fit(self, machine: Machine) -> TrackedDrops:
         """First fit of a machine of which only guesses are known; a failed one is repeated patiently."""
-        return _from_guesses(self.coarse(machine), self.contact, self.progress)
+        return _from_guesses(self.coarse(machine), self.contact, fall_time(machine), self.progress)
 
     def from_guesses(self, machine: Machine, attempt: int) -> TrackedDrops:
         """Fit of a machine by the coarse basis, from its guesses or, in later attempts, from other starts."""
@@ -244,14 +254,12 @@ class _Search:
         problems = self.coarse(machine)
         if attempt >= FIRST_OTHER_START:
             problems = [_started_elsewhere(problem, attempt) for problem in problems]
-        return track(problems, shifted(schedule, self.contact))
+        return track(problems, self.shifted(machine, schedule))
 
     def judge(self, known: TrackedDrops, machine: Machine) -> float:
         """Negative logarithm of the likelihood with another machine, drop by drop, linearised at a fit."""
         problems = self.coarse(machine)
-        last = BLIND_SCHEDULE[-1]
-        settings = PassSettings(impulse=last.impulse, share=last.share)
-        total = 0.0
+        total, settings = 0.0, stage_settings(problems[0], BLIND_SCHEDULE[-1])
         for problem, reference in zip(problems, _carried(known, problems), strict=True):
             result = forward(problem, settings, reference=reference, samples=len(reference), smoothing=False)
             lost = result.done < len(reference)
@@ -261,13 +269,13 @@ class _Search:
     def look(self, known: TrackedDrops, machine: Machine, passes: int) -> TrackedDrops:
         """Passes with another machine over the first window whole, linearised at a fit that is known."""
         problems = self.coarse(machine)
-        last = shifted((replace(BLIND_SCHEDULE[-1], passes=passes),), self.contact)
+        last = self.shifted(machine, (replace(BLIND_SCHEDULE[-1], passes=passes),))
         return track(problems, last, references=_carried(known, problems))
 
     def refined(self, first: Candidate) -> Candidate:
         """The same machine with the finer basis, from what the coarse one found."""
         fine = self.problems(first.machine)
-        schedule = shifted(CALIBRATION_SCHEDULE if self.calibrate_only else FINE_SCHEDULE, self.contact)
+        schedule = self.shifted(first.machine, CALIBRATION_SCHEDULE if self.calibrate_only else FINE_SCHEDULE)
         references = _carried(first.fit, fine)
         if first.kept:
             references = _converged(fine, schedule[0], references)
@@ -342,12 +350,14 @@ def _with_sensors_of(model: DropModel, evidence: Evidence) -> Evidence:
     return evidence if len(columns) == len(evidence.record.sensors) else evidence.of_channels(columns)
 
 
-def _from_guesses(coarse: Sequence[DropProblem], contact: float, progress: Progress | None) -> TrackedDrops:
+def _from_guesses(
+    coarse: Sequence[DropProblem], contact: float, fall: float, progress: Progress | None
+) -> TrackedDrops:
     """First fit of a machine of which only guesses are known; a failed one is repeated more patiently."""
-    found = track(coarse, shifted(BLIND_SCHEDULE, contact), progress=progress)
+    found = track(coarse, shifted(BLIND_SCHEDULE, contact, fall), progress=progress)
     if not beside_the_record(found):
         return found
-    again = track(coarse, shifted(PATIENT_SCHEDULE, contact), progress=progress)
+    again = track(coarse, shifted(PATIENT_SCHEDULE, contact, fall), progress=progress)
     return min(found, again, key=lambda fit: (any(fit.diverged), max(fit.noise_factors), max(fit.nis)))
 
 
@@ -383,10 +393,10 @@ def best_noise_factor(problem: DropProblem, smoothed: Smoothed, stage: Stage) ->
 
     Searched upwards or downwards from the usual size; what later impacts miss shows in their innovations.
     """
-    samples = min(int(np.searchsorted(problem.time, NOISE_WINDOW)), len(smoothed.means))
+    samples = min(int(np.searchsorted(problem.time, NOISE_WINDOW * problem.fall_time)), len(smoothed.means))
 
     def improbability(factor: float) -> float:
-        settings = PassSettings(impulse=stage.impulse * factor, share=stage.share * factor)
+        settings = stage_settings(problem, stage, factor)
         result = forward(problem, settings, reference=smoothed.means, samples=samples, smoothing=False)
         return result.negative_log_likelihood if result.done == samples else math.inf
 

@@ -49,7 +49,6 @@ from rotordrop.tracking.input_state import (
     at_bearings,
     input_state_estimate,
     lent_by_record,
-    lent_by_twin,
 )
 
 Array = NDArray[np.float64]
@@ -138,16 +137,16 @@ def _cross_checked(drop: TrackedDrop, method: Tracked) -> tuple[TrackedDrop, Inp
     """The drop with one check more, and the estimate without contact law, if one is made.
 
     A twin whose innovations are white may still be wrong where its contact law is: a peak that is a factor
-    apart from the cross-check is not called consistent. A twin that does not fit lends nothing to the
-    cross-check, since what it says of gaps and sensors may be as wrong as what it says of forces. A quick
-    estimate does without it, but not for a bearing with play, whose force no study has validated.
+    apart from the cross-check is not called consistent. The twin lends nothing to the cross-check, since what
+    it says of gaps and sensors may be as wrong as what it says of forces. A quick estimate does without it,
+    but not for a bearing with play, whose force no study has validated.
     """
     problem = drop.problem
     with_play = any(not numbers_of(b).held for b in problem.model.machine.touchdown_bearings)
     if not drop.sees_all_directions or (drop.consistent and method.quick and not with_play):
         return drop, None
     if drop.consistent:
-        check = input_state_estimate(problem, lent_by_twin(problem, drop.smoothed))
+        check = input_state_estimate(problem, lent_by_record(problem))
         apart = [
             f"the peak force at {name} is {peak:.0f} N, without a contact law {check.peak[b]:.0f} N"
             for b, name in enumerate(problem.model.bearing_names)
@@ -156,7 +155,7 @@ def _cross_checked(drop: TrackedDrop, method: Tracked) -> tuple[TrackedDrop, Inp
         if not apart:
             return drop, check
         failed = Check(name="cross-check", passed=False, message="; ".join(apart))
-        drop = replace(drop, checks=(*drop.checks, failed))
+        return replace(drop, checks=(*drop.checks, failed)), check
     return drop, input_state_estimate(problem, lent_by_record(problem))
 
 

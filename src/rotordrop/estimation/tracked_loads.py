@@ -26,12 +26,7 @@ from rotordrop.estimation.bearing_drop import (
 from rotordrop.estimation.estimate import CrossCheck
 from rotordrop.simulation.certificate import refined_peak
 from rotordrop.tracking.forces import ForceHistory
-from rotordrop.tracking.input_state import (
-    KNOWN_MEAN_ERROR,
-    KNOWN_PEAK_ERROR,
-    KNOWN_STRESS_ERROR,
-    InputEstimate,
-)
+from rotordrop.tracking.input_state import MEAN_ERROR, InputEstimate
 from rotordrop.tracking.problem import DropProblem
 
 Array = NDArray[np.float64]
@@ -162,17 +157,16 @@ def holding_cross_check(loads: Loads, forces: ForceHistory, check: InputEstimate
     """
     force_ratio = float(check.peak[b]) / max(loads.peak_force.value, 1e-9)
     stress_ratio = float(check.peak_stress[b]) / max(loads.peak_stress.value, 1e-9)
-    ratios = {"mean_stress_Pa": (stress_ratio, KNOWN_STRESS_ERROR)}
+    peak_error, stress_error = float(check.peak_error[b]), float(check.stress_error[b])
+    ratios = {"mean_stress_Pa": (stress_ratio, stress_error)}
     if np.isfinite(check.mean_late[b]):
         late = (forces.time >= LATE[0]) & (forces.time <= LATE[1])
         vector = forces.force[late, b].mean(axis=0)
         ratio = float(check.mean_late[b] / max(np.hypot(*vector), 1e-9))
-        ratios["mean_force_0p15_0p2_N"] = (ratio, KNOWN_MEAN_ERROR)
-    peak_force = replace(
-        loads.peak_force, known=holding(loads.peak_force.known, force_ratio, KNOWN_PEAK_ERROR)
-    )
+        ratios["mean_force_0p15_0p2_N"] = (ratio, MEAN_ERROR)
+    peak_force = replace(loads.peak_force, known=holding(loads.peak_force.known, force_ratio, peak_error))
     peak_stress = replace(
-        loads.peak_stress, known=holding(loads.peak_stress.known, stress_ratio, KNOWN_STRESS_ERROR)
+        loads.peak_stress, known=holding(loads.peak_stress.known, stress_ratio, stress_error)
     )
     return replace(
         loads,
@@ -198,19 +192,20 @@ def _stretched(band: Band, history: History, peak: Peak) -> Band:
 
 def loads_of_cross_check(check: InputEstimate, b: int) -> Loads:
     """What the cross-check knows, with twice the error it is known to make on drops that the model fits."""
+    peak_error, stress_error = float(check.peak_error[b]), float(check.stress_error[b])
     force = History(label="cross-check", time=check.time, values=check.magnitude[:, b], role="cross-check")
     stress = History(label="cross-check", time=check.time, values=check.stress[:, b], role="cross-check")
     means = {"mean_stress_Pa": _doubled(float(np.mean(stress.values)), MEAN_STRESS_ERROR, "Pa")}
     late = float(check.mean_magnitude_late[b])
     if math.isfinite(late):
-        means["mean_force_0p15_0p2_N"] = _doubled(late, KNOWN_MEAN_ERROR, "N")
+        means["mean_force_0p15_0p2_N"] = _doubled(late, MEAN_ERROR, "N")
     return Loads(
         force=force,
-        force_band=_band(force, 2.0 * KNOWN_PEAK_ERROR * force.values),
+        force_band=_band(force, 2.0 * peak_error * force.values),
         stress=stress,
-        stress_band=_band(stress, 2.0 * KNOWN_STRESS_ERROR * stress.values),
-        peak_force=_checked_peak(force, KNOWN_PEAK_ERROR, "N"),
-        peak_stress=_checked_peak(stress, KNOWN_STRESS_ERROR, "Pa"),
+        stress_band=_band(stress, 2.0 * stress_error * stress.values),
+        peak_force=_checked_peak(force, peak_error, "N"),
+        peak_stress=_checked_peak(stress, stress_error, "Pa"),
         means=means,
         missing={
             "impacts": "the twin, which tells impacts apart, lost the record",
@@ -232,7 +227,7 @@ def _doubled(value: float, error: float, unit: str) -> IdentifiedValue:
     return IdentifiedValue(
         value=value,
         status=OF_CROSS_CHECK,
-        interval_90=((1.0 - 2.0 * error) * value, (1.0 + 2.0 * error) * value),
+        interval_90=(max(1.0 - 2.0 * error, 0.0) * value, (1.0 + 2.0 * error) * value),
         standard_error=2.0 * error * value / NINETY,
         unit=unit,
     )
@@ -321,11 +316,12 @@ def _impact_holding(impact: Impact, cross_check: InputEstimate, b: int) -> Impac
     if not during.any() or impact.peak_force.value <= 0.0:
         return impact
     ratio = float(cross_check.magnitude[during, b].max()) / impact.peak_force.value
+    error = float(cross_check.peak_error[b])
     return replace(
         impact,
-        peak_force=holding(impact.peak_force, ratio, KNOWN_PEAK_ERROR),
-        impulse=holding(impact.impulse, ratio, KNOWN_PEAK_ERROR),
-        dissipated_energy=holding(impact.dissipated_energy, ratio, 2.0 * KNOWN_PEAK_ERROR),
+        peak_force=holding(impact.peak_force, ratio, error),
+        impulse=holding(impact.impulse, ratio, error),
+        dissipated_energy=holding(impact.dissipated_energy, ratio, 2.0 * error),
     )
 
 
@@ -334,14 +330,14 @@ def cross_checks(
 ) -> tuple[CrossCheck, ...]:
     """Peak force, peak stress and late mean force vector of one bearing, found in both ways."""
     pairs = [
-        ("peak force", twin.peak_force.known, check.peak[b], KNOWN_PEAK_ERROR),
-        ("peak stress", twin.peak_stress.known, check.peak_stress[b], KNOWN_STRESS_ERROR),
+        ("peak force", twin.peak_force.known, check.peak[b], float(check.peak_error[b])),
+        ("peak stress", twin.peak_stress.known, check.peak_stress[b], float(check.stress_error[b])),
     ]
     if np.isfinite(check.mean_late[b]):
         late = (forces.time >= LATE[0]) & (forces.time <= LATE[1])
         mean = float(np.hypot(*forces.force[late, b].mean(axis=0)))
         vector = IdentifiedValue(value=mean, unit="N")
-        pairs.append(("force of the mean, 150 to 200 ms", vector, check.mean_late[b], KNOWN_MEAN_ERROR))
+        pairs.append(("force of the mean, 150 to 200 ms", vector, check.mean_late[b], MEAN_ERROR))
     return tuple(
         CrossCheck(
             name=f"{name} {what}",

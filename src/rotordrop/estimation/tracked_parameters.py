@@ -20,13 +20,13 @@ from rotordrop.tracking.consistency import PARAMETER_LIMIT
 from rotordrop.tracking.problem import DropProblem
 from rotordrop.tracking.smoother import Smoothed, parameter_sample
 
-MODEL_GAP_SIGMA = 2.5e-6
-"""Standard deviation of an air gap by what confounds it with gains and offsets beyond the fit [m]."""
-LONE_GAP_SIGMA = 4e-6
-"""The same for a gap that was only guessed before a lone drop [m]: one drop seldom touches all round, and
+MODEL_GAP_SIGMA = 0.01
+"""Standard deviation of a gap, over it, by what confounds it with gains and offsets beyond the fit [1]."""
+LONE_GAP_SIGMA = 0.016
+"""The same for a gap that was only guessed before a lone drop [1]: one drop seldom touches all round, and
 near the bottom gap and sensor offset are hard to tell apart."""
-UNSURE_GAP = 12e-6
-"""Prior standard deviation from which an air gap counts as guessed [m]."""
+UNSURE_GAP = 0.05
+"""Relative prior standard deviation from which an air gap counts as guessed [1]."""
 PARAMETER_WIDENING = 1.5
 """Factor on standard errors of parameters for what the linearised fit leaves out [1]."""
 UNDETERMINED: Verdict = "the record does not determine it"
@@ -70,8 +70,8 @@ def model_error(unknown: Unknown, sigma: float, drops: int) -> float:
     """Standard error of a parameter with what the fit to a number of drops leaves out of it."""
     if unknown.parameter is not parameter("air_gap"):
         return sigma
-    lone = drops == 1 and unknown.sigma > UNSURE_GAP
-    return math.hypot(sigma, LONE_GAP_SIGMA if lone else MODEL_GAP_SIGMA)
+    lone = drops == 1 and unknown.sigma > UNSURE_GAP * unknown.begin
+    return math.hypot(sigma, (LONE_GAP_SIGMA if lone else MODEL_GAP_SIGMA) * unknown.begin)
 
 
 def parameter_widening(unknown: Unknown, sigma: float, widening: float = 1.0) -> float:
@@ -110,7 +110,9 @@ def gap_of_record(problem: DropProblem, b: int) -> IdentifiedValue:
     entry = problem.gap_entries[b]
     value = float(problem.mean[entry])
     return replace(
-        with_interval(value, math.hypot(math.sqrt(problem.covariance[entry, entry]), MODEL_GAP_SIGMA)),
+        with_interval(
+            value, math.hypot(math.sqrt(problem.covariance[entry, entry]), MODEL_GAP_SIGMA * value)
+        ),
         status=OF_CROSS_CHECK,
         unit="m",
     )

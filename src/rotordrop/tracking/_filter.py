@@ -33,7 +33,8 @@ IntArray = NDArray[np.int64]
 
 
 LARGEST_VARIANCE = 1e20
-LARGEST_DEFLECTION = 1e-3
+LARGEST_DEFLECTION = 4.0
+"""Way of a race or a support from its place, over the air gap, from which a filter has diverged [1]."""
 SIGN_WIDTH = math.sqrt(0.5 * math.pi)
 
 
@@ -373,9 +374,10 @@ def is_plausible(mean: Array, p: KernelParameters) -> bool:
     """Whether the estimate is finite and no race or support has left its place."""
     good = math.isfinite(np.sum(mean))
     for b in range(p.bearing.shape[0]):
+        limit = LARGEST_DEFLECTION * p.bearing[b, L.AIR_GAP]
         for body in (L.RACE, L.SUPPORT):
             i = p.bearing_at[b, body]
-            good = good and abs(mean[i]) < LARGEST_DEFLECTION and abs(mean[i + 1]) < LARGEST_DEFLECTION
+            good = good and abs(mean[i]) < limit and abs(mean[i + 1]) < limit
     return good
 
 

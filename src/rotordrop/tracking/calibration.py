@@ -8,6 +8,7 @@ belongs to a drop is not.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError
 from rotordrop.tracking.problem import DropProblem
-from rotordrop.tracking.smoother import Forward, PassSettings, Smoothed, forward, smooth
+from rotordrop.tracking.smoother import Forward, PassSettings, Smoothed, forward, pass_settings, smooth
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -24,14 +25,17 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True, kw_only=True)
 class Stage:
-    """One stage: window after power-off [s], unknown impulses [N s], their share, passes, steps per 50 µs.
+    """One stage: window after power-off [s], unknown forces, their share, passes, steps per 50 µs.
+
+    ``force`` is the unknown force at each bearing and axis as a part of the weight on a bearing, ``share`` as
+    a part of the force of the contact [1]; both are new every `STEP` of a free fall through the gap.
 
     ``noise`` is a factor on the noise of the sensors: above 1, readings pull the estimate only part of the
     way, and the next pass linearises nearer to them.
     """
 
     until: float
-    impulse: float
+    force: float
     share: float
     passes: int
     substeps: int = 4
@@ -39,20 +43,20 @@ class Stage:
 
 
 BLIND_SCHEDULE: tuple[Stage, ...] = (
-    Stage(until=0.012, impulse=1e-2, share=0.05, passes=1),
-    Stage(until=0.012, impulse=5e-3, share=0.03, passes=2),
-    Stage(until=0.016, impulse=3e-3, share=0.03, passes=2),
-    Stage(until=0.020, impulse=3e-3, share=0.02, passes=2),
-    Stage(until=0.030, impulse=2e-3, share=0.02, passes=2),
-    Stage(until=0.045, impulse=2e-3, share=0.02, passes=2),
-    Stage(until=0.060, impulse=2e-3, share=0.02, passes=2),
+    Stage(until=0.012, force=0.7, share=0.05, passes=1),
+    Stage(until=0.012, force=0.35, share=0.03, passes=2),
+    Stage(until=0.016, force=0.2, share=0.03, passes=2),
+    Stage(until=0.020, force=0.2, share=0.02, passes=2),
+    Stage(until=0.030, force=0.14, share=0.02, passes=2),
+    Stage(until=0.045, force=0.14, share=0.02, passes=2),
+    Stage(until=0.060, force=0.14, share=0.02, passes=2),
 )
-"""From nominal guesses: windows for a first contact at about 7 ms; they are shifted when it comes later."""
+"""From nominal guesses: windows for a first contact at 7.5 ms, for a gap of 0.25 mm; see `shifted`."""
 
 PATIENT_SCHEDULE: tuple[Stage, ...] = (
-    Stage(until=0.012, impulse=3e-3, share=0.03, passes=3, noise=20.0),
+    Stage(until=0.012, force=0.2, share=0.03, passes=3, noise=20.0),
     *(
-        Stage(until=until, impulse=3e-3, share=0.03, passes=1, noise=noise)
+        Stage(until=until, force=0.2, share=0.03, passes=1, noise=noise)
         for until in (
             0.012,
             0.014,
@@ -70,20 +74,24 @@ PATIENT_SCHEDULE: tuple[Stage, ...] = (
         )
         for noise in (5.0, 1.0)
     ),
-    Stage(until=0.060, impulse=2e-3, share=0.02, passes=2),
+    Stage(until=0.060, force=0.14, share=0.02, passes=2),
 )
 """From nominal guesses when `BLIND_SCHEDULE` ends beside the record: smaller windows, approached softly."""
 
 CALIBRATED_SCHEDULE: tuple[Stage, ...] = (
-    Stage(until=0.02, impulse=1e-3, share=0.01, passes=1),
-    Stage(until=0.2, impulse=1e-3, share=0.01, passes=2),
+    Stage(until=0.02, force=0.07, share=0.01, passes=1),
+    Stage(until=0.2, force=0.07, share=0.01, passes=2),
 )
 """With a calibrated machine: what is left is the state, the sensors and the drop's own unknowns."""
 
-QUICK_SCHEDULE: tuple[Stage, ...] = (Stage(until=0.2, impulse=1e-3, share=0.01, passes=1, substeps=3),)
+QUICK_SCHEDULE: tuple[Stage, ...] = (Stage(until=0.2, force=0.07, share=0.01, passes=1, substeps=3),)
 """With a calibrated machine: one pass, linearised at the filter's own estimate."""
 
 REFERENCE_CONTACT = 0.0075
+REFERENCE_FALL = math.sqrt(2.0 * 0.25e-3 / 9.81)
+"""First contact and time of a free fall that the windows of the schedules are written for [s]."""
+WHOLE_DROP = 0.1
+"""Windows from here on are parts of the drop, not of its first contacts [s]."""
 FITTING_NIS = 1.25
 """Mean normalised innovation squared up to which a model fits its record [1]."""
 LOOSER = (1.0, 8.0, 32.0)
@@ -115,11 +123,23 @@ class TrackedDrops:
     noise_factors: tuple[float, ...] = field(default=())
 
 
-def shifted(schedule: Sequence[Stage], first_contact: float) -> tuple[Stage, ...]:
-    """The schedule with its short windows moved to a first contact at another time [s]."""
-    late = max(first_contact - REFERENCE_CONTACT, -0.004)
+def shifted(schedule: Sequence[Stage], first_contact: float, fall: float) -> tuple[Stage, ...]:
+    """The schedule with its short windows where the first contacts of a drop are.
+
+    Parameters
+    ----------
+    schedule : sequence of Stage
+        Windows for a first contact at 7.5 ms and a free fall of 7.1 ms.
+    first_contact : float
+        Time of the first contact [s].
+    fall : float
+        Time of a free fall through the air gap [s]: rebounds last longer with it.
+    """
     return tuple(
-        replace(stage, until=stage.until + late) if stage.until < 0.1 else stage for stage in schedule
+        replace(stage, until=first_contact + (stage.until - REFERENCE_CONTACT) * fall / REFERENCE_FALL)
+        if stage.until < WHOLE_DROP
+        else stage
+        for stage in schedule
     )
 
 
@@ -153,11 +173,7 @@ def track(
     done = 0.0
     smoothed: list[Smoothed] = []
     for stage in schedule:
-        settings = PassSettings(
-            substeps=stage.substeps,
-            impulse=stage.impulse * noise_factor,
-            share=stage.share * noise_factor,
-        )
+        settings = stage_settings(problems[0], stage, noise_factor)
         for _ in range(stage.passes):
             if progress is not None:
                 progress(f"fitting the first {1e3 * stage.until:.0f} ms", done / total)
@@ -174,6 +190,13 @@ def track(
         nis=tuple(s.filtered.nis for s in smoothed),
         diverged=tuple(s.filtered.done < len(s.filtered.means) for s in smoothed),
         noise_factors=tuple(s.filtered.impulse / settings.impulse for s in smoothed),
+    )
+
+
+def stage_settings(problem: DropProblem, stage: Stage, factor: float = 1.0) -> PassSettings:
+    """Settings of the passes of a stage, with the unknown forces larger by a factor [1]."""
+    return pass_settings(
+        problem, force=factor * stage.force, share=factor * stage.share, substeps=stage.substeps
     )
 
 

@@ -179,13 +179,14 @@ def stress_at_force(problem: DropProblem, theta: Array, b: int, force: Array) ->
 
     if lacking(0.0) >= 0.0:  # no force beyond the rounding of the preload's balance
         return float(out[STRESS])
-    if lacking(LARGEST_DEFLECTION) < 0.0:
+    largest = LARGEST_DEFLECTION * p.bearing[b, L.AIR_GAP]
+    if lacking(largest) < 0.0:
         raise IdentificationError(
             f"{problem.model.bearing_names[b]}: a bearing force of {size:.0f} N was found, which deflects "
-            f"its race by more than {1e3 * LARGEST_DEFLECTION:.1f} mm; expected less. The record and the "
+            f"its race by more than {1e3 * largest:.1f} mm; expected less. The record and the "
             "machine do not belong together, or a sensor is wrong; check units, sensors and bearing data."
         )
-    lacking(brentq(lacking, 0.0, LARGEST_DEFLECTION, xtol=1e-12))  # leaves the stress at the root in `out`
+    lacking(brentq(lacking, 0.0, largest, xtol=1e-12))  # leaves the stress at the root in `out`
     return float(out[STRESS])
 
 

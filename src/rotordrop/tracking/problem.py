@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.machine import Machine
 from rotordrop.model import layout as L
 from rotordrop.model.parameter_table import parameter
 from rotordrop.model.parameters import DropModel
@@ -23,22 +24,26 @@ from rotordrop.tracking.unknowns import parameter_targets
 Array = NDArray[np.float64]
 
 RUNOUT_SIGMA = 0.5e-6
-START_POSITION_SIGMA = 30e-6
-START_VELOCITY_SIGMA = 20e-3
-BENDING_POSITION_SIGMA = 1.5e-6
-BENDING_VELOCITY_SIGMA = 1.5e-3
+START_POSITION_SIGMA, BENDING_POSITION_SIGMA, RACE_POSITION_SIGMA = 0.12, 6e-3, 4e-4
+"""How far the rotor, its first bending and a race may be from where they were seen, over the air gap [1]."""
+START_VELOCITY_SIGMA, BENDING_VELOCITY_SIGMA, RACE_VELOCITY_SIGMA = 0.28, 0.021, 1.4e-3
+"""Their velocities at power-off over that of a free fall through the air gap [1]."""
+START_ORBIT_SIGMA = 0.03
+"""Radius of the orbit of the levitated rotor over the air gap [1]."""
+RACE_SPIN_SIGMA = 0.3
+"""Spin of a race at power-off [rad/s]."""
 SPEED_SIGMA = 0.5
 SPEED_READING_SIGMA = 1.0
 SPEED_SPACING = 2.5e-3
 """Time between speed readings that count as independent [s]."""
 AFTER_FALL = 1.4
 """Time at which parameters are read over the time of a free fall through the widest air gap [1]."""
-FIRST_READINGS = 0.49e-3
-"""Time after power-off whose mean reading says where the rotor is [s]."""
+FIRST_READINGS = 0.07
+"""Time after power-off whose mean reading says where the rotor is, over the time of a free fall [1]."""
 NOISE_FLOOR = 0.1e-6
 USUAL_NOISE = 1e-6
-TAIL_VERTICAL_SIGMA = 0.7e-6
-TAIL_HORIZONTAL_SIGMA = 25e-6
+TAIL_VERTICAL_SIGMA, TAIL_HORIZONTAL_SIGMA = 2.8e-3, 0.1
+"""How far the resting rotor may be from where gap and sag put it, over the air gap [1]."""
 OWN_SIGMA = (0.3e-6, 0.3e-6, 1e-4, 1e-4)
 """How far a foundation may be from rest at power-off, displacement [m] and velocity [m/s], x and y."""
 SMOOTHED_FRICTION_SPEED = 0.15
@@ -150,7 +155,12 @@ class DropProblem:
         Later in a drop friction and race drift with what their laws get wrong.
         """
         gap = max(float(bearing.air_gap) for bearing in self.model.machine.touchdown_bearings)
-        return AFTER_FALL * math.sqrt(2.0 * gap / float(self.model.machine.gravity))
+        return AFTER_FALL * fall_time(self.model.machine, gap)
+
+    @property
+    def fall_time(self) -> float:
+        """Time of a free fall through the narrowest air gap [s]."""
+        return fall_time(self.model.machine)
 
     @property
     def n_channels(self) -> int:
@@ -206,6 +216,11 @@ class DropProblem:
     def watched(self) -> Array:
         """The watched functions of all bearings, shape (5 B, n)."""
         return np.concatenate([self.watched_rows(name) for name in self.model.bearing_names])
+
+
+def fall_time(machine: Machine, gap: float | None = None) -> float:
+    """Time [s] of a free fall through a gap [m], the narrowest of a machine by default."""
+    return math.sqrt(2.0 * (smallest_gap(machine) if gap is None else gap) / float(machine.gravity))
 
 
 def build_problem(
@@ -316,16 +331,17 @@ def _prior(
     mean = np.zeros(s + n_p + 4 * n_c)
     sigma = np.zeros_like(mean)
     mean[:s] = model.at_rest()[:s]
-    _rotor_prior(model, rows, _first_level(drop.time[drop.time >= 0.0], readings), mean, sigma)
+    gap, fall = smallest_gap(model.machine), fall_time(model.machine)
+    level = _first_level(drop.time[drop.time >= 0.0], readings, FIRST_READINGS * fall)
+    _rotor_prior(model, rows, level, drop.initial_speed, mean, sigma)
     for part in (layout.race, layout.support):
-        sigma[part] = 0.1e-6
-        sigma[layout.velocity_of(part)] = 1e-4
-    sigma[layout.race_spin] = 0.3
+        sigma[part] = RACE_POSITION_SIGMA * gap
+        sigma[layout.velocity_of(part)] = RACE_VELOCITY_SIGMA * float(model.machine.gravity) * fall
+    sigma[layout.race_spin] = RACE_SPIN_SIGMA
     mean[layout.rotor_speed] = drop.initial_speed
     sigma[layout.rotor_speed] = math.hypot(SPEED_SIGMA, drop.initial_speed_error)
     for i, unknown in enumerate(unknowns):
         mean[s + i], sigma[s + i] = unknown.mean, unknown.sigma
-    gap = smallest_gap(model.machine)
     for c, sensor in enumerate(model.machine.sensors):
         gain, offset = s + n_p + c, s + n_p + n_c + c
         known = sensor_prior(parameter("gain", "sensor"), sensor.gain, gap)
@@ -349,8 +365,12 @@ def _start(mean: Array, model: DropModel, unknowns: tuple[Unknown, ...]) -> Arra
     return start
 
 
-def _rotor_prior(model: DropModel, rows: Array, level: Array, mean: Array, sigma: Array) -> None:
+def _rotor_prior(
+    model: DropModel, rows: Array, level: Array, omega: float, mean: Array, sigma: Array
+) -> None:
     layout, basis = model.layout, model.basis
+    gap = smallest_gap(model.machine)
+    falling = float(model.machine.gravity) * fall_time(model.machine)
     weight = np.sqrt(model.fe.total_mass)
     frequency = np.sqrt(np.maximum(basis.eigenvalues, 0.0))
     softer = np.where(frequency > 0.0, frequency[2] / np.maximum(frequency, 1.0), 1.0)
@@ -368,17 +388,18 @@ def _rotor_prior(model: DropModel, rows: Array, level: Array, mean: Array, sigma
     mean[layout.modal_x][rigid] = fitted[: basis.n_rigid]
     mean[layout.modal_y][rigid] += fitted[basis.n_rigid :]
     for part in (layout.modal_x, layout.modal_y):
-        position = BENDING_POSITION_SIGMA * weight * softer**2 + 0.2 * np.abs(amplitude)
-        velocity = BENDING_VELOCITY_SIGMA * weight * softer
-        position[rigid] = START_POSITION_SIGMA * weight
-        velocity[rigid] = START_VELOCITY_SIGMA * weight
+        position = BENDING_POSITION_SIGMA * gap * weight * softer**2 + 0.2 * np.abs(amplitude)
+        velocity = BENDING_VELOCITY_SIGMA * falling * weight * softer
+        position[rigid] = START_POSITION_SIGMA * gap * weight
+        circling = START_ORBIT_SIGMA * gap * omega
+        velocity[rigid] = math.hypot(START_VELOCITY_SIGMA * falling, circling) * weight
         sigma[part] = position
         sigma[layout.velocity_of(part)] = velocity
 
 
-def _first_level(time: Array, readings: Array) -> Array:
+def _first_level(time: Array, readings: Array, until: float) -> Array:
     """Mean of the first readings of every channel [m]; NaN where there is none."""
-    first = readings[time[: len(readings)] < time[0] + FIRST_READINGS]
+    first = readings[time[: len(readings)] < time[0] + until]
     known = np.isfinite(first)
     if known.all():
         return np.asarray(first.mean(axis=0))
@@ -434,6 +455,7 @@ def apply_tail(problem: DropProblem, tail_level: Array, mean: Array, covariance:
         trial[k] += problem.targets.step[k]
         slopes[:, k] = (settled_displacement(problem, trial) - height) / problem.targets.step[k]
     model = problem.model
+    gap = smallest_gap(model.machine)
     angles = np.array([float(sensor.angle) for sensor in model.machine.sensors])
     nodes = np.array([sensor.node for sensor in model.machine.sensors])
     gain_scratch = np.empty(len(mean))
@@ -455,13 +477,14 @@ def apply_tail(problem: DropProblem, tail_level: Array, mean: Array, covariance:
                 row[start + n_p + c] += weight * along
                 row[start + n_p + n_c + c] += weight
                 row[problem.parameter_slice] += weight * growth * np.sin(angles[c]) * slopes[c]
-            F.scalar_update(mean, covariance, row, observed - predicted, sigma**2, gain_scratch)
+            F.scalar_update(mean, covariance, row, observed - predicted, (sigma * gap) ** 2, gain_scratch)
 
 
 def _tail_combinations(angles: Array) -> list[tuple[Array, float]]:
-    """Weights of the readings of one plane and how far [m] the resting rotor may be from what they predict.
+    """Weights of the readings of one plane and how far the resting rotor may be from what they predict.
 
-    Two directions give the height and what friction may hold the rotor aside; a single one sees a mixture.
+    Distances are over the air gap [1]. Two directions give the height and what friction may hold the rotor
+    aside; a single one sees a mixture.
     """
     directions = np.column_stack([np.cos(angles), np.sin(angles)])
     if np.linalg.matrix_rank(directions, tol=0.05) == 2:

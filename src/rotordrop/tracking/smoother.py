@@ -18,6 +18,14 @@ Array = NDArray[np.float64]
 Compact = NDArray[np.float32]
 """What a pass stores for the smoother: hundreds of megabytes, of which seven digits are plenty."""
 
+REFERENCE_STEP = 50e-6
+"""Time for which the numbers of `PassSettings` hold [s]."""
+STEP = 0.007
+"""Time over which unknown forces are alike, over the time of a free fall through the air gap [1]."""
+SPIN = 0.07
+"""Unknown friction on races and rotor as a coefficient of friction under the weight [1]."""
+LEARNING = 7.0
+"""Time at which a race turns with the rotor, over the time of a free fall [1]; see `PassSettings`."""
 LARGEST_PHASE = 1.0
 """Largest phase [rad] by which the fastest mode may turn in one integration step of the filter."""
 
@@ -33,7 +41,7 @@ class PassSettings:
     impulse : float
         Standard deviation of an unknown impulse per 50 µs at each bearing and axis [N s].
     share : float
-        The same as a fraction of the contact impulse [1].
+        The same as a fraction of the contact impulse of 50 µs [1].
     spin_noise : float
         Standard deviation of the race spin per 50 µs [rad/s].
     speed_noise : float
@@ -57,18 +65,49 @@ class PassSettings:
         ``fastest`` is the highest natural frequency of the model [rad/s]; it sets a least number of steps.
         ``fall`` limits the unknown impulses before the first contact.
         """
-        growth = np.sqrt(dt / 50e-6)
+        growth = math.sqrt(dt / REFERENCE_STEP)
         return P.FilterSettings(
             dt=dt,
-            substeps=max(1, round(self.substeps * dt / 50e-6), math.ceil(fastest * dt / LARGEST_PHASE)),
+            substeps=max(
+                1, round(self.substeps * dt / REFERENCE_STEP), math.ceil(fastest * dt / LARGEST_PHASE)
+            ),
             impulse=self.impulse * growth,
-            share=self.share,
+            share=self.share / growth,
             spin_noise=self.spin_noise * growth,
             speed_noise=self.speed_noise * growth,
             learning_end=self.learning_end,
             fall_end=-math.inf if fall is None else fall.end,
             fall_impulse=math.inf if fall is None else fall.impulse * growth,
         )
+
+
+def pass_settings(problem: DropProblem, *, force: float, share: float, substeps: int = 4) -> PassSettings:
+    """Settings of a pass by the size of the machine: weight on a bearing, air gap, friction of a race.
+
+    Parameters
+    ----------
+    problem : DropProblem
+        Gives the machine.
+    force, share : float
+        Unknown force as a part of the mean weight on a bearing and of the force of the contact [1]; a new one
+        every `STEP` of a free fall.
+    substeps : int
+        Integration steps per 50 µs.
+    """
+    model = problem.model
+    weight, bearings = float(np.mean(model.load_shares)), model.machine.touchdown_bearings
+    growth = math.sqrt(STEP * problem.fall_time / REFERENCE_STEP)
+    impulse = weight * REFERENCE_STEP * growth
+    race = max(float(bearing.bore_radius) / float(bearing.race.inertia) for bearing in bearings)
+    rotor = sum(float(bearing.bore_radius) for bearing in bearings) / model.fe.polar_inertia
+    return PassSettings(
+        substeps=substeps,
+        impulse=force * impulse,
+        share=share * growth,
+        spin_noise=SPIN * impulse * race,
+        speed_noise=SPIN * impulse * rotor,
+        learning_end=LEARNING * problem.fall_time,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

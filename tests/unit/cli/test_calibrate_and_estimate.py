@@ -40,7 +40,7 @@ def shortened() -> Iterator[None]:
         module = "rotordrop.estimation.tracked"
         patch.setattr(f"{module}.BLIND_SCHEDULE", BLIND_SCHEDULE[:4])
         patch.setattr(
-            f"{module}.CALIBRATION_SCHEDULE", (Stage(until=SHORT, impulse=1e-3, share=0.01, passes=1),)
+            f"{module}.CALIBRATION_SCHEDULE", (Stage(until=SHORT, force=0.07, share=0.01, passes=1),)
         )
         patch.setattr(f"{module}.WINDOW", SHORT)
         yield

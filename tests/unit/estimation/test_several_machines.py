@@ -30,7 +30,7 @@ ERRORS = {"peak_force_N": 0.015, "peak_stress_Pa": 0.006, "mean_force_0p15_0p2_N
 """Largest root mean square of the relative errors over all machines, bearings and seeds [1]."""
 
 HALF_WIDTHS = {
-    "small": {"peak_force_N": 0.038, "peak_stress_Pa": 0.013, "support.stiffness": 0.020},
+    "small": {"peak_force_N": 0.028, "peak_stress_Pa": 0.010, "support.stiffness": 0.0155},
     "paper": {"peak_force_N": 0.027, "peak_stress_Pa": 0.010, "support.stiffness": 0.0175},
     "heavy": {"peak_force_N": 0.031, "peak_stress_Pa": 0.0114, "support.stiffness": 0.012},
 }

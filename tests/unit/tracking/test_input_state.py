@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from rotordrop.errors import IdentificationError
+from rotordrop.estimated import Estimated
 from rotordrop.model import layout as L
 from rotordrop.model.parameters import DropModel
 from rotordrop.tracking import _propagation as P
 from rotordrop.tracking.forces import bearing_values, stress_at_force
-from rotordrop.tracking.input_state import GATE_MARGIN, input_state_estimate, lent_by_record, lent_by_twin
+from rotordrop.tracking.input_state import Lent, at_bearings, input_state_estimate, lent_by_record
 from rotordrop.tracking.problem import DropProblem, private_copy
-from rotordrop.tracking.smoother import Smoothed
 
 DT = 5e-5
 COUNT = 800
@@ -62,63 +61,54 @@ def pushed_rotor(model: DropModel, speed: float, start: np.ndarray) -> np.ndarra
 
 
 @pytest.fixture(scope="module")
-def pushed(flight: DropProblem) -> tuple[DropProblem, Smoothed, np.ndarray]:
-    """Readings of the pushed rotor with noise, a trajectory that opens the gate at the pulses, true force."""
+def pushed(flight: DropProblem) -> tuple[DropProblem, Lent, np.ndarray]:
+    """Readings of the pushed rotor with noise, a gate that opens at the pulses, true force."""
+    return recorded_pushes(flight, every=1)
+
+
+def recorded_pushes(flight: DropProblem, every: int) -> tuple[DropProblem, Lent, np.ndarray]:
+    """The pushed rotor with every so manieth reading, the noise density of the readings the same."""
     model, layout = flight.model, flight.model.layout
     m, n_b = layout.n_modes, layout.n_bearings
     start = np.zeros(4 * m)
     start[: 2 * m] = flight.mean[: 2 * m]
-    states = pushed_rotor(model, float(flight.mean[layout.rotor_speed]), start)
-    time = DT * np.arange(COUNT)
-    noise = np.sqrt(flight.variances) * np.random.default_rng(3).standard_normal((COUNT, flight.n_channels))
+    states = pushed_rotor(model, float(flight.mean[layout.rotor_speed]), start)[::every]
+    time = DT * np.arange(COUNT)[::every]
+    variances = flight.variances / every
+    noise = np.sqrt(variances) * np.random.default_rng(3).standard_normal((len(time), flight.n_channels))
     clean = states[:, : 2 * m] @ flight.sensor_rows[:, : 2 * m].T
     gain, offset = np.array([1.01, 0.99, 1.0, 1.005]), np.array([3e-6, -2e-6, 0.0, 1e-6])
-    means = np.zeros((COUNT, len(flight.mean)))
-    means[:] = flight.mean
-    means[:, : 2 * m] = states[:, : 2 * m]
-    first = flight.n_dynamic + len(flight.unknowns)
-    means[:, first : first + 8] = np.concatenate([gain - 1.0, offset])
     force = np.array([true_force(t, n_b) for t in time])
-    at_bearings = np.stack(
-        [states[:, : 2 * m].reshape(-1, 2, m) @ s for s in model.parameters.bearing_shape], 1
-    )
-    gaps = np.array(
-        [means[0, flight.n_dynamic + k] for k, u in enumerate(flight.unknowns) if u.path.endswith("air_gap")]
-    )
-    touching = np.abs(force).max(axis=2) > 0.0
-    inside = np.where(touching, gaps, gaps - 2.0 * GATE_MARGIN)  # as far from the race as the gate wants it
-    race = at_bearings.copy()
-    race[..., 1] += inside
-    means[:, layout.race] = race.reshape(COUNT, -1)
     problem = replace(
-        flight, time=time, readings=gain * (clean + noise) + offset, speed=np.full(COUNT, np.nan)
+        flight,
+        time=time,
+        readings=gain * (clean + noise) + offset,
+        variances=variances,
+        speed=np.full(len(time), np.nan),
     )
-    empty = np.zeros((0, 0))
-    smoothed = Smoothed(
-        filtered=SimpleNamespace(parameter_sample=200),
-        means=means,
-        watched=empty,
-        kept=np.zeros(0, dtype=np.int64),
-        information=empty,
-        score_0=empty,
-        information_0=empty,  # type: ignore[arg-type]
+    lent = Lent(
+        gain_errors=gain - 1.0,
+        offsets=offset,
+        radius=np.where(np.abs(force).max(axis=2) > 0.0, 1.0, 0.0),
+        reach=np.full(n_b, 0.5),
+        theta=flight.mean[flight.parameter_slice],
     )
-    return problem, smoothed, force
+    return problem, lent, force
 
 
-def peaks_of(force: np.ndarray) -> list[np.ndarray]:
+def peaks_of(force: np.ndarray, dt: float = DT) -> list[np.ndarray]:
     """Largest force vector within every pulse."""
     found = []
     for b, _, middle, duration, _ in PULSES:
-        near = slice(round((middle - 0.5 * duration) / DT), round((middle + 0.5 * duration) / DT) + 1)
+        near = slice(round((middle - 0.5 * duration) / dt), round((middle + 0.5 * duration) / dt) + 1)
         size = np.hypot(*force[near, b].T)
         found.append(force[near, b][np.argmax(size)])
     return found
 
 
 def test_the_peaks_of_known_pulses_are_found_back(pushed):
-    problem, smoothed, force = pushed
-    found = input_state_estimate(problem, lent_by_twin(problem, smoothed))
+    problem, lent, force = pushed
+    found = input_state_estimate(problem, lent)
     for estimate, pulse in zip(peaks_of(found.force), PULSES, strict=True):
         true = pulse[4] * np.array(pulse[1])
         assert np.hypot(*(estimate - true)) < 0.2 * pulse[4]
@@ -129,8 +119,8 @@ def test_the_peaks_of_known_pulses_are_found_back(pushed):
 
 def test_the_peak_stress_is_that_of_the_bearing_under_the_peak_force(pushed):
     """The twin's own force at a deflection leads back to the twin's own stress there."""
-    problem, smoothed, _ = pushed
-    theta = smoothed.means[0][problem.parameter_slice]
+    problem, lent, _ = pushed
+    theta = lent.theta
     p = private_copy(problem.model.parameters)
     P.apply_parameters(theta.copy(), problem.targets, p)
     out = np.empty(4)
@@ -139,7 +129,7 @@ def test_the_peak_stress_is_that_of_the_bearing_under_the_peak_force(pushed):
         bearing_values(0.0, -deflection, p.bearing[b, L.AXIAL_OFFSET], b, p, work, out)
         found = stress_at_force(problem, theta, b, np.array([0.0, -out[2]]))
         assert found == pytest.approx(out[3], rel=1e-6)
-    estimate = input_state_estimate(problem, lent_by_twin(problem, smoothed))
+    estimate = input_state_estimate(problem, lent)
     for b in range(2):
         worst = estimate.force[estimate.magnitude[:, b].argmax(), b]
         assert estimate.peak_stress[b] == pytest.approx(stress_at_force(problem, theta, b, worst), rel=1e-9)
@@ -150,45 +140,94 @@ def test_the_peak_stress_is_that_of_the_bearing_under_the_peak_force(pushed):
 
 def test_without_the_twin_the_record_itself_opens_the_gate(pushed):
     """Nothing of the twin enters: gains within 1 per cent, gaps within their prior, and the same peaks."""
-    problem, smoothed, force = pushed
-    lent = lent_by_record(problem)
-    opened = replace(lent, reach=np.zeros(2))  # this rotor is pushed where no race is
+    problem, _, force = pushed
+    own = lent_by_record(problem)
+    motion = at_bearings(problem, (problem.readings - own.offsets) / (1.0 + own.gain_errors))
+    np.testing.assert_array_equal(own.radius, np.hypot(motion[..., 0], motion[..., 1]))
+    assert np.all((own.reach > 100e-6) & (own.reach < 0.96 * problem.mean[problem.gap_entries]))
+    opened = replace(own, reach=np.zeros(2))  # this rotor is pushed where no race is
     found = input_state_estimate(problem, opened)
     np.testing.assert_allclose(found.peak, np.hypot(*force.transpose(2, 0, 1)).max(axis=0), rtol=0.15)
-    lost = replace(smoothed, means=smoothed.means * np.nan)
-    assert np.all(np.isnan(lent_by_twin(problem, lost).radius)) and np.all(np.isfinite(lent.reach))
+
+
+@pytest.mark.parametrize("every", [2, 4])
+def test_fewer_readings_of_the_same_information_give_the_same_forces(flight, pushed, every):
+    """Process noise grows with time, not with samples: 5 and 10 kHz find what 20 kHz finds."""
+    problem, lent, force = pushed
+    whole = input_state_estimate(problem, lent)
+    thin, thin_lent, thin_force = recorded_pushes(flight, every)
+    found = input_state_estimate(thin, thin_lent)
+    assert found.turn == pytest.approx(whole.turn, rel=0.35)
+    for one, other, pulse in zip(
+        peaks_of(found.force, every * DT), peaks_of(whole.force), PULSES, strict=True
+    ):
+        assert np.hypot(*(one - other)) < 0.15 * pulse[4]
+    assert np.sqrt(np.mean((found.force - thin_force) ** 2)) < 2.0 * np.sqrt(
+        np.mean((whole.force - force) ** 2)
+    )
+
+
+def test_the_stated_error_holds_the_peak_and_grows_with_noise(flight):
+    problem, lent, force = recorded_pushes(flight, 1)
+    true = np.hypot(*force.transpose(2, 0, 1)).max(axis=0)
+    found = input_state_estimate(problem, lent)
+    assert np.all(np.abs(found.peak - true) < found.peak_error * true)
+    noise = np.random.default_rng(4).standard_normal(problem.readings.shape)
+    worse = replace(
+        problem, readings=problem.readings + 4e-6 * noise, variances=problem.variances + (4e-6) ** 2
+    )
+    poor = input_state_estimate(worse, lent)
+    assert np.all(np.abs(poor.peak - true) < poor.peak_error * true)
+    assert np.all(poor.put_back > 1.5 * found.put_back)
+    assert np.all(poor.peak_error > found.peak_error)
+    np.testing.assert_allclose(poor.stress_error, np.hypot(0.015, 0.4 * poor.peak_error), rtol=0.2)
+
+
+def test_a_loose_race_opens_the_gate_by_its_play(flight):
+    """The race lies on its balls: above it, rotor and race touch nearer to the centre."""
+    tight = lent_by_record(flight)
+    machine = flight.model.machine
+    bearing = machine.touchdown_bearings[0]
+    ball = bearing.bearing.model_copy(
+        update={"clearance": Estimated(value=40e-6), "preload": Estimated(value=0.0)}
+    )
+    loose = bearing.model_copy(update={"bearing": ball})
+    changed = machine.model_copy(update={"touchdown_bearings": (loose, *machine.touchdown_bearings[1:])})
+    reach = lent_by_record(replace(flight, model=replace(flight.model, machine=changed))).reach
+    assert tight.reach[0] - reach[0] == pytest.approx(20e-6, rel=0.05)
+    assert reach[1] == tight.reach[1]
 
 
 def test_a_force_that_no_bearing_carries_is_refused(pushed):
-    problem, smoothed, _ = pushed
-    theta = smoothed.means[0][problem.parameter_slice]
+    problem, lent, _ = pushed
+    theta = lent.theta
     with pytest.raises(IdentificationError, match=r"NDE: a bearing force of 1000000000000 N was found"):
         stress_at_force(problem, theta, 0, np.array([0.0, -1e12]))
 
 
 def test_impulses_are_those_of_the_pulses(pushed):
-    problem, smoothed, force = pushed
-    found = input_state_estimate(problem, lent_by_twin(problem, smoothed))
+    problem, lent, force = pushed
+    found = input_state_estimate(problem, lent)
     np.testing.assert_allclose(
         DT * found.force.sum(axis=0), DT * force.sum(axis=0), atol=0.05 * DT * np.abs(force).sum(axis=0).max()
     )
 
 
 def test_in_flight_the_force_is_held_at_zero(pushed):
-    problem, smoothed, force = pushed
-    found = input_state_estimate(problem, lent_by_twin(problem, smoothed))
+    problem, lent, force = pushed
+    found = input_state_estimate(problem, lent)
     flying = np.abs(force).max(axis=2) == 0.0
     assert np.count_nonzero(flying) > 1000
     assert found.magnitude[flying].max() < 0.05 * found.peak.max()
 
 
 def test_missing_readings_are_bridged(pushed):
-    problem, smoothed, _ = pushed
+    problem, lent, _ = pushed
     readings = problem.readings.copy()
     readings[400:405] = np.nan
     readings[100:130, 2] = np.nan
     worse = replace(problem, readings=readings)
-    found = input_state_estimate(worse, lent_by_twin(worse, smoothed))
+    found = input_state_estimate(worse, lent)
     assert np.all(np.isfinite(found.force))
-    whole = input_state_estimate(problem, lent_by_twin(problem, smoothed))
+    whole = input_state_estimate(problem, lent)
     np.testing.assert_allclose(found.peak, whole.peak, rtol=0.05)
