@@ -214,14 +214,13 @@ def read_evidence(
     Raises
     ------
     RecordError
-        When the rotor does not fall in the record.
-    IdentificationError
-        When the record has no speed.
+        When the rotor does not fall in the record, or it has no speed.
     """
     name = name or record.name
     if record.speed_readings is None:
-        raise IdentificationError(
-            f"the record {name} has no rotor speed; expected one. Map it with a profile."
+        raise RecordError(
+            f"the record {name} has no rotor speed; expected one. Name its channel in a profile "
+            '([speed] channel = "..."), or give it by hand ([speed] constant = "60 Hz").'
         )
     instant = find_power_off(record, model.machine) if power_off is None else power_off
     levitated = instant.levitated if isinstance(instant, DropInstant) else None

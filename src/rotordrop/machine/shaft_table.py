@@ -76,7 +76,9 @@ def read_shaft_table(path: Path) -> dict[str, Any]:
             for name, unit in zip(headings, units, strict=False)
         ]
     table = _Table(path, headings, rows[0][0])
-    described = [_with_layer(table.row(number, row)) for number, row in cells[1:]]
+    described = [table.row(number, row) for number, row in cells[1:]]
+    if table.by_mass_diameter:
+        described = [_with_layer(row) for row in described]
     if "position" in table.names:
         return _by_position(described, table)
     if "length" in table.names:
@@ -126,15 +128,20 @@ def _sheet(path: Path) -> str:
 
 
 class _Table:
-    """Names and units of the columns, and how a row is read with them."""
+    """Names and units of the columns, and how a row is read with them.
+
+    ``by_mass_diameter`` says that the table gives a mass diameter, as other programs do, in place of a layer.
+    """
 
     def __init__(self, path: Path, headings: list[str], line: int) -> None:
         self.path = path
         self.names: list[str] = []
         self.units: list[str] = []
+        self.by_mass_diameter = False
         for column, heading in enumerate(headings):
             match = _HEADING.match(heading)
             name = (match.group(1) if match else heading).strip(" .:,").lower().replace(" ", "_")
+            self.by_mass_diameter |= _ALIASES.get(name) == "layer_diameter"
             name = _ALIASES.get(name, name)
             if name not in _COLUMNS and name not in _NUMBERS:
                 raise self.error(

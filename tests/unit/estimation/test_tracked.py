@@ -16,7 +16,7 @@ import jsonschema
 import numpy as np
 import pytest
 
-from rotordrop.errors import IdentificationError, UsageError
+from rotordrop.errors import IdentificationError, RecordError, UsageError
 from rotordrop.estimated import Estimated, IdentifiedValue
 from rotordrop.estimation import Tracked, estimate_drop, estimate_drops
 from rotordrop.estimation.bearing_drop import Origin
@@ -313,7 +313,7 @@ def test_sensor_planes_elsewhere_than_stated_are_flagged_and_intervals_widened(
 
 def test_a_record_without_speed_is_refused(calibrated: Machine, synthetic: SyntheticDrop) -> None:
     mute = replace(synthetic.record, speed=None, speed_time=None, speed_readings=None)
-    with pytest.raises(IdentificationError, match="the record mute has no rotor speed; expected one"):
+    with pytest.raises(RecordError, match="the record mute has no rotor speed; expected one"):
         read_evidence(build_drop_model(calibrated), mute, name="mute")
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotordrop.errors import IdentificationError
+from rotordrop.errors import RecordError
 from rotordrop.estimated import NINETY, Estimated
 from rotordrop.estimation.tracked import COARSE_BASIS, drop_problem, recorded_drop
 from rotordrop.identification.evidence import Missing, read_evidence
@@ -164,7 +164,7 @@ def test_the_rotor_starts_where_the_sensors_see_it_with_its_computed_sag(flight)
 
 def test_a_record_without_speed_is_refused(model, prepared):
     mute = replace(prepared.record, speed=None, speed_time=None, speed_readings=None)
-    with pytest.raises(IdentificationError, match=r"the record drop_060 has no rotor speed.*profile"):
+    with pytest.raises(RecordError, match=r"the record drop_060 has no rotor speed.*profile"):
         read_evidence(model, mute, name="drop_060")
 
 
