@@ -185,6 +185,7 @@ def in_si(value: object, kind: str, name: str) -> float:
 
     Examples
     --------
+    >>> from rotordrop.units import in_si
     >>> in_si("60 rpm", "frequency", "speed")
     1.0
     """

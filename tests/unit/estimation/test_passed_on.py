@@ -28,6 +28,7 @@ from rotordrop.machine import example_machine
 from rotordrop.model.parameter_table import parameter
 from rotordrop.model.parameters import build_drop_model
 from rotordrop.model.unknowns import all_unknowns
+from rotordrop.tracking import calibration
 from rotordrop.tracking.calibration import Stage
 
 NINETY = 1.6448536269514722
@@ -87,15 +88,16 @@ def test_the_rest_of_a_record_is_compared_where_it_has_readings() -> None:
 def test_the_noise_factor_is_the_likeliest_of_those_tried(
     likeliest: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    stage = Stage(until=0.1, impulse=2e-3, share=0.01, passes=1)
+    stage = Stage(until=0.1, force=0.2, share=0.01, passes=1)
 
     def likelihood(problem: Any, settings: Any, samples: int, **_: Any) -> Any:
-        factor = settings.impulse / stage.impulse
-        assert settings.share == pytest.approx(factor * stage.share)
+        factor = settings["force"] / stage.force
+        assert settings["share"] == pytest.approx(factor * stage.share)
         return SimpleNamespace(negative_log_likelihood=math.log(factor / likeliest) ** 2, done=samples)
 
+    monkeypatch.setattr(calibration, "pass_settings", lambda _, **settings: settings)
     monkeypatch.setattr(tracked, "forward", likelihood)
-    problem: Any = SimpleNamespace(time=np.linspace(0.0, 0.1, 501))
+    problem: Any = SimpleNamespace(time=np.linspace(0.0, 0.1, 501), fall_time=7e-3)
     smoothed: Any = SimpleNamespace(means=np.zeros((501, 1)))
     nearest = min(NOISE_FACTORS, key=lambda factor: abs(math.log(factor / likeliest)))
     assert best_noise_factor(problem, smoothed, stage) == nearest
@@ -284,7 +286,7 @@ def test_a_twin_that_fits_stands_whether_it_was_cross_checked_or_not(
     monkeypatch.setattr(tracked_estimate, "parameters", parameters)
     monkeypatch.setattr(tracked_estimate, "sensor_errors", lambda *_, **__: ())
     monkeypatch.setattr(tracked_estimate, "_gives_way", lambda *_: False)
-    drop: Any = SimpleNamespace(problem=problem, smoothed=None, consistent=consistent, drops=1)
+    drop: Any = SimpleNamespace(problem=problem, smoothed=None, consistent=consistent, drops=1, kept=())
     check: Any = object() if checked else None
     judged = tracked_estimate._judge(drop, check)
     assert judged.verdict is verdict and judged.widening == widening

@@ -20,11 +20,11 @@ def test_the_first_level_of_a_channel_is_the_mean_of_what_it_read() -> None:
     readings = np.full((40, 3), 7.0)
     readings[:9] = [[1.0, 2.0, 3.0]]
     readings[:3] += 0.5
-    assert _first_level(time, readings)[1] == pytest.approx(readings[time < 0.49e-3, 1].mean())
+    assert _first_level(time, readings, 0.49e-3)[1] == pytest.approx(readings[time < 0.49e-3, 1].mean())
     readings[:3, 0] = np.nan
     readings[:, 2] = np.nan
-    assert _first_level(time, readings)[0] == pytest.approx(readings[3:10, 0].mean())
-    assert np.isnan(_first_level(time, readings)[2])
+    assert _first_level(time, readings, 0.49e-3)[0] == pytest.approx(readings[3:10, 0].mean())
+    assert np.isnan(_first_level(time, readings, 0.49e-3)[2])
 
 
 def test_a_displacement_is_as_uncertain_as_its_covariance_says() -> None:
