@@ -27,8 +27,8 @@ GATE_MARGIN = 0.12
 """Part of the air gap by which a rotor is clear of a race, at least, where its force is held at zero [1].
 
 The straight line through the sensors does not know how far the rotor bends beside it. A gate that closes
-during a contact takes force away and leaves the likelihood no contact to judge: with 0.04 one of four drops of
-a calibrated 60 kg machine read 6.5 in place of 2.7 kN; 0.08, 0.12 and 0.16 give peaks within 3 %."""
+during a contact takes force away and leaves the likelihood no contact to judge: with 0.04 one of four drops
+of a calibrated 60 kg machine read 6.5 in place of 2.7 kN; 0.08, 0.12 and 0.16 give peaks within 3 %."""
 HELD = 0.01
 """Force that may be left while it is held at zero, as a part of the weight on a bearing [1]."""
 TURNED = 2.0 / math.sqrt(math.pi)
