@@ -147,8 +147,10 @@ def _sorted_out(crossings: Array, per_turn: int, place: str) -> tuple[Array, tup
 
 
 def _usual(intervals: Array, reach: int) -> Array:
-    """Median of the intervals around each."""
-    return np.array([np.median(intervals[max(0, k - reach) : k + reach + 1]) for k in range(len(intervals))])
+    """Median of the intervals around each; beyond the ends the first and the last count on."""
+    from scipy.ndimage import median_filter
+
+    return np.asarray(median_filter(intervals, size=2 * reach + 1, mode="nearest"))
 
 
 def _too_many(intervals: Array, usual: Array) -> set[int]:

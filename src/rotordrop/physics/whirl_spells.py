@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.series import runs_of
+
 Array = NDArray[np.float64]
 
 LEAST_TURNS = 2.0
@@ -67,10 +69,10 @@ def whirl_spells(time: Array, orbit: Array, air_gap: float, *, spin: float = 1.0
     which a first look at a record must not wait for.
     """
     outside = np.hypot(orbit[:, 0], orbit[:, 1]) >= LEAST_RADIUS * air_gap
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], outside, [False]]).astype(np.int8)))
     sense = math.copysign(1.0, spin)
     spells = []
-    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+    for begin, length in zip(*runs_of(outside), strict=True):
+        end = begin + length
         angle = np.unwrap(np.arctan2(orbit[begin:end, 1], orbit[begin:end, 0]))
         for first, last in _one_way(angle):
             if abs(angle[last] - angle[first]) >= 2.0 * math.pi * LEAST_TURNS:

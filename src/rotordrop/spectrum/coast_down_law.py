@@ -14,6 +14,7 @@ from scipy.special import ndtr
 
 from rotordrop.errors import RecordError
 from rotordrop.estimated import NINETY, IdentifiedValue, Verdict
+from rotordrop.series import noise_by_differences
 
 Array = NDArray[np.float64]
 Model = Callable[[Array], Array]
@@ -283,7 +284,7 @@ def neighbour_noise(speed: ArrayLike) -> float:
     turning = values[values > 0.02 * float(values.max())] if values.size else values
     if turning.size < 4:
         return 0.0
-    return 1.4826 * float(np.median(np.abs(np.diff(turning, 2)))) / math.sqrt(6.0)
+    return noise_by_differences(turning, 2)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import RecordError
+from rotordrop.series import noise_by_differences
 from rotordrop.spectrum.waterfall import PlanarSignal
 
 Array = NDArray[np.float64]
@@ -257,8 +258,7 @@ def _block_noise(xy: Array) -> float:
     """Noise of one direction [m], from third differences, which a smooth motion leaves near zero."""
     if len(xy) < 8:
         return 0.0
-    difference = np.diff(xy, 3, axis=0)
-    return 1.4826 * float(np.median(np.abs(difference))) / float(np.sqrt(20.0))
+    return noise_by_differences(xy, 3)
 
 
 def _window_statement(

@@ -12,6 +12,7 @@ from rotordrop.measurement.axes import along_sensors, planar_of, sensor_planes
 from rotordrop.measurement.events import FALLEN_SHARE
 from rotordrop.measurement.record import Record
 from rotordrop.measurement.recording import Array
+from rotordrop.series import noise_by_differences, runs_of
 
 GRAVITY = 9.81
 SMOOTHING = 1e-3
@@ -153,8 +154,7 @@ def _upright(levitated: Array, fall: Array) -> Array:
 
 def _noise(position: Array) -> float:
     """Scatter of neighbouring samples about the parabola through them [m]."""
-    third = np.diff(position, 3, axis=0)
-    return float(1.4826 * np.median(np.abs(third)) / np.sqrt(20.0))
+    return noise_by_differences(position, 3)
 
 
 def _floating(paths: list[Path], rate: float) -> NDArray[np.bool_]:
@@ -165,10 +165,9 @@ def _floating(paths: list[Path], rate: float) -> NDArray[np.bool_]:
         away = np.hypot(*(path.position - path.levitated).T)
         near &= away < min(size, 0.7 * path.gap)
     flight = 2.0 * np.sqrt(8.0 * max(path.gap for path in paths) / GRAVITY)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], near, [False]]).astype(np.int8)))
-    for start, end in zip(edges[::2], edges[1::2], strict=True):
-        if start > 0 and end - start < flight * rate:
-            near[start:end] = False
+    for start, length in zip(*runs_of(near), strict=True):
+        if start > 0 and length < flight * rate:
+            near[start : start + length] = False
     return near
 
 

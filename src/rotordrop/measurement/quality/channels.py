@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotordrop.measurement.quality.finding import Finding
 from rotordrop.measurement.quality.rail import zeroed
 from rotordrop.measurement.quality.recorder import bridged
 from rotordrop.measurement.recording import Array
+from rotordrop.series import runs_of
 from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
@@ -82,12 +82,6 @@ def _dead(channel: str, values: Array, moves: float, typical: float) -> Finding:
         severity="stop",
         channel=channel,
     )
-
-
-def runs_of(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Starts and lengths of the runs of true values."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
-    return edges[::2], edges[1::2] - edges[::2]
 
 
 def _stuck(record: Record, channel: str, values: Array) -> Finding | None:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotordrop.measurement.quality.finding import Finding
 from rotordrop.measurement.quality.motion import first_motion
 from rotordrop.measurement.recording import Array
+from rotordrop.series import noise_by_differences, runs_of
 from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ COMES_FROM = 8.0
 
 def zeroed(record: Record, channel: str, values: Array) -> Finding | None:
     """Find a block of exact zeros among readings that are far from zero."""
-    starts, lengths = _runs(values == 0.0)
+    starts, lengths = runs_of(values == 0.0)
     if not len(lengths) or int(np.max(lengths)) < FEWEST_ZEROS:
         return None
     changes = np.abs(np.diff(values))
@@ -92,7 +92,7 @@ def check_rail(record: Record) -> list[Finding]:
 def _railed(channel: str, time: Array, values: Array, least: int) -> Finding | None:
     if len(values) < 100:
         return None
-    noise = 1.4826 * float(np.median(np.abs(np.diff(values, 2)))) / np.sqrt(6.0)
+    noise = noise_by_differences(values, 2)
     for extreme, side in ((float(np.max(values)), "upper"), (float(np.min(values)), "lower")):
         spells = _spells(np.abs(values - extreme), noise, least)
         if len(spells) < FEWEST_SPELLS or not _of_one_level(values, spells, noise):
@@ -115,7 +115,7 @@ def _spells(below: Array, noise: float, least: int) -> list[tuple[int, int]]:
     band = 2.0 * ON_THE_RAIL * noise
     far = max(3.0 * band, FAR * float(np.max(below)))
     reach = round(COMES_FROM * least)
-    starts, lengths = _runs(below <= band)
+    starts, lengths = runs_of(below <= band)
     found = []
     for start, length in zip(starts.tolist(), lengths.tolist(), strict=True):
         before, after = below[max(start - reach, 0) : start], below[start + length : start + length + reach]
@@ -139,8 +139,3 @@ def _is_flat(spell: Array, noise: float) -> bool:
     """Whether a spell is noise about a level, not an arc: its thirds have one mean."""
     thirds = [float(np.mean(part)) for part in np.array_split(spell, 3)]
     return max(thirds) - min(thirds) < 3.0 * noise * float(np.sqrt(3.0 / len(spell)) * np.sqrt(2.0))
-
-
-def _runs(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
-    return edges[::2], edges[1::2] - edges[::2]

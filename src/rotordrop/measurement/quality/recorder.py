@@ -11,6 +11,7 @@ import numpy as np
 
 from rotordrop.measurement.quality.finding import Finding
 from rotordrop.measurement.recording import Array
+from rotordrop.series import runs_of
 from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
@@ -48,14 +49,13 @@ def bridged(record: Record, channel: str, values: Array) -> Finding | None:
         return None
     moving = np.diff(values)[:-1] != 0.0  # a channel that stands still is stuck, which has its own name
     straight = (bend < 0.1 * usual) & moving
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], straight, [False]]).astype(np.int8)))
-    if not len(edges):
+    starts, lengths = runs_of(straight)
+    if not len(starts):
         return None
-    lengths = edges[1::2] - edges[::2]
     longest = int(np.argmax(lengths))
     if lengths[longest] < max(_BRIDGE_S * record.sampling_rate, 12):
         return None
-    at, count = float(record.time[edges[2 * longest]]), int(lengths[longest]) + 2
+    at, count = float(record.time[starts[longest]]), int(lengths[longest]) + 2
     return Finding(
         kind="bridged gap",
         message=f"{count} samples ({(count - 1) / record.sampling_rate * 1e3:.3g} ms) lie on a straight line "

@@ -1,0 +1,34 @@
+"""Facts on evenly sampled series that several packages need: runs of a condition, noise beside the motion."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+SIGMA_OF_MEDIAN = 1.4826
+"""Standard deviation over median absolute deviation of a normal distribution [1]."""
+
+
+def runs_of(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Starts and lengths of the runs of true values, shape (R,) each, for a mask of shape (N,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    return edges[::2], edges[1::2] - edges[::2]
+
+
+def noise_by_differences(values: NDArray[np.float64], order: int) -> float:
+    """Standard deviation of white noise on a smooth motion, in the unit of the values.
+
+    Differences take the motion away; their median leaves the few large ones at contacts aside. The k-th
+    difference of white noise has the variance ``C(2k, k) σ²``.
+
+    Parameters
+    ----------
+    values : ndarray, shape (N, ...)
+        Samples along the first axis; all columns have one noise.
+    order : int
+        How often differences are taken: a polynomial of a lower degree counts as motion.
+    """
+    difference = np.diff(values, order, axis=0)
+    return SIGMA_OF_MEDIAN * float(np.median(np.abs(difference))) / math.sqrt(math.comb(2 * order, order))

@@ -1,0 +1,28 @@
+"""Runs of a condition and noise beside a motion, on series that are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rotordrop.series import noise_by_differences, runs_of
+
+
+def test_runs_are_found_with_starts_and_lengths_at_the_ends_too() -> None:
+    mask = np.array([True, True, False, True, False, False, True, True, True])
+    starts, lengths = runs_of(mask)
+    assert starts.tolist() == [0, 3, 6]
+    assert lengths.tolist() == [2, 1, 3]
+    for nothing in (np.zeros(4, dtype=np.bool_), np.empty(0, dtype=np.bool_)):
+        assert [part.size for part in runs_of(nothing)] == [0, 0]
+
+
+@pytest.mark.parametrize("order", [2, 3])
+@pytest.mark.parametrize("shape", [(20_000,), (20_000, 2)])
+def test_the_noise_is_found_beside_a_motion_and_a_few_jumps(order: int, shape: tuple[int, ...]) -> None:
+    rng = np.random.default_rng(order)
+    time = np.arange(shape[0]) / 20e3
+    motion = 2e-4 * np.sin(2.0 * np.pi * 60.0 * time)
+    motion[::500] += 1e-4
+    values = (motion if len(shape) == 1 else motion[:, None]) + rng.normal(0.0, 0.4e-6, shape)
+    assert noise_by_differences(values, order) == pytest.approx(0.4e-6, rel=0.04)
