@@ -26,9 +26,9 @@ def noise_by_differences(values: NDArray[np.float64], order: int) -> float:
     Parameters
     ----------
     values : ndarray, shape (N, ...)
-        Samples along the first axis; all columns have one noise.
+        Samples along the first axis; all columns have one noise. A difference over a missing one is left out.
     order : int
         How often differences are taken: a polynomial of a lower degree counts as motion.
     """
     difference = np.diff(values, order, axis=0)
-    return SIGMA_OF_MEDIAN * float(np.median(np.abs(difference))) / math.sqrt(math.comb(2 * order, order))
+    return SIGMA_OF_MEDIAN * float(np.nanmedian(np.abs(difference))) / math.sqrt(math.comb(2 * order, order))

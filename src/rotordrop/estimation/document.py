@@ -15,7 +15,7 @@ from rotordrop.estimation.agreement import Agreement
 from rotordrop.estimation.bearing_drop import BearingDrop, Impact, Peak
 from rotordrop.estimation.estimate import Estimate, ReplaySteps, Structure
 from rotordrop.estimation.methods import Replay
-from rotordrop.identification.first_contact import FirstContact
+from rotordrop.identification.first_contact import TimedContact
 from rotordrop.simulation.fingerprint import fingerprint
 
 FORMAT = "rotordrop estimate 2"
@@ -174,7 +174,7 @@ def _replay(estimate: Estimate, steps: ReplaySteps) -> dict[str, Any]:
     }
 
 
-def _first_contact(contact: FirstContact) -> dict[str, float]:
+def _first_contact(contact: TimedContact) -> dict[str, float]:
     return {
         "start_s": contact.start,
         "end_s": contact.end,

@@ -24,7 +24,7 @@ from rotordrop.estimation.agreement import Agreement
 from rotordrop.estimation.bearing_drop import BearingDrop
 from rotordrop.estimation.later_motion import LaterMotion
 from rotordrop.estimation.methods import Method
-from rotordrop.identification.first_contact import FirstContact as FirstContact
+from rotordrop.identification.first_contact import TimedContact as TimedContact
 from rotordrop.identification.friction import FrictionSweep as FrictionSweep
 from rotordrop.identification.speed import SpeedFit
 from rotordrop.machine import Machine
@@ -190,7 +190,7 @@ class ReplaySteps:
     ----------
     speed : SpeedFit
         Speed at power-off and how it falls.
-    contacts : tuple of FirstContact
+    contacts : tuple of TimedContact
         First contact of every bearing in the record, with the stiffness of eq. (17).
     friction : FrictionSweep or None
         Sweep of the friction coefficient; None when it was taken over.
@@ -209,7 +209,7 @@ class ReplaySteps:
     """
 
     speed: SpeedFit
-    contacts: tuple[FirstContact, ...]
+    contacts: tuple[TimedContact, ...]
     friction: FrictionSweep | None
     correlations: tuple[Correlation, ...]
     speed_time: Array

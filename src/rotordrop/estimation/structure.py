@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from rotordrop.estimated import NINETY, Estimated
 from rotordrop.machine import Machine
+from rotordrop.machine.amb import REMANENCE_TIME
 
 Values = dict[str, Estimated]
 
@@ -48,16 +49,16 @@ def _foundation(machine: Machine) -> Values:
     return values
 
 
-USUAL_REMANENCE, REMANENCE_SIGMA = 2e-3, 1.2
-"""Time in which a remanent force usually decays [s], and the standard deviation of its logarithm."""
+REMANENCE_SIGMA = 1.2
+"""Standard deviation of the logarithm of the time in which a remanent force decays [1]."""
 
 
 def _remanence(machine: Machine) -> Values:
     if not machine.ambs or machine.remanence_time_constant is not None:
         return {}
     reach = math.exp(NINETY * REMANENCE_SIGMA)
-    long = (USUAL_REMANENCE / reach, USUAL_REMANENCE * reach)
-    return {"remanence_time_constant": Estimated(value=USUAL_REMANENCE, status="guess", range=long)}
+    long = (REMANENCE_TIME / reach, REMANENCE_TIME * reach)
+    return {"remanence_time_constant": Estimated(value=REMANENCE_TIME, status="guess", range=long)}
 
 
 BEYOND_GRADE = 3.0

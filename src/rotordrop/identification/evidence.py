@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError, RecordError
 from rotordrop.identification.air_gap import AirGap, SettledRest, find_rest, identify_air_gap
-from rotordrop.identification.first_contact import FirstContact, identify_first_contacts
+from rotordrop.identification.first_contact import TimedContact, identify_first_contacts
 from rotordrop.identification.initial_state import InitialState, fit_initial_state
 from rotordrop.identification.sensing import Sensing, build_sensing
 from rotordrop.identification.speed import SpeedFit, identify_speed
 from rotordrop.machine.sensor import Sensor
 from rotordrop.measurement.axes import along_sensors, sensor_polarity
-from rotordrop.measurement.contacts import first_contacts
+from rotordrop.measurement.contacts import first_forces
 from rotordrop.measurement.events import DropInstant
 from rotordrop.measurement.levitated import LevitatedModel
 from rotordrop.measurement.power_off import PowerOff, find_power_off
@@ -93,7 +93,7 @@ class Evidence:
         Air gaps with the sag of the machine's supports.
     fall : InitialState
         State of the rotor at power-off with its covariance, and the fall up to the first contact.
-    contacts : tuple of FirstContact
+    contacts : tuple of TimedContact
         First contact of every bearing.
     reach : ndarray, shape (B,)
         Distance from the bearing centre at which the first force acts [m]; NaN for a bearing that is not
@@ -112,7 +112,7 @@ class Evidence:
     settled_level: Array | Missing
     gap: AirGap | Missing
     fall: InitialState | Missing
-    contacts: tuple[FirstContact, ...] | Missing
+    contacts: tuple[TimedContact, ...] | Missing
     reach: Array | Missing
 
     @property
@@ -295,7 +295,7 @@ def _settled_level(still: Record, rest: SettledRest | Missing) -> Array:
     return np.asarray(level * polarity)
 
 
-def _first_contacts(found: Evidence, fall: InitialState, gap: AirGap) -> tuple[FirstContact, ...]:
+def _first_contacts(found: Evidence, fall: InitialState, gap: AirGap) -> tuple[TimedContact, ...]:
     record, model = found.record, found.model
     return identify_first_contacts(
         record.time - fall.drop_instant,
@@ -320,7 +320,7 @@ def _reach(record: Record, instant: DropInstant | PowerOff, model: DropModel, se
             "rotor before it"
         )
     reached = np.full(len(model.bearing_names), np.nan)
-    for contact in first_contacts(record, model.machine, instant):
+    for contact in first_forces(record, model.machine, instant):
         b = model.bearing_names.index(contact.bearing)
         along = along_sensors(instant.fall.predicted(np.array([contact.start])), record.sensors)
         reached[b] = np.hypot(*sensing.at_bearings(along)[0, b])

@@ -21,8 +21,8 @@ APPROACH = 1.5e-3
 
 
 @dataclass(frozen=True, kw_only=True)
-class FirstContact:
-    """First contact of one bearing.
+class TimedContact:
+    """First contact of one bearing by the times at which the rotor crosses the air gap.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class FirstContact:
 
 def identify_first_contacts(
     time: Array, place: Array, gaps: Array, loads: Array, gravity: float, noise: float
-) -> tuple[FirstContact, ...]:
+) -> tuple[TimedContact, ...]:
     """First contact of every bearing from the measured displacement.
 
     Parameters
@@ -127,7 +127,7 @@ def contact_intervals(time: Array, radius: Array, gap: float) -> Array:
 
 def _first_contact(
     time: Array, radius: Array, gap: float, mass: float, gravity: float, noise: float
-) -> FirstContact:
+) -> TimedContact:
     outside = (radius > (1.0 + CLEAR) * gap) & (time > 0.0)
     if not outside.any():
         raise IdentificationError(
@@ -150,7 +150,7 @@ def _first_contact(
     duration = max(end - start, step)
     stiffness = equivalent_stiffness(duration, mass)
     inside = slice(first, first + int(back[0]))
-    return FirstContact(
+    return TimedContact(
         start=start,
         end=end,
         timing_error=timing,

@@ -18,6 +18,9 @@ RIGID_FREQUENCY = 40.0
 DAMPING_RATIO = 0.3
 """Damping ratio [1] of that motion when the AMB damping is left out."""
 
+REMANENCE_TIME = 2e-3
+"""Time in which the remanent force of a magnet decays, where nothing is known of it [s]."""
+
 
 class ActiveMagneticBearing(Placed):
     """A radial active magnetic bearing, near its operating point.

@@ -9,9 +9,9 @@ if TYPE_CHECKING:
     from rotordrop.measurement.axes import planar as planar
     from rotordrop.measurement.axes import sensor_planes as sensor_planes
     from rotordrop.measurement.contacts import EarlyForces as EarlyForces
-    from rotordrop.measurement.contacts import FirstContact as FirstContact
+    from rotordrop.measurement.contacts import FirstForce as FirstForce
     from rotordrop.measurement.contacts import early_forces as early_forces
-    from rotordrop.measurement.contacts import first_contacts as first_contacts
+    from rotordrop.measurement.contacts import first_forces as first_forces
     from rotordrop.measurement.events import DropInstant as DropInstant
     from rotordrop.measurement.events import find_drop_instant as find_drop_instant
     from rotordrop.measurement.examples import example_record_names as example_record_names
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 _PUBLIC = {
     "axes": ("planar", "sensor_planes"),
-    "contacts": ("EarlyForces", "FirstContact", "early_forces", "first_contacts"),
+    "contacts": ("EarlyForces", "FirstForce", "early_forces", "first_forces"),
     "events": ("DropInstant", "find_drop_instant"),
     "examples": ("example_record_names", "example_record_path"),
     "levitated": ("LevitatedModel", "fit_levitated"),

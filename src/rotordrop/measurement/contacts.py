@@ -59,8 +59,8 @@ class EarlyForces:
 
 
 @dataclass(frozen=True, kw_only=True)
-class FirstContact:
-    """First contact at a touchdown bearing.
+class FirstForce:
+    """First force at a touchdown bearing.
 
     Attributes
     ----------
@@ -178,10 +178,10 @@ def _regularised(
     return force, np.max(error, axis=0).T
 
 
-def first_contacts(
+def first_forces(
     record: Record, machine: Machine, drop: DropInstant, *, span: float = 6e-3
-) -> tuple[FirstContact, ...]:
-    """Find the first contact at every touchdown bearing from the forces of `early_forces`.
+) -> tuple[FirstForce, ...]:
+    """Find the first force at every touchdown bearing from the forces of `early_forces`.
 
     Bearings not touched within `span` of the end of the free fall are left out. Touches less than 0.3 ms
     apart count as one.
@@ -191,7 +191,7 @@ def first_contacts(
     return tuple(contact for contact in found if contact is not None)
 
 
-def _first(forces: EarlyForces, index: int) -> FirstContact | None:
+def _first(forces: EarlyForces, index: int) -> FirstForce | None:
     size = np.hypot(*forces.force[:, index].T)
     sigma = forces.error[:, index]
     largest = float(np.max(np.hypot(forces.force[..., 0], forces.force[..., 1])[2:-3]))
@@ -205,7 +205,7 @@ def _first(forces: EarlyForces, index: int) -> FirstContact | None:
     last = first + int(below[0]) - 1
     peak = first + int(np.argmax(size[first : last + 1]))
     ended = last < len(size) - 4
-    return FirstContact(
+    return FirstForce(
         bearing=forces.bearings[index],
         start=_zero_crossing(forces.time, size, first, peak),
         end=_zero_crossing(forces.time, size, last, peak) if ended else None,

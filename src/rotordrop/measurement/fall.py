@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.machine.amb import REMANENCE_TIME
 from rotordrop.measurement.axes import Plane, sensor_directions
 from rotordrop.measurement.levitated import LevitatedModel
 from rotordrop.measurement.recording import Array
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 REMANENT_SHARE = (0.2, 0.2)
 """Expected share of the static lift that remains at power-off, and its standard deviation."""
 
-REMANENT_TIME = (2e-3, 0.7)
+REMANENT_TIME = (REMANENCE_TIME, 0.7)
 """Expected time constant of the remanent lift [s], and the standard deviation of its logarithm."""
 
 _SIDEWAYS_SHARE = 0.1

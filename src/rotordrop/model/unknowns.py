@@ -11,6 +11,7 @@ import numpy as np
 
 from rotordrop.estimated import NINETY, Estimated
 from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.machine.amb import REMANENCE_TIME
 from rotordrop.machine.sensor import Sensor
 from rotordrop.model import layout as L
 from rotordrop.model.bearing_numbers import Measure, numbers_of
@@ -339,7 +340,7 @@ def drop_unknowns(model: DropModel) -> Iterator[Unknown]:
 def _remanence_time(machine: Machine) -> Unknown:
     row, described = parameter("remanence.time_constant", "drop"), machine.remanence_time_constant
     if described is None:
-        return _of_drop(row, "", math.log(2e-3))
+        return _of_drop(row, "", math.log(REMANENCE_TIME))
     known = prior(row, described)
     return _of_drop(row, "", known.mean, known.sigma)
 

@@ -9,7 +9,7 @@ import plotly.graph_objects as go
 
 from rotordrop.estimated import Correlation
 from rotordrop.estimation.agreement import Agreement
-from rotordrop.estimation.estimate import FirstContact, FrictionSweep
+from rotordrop.estimation.estimate import FrictionSweep, TimedContact
 from rotordrop.report.content import Cell, Table
 from rotordrop.report.quantity import Quantity
 from rotordrop.report.style import BAND_FILL, MICRO, SERIES, axis_title, fit_legend, panels, single
@@ -18,7 +18,7 @@ CONFOUNDED = 0.9
 """Correlation from which two parameters count as confounded [1]."""
 
 
-def first_contact_table(names: Sequence[str], contacts: Sequence[FirstContact]) -> Table:
+def first_contact_table(names: Sequence[str], contacts: Sequence[TimedContact]) -> Table:
     """State first contact and half-period stiffness of every bearing (Neisi 2020, Table 3)."""
     rows = tuple(
         (
@@ -56,7 +56,7 @@ def first_contact_table(names: Sequence[str], contacts: Sequence[FirstContact]) 
     )
 
 
-def _timing(contacts: Sequence[FirstContact]) -> str:
+def _timing(contacts: Sequence[TimedContact]) -> str:
     """Standard error of the contact times, the largest of all bearings."""
     if not contacts:
         return ""

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import SimulationError
+from rotordrop.machine.amb import REMANENCE_TIME
 from rotordrop.model.reduction import Reduction
 from rotordrop.units import InSI
 
@@ -69,7 +70,7 @@ class LevitatedStart:
     rotor_angle: float = 0.0
     delay: float = 0.0
     remanent_force: Array | None = None
-    remanence_time_constant: float = 2e-3
+    remanence_time_constant: float = REMANENCE_TIME
     offset: Array | None = None
     orbit: NDArray[np.complex128] | None = None
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine, load_machine
+from rotordrop.machine.amb import REMANENCE_TIME
 from rotordrop.machine.description import unknown_key
 from rotordrop.machine.parameter_paths import kind_of_path
 from rotordrop.machine.saving import machine_text
@@ -212,7 +213,7 @@ class Study:
         start = LevitatedStart(
             rotor_angle=values["rotor_angle"],
             remanent_force=lift if "remanent_share" in values else None,
-            remanence_time_constant=values.get("remanence_time", 2e-3),
+            remanence_time_constant=values.get("remanence_time", REMANENCE_TIME),
             offset=offset,
         )
         return DropCase(speed=speed, start=start, **settings)

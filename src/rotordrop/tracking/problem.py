@@ -16,6 +16,7 @@ from rotordrop.model.static_sag import race_sag, static_sag
 from rotordrop.model.statics import levitated_sag, settled_sag
 from rotordrop.model.unknowns import Unknown, all_unknowns, sensor_prior, smallest_gap
 from rotordrop.physics import aerodynamics
+from rotordrop.series import noise_by_differences
 from rotordrop.tracking import _filter as F
 from rotordrop.tracking import _propagation as P
 from rotordrop.tracking.sensor_form import begin_caught_up, rest_terms, sensor_form, share_in_groups
@@ -38,6 +39,8 @@ SPEED_SPACING = 2.5e-3
 """Time between speed readings that count as independent [s]."""
 AFTER_FALL = 1.4
 """Time at which parameters are read over the time of a free fall through the widest air gap [1]."""
+FEWEST_DIFFERENCES = 50
+"""Differences from which their median is a noise [1]."""
 FIRST_READINGS = 0.07
 """Time after power-off whose mean reading says where the rotor is, over the time of a free fall [1]."""
 NOISE_FLOOR = 0.1e-6
@@ -301,12 +304,10 @@ def rough_noise(readings: Array) -> Array:
 
     Third differences take the motion away; their median leaves the few at contacts aside.
     """
-    rough = np.abs(np.diff(readings, n=3, axis=0))
     found = np.full(readings.shape[1], np.nan)
     for c in range(readings.shape[1]):
-        known = rough[np.isfinite(rough[:, c]), c]
-        if len(known) > 50:
-            found[c] = np.median(known) / (0.6745 * math.sqrt(20.0))
+        if np.count_nonzero(np.isfinite(np.diff(readings[:, c], 3))) > FEWEST_DIFFERENCES:
+            found[c] = noise_by_differences(readings[:, c], 3)
     return found
 
 

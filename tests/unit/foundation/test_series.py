@@ -26,3 +26,9 @@ def test_the_noise_is_found_beside_a_motion_and_a_few_jumps(order: int, shape: t
     motion[::500] += 1e-4
     values = (motion if len(shape) == 1 else motion[:, None]) + rng.normal(0.0, 0.4e-6, shape)
     assert noise_by_differences(values, order) == pytest.approx(0.4e-6, rel=0.04)
+
+
+def test_missing_samples_are_left_out_of_the_noise() -> None:
+    values = np.random.default_rng(4).normal(0.0, 0.4e-6, 20_000)
+    values[100:4000:7] = np.nan
+    assert noise_by_differences(values, 3) == pytest.approx(0.4e-6, rel=0.05)

@@ -8,7 +8,7 @@ import pytest
 from rotordrop.errors import RecordError
 from rotordrop.estimated import Estimated
 from rotordrop.machine import example_machine
-from rotordrop.measurement import EarlyForces, find_drop_instant, first_contacts
+from rotordrop.measurement import EarlyForces, find_drop_instant, first_forces
 from rotordrop.measurement.axes import sensor_planes
 from rotordrop.measurement.events import coarse_drop
 from rotordrop.measurement.release import GRID, free_rotor, response_at, tabulate_response
@@ -100,7 +100,7 @@ def test_first_contacts_without_any_contact_model(drop, fast_drop, machine, foun
         150: {"NDE": (9.35, 10.04, 4131.0), "DE": (7.24, 9.74, 3410.0)},
     }
     for hertz, record, instant, t0 in ((60, drop, found, -0.25e-3), (150, fast_drop, found_fast, -0.6e-3)):
-        contacts = first_contacts(record, machine, instant)
+        contacts = first_forces(record, machine, instant)
         assert [contact.bearing for contact in contacts] == ["NDE", "DE"]
         for contact in contacts:
             begin, end, peak = truth[hertz][contact.bearing]
@@ -123,18 +123,18 @@ def test_forces_at_the_ends_of_the_span_do_not_hide_a_contact(drop, machine, fou
         monkeypatch.setattr(
             "rotordrop.measurement.contacts.early_forces", lambda *_, early=early, **__: early
         )
-        (contact,) = first_contacts(drop, machine, found)
+        (contact,) = first_forces(drop, machine, found)
         assert contact.bearing == "NDE"
         assert contact.peak_force == pytest.approx(1000.0 * np.sin(np.pi * 4 / 9))
         assert contact.start == pytest.approx(1e-3, abs=1e-4)
         assert contact.end == pytest.approx(1.9e-3, abs=1e-4)
     ends[-4, 1] = (0.0, 8000.0)  # the last knot that counts; 15 per cent of the largest force is no contact
-    assert [one.bearing for one in first_contacts(drop, machine, found)] == ["DE"]
+    assert [one.bearing for one in first_forces(drop, machine, found)] == ["DE"]
 
 
 def test_first_contacts_need_the_amb_planes(drop, machine, found):
     with pytest.raises(RecordError, match=r"the machine has 0 AMB planes; give the AMB nodes"):
-        first_contacts(drop, machine.changed(ambs=()), found)
+        first_forces(drop, machine.changed(ambs=()), found)
 
 
 def test_without_amb_planes_the_instant_is_still_near(drop, machine):

@@ -15,7 +15,7 @@ from rotordrop.estimation.agreement import Agreement, compare_orbits
 from rotordrop.estimation.bearing_drop import BearingDrop, Motion, Origin, Peak, simulated_bearings
 from rotordrop.estimation.estimate import Estimate, FittedParameter, ReplaySteps, Verdict
 from rotordrop.estimation.methods import Replay
-from rotordrop.identification.first_contact import FirstContact
+from rotordrop.identification.first_contact import TimedContact
 from rotordrop.identification.friction import FrictionSweep
 from rotordrop.machine import example_machine
 from rotordrop.model.parameter_table import parameter
@@ -34,7 +34,7 @@ from rotordrop.report.replay_tables import (
 from rotordrop.simulation.result import DropResult
 
 GAPS = np.array([275e-6, 285e-6])
-CONTACT = FirstContact(
+CONTACT = TimedContact(
     start=0.0075,
     end=0.0095,
     timing_error=2e-5,
