@@ -64,6 +64,8 @@ _ORDER = (
     "compare",
     "waterfall",
     "study",
+    "rare",
+    "design",
     "log",
     "synthesize",
     "score",

@@ -35,12 +35,18 @@ def compare(
             help='Scatter of the peak force between equal drops (1 s.d.), "400 N", to judge speeds.',
         ),
     ] = None,
+    limit: Annotated[
+        list[str] | None,
+        typer.Option(metavar="LIMIT", help='Limit to judge by, "peak_stress=2.5 GPa"; repeat it.'),
+    ] = None,
+    allowed: Annotated[int | None, typer.Option(metavar="N", help="Drops that somebody allows.")] = None,
     report: ReportOption = None,
     data: DataOption = None,
     json: JsonOption = None,
 ) -> None:
     """Compare several drops: which was worst, and how sure that is."""
     from rotordrop.report.compare_page import compare_page
+    from rotordrop.report.limits import limit_statement, read_limits
     from rotordrop.report.page import write_page
     from rotordrop.report.terminal import print_summary
 
@@ -54,7 +60,14 @@ def compare(
         )
     machines = {str(document.get("machine", "")) for document in documents.values()}
     drop_scatter = None if scatter is None else {"peak_force_N": scatter}
-    page = compare_page(drops, machine_name=", ".join(sorted(machines - {""})), drop_scatter=drop_scatter)
+    limits = read_limits(limit or ())
+    page = compare_page(
+        drops,
+        machine_name=", ".join(sorted(machines - {""})),
+        drop_scatter=drop_scatter,
+        limits=limits,
+        allowed=allowed,
+    )
     if report is not None:
         write_page(page, report)
     if data is not None:
@@ -67,7 +80,8 @@ def compare(
         if report is not None:
             out.print(f"Report: {report}")
 
-    deliver(_ranked(drops, drop_scatter), json, summarise)
+    verdict = limit_statement(drops, limits, allowed).text
+    deliver(_ranked(drops, drop_scatter) | {"verdict": verdict}, json, summarise)
 
 
 def _documents(paths: list[Path]) -> dict[str, dict[str, Any]]:
@@ -117,6 +131,7 @@ def _ranked(drops: list[ComparedDrop], scatter: Mapping[str, float] | None) -> d
             "worst_first": list(ranking.names),
             "values": list(ranking.values),
             "probability_worst_drop": list(ranking.worst_drop),
+            "probability_worse_than_next": list(ranking.worse_than_next),
             "probability_worst_condition": None if condition is None else list(condition),
             "statement": ranking.statement,
         }

@@ -16,9 +16,12 @@ from rotordrop.cli._output import console, deliver, progress_bar, require_places
 from rotordrop.errors import UsageError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rotordrop.cli._output import Progress
     from rotordrop.study.plan import Study
     from rotordrop.study.run import Report
+    from rotordrop.study.summary import StudyResults
 
 
 class Action(StrEnum):
@@ -60,6 +63,12 @@ def study(
         list[str] | None,
         typer.Option(metavar="VALUE", help='Map the results against a varied value, "speed"; repeat it.'),
     ] = None,
+    above: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="LIMIT", help='Map the probability to exceed a limit, "peak_stress=1.8 GPa"; repeat it.'
+        ),
+    ] = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="FILE", help="Write all drops as HDF5 (NetCDF4).")
     ] = None,
@@ -88,7 +97,8 @@ def study(
     if not len(results):
         console().print(f"{place}: no drop is finished yet")
         return
-    page = study_page(results, by or ())
+    limits = _limits(results, above or ())
+    page = study_page(results, by or (), limits)
     if output is not None:
         save_results(results, output)
     if report is not None:
@@ -97,7 +107,7 @@ def study(
         from rotordrop.report.csv_files import write_data
 
         write_data(page, data)
-    deliver(study_numbers(results, by or ()), json_file, lambda out: print_summary(page, out))
+    deliver(study_numbers(results, by or (), limits), json_file, lambda out: print_summary(page, out))
 
 
 def _opened(place: Path, folder: Path | None) -> tuple[Study, Path]:
@@ -109,6 +119,24 @@ def _opened(place: Path, folder: Path | None) -> tuple[Study, Path]:
             raise UsageError(f"{place} is the folder of a study already; leave out --folder {folder}")
         return study_of(place), place
     return load_study(place), folder or place.with_suffix("")
+
+
+def _limits(results: StudyResults, written: Sequence[str]) -> dict[str, float]:
+    """Limits [SI] by quantity of a bearing, of texts such as ``"peak_stress=1.8 GPa"``."""
+    from rotordrop.machine.description import unknown_key
+    from rotordrop.study.quantities import BEARING_QUANTITIES
+    from rotordrop.units import parse_quantity
+
+    kinds = {q.name: q.kind for q in BEARING_QUANTITIES}
+    found = {}
+    for text in written:
+        name, equals, limit = text.partition("=")
+        if not equals:
+            raise UsageError(f'--above {text!r}; expected a quantity and its limit, "peak_stress=1.8 GPa"')
+        if name.strip() not in kinds:
+            raise UsageError(f"--above: {unknown_key(name.strip(), tuple(kinds))}")
+        found[name.strip()] = parse_quantity(limit.strip(), kinds[name.strip()])
+    return found
 
 
 def _shown(bar: Progress) -> Report:

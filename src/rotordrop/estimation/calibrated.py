@@ -13,6 +13,7 @@ from rotordrop.errors import IdentificationError, UsageError
 from rotordrop.estimated import NINETY, Estimated, IdentifiedValue, Verdict
 from rotordrop.estimation.document import structure_json
 from rotordrop.estimation.estimate import Structure
+from rotordrop.estimation.joint_spread import joint_spread
 from rotordrop.estimation.structure import BEYOND_GRADE_SOURCE
 from rotordrop.estimation.structure_sentence import structure_of
 from rotordrop.estimation.tracked import track_drops
@@ -161,9 +162,10 @@ def calibrate_machine(
     beside = "" if consistent else " (not consistent with them)"  # for people: nothing reads a source
     source = f"calibrated on {', '.join(stems)}{beside}"
     fitted = machine_values(bearings, known, source)
+    joint = joint_spread(problem, mean, covariance, known)
     said = values | _of_drop(problem, mean, covariance)
     drops = [CalibrationDrop(name=n, sha256=r.sha256) for n, r in zip(stems, records, strict=True)]
-    origin = CalibrationOrigin(drops=tuple(drops), consistent=consistent)
+    origin = CalibrationOrigin(drops=tuple(drops), consistent=consistent, joint=joint)
     return Calibration(
         machine=_possible(_with_unbalance(machine, said), fitted, stems).calibrated_on(origin),
         values=values,

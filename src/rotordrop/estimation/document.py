@@ -15,7 +15,9 @@ from rotordrop.estimation.agreement import Agreement
 from rotordrop.estimation.bearing_drop import BearingDrop, Impact, Peak
 from rotordrop.estimation.estimate import Estimate, ReplaySteps, Structure
 from rotordrop.estimation.methods import Replay
+from rotordrop.estimation.severity_numbers import severity_values
 from rotordrop.identification.first_contact import TimedContact
+from rotordrop.measurement.event_date import event_date
 from rotordrop.simulation.fingerprint import fingerprint
 
 FORMAT = "rotordrop estimate 2"
@@ -28,7 +30,10 @@ def estimate_document(estimate: Estimate) -> dict[str, Any]:
         "warnings": list(estimate.warnings),
         "notes": list(estimate.notes),
         "consistency": _consistency(estimate),
-        "bearings": {bearing.name: bearing_entry(bearing) for bearing in estimate.bearings},
+        "bearings": {
+            bearing.name: {**bearing_entry(bearing), **nested(severity_values(estimate, bearing))}
+            for bearing in estimate.bearings
+        },
         "structure": structure_json(estimate.structure),
         "cross_check": [_cross_check(one) for one in estimate.cross_check],
         "later_motion": [{**asdict(one), "larger": one.larger} for one in estimate.later],
@@ -77,6 +82,7 @@ def _heading(estimate: Estimate) -> dict[str, Any]:
         "machine": estimate.machine.name,
         "record": estimate.name if record.path is None else record.path.name,
         "record_sha256": record.sha256,
+        "recorded": event_date(record),
         "simulated_record": estimate.simulated_record,
         "method": "replay" if isinstance(method, Replay) else "tracked",
         "quick": not isinstance(method, Replay) and method.quick,

@@ -20,6 +20,7 @@ from rotordrop.json_schema import (
     numbers,
 )
 from rotordrop.model.parameter_table import LOADS, published
+from rotordrop.severity.numbers import SEVERITY
 from rotordrop.units import si_unit
 
 _VALUE_REF: dict[str, Any] = {"$ref": "#/$defs/value"}
@@ -67,6 +68,7 @@ def _numbers_of_bearing() -> dict[str, Any]:
     properties: dict[str, Any] = {}
     described = {field: f"{row.label} [{row.unit}]" for field, row in published().items()}
     described |= {load.field: f"{load.label} [{si_unit(load.kind)}]" for load in LOADS}
+    described |= {one.field: f"{one.label} [{si_unit(one.kind) or '1'}]" for one in SEVERITY}
     for path, text in described.items():
         group, _, leaf = path.rpartition(".")
         at = properties.setdefault(group, closed({}))["properties"] if group else properties
@@ -206,6 +208,7 @@ _DROP = closed(
     machine=TEXT,
     record=TEXT,
     record_sha256=TEXT,
+    recorded={**TEXT, "description": "When the recorder says the drop was; empty where it does not."},
     simulated_record={**FLAG, "description": "Whether the record is known to be simulated."},
     method={"enum": ["tracked", "replay"]},
     quick=FLAG,

@@ -2,7 +2,7 @@
 
 from rotordrop.machine.amb import ActiveMagneticBearing
 from rotordrop.machine.ball_bearing import BallBearing
-from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin
+from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin, JointSpread
 from rotordrop.machine.examples import example_machine, example_names, example_path
 from rotordrop.machine.loading import load_machine, loads_machine
 from rotordrop.machine.machine import Machine
@@ -29,6 +29,7 @@ __all__ = [
     "Doubt",
     "Element",
     "Friction",
+    "JointSpread",
     "Machine",
     "Material",
     "Race",

@@ -60,6 +60,22 @@ def kind_of_path(machine: Machine, path: str) -> str:
     return kind
 
 
+def value_of_path(machine: Machine, path: str) -> float:
+    """Value [SI] by path, such as ``"NDE.support.stiffness"``.
+
+    Raises
+    ------
+    UsageError
+        If the machine has no such value.
+    """
+    part: Any = machine
+    for key in _resolved(machine, path):
+        part = _step(part, key, path)
+    if part is None:
+        raise UsageError(f"{machine.name!r} leaves {path!r} out; describe it to vary it")
+    return float(part)
+
+
 def _refusal(error: ValueError, values: Mapping[str, float | str | Estimated]) -> str:
     from pydantic import ValidationError
 

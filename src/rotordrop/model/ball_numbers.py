@@ -13,11 +13,13 @@ from numpy.typing import NDArray
 
 from rotordrop.estimated import Estimated
 from rotordrop.machine.ball_bearing import STATIC_STRESS
+from rotordrop.machine.catalog.inference import dynamic_rating, static_rating
 from rotordrop.model.bearing_numbers import (
     BearingFigure,
     BearingNumbers,
     Excess,
     Measure,
+    Ratings,
     RollingElements,
     Spread,
 )
@@ -77,6 +79,29 @@ class BallNumbers(BearingNumbers):
     def load_of_stress(self, stress: Array) -> Array:
         """Load [N] of the ball with a stress at the inner race."""
         return np.asarray((stress / self.constants.stress_coefficient_inner) ** 3)
+
+    def ratings(self) -> Ratings:
+        """Load ratings as given, else by ISO 76 and ISO 281 from the balls."""
+        b = self.balls
+        angle, rows = float(b.contact_angle), 1 if b.arrangement == "single" else 2
+        row = (b.ball_count, float(b.ball_diameter), float(b.pitch_diameter), angle)
+        given = [b.static_load_rating, b.dynamic_load_rating]
+        static, dynamic = (
+            rule(*row) if one is None else float(one)
+            for one, rule in zip(given, (static_rating, dynamic_rating), strict=True)
+        )
+        both = all(one is not None for one in given)
+        return Ratings(
+            static=rows * static,
+            dynamic=dynamic,
+            rows=rows,
+            balls=b.ball_count,
+            gamma=float(b.ball_diameter) * math.cos(angle) / float(b.pitch_diameter),
+            cosine=math.cos(angle),
+            conformity_inner=float(b.conformity_inner),
+            conformity_outer=float(b.conformity_outer),
+            source="as given" if both else "from the balls by ISO 76 and ISO 281",
+        )
 
     @property
     def drag_diameter(self) -> float:

@@ -102,6 +102,37 @@ class Spread:
     described: Estimated | None = None
 
 
+@dataclass(frozen=True, kw_only=True)
+class Ratings:
+    """What a bearing bears by the standards, and what follows from its balls.
+
+    Attributes
+    ----------
+    static : float
+        Static radial load rating C_0 of the whole bearing [N], ISO 76.
+    dynamic : float
+        Basic dynamic radial load rating C of one row [N], ISO 281.
+    rows, balls : int
+        Rows, and balls of each.
+    gamma, cosine : float
+        Ball diameter times cosine of the contact angle over pitch diameter, and that cosine [1].
+    conformity_inner, conformity_outer : float
+        Groove radius over ball diameter [1].
+    source : str
+        Where the load ratings come from.
+    """
+
+    static: float
+    dynamic: float
+    rows: int
+    balls: int
+    gamma: float
+    cosine: float
+    conformity_inner: float
+    conformity_outer: float
+    source: str
+
+
 class BearingNumbers(ABC):
     """The numbers of one kind of bearing; a kind that has none of something says so."""
 
@@ -177,6 +208,10 @@ class BearingNumbers(ABC):
     def load_of_stress(self, stress: Array) -> Array:
         """Load [N] of the element whose largest Hertz stress is given [Pa]; NaN without rolling elements."""
         return np.full_like(stress, np.nan)
+
+    def ratings(self) -> Ratings | None:
+        """Load ratings; None without rolling elements."""
+        return None
 
     def rolling_elements(self) -> RollingElements | None:
         """What defects may show in a spectrum; None without rolling elements."""

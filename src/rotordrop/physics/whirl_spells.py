@@ -74,6 +74,8 @@ def whirl_spells(time: Array, orbit: Array, air_gap: float, *, spin: float = 1.0
     for begin, length in zip(*runs_of(outside), strict=True):
         end = begin + length
         angle = np.unwrap(np.arctan2(orbit[begin:end, 1], orbit[begin:end, 0]))
+        if np.ptp(angle) < 2.0 * math.pi * LEAST_TURNS:
+            continue  # most drops swing at the bottom: they need no search for turning points
         for first, last in _one_way(angle):
             if abs(angle[last] - angle[first]) >= 2.0 * math.pi * LEAST_TURNS:
                 part = slice(first, last + 1)

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from rotordrop.errors import UsageError
 from rotordrop.report.quantity import Quantity
+from rotordrop.severity.numbers import SEVERITY
 
 NUMBERS = (
     ("peak_force_N", "peak bearing force", "force"),
     ("mean_force_0p15_0p2_N", "mean force, 150 to 200 ms", "force"),
     ("peak_stress_Pa", "peak Hertz stress", "pressure"),
     ("mean_stress_Pa", "mean Hertz stress", "pressure"),
+    *((one.field, one.label, one.kind) for one in SEVERITY),
 )
 """Numbers of an estimate document that are compared: key, name, kind."""
+LESS_IS_WORSE = frozenset(one.field for one in SEVERITY if not one.more_is_worse)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,6 +44,12 @@ class ComparedDrop:
         SHA-256 of the recording, to know a drop that is given twice.
     simulated : bool
         Whether the record is known to be simulated.
+    machine, recorded : str
+        Name of the machine, and when the recorder says the drop was.
+    statistics : mapping
+        By bearing, the statistics of the stress as the document has them.
+    hardest : mapping
+        By bearing, what its worst impact was and how much of the whole it made, in words.
     """
 
     name: str
@@ -51,6 +60,16 @@ class ComparedDrop:
     method: str = ""
     record: str = ""
     simulated: bool = False
+    machine: str = ""
+    recorded: str = ""
+    statistics: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    hardest: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def label(self) -> str:
+        """Record, date and speed, for a table."""
+        speed = Quantity(value=self.speed / (2.0 * math.pi), kind="frequency", digits=3).text
+        return ", ".join(part for part in (self.name, self.recorded, speed) if part)
 
     @classmethod
     def of_document(cls, name: str, document: Mapping[str, Any], *, simulated: bool = False) -> ComparedDrop:
@@ -83,6 +102,18 @@ class ComparedDrop:
             method=str(document.get("method", "")),
             record=str(document.get("record_sha256") or ""),
             simulated=simulated,
+            machine=str(document.get("machine", "")),
+            recorded=str(document.get("recorded", "")),
+            statistics={
+                bearing: values["stress_statistics_Pa"]
+                for bearing, values in document["bearings"].items()
+                if "stress_statistics_Pa" in values
+            },
+            hardest={
+                bearing: text
+                for bearing, values in document["bearings"].items()
+                if (text := _hardest(values))
+            },
         )
 
 
@@ -116,8 +147,10 @@ def left_out(drops: Sequence[ComparedDrop]) -> dict[str, str]:
 def _numbers(values: Mapping[str, Any]) -> dict[str, Quantity]:
     found = {}
     for key, _, kind in NUMBERS:
-        if key in values:
-            entry = values[key]
+        entry: Any = values
+        for part in key.split("."):
+            entry = entry.get(part) if isinstance(entry, Mapping) else None
+        if entry is not None:
             interval = entry.get("interval_90")
             found[key] = Quantity(
                 value=float(entry["value"]),
@@ -127,3 +160,19 @@ def _numbers(values: Mapping[str, Any]) -> dict[str, Quantity]:
                 status=str(entry.get("status", "")),
             )
     return found
+
+
+def _hardest(values: Mapping[str, Any]) -> str:
+    """Which impact gave the peak, and which part of impulse and energy it made."""
+    impacts = values.get("impacts") or ()
+    if not impacts:
+        return ""
+    first = max(range(len(impacts)), key=lambda k: impacts[k]["peak_force_N"]["value"])
+    hit = impacts[first]
+    parts = []
+    for key, name in (("impulse_N_s", "impulse"), ("dissipated_energy_J", "energy")):
+        whole = math.fsum(one[key]["value"] for one in impacts)
+        if whole > 0.0:
+            parts.append(f"{hit[key]['value'] / whole:.0%} of the {name}")
+    moment = Quantity(value=hit["peak_time_s"], kind="time", digits=3).text
+    return f"impact {first + 1} of {len(impacts)} at {moment}: {' and '.join(parts)}"

@@ -10,6 +10,7 @@ from rotordrop._version import __version__
 from rotordrop.estimation.bearing_drop import History
 from rotordrop.estimation.estimate import CrossCheck, Estimate, FittedParameter, Innovations, ReplaySteps
 from rotordrop.estimation.methods import Replay
+from rotordrop.measurement.event_date import event_date
 from rotordrop.report.content import (
     SIMULATED_RECORD,
     Figure,
@@ -24,7 +25,7 @@ from rotordrop.report.estimate_numbers import headline_card, identified_table
 from rotordrop.report.innovations import innovations_figure, nis_figure, whiteness_figure
 from rotordrop.report.inspection import assumptions_section, inspection_section, limits_section
 from rotordrop.report.machine_sections import defaults_section, drawing_section, weight_shares
-from rotordrop.report.origin import Origin, event_date
+from rotordrop.report.origin import Origin
 from rotordrop.report.parameters import ParameterRow, parameter_figure, parameter_table
 from rotordrop.report.quantity import Quantity, written
 from rotordrop.report.record_quality import quality_statements, record_quality_section
@@ -35,6 +36,7 @@ from rotordrop.report.replay_tables import (
     friction_sweep_figure,
     window_table,
 )
+from rotordrop.report.severity_section import severity_section
 
 KINDS = {"N": "force", "Pa": "pressure"}
 PRIOR_NOTE = (
@@ -150,6 +152,7 @@ def _sections(estimate: Estimate) -> tuple[Section, ...]:
             weight_shares(estimate.machine),
             contact_tables=tables,
         ),
+        severity_section(estimate),
         *_agreement(estimate, names),
         _parameters(estimate),
         *_friction(steps),

@@ -3,25 +3,12 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from rotordrop.measurement.record import Record, sha256_of
-
-EVENT_KEYS = (
-    "start",
-    "event_time",
-    "event time",
-    "trigger_time",
-    "trigger time",
-    "trigger",
-    "date",
-    "recorded",
-    "time",
-)
-"""Header entries of recorders that say when the drop was."""
+from rotordrop.measurement.record import sha256_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,12 +69,3 @@ def now() -> str:
 def command_line(arguments: Sequence[str]) -> str:
     """The command as it can be typed again."""
     return shlex.join(["rotordrop", *arguments])
-
-
-def event_date(record: Record) -> str:
-    """When the recorder says the drop was; empty where its header does not tell."""
-    told: Mapping[str, str] = {str(key).strip().lower(): str(value) for key, value in record.metadata.items()}
-    for key in EVENT_KEYS:
-        if any(sign.isdigit() for sign in told.get(key, "")):
-            return told[key][:40]
-    return ""

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
 
 from rotordrop._version import __version__
+from rotordrop.errors import UsageError
+from rotordrop.machine.description import unknown_key
 from rotordrop.machine.parameter_paths import kind_of_path
 from rotordrop.report.content import Cell, Figure, ReportContent, Section, Statement, Table
 from rotordrop.report.quantity import display_unit
@@ -17,17 +20,23 @@ from rotordrop.report.style import SERIES, axis_title, fit_legend, panels, plain
 from rotordrop.simulation.fingerprint import fingerprint
 from rotordrop.study.plan import CASE_KINDS
 from rotordrop.study.quantities import Quantity
+from rotordrop.study.sensitivity import Share, influences
 from rotordrop.study.summary import Known, StudyResults
 from rotordrop.units import format_quantity
 
 SHARES = (0.5, 0.9, 0.99)
-MAPPED = ("peak_force", "peak_stress")
-"""Quantities of a bearing that are drawn against what varies."""
+MAPPED = ("peak_force", "peak_stress", "settling_time")
+"""Quantities of a bearing whose quantiles are drawn against what varies."""
+MATTERS = ("peak_force", "peak_stress")
+"""Quantities of a bearing for which it is said which varied values matter."""
+WHIRL = {"backward_whirl": 0.0}
 HEADLINES = ("peak_force", "peak_stress", "largest_radius")
 """Quantities of a bearing that stand beside the verdict."""
 
 
-def study_page(results: StudyResults, by: Sequence[str] = ()) -> ReportContent:
+def study_page(
+    results: StudyResults, by: Sequence[str] = (), limits: Mapping[str, float] | None = None
+) -> ReportContent:
     """Build the report on a study.
 
     Parameters
@@ -36,14 +45,16 @@ def study_page(results: StudyResults, by: Sequence[str] = ()) -> ReportContent:
         Finished drops.
     by : sequence of str
         Varied values to draw the results against.
+    limits : mapping, optional
+        Limits [SI] by the quantity of a bearing, such as ``"peak_stress"``: the probability to exceed them.
     """
     study = results.study
-    sections = [_spread_section(results)]
-    sections += [_map_section(results, name) for name in by]
+    sections = [_spread_section(results), *_influence_section(results)]
+    sections += [_map_section(results, name, limits or {}) for name in by]
     return ReportContent(
         title=f"{len(results)} simulated drops: {study.name}",
         subtitle=f"{study.machine.name}, {1e3 * study.duration:g} ms each",
-        verdict=tuple(_verdict(results)),
+        verdict=tuple(_verdict(results, limits or {})),
         summary=(_table(results, SHARES, only=HEADLINES),),
         facts=(
             ("machine", study.machine.name),
@@ -55,7 +66,7 @@ def study_page(results: StudyResults, by: Sequence[str] = ()) -> ReportContent:
     )
 
 
-def _verdict(results: StudyResults) -> list[Statement]:
+def _verdict(results: StudyResults, limits: Mapping[str, float]) -> list[Statement]:
     said = []
     missing = results.study.drops - len(results)
     if missing:
@@ -74,6 +85,16 @@ def _verdict(results: StudyResults) -> list[Statement]:
                 level="notice" if whirl.value == 0.0 else "warning",
             )
         )
+        for quantity, limit in limits.items():
+            over = results.exceedance(f"{bearing.name}.{quantity}", limit)
+            shown = format_quantity(limit, _quantity(results, bearing.name, quantity).kind)
+            said.append(
+                Statement(
+                    text=f"{bearing.name}: {_share(over)} of the drops exceed "
+                    f"{quantity.replace('_', ' ')} {shown}.",
+                    level="notice" if over.upper < 0.5 else "warning",
+                )
+            )
     said.append(
         Statement(
             text="The drops are simulated; the spread is that of the values that vary here, not of all that "
@@ -129,7 +150,45 @@ def _kind(results: StudyResults, name: str) -> str:
     return kind_of_path(results.study.machine, name.replace("*", first, 1))
 
 
-def _map_section(results: StudyResults, name: str) -> Section:
+def _quantity(results: StudyResults, bearing: str, quantity: str) -> Quantity:
+    wanted = f"{bearing}.{quantity}"
+    names = {q.name: q for q in results.columns}
+    if wanted not in names:
+        raise UsageError(unknown_key(quantity, tuple(name.partition(".")[2] for name in names)))
+    return names[wanted]
+
+
+def _influence_section(results: StudyResults) -> tuple[Section, ...]:
+    """Which varied values matter, or nothing where there are too few drops to say it."""
+    tables = []
+    for bearing in results.study.machine.touchdown_bearings:
+        for quantity in MATTERS:
+            try:
+                found = influences(results, f"{bearing.name}.{quantity}")
+            except UsageError:
+                return ()
+            tables.append(
+                Table(
+                    columns=("varied value", "alone (90 %)", "with all others (90 %)"),
+                    rows=tuple((one.name, _part(one.alone), _part(one.total)) for one in found),
+                    caption=f"{bearing.name} {quantity.replace('_', ' ')}: shares of the variance",
+                )
+            )
+    text = (
+        "Alone: the part of the variance over the drops that would go if this value were known. With all "
+        "others: the part that would be left if everything else were known; it takes the design "
+        '"sensitivity". What no value explains alone is their interplay, which in a drop is chaos.'
+    )
+    return (Section(heading="What matters", text=(text,), tables=tuple(tables)),)
+
+
+def _part(share: Share | None) -> str:
+    if share is None:
+        return "–"
+    return f"{100 * share.value:.0f} % ({100 * share.lower:.0f} to {100 * share.upper:.0f} %)"
+
+
+def _map_section(results: StudyResults, name: str, limits: Mapping[str, float]) -> Section:
     kind = _kind(results, name)
     figures = [
         Figure(
@@ -138,19 +197,28 @@ def _map_section(results: StudyResults, name: str) -> Section:
         )
         for quantity in MAPPED
     ]
+    figures += [
+        Figure(
+            chart=_map_figure(results, name, kind, quantity, limit),
+            caption="Probability among drops with neighbouring values; bars: 90 % intervals.",
+        )
+        for quantity, limit in (WHIRL | dict(limits)).items()
+    ]
     return Section(heading=f"Against {plain(name)}", figures=tuple(figures))
 
 
-def _map_figure(results: StudyResults, name: str, kind: str, quantity: str) -> go.Figure:
+def _map_figure(
+    results: StudyResults, name: str, kind: str, quantity: str, limit: float | None = None
+) -> go.Figure:
     bearings = [bearing.name for bearing in results.study.machine.touchdown_bearings]
     figure = panels(bearings)
     factor, unit = display_unit(kind)
     for column, bearing in enumerate(bearings, start=1):
         key = f"{bearing}.{quantity}"
-        shown: Quantity = next(q for q in results.columns if q.name == key)
-        size, size_unit = display_unit(shown.kind)
-        for k, share in enumerate(SHARES):
-            cells = results.map(key, name, share=share)
+        shown = _quantity(results, bearing, quantity)
+        size, size_unit = display_unit(shown.kind) if limit is None else (1.0, "")
+        for k, share in enumerate(SHARES if limit is None else SHARES[:1]):
+            cells = results.map(key, name, share=share, above=limit)
             known: list[Known] = [cell["known"] for cell in cells]
             figure.add_trace(
                 go.Scatter(
@@ -162,7 +230,7 @@ def _map_figure(results: StudyResults, name: str, kind: str, quantity: str) -> g
                     },
                     mode="lines+markers",
                     line={"color": SERIES[k], "width": 1.6},
-                    name=f"{100 * share:g} % of drops below",
+                    name=f"{100 * share:g} % of drops below" if limit is None else "probability",
                     legendgroup=str(k),
                     showlegend=column == 1,
                 ),
@@ -170,7 +238,11 @@ def _map_figure(results: StudyResults, name: str, kind: str, quantity: str) -> g
                 col=column,
             )
         figure.update_xaxes(title_text=axis_title(plain(name), unit), col=column)
-    figure.update_yaxes(title_text=axis_title(quantity.replace("_", " "), size_unit), col=1)
+    words = quantity.replace("_", " ")
+    if limit is not None:
+        beyond = format_quantity(limit, shown.kind) if limit else ""
+        words = f"P({words} > {beyond})" if beyond else f"P({words})"
+    figure.update_yaxes(title_text=axis_title(words, size_unit), col=1)
     return fit_legend(figure)
 
 
@@ -178,7 +250,9 @@ def _reach(length: float, size: float) -> float:
     return length / size if math.isfinite(length) else 0.0
 
 
-def study_numbers(results: StudyResults, by: Sequence[str] = ()) -> dict[str, Any]:
+def study_numbers(
+    results: StudyResults, by: Sequence[str] = (), limits: Mapping[str, float] | None = None
+) -> dict[str, Any]:
     """The same numbers, ready for JSON (SI; an open end of an interval is null)."""
     study = results.study
     return {
@@ -212,9 +286,30 @@ def study_numbers(results: StudyResults, by: Sequence[str] = ()) -> dict[str, An
                 for bearing in study.machine.touchdown_bearings
                 for quantity in MAPPED
             }
+            | {
+                f"{bearing.name}.{quantity} > {limit:g}": [
+                    {"from": cell["from"], "to": cell["to"], **_numbers(cell["known"])}
+                    for cell in results.map(f"{bearing.name}.{quantity}", name, above=limit)
+                ]
+                for bearing in study.machine.touchdown_bearings
+                for quantity, limit in (WHIRL | dict(limits or {})).items()
+            }
             for name in by
         },
+        "influences": _influences(results),
     }
+
+
+def _influences(results: StudyResults) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for bearing in results.study.machine.touchdown_bearings:
+        for quantity in MATTERS:
+            column = f"{bearing.name}.{quantity}"
+            try:
+                found[column] = [asdict(one) for one in influences(results, column)]
+            except UsageError:
+                return {}  # too few drops
+    return found
 
 
 def _numbers(known: Known) -> dict[str, Any]:

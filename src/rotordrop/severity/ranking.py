@@ -64,6 +64,8 @@ class Ranking:
         drops is unknown.
     drop_scatter : float or None
         Standard deviation between equal drops [unit of value].
+    worse_than_next : tuple of float
+        Probability that each drop but the last was worse than the one after it [1].
     statement : str
     """
 
@@ -72,6 +74,7 @@ class Ranking:
     worst_drop: tuple[float, ...]
     worst_condition: tuple[float, ...] | None
     drop_scatter: float | None
+    worse_than_next: tuple[float, ...]
     statement: str
 
     def as_json(self) -> dict[str, Any]:
@@ -84,11 +87,14 @@ class Ranking:
             if self.worst_condition is None
             else list(self.worst_condition),
             "drop_scatter": self.drop_scatter,
+            "probability_worse_than_next": list(self.worse_than_next),
             "statement": self.statement,
         }
 
 
-def rank_drops(drops: Sequence[DropSeverity], *, drop_scatter: float | None = None) -> Ranking:
+def rank_drops(
+    drops: Sequence[DropSeverity], *, drop_scatter: float | None = None, more_is_worse: bool = True
+) -> Ranking:
     """Order drops by severity and say how sure the order is.
 
     Two questions are kept apart. Which of the recorded drops was the worst? Only the errors of the estimates
@@ -101,6 +107,8 @@ def rank_drops(drops: Sequence[DropSeverity], *, drop_scatter: float | None = No
         At least two, independent of each other.
     drop_scatter : float, optional
         Standard deviation between drops under equal conditions [unit of value], from repeated drops.
+    more_is_worse : bool
+        Whether the largest value is the worst; of a safety factor the smallest is.
 
     Returns
     -------
@@ -112,18 +120,20 @@ def rank_drops(drops: Sequence[DropSeverity], *, drop_scatter: float | None = No
     """
     if len(drops) < 2:
         raise UsageError(f"ranking: {len(drops)} drop given, at least two are needed")
-    ordered = sorted(drops, key=lambda drop: -drop.value)
-    value = np.array([drop.value for drop in ordered])
+    sign = 1.0 if more_is_worse else -1.0
+    ordered = sorted(drops, key=lambda drop: -sign * drop.value)
+    value = sign * np.array([drop.value for drop in ordered])
     error = np.array([drop.standard_error for drop in ordered])
     worst_drop = worst_probability(value, error)
     condition = None if drop_scatter is None else worst_probability(value, np.hypot(error, drop_scatter))
     return Ranking(
         names=tuple(drop.name for drop in ordered),
-        values=tuple(value.tolist()),
+        values=tuple((sign * value).tolist()),
         worst_drop=tuple(worst_drop.tolist()),
         worst_condition=None if condition is None else tuple(condition.tolist()),
         drop_scatter=drop_scatter,
-        statement=_statement(ordered[0].name, float(worst_drop[0]), condition),
+        worse_than_next=tuple(worse_probability(value, error).tolist()),
+        statement=_statement([drop.name for drop in ordered], worst_drop, condition, value, error),
     )
 
 
@@ -141,11 +151,22 @@ def worst_probability(value: Array, error: Array) -> Array:
     return np.asarray(result / result.sum())
 
 
-def _statement(first: str, drop: float, condition: Array | None) -> str:
+def worse_probability(value: Array, error: Array) -> Array:
+    """Probability that each of several independent normal quantities exceeds the next one [1], (n − 1,)."""
+    error = np.maximum(error, 1e-300)
+    return np.asarray(ndtr((value[:-1] - value[1:]) / np.hypot(error[:-1], error[1:])))
+
+
+def _statement(
+    names: Sequence[str], worst: Array, condition: Array | None, value: Array, error: Array
+) -> str:
+    first, drop = names[0], float(worst[0])
     if drop >= CLEAR:
         text = f"the drop {first} was the worst of those recorded ({drop:.0%})"
     else:
-        text = f"{first} shows the largest value; that it was the worst drop has a probability of {drop:.0%}"
+        text = f"{first} shows the worst value; that it was the worst drop has a probability of {drop:.0%}"
+    if len(names) > 2:
+        text += f"; it was worse than {names[1]} with {float(worse_probability(value, error)[0]):.0%}"
     if condition is None:
         return f"{text}; the scatter between equal drops is unknown, so nothing follows for its conditions"
     sure = float(condition[0])

@@ -168,7 +168,7 @@ def integrate_window(  # noqa: C901, PLR0915  one compiled loop
         Filled with the states on the grid, as far as they were reached.
     log : ndarray, shape (R, 8)
         Contacts; the first entries are those still open.
-    running : ndarray, shape (B, 4)
+    running : ndarray, shape (B, 5)
         The running contacts.
     peaks : ndarray, shape (B, 7)
         Peaks of the window.

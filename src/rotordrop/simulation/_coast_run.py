@@ -131,7 +131,7 @@ def begin(setup: Setup) -> Run:
     progress = np.zeros(C.N_PROGRESS)
     progress[C.STEP] = FIRST_STEP
     progress[C.PREVIOUS_ERROR] = 1.0
-    running = np.zeros((n_b, 4))
+    running = np.zeros((n_b, _loop.N_RUN_COLUMNS))
     log = np.zeros((n_b, _loop.N_LOG_COLUMNS))
     progress[C.LOGGED] = C.start_window(start, 0.0, setup.parameters, running, log)
     whirl = np.zeros((n_b, C.N_WHIRL))
@@ -410,13 +410,14 @@ def _carry_contacts(run: Run, histories: Array, begun: float, step: float, log: 
         normal, power = histories[:, b, H.H_CONTACT_FORCE], histories[:, b, H.H_CONTACT_POWER]
         row[_loop.LOG_IMPULSE] += step * float(np.sum(normal))
         row[_loop.LOG_DISSIPATED] += step * float(np.sum(power))
+        row[_loop.LOG_SLIDING] += step * float(np.sum(power))  # settled: the normal force loses nothing
         best = int(np.argmax(normal))
         if normal[best] > row[_loop.LOG_PEAK_FORCE]:
             row[_loop.LOG_PEAK_FORCE] = normal[best]
             row[_loop.LOG_PEAK_TIME] = begun + (best + 1) * step
             row[_loop.LOG_AZIMUTH] = atan2(histories[best, b, H.H_NORMAL_Y], histories[best, b, H.H_NORMAL_X])
         run.running[b, _loop.RUN_FORCE] = normal[-1]
-        run.running[b, _loop.RUN_POWER] = power[-1]
+        run.running[b, _loop.RUN_POWER] = run.running[b, _loop.RUN_SLIDING] = power[-1]
         run.running[b, _loop.RUN_DELTA] = histories[-1, b, H.H_DELTA]
         for column, quantity in zip((C.PEAK_INDENTATION, C.PEAK_FORCE, C.PEAK_STRESS), values, strict=True):
             best = int(np.argmax(quantity[:, b]))

@@ -32,13 +32,16 @@ LOG_PEAK_TIME = 4
 LOG_AZIMUTH = 5
 LOG_IMPULSE = 6
 LOG_DISSIPATED = 7
-N_LOG_COLUMNS = 8
+LOG_SLIDING = 8
+N_LOG_COLUMNS = 9
 
 # Columns of the running contact of each bearing.
 RUN_IN_CONTACT = 0
 RUN_FORCE = 1
 RUN_POWER = 2
 RUN_DELTA = 3
+RUN_SLIDING = 4
+N_RUN_COLUMNS = 5
 
 SAFETY = 0.9
 SHRINK = 0.2
@@ -113,21 +116,24 @@ def dense_output(theta: float, h: float, y: Array, k: Array, tab: Tableau, out: 
 
 
 @inner_kernel
-def contact_values(b: int, y: Array, p: KernelParameters) -> tuple[float, float, float, float, float, float]:
+def contact_values(
+    b: int, y: Array, p: KernelParameters
+) -> tuple[float, float, float, float, float, float, float]:
     """Contact of one bearing in a state: indentation [m], normal force [N], friction force [N], normal
-    x and y [1], power dissipated in the contact [W].
+    x and y [1], power dissipated in the contact [W] and the part of it that sliding takes [W].
     """
     ux, uy, vx, vy = relative_motion(b, y, p)
     omega, omega_i = y[p.rotor_at[L.ROTOR_SPEED]], y[p.bearing_at[b, L.RACE_SPIN]]
     delta, F_r, mu, nx, ny, v_t, elastic = contact_state(ux, uy, vx, vy, omega, omega_i, p.bearing[b])
-    power = mu * F_r * v_t + (F_r - elastic) * (vx * nx + vy * ny)
-    return delta, F_r, mu * F_r, nx, ny, power
+    sliding = mu * F_r * v_t
+    power = sliding + (F_r - elastic) * (vx * nx + vy * ny)
+    return delta, F_r, mu * F_r, nx, ny, power, sliding
 
 
 @inner_kernel
 def contact_at(b: int, y: Array, p: KernelParameters, out: Array) -> None:
     """Fill ``out`` (6,) with the contact of one bearing in a state, in the order of `contact_values`."""
-    out[0], out[1], out[2], out[3], out[4], out[5] = contact_values(b, y, p)
+    out[0], out[1], out[2], out[3], out[4], out[5], _sliding = contact_values(b, y, p)
 
 
 @lean_kernel
@@ -183,7 +189,7 @@ def log_contacts(
     """Update the contact log with an accepted step; returns the number of entries opened so far."""
     scratch_time = -math.inf
     for b in range(p.bearing.shape[0]):
-        delta, force, _friction, nx, ny, power = contact_values(b, y_new, p)
+        delta, force, _friction, nx, ny, power, sliding = contact_values(b, y_new, p)
         was = running[b, RUN_IN_CONTACT] > 0.0
         touches = delta > 0.0
         begin = t
@@ -209,10 +215,11 @@ def log_contacts(
             if middle != scratch_time:
                 dense_output((middle - t) / h, h, y, k, tab, scratch)
                 scratch_time = middle
-            _delta, between, _friction, mid_x, mid_y, mid_power = contact_values(b, scratch, p)
+            _delta, between, _friction, mid_x, mid_y, mid_power, mid_sliding = contact_values(b, scratch, p)
             sixth = (end - begin) / 6.0
             log[row, LOG_IMPULSE] += sixth * (running[b, RUN_FORCE] + 4.0 * between + force)
             log[row, LOG_DISSIPATED] += sixth * (running[b, RUN_POWER] + 4.0 * mid_power + power)
+            log[row, LOG_SLIDING] += sixth * (running[b, RUN_SLIDING] + 4.0 * mid_sliding + sliding)
             note_peak(middle, between, mid_x, mid_y, log[row])
             note_peak(t + h, force, nx, ny, log[row])
             if not touches:
@@ -222,28 +229,29 @@ def log_contacts(
         running[b, RUN_FORCE] = force
         running[b, RUN_POWER] = power
         running[b, RUN_DELTA] = delta
+        running[b, RUN_SLIDING] = sliding
     return n_log
 
 
 @kernel
 def start_running(y: Array, t: float, p: KernelParameters, running: Array, log: Array) -> int:
     """Fill the running contacts from a state that may already touch; returns the number of entries opened."""
-    now = np.empty(6)
     n_log = 0
     for b in range(p.bearing.shape[0]):
-        contact_at(b, y, p, now)
+        delta, force, _friction, nx, ny, power, sliding = contact_values(b, y, p)
         running[b, RUN_IN_CONTACT] = 0.0
-        running[b, RUN_FORCE] = now[1]
-        running[b, RUN_POWER] = now[5]
-        running[b, RUN_DELTA] = now[0]
-        if now[0] > 0.0:
+        running[b, RUN_FORCE] = force
+        running[b, RUN_POWER] = power
+        running[b, RUN_DELTA] = delta
+        running[b, RUN_SLIDING] = sliding
+        if delta > 0.0:
             if n_log < log.shape[0]:
                 log[n_log, LOG_BEARING] = b
                 log[n_log, LOG_START] = t
                 log[n_log, LOG_END] = np.nan
-                log[n_log, LOG_PEAK_FORCE] = now[1]
+                log[n_log, LOG_PEAK_FORCE] = force
                 log[n_log, LOG_PEAK_TIME] = t
-                log[n_log, LOG_AZIMUTH] = atan2(now[4], now[3])
+                log[n_log, LOG_AZIMUTH] = atan2(ny, nx)
             n_log += 1
             running[b, RUN_IN_CONTACT] = n_log
     return n_log
@@ -276,7 +284,7 @@ def integrate_drop(  # noqa: C901, PLR0915  one compiled loop
         Size of each state that error control looks at; the states behind (angle, energies) follow.
     states : ndarray, shape (T, n)
         Filled with the states on the grid.
-    log : ndarray, shape (R, 8)
+    log : ndarray, shape (R, 9)
         Filled with the contacts, columns ``LOG_*``.
     counters : ndarray, shape (5,)
         Filled with accepted steps, rejected steps, last step [s], contacts, time reached [s].
@@ -292,7 +300,7 @@ def integrate_drop(  # noqa: C901, PLR0915  one compiled loop
     k = np.empty((7, n))
     work = np.empty((2, p.balls.shape[2]))
     scratch = np.empty(n)
-    running = np.zeros((p.bearing.shape[0], 4))
+    running = np.zeros((p.bearing.shape[0], N_RUN_COLUMNS))
     log[:, :] = 0.0
     n_log = start_running(y, times[0], p, running, log)
     t = times[0]

@@ -33,6 +33,7 @@ from rotordrop.simulation._coast_run import (
     prepare,
     stored_energy_of,
 )
+from rotordrop.simulation._loop import N_RUN_COLUMNS
 from rotordrop.simulation.checkpoint import (
     load_checkpoint,
     open_work_folder,
@@ -96,7 +97,7 @@ def simulate_coast_down(
     """
     model = machine if isinstance(machine, DropModel) else build_drop_model(machine, case.reduction)
     setup = prepare(model, case)
-    digest = run_digest(model, repr(case))
+    digest = run_digest(model, f"{case!r} {N_RUN_COLUMNS}")
     folder = None if output is None else _folder(output, resume=resume)
     stored = None if folder is None or not resume else load_checkpoint(folder, digest)
     run = begin(setup) if stored is None else Run.of(stored)

@@ -163,6 +163,7 @@ def _contact_log(log: Array) -> ContactLog:
         azimuth=log[:, _loop.LOG_AZIMUTH].copy(),
         impulse=log[:, _loop.LOG_IMPULSE].copy(),
         dissipated_energy=log[:, _loop.LOG_DISSIPATED].copy(),
+        sliding_energy=log[:, _loop.LOG_SLIDING].copy(),
     )
 
 

@@ -36,8 +36,9 @@ class ContactLog:
         Times [s]; ``end`` is NaN when the contact still lasts.
     peak_force, peak_time, azimuth : ndarray
         Largest normal force [N], when [s], and direction from race to rotor there [rad ccw from +x].
-    impulse, dissipated_energy : ndarray
-        Normal impulse [N s] and energy lost in contact and friction [J].
+    impulse, dissipated_energy, sliding_energy : ndarray
+        Normal impulse [N s], energy lost in contact and friction [J], and the part of it that sliding takes
+        [J]; NaN where it is not known.
     """
 
     bearing: NDArray[np.int64]
@@ -48,6 +49,7 @@ class ContactLog:
     azimuth: Array
     impulse: Array
     dissipated_energy: Array
+    sliding_energy: Array
 
     @property
     def duration(self) -> Array:
@@ -307,7 +309,13 @@ def _read(file: Any) -> DropResult:
     values["steps"] = int(file.attrs["steps"])
     values["rejected_steps"] = int(file.attrs["rejected_steps"])
     values["finished"] = bool(file.attrs["finished"])
-    values["contacts"] = ContactLog(**{f.name: file[f"contact_{f.name}"][()] for f in fields(ContactLog)})
+    unknown = np.full(len(file["contact"]), np.nan)  # files of before the split of the contact's loss
+    values["contacts"] = ContactLog(
+        **{
+            f.name: file[name][()] if (name := f"contact_{f.name}") in file else unknown
+            for f in fields(ContactLog)
+        }
+    )
     lines = {f.name: file[f"line_contact_{f.name}"][()].tolist() for f in fields(LineContact)}
     values["line_contacts"] = tuple(
         LineContact(**dict(zip(lines, numbers, strict=True))) for numbers in zip(*lines.values(), strict=True)

@@ -30,7 +30,7 @@ from rotordrop.study.quantities import columns_of
 
 Array = NDArray[np.float64]
 
-FORMAT = "rotordrop study 1"
+FORMAT = "rotordrop study 2"
 REASON = 160
 """Characters kept of why a drop failed."""
 LEASE = 120.0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import itertools
 import json
 import math
 import tomllib
@@ -20,15 +19,15 @@ from rotordrop.errors import UsageError
 from rotordrop.machine import Machine, load_machine
 from rotordrop.machine.amb import REMANENCE_TIME
 from rotordrop.machine.description import unknown_key
-from rotordrop.machine.parameter_paths import kind_of_path
+from rotordrop.machine.parameter_paths import kind_of_path, value_of_path
 from rotordrop.machine.saving import machine_text
 from rotordrop.simulation.case import DropCase, LevitatedStart
+from rotordrop.study import sampling
 from rotordrop.study.distributions import Distribution, read_distribution
 from rotordrop.units import parse_quantity
 
 Array = NDArray[np.float64]
 
-DESIGNS = ("random", "latin hypercube", "sobol", "grid")
 CASE_KINDS: Mapping[str, str] = {
     "speed": "speed",
     "rotor_angle": "angle",
@@ -42,15 +41,18 @@ CASE_KINDS: Mapping[str, str] = {
 TURN = Distribution(shape="uniform", numbers=(0.0, 2.0 * math.pi))
 _KEYS = (
     "name", "machine", "drops", "seed", "duration", "output_step", "tolerance", "reduction", "start",
-    "design", "shard", "speed", "vary", "until",
+    "design", "shard", "speed", "vary", "until", "calibrated", "choose", "repeats",
 )  # fmt: skip
+_WHOLE = ("drops", "seed", "shard", "repeats")
 _QUANTITIES = {
     "duration": "time",
     "output_step": "time",
     "speed": "speed",
     "tolerance": "dimensionless",
 }
-_AS_WRITTEN = ("name", "drops", "seed", "tolerance", "reduction", "design", "shard")
+_AS_WRITTEN = (
+    "name", "drops", "seed", "tolerance", "reduction", "design", "shard", "calibrated", "repeats"
+)  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,7 +97,7 @@ class Study:
     levitated : bool
         Whether drops start floating in the AMBs; else straight in the centre.
     design : str
-        One of `DESIGNS`.
+        One of `sampling.DESIGNS`.
     shard : int
         Drops of a shard.
     speed : float
@@ -105,6 +107,14 @@ class Study:
         one value) or by a name of `CASE_KINDS`.
     until : Until or None
         When to end early.
+    calibrated : bool
+        Whether the values of a calibrated machine vary by their joint distribution.
+    choose : dict of Distribution
+        Values that are chosen, not left to chance, in the design ``"candidates"``.
+    repeats : int
+        Drops of each candidate; every candidate meets the same chances.
+    candidates : tuple of tuple of float
+        Values of every candidate [SI], in the order of ``choose``; drawn over its bounds when left out.
     """
 
     name: str
@@ -121,6 +131,10 @@ class Study:
     speed: float = math.nan
     vary: Mapping[str, Distribution] = field(default_factory=dict)
     until: Until | None = None
+    calibrated: bool = False
+    choose: Mapping[str, Distribution] = field(default_factory=dict)
+    repeats: int = 1
+    candidates: tuple[tuple[float, ...], ...] = ()
 
     def __post_init__(self) -> None:
         _check(self)
@@ -128,10 +142,18 @@ class Study:
     @cached_property
     def varied(self) -> Mapping[str, Distribution]:
         """Everything that varies, by name in order; the unknown rotor angle of a levitated start included."""
-        spread = dict(sorted(self.vary.items()))
+        joint = (
+            {} if self.joint is None else {p: self.joint.marginal(k) for k, p in enumerate(self.joint.paths)}
+        )
+        spread = dict(sorted({**joint, **self.vary, **self.choose}.items()))
         if self.levitated and "rotor_angle" not in spread:
             spread["rotor_angle"] = TURN
         return spread
+
+    @cached_property
+    def joint(self) -> sampling.Joint | None:
+        """Joint distribution of the calibrated values, where they vary by it."""
+        return sampling.joint_of(self.machine) if self.calibrated else None
 
     @property
     def shards(self) -> int:
@@ -148,43 +170,31 @@ class Study:
         Every drop has random numbers of its own (Philox, key = seed, counter = drop), so that no value
         depends on shards, threads or the order of work.
         """
-        share = self._shares(first, last)
+        values = self.values_at(self._shares(first, last))
+        if self.candidates:
+            chosen = [list(self.varied).index(name) for name in self.choose]
+            values[:, chosen] = np.array(self.candidates)[np.arange(first, last) // self.repeats]
+        return values
+
+    def values_at(self, share: Array) -> Array:
+        """Values [SI] at independent shares of the probability, shape (n, V) as `varied` has them."""
         columns = [spread(share[:, j]) for j, spread in enumerate(self.varied.values())]
-        return np.column_stack(columns) if columns else np.zeros((last - first, 0))
+        values = np.column_stack(columns) if columns else np.zeros((len(share), 0))
+        if self.joint is not None:
+            together = [list(self.varied).index(path) for path in self.joint.paths]
+            values[:, together] = self.joint.values(share[:, together])
+        return values
 
     def _shares(self, first: int, last: int) -> Array:
-        width = len(self.varied)
-        if self.design == "random":
-            return np.array([_uniform(self.seed, i, width) for i in range(first, last)]).reshape(-1, width)
-        if self.design == "grid":
-            return self._grid_shares(first, last)
-        from scipy.stats import qmc
-
-        random = np.random.Generator(np.random.Philox(np.random.SeedSequence(self.seed)))
-        if self.design == "sobol":
-            sequence = qmc.Sobol(width, scramble=True, rng=random)
-            if first:
-                sequence.fast_forward(first)
-            return np.asarray(sequence.random(last - first))
-        return np.asarray(self._hypercube[first:last])
-
-    @cached_property
-    def _hypercube(self) -> Array:
-        from scipy.stats import qmc
-
-        random = np.random.Generator(np.random.Philox(np.random.SeedSequence(self.seed)))
-        return np.asarray(qmc.LatinHypercube(len(self.varied), rng=random).random(self.drops))
-
-    def _grid_shares(self, first: int, last: int) -> Array:
-        """Cells in the order of the product, again and again until all drops are placed."""
         names = list(self.varied)
-        grids = [name for name in names if self.varied[name].shape == "grid"]
-        cells = list(itertools.product(*(range(len(self.varied[name].numbers)) for name in grids)))
-        share = np.array([_uniform(self.seed, i, len(names)) for i in range(first, last)])
-        for row, drop in enumerate(range(first, last)):
-            for name, place in zip(grids, cells[drop % len(cells)], strict=True):
-                share[row, names.index(name)] = (place + 0.5) / len(self.varied[name].numbers)
-        return share
+        if self.design == "grid":
+            return sampling.grid(self.seed, first, last, self.varied)
+        if self.design == "candidates":
+            return sampling.crossed(self.seed, first, last, names, list(self.choose), self.repeats)
+        if self.design == "latin hypercube":
+            return sampling.hypercube(self.seed, self.drops, len(names))[first:last]
+        draw = {"random": sampling.independent, "sobol": sampling.sobol, "sensitivity": sampling.sensitivity}
+        return draw[self.design](self.seed, first, last, len(names))
 
     def machine_values(self, values: Mapping[str, float]) -> dict[str, float]:
         """Machine values by full path [SI]; a star stands for every touchdown bearing."""
@@ -192,6 +202,11 @@ class Study:
         for path, value in values.items():
             if path not in CASE_KINDS:
                 found |= dict.fromkeys(_starred(self.machine, path), value)
+        if self.joint is not None:
+            for path in [path for path in self.joint.paths if path.endswith("friction.dynamic")]:
+                static = path.replace("dynamic", "static")  # known by its ratio alone
+                ratio = value_of_path(self.machine, static) / value_of_path(self.machine, path)
+                found.setdefault(static, ratio * found[path])
         return found
 
     def case(self, values: Mapping[str, float]) -> DropCase:
@@ -228,6 +243,8 @@ class Study:
             "speed_rad_per_s": None if math.isnan(self.speed) else self.speed,
             "vary": {name: {spread.shape: list(spread.numbers)} for name, spread in self.vary.items()},
             "until": None if self.until is None else dict(self.until.__dict__),
+            "choose": {name: {spread.shape: list(spread.numbers)} for name, spread in self.choose.items()},
+            "candidates": [list(one) for one in self.candidates],
         }
 
     @cached_property
@@ -235,12 +252,6 @@ class Study:
         """SHA-256 of plan and machine: two studies with the same one give the same numbers."""
         plan = json.dumps(self.document(), sort_keys=True, allow_nan=False)
         return hashlib.sha256((plan + "\n" + machine_text(self.machine)).encode()).hexdigest()
-
-
-def _uniform(seed: int, drop: int, width: int) -> Array:
-    """Random numbers of one drop: a block of the counter that no other drop reaches."""
-    bits = np.random.Philox(key=seed, counter=[0, 0, drop & (2**64 - 1), 0])
-    return np.random.Generator(bits).random(width)
 
 
 def _starred(machine: Machine, path: str) -> list[str]:
@@ -251,13 +262,13 @@ def _starred(machine: Machine, path: str) -> list[str]:
 
 
 def _check(study: Study) -> None:
-    for name in ("drops", "shard"):
+    for name in ("drops", "shard", "repeats"):
         if not getattr(study, name) >= 1:
             raise UsageError(f"{name} = {getattr(study, name)!r}; expected a whole number above zero")
     if not 0 <= study.seed < 2**64:
         raise UsageError(f"seed = {study.seed}; expected a whole number from 0 to 2^64 - 1")
-    if study.design not in DESIGNS:
-        raise UsageError(f"design = {study.design!r}; expected one of {', '.join(DESIGNS)}")
+    if study.design not in sampling.DESIGNS:
+        raise UsageError(f"design = {study.design!r}; expected one of {', '.join(sampling.DESIGNS)}")
     if not 0.0 < study.tolerance <= 1e-3:
         raise UsageError(f"tolerance = {study.tolerance!r}; expected a number up to 1e-3, such as 1e-6")
     _check_vary(study)
@@ -277,11 +288,31 @@ def _check_vary(study: Study) -> None:
             continue
         for path in _starred(study.machine, name):
             kind_of_path(study.machine, path)
+    _check_choice(study)
     gridded = [name for name, spread in study.vary.items() if spread.shape == "grid"]
     if bool(gridded) != (study.design == "grid"):
         raise UsageError(
             f"design = {study.design!r} with {len(gridded)} values varied by 'grid'; a design \"grid\" needs "
             "at least one of them, and other designs none ('choices' draws from a list)"
+        )
+
+
+def _check_choice(study: Study) -> None:
+    if bool(study.choose) != (study.design == "candidates"):
+        raise UsageError(
+            f'design = {study.design!r} with {len(study.choose)} values under [choose]; "candidates" '
+            "needs at least one of them, and other designs none"
+        )
+    for name in study.choose:
+        for path in _starred(study.machine, name):
+            kind_of_path(study.machine, path)
+    once = [*study.vary, *study.choose, *(() if study.joint is None else study.joint.paths)]
+    paths = [path for name in once for path in _starred(study.machine, name)]
+    twice = {path for path in paths if paths.count(path) > 1}
+    if twice:
+        raise UsageError(
+            f"{', '.join(sorted(twice))}: drawn in two ways; expected each value once among [vary], [choose] "
+            "and the calibrated values. Leave one of them out"
         )
 
 
@@ -294,15 +325,18 @@ def read_study(table: Mapping[str, Any], machine: Machine) -> Study:
         raise UsageError("the study does not say how many drops; write drops = 1000")
     settings: dict[str, Any] = {"name": machine.name}
     settings |= {key: table[key] for key in ("name", "design", "reduction") if key in table}
-    settings |= {key: _whole(key, table[key]) for key in ("drops", "seed", "shard") if key in table}
+    settings |= {key: _whole(key, table[key]) for key in _WHOLE if key in table}
     settings |= {key: _quantity(key, table[key], kind) for key, kind in _QUANTITIES.items() if key in table}
     if table.get("start", "levitated") not in ("levitated", "centred"):
         raise UsageError(f'start = {table["start"]!r}; expected "levitated" or "centred"')
     settings["levitated"] = table.get("start", "levitated") == "levitated"
-    settings["vary"] = {
-        name: read_distribution(name, spread, _reader(machine, name))
-        for name, spread in dict(table.get("vary", {})).items()
-    }
+    if "calibrated" in table:
+        settings["calibrated"] = _flag("calibrated", table["calibrated"])
+    for part in ("vary", "choose"):
+        settings[part] = {
+            name: read_distribution(name, spread, _reader(machine, name))
+            for name, spread in dict(table.get(part, {})).items()
+        }
     if "until" in table:
         settings["until"] = _until(table["until"])
     return Study(machine=machine, **settings)
@@ -317,14 +351,26 @@ def planned_study(document: Mapping[str, Any], machine: Machine) -> Study:
         output_step=document["output_step_s"],
         levitated=document["start"] == "levitated",
         speed=math.nan if speed is None else speed,
-        vary={
-            name: Distribution(shape=shape, numbers=tuple(numbers))
-            for name, spread in document["vary"].items()
-            for shape, numbers in spread.items()
-        },
+        vary=_spreads(document["vary"]),
+        choose=_spreads(document["choose"]),
+        candidates=tuple(tuple(one) for one in document["candidates"]),
         until=None if until is None else Until(**until),
         **{key: document[key] for key in _AS_WRITTEN},
     )
+
+
+def _spreads(written: Mapping[str, Any]) -> dict[str, Distribution]:
+    return {
+        name: Distribution(shape=shape, numbers=tuple(numbers))
+        for name, spread in written.items()
+        for shape, numbers in spread.items()
+    }
+
+
+def _flag(key: str, raw: Any) -> bool:
+    if not isinstance(raw, bool):
+        raise UsageError(f"{key} = {raw!r}; expected true or false")
+    return raw
 
 
 def _whole(key: str, raw: Any) -> int:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.machine import Machine
+from rotordrop.model.parameters import DropModel
 from rotordrop.physics.whirl_spells import WhirlSpell, whirl_spells
+from rotordrop.simulation.losses import losses
 from rotordrop.simulation.result import DropResult
 from rotordrop.units import si_unit
 
@@ -48,6 +50,16 @@ BEARING_QUANTITIES: tuple[Quantity, ...] = (
     Quantity(
         name="contact_energy", kind="energy", meaning="energy dissipated by contact damping and friction"
     ),
+    Quantity(name="sliding_energy", kind="energy", meaning="heat of sliding between rotor and race"),
+    Quantity(name="damping_energy", kind="energy", meaning="energy lost in the normal direction of contacts"),
+    Quantity(name="ball_set_energy", kind="energy", meaning="energy lost between race and support"),
+    Quantity(name="support_energy", kind="energy", meaning="energy lost in support and foundation"),
+    Quantity(name="drag_energy", kind="energy", meaning="energy lost to the drag of the race"),
+    Quantity(
+        name="spin_up_energy",
+        kind="energy",
+        meaning="work of friction on the spin of the race, drag included",
+    ),
     Quantity(name="largest_radius", kind="dimensionless", meaning="largest displacement over the air gap"),
     Quantity(name="forward_whirl", kind="dimensionless", meaning="share of the time in forward whirl"),
     Quantity(name="backward_whirl", kind="dimensionless", meaning="share of the time in backward whirl"),
@@ -69,6 +81,7 @@ BEARING_QUANTITIES: tuple[Quantity, ...] = (
 )
 DROP_QUANTITIES: tuple[Quantity, ...] = (
     Quantity(name="dissipated", kind="energy", meaning="energy dissipated in all places"),
+    Quantity(name="bending_energy", kind="energy", meaning="energy lost to the damping of the rotor"),
     Quantity(name="final_speed", kind="speed", meaning="rotor speed at the end"),
     Quantity(
         name="energy_residual",
@@ -96,11 +109,19 @@ def columns_of(machine: Machine) -> tuple[Quantity, ...]:
     return (*bearings, *magnets, *DROP_QUANTITIES)
 
 
-def row_of(machine: Machine, result: DropResult) -> Array:
+def row_of(model: DropModel, result: DropResult) -> Array:
     """Numbers of one drop in the order of `columns_of`, shape (Q,), SI; NaN where there is none."""
+    machine, lost = model.machine, losses(model, result)
     values: list[float] = []
     for b in range(len(machine.touchdown_bearings)):
-        found = _bearing_numbers(machine, result, b)
+        found = _bearing_numbers(machine, result, b) | {
+            "sliding_energy": lost.sliding[b],
+            "damping_energy": lost.contact[b],
+            "ball_set_energy": lost.ball_set[b],
+            "support_energy": lost.support[b],
+            "drag_energy": lost.drag[b],
+            "spin_up_energy": lost.spin_up[b],
+        }
         values += [found[q.name] for q in BEARING_QUANTITIES]
     if machine.ambs:
         moved = result.at_nodes([amb.node for amb in machine.ambs])
@@ -108,13 +129,14 @@ def row_of(machine: Machine, result: DropResult) -> Array:
     certificate = result.certificate
     values += [
         float(result.state[-1, list(result.state_names).index("dissipated energy")]),
+        lost.bending,
         float(result.speed[-1]),
         certificate.energy_residual / max(certificate.energy_scale, 1e-300),
     ]
     return np.array(values)
 
 
-def _bearing_numbers(machine: Machine, result: DropResult, b: int) -> Mapping[str, float]:
+def _bearing_numbers(machine: Machine, result: DropResult, b: int) -> dict[str, float]:
     gap = float(machine.touchdown_bearings[b].air_gap)
     log = result.contacts
     mine = log.bearing == b

@@ -30,7 +30,7 @@ from rotordrop.study.folder import (
 )
 from rotordrop.study.plan import Study
 from rotordrop.study.quantities import columns_of, row_of
-from rotordrop.study.summary import StudyResults, load_results, shards_needed
+from rotordrop.study.summary import EarlyEnd, StudyResults, load_results
 
 LOOK_EVERY = 0.5
 """Pause between two looks at the folder [s]."""
@@ -131,7 +131,7 @@ def compute_shard(
     for row in range(len(drops)):
         if stop is not None and stop.is_set():
             return None
-        numbers[row], reason = _one_drop(
+        numbers[row], reason = one_drop(
             study, model, dict(zip(study.varied, varied[row].tolist(), strict=True))
         )
         reasons.append(reason)
@@ -140,14 +140,15 @@ def compute_shard(
     return Shard(first=drops.start, varied=varied, numbers=numbers, reasons=tuple(reasons))
 
 
-def _one_drop(study: Study, model: DropModel, values: dict[str, float]) -> tuple[Any, str]:
+def one_drop(study: Study, model: DropModel, values: dict[str, float]) -> tuple[Any, str]:
+    """Numbers of the drop with given varied values [SI], in the order of `columns_of`, and why it failed."""
     nothing = np.nan
     try:
         drawn = model.with_values(study.machine_values(values))
         result = simulate_drop(drawn, study.case(values))
         if not result.finished:
             return nothing, result.outcome
-        return row_of(drawn.machine, result), ""
+        return row_of(drawn, result), ""
     except RotordropError as error:
         return nothing, str(error)
 
@@ -243,6 +244,7 @@ def _drive(
 ) -> None:
     """Hand out the shards in order and look at the folder until all is done or enough is known."""
     began, before = time.monotonic(), _drops(study, place)
+    end = EarlyEnd(study, place)
     running = {pool.submit(work, shard) for shard in wanted}
     try:
         while running:
@@ -250,7 +252,7 @@ def _drive(
             for one in done:
                 one.result()
             _tell(study, place, report, began, before)
-            if shards_needed(study, place) is not None:
+            if end.shards() is not None:
                 break
     finally:
         for one in running:
@@ -272,9 +274,9 @@ def _tell(study: Study, place: StudyFolder, report: Report | None, began: float,
 
 def _wait_for_others(study: Study, place: StudyFolder, report: Report | None) -> None:
     """Wait for shards that others work on; take over those whose worker has gone."""
-    began, before = time.monotonic(), _drops(study, place)
+    began, before, end = time.monotonic(), _drops(study, place), EarlyEnd(study, place)
     while missing := _missing(study, place):
-        if shards_needed(study, place) is not None:
+        if end.shards() is not None:
             return
         worked = [work_on(place.path, shard) for shard in missing]
         _tell(study, place, report, began, before)

@@ -95,8 +95,10 @@ class StudyResults:
     def _computed(self) -> NDArray[np.bool_]:
         return np.array([not reason for reason in self.reasons], dtype=bool)
 
-    def map(self, name: str, by: str, *, cells: int = 10, share: float = 0.5) -> list[dict[str, Any]]:
-        """Quantile of a quantity against a varied value, cell by cell.
+    def map(
+        self, name: str, by: str, *, cells: int = 10, share: float = 0.5, above: float | None = None
+    ) -> list[dict[str, Any]]:
+        """Quantile of a quantity, or the probability that it exceeds a limit, against a varied value.
 
         Parameters
         ----------
@@ -108,6 +110,9 @@ class StudyResults:
             Cells with equal numbers of drops; a value with fewer distinct values has one cell for each.
         share : float
             Which quantile [1].
+        above : float, optional
+            Limit [SI]; gives the probability to exceed it, among drops that were computed, in place of a
+            quantile.
 
         Returns
         -------
@@ -121,10 +126,13 @@ class StudyResults:
         else:
             place = np.argsort(np.argsort(x, kind="stable"), kind="stable") * cells // len(x)
             groups = [place == k for k in range(cells)]
+        done = self._computed
+
+        def known(group: NDArray[np.bool_]) -> Known:
+            return quantile(y[group], share) if above is None else exceedance(y[group & done], above)
+
         return [
-            {"from": float(x[g].min()), "to": float(x[g].max()), "known": quantile(y[g], share)}
-            for g in groups
-            if g.any()
+            {"from": float(x[g].min()), "to": float(x[g].max()), "known": known(g)} for g in groups if g.any()
         ]
 
 
@@ -187,7 +195,7 @@ def load_results(folder: str | Path) -> StudyResults:
     Of a study that ended early only the drops that ended it: which others were finished by then is chance.
     """
     study, place = study_of(folder), StudyFolder(Path(folder))
-    enough = shards_needed(study, place)
+    enough = EarlyEnd(study, place).shards()
     return _joined(study, place, place.finished() if enough is None else range(enough))
 
 
@@ -206,28 +214,36 @@ def _joined(study: Study, place: StudyFolder, shards: Sequence[int]) -> StudyRes
     )
 
 
-def shards_needed(study: Study, place: StudyFolder) -> int | None:
-    """Number of shards from the first on that make the quantile known that ends a study early, or None.
+class EarlyEnd:
+    """Looks whether the quantile that ends a study early is known; reads every shard once, however often.
 
     Only the unbroken row of shards since the first counts, looked at after 1, 2, 3, … shards and then in
     steps of about an eighth, so that the answer does not depend on which shard was finished first.
     """
-    if study.until is None:
-        return None
-    finished = set(place.finished())
-    row = next((k for k in range(study.shards) if k not in finished), study.shards)
-    place_of = [q.name for q in columns_of(study.machine)].index(study.until.column)
-    values: list[Array] = []
-    looked = 1
-    for k in range(row):
-        values.append(read_shard(place, study, k)["numbers"][:, place_of])
-        if k + 1 < looked:
-            continue
-        looked = max(looked + 1, looked * 9 // 8)
-        found = quantile(np.concatenate(values), study.until.quantile)
-        if 0.5 * (found.upper - found.lower) <= study.until.within * abs(found.value):
-            return k + 1
-    return None
+
+    def __init__(self, study: Study, place: StudyFolder) -> None:
+        self._study = study
+        self._place = place
+        self._values: list[Array] = []
+        self._next_look = 1
+        self._needed: int | None = None
+
+    def shards(self) -> int | None:
+        """Number of shards from the first on that are enough; None while they are not."""
+        study, until = self._study, self._study.until
+        if until is None or self._needed is not None:
+            return self._needed
+        column = [q.name for q in columns_of(study.machine)].index(until.column)
+        while (k := len(self._values)) < study.shards and self._place.shard_path(k).exists():
+            self._values.append(read_shard(self._place, study, k)["numbers"][:, column])
+            if k + 1 < self._next_look:
+                continue
+            self._next_look = max(self._next_look + 1, self._next_look * 9 // 8)
+            found = quantile(np.concatenate(self._values), until.quantile)
+            if 0.5 * (found.upper - found.lower) <= until.within * abs(found.value):
+                self._needed = k + 1
+                break
+        return self._needed
 
 
 def save_results(results: StudyResults, path: str | Path) -> None:

@@ -184,6 +184,7 @@ def _contact_log(times: Array, histories: Array) -> ContactLog:
         azimuth=log[5],
         impulse=log[6],
         dissipated_energy=log[7],
+        sliding_energy=np.full(log.shape[1], np.nan),
     )
 
 

@@ -62,6 +62,7 @@ def drop_result() -> DropResult:
             azimuth=np.radians([-90.0, -95.0, 250.0]),
             impulse=np.array([1.33, 6.4, 0.5]),
             dissipated_energy=np.array([1.7, 7.6, 0.2]),
+            sliding_energy=np.array([1.6, 7.5, 0.2]),
         ),
         bearing_names=("NDE", "DE"),
         state_names=("a", "b"),

@@ -13,9 +13,10 @@ import pytest
 from rotordrop.estimated import IdentifiedValue
 from rotordrop.estimation.bearing_drop import BearingDrop, simulated_bearings
 from rotordrop.estimation.later_motion import LaterMotion
+from rotordrop.measurement.event_date import event_date
 from rotordrop.report.content import ReportContent
 from rotordrop.report.inspection import inspection_section, limits_section
-from rotordrop.report.origin import Origin, UsedFile, command_line, event_date
+from rotordrop.report.origin import Origin, UsedFile, command_line
 from rotordrop.report.page import css_text, render_page
 from rotordrop.report.style import LOG_LABELS, faded
 from rotordrop.report.time_panels import Panel, time_panels

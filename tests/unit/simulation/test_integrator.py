@@ -192,7 +192,7 @@ def test_loop_can_be_called_with_a_state_that_touches_already(quick):
     from rotordrop.simulation.levitation import start_of_drop
 
     state, parameters = start_of_drop(quick, DropCase(speed=SPEED, start=PRESSED))
-    running, log = np.zeros((2, 4)), np.zeros((4, _loop.N_LOG_COLUMNS))
+    running, log = np.zeros((2, _loop.N_RUN_COLUMNS)), np.zeros((4, _loop.N_LOG_COLUMNS))
     assert _loop.start_running(state, 0.0, parameters, running, log) == 2
     assert np.all(log[:2, _loop.LOG_PEAK_FORCE] > 0.0)
     rate, work = np.zeros(quick.layout.size), np.empty((2, parameters.balls.shape[2]))

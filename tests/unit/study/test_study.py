@@ -20,8 +20,8 @@ from rotordrop.model.parameters import build_drop_model
 from rotordrop.study.folder import StudyFolder, claimed, open_folder, read_shard, study_of
 from rotordrop.study.plan import Study, load_study, read_study
 from rotordrop.study.quantities import columns_of
-from rotordrop.study.run import _one_drop, compute_shard, run_study, work_on
-from rotordrop.study.summary import load_results, save_results, shards_needed
+from rotordrop.study.run import compute_shard, one_drop, run_study, work_on
+from rotordrop.study.summary import EarlyEnd, load_results, save_results
 
 MACHINE = example_machine("lp400")
 TABLE = {
@@ -142,7 +142,7 @@ def test_a_changed_machine_file_is_noticed(serial, tmp_path):
 def test_a_drop_that_fails_is_a_result_with_its_reason(monkeypatch):
     study = study_with()
     model = build_drop_model(MACHINE, "quick")
-    numbers, reason = _one_drop(replace(study, tolerance=1e-3), model, values_of(study) | {"speed": np.inf})
+    numbers, reason = one_drop(replace(study, tolerance=1e-3), model, values_of(study) | {"speed": np.inf})
     assert np.isnan(numbers)
     assert "speed is inf" in reason
     done = compute_shard(study_with(vary={"speed": {"choices": ["60 Hz"]}}), model, 0)
@@ -279,7 +279,7 @@ def test_a_study_ends_when_its_quantile_is_known_whatever_was_finished_first(tmp
     until = {"column": "DE.peak_stress", "quantile": 0.5, "within": 0.01}
     study = study_with(drops=60, shard=3, until=until)
     results = run_study(study, tmp_path / "study", threads=2)
-    needed = shards_needed(study, StudyFolder(tmp_path / "study"))
+    needed = EarlyEnd(study, StudyFolder(tmp_path / "study")).shards()
     assert needed is not None and needed < study.shards
     assert len(results) == 3 * needed
     found = results.quantile("DE.peak_stress", 0.5)
@@ -289,6 +289,26 @@ def test_a_study_ends_when_its_quantile_is_known_whatever_was_finished_first(tmp
 
     before = quantile(fewer, 0.5)
     assert not 0.5 * (before.upper - before.lower) <= 0.01 * before.value
+
+
+def test_the_end_is_looked_for_without_reading_a_shard_twice(tmp_path, monkeypatch):
+    from rotordrop.study import summary
+
+    until = {"column": "DE.peak_stress", "quantile": 0.5, "within": 1e-6}
+    study = study_with(drops=8, shard=2, until=until)
+    place = open_folder(study, tmp_path / "study")
+    end, read = EarlyEnd(study, place), []
+
+    def counted(*arguments):
+        read.append(arguments[-1])
+        return read_shard(*arguments)
+
+    monkeypatch.setattr(summary, "read_shard", counted)
+    for shard in (0, 2, 1):
+        work_on(place.path, shard)
+        for _ in range(3):
+            assert end.shards() is None
+    assert read == [0, 1, 2]
 
 
 def test_results_are_written_with_units(serial, tmp_path):

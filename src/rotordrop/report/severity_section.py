@@ -1,0 +1,55 @@
+"""Severity of a drop in one table: safety, impulse, energy, indices, fatigue, and what each rests on."""
+
+from __future__ import annotations
+
+from rotordrop.estimation.estimate import Estimate
+from rotordrop.estimation.severity_numbers import severity_values
+from rotordrop.model.bearing_numbers import numbers_of
+from rotordrop.report.content import Section, Table
+from rotordrop.report.quantity import Quantity
+from rotordrop.severity.numbers import SEVERITY
+
+NOTE = (
+    "Static safety (ISO 76): by the peak stress, which counts the preload, against 4 200 MPa; by C0 over the "
+    "peak force. Shares of the basic rating life (at one a tenth of new bearings fails): finite segments of "
+    "the raceways (after Menck 2023), ISO/TS 16281 at every instant, rainflow of the most loaded ball; the "
+    "first two as if the race turned with the rotor from the first impact on, as upper ends. None is a limit."
+)
+
+
+def severity_section(estimate: Estimate) -> Section:
+    """Table of all severity numbers of a drop, bearing by bearing."""
+    found = [severity_values(estimate, bearing) for bearing in estimate.bearings]
+    rows = tuple(
+        (
+            one.label,
+            *(
+                Quantity.of(values.get(one.field), one.kind, range_only=not estimate.consistent)
+                for values in found
+            ),
+        )
+        for one in SEVERITY
+        if any(one.field in values for values in found)
+    )
+    return Section(
+        heading="Severity",
+        text=tuple(_rating(estimate, bearing.name) for bearing in estimate.bearings),
+        tables=(
+            Table(
+                columns=("severity", *(bearing.name for bearing in estimate.bearings)),
+                rows=rows,
+                caption="Severity of the drop",
+                note=NOTE,
+            ),
+        ),
+    )
+
+
+def _rating(estimate: Estimate, name: str) -> str:
+    ratings = numbers_of(estimate.machine.bearing(name)).ratings()
+    if ratings is None:
+        return f"{name}: no load ratings."
+    static, dynamic = (
+        Quantity(value=value, kind="force", digits=3).text for value in (ratings.static, ratings.dynamic)
+    )
+    return f"{name}: C0 = {static} of all rows ({ratings.rows}), C = {dynamic} of one, {ratings.source}."

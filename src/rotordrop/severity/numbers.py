@@ -1,0 +1,116 @@
+"""The numbers that say how severe a drop was at one bearing, beside force and stress themselves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.machine.ball_bearing import STATIC_STRESS
+from rotordrop.model.bearing_numbers import Ratings
+from rotordrop.severity.fatigue import (
+    ball_row,
+    joined,
+    share_by_16281,
+    share_by_rainflow,
+    share_by_segments,
+)
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeverityNumber:
+    """A number of the table: field of a document, name for people, kind, whether more is worse."""
+
+    field: str
+    label: str
+    kind: str
+    more_is_worse: bool = True
+
+
+SEVERITY: tuple[SeverityNumber, ...] = (
+    SeverityNumber(
+        field="severity.static_safety",
+        label="static safety factor by the peak stress",
+        kind="dimensionless",
+        more_is_worse=False,
+    ),
+    SeverityNumber(
+        field="severity.static_safety_of_rating",
+        label="static safety factor by C0",
+        kind="dimensionless",
+        more_is_worse=False,
+    ),
+    SeverityNumber(field="severity.impulse_N_s", label="impulse of all impacts", kind="impulse"),
+    SeverityNumber(field="severity.skid_energy_J", label="energy lost in the contact", kind="energy"),
+    SeverityNumber(
+        field="severity.position_index", label="position index (mean distance over gap)", kind="dimensionless"
+    ),
+    SeverityNumber(
+        field="severity.velocity_index",
+        label="velocity index (velocity over speed times gap)",
+        kind="dimensionless",
+    ),
+    SeverityNumber(
+        field="severity.fatigue_by_segments", label="share of rating life, segments", kind="dimensionless"
+    ),
+    SeverityNumber(
+        field="severity.fatigue_by_16281",
+        label="share of rating life, ISO/TS 16281",
+        kind="dimensionless",
+    ),
+    SeverityNumber(
+        field="severity.fatigue_by_rainflow", label="share of rating life, rainflow", kind="dimensionless"
+    ),
+)
+"""Severity of a drop at a bearing, in the order in which it is shown."""
+
+
+def static_safety_of_stress(stress: float) -> float:
+    """Static safety factor s0 of a largest Hertz stress [Pa], ``(4200 MPa / σ)³`` [1].
+
+    Source: ISO 76, which defines the static load rating of ball bearings by that stress at the most loaded
+    ball; its load goes with the cube of the stress.
+    """
+    return (STATIC_STRESS / stress) ** 3
+
+
+def static_safety_of_load(rating: float, force: float) -> float:
+    """Static safety factor s0 of a radial force [N] for a static load rating C0 [N], ``C0 / P0`` [1].
+
+    Source: ISO 76, with the radial force as equivalent load P0 where no axial one acts from outside. The
+    preload counts in the stress, not here.
+    """
+    return rating / force
+
+
+def fatigue_shares(ratings: Ratings, time: Array, loads: Array, spin: Array) -> tuple[float, float, float]:
+    """Shares of the rating life that a drop uses: by segments, by ISO/TS 16281, by rainflow [1].
+
+    Parameters
+    ----------
+    ratings : Ratings
+        Of the bearing.
+    time : ndarray, shape (T,)
+        [s], rising.
+    loads : ndarray, shape (T, rows, Z)
+        Ball loads at equal steps of azimuth [N].
+    spin : ndarray, shape (T,)
+        Spin of the inner ring [rad/s].
+    """
+    row = ball_row(
+        ratings.dynamic,
+        ratings.balls,
+        ratings.gamma,
+        ratings.cosine,
+        ratings.conformity_inner,
+        ratings.conformity_outer,
+    )
+    each = [loads[:, k] for k in range(loads.shape[1])]
+    return (
+        joined(np.array([share_by_segments(row, time, one, spin) for one in each])),
+        joined(np.array([share_by_16281(row, time, one, spin) for one in each])),
+        joined(np.array([share_by_rainflow(row, one.max(axis=1)) for one in each])),
+    )

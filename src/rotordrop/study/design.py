@@ -1,0 +1,306 @@
+"""Choose supports, damping, gap or preload: the designs that no other one beats in every aim."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.errors import UsageError
+from rotordrop.machine import Machine, load_machine
+from rotordrop.machine.description import unknown_key
+from rotordrop.study.plan import Study, read_study
+from rotordrop.study.quantities import columns_of
+from rotordrop.study.run import Report, run_study
+from rotordrop.study.summary import Known, StudyResults, exceedance, quantile
+
+Array = NDArray[np.float64]
+
+FRESH = 0x5EED
+"""What is added to the seed for the drops that draw a front again."""
+STEP = 0.12
+"""Width of the steps around a front, as a share of each range [1]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Aim:
+    """Something that shall be small: a quantile of a quantity, or the probability to exceed a limit.
+
+    Attributes
+    ----------
+    column : str
+        Column of a study; with ``*`` for the bearing, the worst bearing counts in every drop.
+    quantile : float or None
+        Which quantile [1].
+    above : float or None
+        Limit [SI], whose probability to be exceeded counts.
+    """
+
+    column: str
+    quantile: float | None = None
+    above: float | None = None
+
+    def __post_init__(self) -> None:
+        if (self.quantile is None) == (self.above is None):
+            raise UsageError(f"{self.column}: an aim has either a 'quantile' or a limit 'above', not both")
+
+    def of(self, values: Array) -> Known:
+        """What the drops of one candidate say, with its 90 % interval."""
+        if self.above is not None:
+            return exceedance(values, self.above)
+        assert self.quantile is not None
+        return quantile(values, self.quantile)
+
+    @property
+    def name(self) -> str:
+        """The aim in words."""
+        if self.above is not None:
+            return f"P({self.column} > {self.above:g} SI)"
+        return f"{100 * (self.quantile or 0.0):g} % quantile of {self.column}"
+
+
+USUAL = (Aim(column="*.peak_stress", quantile=0.9), Aim(column="*.backward_whirl", above=0.0))
+"""Aims when none are given: a stress that nine drops of ten stay below, and seldom backward whirl."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidate:
+    """One choice of values [SI] with what it gives, and whether any other is better in every aim."""
+
+    values: Mapping[str, float]
+    aims: tuple[Known, ...]
+    on_front: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class DesignResult:
+    """Outcome of a design study.
+
+    Attributes
+    ----------
+    aims : tuple of Aim
+        What was made small.
+    candidates : tuple of Candidate
+        All that were tried, with the chances that all of them met.
+    front : tuple of Candidate
+        The best of them, drawn again with other chances: what was luck shows here.
+    described : Candidate
+        The machine as it is described, drawn with those other chances too.
+    """
+
+    aims: tuple[Aim, ...]
+    candidates: tuple[Candidate, ...]
+    front: tuple[Candidate, ...]
+    described: Candidate
+
+
+@dataclass(frozen=True, kw_only=True)
+class DesignPlan:
+    """What to choose from, what is left to chance, and what shall be small.
+
+    Attributes
+    ----------
+    study : Study
+        Of the design ``"candidates"``.
+    aims : tuple of Aim
+        What shall be small.
+    rounds : int
+        Rounds around the front after the first, each with half as many candidates.
+    again : int
+        Drops of each candidate of the front when it is drawn again.
+    """
+
+    study: Study
+    aims: tuple[Aim, ...] = USUAL
+    rounds: int = 1
+    again: int = 100
+
+
+def front_of(numbers: Array) -> NDArray[np.bool_]:
+    """Which rows (n, k) are on the front: no other row is at least as small in all and smaller in one."""
+    found = np.ones(len(numbers), dtype=bool)
+    for i, row in enumerate(numbers):
+        found[i] = not np.any(np.all(numbers <= row, axis=1) & np.any(numbers < row, axis=1))
+    return found
+
+
+def best_designs(
+    plan: DesignPlan, folder: str | Path, *, threads: int | None = None, report: Report | None = None
+) -> DesignResult:
+    """Find the front, and draw it again with other chances.
+
+    Parameters
+    ----------
+    plan : DesignPlan
+        What to choose.
+    folder : path
+        Holds one study a round; continued when it holds them already.
+    threads : int, optional
+        Threads; all cores by default.
+    report : callable, optional
+        Called with the progress of each round.
+    """
+    place = Path(folder)
+    tried: list[Candidate] = []
+    study = plan.study
+    for number in range(plan.rounds + 1):
+        if number:
+            study = _with_candidates(plan.study, _around(plan.study, tried, number))
+        results = run_study(study, place / f"round {number}", threads=threads, report=report)
+        tried = _marked([*tried, *_read(results, plan.aims)])
+    best = [one for one in tried if one.on_front]
+    values = [tuple(one.values.values()) for one in best] + [_described(plan.study)]
+    fresh = replace(
+        _with_candidates(plan.study, values, repeats=plan.again),
+        seed=(plan.study.seed + FRESH) % 2**64,
+        name=f"{plan.study.name}, again",
+    )
+    again = _read(run_study(fresh, place / "again", threads=threads, report=report), plan.aims)
+    return DesignResult(
+        aims=plan.aims, candidates=tuple(tried), front=tuple(_marked(again[:-1])), described=again[-1]
+    )
+
+
+def _with_candidates(study: Study, values: Sequence[tuple[float, ...]], repeats: int | None = None) -> Study:
+    count = repeats or study.repeats
+    return replace(study, candidates=tuple(values), repeats=count, drops=count * len(values))
+
+
+def _described(study: Study) -> tuple[float, ...]:
+    from rotordrop.machine.parameter_paths import value_of_path
+
+    first = study.machine.touchdown_bearings[0].name
+    return tuple(value_of_path(study.machine, name.replace("*", first, 1)) for name in study.choose)
+
+
+def _around(study: Study, tried: Sequence[Candidate], number: int) -> list[tuple[float, ...]]:
+    """New candidates beside those of the front, within the bounds."""
+    random = np.random.Generator(np.random.Philox(np.random.SeedSequence((study.seed, number))))
+    best = [one for one in tried if one.on_front]
+    found = []
+    for k in range(max(len(tried) // (2 * number), 1)):
+        values = best[k % len(best)].values
+        moved = []
+        for name, spread in study.choose.items():
+            share = _share(spread, values[name]) + STEP * float(random.standard_normal())
+            moved.append(float(spread(np.array([min(max(share, 0.0), 1.0 - 1e-12)]))[0]))
+        found.append(tuple(moved))
+    return found
+
+
+def _share(spread: Any, value: float) -> float:
+    """Where a value lies in the range of its spread [1], by halving: spreads only rise."""
+    if spread.shape in ("choices", "grid"):
+        return (list(spread.numbers).index(value) + 0.5) / len(spread.numbers)
+    low, high = 0.0, 1.0
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if float(spread(np.array([middle]))[0]) < value else (low, middle)
+    return 0.5 * (low + high)
+
+
+def _read(results: StudyResults, aims: Sequence[Aim]) -> list[Candidate]:
+    """Candidates of a study with their aims; a drop that failed counts as the worst there is."""
+    study = results.study
+    columns = [_column(results, aim.column) for aim in aims]
+    found = []
+    for c in range(len(results) // study.repeats):
+        drops = slice(c * study.repeats, (c + 1) * study.repeats)
+        found.append(
+            Candidate(
+                values={name: float(results.varied[name][drops.start]) for name in study.choose},
+                aims=tuple(aim.of(values[drops]) for aim, values in zip(aims, columns, strict=True)),
+                on_front=False,
+            )
+        )
+    return found
+
+
+def _column(results: StudyResults, column: str) -> Array:
+    if not column.startswith("*."):
+        return results.column(column)
+    bearings = [bearing.name for bearing in results.study.machine.touchdown_bearings]
+    return np.asarray(np.max([results.column(f"{name}.{column[2:]}") for name in bearings], axis=0))
+
+
+def _marked(candidates: Sequence[Candidate]) -> list[Candidate]:
+    numbers = np.array([[known.value for known in one.aims] for one in candidates])
+    best = front_of(np.nan_to_num(numbers, nan=np.inf))
+    return [replace(one, on_front=bool(good)) for one, good in zip(candidates, best, strict=True)]
+
+
+def read_design(table: Mapping[str, Any], machine: Machine) -> DesignPlan:
+    """Make a plan of what a design file holds; ``machine`` is already read.
+
+    Raises
+    ------
+    UsageError
+        If the plan cannot be used.
+    """
+    content = dict(table)
+    aims = content.pop("aims", None)
+    candidates, rounds, again = (
+        _count(content, key, usual) for key, usual in (("candidates", 64), ("rounds", 1), ("again", 100))
+    )
+    repeats = content.setdefault("repeats", 40)
+    if "drops" in content or "design" in content:
+        raise UsageError("a design file says how many 'candidates' and 'repeats'; leave out drops and design")
+    if not content.get("choose"):
+        raise UsageError('nothing to choose; write [choose] with bounds, such as "*.support.damping"')
+    content |= {"drops": candidates * repeats if isinstance(repeats, int) else 1, "design": "candidates"}
+    return DesignPlan(
+        study=read_study(content, machine),
+        aims=USUAL if aims is None else tuple(_aim(machine, one) for one in aims),
+        rounds=rounds,
+        again=again,
+    )
+
+
+def _count(content: dict[str, Any], key: str, usual: int) -> int:
+    value = content.pop(key, usual)
+    if isinstance(value, bool) or not isinstance(value, int) or value < (key != "rounds"):
+        raise UsageError(f"{key} = {value!r}; expected a whole number, such as {usual}")
+    return value
+
+
+def _aim(machine: Machine, raw: Any) -> Aim:
+    if not isinstance(raw, Mapping) or "column" not in raw or set(raw) - {"column", "quantile", "above"}:
+        raise UsageError(f'aims: {raw!r}; expected {{column = "*.peak_stress", quantile = 0.9}} or "above"')
+    from rotordrop.units import parse_quantity
+
+    bearings = [bearing.name for bearing in machine.touchdown_bearings]
+    columns = {q.name: q for q in columns_of(machine)}
+    column = str(raw["column"])
+    kind = columns.get(column.replace("*", bearings[0], 1))
+    if kind is None:
+        raise UsageError(
+            unknown_key(column, (*columns, *(f"*.{n.split('.', 1)[1]}" for n in columns if "." in n)))
+        )
+    above = None if "above" not in raw else parse_quantity(raw["above"], kind.kind)
+    share = raw.get("quantile")
+    if share is not None and not (isinstance(share, float) and 0.0 < share < 1.0):
+        raise UsageError(f"aims: quantile = {share!r}; expected a number between 0 and 1, such as 0.9")
+    return Aim(column=column, quantile=share, above=above)
+
+
+def load_design(path: str | Path) -> DesignPlan:
+    """Read a design file (TOML); its machine file counts from its folder."""
+    file = Path(path)
+    try:
+        table = tomllib.loads(file.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise UsageError(f"{file}: cannot read the design file: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise UsageError(f"{file}: not valid TOML: {error}") from error
+    named = table.get("machine")
+    if not isinstance(named, str):
+        raise UsageError(f'{file}: machine = {named!r}; expected the name of a machine file, "machine.toml"')
+    try:
+        return read_design(table, load_machine(file.parent / named))
+    except UsageError as error:
+        raise UsageError(f"{file}: {error}") from error

@@ -1,0 +1,172 @@
+"""Random numbers of a study: which share of the probability every varied value of a drop has.
+
+Every drop has numbers of its own (Philox, key = seed, counter = drop), so that none depends on shards,
+threads or the order of work.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from rotordrop.errors import UsageError
+from rotordrop.machine import Machine
+from rotordrop.machine.parameter_paths import value_of_path
+from rotordrop.model.parameter_table import row_of
+from rotordrop.study.distributions import Distribution
+
+Array = NDArray[np.float64]
+
+DESIGNS = ("random", "latin hypercube", "sobol", "grid", "sensitivity", "candidates")
+
+
+def uniform(seed: int, drop: int, width: int, stream: int = 0) -> Array:
+    """Random numbers of one drop: a block of the counter that no other drop reaches, shape (width,)."""
+    bits = np.random.Philox(key=seed, counter=[0, 0, drop & (2**64 - 1), stream])
+    return np.random.Generator(bits).random(width)
+
+
+def independent(seed: int, first: int, last: int, width: int) -> Array:
+    """Shares of drops ``first`` to ``last - 1``, shape (n, width), each drop on its own."""
+    return np.array([uniform(seed, i, width) for i in range(first, last)]).reshape(-1, width)
+
+
+def sobol(seed: int, first: int, last: int, width: int) -> Array:
+    """Points of a scrambled Sobol sequence, shape (n, width)."""
+    from scipy.stats import qmc
+
+    sequence = qmc.Sobol(width, scramble=True, rng=_generator(seed))
+    if first:
+        sequence.fast_forward(first)
+    return np.asarray(sequence.random(last - first))
+
+
+@lru_cache(maxsize=4)
+def hypercube(seed: int, drops: int, width: int) -> Array:
+    """All points of a Latin hypercube, shape (drops, width)."""
+    from scipy.stats import qmc
+
+    return np.asarray(qmc.LatinHypercube(width, rng=_generator(seed)).random(drops))
+
+
+def _generator(seed: int) -> np.random.Generator:
+    return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed)))
+
+
+def grid(seed: int, first: int, last: int, spreads: Mapping[str, Distribution]) -> Array:
+    """Cells in the order of the product, again and again until all drops are placed, shape (n, V)."""
+    names = list(spreads)
+    grids = [name for name in names if spreads[name].shape == "grid"]
+    cells = list(itertools.product(*(range(len(spreads[name].numbers)) for name in grids)))
+    share = independent(seed, first, last, len(names))
+    for row, drop in enumerate(range(first, last)):
+        for name, place in zip(grids, cells[drop % len(cells)], strict=True):
+            share[row, names.index(name)] = (place + 0.5) / len(spreads[name].numbers)
+    return share
+
+
+def sensitivity(seed: int, first: int, last: int, width: int) -> Array:
+    """Blocks of ``width + 2`` drops that tell the values apart, shape (n, width).
+
+    The first drop of a block is a point A, the second a point B, and each further one is A with one value
+    taken from B. Source: Saltelli and others, Computer Physics Communications 181, 2010.
+    """
+    size = width + 2
+    low, high = first // size, -(-last // size)
+    points = sobol(seed, low, high, 2 * width)
+    share = np.empty((last - first, width))
+    for row, drop in enumerate(range(first, last)):
+        block, place = divmod(drop, size)
+        a, b = points[block - low, :width], points[block - low, width:]
+        share[row] = b if place == 1 else a
+        if place > 1:
+            share[row, place - 2] = b[place - 2]
+    return share
+
+
+def crossed(
+    seed: int, first: int, last: int, names: Sequence[str], chosen: Sequence[str], repeats: int
+) -> Array:
+    """Candidates that all meet the same chances, shape (n, V).
+
+    Drop ``i`` is candidate ``i // repeats``; what is left to chance depends on ``i % repeats`` alone, so that
+    two candidates differ by what was chosen and not by luck (common random numbers).
+    """
+    places = [names.index(name) for name in chosen]
+    share = np.array([uniform(seed, i % repeats, len(names), stream=1) for i in range(first, last)])
+    share = share.reshape(-1, len(names))
+    low, high = first // repeats, -(-last // repeats)
+    if places and high > low:
+        points = sobol(seed, low, high, len(places))
+        share[:, places] = points[np.arange(first, last) // repeats - low]
+    return share
+
+
+@dataclass(frozen=True, kw_only=True)
+class Joint:
+    """Joint distribution of calibrated values: normal in the values or in their logarithms.
+
+    Attributes
+    ----------
+    paths : tuple of str
+        Values by path.
+    logarithmic : ndarray of bool, shape (n,)
+        Whether the logarithm is normal.
+    middle : ndarray, shape (n,)
+        Mean of each, of the logarithm where that is normal [SI].
+    root : ndarray, shape (n, n)
+        Root of the covariance.
+    """
+
+    paths: tuple[str, ...]
+    logarithmic: NDArray[np.bool_]
+    middle: Array
+    root: Array
+
+    def values(self, share: Array) -> Array:
+        """Values [SI], shape (n, V), at independent shares of the probability, shape (n, V)."""
+        score = ndtri(np.clip(share, 1e-16, 1.0 - 1e-16))
+        drawn: Array = self.middle + score @ self.root.T
+        drawn[:, self.logarithmic] = np.exp(drawn[:, self.logarithmic])
+        for k, path in enumerate(self.paths):
+            if not path.endswith("_horizontal"):
+                row = row_of(path)
+                drawn[:, k] = [row.within(value) for value in drawn[:, k].tolist()]
+        return drawn
+
+    def marginal(self, k: int) -> Distribution:
+        """Distribution of one value alone."""
+        sigma = float(np.sqrt(np.sum(self.root[k] ** 2)))
+        if self.logarithmic[k]:
+            return Distribution(shape="log_normal", numbers=(float(np.exp(self.middle[k])), sigma))
+        return Distribution(shape="normal", numbers=(float(self.middle[k]), sigma))
+
+
+def joint_of(machine: Machine) -> Joint:
+    """The joint distribution that a calibrated machine file holds.
+
+    Raises
+    ------
+    UsageError
+        If it holds none.
+    """
+    origin = machine.calibration
+    if origin is None or origin.joint is None:
+        raise UsageError(
+            f"{machine.name!r} holds no joint distribution of its values; expected a machine file that "
+            "'rotordrop calibrate' wrote. Calibrate it on recorded drops, or vary its values one by one"
+        )
+    spread = origin.joint
+    logs = np.array(spread.logarithmic)
+    middle = np.array([value_of_path(machine, path) for path in spread.paths])
+    middle[logs] = np.log(middle[logs])
+    size, turn = np.linalg.eigh(spread.matrix)
+    # rows of the symmetric root: the same numbers whatever sign an eigenvector has
+    root = (turn * np.sqrt(np.maximum(size, 0.0))) @ turn.T
+    return Joint(paths=spread.paths, logarithmic=logs, middle=middle, root=root)
