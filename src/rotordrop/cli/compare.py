@@ -88,14 +88,15 @@ def _documents(paths: list[Path]) -> dict[str, dict[str, Any]]:
     """Every drop of every file, by name; the same name in two files gets the file's name before it."""
     found: dict[str, dict[str, Any]] = {}
     for path in paths:
-        content = _read(path)
+        content = read_estimate(path)
         drops = content.get("drops", {path.stem: content})
         for name, drop in drops.items():
             found[name if name not in found else f"{path.stem}: {name}"] = drop
     return found
 
 
-def _read(path: Path) -> dict[str, Any]:
+def read_estimate(path: Path) -> dict[str, Any]:
+    """Content of a file that the estimate command wrote, of one drop or several."""
     try:
         content = json_module.loads(path.read_text(encoding="utf-8"))
     except OSError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
@@ -12,6 +13,8 @@ from rotordrop.errors import OutputError, UsageError
 
 WAIT = 60.0
 """How long a writer waits for others [s]."""
+PAUSE = 0.02
+"""Pause before a log that is being made is looked at again [s]."""
 
 TABLES = (
     """CREATE TABLE IF NOT EXISTS drops (
@@ -81,8 +84,8 @@ def _sqlite(file: Path, writing: bool) -> Iterator[Transaction]:
         raise UsageError(f"{file} is not there; 'rotordrop log add' makes a log with its first drop")
     try:
         with closing(sqlite3.connect(file, timeout=WAIT, isolation_level=None)) as connection:
-            # Readers go on while somebody writes; FULL: what was added survives a power cut
-            connection.execute("PRAGMA journal_mode = WAL")
+            _make_wal(connection)
+            # FULL: what was added survives a power cut
             connection.execute("PRAGMA synchronous = FULL")
             connection.execute("PRAGMA foreign_keys = ON")
             opened = Transaction(connection.cursor(), "?")
@@ -103,6 +106,24 @@ def _sqlite(file: Path, writing: bool) -> Iterator[Transaction]:
         if isinstance(error, sqlite3.OperationalError):
             raise OutputError(f"{file}: the log cannot be used: {error}") from error
         raise UsageError(f"{file} is not a log of drops ({error}); name another file") from error
+
+
+def _make_wal(connection: sqlite3.Connection) -> None:
+    """Let readers go on while somebody writes.
+
+    Making a new log so fails at once, whatever the timeout, while another one does the same or repairs what a
+    killed writer left.
+    """
+    until = time.monotonic() + WAIT
+    while True:
+        try:
+            if connection.execute("PRAGMA journal_mode").fetchone()[0] != "wal":
+                connection.execute("PRAGMA journal_mode = WAL")
+            return
+        except sqlite3.OperationalError as error:
+            if "locked" not in str(error) or time.monotonic() > until:
+                raise
+        time.sleep(PAUSE)
 
 
 @contextmanager

@@ -5,7 +5,7 @@ from __future__ import annotations
 from rotordrop.estimation.estimate import Estimate
 from rotordrop.estimation.severity_numbers import severity_values
 from rotordrop.model.bearing_numbers import numbers_of
-from rotordrop.report.content import Section, Table
+from rotordrop.report.content import Cell, Section, Table
 from rotordrop.report.quantity import Quantity
 from rotordrop.severity.numbers import SEVERITY
 
@@ -20,7 +20,7 @@ NOTE = (
 def severity_section(estimate: Estimate) -> Section:
     """Table of all severity numbers of a drop, bearing by bearing."""
     found = [severity_values(estimate, bearing) for bearing in estimate.bearings]
-    rows = tuple(
+    rows: tuple[tuple[Cell, ...], ...] = tuple(
         (
             one.label,
             *(

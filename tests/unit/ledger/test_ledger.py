@@ -18,6 +18,7 @@ import pytest
 
 from rotordrop.errors import OutputError, UsageError
 from rotordrop.ledger import LoggedDrop, Severity, add_drop, allow, logged_drops, used_shares
+from rotordrop.ledger._store import _make_wal
 from rotordrop.ledger.book import drop_of_estimate, remove_drop
 
 PEAK = Severity(bearing="NDE", quantity="peak_force_N", unit="N", value=3300.0, lower=3200.0, upper=3400.0)
@@ -231,3 +232,31 @@ def test_a_postgresql_that_is_not_there_is_named():
     pytest.importorskip("psycopg")
     with pytest.raises(OutputError, match=r"the log at 127\.0\.0\.1:1/none cannot be used"):
         logged_drops("postgresql://someone@127.0.0.1:1/none")
+
+
+class Busy:
+    """A connection to a log that others are making: refused twice, then open."""
+
+    def __init__(self, refusal="database is locked", mode="delete"):
+        self.asked, self.refusal, self.mode = [], refusal, mode
+
+    def execute(self, statement):
+        self.asked.append(statement)
+        if len(self.asked) <= 2:
+            raise sqlite3.OperationalError(self.refusal)
+        return self
+
+    def fetchone(self):
+        return (self.mode,)
+
+
+def test_a_log_that_others_are_making_is_waited_for():
+    """Of writers that were killed and started again some were refused at once, whatever they would wait."""
+    busy = Busy()
+    _make_wal(busy)
+    assert busy.asked[-1] == "PRAGMA journal_mode = WAL" and len(busy.asked) == 4
+    there = Busy(mode="wal")
+    _make_wal(there)
+    assert there.asked[-1] == "PRAGMA journal_mode"
+    with pytest.raises(sqlite3.OperationalError, match="disk"):
+        _make_wal(Busy("disk I/O error"))

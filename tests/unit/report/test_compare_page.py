@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.special import ndtr
 
 from rotordrop.errors import UsageError
 from rotordrop.report.compare_page import compare_page, rankings
@@ -44,11 +45,11 @@ DROPS = (drop("a", 60, 3300, 3600), drop("b", 100, 3100, 3300), drop("c", 210, 2
 def test_every_number_of_every_drop_is_in_the_table_of_its_bearing() -> None:
     nde, de = compare_page(DROPS, machine_name="LP-400").summary
     assert nde.caption == "NDE touchdown bearing"
-    forces = {row[0]: row[2] for row in de.rows}
+    forces = {row[0]: row[3] for row in de.rows}
     assert isinstance(forces["c"], Quantity)
     assert forces["c"].text == "4\u202f200 N"
     assert forces["c"].interval_text == "4\u202f050 to 4\u202f350 N"
-    speed = nde.rows[2][1]
+    speed = nde.rows[2][2]
     assert isinstance(speed, Quantity)
     assert speed.text == "210 Hz (12\u202f600 rpm)"
 
@@ -178,3 +179,55 @@ def test_consistency_and_recording_are_read_from_the_estimate() -> None:
     }
     found = ComparedDrop.of_document("x", document)
     assert (found.consistent, found.method, found.record) == (False, "tracked", "4f")
+
+
+def test_machines_are_never_mixed_unsaid() -> None:
+    one, *others = (replace(drop, machine="LP-400") for drop in DROPS)
+    assert not any("machines" in s.text for s in compare_page((one, *others)).verdict)
+    mixed = compare_page((replace(one, machine="HP-90"), *others))
+    (said,) = (s for s in mixed.verdict if "machines" in s.text)
+    assert said.level == "warning"
+    assert said.text.startswith("These are drops of 2 machines, HP-90: a; LP-400: b, c")
+
+
+def test_no_limit_given_is_said_and_a_limit_is_judged() -> None:
+    assert compare_page(DROPS).verdict[-1].text.startswith("No limit given")
+    said = compare_page(DROPS, limits={"peak_force_N": 4000.0}).verdict[-1]
+    assert said.level == "bad" and "passed by c at DE" in said.text
+
+
+def test_the_ranking_says_how_much_worse_than_the_next() -> None:
+    ranked = rankings(DROPS, ("NDE", "DE"), {})["DE", "peak_force_N"]
+    sigma = 150.0 / 1.6448536
+    assert_allclose(ranked.worse_than_next[0], ndtr(600.0 / (2**0.5 * sigma)), rtol=1e-6)
+    assert_allclose(ranked.worse_than_next[1], ndtr(300.0 / (2**0.5 * sigma)), rtol=1e-6)
+    assert "it was worse than a with" in ranked.statement
+
+
+def test_severity_of_a_document_is_compared_with_its_worst_impact() -> None:
+    def known(value: float) -> dict[str, object]:
+        return {"value": value, "interval_90": [0.95 * value, 1.05 * value]}
+
+    def document(peak: float) -> dict[str, object]:
+        impacts = [
+            {
+                "peak_force_N": known(p),
+                "impulse_N_s": known(i),
+                "dissipated_energy_J": known(e),
+                "peak_time_s": t,
+            }
+            for p, i, e, t in ((900.0, 1.0, 2.0, 0.008), (peak, 3.0, 6.0, 0.02))
+        ]
+        severity = {"static_safety": known(1e10 / peak**2), "impulse_N_s": known(4.0)}
+        entry = {"peak_force_N": known(peak), "severity": severity, "impacts": impacts}
+        return {"speed_Hz": 60.0, "recorded": "2026-03-14", "machine": "m", "bearings": {"NDE": entry}}
+
+    drops = [ComparedDrop.of_document(name, document(p)) for name, p in (("a", 3000.0), ("b", 4000.0))]
+    assert drops[0].label == "a, 2026-03-14, 60.0 Hz"
+    content = compare_page(drops)
+    table = next(t for t in content.sections[0].tables if t.caption == "NDE: severity of every drop")
+    rows = {row[0]: row[1:] for row in table.rows}
+    assert rows["worst impact"][1] == "impact 2 of 2 at 20.0 ms: 75% of the impulse and 75% of the energy"
+    ranked = rankings(drops, ("NDE",), {})["NDE", "severity.static_safety"]
+    assert ranked.names == ("b", "a")  # the smaller factor is the worse one
+    assert ranked.values[0] < ranked.values[1]

@@ -1,0 +1,222 @@
+"""What changed between two drops: parameters that one value cannot explain in both."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr, ndtri
+
+from rotordrop.errors import UsageError
+from rotordrop.estimated import NINETY
+from rotordrop.model.parameter import Parameter
+from rotordrop.model.parameter_table import row_of
+
+Array = NDArray[np.float64]
+
+FALSE_ALARM = 0.01
+"""Probability that anything is named of two drops between which nothing changed [1]."""
+BY_PRIOR = 0.95
+"""Standard deviation over that of the prior from which a record says nothing of its own [1]."""
+WATCHED: Mapping[str, float] = {
+    "air_gap": 10e-6,
+    "support.stiffness": math.log(1.1),
+    "support.damping": math.log(1.2),
+    "friction.dynamic": math.log(1.2),
+    "race.drag_coefficient": math.log(2.0),
+}
+"""Parameters that wear, loosen or seize, with the change that is asked for: [m], or of the logarithm."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Change:
+    """One parameter in two drops.
+
+    Attributes
+    ----------
+    path : str
+        Path in the machine.
+    before, after : float
+        Its values [SI].
+    change : float
+        Difference [SI], or factor where the parameter is positive by nature [1].
+    interval_90 : tuple of float
+        Of the change.
+    factor : bool
+        Whether the change is a factor.
+    probability : float
+        Probability that it changed by more than what is asked for [1].
+    named : bool
+        Whether the change is beyond chance, of all parameters looked at together.
+    determined : bool
+        Whether both records say something of it; else nothing is said.
+    """
+
+    path: str
+    before: float
+    after: float
+    change: float
+    interval_90: tuple[float, float]
+    factor: bool
+    probability: float
+    named: bool
+    determined: bool = True
+
+
+@dataclass(frozen=True, kw_only=True)
+class Changes:
+    """What changed between two drops.
+
+    Attributes
+    ----------
+    first, second : str
+        The drops.
+    found : tuple of Change
+        Every parameter looked at, the surest change first.
+    """
+
+    first: str
+    second: str
+    found: tuple[Change, ...]
+
+    @property
+    def named(self) -> tuple[Change, ...]:
+        """Parameters that changed beyond chance."""
+        return tuple(one for one in self.found if one.named)
+
+    def sentence(self) -> str:
+        """The outcome in words."""
+        unknown = sum(not one.determined for one in self.found)
+        beside = f"; of {unknown} parameters the records do not say it" if unknown else ""
+        if not self.named:
+            return f"Between {self.first} and {self.second} no parameter changed beyond chance{beside}."
+        parts = [f"{one.path} ({_words(one)}, {one.probability:.0%})" for one in self.named]
+        return f"Between {self.first} and {self.second} changed: {', '.join(parts)}{beside}."
+
+
+def _words(one: Change) -> str:
+    low, high = one.interval_90
+    if one.factor:
+        return f"× {one.change:.3g}, 90 %: {low:.3g} to {high:.3g}"
+    return f"{1e6 * one.change:+.3g} µm, 90 %: {1e6 * low:+.3g} to {1e6 * high:+.3g} µm"
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Told:
+    """What one record says of a parameter by itself, in the measure it is estimated in."""
+
+    value: float
+    mean: float
+    sigma: float
+
+
+def changes(first: Mapping[str, Any], second: Mapping[str, Any]) -> Changes:
+    """Compare the parameters of two estimates of one machine.
+
+    Parameters
+    ----------
+    first, second : mapping
+        Their documents, as ``rotordrop estimate --json`` writes them, made with one machine file.
+
+    Notes
+    -----
+    What was known before stands in both estimates; it is taken out of each (the quotient of posterior and
+    prior), so that two records of an unchanged machine differ by their own errors alone, and a tight prior
+    does not hide a change. Every parameter may change; none is assumed to. Of m parameters the level of each
+    is `FALSE_ALARM` over m (Bonferroni). Source: Gaussian fusion; Differs from a common fit of both records:
+    correlations between parameters are not used, so a change must show in one of them alone.
+
+    Raises
+    ------
+    UsageError
+        If the documents are not estimates of drops of one machine that fit their records.
+    """
+    for document in (first, second):
+        _require(document)
+    if first["machine"] != second["machine"]:
+        raise UsageError(
+            f"the drops are of {first['machine']!r} and {second['machine']!r}; only drops of one machine can "
+            "show what changed"
+        )
+    told = [{one["path"]: one for one in document["parameters"]} for document in (first, second)]
+    paths = [path for path in told[0] if path in told[1] and _watched(path) is not None]
+    pairs = {path: [_alone(one[path], row_of(path)) for one in told] for path in paths}
+    count = sum(None not in pair for pair in pairs.values())
+    level = float(-ndtri(0.5 * FALSE_ALARM / max(count, 1)))
+    found = [_change(path, told, pair, level) for path, pair in pairs.items()]
+    return Changes(
+        first=str(first.get("record", "the first")),
+        second=str(second.get("record", "the second")),
+        found=tuple(sorted(found, key=lambda one: (-one.named, -one.probability))),
+    )
+
+
+def _require(document: Mapping[str, Any]) -> None:
+    if "parameters" not in document or "machine" not in document:
+        raise UsageError(
+            "the file is no estimate of one drop; give one that 'rotordrop estimate --json' wrote"
+        )
+    if not document.get("consistent", True):
+        raise UsageError(
+            f"{document.get('record')}: the model is not consistent with this record, so its parameters say "
+            "nothing of a change; expected two estimates that fit"
+        )
+
+
+def _watched(path: str) -> float | None:
+    return next((least for name, least in WATCHED.items() if path.endswith(f".{name}")), None)
+
+
+def _alone(entry: Mapping[str, Any], row: Parameter) -> _Told | None:
+    """What the record says beyond the prior; None where that is nothing."""
+    value, prior = entry["estimate"], entry["prior"]
+    mean, sigma = _measured(value, row)
+    if prior is None:
+        return _Told(value=value["value"], mean=mean, sigma=sigma)
+    before, width = _measured(prior, row)
+    if sigma >= BY_PRIOR * width:
+        return None
+    own = 1.0 / (sigma**-2 - width**-2)
+    return _Told(value=value["value"], mean=own * (mean / sigma**2 - before / width**2), sigma=math.sqrt(own))
+
+
+def _measured(known: Mapping[str, Any], row: Parameter) -> tuple[float, float]:
+    """Middle and standard deviation, of the logarithm where the parameter is logarithmic."""
+    low, high = known.get("interval_90") or (known["value"], known["value"])
+    if not row.logarithmic:
+        return known["value"], max((high - low) / (2.0 * NINETY), 1e-300)
+    if low <= 0.0:
+        return math.log(known["value"]), max(math.log(high / known["value"]) / NINETY, 1e-12)
+    return math.log(known["value"]), max(math.log(high / low) / (2.0 * NINETY), 1e-12)
+
+
+def _change(
+    path: str, told: Sequence[Mapping[str, Any]], pair: Sequence[_Told | None], level: float
+) -> Change:
+    factor, least = row_of(path).logarithmic, _watched(path)
+    values = [one[path]["estimate"]["value"] for one in told]
+    one, other = pair
+    if one is None or other is None or least is None:
+        nothing = (0.0, math.inf) if factor else (-math.inf, math.inf)
+        return Change(
+            path=path, before=values[0], after=values[1], change=1.0 if factor else 0.0, interval_90=nothing,
+            factor=factor, probability=0.0, named=False, determined=False,
+        )  # fmt: skip
+    moved, sigma = other.mean - one.mean, math.hypot(one.sigma, other.sigma)
+    ends = (moved - NINETY * sigma, moved, moved + NINETY * sigma)
+    low, middle, high = (math.exp(end) for end in ends) if factor else ends
+    beyond = float(ndtr((moved - least) / sigma) + ndtr((-moved - least) / sigma))
+    return Change(
+        path=path,
+        before=values[0],
+        after=values[1],
+        change=middle,
+        interval_90=(low, high),
+        factor=factor,
+        probability=beyond,
+        named=abs(moved) > level * sigma,
+    )

@@ -1,0 +1,131 @@
+"""What changed between two drops, on pairs of estimates whose truth and errors are known."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from rotordrop.errors import UsageError
+from rotordrop.estimated import NINETY
+from rotordrop.estimation.changed import WATCHED, changes
+
+TRUTH = {
+    "air_gap": 275e-6,
+    "support.stiffness": 1e8,
+    "support.damping": 2e4,
+    "friction.dynamic": 0.1,
+    "race.drag_coefficient": 0.002,
+}
+PRIOR = {
+    "air_gap": 22e-6,
+    "support.stiffness": 0.5,
+    "support.damping": 0.7,
+    "friction.dynamic": 0.3,
+    "race.drag_coefficient": 1.0,
+}
+ERROR = {
+    "air_gap": 1.4e-6,
+    "support.stiffness": 0.0135,
+    "support.damping": 0.026,
+    "friction.dynamic": 0.026,
+    "race.drag_coefficient": 0.098,
+}
+"""Standard errors, but for the gap of the logarithm, at which 95 of 100 changes asked for are found."""
+CHANGED = {
+    "air_gap": lambda value: value + 10e-6,
+    "support.stiffness": lambda value: 1.1 * value,
+    "support.damping": lambda value: 1.2 * value,
+    "friction.dynamic": lambda value: 1.2 * value,
+    "race.drag_coefficient": lambda value: 2.0 * value,
+}
+
+
+def entry(path, mean, sigma):
+    linear = path.endswith("air_gap")
+    ends = [mean - NINETY * sigma, mean, mean + NINETY * sigma]
+    low, value, high = ends if linear else [math.exp(end) for end in ends]
+    return {"value": value, "interval_90": [low, high]}
+
+
+def document(random, truth, name, spread=1.0):
+    """An estimate: the record's own error, drawn together with a prior whose centre is drawn once."""
+    parameters = []
+    for end in ("NDE", "DE"):
+        for path, value in truth.items():
+            middle = value if path == "air_gap" else math.log(value)
+            own = middle + ERROR[path] * random.standard_normal()
+            before = (TRUTH[path] if path == "air_gap" else math.log(TRUTH[path])) + 0.7 * PRIOR[path]
+            precision = ERROR[path] ** -2 + PRIOR[path] ** -2
+            mean = (own * ERROR[path] ** -2 + before * PRIOR[path] ** -2) / precision
+            full = f"{end}.{path}"
+            parameters.append(
+                {
+                    "path": full,
+                    "scope": "machine",
+                    "prior": entry(full, before, PRIOR[path]),
+                    "estimate": entry(full, mean, spread * precision**-0.5),
+                }
+            )
+    return {"machine": "m", "record": name, "consistent": True, "parameters": parameters}
+
+
+def test_unchanged_pairs_give_few_false_alarms():
+    random = np.random.default_rng(5)
+    alarms = sum(
+        bool(changes(document(random, TRUTH, "a"), document(random, TRUTH, "b")).named) for _ in range(1000)
+    )
+    assert alarms <= 18  # one in a hundred, and what chance adds
+
+
+@pytest.mark.parametrize("path", list(CHANGED))
+def test_changes_of_the_size_asked_for_are_found(path):
+    random, found = np.random.default_rng(6), 0
+    other = TRUTH | {path: CHANGED[path](TRUTH[path])}
+    for _ in range(200):
+        named = changes(document(random, TRUTH, "a"), document(random, other, "b")).named
+        found += sum(one.path.endswith(f".{path}") for one in named)
+    assert found >= 0.92 * 400
+
+
+def test_a_change_is_said_with_its_interval():
+    random = np.random.default_rng(7)
+    other = TRUTH | {"support.stiffness": 1.5 * TRUTH["support.stiffness"]}
+    found = changes(document(random, TRUTH, "a.csv"), document(random, other, "b.csv"))
+    one = next(one for one in found.found if one.path == "NDE.support.stiffness")
+    assert one.factor and one.interval_90[0] < 1.5 < one.interval_90[1]
+    assert one.probability > 0.999
+    assert "Between a.csv and b.csv changed:" in found.sentence()
+    assert "NDE.support.stiffness (× 1." in found.sentence()
+
+
+def test_a_tight_prior_hides_no_change():
+    """Both estimates lean on one prior: the difference of their values is too small, that of records not."""
+    random, sizes = np.random.default_rng(8), []
+    other = TRUTH | {"race.drag_coefficient": 2.0 * TRUTH["race.drag_coefficient"]}
+    for _ in range(300):
+        found = changes(document(random, TRUTH, "a"), document(random, other, "b"))
+        sizes.append(next(one.change for one in found.found if one.path == "NDE.race.drag_coefficient"))
+    assert np.median(sizes) == pytest.approx(2.0, rel=0.02)
+
+
+def test_what_no_record_shows_is_not_judged():
+    random = np.random.default_rng(9)
+    one, other = document(random, TRUTH, "a"), document(random, TRUTH, "b")
+    for entry_ in one["parameters"]:
+        entry_["estimate"] = entry_["prior"]
+    found = changes(one, other)
+    assert not found.named and not any(change.determined for change in found.found)
+    assert f"of {2 * len(WATCHED)} parameters the records do not say it" in found.sentence()
+
+
+def test_other_machines_and_estimates_beside_their_record_are_refused():
+    random = np.random.default_rng(1)
+    one = document(random, TRUTH, "a")
+    with pytest.raises(UsageError, match=r"'m' and 'n'; only drops of one machine"):
+        changes(one, {**one, "machine": "n"})
+    with pytest.raises(UsageError, match=r"a: the model is not consistent with this record"):
+        changes({**one, "consistent": False}, one)
+    with pytest.raises(UsageError, match=r"is no estimate of one drop"):
+        changes({"drops": {}}, one)
