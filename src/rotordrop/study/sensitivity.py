@@ -13,7 +13,7 @@ from rotordrop.study.summary import COVER, StudyResults
 
 Array = NDArray[np.float64]
 
-RESAMPLED = 500
+RESAMPLED = 300
 """Bootstrap samples behind an interval."""
 DROPS_OF_A_CELL = 10
 """Drops that a cell must hold at least, where shares are read off any study."""
@@ -116,20 +116,25 @@ def _from_cells(results: StudyResults, column: str) -> list[Influence]:
         x = drawn[whole]
         if len(np.unique(x)) < 2:
             continue
-        known = _with_intervals(np.column_stack([x, y]), _explained)
+        known = _with_intervals(np.column_stack([_cells(x), y]), _explained)
         found.append(Influence(name=name, alone=known[0], total=None))
     return found
 
 
-def _explained(pairs: Array) -> Array:
-    """Share of the variance between cells of the first column, less what chance alone would give, (1,)."""
-    x, y = pairs.T
+def _cells(x: Array) -> Array:
+    """Number of the cell of every value, cells of equal numbers; one for each of a few distinct values."""
     n, levels = len(x), np.unique(x)
     cells = min(MOST_CELLS, n // DROPS_OF_A_CELL)
     if len(levels) <= cells:
-        cell, cells = np.searchsorted(levels, x), len(levels)
-    else:
-        cell = np.argsort(np.argsort(x, kind="stable"), kind="stable") * cells // n
+        return np.searchsorted(levels, x).astype(np.float64)
+    rank = np.argsort(np.argsort(x, kind="stable"), kind="stable")
+    return (rank * cells // n).astype(np.float64)
+
+
+def _explained(pairs: Array) -> Array:
+    """Share of the variance between cells (first column), less what chance alone would give, shape (1,)."""
+    cell, y = pairs[:, 0].astype(np.int64), pairs[:, 1]
+    n, cells = len(y), int(cell.max()) + 1
     count = np.bincount(cell, minlength=cells)
     mean = np.bincount(cell, weights=y, minlength=cells) / np.maximum(count, 1)
     between = float(np.sum(count * (mean - y.mean()) ** 2))
