@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,8 +11,10 @@ from rotordrop.errors import IdentificationError, RecordError
 from rotordrop.estimated import NINETY, Estimated
 from rotordrop.identification.air_gap import AirGap, identify_air_gap, rest_at_end
 from rotordrop.identification.evidence import Evidence, Missing, known, read_evidence
-from rotordrop.identification.sensing import Sensing, displacements_along
+from rotordrop.identification.sensing import Sensing
 from rotordrop.machine import Machine
+from rotordrop.machine.sensor import Sensor
+from rotordrop.measurement.axes import along_sensors
 from rotordrop.measurement.record import Record
 from rotordrop.model.assembly import build_rotor_fe
 from rotordrop.model.bearing_numbers import numbers_of
@@ -21,6 +25,45 @@ from rotordrop.spectrum.coast_down_law import fit_drag
 from rotordrop.spectrum.speed_profile import SpeedProfile, fit_speed_profile
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedPlane:
+    """Displacement at one bearing out of the readings of a record, computed where it is asked for.
+
+    A coast-down of a minute fills a quarter of a gigabyte as soon as every step keeps a copy of it.
+
+    Attributes
+    ----------
+    signals : ndarray, shape (N, S)
+        Readings from power-off on [m].
+    sensors : tuple of Sensor
+        Behind every column.
+    sensing : Sensing
+        What they say about the bearings.
+    bearing : int
+        Which of them.
+    sideways : float
+        Where the rotor rests horizontally [m]; displacements count from there.
+    """
+
+    signals: Array
+    sensors: tuple[Sensor, ...]
+    sensing: Sensing
+    bearing: int
+    sideways: float
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Samples and directions, (N, 2)."""
+        return (len(self.signals), 2)
+
+    def __getitem__(self, key: slice, /) -> Array:
+        """Displacement (x, y) [m] of a part, shape (K, 2)."""
+        along = along_sensors(self.signals[key], self.sensors) - self.sensing.settled_bend
+        moved: Array = np.einsum("cs,ns->nc", self.sensing.to_bearings[self.bearing], along)
+        moved[:, 0] -= self.sideways
+        return moved
 
 
 def recorded_coast_down(machine: Machine, record: Record) -> CoastDownSignal:
@@ -40,27 +83,30 @@ def recorded_coast_down(machine: Machine, record: Record) -> CoastDownSignal:
     evidence = read_evidence(build_drop_model(machine), record)
     off, names = evidence.power_off.value, evidence.model.bearing_names
     sensing = known(evidence.sensing)
-    falling = record.time >= off
-    moved = sensing.at_bearings(displacements_along(record)[falling] - sensing.settled_bend)
+    first = int(np.searchsorted(record.time, off))
     try:
         gap = _air_gap(evidence, sensing)
-        moved[..., 0] -= gap.rest.sideways
+        sideways = gap.rest.sideways
         gaps, errors = gap.value, dict(zip(names, map(float, gap.standard_error), strict=True))
         centre = (
             f"above the rest of the last {gap.rest.end - gap.rest.start:.3g} s, at the height of sensor zero"
         )
     except IdentificationError as error:
+        sideways = np.zeros(len(names))
         gaps = np.array([float(bearing.air_gap) for bearing in machine.touchdown_bearings])
         errors = None
         centre = f"taken as the zero of the sensors, the air gap from the machine file: {error}"
     time, speed = _speed(record, off)
     return CoastDownSignal(
-        planes={name: np.ascontiguousarray(moved[:, b]) for b, name in enumerate(names)},
+        planes={
+            name: RecordedPlane(record.signals[first:], record.sensors, sensing, b, float(sideways[b]))
+            for b, name in enumerate(names)
+        },
         air_gap=dict(zip(names, map(float, gaps), strict=True)),
         air_gap_error=errors,
         centre=centre,
         sampling_rate=record.sampling_rate,
-        start_time=float(record.time[falling][0]) - off,
+        start_time=float(record.time[first]) - off,
         profile=_profile(time, speed),
         speed_time=time,
         speed=speed,

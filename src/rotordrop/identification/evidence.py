@@ -21,7 +21,7 @@ from rotordrop.identification.speed import SpeedFit, identify_speed
 from rotordrop.machine.sensor import Sensor
 from rotordrop.measurement.axes import along_sensors, sensor_polarity
 from rotordrop.measurement.contacts import first_forces
-from rotordrop.measurement.events import DropInstant
+from rotordrop.measurement.events import AFTER_FALL, DropInstant
 from rotordrop.measurement.levitated import LevitatedModel
 from rotordrop.measurement.power_off import PowerOff, find_power_off
 from rotordrop.measurement.record import Record
@@ -253,17 +253,27 @@ def read_evidence(
         contacts=nothing,
         reach=_sought(lambda: _reach(record, instant, model, known(sensing))),
     )
-    return _with_fall(found)
+    until = max(instant.value, float(record.time[0])) + AFTER_FALL
+    seen = None
+    if record.time[-1] > until:
+        seen = _with_fall(found, replace(found, record=record.window(-np.inf, until)))
+    return seen or _with_fall(found, found) or found
 
 
-def _with_fall(found: Evidence) -> Evidence:
-    """The evidence with the fall, and power-off as the fit of the fall leaves it."""
-    fall = _sought(lambda: fit_initial_state(found, known(found.gap), known(found.sensing)))
+def _with_fall(found: Evidence, seen: Evidence) -> Evidence | None:
+    """The evidence with the fall that part of its record shows, and power-off as the fit leaves it.
+
+    None where only a part was seen that does not show fall and first contacts: all of it may.
+    """
+    whole = seen is found
+    fall = _sought(lambda: fit_initial_state(seen, known(found.gap), known(found.sensing)))
     if isinstance(fall, Missing):
-        return replace(found, fall=fall, contacts=fall)
+        return replace(found, fall=fall, contacts=fall) if whole else None
     instant = found.power_off
     refined = fall.refined(instant) if isinstance(instant, DropInstant) else instant
-    contacts = _sought(lambda: _first_contacts(found, fall, known(found.gap)))
+    contacts = _sought(lambda: _first_contacts(seen, fall, known(found.gap)))
+    if isinstance(contacts, Missing) and not whole:
+        return None
     return replace(found, power_off=refined, fall=fall, contacts=contacts)
 
 

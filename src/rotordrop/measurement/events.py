@@ -32,6 +32,10 @@ is its own bending after the release."""
 MODEL_ERROR = 1.5e-5
 """Standard uncertainty of the drop instant by what the release model leaves out [s]."""
 
+AFTER_FALL = 2.0
+"""How long after the fall a record is looked at for its first contact [s], before all of it is."""
+
+_BLOCK = 65536
 _CONTACT_FILTER = 1e-3
 _UNSURE = 3e-3
 """How far the first guess of the drop may be off [s]."""
@@ -200,12 +204,41 @@ def coarse_drop(record: Record, machine: Machine, planes: tuple[Plane, ...]) -> 
     RecordError
         When it never does, or has done so from the beginning.
     """
-    speed_time, readings = require_speed(record)
     gaps = np.array([gap_of(machine, plane) for plane in planes])
+    turn = 2 * np.pi / max(abs(float(require_speed(record)[1][0])), 1.0)
+    first = max(int(min(turn, 0.02) * record.sampling_rate), 8)
+    early = until_fallen(record, planes, gaps, first)
+    found = _coarse_drop(early, machine, planes, gaps, first)
+    if early is not record and found.contact > early.time[-1] - 2.0 * _CONTACT_FILTER:
+        return _coarse_drop(record, machine, planes, gaps, first)
+    return found
+
+
+def until_fallen(record: Record, planes: tuple[Plane, ...], gaps: Array, first: int) -> Record:
+    """A record until shortly after all planes are low; all of it where they never are.
+
+    A coast-down goes on for a minute after its fall of some milliseconds: what is asked of the fall must not
+    hold that minute in memory several times over.
+    """
+
+    def height(part: slice) -> Array:
+        return planar_of(along_sensors(record.signals[part], record.sensors), planes)[:, :, 1]
+
+    start = np.mean(height(slice(first)), axis=0)
+    for begin in range(0, len(record.time), _BLOCK):
+        fallen = (start - height(slice(begin, begin + _BLOCK)) > FALLEN_SHARE * gaps).all(axis=1)
+        if fallen.any():
+            end = begin + int(np.argmax(fallen)) + round(AFTER_FALL * record.sampling_rate)
+            return record if end >= len(record.time) else record.window(-np.inf, float(record.time[end]))
+    return record
+
+
+def _coarse_drop(
+    record: Record, machine: Machine, planes: tuple[Plane, ...], gaps: Array, first: int
+) -> CoarseDrop:
+    speed_time, readings = require_speed(record)
     shape = planar_of(along_sensors(record.signals, record.sensors), planes)
     height = shape[:, :, 1]
-    turn = 2 * np.pi / max(abs(float(readings[0])), 1.0)
-    first = max(int(min(turn, 0.02) * record.sampling_rate), 8)
     start = np.mean(height[:first], axis=0)
     deepest = float(np.max((start - np.min(height, axis=0)) / gaps))
     low = start - height > FALLEN_SHARE * gaps

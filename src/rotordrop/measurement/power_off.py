@@ -17,6 +17,7 @@ from rotordrop.measurement.events import (
     first_sudden,
     gap_of,
     sinking,
+    until_fallen,
     with_whole_planes,
 )
 from rotordrop.measurement.fall import REMANENT_SHARE, REMANENT_TIME
@@ -99,8 +100,9 @@ def find_power_off(record: Record, machine: Machine) -> DropInstant | PowerOff:
 def begins_with_fall(record: Record, machine: Machine) -> bool:
     """Whether the rotor has fallen by a share of its gap before it could have levitated for 5 ms."""
     whole, planes = with_whole_planes(record)
-    height = planar_of(along_sensors(whole.signals, whole.sensors), planes)[:, :, 1]
     gaps = np.array([gap_of(machine, plane) for plane in planes])
+    whole = until_fallen(whole, planes, gaps, first=1)
+    height = planar_of(along_sensors(whole.signals, whole.sensors), planes)[:, :, 1]
     sunk = height[:1] - height > FALLEN_SHARE * gaps
     if not sunk.all(axis=1).any():
         return False

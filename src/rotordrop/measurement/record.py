@@ -283,16 +283,19 @@ def record_of(
     rounded = (
         ("time stamps are rounded; an even clock was put behind them",) if _repeats(matched[0].time) else ()
     )
-    columns = [displacement(c, s, recording, profile, place) for c, s in zip(matched, sensors, strict=True)]
+    signals, words = np.empty((len(time), len(sensors))), []
+    for column, (channel, sensor) in enumerate(zip(matched, sensors, strict=True)):
+        signals[:, column], said = displacement(channel, sensor, recording, profile, place)
+        words += said
     pulses = _pulses(recording, matched, profile, place)
     speed_time, speed_readings, notes = _speed(recording, matched, profile, time, place, pulses)
     speed = None
     if speed_time is not None and speed_readings is not None:
         speed = np.interp(time, speed_time, speed_readings)
-    spoken = tuple(dict.fromkeys(word for _, words in columns for word in words))
+    spoken = tuple(dict.fromkeys(words))
     return Record(
         time=time,
-        signals=np.column_stack([values for values, _ in columns]),
+        signals=signals,
         sensors=sensors,
         sampling_rate=rate,
         speed=speed,

@@ -84,16 +84,11 @@ class Clock:
         """The part of a signal [m] that follows a phase [rad]."""
         return extract(signal, self.rate, phase, bandwidth=self.settings.bandwidth)
 
-    def views(self, signal: Array, share: float) -> list[View]:
-        """All ways to look at a signal [m] in frames of a share of the usual length."""
-        views = (self.frequency_view(signal, share), self.order_view(signal, share))
-        return [view for view in views if view is not None]
-
-    def same_view(self, view: View, signal: Array) -> FramePower:
+    def same_view(self, view: View, signal: Array) -> View:
         """The same look at another signal [m]."""
         again = (self.order_view if view.of_orders else self.frequency_view)(signal, view.share)
         assert again is not None
-        return again.frames
+        return again
 
     def frequency_view(self, signal: Array, share: float) -> View:
         """Power over frequency, in frames of equal time."""

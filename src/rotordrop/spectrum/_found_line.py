@@ -21,12 +21,11 @@ class FoundLine:
 
     Attributes
     ----------
-    phase : shape (N,)
-        Phase that the line follows [rad].
     path : shape (N,)
-        Its frequency [Hz].
-    taken : shape (N, C)
-        What was taken out of the signal [m].
+        The frequency that it follows [Hz].
+    power : shape (N,)
+        Square of what was taken out of the signal [m²], over all channels, in single precision: dozens of
+        lines are kept until all are named.
     brief : bool
         Seen only for a short part of the signal.
     parent, multiple
@@ -49,9 +48,8 @@ class FoundLine:
     last_seen: float
     existence: float
     time: Array
-    phase: Array
     path: Array
-    taken: Array
+    power: NDArray[np.float32]
     brief: bool
     parent: FoundLine | None = None
     multiple: float = 0.0
@@ -59,7 +57,7 @@ class FoundLine:
     @property
     def strength(self) -> float:
         """Sum of squares of what was taken out [m²]."""
-        return float(np.sum(self.taken**2))
+        return float(np.sum(self.power, dtype=np.float64))
 
     @property
     def skirt(self) -> float:
@@ -71,7 +69,7 @@ class FoundLine:
     def path_of_frequency(self) -> FrequencyPath:
         """Frequency over time, about twenty values per second."""
         step = max(round(0.05 / (self.time[1] - self.time[0])), 1)
-        return FrequencyPath(time=self.time[::step], frequency=self.path[::step])
+        return FrequencyPath(time=self.time[::step], frequency=self.path[::step].copy())
 
     def frequency_at(self, time: Array) -> Array:
         """Frequency [Hz] at times [s]; infinite where a brief line is not there."""

@@ -98,6 +98,9 @@ class LineSearch:
         )
         self._rest = signal - smooth(signal, round(sampling_rate / settings.lowest_frequency))
         self._refused: list[_Refused] = []
+        self._views: dict[tuple[bool, float], View] = {}
+        self._after: tuple[Array, View] | None = None
+        self._phases: list[tuple[FoundLine, Array]] = []
         self.found: list[FoundLine] = []
 
     def run(self) -> list[FoundLine]:
@@ -107,21 +110,23 @@ class LineSearch:
         self._bursts()
         self._single_lines(speed_change=0.4, shares=(1.0,))
         self._combinations()
+        self._phases.clear()
         self._single_lines(speed_change=0.0, shares=(1.0, SHORT_FRAME))
         return self.found
 
     def _bursts(self) -> None:
         """Take out what is strong for a moment only, against what the same frequency usually shows."""
         while len(self._refused) < MOST_REFUSED and self._clock.profile is not None:
-            view = self._clock.frequency_view(self._rest, SHORT_FRAME)
+            view = self._view(SHORT_FRAME, of_orders=False)
+            assert view is not None
             usual = np.median(view.frames.power, axis=0)
             peak = self._clearest(view, 0.0, usual)
             if peak is None or peak.ratio < BURST:
                 break
-            line = self._follow(peak, view)
+            line, taken = self._follow(peak, view)
             moved = math.inf if line is None else abs(line.frequency - peak.coordinate)
             if line is not None and line.brief and line.kind == "steady" and moved < 0.3 * view.resolution:
-                self._keep(line)
+                self._keep(line, taken)
             else:
                 self._refuse(peak, view)
         self._refused = []
@@ -129,21 +134,35 @@ class LineSearch:
     def _single_lines(self, *, speed_change: float, shares: tuple[float, ...]) -> None:
         """Take lines out as long as any is seen while the speed falls by such a share of itself."""
         while len(self.found) < self.settings.most_lines and len(self._refused) < MOST_REFUSED:
-            views = [view for share in shares for view in self._clock.views(self._rest, share)]
-            peaks = [(self._clearest(view, speed_change), view) for view in views]
+            views = [self._view(share, of_orders) for share in shares for of_orders in (False, True)]
+            peaks = [(self._clearest(view, speed_change), view) for view in views if view is not None]
             seen = [(peak, view) for peak, view in peaks if peak is not None]
             if not seen:
                 return
             peak, view = max(seen, key=lambda one: one[0].score)
-            line = self._follow(peak, view)
+            line, taken = self._follow(peak, view)
             if line is None:
                 self._refuse(peak, view)
             else:
-                self._keep(line)
+                self._keep(line, taken)
 
-    def _keep(self, line: FoundLine) -> None:
+    def _view(self, share: float, of_orders: bool) -> View | None:
+        """What is left of the signal, seen in frames of a share of the usual length; None if none fits."""
+        if (of_orders, share) not in self._views:
+            view = (self._clock.order_view if of_orders else self._clock.frequency_view)(self._rest, share)
+            if view is None:
+                return None
+            self._views[of_orders, share] = view
+        return self._views[of_orders, share]
+
+    def _keep(self, line: FoundLine, taken: Array) -> None:
         self.found.append(line)
-        self._rest = self._rest - line.taken
+        self._rest = self._rest - taken
+        self._views.clear()
+        if self._after is not None and self._after[0] is taken:
+            seen = self._after[1]  # what was looked at to judge the line is what is left now
+            self._views[seen.of_orders, seen.share] = seen
+        self._after = None
 
     def _refuse(self, peak: Peak, view: View) -> None:
         first, last = view.frames.time[[peak.first, peak.last - 1]]
@@ -186,8 +205,8 @@ class LineSearch:
                 free &= ~(then[:, None] & (np.abs(place - refused.coordinate) < 2.0 * width[:, None]))
         return free
 
-    def _follow(self, peak: Peak, view: View) -> FoundLine | None:
-        """Follow a peak through the signal; None if a line only swept past it."""
+    def _follow(self, peak: Peak, view: View) -> tuple[FoundLine | None, Array]:
+        """Follow a peak through the signal, with the part it takes of it; None if a line only swept past."""
         advance = cast(Array, self._clock.angle) if view.of_orders else TURN * self._clock.time
         spoken = self._spoken(peak, view)
         coordinate, offset = peak.coordinate, Offset(value=0.0, error=math.inf)
@@ -207,9 +226,13 @@ class LineSearch:
         if not self._explained(peak, view, taken) or self._better_otherwise(
             envelope, view, coordinate, spoken
         ):
-            return None
+            return None, taken
         line = self._describe(envelope, present, taken, peak, view, coordinate, offset.error)
-        return None if self._skirt(line) else line
+        if self._skirt(line):
+            return None, taken
+        if line.kind == "steady":
+            self._phases.append((line, phase))
+        return line, taken
 
     def _skirt(self, line: FoundLine) -> bool:
         """Whether a line is blurred and small beside a strong one: what is left of that one, not a line."""
@@ -225,7 +248,9 @@ class LineSearch:
     def _explained(self, peak: Peak, view: View, taken: Array) -> bool:
         """Whether a line taken out is what made the peak: a line that only sweeps past leaves most of it."""
         row = slice(peak.first, peak.last)
-        after = self._clock.same_view(view, self._rest - taken).power[row, :, peak.channel]
+        seen = self._clock.same_view(view, self._rest - taken)
+        self._after = (taken, seen)
+        after = seen.frames.power[row, :, peak.channel]
         line = int(np.argmin(np.abs(view.frames.coordinate - peak.coordinate)))
         near = slice(max(line - 1, 0), line + 2)
         left = median_of_known(after[:, near].max(axis=1))
@@ -364,9 +389,8 @@ class LineSearch:
             last_seen=float(when[-1]),
             existence=1.0 - self.settings.detection.false_alarm,
             time=self._clock.time,
-            phase=envelope.phase,
             path=np.abs(self._clock.rate_of(envelope.phase)),
-            taken=taken,
+            power=np.sum(taken**2, axis=1).astype(np.float32),
             brief=bool(when[-1] - when[0] < BRIEF * (self._clock.time[-1] - self._clock.time[0])),
             parent=parent,
             multiple=multiple,
@@ -388,32 +412,37 @@ class LineSearch:
         """Lines at a steady one plus or minus an order: look along every such path."""
         if self._clock.angle is None:
             return
-        steady = sorted(
-            (line for line in self.found if line.kind == "steady"), key=lambda line: -line.strength
-        )
-        pairs = [(line, k) for line in steady[:STEADY_PARTNERS] for k in COMBINED_ORDERS]
+        steady = sorted(self._phases, key=lambda entry: -entry[0].strength)
+        pairs = [(line, phase, k) for line, phase in steady[:STEADY_PARTNERS] for k in COMBINED_ORDERS]
         while pairs and len(self.found) < self.settings.most_lines:
             scored = [
-                (self._along(line.phase + k * self._clock.angle, share), line, k)
-                for line, k in pairs
-                for share in (1.0, 0.5)
+                (peak, index)
+                for index, (_, phase, k) in enumerate(pairs)
+                for peak in self._along(phase + k * self._clock.angle)
             ]
-            peak, line, k = max(scored, key=lambda entry: entry[0].score if entry[0] else 0.0)
+            peak, index = max(scored, key=lambda entry: entry[0].score if entry[0] else 0.0)
             if peak is None:
                 return
-            pairs.remove((line, k))
+            line, phase, k = pairs.pop(index)
             if peak.amplitude < float(line.amplitude.max()):
-                self._take_combination(peak, line, k)
+                self._take_combination(peak, line, phase, k)
 
-    def _along(self, phase: Array, share: float) -> Peak | None:
-        """The peak, if there is one, on a moving path against what lies beside it."""
+    def _along(self, phase: Array) -> list[Peak | None]:
+        """The peak on a moving path against what lies beside it, in long frames and in short ones."""
+        turned = np.empty(self._rest.shape, dtype=np.complex128)
+        np.multiply(2.0 * self._rest, np.cos(phase)[:, None], out=turned.real)
+        np.multiply(-2.0 * self._rest, np.sin(phase)[:, None], out=turned.imag)
+        path, reachable = np.abs(self._clock.rate_of(phase)), self._clock.reachable(phase).astype(np.float64)
+        return [self._beside(turned, path, reachable, share) for share in (1.0, 0.5)]
+
+    def _beside(
+        self, turned: NDArray[np.complex128], path: Array, reachable: Array, share: float
+    ) -> Peak | None:
         length = share * self._clock.frame
-        turned = 2.0 * self._rest * np.exp(-1j * phase)[:, None]
         view = offset_power(
             turned, self._clock.rate, start_time=self._clock.start, frame=length, reach=BESIDE
         )
-        usable = self._clock.at(view.time, self._clock.reachable(phase).astype(np.float64)) > 0.99
-        path = np.abs(self._clock.rate_of(phase))
+        usable = self._clock.at(view.time, reachable) > 0.99
         for line in self.found:
             moments = [view.time + share * length for share in FIVE_MOMENTS]
             apart = np.abs([self._clock.at(when, path) - line.frequency_at(when) for when in moments])
@@ -429,16 +458,17 @@ class LineSearch:
             return None
         return peak
 
-    def _take_combination(self, peak: Peak, partner: FoundLine, k: float) -> None:
-        phase = partner.phase + k * cast(Array, self._clock.angle)
+    def _take_combination(self, peak: Peak, partner: FoundLine, partner_phase: Array, k: float) -> None:
+        phase = partner_phase + k * cast(Array, self._clock.angle)
         envelope = self._clock.extract(self._rest, phase)
         present = self._present(envelope, peak, self._clock.reachable(phase))
         frequency = np.abs(self._clock.rate_of(phase))
         low, high = np.percentile(frequency[present], [5.0, 95.0])
+        taken = self._part(envelope, present)
         line = self._line(
             envelope,
             present,
-            self._part(envelope, present),
+            taken,
             peak,
             kind="combination",
             frequency=float(np.sum(_weight(envelope, present) * frequency)),
@@ -450,7 +480,7 @@ class LineSearch:
             parent=partner,
             multiple=k,
         )
-        self._keep(line)
+        self._keep(line, taken)
 
 
 def _connected(clear: Mask, spoken: Mask, gap: int) -> Mask:

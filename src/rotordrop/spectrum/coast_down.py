@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -233,9 +232,7 @@ def analyse_coast_down(
         settings=STANDARD_SETTINGS if signal.recorded else LineSettings(most_lines=LINES_OF_A_SIMULATION),
     )
     tell("orders and waterfalls", 0.5)
-    with ThreadPoolExecutor() as pool:
-        work = [(signal, name, read[name], lines, candidates, choice) for name in signal.planes]
-        planes = dict(zip(signal.planes, pool.map(lambda one: _plane(*one), work), strict=True))
+    planes = {name: _plane(signal, name, read[name], lines, candidates, choice) for name in signal.planes}
     tell("speed", 0.95)
     return CoastDownAnalysis(signal=signal, planes=planes, lines=lines, speed_law=_speed_law(signal))
 

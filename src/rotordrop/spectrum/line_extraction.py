@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import cast
 
 import numpy as np
@@ -35,23 +36,39 @@ class Envelope:
 
     def line(self) -> Array:
         """The line itself [m], shape (N, C)."""
-        return cast(Array, (self.value * np.exp(1j * self.phase)[:, None]).real)
+        return self.value.real * np.cos(self.phase)[:, None] - self.value.imag * np.sin(self.phase)[:, None]
 
 
 def smooth(values: Array, samples: int) -> Array:
     """Smooth over so many samples on each side (three moving averages), fair to the ends, shape kept."""
-    size = max(samples, 1)
-    weight = np.ones(len(values))
-    out = values
-    for _ in range(3):
-        weight = uniform_filter1d(weight, size, mode="constant")
-        out = uniform_filter1d(out, size, axis=0, mode="constant")
-    return out / weight.reshape(-1, *([1] * (values.ndim - 1)))
+    rows = np.array(values.T, dtype=np.float64, order="C", ndmin=2)
+    _smooth_rows(rows, samples)
+    return np.ascontiguousarray(rows.T).reshape(values.shape)
 
 
 def smooth_complex(values: ComplexArray, samples: int) -> ComplexArray:
-    """Smooth real and imaginary part alike."""
-    return cast(ComplexArray, smooth(values.real, samples) + 1j * smooth(values.imag, samples))
+    """Smooth real and imaginary part of a series, shape (N,), alike."""
+    rows = np.stack([values.real, values.imag])
+    _smooth_rows(rows, samples)
+    return cast(ComplexArray, rows[0] + 1j * rows[1])
+
+
+def _smooth_rows(rows: Array, samples: int) -> None:
+    """Smooth every row in place."""
+    size = max(samples, 1)
+    for _ in range(3):
+        uniform_filter1d(rows, size, axis=1, mode="constant", output=rows)
+    rows /= _share_inside(rows.shape[1], size)
+
+
+@lru_cache(maxsize=8)
+def _share_inside(count: int, size: int) -> Array:
+    """Share of the three moving averages that lies inside a series, sample by sample."""
+    weight = np.ones(count)
+    for _ in range(3):
+        weight = uniform_filter1d(weight, size, mode="constant")
+    weight.setflags(write=False)
+    return weight
 
 
 def extract(signal: Array, sampling_rate: float, phase: Array, *, bandwidth: float) -> Envelope:
@@ -69,11 +86,19 @@ def extract(signal: Array, sampling_rate: float, phase: Array, *, bandwidth: flo
         Distance from the line up to which amplitude changes are followed [Hz].
     """
     samples = round(0.5 * sampling_rate / bandwidth)
-    turned = 2.0 * signal * np.exp(-1j * phase)[:, None]
+    channels = signal.shape[1]
+    turned = np.empty((2 * channels, len(signal)))  # one row per channel: real parts, then imaginary parts
+    np.multiply(2.0 * signal.T, np.cos(phase), out=turned[:channels])
+    np.multiply(-2.0 * signal.T, np.sin(phase), out=turned[channels:])
     value = np.zeros_like(turned)
+    missed = np.empty_like(turned)
     for _ in range(SHARPENING):
-        value = value + smooth_complex(turned - value, samples)
-    return Envelope(value=value, phase=phase)
+        np.subtract(turned, value, out=missed)
+        _smooth_rows(missed, samples)
+        value += missed
+    found = np.empty(signal.shape, dtype=np.complex128)
+    found.real, found.imag = value[:channels].T, value[channels:].T
+    return Envelope(value=found, phase=phase)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
+from scipy.fft import fft, rfft
 from scipy.ndimage import map_coordinates, spline_filter1d
 from scipy.signal import resample_poly
 
@@ -64,15 +66,15 @@ def frequency_power(
         Highest frequency kept [Hz].
     """
     points = min(2 * max(round(frame * sampling_rate / 2), 8), len(signal) // 2 * 2)
-    window = hann_window(points)[:, None]
+    window = hann_window(points)
     starts = np.arange(0, len(signal) - points + 1, points // 2)
     frequency = np.fft.rfftfreq(points, 1.0 / sampling_rate)
     kept = frequency <= highest
     power = np.empty((starts.size, int(kept.sum()), signal.shape[1]))
-    for row, start in enumerate(starts):
-        cut = signal[start : start + points]
-        spectrum = np.fft.rfft((cut - cut.mean(axis=0)) * window, axis=0)[kept]
-        power[row] = np.abs(spectrum) ** 2 * (4.0 / points) ** 2
+    for channel in range(signal.shape[1]):
+        frames = _frames(signal[:, channel], points)
+        spectrum = rfft((frames - frames.mean(axis=1, keepdims=True)) * window, overwrite_x=True)[:, kept]
+        power[:, :, channel] = np.abs(spectrum) ** 2 * (4.0 / points) ** 2
     middle = start_time + (starts.astype(np.float64) + points / 2) / sampling_rate
     return FramePower(
         time=middle,
@@ -100,20 +102,26 @@ def offset_power(
         Largest distance kept [Hz].
     """
     points = min(2 * max(round(frame * sampling_rate / 2), 8), len(turned) // 2 * 2)
-    window = hann_window(points)[:, None]
+    window = hann_window(points)
     starts = np.arange(0, len(turned) - points + 1, points // 2)
     offset = np.fft.fftfreq(points, 1.0 / sampling_rate)
     kept = np.flatnonzero(np.abs(offset) <= reach)
     kept = kept[np.argsort(offset[kept])]
     power = np.empty((starts.size, kept.size, turned.shape[1]))
-    for row, start in enumerate(starts):
-        power[row] = np.abs(np.fft.fft(turned[start : start + points] * window, axis=0)[kept]) ** 2
+    for channel in range(turned.shape[1]):
+        spectrum = fft(_frames(turned[:, channel], points) * window, overwrite_x=True)[:, kept]
+        power[:, :, channel] = np.abs(spectrum) ** 2
     middle = start_time + (starts.astype(np.float64) + points / 2) / sampling_rate
     return FramePower(
         time=middle,
         coordinate=cast(Array, offset[kept]),
         power=power * (2.0 / points) ** 2,
     )
+
+
+def _frames(series: NDArray[Any], points: int) -> NDArray[Any]:
+    """Half-overlapping frames of a series, shape (F, points), without a copy."""
+    return sliding_window_view(series, points)[:: points // 2]
 
 
 def order_power(

@@ -249,8 +249,7 @@ def _window_fit(
     freedom = max(float(np.sum(weight**2)) * (1.0 - basis.shape[1] / len(basis)), 1.0)
     spread = np.sqrt(np.sum(residual**2, axis=0) / freedom)
     # Equal noise in all samples, unequal weights: the weights enter the variance once more.
-    spreading = inverse @ (basis * weight).T
-    variance = np.sum(spreading[first] ** 2, axis=1)
+    variance = np.sum(((basis * weight) @ inverse[first].T) ** 2, axis=0)
     return amplitude, np.sqrt(variance)[:, None] * spread
 
 

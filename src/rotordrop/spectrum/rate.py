@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import firwin, resample_poly
+from scipy.signal import firwin, upfirdn
 
 from rotordrop.spectrum.waterfall import PlanarSignal
 
 Array = NDArray[np.float64]
 
 TAPS_PER_FACTOR = 40
+BLOCK = 8192
+"""Samples that remain of what is read at a time [1]: the signal may lie in a file, or be made while read."""
 STOP_BAND = 100.0
 """Attenuation of what would fold back [dB]."""
 
@@ -45,13 +47,26 @@ def reduce_rate(
     sampling_rate : float
         [Hz].
     """
-    values = np.asarray(displacement[0 : displacement.shape[0]], dtype=np.float64)
     factor = int(sampling_rate // (samples_per_turn * highest_frequency))
     if factor < 2:
-        return values, sampling_rate
+        return np.asarray(displacement[0 : displacement.shape[0]], dtype=np.float64), sampling_rate
     beta = 0.1102 * (STOP_BAND - 8.7)
-    taps = firwin(2 * (TAPS_PER_FACTOR // 2) * factor + 1, 0.75 / factor, window=("kaiser", beta))
-    thin = [
-        resample_poly(values[:, k], 1, factor, window=taps, padtype="line") for k in range(values.shape[1])
-    ]
-    return np.column_stack(thin), sampling_rate / factor
+    half = TAPS_PER_FACTOR // 2
+    taps = firwin(2 * half * factor + 1, 0.75 / factor, window=("kaiser", beta))
+    samples = displacement.shape[0]
+    thin = np.empty((-(-samples // factor), displacement.shape[1]))
+    for first in range(0, len(thin), BLOCK):
+        last = min(first + BLOCK, len(thin))
+        read = _extended(displacement, (first - half) * factor, (last - 1 + half) * factor + 1)
+        thin[first:last] = upfirdn(taps, read, 1, factor, axis=0)[2 * half : 2 * half + last - first]
+    return thin, sampling_rate / factor
+
+
+def _extended(displacement: PlanarSignal, first: int, last: int) -> Array:
+    """Samples of a stretch; beyond the ends, the straight line through the first sample and the last one."""
+    samples = displacement.shape[0]
+    ends = [np.asarray(displacement[k : k + 1], dtype=np.float64) for k in (0, samples - 1)]
+    slope = (ends[1] - ends[0]) / max(samples - 1, 1)
+    before, after = np.arange(first, 0)[:, None], np.arange(1, last - samples + 1)[:, None]
+    inside = np.asarray(displacement[max(first, 0) : min(last, samples)], dtype=np.float64)
+    return np.concatenate([ends[0] + slope * before, inside, ends[1] + slope * after])

@@ -241,9 +241,8 @@ def test_a_brief_line_has_a_frequency_only_while_it_is_there() -> None:
         last_seen=8.0,
         existence=1.0,
         time=time,
-        phase=np.zeros(401),
         path=np.full(401, 92.0),
-        taken=np.zeros((401, 2)),
+        power=np.zeros(401, dtype=np.float32),
         brief=True,
     )
     at = np.array([3.9, 4.1, 6.0, 8.9, 9.1])

@@ -50,9 +50,8 @@ def taken(kind: str, frequency: float, ratio: float, time: Any) -> Any:
         last_seen=float(time[-1]),
         existence=0.999,
         time=time,
-        phase=TURN * frequency * time,
         path=np.full(len(time), frequency),
-        taken=np.zeros((len(time), 2)),
+        power=np.zeros(len(time), dtype=np.float32),
         brief=False,
     )
 
@@ -169,11 +168,11 @@ def test_the_width_of_a_triangle_is_half_its_foot(line: int) -> None:
 def test_a_harmonic_is_looked_for_where_the_swing_was_while_the_line_was_strong() -> None:
     """Weighted by power: at 10 Hz with three times the amplitude, as long at 20 Hz."""
     swing: Any = SimpleNamespace(path=np.array([10.0] * 50 + [20.0] * 50), frequency_error=0.01)
-    line: Any = SimpleNamespace(taken=np.repeat([[3e-6, 0.0], [0.0, -1e-6]], 50, axis=0))
+    line: Any = SimpleNamespace(power=np.repeat(np.float32([9e-12, 1e-12]), 50))
     first, *_ = _harmonics(line, [("pendulum", swing), ("itself", line)])
     assert first.value == pytest.approx(2.0 * 11.0)
     assert first.tolerance >= 2.0 * SWING_ERROR
-    silent: Any = SimpleNamespace(taken=np.zeros((100, 2)))
+    silent: Any = SimpleNamespace(power=np.zeros(100, dtype=np.float32))
     assert _harmonics(silent, [("pendulum", swing)]) == []
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from rotordrop.measurement.recording import Array, Channel, Recording, known_uni
 from rotordrop.measurement.unpacking import Item, unpack
 
 _TIME_NAMES = ("time", "t")
+
+Clocks: TypeAlias = dict[tuple[float, float, float, int], Array]
+"""Even clocks by start, rate, step and number of samples: channels of one clock share its array."""
 
 
 def read_hdf5(path: Path, profile: Profile) -> Recording:
@@ -37,7 +40,10 @@ def read_hdf5(path: Path, profile: Profile) -> Recording:
     """
     content = unpack(path, "hdf5")
     times = {item.name: item for item in content.items if _is_time(item.name)}
-    channels = tuple(_channel(item, times, profile, path) for item in content.items if item.name not in times)
+    clocks: Clocks = {}
+    channels = tuple(
+        _channel(item, times, profile, path, clocks) for item in content.items if item.name not in times
+    )
     if not channels:
         raise RecordError(f"{path} holds no one-dimensional numeric dataset; export the channels one by one")
     entries = {key: str(value) for key, value in content.attributes.items()}
@@ -50,7 +56,7 @@ def _is_time(name: str) -> bool:
     return last in _TIME_NAMES or last.endswith("_time")
 
 
-def _channel(item: Item, times: dict[str, Item], profile: Profile, path: Path) -> Channel:
+def _channel(item: Item, times: dict[str, Item], profile: Profile, path: Path, clocks: Clocks) -> Channel:
     attributes = {key.lower(): value for key, value in item.attributes.items()}
     scale, offset = (_number(attributes, names, item.name, path) for names in (("scale",), ("offset",)))
     values = item.values.astype(np.float64)
@@ -62,7 +68,7 @@ def _channel(item: Item, times: dict[str, Item], profile: Profile, path: Path) -
         label=item.name,
         unit=known_unit(unit) or unit,
         values=values,
-        time=_time(item, attributes, times, path),
+        time=_time(item, attributes, times, path, clocks),
     )
 
 
@@ -77,16 +83,19 @@ def _number(attributes: Mapping[str, Any], names: tuple[str, ...], dataset: str,
         ) from None
 
 
-def _time(item: Item, attributes: Mapping[str, Any], times: dict[str, Item], path: Path) -> Array:
+def _time(
+    item: Item, attributes: Mapping[str, Any], times: dict[str, Item], path: Path, clocks: Clocks
+) -> Array:
     name, count = item.name, len(item.values)
     step = _number(attributes, ("dt_s", "dt"), name, path)
     rate = _number(attributes, ("fs_hz", "fs"), name, path)
     start = _number(attributes, ("t0_s", "t0"), name, path) or 0.0
-    index = np.arange(count, dtype=np.float64)
-    if rate is not None and rate > 0:
-        return start + index / rate
-    if step is not None and step > 0:
-        return start + index * step
+    if (rate is not None and rate > 0) or (step is not None and step > 0):
+        key = (start, rate or 0.0, step or 0.0, count)
+        if key not in clocks:
+            index = np.arange(count, dtype=np.float64)
+            clocks[key] = start + (index / rate if rate is not None and rate > 0 else index * (step or 0.0))
+        return clocks[key]
     folder = name.rpartition("/")[0]
     named = f"{folder}/{attributes.get('time', '')}".lstrip("/")
     if named in times and len(times[named].values) == count:
