@@ -11,6 +11,8 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
 import generated_pages  # noqa: E402
+from docutils.nodes import SkipNode  # noqa: E402
+from docutils.utils.math.latex2mathml import tex2mathml  # noqa: E402
 
 from rotordrop import __version__  # noqa: E402
 
@@ -23,7 +25,6 @@ extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.doctest",
-    "sphinx.ext.mathjax",
     "sphinx.ext.viewcode",
     "numpydoc",
 ]
@@ -47,8 +48,25 @@ doctest_global_setup = "import numpy as np\nnp.set_printoptions(precision=4, sup
 generated_pages.write(HERE / "generated")
 
 
+html_math_renderer = "mathml"
+
+
+def _inline_math(writer: Any, node: Any) -> None:
+    writer.body.append(tex2mathml(node.astext(), as_block=False))
+    raise SkipNode
+
+
+def _block_math(writer: Any, node: Any) -> None:
+    writer.body.append(f'<div class="math">{tex2mathml(node.astext(), as_block=True)}</div>')
+    raise SkipNode
+
+
 def setup(app: Any) -> None:
-    """Leave names of array types out of the pages: numpydoc takes them for functions and fails."""
+    """Write mathematics as MathML, which browsers show without a network, and skip what numpydoc cannot read.
+
+    Names of array types are left out of the pages: numpydoc takes them for functions and fails.
+    """
+    app.add_html_math_renderer("mathml", (_inline_math, None), (_block_math, None))
 
     def is_array_type(app: Any, what: str, name: str, obj: Any, skip: bool, options: Any) -> bool | None:
         return True if isinstance(obj, GenericAlias) else None

@@ -1,4 +1,4 @@
-"""Write the pages that follow from the sources: equations, parameters, packages, commands."""
+"""Write the pages that follow from the sources: machine file, equations, parameters, packages, commands."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 
 import equation_index
 import parameter_page
+import reference_page
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "src" / "rotordrop"
@@ -20,6 +21,8 @@ def write(folder: Path) -> None:
     pages |= {f"api_{name}.md": package_page(name) for name in packages()}
     pages["api.md"] = api_page()
     pages["parameters.md"] = parameter_page.parameter_page()
+    pages["machine_file.md"] = reference_page.machine_page()
+    pages["profile.md"] = reference_page.profile_page()
     for name, text in pages.items():
         file = folder / name
         if not file.exists() or file.read_text(encoding="utf-8") != text:

@@ -76,7 +76,7 @@ def _list(only: list[str], json_file: Path | None) -> None:
     drops = chosen_drops(only)
 
     def summarise(out: Console) -> None:
-        out.print(f"DropBench, version {VERSION}: {len(drops)} drops")
+        out.print(f"DropBench, version {VERSION}; drops: {len(drops)}")
         for drop in drops:
             kinds = " + ".join(kind for kind, _ in drop.departures)
             out.print(
@@ -112,7 +112,7 @@ def _score(folder: Path, estimates: Path, only: list[str], every: bool, json_fil
     def summarise(out: Console) -> None:
         out.print(_table(scores, every))
         flagged = sum(drop["consistent"] is False for drop in scores.drops)
-        out.print(f"{len(scores.drops)} drops, {flagged} whose estimate calls itself not consistent.")
+        out.print(f"Drops: {len(scores.drops)}; estimates that call themselves not consistent: {flagged}.")
         out.print(
             f"Of {scores.departures} departures {scores.named_rightly} were named; "
             f"{scores.named_wrongly} estimates name one that was not there."

@@ -35,7 +35,8 @@ def score(
     ],
     truth: Annotated[Path, typer.Argument(metavar="TRUTH", help="Truth file, a .json.", show_default=False)],
     drop: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Which recording of an estimate of several.")
+        str | None,
+        typer.Option(metavar="NAME", help="Which recording of an estimate of several, or its new name."),
     ] = None,
     json_file: JsonOption = None,
 ) -> None:
@@ -98,7 +99,10 @@ def _cells(where: str, path: str, entry: dict[str, Any]) -> tuple[str, ...]:
 
 def _impact_line(name: str, impacts: dict[str, Any]) -> str:
     median = impacts["median_absolute_error"]
-    text = f"{name}: {impacts['found']} of {impacts['true_impacts']} impacts above 500 N found"
+    from rotordrop.units import format_quantity
+
+    above = format_quantity(impacts["above_N"], "force", digits=2)
+    text = f"{name}: {impacts['found']} of {impacts['true_impacts']} impacts above {above} found"
     return text if median is None else f"{text}, median error of their peaks {percent(median)}"
 
 

@@ -14,7 +14,6 @@ from rotordrop.estimated import NINETY, Estimated, IdentifiedValue, Verdict
 from rotordrop.estimation.document import structure_json
 from rotordrop.estimation.estimate import Structure
 from rotordrop.estimation.joint_spread import joint_spread
-from rotordrop.estimation.structure import BEYOND_GRADE_SOURCE
 from rotordrop.estimation.structure_sentence import structure_of
 from rotordrop.estimation.tracked import track_drops
 from rotordrop.estimation.tracked_loads import INCONSISTENT_WIDENING
@@ -194,13 +193,15 @@ def _with_unbalance(machine: Machine, said: Mapping[str, IdentifiedValue]) -> Ma
 
     What was described then is the width of a prior, and no amount that a simulation could use.
     """
-    amounts = {}
+    values = {}
     for i, unbalance in enumerate(machine.unbalances):
-        along = [said[f"unbalance.{i}.{part}"].value for part in ("cosine", "sine")]
-        if unbalance.amount.source == BEYOND_GRADE_SOURCE:
-            found = Estimated(value=math.hypot(*along), status="guess", source=BEYOND_GRADE_SOURCE)
-            amounts[f"unbalance.{i}.amount"] = found
-    return machine.with_values(amounts) if amounts else machine
+        if unbalance.beyond_described is not None:
+            along = [said[f"unbalance.{i}.{part}"].value for part in ("cosine", "sine")]
+            found = math.hypot(*along)
+            factor = float(unbalance.beyond_described) * found / float(unbalance.amount)
+            values[f"unbalance.{i}.amount"] = Estimated(value=found, status="guess")
+            values[f"unbalance.{i}.beyond_described"] = Estimated(value=factor, status="guess")
+    return machine.with_values(values) if values else machine
 
 
 def _possible(machine: Machine, fitted: dict[str, Estimated], drops: Sequence[str]) -> Machine:

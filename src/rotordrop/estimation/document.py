@@ -11,6 +11,7 @@ import numpy as np
 
 from rotordrop._version import __version__
 from rotordrop.estimated import IdentifiedValue
+from rotordrop.estimation.advice import Advice
 from rotordrop.estimation.agreement import Agreement
 from rotordrop.estimation.bearing_drop import BearingDrop, Impact, Peak
 from rotordrop.estimation.estimate import Estimate, ReplaySteps, Structure
@@ -35,6 +36,7 @@ def estimate_document(estimate: Estimate) -> dict[str, Any]:
             for bearing in estimate.bearings
         },
         "structure": structure_json(estimate.structure),
+        "advice": [_advice(one) for one in estimate.advice],
         "cross_check": [_cross_check(one) for one in estimate.cross_check],
         "later_motion": [{**asdict(one), "larger": one.larger} for one in estimate.later],
         "parameters": [
@@ -100,6 +102,16 @@ def _consistency(estimate: Estimate) -> dict[str, Any]:
         "nis": _finite(estimate.nis),
         "process_noise_factor": estimate.noise_factor,
         "checks": [asdict(check) for check in estimate.checks],
+    }
+
+
+def _advice(one: Advice) -> dict[str, Any]:
+    return {
+        "measurement": one.measurement,
+        "paths": list(one.paths),
+        "half_widths_N": one.half_widths,
+        "narrowed_N": one.narrowed,
+        "sentence": one.sentence(),
     }
 
 

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from rotordrop.atomic_file import write_json
 from rotordrop.estimated import Correlation, IdentifiedValue
+from rotordrop.estimation.advice import Advice
 from rotordrop.estimation.agreement import Agreement
 from rotordrop.estimation.bearing_drop import BearingDrop
 from rotordrop.estimation.later_motion import LaterMotion
@@ -263,6 +264,8 @@ class Estimate:
         How far the replayed drop follows the record.
     replay : ReplaySteps or None
         The steps of the paper's route.
+    advice : tuple of Advice
+        Further numbers that would narrow the peak forces of a machine that is known by few; the best first.
     later : tuple of LaterMotion
         What the rest of the record shows; empty where it has none.
     findings : tuple of Finding
@@ -292,6 +295,7 @@ class Estimate:
     noise_factor: float | None = None
     agreement: Agreement | None = None
     replay: ReplaySteps | None = None
+    advice: tuple[Advice, ...] = ()
     later: tuple[LaterMotion, ...] = ()
     findings: tuple[Finding, ...] = ()
     warnings: tuple[str, ...] = field(default=())

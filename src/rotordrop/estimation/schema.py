@@ -190,6 +190,14 @@ _AGREEMENT = closed(
     orbit_disagreement_m=NUMBER,
     expected_horizon_s=MAYBE,
 )
+_ADVICE = closed(
+    {},
+    measurement={**TEXT, "description": "What to measure of the machine."},
+    paths=TEXTS,
+    half_widths_N={**by_name(NUMBER), "description": "Half the 90 % interval of the peak force by bearing."},
+    narrowed_N={**by_name(NUMBER), "description": "The same once the measurement is known."},
+    sentence=TEXT,
+)
 _DROP = closed(
     {
         "fixed": {"type": ["string", "null"]},
@@ -221,6 +229,7 @@ _DROP = closed(
     consistency=_CONSISTENCY,
     bearings=by_name({"$ref": "#/$defs/bearing"}),
     structure={"type": "array", "items": _STRUCTURE},
+    advice={"type": "array", "items": _ADVICE},
     cross_check={"type": "array", "items": _CROSS_CHECK},
     later_motion={"type": "array", "items": _LATER},
     parameters={"type": "array", "items": _PARAMETER},

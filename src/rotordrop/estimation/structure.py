@@ -63,18 +63,17 @@ def _remanence(machine: Machine) -> Values:
 
 BEYOND_GRADE = 3.0
 """Factor on the unbalance that the grade permits [1]."""
-BEYOND_GRADE_SOURCE = "beyond the described one, as the record asked for"
 
 
 def _unbalance(machine: Machine) -> Values:
-    if any(unbalance.amount.source == BEYOND_GRADE_SOURCE for unbalance in machine.unbalances):
+    if any(unbalance.beyond_described is not None for unbalance in machine.unbalances):
         return {}
-    return {
-        f"unbalance.{i}.amount": Estimated(
-            value=BEYOND_GRADE * float(unbalance.amount), status="guess", source=BEYOND_GRADE_SOURCE
-        )
+    amounts = {
+        f"unbalance.{i}.amount": _guess(BEYOND_GRADE * float(unbalance.amount))
         for i, unbalance in enumerate(machine.unbalances)
     }
+    factors = {f"unbalance.{i}.beyond_described": _guess(BEYOND_GRADE) for i in range(len(amounts))}
+    return amounts | factors
 
 
 def _modulus(machine: Machine) -> Values:

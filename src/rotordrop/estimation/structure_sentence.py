@@ -9,6 +9,7 @@ from rotordrop.estimated import IdentifiedValue
 from rotordrop.estimation.estimate import Structure
 from rotordrop.estimation.structure_search import Kept
 from rotordrop.machine import Machine
+from rotordrop.machine.amb import REMANENCE_TIME
 from rotordrop.model.statics import bearing_load_shares
 from rotordrop.model.unknowns import PEAK_LOADS
 
@@ -117,7 +118,11 @@ def _sensors(key: str, unit: str, scale: float, text: str) -> Callable[[Machine,
 
 def _remanence(_machine: Machine, values: Values) -> str:
     time = derived(_same, values["remanence.time_constant"])
-    return f"the lift of the magnets decays in {_text(time, 'ms', 1e-3)}, longer or shorter than usual"
+    usual = f"the usual {1e3 * REMANENCE_TIME:g} ms"
+    side = f"longer than {usual}" if time[1] > REMANENCE_TIME else f"shorter than {usual}"
+    if time[1] <= REMANENCE_TIME <= time[2]:
+        side = f"not to be told from {usual}"
+    return f"the lift of the magnets decays in {_text(time, 'ms', 1e-3)}, {side}"
 
 
 def _unbalance(machine: Machine, values: Values) -> str:

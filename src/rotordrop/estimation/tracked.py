@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError
+from rotordrop.estimation.rotor_search import with_found_rotor
 from rotordrop.estimation.structure_search import (
     FIRST_OTHER_START,
     PATIENT,
@@ -21,6 +22,7 @@ from rotordrop.estimation.structure_search import (
     found_structure,
     improbability,
 )
+from rotordrop.estimation.tracked_loads import of_a_beam
 from rotordrop.estimation.tracked_parameters import UNSURE_GAP
 from rotordrop.identification.evidence import Evidence, Missing
 from rotordrop.machine import Machine
@@ -28,6 +30,7 @@ from rotordrop.measurement.axes import sees_both_directions
 from rotordrop.model.contact_band import reduction_for_contact
 from rotordrop.model.parameters import DropModel, build_drop_model
 from rotordrop.model.reduction import Reduction
+from rotordrop.model.rotor_form import is_beam
 from rotordrop.tracking.calibration import (
     BLIND_SCHEDULE,
     CALIBRATED_SCHEDULE,
@@ -76,6 +79,9 @@ ends them [1]."""
 
 START_SPREAD = 0.8
 """Spread of other starts, in standard deviations of the prior [1]."""
+
+ROTOR_SEEN = 6.0
+"""Part of the drop from which the form of a rotor is found, over the time of a free fall [1]."""
 
 FALL_SHARE = 1.7e-7
 """Largest unknown impulse per 50 µs while the rotor falls, over its weight [s]."""
@@ -192,6 +198,7 @@ def track_drops(
     record is tried with extensions of the usual model; the machine that comes back has those that were kept.
     """
     search = _Search(evidence=tuple(_tail_first(evidence)), calibrate_only=calibrate_only, progress=progress)
+    machine = search.with_rotor(machine)
     if is_calibrated(machine) and not calibrate_only:
         schedule = search.shifted(machine, QUICK_SCHEDULE if quick else CALIBRATED_SCHEDULE)
         found = Candidate(machine=machine, fit=track(search.problems(machine), schedule, progress=progress))
@@ -204,7 +211,8 @@ def track_drops(
             usual = found_sensors(usual, search.judge, search.look)
         # First: the coarse basis alone may end beside a record that the finer one fits.
         found = search.refined(usual)
-    if found.beside and not found.kept:
+    # Where a beam stands for a rotor, its form is what does not fit: no extension stands for that.
+    if found.beside and not found.kept and not is_beam(machine.rotor):
         extended = found_structure(usual, search.from_guesses, search.look)
         if extended.fit is not usual.fit:
             found = min(found, search.refined(extended), key=lambda one: one.rank)
@@ -232,6 +240,13 @@ class _Search:
     def contact(self) -> float:
         """Time of the latest first contact after power-off [s]."""
         return max(_first_contact(item) for item in self.evidence)
+
+    def with_rotor(self, machine: Machine) -> Machine:
+        """The machine with its rotor as the records show it, where a beam stands for it."""
+        if not is_beam(machine.rotor):
+            return machine
+        until = ROTOR_SEEN * fall_time(machine)
+        return with_found_rotor(machine, [(item, recorded_drop(item, until)) for item in self.evidence])
 
     def problems(self, machine: Machine) -> list[DropProblem]:
         """The drops with the finer basis."""
@@ -424,11 +439,12 @@ def tracked_drop(
     kept: tuple[Kept, ...] = (),
 ) -> TrackedDrop:
     """Forces and checks of one smoothed drop."""
+    forces = force_history(problem, smoothed)
     return TrackedDrop(
         evidence=evidence,
         problem=problem,
         smoothed=smoothed,
-        forces=force_history(problem, smoothed),
+        forces=of_a_beam(forces) if is_beam(problem.model.machine.rotor) else forces,
         checks=consistency_checks(problem, smoothed, noise_factor),
         noise_factor=noise_factor,
         drops=drops,

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError
 from rotordrop.estimated import IdentifiedValue
+from rotordrop.estimation.advice import Advice
 from rotordrop.estimation.assumptions import twin_assumptions
 from rotordrop.estimation.bearing_drop import BearingDrop
 from rotordrop.estimation.estimate import (
@@ -22,6 +23,7 @@ from rotordrop.estimation.estimate import (
 )
 from rotordrop.estimation.later_motion import LaterMotion, later_motion
 from rotordrop.estimation.methods import Tracked
+from rotordrop.estimation.narrowing import narrowing
 from rotordrop.estimation.record_facts import RecordFacts
 from rotordrop.estimation.structure_sentence import structure_of
 from rotordrop.estimation.tracked import TrackedDrop
@@ -94,6 +96,7 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
     problem, evidence = drop.problem, drop.evidence
     judged = _judge(drop, check)
     later = _later(drop, judged)
+    advice = _advice(drop, judged)
     quick = (QUICK.format("" if judged.check else "without the independent cross-check and "),)
     return Estimate(
         name=evidence.name,
@@ -113,6 +116,7 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
         innovations=_innovations(drop),
         nis=drop.smoothed.filtered.nis,
         noise_factor=drop.noise_factor,
+        advice=advice,
         later=later,
         findings=facts.findings,
         warnings=facts.warnings_with(
@@ -121,10 +125,19 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
         notes=(
             *twin_assumptions(evidence, problem),
             *(check.note for check in drop.checks if check.note),
+            *(f"a further number: {one.sentence()}" for one in advice),
             *(quick if method.quick else ()),
         ),
         simulated_record=facts.simulated,
     )
+
+
+def _advice(drop: TrackedDrop, judged: _Judgement) -> tuple[Advice, ...]:
+    """What to measure of a machine whose rotor is not known by its drawing; of others it costs a pass."""
+    unsure = any(unknown.parameter.owner == "rotor" for unknown in drop.problem.unknowns)
+    if not (unsure and judged.fits and drop.drops == 1):
+        return ()
+    return narrowing(drop.problem, drop.smoothed, drop.forces, judged.widening)
 
 
 def _structure(drop: TrackedDrop, judged: _Judgement) -> tuple[Structure, ...]:

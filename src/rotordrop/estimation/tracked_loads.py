@@ -38,6 +38,8 @@ MODEL_MEAN_STRESS_SIGMA = 0.04
 """The same for the mean stress: preload sets it, known only through the ball stiffness [1]."""
 MODEL_MEAN_FORCE_SIGMA = 0.01
 """Relative standard deviation of a mean force by what every model here leaves out [1]."""
+BEAM_FORCE_SIGMA = 0.08
+"""Relative standard deviation of a force by a beam in place of the rotor, its form from the record [1]."""
 INDEPENDENT_SPANS = 50.0
 """Independent stretches in the 50 ms of the mean force: its errors last about a millisecond [1]."""
 INCONSISTENT_WIDENING = 2.0
@@ -67,6 +69,15 @@ class Loads:
     peak_stress: Peak
     means: Mapping[str, IdentifiedValue]
     missing: Mapping[str, str] = field(default_factory=dict)
+
+
+def of_a_beam(forces: ForceHistory) -> ForceHistory:
+    """Forces with the error of a beam that stands for the rotor; stress goes with the third root of force."""
+    return replace(
+        forces,
+        magnitude_sigma=np.hypot(forces.magnitude_sigma, BEAM_FORCE_SIGMA * forces.magnitude),
+        stress_sigma=np.hypot(forces.stress_sigma, BEAM_FORCE_SIGMA / 3.0 * forces.stress),
+    )
 
 
 def with_interval(value: float, sigma: float, widening: float = 1.0, unit: str = "") -> IdentifiedValue:

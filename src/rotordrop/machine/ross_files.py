@@ -10,7 +10,8 @@ import json
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ _CONE_CUTS = 8
 _SOFT = 1e-3
 """A layer with less than this share of the shaft's elastic modulus carries no load."""
 _LAYER_MODULUS = 1.0
+_COEFFICIENT = re.compile(r"[kcm](xx|xy|yx|yy|zz)|frequency")
 _PASSED_OVER = ("parameters", "ross_version")
 _BUILT_IN = {
     "steel": (7810.0, 211e9, 81.2e9),
@@ -36,15 +38,76 @@ _BUILT_IN = {
 
 @dataclass(frozen=True, kw_only=True)
 class Spring:
-    """A bearing of the source: node here, name, stiffness [N/m] and damping [N s/m] in x and y.
+    """A bearing of the source.
 
-    Where the source has them by speed, these are the first of its table.
+    Attributes
+    ----------
+    node : int
+        Node here.
+    name : str
+        Its name.
+    stiffness, damping : tuple of float
+        In x and y [N/m], [N s/m]; where the source has them by speed, the first of its table.
+    cross_stiffness, cross_damping : tuple of float
+        Force in x against motion in y, and in y against motion in x.
+    told : dict of str to tuple of float
+        All coefficients of the source by its own names, over ``frequency`` [rad/s]; written back as they are.
     """
 
     node: int
     name: str
     stiffness: tuple[float, float]
     damping: tuple[float, float]
+    cross_stiffness: tuple[float, float] = (0.0, 0.0)
+    cross_damping: tuple[float, float] = (0.0, 0.0)
+    told: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+
+    @property
+    def stiffness_matrix(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Force in (x, y) against displacement in (x, y) [N/m]."""
+        return _matrix(self.stiffness, self.cross_stiffness)
+
+    @property
+    def damping_matrix(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Force in (x, y) against velocity in (x, y) [N s/m]."""
+        return _matrix(self.damping, self.cross_damping)
+
+    def at_speed(self, speed: float) -> Spring:
+        """The bearing with its coefficients at a speed [rad/s], straight between those of its table."""
+        speeds = self.told.get("frequency", ())
+        if len(speeds) < 2:
+            return self
+
+        def between(key: str, otherwise: float) -> float:
+            values = self.told.get(key)
+            return otherwise if values is None or len(values) < 2 else _between(speed, speeds, values)
+
+        def pair(kind: str, keys: tuple[str, str], now: tuple[float, float]) -> tuple[float, float]:
+            first, second = (between(f"{kind}{key}", value) for key, value in zip(keys, now, strict=True))
+            return first, second
+
+        own, cross = ("xx", "yy"), ("xy", "yx")
+        return replace(
+            self,
+            stiffness=pair("k", own, self.stiffness),
+            damping=pair("c", own, self.damping),
+            cross_stiffness=pair("k", cross, self.cross_stiffness),
+            cross_damping=pair("c", cross, self.cross_damping),
+        )
+
+
+def _between(at: float, places: tuple[float, ...], values: tuple[float, ...]) -> float:
+    """Value on the straight line between two of a table; the end one beyond it."""
+    for (a, u), (b, v) in pairwise(zip(places, values, strict=True)):
+        if at <= b:
+            return u if at <= a else u + (v - u) * (at - a) / (b - a)
+    return values[-1]
+
+
+def _matrix(
+    own: tuple[float, float], cross: tuple[float, float]
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    return (own[0], cross[0]), (cross[1], own[1])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,12 +124,15 @@ class ImportedRotor:
         Program and version that wrote it.
     notes : tuple of str
         What was changed or left out.
+    nodes : tuple of int
+        The node here of every node of the source.
     """
 
     rotor: Rotor
     springs: tuple[Spring, ...]
     source: str
     notes: tuple[str, ...]
+    nodes: tuple[int, ...] = ()
 
 
 def read_ross(path: str | Path) -> ImportedRotor:
@@ -144,7 +210,11 @@ def _imported(
     springs = tuple(_spring(k, item, nodes) for k, (kind, item) in enumerate(elements) if _is_bearing(kind))
     notes += _left_out(elements)
     return ImportedRotor(
-        rotor=rotor, springs=springs, source=f"ROSS {version}", notes=tuple(dict.fromkeys(notes))
+        rotor=rotor,
+        springs=springs,
+        source=f"ROSS {version}",
+        notes=tuple(dict.fromkeys(notes)),
+        nodes=tuple(nodes),
     )
 
 
@@ -281,19 +351,34 @@ def _is_bearing(kind: str) -> bool:
 
 
 def _spring(k: int, item: Mapping[str, Any], nodes: list[int]) -> Spring:
-    first = {name: _first(item.get(name)) for name in ("kxx", "kyy", "cxx", "cyy")}
+    told = {key: _numbers(item[key]) for key in item if _COEFFICIENT.fullmatch(key) and item[key] is not None}
+    told = {key: values for key, values in told.items() if values}
+
+    def both(kind: str, first: str, second: str, otherwise: str) -> tuple[float, float]:
+        one = told.get(f"{kind}{first}", (0.0,))[0]
+        return one, told.get(f"{kind}{second}", (one if otherwise == "same" else 0.0,))[0]
+
     return Spring(
         node=nodes[int(item["n"])],
         name=str(item.get("tag") or f"bearing {k + 1}"),
-        stiffness=(first["kxx"], first["kxx"] if item.get("kyy") is None else first["kyy"]),
-        damping=(first["cxx"], first["cxx"] if item.get("cyy") is None else first["cyy"]),
+        stiffness=both("k", "xx", "yy", "same"),
+        damping=both("c", "xx", "yy", "same"),
+        cross_stiffness=both("k", "xy", "yx", "zero"),
+        cross_damping=both("c", "xy", "yx", "zero"),
+        told=told if _says_more(told) else {},
     )
 
 
-def _first(value: Any) -> float:
-    if isinstance(value, list):
-        return float(value[0]) if value else 0.0
-    return float(value or 0.0)
+def _says_more(told: Mapping[str, tuple[float, ...]]) -> bool:
+    """Whether coefficients change with speed, or act along the axis or as a mass."""
+    return any(
+        len(values) > 1 or ((key[0] == "m" or key[1:] == "zz") and any(values))
+        for key, values in told.items()
+    )
+
+
+def _numbers(value: Any) -> tuple[float, ...]:
+    return tuple(float(one) for one in value) if isinstance(value, list) else (float(value),)
 
 
 def _left_out(elements: Iterable[tuple[str, dict[str, Any]]]) -> list[str]:
@@ -345,11 +430,20 @@ def write_ross(rotor: Rotor, path: str | Path, springs: Iterable[Spring] = ()) -
     for spring in springs:
         content[f"BearingElement_{spring.name}"] = {
             "n": spring.node - 1,
-            "kxx": [spring.stiffness[0]],
-            "kyy": [spring.stiffness[1]],
-            "cxx": [spring.damping[0]],
-            "cyy": [spring.damping[1]],
             "tag": spring.name,
+            **(
+                {key: list(values) for key, values in spring.told.items()}
+                or {
+                    "kxx": [spring.stiffness[0]],
+                    "kxy": [spring.cross_stiffness[0]],
+                    "kyx": [spring.cross_stiffness[1]],
+                    "kyy": [spring.stiffness[1]],
+                    "cxx": [spring.damping[0]],
+                    "cxy": [spring.cross_damping[0]],
+                    "cyx": [spring.cross_damping[1]],
+                    "cyy": [spring.damping[1]],
+                }
+            ),
         }
     write_text(path, json.dumps(content, indent=2) if path.suffix.lower() == ".json" else _toml(content))
 

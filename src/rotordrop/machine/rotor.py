@@ -19,6 +19,7 @@ from rotordrop.machine.values import (
     Inertia,
     NonNegative,
     NonNegativeLength,
+    Number,
     Physical,
     Positive,
     PositiveLength,
@@ -203,6 +204,11 @@ class Rotor(Description):
         Damping ratio of the free-free flexible modes [1].
     stiffness_factor : Estimated, optional
         Bending stiffness over the one that sections and materials give [1].
+    mass_to_ends, mass_to_de : Estimated, optional
+        Of a beam in place of a rotor: part of its mass moved from the middle to the ends, and towards the DE,
+        such that mass and centre of mass stay [1].
+    stiffness_to_de, stiffness_to_ends : Estimated, optional
+        The same of the logarithm of its bending stiffness [1].
     """
 
     material: Name = Field(default="steel", description="Material of all sections that name no other")
@@ -210,6 +216,18 @@ class Rotor(Description):
     modal_damping: NonNegative = default(0.005, "0.5 % of critical on every free-free flexible mode")
     stiffness_factor: Positive | None = Field(
         default=None, description="Bending stiffness over the one that sections and materials give"
+    )
+    mass_to_ends: Number | None = Field(
+        default=None, description="Of a beam in place of a rotor: mass moved from its middle to its ends"
+    )
+    mass_to_de: Number | None = Field(
+        default=None, description="Of a beam: mass moved towards the DE; its centre of mass stays"
+    )
+    stiffness_to_de: Number | None = Field(
+        default=None, description="Of a beam: logarithm of bending stiffness, more towards the DE"
+    )
+    stiffness_to_ends: Number | None = Field(
+        default=None, description="Of a beam: logarithm of bending stiffness, more at the ends"
     )
     node_positions: NodePositions = Field(
         default=(), validate_default=False, description="Position of every node, for sections given by nodes"

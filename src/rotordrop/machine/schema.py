@@ -66,12 +66,14 @@ def _describe(schema: dict[str, Any], description: type[Description]) -> None:
     text = description.__doc__ or ""
     schema["description"] = text.split("\n")[0]
     schema.pop("title", None)
-    meanings = _meanings(text)
+    meanings = attribute_meanings(text)
+    shared = list(meanings.values())
     for name, entry in schema["properties"].items():
         entry.pop("title", None)
         standing = entry.pop("default", None)
         field = description.model_fields[name]
-        words = list(dict.fromkeys([meanings.get(name, ""), field.description or ""]))
+        meaning = meanings.get(name, "")
+        words = _words(meaning, shared.count(meaning) > 1, field.description or "")
         if isinstance(field.default, Estimated) and field.default.value == field.default.value:
             value = format_quantity(field.default.value, kind_of(description, name) or "dimensionless")
             words = [meanings.get(name, ""), f"Default {value}: {field.default.source}"]
@@ -80,7 +82,16 @@ def _describe(schema: dict[str, Any], description: type[Description]) -> None:
         entry["description"] = ". ".join(word.rstrip(".") for word in words if word)
 
 
-def _meanings(text: str) -> dict[str, str]:
+def _words(meaning: str, shared: bool, field: str) -> list[str]:
+    """What is said of a key: once, and the words of its own rather than those of several keys together."""
+    if not field or not meaning:
+        return [meaning or field]
+    if field.lower().startswith("when left out"):
+        return [meaning] if "left out" in meaning else [meaning, field]
+    return [field if shared else meaning]
+
+
+def attribute_meanings(text: str) -> dict[str, str]:
     """Read the attributes of a numpydoc docstring."""
     found: dict[str, str] = {}
     plain = "\n".join(line.removeprefix("    ") for line in text.split("\n"))

@@ -10,7 +10,7 @@ from pydantic import Field
 from rotordrop.errors import UsageError
 from rotordrop.estimated import Estimated
 from rotordrop.machine.description import Description, Placed
-from rotordrop.machine.values import Angle, PositiveSpeed
+from rotordrop.machine.values import Angle, Positive, PositiveSpeed
 from rotordrop.machine.values import Unbalance as UnbalanceAmount
 from rotordrop.units import parse_quantity
 
@@ -26,10 +26,15 @@ class Unbalance(Placed):
         Mass times radius [kg m].
     phase : Estimated
         Angle from +y, positive with the spin [rad], when the rotor angle is zero.
+    beyond_described : Estimated, optional
+        Factor by which the amount stands above what was described, where a record asked for more [1].
     """
 
     amount: UnbalanceAmount
     phase: Angle
+    beyond_described: Positive | None = Field(
+        default=None, description="Factor above the described amount, where a record asked for more"
+    )
 
 
 class BalanceGrade(Description):

@@ -23,8 +23,10 @@ class TextLayout(_Section):
     """How a text file is written, where guessing would go wrong."""
 
     encoding: str | None = Field(default=None, description="for example utf-8 or latin-1")
-    separator: str | None = Field(default=None, min_length=1, max_length=1)
-    decimal: str | None = Field(default=None, pattern=r"^[.,]$")
+    separator: str | None = Field(
+        default=None, min_length=1, max_length=1, description="one character between columns"
+    )
+    decimal: str | None = Field(default=None, pattern=r"^[.,]$", description="point or comma")
     first_data_line: int | None = Field(default=None, ge=1, description="counted from 1")
     names: tuple[str, ...] | None = Field(
         default=None, description="column names, for files without a header"
@@ -52,7 +54,7 @@ class SpeedSource(_Section):
     unit: str | None = Field(default=None, description="unit of the speed channel")
     constant: str | None = Field(default=None, description='speed by hand, for example "60 Hz"')
     pulses: str | None = Field(default=None, description="name of a channel of tacho or keyphasor pulses")
-    pulses_per_turn: int = Field(default=1, ge=1, le=10_000)
+    pulses_per_turn: int = Field(default=1, ge=1, le=10_000, description="pulses in one turn of the shaft")
     edge: Edge = Field(default="rising", description="the edge of a pulse that counts, rising or falling")
 
     @field_validator("constant")

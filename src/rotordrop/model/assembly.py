@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import UsageError
+from rotordrop.model.rotor_form import element_factors, is_beam
 from rotordrop.physics import timoshenko
 from rotordrop.physics.linear_algebra import product
 from rotordrop.physics.timoshenko import Section
@@ -176,19 +177,22 @@ def build_rotor_fe(machine: Machine) -> RotorFE:
 def rotor_fe(rotor: Rotor) -> RotorFE:
     """Finite elements of a rotor alone. Source: Neisi 2020, eq. (1)."""
     factor = 1.0 if rotor.stiffness_factor is None else float(rotor.stiffness_factor)
+    densities, stiffnesses = element_factors(rotor) if is_beam(rotor) else (None, None)
     sections = []
-    for element in rotor.elements:
+    for e, element in enumerate(rotor.elements):
         outer = float(element.outer_diameter)
+        heavier = 1.0 if densities is None else float(densities[e])
+        stiffer = factor if stiffnesses is None else factor * float(stiffnesses[e])
         section = timoshenko.round_section(
             outer,
             float(element.inner_diameter),
-            factor * float(element.youngs_modulus),
+            stiffer * float(element.youngs_modulus),
             float(element.poisson_ratio),
-            float(element.density),
+            heavier * float(element.density),
         )
         if element.layer_diameter is not None:
             section = timoshenko.with_layer(
-                section, outer, float(element.layer_diameter), float(element.layer_density)
+                section, outer, float(element.layer_diameter), heavier * float(element.layer_density)
             )
         sections.append(section)
     discs = [

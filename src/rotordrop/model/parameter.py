@@ -114,6 +114,8 @@ class Parameter:
         where it differs from that of one of them.
     group : {"plane", "machine"}
         Sensors that have it in common.
+    measured_by : str
+        What measurement would make it known, with ``{owner}`` for what has it; empty where none is usual.
     separated_by : dict
         What measurement would tell it from another parameter, by the path of the other.
     """
@@ -144,6 +146,7 @@ class Parameter:
     taken_over: Literal["needed", "welcome", "no"] = "no"
     common_sigma: float = 0.0
     group: Literal["plane", "machine"] = "machine"
+    measured_by: str = ""
     separated_by: dict[str, str] = dataclasses.field(default_factory=dict)
 
     @property

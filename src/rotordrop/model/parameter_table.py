@@ -10,6 +10,7 @@ from collections.abc import Iterator
 
 from rotordrop.model import layout as L
 from rotordrop.model.parameter import Entry, Load, Owner, Parameter, Role, Rule, Step
+from rotordrop.model.rotor_form import FORM
 from rotordrop.model.structure_table import STRUCTURE
 
 
@@ -27,6 +28,7 @@ TABLE: tuple[Parameter, ...] = (
         path="air_gap",
         label="air gap",
         kind="length",
+        measured_by="a lift check at {owner} (rotordrop clearance)",
         logarithmic=False,
         role=Role.SOUGHT,
         guess_sigma=0.08,
@@ -54,6 +56,7 @@ TABLE: tuple[Parameter, ...] = (
         path="support.stiffness",
         label="support stiffness",
         kind="stiffness",
+        measured_by="a hammer test of the touchdown-bearing housing at {owner}",
         role=Role.SOUGHT,
         guess_sigma=0.5,
         given_sigma=0.05,
@@ -85,6 +88,7 @@ TABLE: tuple[Parameter, ...] = (
         path="support.mass",
         label="support mass",
         kind="mass",
+        measured_by="a hammer test of the touchdown-bearing housing at {owner}",
         role=Role.SOUGHT,
         guess_sigma=0.4,
         given_sigma=0.05,
@@ -101,6 +105,7 @@ TABLE: tuple[Parameter, ...] = (
         path="support.damping",
         label="support damping",
         kind="damping",
+        measured_by="a hammer test of the touchdown-bearing housing at {owner}",
         role=Role.SOUGHT,
         guess_sigma=0.7,
         given_sigma=0.3,
@@ -116,6 +121,7 @@ TABLE: tuple[Parameter, ...] = (
         path="contact.stiffness",
         label="contact stiffness",
         kind="contact_stiffness",
+        measured_by="a static push with a known force at {owner}",
         guess_sigma=0.3,
         given_sigma=0.3,
         drift=0.2,
@@ -131,6 +137,7 @@ TABLE: tuple[Parameter, ...] = (
         path="contact.exponent",
         label="contact exponent",
         kind="dimensionless",
+        measured_by="a static push with a known force at {owner}",
         guess_sigma=0.1,  # from 10/9 of a line to 3/2 of a point
         given_sigma=0.1,
         least_sigma=0.01,  # an interval that ends at a limit may have no width, and no drop says more
@@ -170,6 +177,7 @@ TABLE: tuple[Parameter, ...] = (
         path="friction.dynamic",
         label="dynamic friction coefficient",
         kind="dimensionless",
+        measured_by="a speed sensor on the inner race of {owner}",
         role=Role.SOUGHT,
         guess_sigma=0.4,
         given_sigma=0.4,
@@ -201,6 +209,7 @@ TABLE: tuple[Parameter, ...] = (
         path="race.inertia",
         label="race inertia",
         kind="inertia",
+        measured_by="a speed sensor on the inner race of {owner}",
         role=Role.CONSIDERED,
         guess_sigma=0.12,
         given_sigma=0.12,
@@ -245,6 +254,7 @@ TABLE: tuple[Parameter, ...] = (
         path="preload",
         label="preload",
         kind="force",
+        measured_by="the preload of the bearing at {owner}, from its drawing",
         logarithmic=False,  # by the axial offset of the ball rows, which is what the ball forces depend on
         role=Role.CONSIDERED,
         guess_sigma=0.15,
@@ -325,7 +335,7 @@ TABLE: tuple[Parameter, ...] = (
 )
 """The rows; those of a bearing in the order in which the estimators hold them."""
 
-_BY_PATH = {(row.owner, row.path): row for row in (*TABLE, *STRUCTURE)}
+_BY_PATH = {(row.owner, row.path): row for row in (*TABLE, *STRUCTURE, *FORM)}
 
 
 def parameter(path: str, owner: Owner = "bearing") -> Parameter:

@@ -117,6 +117,7 @@ STRUCTURE: tuple[Parameter, ...] = (
         owner="rotor",
         label="bending stiffness of the rotor over the described one",
         kind="dimensionless",
+        measured_by="the first bending frequency of the free rotor, from a hammer test",
         guess_sigma=0.03,
         given_sigma=0.01,
         reach=1.3,

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.errors import SimulationError
 from rotordrop.physics.ball_bearing import BearingConstants
 
 Array = NDArray[np.float64]
@@ -14,6 +15,8 @@ Array = NDArray[np.float64]
 _STEPS = 60
 _LONGEST_STEP = 20e-6
 """Longest step [m] of the search for a displacement: a fraction of what any ball gives way under load."""
+_SETTLED = 1e-9
+"""Last step [m] above which the search has not found a displacement: a thousandth of what matters."""
 
 
 def ball_loads(constants: BearingConstants, displacement: Array) -> Array:
@@ -37,6 +40,11 @@ def displacement_under(constants: BearingConstants, force: Array) -> Array:
     Damped Newton steps for all instants at once. ``force`` is the force *on* the race; balls push against its
     displacement. Without preload and without force a race may be anywhere in its play: it is left in the
     centre. Source: equilibrium of Neisi 2020, eqs. (2)–(6).
+
+    Raises
+    ------
+    SimulationError
+        If the search does not settle, which takes a force that no such bearing bears.
     """
     angles = constants.row_ball_angles.reshape(-1)
     cosine, sine = np.cos(angles), np.sin(angles)
@@ -70,4 +78,17 @@ def displacement_under(constants: BearingConstants, force: Array) -> Array:
         found = found + step
         if math.sqrt(float(np.max(length, initial=0.0))) < 1e-7:
             break
+    _refuse_unsettled(length, size)
     return found
+
+
+def _refuse_unsettled(last_step: Array, force: Array) -> None:
+    """Refuse displacements that were still moving when the steps ran out."""
+    lost = np.flatnonzero(~(last_step < _SETTLED))
+    if len(lost):
+        worst = float(np.max(force[lost]))
+        raise SimulationError(
+            f"no position of the race was found at which its balls push back with {worst:.4g} N "
+            f"({len(lost)} of {len(force)} instants, after {_STEPS} steps); such a force is beyond any "
+            "bearing of this size: check units of force and balls"
+        )

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.atomic_file import atomic_path, make_folder, write_json
-from rotordrop.measurement.record import Record
+from rotordrop.measurement.record import Record, sha256_of
 from rotordrop.measurement.writers import recording_of, write_delimited, write_hdf5
 from rotordrop.synthesis.recording import SyntheticDrop
 
@@ -55,8 +55,9 @@ def write_synthetic(
     if drop.tail is not None:
         paths.append(folder / f"{stem}_tail.csv")
         write_record(drop.tail, paths[-1])
+    hashes = {f"{stem}.{kind}": sha256_of(folder / f"{stem}.{kind}") for kind in formats}
     paths.append(folder / TRUTH_FOLDER / f"{stem}.json")
-    write_json(paths[-1], {**drop.truth, "name": stem})
+    write_json(paths[-1], {**drop.truth, "name": stem, "record_sha256": hashes})
     if histories:
         paths.append(folder / TRUTH_FOLDER / f"{stem}.npz")
         _write_histories(drop.histories, paths[-1])

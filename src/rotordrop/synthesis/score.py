@@ -18,8 +18,8 @@ from rotordrop.synthesis.truth import Truth, read_truth, truth_of
 Array = NDArray[np.float64]
 Estimate = Mapping[str, Any]
 
-LARGE_IMPACT = 500.0
-"""Impacts whose true peak exceeds this [N] are scored."""
+LARGE_IMPACT = 1.7
+"""Impacts are scored whose true peak exceeds this many times the mean weight on a bearing [1]."""
 
 SAME_IMPACT = 5e-4
 """An estimated impact belongs to a true one when it peaks within it, widened by this [s]."""
@@ -67,7 +67,8 @@ def score_estimate(
     truth : Truth, mapping or path
         Truth file of a recording, ours or a supplied one.
     drop : str, optional
-        Which recording of an estimate of several; the name of the truth when left out.
+        Which recording of an estimate of several, or the name the recording was given since; the name of the
+        truth when left out.
 
     Returns
     -------
@@ -77,9 +78,16 @@ def score_estimate(
         ``bearings.<name>.<quantity>`` and ``structure.<path>``, each with ``estimate``, ``truth``, ``error``,
         ``relative_error`` and, where an interval was given, ``covered`` and ``half_width``; ``impacts`` per
         bearing where the estimate lists impacts; ``coverage`` over all intervals.
+
+    Raises
+    ------
+    UsageError
+        If the estimate is none, or is one of another recording: by the hash of the file where the truth has
+        it, else by its name.
     """
     known = _truth(truth)
     found = _one_drop(_estimate(estimate), known, drop)
+    _refuse_another_recording(found, known, drop)
     bearings = {name: _bearing_scores(found, known, name) for name in known.bearing_names}
     whole = _drop_scores(found, known)
     structure = _structure_scores(found, known)
@@ -144,6 +152,27 @@ def _one_drop(estimate: Estimate, truth: Truth, drop: str | None) -> Estimate:
     names = {*shared, *mine.get("bearings", {})}
     merged = {name: {**shared.get(name, {}), **mine.get("bearings", {}).get(name, {})} for name in names}
     return {**mine, "bearings": merged}
+
+
+def _refuse_another_recording(estimate: Estimate, truth: Truth, drop: str | None) -> None:
+    """Refuse an estimate of another recording: its numbers compare with nothing."""
+    hashes, own = truth.values.get("record_sha256"), estimate.get("record_sha256")
+    if hashes and own:
+        if own not in hashes.values():
+            raise UsageError(
+                f"the estimate is of a recording with SHA-256 {str(own)[:12]}…, and the truth {truth.name!r} "
+                f"belongs to {', '.join(f'{file} ({sha[:12]}…)' for file, sha in hashes.items())}; give the "
+                "truth of that recording"
+            )
+        return
+    record = estimate.get("record")
+    names = {estimate.get("name"), Path(record).stem if isinstance(record, str) else None} - {None}
+    if names and (drop or truth.name) not in names:
+        raise UsageError(
+            f"the estimate is of the recording {' or '.join(sorted(map(repr, names)))}, the truth of "
+            f"{truth.name!r}; give the truth of that recording, or say --drop {min(map(str, names))} if it "
+            "was renamed"
+        )
 
 
 def _bearing_scores(estimate: Estimate, truth: Truth, bearing: str) -> dict[str, Score]:
@@ -225,13 +254,14 @@ def _impact_scores(estimate: Estimate, truth: Truth, bearing: str) -> dict[str, 
     listed = estimate.get("bearings", {}).get(bearing, {}).get("impacts")
     if not isinstance(listed, list):
         return {}
-    true = truth.impacts(bearing)
-    true = true[true[:, 2] > LARGE_IMPACT]
+    true, least = truth.impacts(bearing), LARGE_IMPACT * truth.bearing_load
+    true = true[true[:, 2] > least]
     matches = [_matching(listed, row) for row in true]
     errors = [(m[0] - row[2]) / row[2] for m, row in zip(matches, true, strict=True) if m is not None]
     covered = [m[1] <= row[2] <= m[2] for m, row in zip(matches, true, strict=True) if m is not None and m[3]]
     return {
         "true_impacts": len(true),
+        "above_N": least,
         "found": len(errors),
         "relative_errors": errors,
         "median_absolute_error": float(np.median(np.abs(errors))) if errors else None,

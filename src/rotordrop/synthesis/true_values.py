@@ -136,6 +136,7 @@ def machine_truth(machine: Machine) -> dict[str, Any]:
     described = (row for row in rows("bearing") if len(row.truth) == 1 and row.step is not Step.FIRST_CONTACT)
     return {
         **{row.truth[0]: {b.name: float(row.described(b)) for b in bearings} for row in described},
+        "rotor_weight_N": machine.rotor.mass * float(machine.gravity),
         "equivalent_stiffness": _equivalent_stiffness(machine),
         "friction_dynamic": float(first.dynamic),
         "friction_static": float(first.static),

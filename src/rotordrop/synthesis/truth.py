@@ -47,6 +47,14 @@ class Truth:
         """Names of the touchdown bearings."""
         return tuple(self.values["air_gap_m"])
 
+    @property
+    def bearing_load(self) -> float:
+        """Mean weight on a bearing [N]; where it is not told, the mean force late in the drop."""
+        weight = self.values.get("rotor_weight_N")
+        if weight is None:
+            return float(np.mean(list(self.values.get("mean_force_0p15_0p2_N", {}).values() or [0.0])))
+        return float(weight) / len(self.bearing_names)
+
     def of_bearing(self, bearing: str) -> dict[str, float]:
         """True values of one bearing (SI) by path in an estimate, such as ``"support.mass_kg"``."""
         found = {row.field: self._of_bearing(bearing, row.truth) for row in published().values() if row.truth}

@@ -158,6 +158,17 @@ def force_history(problem: DropProblem, smoothed: Smoothed) -> ForceHistory:
     )
 
 
+def force_gradient(problem: DropProblem, mean: Array, b: int) -> Array:
+    """Derivative of the force [N] of bearing ``b`` by the whole estimate ``mean`` (n,), shape (n,)."""
+    n_b, count = problem.model.layout.n_bearings, len(problem.unknowns)
+    gradients = np.empty((1, n_b, N_VALUES, 3))
+    values, contacts = np.empty((1, n_b, N_VALUES)), np.empty((1, n_b, 6))
+    p = private_copy(problem.model.parameters)
+    force_values(mean[None].copy(), problem.n_dynamic, problem.targets, p, count, values, gradients, contacts)
+    rows = problem.watched_rows(problem.model.bearing_names[b])[:3]
+    return np.asarray(gradients[0, b, FORCE] @ rows)
+
+
 def stress_at_force(problem: DropProblem, theta: Array, b: int, force: Array) -> float:
     """Largest Hertz stress [Pa] at the inner race of bearing ``b`` under a static force (2,) [N].
 

@@ -188,7 +188,7 @@ def input_state_estimate(problem: DropProblem, lent: Lent) -> InputEstimate:
     count = len(lent.radius)
     closed = np.repeat(lent.radius < lent.reach, 2, axis=1)
     readings = ((problem.readings - lent.offsets) / (1.0 + lent.gain_errors))[:count]
-    rotor = _rotor(problem)
+    rotor = rotor_of(problem)
     early = slice(0, int(np.searchsorted(problem.time[:count], SEARCHED * problem.fall_time)))
     turn = (
         USUAL_PEAK / problem.fall_time
@@ -197,7 +197,7 @@ def input_state_estimate(problem: DropProblem, lent: Lent) -> InputEstimate:
     for look in range(LOOKS):
         if look == 1:
             turn = _likeliest_turn(rotor, readings[early], closed[early], local[early], turn)
-        passed = _forward(rotor, readings, closed, local, turn)
+        passed = forward_pass(rotor, readings, closed, local, turn)
         shown, variance = _backward(rotor, passed, variances=look == LOOKS - 1)
         force, fitted = shown[:, : closed.shape[1]], shown[:, closed.shape[1] :]
         local = _local_force(force, max(1, round(LOCAL * math.pi / (turn * rotor.dt))))
@@ -304,7 +304,8 @@ class _Rotor:
         return np.concatenate([np.eye(len(self.A))[self.forces], self.C])
 
 
-def _rotor(problem: DropProblem) -> _Rotor:
+def rotor_of(problem: DropProblem) -> _Rotor:
+    """The rotor of a problem under unknown forces at its bearings."""
     model = problem.model
     dt = float(problem.time[1] - problem.time[0])
     A, gravity, n = _transition(model, float(problem.mean[model.layout.rotor_speed]), dt)
@@ -336,7 +337,7 @@ def _likeliest_turn(
 
     def improbability(octave: int) -> float:
         if octave not in tried:
-            tried[octave] = _forward(rotor, readings, closed, local, turn * 2.0**octave).improbability
+            tried[octave] = forward_pass(rotor, readings, closed, local, turn * 2.0**octave).improbability
         return tried[octave]
 
     tried: dict[int, float] = {}
@@ -377,7 +378,9 @@ class _Passed:
     improbability: float
 
 
-def _forward(rotor: _Rotor, readings: Array, closed: NDArray[np.bool_], local: Array, turn: float) -> _Passed:
+def forward_pass(
+    rotor: _Rotor, readings: Array, closed: NDArray[np.bool_], local: Array, turn: float
+) -> _Passed:
     """Kalman filter over the readings (N, C) with unknown forces of local size (N, K) [N]."""
     dt, f = rotor.dt, rotor.forces
     k = f.stop - f.start

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 
 from rotordrop.errors import IdentificationError
 from rotordrop.estimated import IdentifiedValue
+from rotordrop.estimation.calibrated import _with_unbalance
 from rotordrop.estimation.document import structure_json
 from rotordrop.estimation.estimate import Verdict
 from rotordrop.estimation.structure import EXTENSIONS
@@ -23,7 +25,7 @@ from rotordrop.estimation.structure_search import (
     found_structure,
 )
 from rotordrop.estimation.structure_sentence import derived, soft_axis, soft_over_stiff, structure_of
-from rotordrop.machine import Machine, example_machine
+from rotordrop.machine import Machine, example_machine, load_machine, save_machine
 from rotordrop.model.parameters import build_drop_model
 from rotordrop.model.unknowns import all_unknowns
 
@@ -55,6 +57,7 @@ def has(machine: Machine) -> frozenset[str]:
         "brackets that follow the housing": sensor.follows_housing,
         "sensor planes elsewhere": sensor.plane_offset,
         "long remanence": machine.remanence_time_constant,
+        "unbalance beyond its grade": machine.unbalances[0].beyond_described,
         "rotor stiffness": machine.rotor.stiffness_factor,
     }
     return frozenset(name for name, value in marks.items() if value is not None)
@@ -190,3 +193,34 @@ def test_every_extension_says_what_was_found_with_its_interval(lp400, extension)
 
 def test_consistent_with_an_extension_holds():
     assert Verdict.EXTENDED.holds and not Verdict.HELD.holds and not Verdict.GIVEN_WAY.holds
+
+
+def test_an_unbalance_beyond_its_grade_is_known_by_its_field_and_outlives_the_file(lp400, tmp_path):
+    extension = next(one for one in EXTENSIONS if one.name == "unbalance beyond its grade")
+    beyond = extension.added_to(lp400)
+    assert float(beyond.unbalances[0].amount) == pytest.approx(3.0 * float(lp400.unbalances[0].amount))
+    save_machine(beyond, tmp_path / "machine.toml")
+    text = (tmp_path / "machine.toml").read_text()
+    (tmp_path / "machine.toml").write_text(re.sub(r'source = ".*?"', 'source = "other words"', text))
+    back = load_machine(tmp_path / "machine.toml")
+    assert float(back.unbalances[0].beyond_described) == 3.0
+    assert extension.values(back) == {}
+    said = {f"unbalance.{i}.{p}": IdentifiedValue(value=2e-5) for i in range(2) for p in ("cosine", "sine")}
+    found = _with_unbalance(back, said).unbalances[0]
+    assert float(found.amount) == pytest.approx(np.hypot(2e-5, 2e-5))
+    assert float(found.beyond_described) == pytest.approx(
+        float(found.amount) / float(lp400.unbalances[0].amount)
+    )
+    assert _with_unbalance(lp400, said) == lp400
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "words"),
+    [(5e-3, 9e-3, "longer than the usual 2 ms"), (1e-4, 1e-3, "shorter than the usual 2 ms")],
+)
+def test_the_lift_of_the_magnets_is_longer_or_shorter_and_not_both(lp400, low, high, words):
+    extension = next(one for one in EXTENSIONS if one.name == "long remanence")
+    middle = 0.5 * (low + high)
+    value = IdentifiedValue(value=middle, interval_90=(low, high))
+    kept = Kept(extension=extension, gain=50.0)
+    assert words in structure_of(kept, lp400, {"remanence.time_constant": value}).sentence

@@ -9,7 +9,10 @@ from rotordrop.errors import UsageError
 from rotordrop.machine import load_machine, loads_machine, machine_text
 from rotordrop.machine.other_programs import read_rotor
 from rotordrop.machine.simple import SimpleMachine, simple_machine
+from rotordrop.model.assembly import rotor_fe
 from rotordrop.model.machine_summary import summarise_machine
+from rotordrop.model.modes import free_free_modes
+from rotordrop.synthesis.bench.rotors import ROTORS
 
 NUMBERS = {
     "mass": "60 kg",
@@ -42,7 +45,9 @@ def test_mass_and_centre_of_mass_are_those_given_and_planes_are_nodes():
 
 def test_its_bending_is_that_of_the_beam():
     """Uniform free-free beam, first bending (4.730)² √(EI/ρA)/(2π L²), less what shear takes."""
-    machine = simple_machine(SimpleMachine(**(NUMBERS | {"centre": "550 mm"})))
+    guessed = simple_machine(SimpleMachine(**(NUMBERS | {"centre": "550 mm"})))
+    machine = guessed.with_values({"rotor.stiffness_factor": 1.0, "rotor.mass_to_ends": 0.0})
+    assert guessed.rotor.stiffness_factor.range == (0.16, 1.0)
     d = machine.rotor.elements[0].outer_diameter
     area = math.pi / 4 * d * d
     slender = 4.730041**2 / (2 * math.pi * 1.1**2) * math.sqrt(206e9 * math.pi / 64 * d**4 / (7850.0 * area))
@@ -53,7 +58,41 @@ def test_its_bending_is_that_of_the_beam():
 def test_the_file_reads_back_as_the_same_machine():
     machine = simple_machine(SimpleMachine(**NUMBERS))
     assert loads_machine(machine_text(machine)) == machine
-    assert any("± 30 %" in note for note in machine.notes)
+    assert any("0.4 to 1.0 of a steel cylinder's" in note for note in machine.notes)
+
+
+@pytest.mark.parametrize("rotor", ROTORS)
+def test_the_ranges_of_the_beam_hold_the_rotors_at_hand(rotor):
+    """Bending and inertia of every rotor of the bench over those of the cylinder of its mass and length."""
+    described = ROTORS[rotor]().rotor
+    numbers = {"mass": described.mass, "length": described.node_positions[-1]}
+    beam = simple_machine(
+        SimpleMachine(
+            **(
+                NUMBERS
+                | numbers
+                | {"centre": described.centre_of_gravity}
+                | {
+                    "bearings": (0.1 * numbers["length"], 0.9 * numbers["length"]),
+                    "sensors": (0.2 * numbers["length"], 0.8 * numbers["length"]),
+                }
+            )
+        )
+    )
+    cylinder = beam.with_values({"rotor.stiffness_factor": 1.0, "rotor.mass_to_ends": 0.0})
+    true, plain = rotor_fe(described), rotor_fe(cylinder.rotor)
+    softer = (free_free_modes(true, 3).frequency[2] / free_free_modes(plain, 3).frequency[2]) ** 2
+    assert 0.16 <= softer <= 1.0
+    assert 0.8 <= true.diametral_inertia / plain.diametral_inertia <= 1.5
+
+
+def test_a_support_without_a_number_goes_with_the_size_of_the_rotor():
+    small, large = (
+        simple_machine(SimpleMachine(**(NUMBERS | {"mass": mass}))).touchdown_bearings[0].support.stiffness
+        for mass in ("7.5 kg", "60 kg")
+    )
+    assert float(large) == pytest.approx(2.0 * float(small), rel=1e-5)
+    assert large.range == pytest.approx((2e8 / 7.0, 1.4e9), rel=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -93,7 +132,9 @@ def test_the_command_takes_options_and_asks_for_the_rest(tmp_path, monkeypatch):
     assert run(["init", "--simple", str(target), *options]) == 0
     assert len(asked) == 1
     assert "support of the touchdown bearings" in asked[0]
-    assert load_machine(target).touchdown_bearings[0].support.stiffness.range == pytest.approx((3e6, 1e8))
+    assert load_machine(target).touchdown_bearings[0].support.stiffness.range == pytest.approx(
+        (1e7 / 7.0, 7e7), rel=1e-5
+    )
 
 
 def test_numbers_without_simple_are_refused(capsys, tmp_path):

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from rotordrop.errors import SimulationError
 from rotordrop.physics.ball_bearing import bearing_constants
 from rotordrop.physics.ball_bearing_geometry import BallBearingGeometry
 from rotordrop.physics.ball_loads import ball_loads, displacement_under
@@ -68,3 +69,11 @@ def test_without_a_force_the_balls_of_a_pair_carry_their_preload_and_loose_ones_
         ball_loads(pair, displacement_under(pair, none)), pair.preload_ball_load, rtol=1e-6
     )
     np.testing.assert_array_equal(ball_loads(deep, displacement_under(deep, none)), 0.0)
+
+
+def test_a_force_that_no_bearing_bears_is_refused_and_not_answered_with_a_place():
+    constants = bearing_constants(PAIR)
+    bearable, beyond = np.array([[0.0, -1e4]]), np.array([[0.0, -1e4], [0.0, -1e12]])
+    assert 1e-6 < abs(displacement_under(constants, bearable)[0, 1]) < 1e-4
+    with pytest.raises(SimulationError, match=r"1e\+12 N \(1 of 2 instants"):
+        displacement_under(constants, beyond)

@@ -159,13 +159,26 @@ def test_a_wrong_and_a_missing_estimate_are_lost(folder, estimates):
     assert [drop["consistent"] for drop in scores.drops] == [True, None]
 
 
+def test_parameters_of_a_lost_drop_are_missing_if_the_estimator_states_them_elsewhere(folder, estimates):
+    _estimates(estimates)
+    for name in MADE:
+        document = json.loads((estimates / f"{name}.json").read_text())
+        for fields in document["bearings"].values():
+            fields["support"] = {"mass_kg": {"value": 20.0, "interval_90": [1.0, 1e4]}}
+        (estimates / f"{name}.json").write_text(json.dumps(document))
+    (estimates / "drop_034.json").write_text("no estimate")
+    row = _row(score_bench(folder, estimates), "parameters")
+    assert (row.values, row.missing) == (2, 2)
+    assert row.lost >= 0.5
+
+
 def test_the_table_is_printed_and_written(folder, estimates, tmp_path, capsys):
     _estimates(estimates)
     file = tmp_path / "scores.json"
     assert run(["bench", "score", str(folder), str(estimates), "--json", str(file)]) == 0
     out = capsys.readouterr().out
     assert "DropBench, version 1" in out
-    assert "2 drops, 0 whose estimate calls itself not consistent." in out
+    assert "Drops: 2; estimates that call themselves not consistent: 0." in out
     assert json.loads(file.read_text())["bench_version"] == "1"
 
 

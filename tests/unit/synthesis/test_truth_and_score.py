@@ -13,6 +13,8 @@ from rotordrop.errors import OutputError, UsageError
 from rotordrop.measurement.record import read_record
 from rotordrop.model.parameter_table import LOADS, published
 from rotordrop.synthesis import FAULTS, read_truth, score_estimate, with_fault, write_synthetic
+from rotordrop.synthesis.score import LARGE_IMPACT
+from rotordrop.synthesis.truth import truth_of
 
 
 @pytest.fixture(scope="module")
@@ -156,7 +158,7 @@ def test_impacts_are_matched_by_time(folder):
     truth = read_truth(folder / "truth" / "drop_060.json")
     estimate = estimate_of(truth)
     rows = truth.impacts("NDE")
-    large = rows[rows[:, 2] > 500.0]
+    large = rows[rows[:, 2] > LARGE_IMPACT * truth.values["rotor_weight_N"] / 2]
     impacts = [
         {"time_s": 0.5 * (a + b), "peak_force_N": {"value": 0.98 * f, "interval_90": [0.9 * f, 1.1 * f]}}
         for a, b, f in large[:-1]
@@ -232,3 +234,45 @@ def test_faults_do_what_they_say(synthetic):
     assert np.ptp(with_fault(synthetic.record, "dead channel").signals[:, 3]) == 0.0
     with pytest.raises(UsageError, match="unknown fault 'fire'; choose one of 'inverted polarity'"):
         with_fault(synthetic.record, "fire")
+
+
+def test_an_estimate_of_another_recording_is_refused_by_its_hash(folder):
+    truth = read_truth(folder / "truth" / "drop_060.json")
+    own = estimate_of(truth) | {"record": "renamed.csv"}
+    for file, sha in truth.values["record_sha256"].items():
+        assert (folder / file).is_file()
+        assert score_estimate(own | {"record_sha256": sha}, truth)["name"] == "drop_060"
+    with pytest.raises(UsageError, match=r"SHA-256 abababababab….*'drop_060' belongs to drop_060\.csv \("):
+        score_estimate(own | {"record_sha256": "ab" * 32, "name": "drop_060"}, truth)
+
+
+def test_where_the_truth_knows_no_hash_the_names_have_to_agree(folder):
+    known = read_truth(folder / "truth" / "drop_060.json")
+    truth = truth_of({key: value for key, value in known.values.items() if key != "record_sha256"})
+    own = estimate_of(truth)
+    assert score_estimate(own | {"name": "drop_060"}, truth)
+    assert score_estimate(own | {"record": "drop_060.h5", "name": "of Monday"}, truth)
+    with pytest.raises(UsageError, match=r"recording 'repeat_3', the truth of 'drop_060'.*--drop repeat_3"):
+        score_estimate(own | {"name": "repeat_3", "record": "repeat_3.csv"}, truth)
+    assert score_estimate(own | {"name": "repeat_3"}, truth, drop="repeat_3")
+
+
+def test_impacts_count_by_the_weight_of_the_rotor():
+    """The same drop of a rotor a thousand times as heavy has the same large impacts."""
+    rows = [[0.01, 0.011, 400.0], [0.02, 0.021, 600.0]]
+    for factor in (0.001, 1.0, 1000.0):
+        values = {
+            "name": "one",
+            "air_gap_m": {"NDE": 250e-6, "DE": 250e-6},
+            "peak_force_N": {"NDE": 600.0 * factor, "DE": 600.0 * factor},
+            "contact_intervals_0_0p25_s": {"NDE": [[a, b, f * factor] for a, b, f in rows]},
+        }
+        listed = [{"time_s": a, "peak_force_N": f * factor} for a, _, f in rows]
+        peak = {"value": 600.0 * factor}
+        estimate = {"bearings": {"NDE": {"peak_force_N": peak, "impacts": listed}}}
+        for weight in (
+            {"rotor_weight_N": 580.0 * factor},
+            {"mean_force_0p15_0p2_N": {"NDE": 187.0 * factor, "DE": 415.0 * factor}},
+        ):
+            score = score_estimate(estimate, truth_of(values | weight))["impacts"]["NDE"]
+            assert (score["true_impacts"], score["found"]) == (1, 1)

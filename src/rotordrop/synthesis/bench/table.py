@@ -125,15 +125,19 @@ def score_bench(folder: str | Path, estimates: str | Path, only: Iterable[str] =
         )
     if not estimates.is_dir():
         raise UsageError(f"{estimates} is no folder; give the one with the estimates, NAME.json each")
-    entries, drops, unscored = [], [], {}
-    for drop in made:
-        truth = read_truth(truth_path(folder, drop.name))
+    truths = [read_truth(truth_path(folder, drop.name)) for drop in made]
+    scores: list[Mapping[str, Any]] = []
+    unscored = {}
+    for drop, truth in zip(made, truths, strict=True):
         _refuse_another_version(truth)
-        scored = _scored(estimates / f"{drop.name}.json", truth)
-        if isinstance(scored, str):
-            unscored[drop.name], scored = scored, {}
-        found = _entries(scored, truth)
-        entries += [(drop.family, *entry) for entry in found]
+        found = _scored(estimates / f"{drop.name}.json", truth)
+        if isinstance(found, str):
+            unscored[drop.name] = found
+        scores.append({} if isinstance(found, str) else found)
+    stated = {f for scored in scores for mine in scored.get("bearings", {}).values() for f in mine}
+    entries, drops = [], []
+    for drop, truth, scored in zip(made, truths, scores, strict=True):
+        entries += [(drop.family, *entry) for entry in _entries(scored, truth, stated)]
         there = list(truth.values.get("violated", []))
         drops.append(_summary(drop.name, drop.family, drop.rotor, scored) | {"violated": there})
     return BenchScores(rows=_rows(entries), drops=tuple(drops), unscored=unscored)
@@ -153,7 +157,7 @@ def _scored(file: Path, truth: Truth) -> dict[str, Any] | str:
     if not file.is_file():
         return f"there is no {file.name}"
     try:
-        return score_estimate(file, truth)
+        return score_estimate(file, truth, drop=truth.name)
     except UsageError as error:
         return str(error)
 
@@ -161,16 +165,20 @@ def _scored(file: Path, truth: Truth) -> dict[str, Any] | str:
 Entry = tuple[str, Mapping[str, Any] | None]
 
 
-def _entries(scored: Mapping[str, Any], truth: Truth) -> list[Entry]:
-    """Every value that an estimate of a drop should have, with its score or None."""
+def _entries(scored: Mapping[str, Any], truth: Truth, stated: set[str]) -> list[Entry]:
+    """Every value that an estimate of a drop should have, with its score or None.
+
+    A drop without a usable estimate lacks every parameter that the estimator ``stated`` of any other one.
+    """
     loads = [load.field for load in LOADS]
     listed: list[Entry] = []
     for name in truth.bearing_names:
         mine = scored.get("bearings", {}).get(name, {})
         listed += [(field, mine.get(field)) for field in [*loads, "air_gap_m"]]
+        due = set(mine) if scored else stated & set(truth.of_bearing(name))
         for field in published():
-            if field in mine and field != "air_gap_m":
-                listed += [(field, mine[field]), (PARAMETERS, mine[field])]
+            if field in due and field not in (*loads, "air_gap_m"):
+                listed += [(field, mine.get(field)), (PARAMETERS, mine.get(field))]
     listed += [(STRUCTURE, score) for score in scored.get("structure", {}).values()]
     return listed
 

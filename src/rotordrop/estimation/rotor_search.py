@@ -1,0 +1,126 @@
+"""The rotor of a machine of twelve numbers, found from how its readings move together.
+
+Between its contacts a rotor swings freely, and a contact moves every sensor plane at once by its mass, its
+inertia and its bending. None of that needs a contact law: the filter of the cross-check says how probable the
+readings are with a rotor under any forces at its bearings, and the rotor that makes them likeliest is taken.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from rotordrop.errors import RotordropError
+from rotordrop.estimated import NINETY, Estimated
+from rotordrop.identification.evidence import Evidence
+from rotordrop.machine import Machine
+from rotordrop.model.parameter import Parameter
+from rotordrop.model.parameter_table import parameter
+from rotordrop.model.parameters import build_drop_model
+from rotordrop.model.reduction import Reduction
+from rotordrop.model.rotor_form import FORM, is_beam
+from rotordrop.model.unknowns import prior
+from rotordrop.tracking.problem import RecordedDrop, build_problem
+from rotordrop.tracking.rotor_likelihood import Readings, improbability_of, readings_of
+
+Array = NDArray[np.float64]
+
+BASIS = Reduction(modes=6, attachment=False)
+"""Modes of the search: it asks for the motion of the sensor planes, which four bending modes hold."""
+STEP = 5e-3
+"""Step of the derivatives, in standard deviations of the prior [1]."""
+FARTHEST = 2.5
+"""How far from the middle of its prior a number may be found, in standard deviations [1]."""
+ROUNDS = 25
+REMAINING = 0.03
+"""Standard deviation of the logarithm of the bending stiffness after the search [1]: a beam is not the rotor,
+so the readings seem to say more of it than they do."""
+REMAINING_FORM = 0.1
+"""The same of the other numbers of the form [1]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Unknown:
+    """A number of the rotor with its prior, in the measure it is searched in."""
+
+    row: Parameter
+    path: str
+    mean: float
+    sigma: float
+
+    def value(self, deviation: float) -> float:
+        """The number at a deviation, in standard deviations."""
+        theta = self.mean + self.sigma * deviation
+        return math.exp(theta) if self.row.logarithmic else float(theta)
+
+
+def with_found_rotor(machine: Machine, drops: Sequence[tuple[Evidence, RecordedDrop]]) -> Machine:
+    """The machine with the rotor that makes its records likeliest, where a beam stands for it; else itself.
+
+    Parameters
+    ----------
+    machine : Machine
+        The machine; of its rotor, what has a range is sought.
+    drops : sequence of (Evidence, RecordedDrop)
+        What the records say, and the readings of the time after power-off that is looked at.
+    """
+    unknowns = _sought(machine)
+    if not unknowns:
+        return machine
+    model = build_drop_model(machine, BASIS)
+    seen: list[tuple[RecordedDrop, Readings]] = []
+    for _, drop in drops:
+        until = float(drop.time[-1])
+        seen.append((drop, readings_of(build_problem(model, drop, until=until))))
+
+    def with_values(deviations: Array) -> Machine:
+        return machine.with_values({u.path: u.value(d) for u, d in zip(unknowns, deviations, strict=True)})
+
+    def cost(deviations: Array) -> float:
+        inside = np.clip(deviations, -FARTHEST, FARTHEST)
+        beyond = 1e3 * float(np.sum((deviations - inside) ** 2))
+        try:
+            tried = build_drop_model(with_values(inside), BASIS)
+            total = sum(improbability_of(tried, drop, readings) for drop, readings in seen)
+        except RotordropError:  # no rotor can be so
+            return math.inf
+        return total + 0.5 * float(np.sum(inside**2)) + beyond
+
+    found = minimize(
+        cost, np.zeros(len(unknowns)), method="BFGS", options={"eps": STEP, "maxiter": ROUNDS, "gtol": 1.0}
+    ).x
+    found = np.clip(found, -FARTHEST, FARTHEST)
+    return machine.with_values({u.path: _known(u, u.value(d)) for u, d in zip(unknowns, found, strict=True)})
+
+
+def _sought(machine: Machine) -> list[_Unknown]:
+    """What is only guessed of a beam."""
+    if not is_beam(machine.rotor):
+        return []
+    sought = []
+    for row in (parameter("stiffness_factor", "rotor"), *FORM):
+        quantity = row.stated(machine.rotor)
+        if quantity is not None and quantity.status in ("guess", "default") and quantity.range is not None:
+            known = prior(row, quantity)
+            path = f"rotor.{row.path}"
+            sought.append(_Unknown(row=row, path=path, mean=known.mean, sigma=known.sigma))
+    return sought
+
+
+def _known(unknown: _Unknown, value: float) -> Estimated:
+    if unknown.row.logarithmic:
+        reach = math.exp(NINETY * REMAINING)
+        interval = (value / reach, value * reach)
+    else:
+        interval = (value - NINETY * REMAINING_FORM, value + NINETY * REMAINING_FORM)
+    return Estimated(
+        value=value,
+        status="estimated",
+        interval_90=interval,
+        source="likeliest by the readings, without a contact law",
+    )

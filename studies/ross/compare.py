@@ -1,0 +1,93 @@
+"""Rotors of ROSS read without it, against what ROSS itself computed of them.
+
+Usage: python studies/ross/compare.py FOLDER
+
+FOLDER is what ``in_ross.py`` wrote, one for each version of ROSS. Every rotor is read from TOML and JSON,
+put on the bearings of its file, and compared in lateral natural frequencies at two speeds and in the
+magnitude of its response to an unbalance; then written back as ``NAME_back`` for ROSS to load. Writes
+``results/ross_VERSION.json``; with FOLDER/back.json there, the rotors that went to and fro too.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.errors import RotordropError
+from rotordrop.machine.ross_files import ImportedRotor, read_ross, write_ross
+from rotordrop.model.assembly import rotor_fe
+from rotordrop.model.supports import Support, spring
+from rotordrop.model.whirl import unbalance_response, whirl_modes
+
+HERE = Path(__file__).parent
+AMOUNT = 1e-4
+
+
+def supports_of(imported: ImportedRotor, speed: float) -> list[Support]:
+    """Bearings of the source as supports here, with their coefficients at a speed [rad/s]."""
+    at = [one.at_speed(speed) for one in imported.springs]
+    return [spring(one.node, np.array(one.stiffness_matrix), np.array(one.damping_matrix)) for one in at]
+
+
+def compared(imported: ImportedRotor, numbers: dict[str, Any]) -> dict[str, Any]:
+    """Largest relative errors of one rotor."""
+    fe = replace(rotor_fe(imported.rotor), modal_damping=0.0)  # a shaft of ROSS has none
+    row: dict[str, Any] = {"mass": imported.rotor.mass / numbers["mass"] - 1.0, "notes": list(imported.notes)}
+    for speed, wanted in numbers["frequencies"].items():
+        found = whirl_modes(fe, float(speed), supports_of(imported, float(speed))).frequency
+        row[f"frequencies at {speed} rad/s"] = matched(found, np.array(wanted)).tolist()
+    told = numbers["response"]
+    speeds, node = np.array(told["speeds"]), imported.nodes[told["node"]]
+    unbalance = {node: complex(AMOUNT)}
+    moved = [unbalance_response(fe, speed, unbalance, supports_of(imported, speed))[0] for speed in speeds]
+    found = np.abs(np.array(moved)[:, [n - 1 for n in imported.nodes], :])
+    wanted = np.array(told["magnitude"])
+    row["response"] = float(np.max(np.abs(found - wanted) / np.max(wanted, axis=(1, 2), keepdims=True)))
+    return row
+
+
+def matched(found: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Relative error of the nearest frequency found, for every wanted one."""
+    nearest = found[np.argmin(np.abs(found[:, None] - wanted), axis=0)]
+    return np.asarray(nearest / wanted - 1.0)
+
+
+def main() -> None:
+    """Compare every rotor of a folder and write it back."""
+    folder = Path(sys.argv[1])
+    told = json.loads((folder / "numbers.json").read_text())
+    back = json.loads((folder / "back.json").read_text()) if (folder / "back.json").is_file() else None
+    results: dict[str, Any] = {"version": told["version"], "rotors": {}}
+    for name, numbers in told["rotors"].items():
+        for suffix in ("toml", "json"):
+            file = folder / f"{name}.{suffix}"
+            if not file.is_file():
+                continue
+            try:
+                imported = read_ross(file)
+            except RotordropError as error:
+                results["rotors"][file.name] = {"refused": str(error)}
+                continue
+            row = compared(imported, numbers)
+            again = folder / f"{name}_back.{suffix}"
+            write_ross(imported.rotor, again, imported.springs)
+            row["read back equal"] = read_ross(again).rotor == imported.rotor
+            if back is not None:
+                row["back in ROSS"] = {
+                    key: float(np.max(np.abs(np.array(new) / np.array(numbers["frequencies"][key]) - 1.0)))
+                    for key, new in back["rotors"][again.name]["frequencies"].items()
+                }
+            results["rotors"][file.name] = row
+    for name, row in results["rotors"].items():
+        print(name, {key: value for key, value in row.items() if key != "notes"})
+    (HERE / "results" / f"ross_{told['version']}.json").write_text(json.dumps(results, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,104 @@
+"""The rotor of a machine of twelve numbers is found from a record; what else to measure is said."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rotordrop
+from rotordrop.estimation.advice import Advice
+from rotordrop.estimation.narrowing import explained
+from rotordrop.estimation.rotor_search import with_found_rotor
+from rotordrop.estimation.tracked import recorded_drop
+from rotordrop.identification.evidence import read_evidence
+from rotordrop.machine import example_machine
+from rotordrop.machine.simple import SimpleMachine, simple_machine
+from rotordrop.measurement.record import read_record
+from rotordrop.model.assembly import rotor_fe
+from rotordrop.model.modes import free_free_modes
+from rotordrop.model.parameters import build_drop_model
+from rotordrop.model.rotor_form import FORM
+
+RECORDS = Path(rotordrop.__file__).parent / "examples" / "lp400"
+
+
+@pytest.fixture(scope="module")
+def described():
+    return example_machine("lp400")
+
+
+@pytest.fixture(scope="module")
+def twelve(described):
+    """The machine of the bundled record as twelve numbers tell it."""
+    rotor, bearings, sensors = described.rotor, described.touchdown_bearings, described.sensors
+    at = rotor.node_positions
+    machine = simple_machine(
+        SimpleMachine(
+            mass=rotor.mass,
+            centre=rotor.centre_of_gravity,
+            length=at[-1],
+            bearings=(at[bearings[0].node - 1], at[bearings[1].node - 1]),
+            sensors=(at[sensors[0].node - 1], at[sensors[-1].node - 1]),
+            sensor_angle=float(sensors[0].angle),
+            designation=str(bearings[0].bearing.designation),
+            gap="0.27 mm",
+            speed="550 Hz",
+            grade="G 1",
+            support="stiff",
+        )
+    )
+    named = [one.changed(name=other.name) for one, other in zip(machine.sensors, sensors, strict=True)]
+    return machine.changed(sensors=tuple(named))
+
+
+@pytest.fixture(scope="module")
+def seen(twelve):
+    record = read_record(RECORDS / "drop_060.h5", twelve)
+    tail = read_record(RECORDS / "drop_060_tail.csv", twelve)
+    evidence = read_evidence(build_drop_model(twelve), record, tail)
+    return [(evidence, recorded_drop(evidence, 0.03))]
+
+
+@pytest.mark.slow
+def test_bending_and_inertia_are_found_from_the_record_without_a_contact_law(described, twelve, seen):
+    """The cylinder of twelve numbers bends 80 % too fast; two numbers of the form bring it within a tenth."""
+    held = {f"rotor.{row.path}": 0.0 for row in FORM[1:]}
+    found = with_found_rotor(twelve.with_values(held), seen).rotor
+    true = rotor_fe(described.rotor)
+    frequencies = free_free_modes(true, 4).frequency[2:]
+    cylinder = rotor_fe(twelve.with_values({"rotor.stiffness_factor": 1.0, "rotor.mass_to_ends": 0.0}).rotor)
+    assert free_free_modes(cylinder, 3).frequency[2] > 1.7 * frequencies[0]
+    np.testing.assert_allclose(free_free_modes(rotor_fe(found), 4).frequency[2:], frequencies, rtol=0.1)
+    assert rotor_fe(found).diametral_inertia == pytest.approx(true.diametral_inertia, rel=0.12)
+    assert found.stiffness_factor.status == "estimated"
+    assert "without a contact law" in found.stiffness_factor.source
+
+
+def test_a_rotor_that_is_described_stays_as_it_is(described):
+    assert with_found_rotor(described, []) is described
+
+
+def test_numbers_that_are_known_are_not_sought(twelve):
+    known = twelve.with_values({f"rotor.{row.path}": 0.1 for row in FORM} | {"rotor.stiffness_factor": 0.3})
+    assert with_found_rotor(known, []) is known
+
+
+def test_what_numbers_explain_of_a_variance():
+    """Two independent numbers explain the sum of their squares; one told twice explains no more than once."""
+    apart = np.diag([4.0, 9.0])
+    assert explained(apart, np.array([2.0, 3.0])) == pytest.approx(2.0)
+    assert explained(np.array([[4.0, 4.0], [4.0, 4.0]]), np.array([2.0, 2.0])) == pytest.approx(1.0)
+
+
+def test_advice_names_the_measurement_and_what_it_would_bring():
+    one = Advice(
+        measurement="a lift check at DE (rotordrop clearance)",
+        paths=("DE.air_gap",),
+        half_widths={"NDE": 200.0, "DE": 300.0},
+        narrowed={"NDE": 199.0, "DE": 150.0},
+    )
+    assert one.left == pytest.approx(0.5)
+    said = "a lift check at DE (rotordrop clearance) would narrow the peak force: DE from ± 300 N to ± 150 N"
+    assert one.sentence() == said
