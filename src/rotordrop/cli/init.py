@@ -5,6 +5,7 @@ The template is complete and commented; an example comes with its recording wher
 
 from __future__ import annotations
 
+import sys
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any
@@ -106,6 +107,12 @@ def _simple_text(given: dict[str, str | None], preload: str | None) -> str:
     from rotordrop.machine import machine_text
     from rotordrop.machine.simple import SimpleMachine, simple_machine
 
+    missing = [f"--{name.replace('_', '-')}" for name, value in given.items() if not value]
+    if missing and not (sys.stdin and sys.stdin.isatty()):
+        raise UsageError(
+            f"--simple needs {', '.join(missing)}; nobody can be asked, because the input is no terminal: "
+            "give them as options"
+        )
     said = {name: value or typer.prompt(_QUESTIONS[name], err=True).strip() for name, value in given.items()}
     numbers: dict[str, Any] = dict(said)
     for name in ("bearings", "sensors"):

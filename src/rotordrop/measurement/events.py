@@ -272,6 +272,29 @@ def sinking(low: NDArray[np.bool_]) -> int:
     return int(np.min(np.where(high.any(axis=0), both + 1 - np.argmax(high[::-1], axis=0), 0)))
 
 
+def fall_acceleration(away: Array, reach: float, rate: float) -> float:
+    """Acceleration with which a plane goes from a tenth of its way to `FALLEN_SHARE` of it [m/s²].
+
+    A falling rotor has up to that of gravity; a swing along the race goes slower, by its amplitude over the
+    air gap. No machine, unit or direction need be known; a wrong clock shows by its square.
+
+    Parameters
+    ----------
+    away : array, shape (N,)
+        Distance from where the plane was first [m].
+    reach : float
+        How far it goes in all [m].
+    rate : float
+        Samples per second [Hz].
+    """
+    far = int(np.argmax(away > FALLEN_SHARE * reach))
+    near = np.flatnonzero(away[: far + 1] < 0.1 * reach)
+    if not len(near):
+        return float("inf")  # it circled as wide as this before the fall
+    took = max(far - int(near[-1]), 1) / rate
+    return 2.0 * reach * float(np.sqrt(FALLEN_SHARE) - np.sqrt(0.1)) ** 2 / took**2
+
+
 def _first(far: NDArray[np.bool_]) -> int:
     """First sample at which any plane (N, P) is far, or the last one."""
     at = np.flatnonzero(far.any(axis=1))

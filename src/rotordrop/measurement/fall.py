@@ -46,6 +46,9 @@ _STILL_FREE = 4.0
 _STARTS = (0.0, -0.7, 0.6, -1.4, 1.2)
 """Where the search for the release begins, from the first guess [ms]; the later ones only when needed."""
 
+_TABLES = 8
+"""Tabulated responses kept while a release is searched."""
+
 _LEAD = 5e-3
 """Levitated samples kept before the earliest release [s]."""
 
@@ -107,11 +110,20 @@ class _Problem:
     fixed: tuple[ComplexArray, ...]
     prior_mean: Array
     prior_error: Array
+    tables: dict[float, ComplexArray]
+
+    def _fading(self, decay: float) -> ComplexArray:
+        """Response to lift that fades; most steps of the search move the release only and need it again."""
+        if decay not in self.tables:
+            if len(self.tables) > _TABLES:
+                self.tables.clear()
+            self.tables[decay] = tabulate_response(self.rotor, self.speed, 1.0 / decay, self.span)
+        return self.tables[decay]
 
     def columns(self, time: Array, release: float, decay: float) -> tuple[Array, Array]:
         """Fall of the sensors by the lost lift, shape (T, S), and what every unknown adds, (T, S, U)."""
         since = time - release
-        remanent = tabulate_response(self.rotor, self.speed, 1.0 / decay, self.span)
+        remanent = self._fading(decay)
         step, forward, backward = (self._seen(response_at(table, since)) for table in self.fixed)
         left = self._seen(response_at(remanent, since)) * self.rotor.lift
         fall = (-1j * step * self.rotor.lift).sum(axis=-1).real
@@ -198,6 +210,42 @@ def fit_fall(
     assert grown is not None
     gain = np.array([float(sensor.gain) for sensor in record.sensors])
     return _fall(grown.problem, grown.best, levitated, gain)
+
+
+def linearised(
+    record: Record, planes: tuple[Plane, ...], levitated: LevitatedModel, fall: Fall
+) -> tuple[Array, Array]:
+    """Residual of a fall over the noise and its derivatives by all that was sought.
+
+    Returns
+    -------
+    residual : array, shape (T S + K,)
+        Readings less prediction over the noise, sensor after sensor within each sample, then what was sought
+        less what was expected over its deviation [1].
+    jacobian : array, shape (T S + K, K)
+        Its derivatives by forces, gains, release and time constant.
+    """
+    origin = fall.start + _LEAD - 1e-9  # the samples of the fit, whatever its first guess was
+    problem = _problem(record, fall.rotor, levitated, planes, (origin, fall.end))
+    best = np.array([1e3 * (fall.instant - origin), np.log(fall.remanent_time)])
+    unknown, residual = problem.solve(*problem.named(best))
+    weight = 1.0 / problem.noise
+
+    def columns_at(search: Array) -> tuple[Array, Array]:
+        dropped, columns = problem.columns(problem.time, *problem.named(search))
+        return dropped + columns @ unknown, columns
+
+    _, columns = columns_at(best)
+    step = 1e-2
+    searched = [
+        (columns_at(best + step * unit)[0] - columns_at(best - step * unit)[0]) / (2.0 * step)
+        for unit in np.eye(2)
+    ]
+    of_readings = np.concatenate([columns, np.stack(searched, axis=-1)], axis=-1) * weight[None, :, None]
+    expected = np.concatenate([1.0 / problem.prior_error, [0.0, 1.0 / REMANENT_TIME[1]]])
+    jacobian = -np.vstack([of_readings.reshape(-1, len(expected)), np.diag(expected)])
+    late = (np.log(REMANENT_TIME[0]) - best[1]) / REMANENT_TIME[1]
+    return np.concatenate([residual, [0.0, late]]), jacobian
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -306,6 +354,7 @@ def _problem(
         fixed=tuple(tabulate_response(rotor, speed, s, span) for s in (0.0, -1j * speed, 1j * speed)),
         prior_mean=mean,
         prior_error=error,
+        tables={},
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import tomllib
 from pathlib import Path
@@ -10,6 +11,7 @@ import jsonschema
 import pytest
 
 from rotordrop.cli.app import run
+from rotordrop.errors import UsageError
 from rotordrop.machine import example_machine, load_machine
 
 
@@ -100,3 +102,13 @@ def test_the_schema_of_an_estimate_knows_its_fields(capsys):
             jsonschema.validate(broken, bearing)
     for part in ("drop", "bearing"):
         assert schema["$defs"][part]["additionalProperties"] is False
+
+
+def test_numbers_that_nobody_can_be_asked_for_are_named(capsys, monkeypatch):
+    """Without a terminal the first question ended the command with the exit code of Ctrl-C."""
+    monkeypatch.setattr("sys.stdin", io.StringIO(""))
+    assert run(["init", "--simple", "--mass", "60 kg", "--length", "1.1 m"]) == UsageError.exit_code
+    said = capsys.readouterr().err
+    assert "--simple needs --centre, --bearings, --sensors, --sensor-angle, --designation" in said
+    assert "the input is no terminal" in said
+    assert not Path("machine.toml").exists()

@@ -91,3 +91,54 @@ def test_a_good_record_is_left_alone(whole_drop, fast_drop, tail, machine):
     assert check_record(whole_drop, machine, tail) == ()
     mine = {"recorder low-pass", "AC coupling", "bridged gap", "clipping", "second drop", "dead speed"}
     assert not mine & {finding.kind for finding in check_record(fast_drop, machine)}
+
+
+def late(record, channel, delay):
+    signals = record.signals.copy()
+    moved = np.interp(record.time - delay, record.time, signals[:, channel])
+    signals[:, channel] = np.where(record.time - delay < record.time[0], signals[:, channel], moved)
+    return replace(record, signals=signals)
+
+
+@pytest.mark.parametrize(("channel", "delay"), [(1, 5e-4), (2, 1e-3), (3, 2e-3)])
+def test_a_late_channel(channel, delay, drop, tail, machine):
+    """A delay between the channels was called a wrong gain, or nothing at all."""
+    found = first_stop(late(drop, channel, delay), machine)
+    assert (found.kind, found.channel) == ("late channel", drop.channel_names[channel])
+    if delay < 7e-4:
+        assert f"{drop.channel_names[channel]} about 0.4 ms late" in found.message
+
+
+def test_sensors_that_saturate_softly(drop, machine):
+    level = 1.2 * float(np.max(np.abs(drop.signals)))
+    found = first_stop(replace(drop, signals=level * np.tanh(drop.signals / level)), machine)
+    assert found.kind == "soft saturation"
+    assert set(found.channel.split(", ")) == set(drop.channel_names)
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_a_clock_that_is_wrong_by_two(factor, drop, machine):
+    """A doubled rate puts 1X where 2X may be: only the fall, four times as fast, tells."""
+    start = drop.time[0]
+    changes = {
+        "time": start + (drop.time - start) / factor,
+        "sampling_rate": factor * drop.sampling_rate,
+        "speed_time": start + (drop.speed_time - start) / factor,
+    }
+    found = first_stop(replace(drop, **changes), machine)
+    assert found.kind == "wrong sampling rate"
+    assert "so the clock is wrong" in found.message
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_a_speed_that_is_wrong_by_two(factor, drop, machine):
+    found = first_stop(replace(drop, speed_readings=factor * drop.speed_readings), machine)
+    assert (found.kind, found.channel) == ("wrong speed", "speed")
+    assert "so the speed is wrong" in found.message
+
+
+@pytest.mark.parametrize("gain", [0.9, 1.1])
+def test_a_tenth_in_all_gains_shows_in_no_fall(gain, drop, tail, machine):
+    """Less lift that remains fits as well: the record does not say it, and nothing is invented."""
+    wrong = [replace(one, signals=gain * one.signals) for one in (drop, tail)]
+    assert "wrong gain" not in {finding.kind for finding in check_record(*wrong[:1], machine, wrong[1])}

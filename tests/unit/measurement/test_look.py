@@ -151,6 +151,22 @@ def test_a_record_without_a_fall_is_refused(tmp_path):
         look(written(tmp_path / "drop.csv", time, {"NDE": still, "DE": still}))
 
 
+@pytest.mark.parametrize("amplitude", [5.0, 20.0, 45.0])
+def test_a_settled_tail_is_no_drop(amplitude, tmp_path):
+    """A rotor that swings along its race was taken for one that falls again and again: 17 drops."""
+    time = np.arange(0.0, 3.0, 1e-3)
+    swing = amplitude * 1e-6 * np.exp(-time / 8.0) * np.cos(2 * np.pi * 29.0 * time + 0.4)
+    path = np.column_stack([swing, np.square(swing) / (2 * GAP) - GAP])
+    with pytest.raises(RecordError, match=r"nothing falls in the record: the shaft (moves away|strays) by"):
+        look(written(tmp_path / "tail.csv", time, {"NDE": path, "DE": 0.6 * path}))
+
+
+def test_the_bundled_tail_is_no_drop(machine):
+    for described in (None, machine):
+        with pytest.raises(RecordError, match=r"with 0\.\d+ m/s².*'estimate --tail'"):
+            look(example_record_path("lp400_drop_060_tail"), machine=described)
+
+
 def test_the_bundled_drop_with_and_without_its_machine(machine):
     record = example_record_path("lp400_drop_060")
     alone, known = look(record), look(record, machine=machine)

@@ -9,12 +9,15 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import RecordError
 from rotordrop.measurement.axes import along_sensors, planar_of, sensor_planes
-from rotordrop.measurement.events import FALLEN_SHARE
+from rotordrop.measurement.events import FALLEN_SHARE, fall_acceleration
 from rotordrop.measurement.record import Record
 from rotordrop.measurement.recording import Array
 from rotordrop.series import noise_by_differences, runs_of
 
 GRAVITY = 9.81
+_SLOWEST_FALL = 0.2
+"""Share of gravity with which the fastest end of a dropped rotor falls at least [1]."""
+
 SMOOTHING = 1e-3
 """Window of velocities [s]."""
 
@@ -134,6 +137,14 @@ def _first_fall(raw: Array, rate: float) -> tuple[int, int]:
         )
     moved = np.min(away / reach, axis=1) > FALLEN_SHARE
     sunk = int(np.argmax(moved))
+    fastest = max(fall_acceleration(path, far, rate) for path, far in zip(away.T, reach, strict=True))
+    if fastest < _SLOWEST_FALL * GRAVITY:
+        raise RecordError(
+            f"nothing falls in the record: the shaft moves away by {1e6 * float(np.max(reach)):.3g} µm, but "
+            f"with {fastest:.2g} m/s², a rotor falls with up to {GRAVITY:g} m/s²; a rotor that lies on its "
+            "bearings swings like that: give the recording of the drop (a settled tail belongs to "
+            "'estimate --tail'), or check unit and sampling rate"
+        )
     back = int(np.sqrt(2.0 * float(np.max(reach)) / GRAVITY) * rate) + int(3e-3 * rate)
     return max(sunk - back, first), sunk
 

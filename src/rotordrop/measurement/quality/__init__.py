@@ -19,7 +19,7 @@ from rotordrop.measurement.levitated import LevitatedModel, fit_levitated
 from rotordrop.measurement.quality.arrangement import LEANING, check_planes, fall_of
 from rotordrop.measurement.quality.channels import check_channels
 from rotordrop.measurement.quality.clock import check_blocks, check_clock
-from rotordrop.measurement.quality.ends import TURNED, UNDECIDED_ENDS, check_ends
+from rotordrop.measurement.quality.ends import UNDECIDED_ENDS, check_ends
 from rotordrop.measurement.quality.finding import Finding, Severity, ranked, refuse_unusable, stops
 from rotordrop.measurement.quality.motion import (
     check_length,
@@ -32,6 +32,7 @@ from rotordrop.measurement.quality.motion import (
 )
 from rotordrop.measurement.quality.rail import check_rail
 from rotordrop.measurement.quality.recorder import check_again, check_filters, check_speed_signal
+from rotordrop.measurement.quality.sensing import TURNED
 from rotordrop.measurement.quality.tail import check_tail
 
 if TYPE_CHECKING:

@@ -20,6 +20,9 @@ SLOWEST = 2000.0
 _GAP = 1.5
 _JITTER = 0.02
 _SHORTEST_COPY = 24
+_AROUND = 20
+"""Samples on both sides of a jump that say what is usual there."""
+
 _RATE_KEYS = re.compile(r"^(fs|sampl\w*[ _-]*(rate|frequency)|abtast(rate|frequenz))", re.IGNORECASE)
 
 
@@ -183,7 +186,13 @@ def _jumps(record: Record) -> list[Finding]:
     usual = np.maximum(1.4826 * np.median(kink, axis=0), 1e-12)
     finest = np.array([np.min(np.diff(np.unique(column)), initial=np.inf) for column in signals.T])
     limit = np.maximum(np.maximum(12.0 * usual, 2e-6), 4.0 * np.where(np.isfinite(finest), finest, 0.0))
-    many = np.sum(kink > limit, axis=1) >= max(2, signals.shape[1] // 2 + 1)
+    enough = max(2, signals.shape[1] // 2 + 1)
+    many = np.sum(kink > limit, axis=1) >= enough
+    # where the rotor moves along one sensor, one channel jumps far and the others less
+    far = np.max(kink / np.maximum(8.0 * np.percentile(kink, 99.9, axis=0), limit), axis=1) > 1.0
+    for at in np.flatnonzero(far & ~many):
+        nearby = np.median(kink[max(at - _AROUND, 0) : at + _AROUND], axis=0)
+        many[at] = np.sum(kink[at] > 6.0 * np.maximum(nearby, usual)) >= enough
     beside = np.append(many[1:], False) | np.append(False, many[:-1])
     alone = np.flatnonzero(many & ~beside)  # a spike makes two such steps in a row
     if not len(alone):

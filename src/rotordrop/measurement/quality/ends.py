@@ -19,6 +19,7 @@ from rotordrop.measurement.axes import Plane
 from rotordrop.measurement.events import CoarseDrop, find_fall
 from rotordrop.measurement.levitated import LevitatedModel
 from rotordrop.measurement.quality.finding import Finding
+from rotordrop.measurement.quality.sensing import TURNED, read_otherwise
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
@@ -40,9 +41,6 @@ _POSSIBLE_LIFT = (-0.15, 0.8)
 
 _POSSIBLE_SIDEWAYS = 0.25
 """Horizontal force over static lift that a magnetic bearing can have at power-off [1]."""
-
-TURNED = "turned sensors"
-"""Kind of the finding that the rotor falls aside before it touches anything."""
 
 _ANY_GAIN = (0.2, 1.8)
 _WRONG_GAIN = 0.08
@@ -71,20 +69,23 @@ def check_ends(
         return [_undecided("it takes two AMB planes in the machine file and two sensor planes")]
     own = find_fall(record, machine, planes, levitated, coarse)
     if own.misfit <= GOOD_FIT and own.end >= coarse.contact - _NEAR_CONTACT:
-        return _implausible_lift(own, machine)
+        return read_otherwise(record, planes, levitated, own) or _implausible_lift(own, machine)
     cases = _other_cases(record, planes, levitated)
     grown = [find_fall(case.record, machine, planes, case.levitated, coarse) for case in cases]
     until = max([own.end, *(fall.end for fall in grown if fall.misfit <= GOOD_FIT)])
     mine = find_fall(record, machine, planes, levitated, coarse, until=until).misfit
     if mine <= GOOD_FIT:
-        return _implausible_lift(own, machine)
+        return read_otherwise(record, planes, levitated, own) or _implausible_lift(own, machine)
     finals = [
         find_fall(case.record, machine, planes, case.levitated, coarse, until=until)
         if case.kind == "wrong gain" or fall.end >= until - _NEAR_CONTACT
         else None
         for case, fall in zip(cases, grown, strict=True)
     ]
-    return [_decide(mine, cases, finals)]
+    decided = _decide(mine, cases, finals)
+    if decided.kind not in (UNDECIDED_ENDS, "wrong gain"):
+        return [decided]
+    return read_otherwise(record, planes, levitated, own) or [decided]
 
 
 def _implausible_lift(fall: Fall, machine: Machine) -> list[Finding]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from rotordrop.errors import RecordError
 from rotordrop.measurement.axes import Plane
-from rotordrop.measurement.events import FALLEN_SHARE, gap_of
+from rotordrop.measurement.events import FALLEN_SHARE, fall_acceleration, gap_of
 from rotordrop.measurement.levitated import LevitatedModel
 from rotordrop.measurement.quality.finding import Finding
 from rotordrop.measurement.recording import Array
@@ -31,6 +31,20 @@ _FACTORS = {
     1e-3: "mm taken for µm, or µm for nm",
     1e-6: "m taken for µm, or the like",
 }
+_NO_HALF = 1e-3
+"""Power at half the strongest line over that at it, below which the half is no line [1]."""
+
+_USUAL_FALL = 0.7
+"""Acceleration of a channel in a fall over gravity [1]: remanence holds back, sensors stand at 45 degrees."""
+
+_POSSIBLE_FALL = (5e-3, 200.0)
+"""Acceleration over gravity outside of which what is seen is no fall by any clock [1]."""
+
+_CLEAR = 0.25
+"""Logarithm of a factor from which on the fall tells a wrong clock from a wrong speed [1]."""
+
+GRAVITY = 9.81
+
 _LONG_ENOUGH = 0.2
 _LOUD = 3e-6
 
@@ -139,14 +153,26 @@ def _speed_finding(record: Record, words: str, at: int, severity: str) -> Findin
 
 
 def check_rotation_line(record: Record, end: float, speed: float) -> list[Finding]:
-    """Compare the strongest line of the levitated readings with the shaft speed."""
+    """Compare the strongest line of the levitated readings with the shaft speed, the fall with gravity."""
     line = _strongest_line(record, end)
     if line is None:
         return []
-    frequency, resolution = line
+    frequency, resolution, at_half = line
     expected = abs(speed) / (2 * np.pi)
-    if any(abs(frequency - k * expected) <= max(1.5 * resolution, 0.01 * expected) for k in (1, 2)):
+    ratio = frequency / expected
+    if abs(ratio - 1.0) * expected <= max(1.5 * resolution, 0.01 * expected):
         return []
+    twice = abs(ratio - 2.0) * expected <= max(1.5 * resolution, 0.01 * expected)
+    if twice and at_half > _NO_HALF:
+        return []  # the second harmonic of a rotor whose first is there too
+    return [_other_frequency(record, frequency, expected)]
+
+
+def _other_frequency(record: Record, frequency: float, expected: float) -> Finding:
+    """Say which of clock and speed is wrong: by a clock that is off by a factor a rotor falls by its square.
+
+    The fall alone is known to about a third, by what remains of the lift; near a factor of 1 both stay open.
+    """
     ratio = frequency / expected
     named = {
         60.0: "rpm taken for Hz",
@@ -155,22 +181,40 @@ def check_rotation_line(record: Record, end: float, speed: float) -> list[Findin
         1 / (2 * np.pi): "rad/s and Hz mixed up",
     }
     why = next((text for factor, text in named.items() if abs(ratio * factor - 1) < 0.05), "")
+    share = _fall_share(record)
+    falls = _POSSIBLE_FALL[0] < share < _POSSIBLE_FALL[1]
+    fallen = math.log(share / _USUAL_FALL) if falls else 0.0
+    of_clock = not falls or abs(fallen - 2.0 * math.log(ratio)) < abs(fallen)
+    kind = "wrong sampling rate" if of_clock else "wrong speed unit" if why else "wrong speed"
     guess = f" ({why})" if why else ""
-    return [
-        Finding(
-            kind="wrong speed unit" if why else "wrong sampling rate",
-            message=f"the levitated rotor turns at {frequency:.4g} Hz in the displacements and at "
-            f"{expected:.4g} Hz by the "
-            f"speed channel, a factor {ratio:.4g}{guess}",
-            remedy="correct the sampling interval (time.step) or the speed unit (speed.unit) in the profile",
-            severity="stop",
-            time=float(record.time[0]),
-        )
-    ]
+    open_ = "" if falls and abs(math.log(ratio)) > _CLEAR else ", though the fall hardly tells the two apart"
+    return Finding(
+        kind=kind,
+        message=f"the levitated rotor turns at {frequency:.4g} Hz in the displacements and at "
+        f"{expected:.4g} Hz by the speed channel, a factor {ratio:.4g}{guess}; it falls with "
+        f"{share:.2g} × gravity, so the {'clock' if of_clock else 'speed'} is wrong{open_}",
+        remedy="correct the sampling interval (time.step) or the speed unit (speed.unit) in the profile",
+        severity="stop",
+        channel=None if of_clock else "speed",
+        time=float(record.time[0]),
+    )
 
 
-def _strongest_line(record: Record, end: float) -> tuple[float, float] | None:
-    """Frequency of the strongest line before `end` and the resolution [Hz], if one stands out."""
+def _fall_share(record: Record) -> float:
+    """Acceleration of the fall by the clock of the record, median of the channels, over gravity [1]."""
+    level = first_motion(record)[1]
+    away = np.abs(record.signals - level)
+    reach = np.percentile(away, 98, axis=0)
+    found = [fall_acceleration(a, r, record.sampling_rate) for a, r in zip(away.T, reach, strict=True)]
+    middle = float(np.median(found))
+    return middle / GRAVITY
+
+
+def _strongest_line(record: Record, end: float) -> tuple[float, float, float] | None:
+    """Strongest line before `end` and the resolution [Hz], and the power at half of it over that at it.
+
+    None where none stands out.
+    """
     keep = record.time < end
     count = int(keep.sum())
     if count < 64:
@@ -185,7 +229,8 @@ def _strongest_line(record: Record, end: float) -> tuple[float, float] | None:
     best = int(np.argmax(power))
     if power[best] < 50.0 * float(np.median(power[power > 0])):
         return None
-    return float(frequencies[best]), resolution
+    half = np.abs(frequencies - 0.5 * frequencies[best]) < resolution
+    return float(frequencies[best]), resolution, float(np.max(power[half], initial=0.0) / power[best])
 
 
 def check_levitated(levitated: LevitatedModel, record: Record) -> list[Finding]:

@@ -1,0 +1,238 @@
+"""Damage small recordings of every format and see what the program makes of them.
+
+Usage: python studies/damaged/records.py FORMAT COUNT      random damage up to number COUNT, 250 at a time
+       python studies/damaged/records.py FORMAT cut         cut after every byte
+       python studies/damaged/records.py summary
+
+Number and format are the seed of a damage. A block that is in ``results/records.jsonl`` is not made again.
+The libraries of binary formats run in this process, which is forked for every block: a file that ends or
+holds up one is then read as a user would, through the child process of the program, and the block goes on
+behind it.
+"""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import queue
+import sys
+import tempfile
+import time
+import traceback
+import zlib
+from collections import Counter
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from tests.unit.measurement.every_format import BY_HAND, BY_PROFILE, MACHINE, READINGS, WRITERS, written
+
+from rotordrop.errors import RecordError
+from rotordrop.measurement import read_record
+from rotordrop.measurement.quality.channels import check_channels
+from rotordrop.measurement.quality.clock import check_blocks, check_clock
+from rotordrop.measurement.record import Record
+from rotordrop.measurement.unpacking import Content
+
+BLOCK = 250
+HANG_S = 5.0
+RESULTS = Path(__file__).parent / "results" / "records.jsonl"
+KINDS = ("bits", "cut", "deleted", "twice", "zeroed", "header")
+
+
+def damaged(content: bytes, seed: int) -> tuple[str, bytes]:
+    """Damage a file in one of six ways."""
+    random = np.random.default_rng(seed)
+    kind = KINDS[int(random.integers(len(KINDS)))]
+    data = bytearray(content)
+    at = int(random.integers(len(data)))
+    length = int(np.exp(random.uniform(0.0, np.log(max(len(data) // 4, 2)))))
+    if kind == "bits":
+        for _ in range(int(random.integers(1, 9))):
+            data[int(random.integers(len(data)))] ^= 1 << int(random.integers(8))
+    elif kind == "cut":
+        del data[at:]
+    elif kind == "deleted":
+        del data[at : at + length]
+    elif kind == "twice":
+        data[at:at] = data[at : at + length]
+    elif kind == "zeroed":
+        data[at : at + length] = bytes(len(data[at : at + length]))
+    else:
+        for _ in range(int(random.integers(1, 9))):
+            data[int(random.integers(min(len(data), 512)))] = int(random.integers(256))
+    return kind, bytes(data)
+
+
+def _plain(path: Path, kind: str) -> Content:
+    """Unpack in this process what the program unpacks in a child."""
+    content: Content = import_module(f"rotordrop.measurement.unpacking.{kind}").unpacked(path)
+    return content
+
+
+def outcome(path: Path, whole: Record, name: str) -> tuple[str, float]:
+    """What became of a file, and by how much values changed unseen [m]."""
+    profile = BY_PROFILE if name in BY_HAND else None
+    try:
+        record = read_record(path, MACHINE, profile=profile)
+    except RecordError:
+        return "refused", 0.0
+    except Exception:
+        return "traceback: " + traceback.format_exc().strip().splitlines()[-1][:120], 0.0
+    if len(record.time) == len(whole.time):
+        change = float(np.nanmax(np.abs(record.signals - whole.signals), initial=0.0))
+        speed = record.speed is None or np.array_equal(record.speed, np.asarray(whole.speed))
+        if change == 0.0 and np.array_equal(record.time, whole.time) and speed:
+            return "identical", 0.0
+    if record.warnings:
+        return "warned", 0.0
+    found = check_clock(record, drop=False) + check_channels(record)
+    if not found:
+        found = check_blocks(record)
+    if found:
+        return "gate", 0.0
+    if len(record.time) != len(whole.time):
+        return "silent: count of samples", abs(len(record.time) - len(whole.time)) * 1.0
+    if not np.array_equal(record.time, whole.time):
+        return "silent: time", change
+    return ("silent: values", change) if change > 0.0 else ("silent: speed", 0.0)
+
+
+def _work(name: str, jobs: list[tuple[int, str, bytes]], folder: Path, answers: Any) -> None:
+    """Read the damaged files of a block one after the other, telling before each."""
+    for module in ("hdf5", "matlab", "tdms", "uff", "excel"):
+        reader = import_module(f"rotordrop.measurement.readers.{module}")
+        if hasattr(reader, "unpack"):
+            reader.unpack = _plain  # type: ignore[attr-defined]
+    path, whole = _seed(name, folder)
+    for number, kind, content in jobs:
+        answers.put((number, kind, "begun", 0.0, 0.0))
+        path.write_bytes(content)
+        begun = time.perf_counter()
+        said, change = outcome(path, whole, name)
+        answers.put((number, kind, said, change, time.perf_counter() - begun))
+    answers.put(None)
+
+
+def _seed(name: str, folder: Path) -> tuple[Path, Record]:
+    path = written(name, folder)
+    profile = BY_PROFILE if name in BY_HAND else None
+    whole = read_record(path, MACHINE, profile=profile)
+    assert np.allclose(whole.signals, READINGS * 1e-6, atol=1e-8)
+    return path, whole
+
+
+def judged(name: str, jobs: list[tuple[int, str, bytes]]) -> Iterator[tuple[int, str, str, float]]:
+    """Outcome of every damaged file; a worker that dies or hangs is replaced behind the file that did it."""
+    context = multiprocessing.get_context("fork")
+    while jobs:
+        with tempfile.TemporaryDirectory() as folder:
+            answers: Any = context.Queue()
+            worker = context.Process(target=_work, args=(name, jobs, Path(folder), answers))
+            worker.start()
+            at = None
+            while True:
+                try:
+                    answer = answers.get(timeout=HANG_S * 4 if at is None else HANG_S)
+                except queue.Empty:
+                    break
+                if answer is None:
+                    at, jobs = None, []
+                    break
+                number, kind, said, change, _ = answer
+                at = number
+                if said != "begun":
+                    yield number, kind, said, change
+                    jobs = jobs[1:]
+            worker.kill()
+            worker.join()
+            if jobs and at is not None:
+                yield _as_a_user(name, jobs[0], Path(folder))
+                jobs = jobs[1:]
+            elif jobs:
+                raise SystemExit(f"{name}: the worker did not begin")
+
+
+def _as_a_user(name: str, job: tuple[int, str, bytes], folder: Path) -> tuple[int, str, str, float]:
+    """Read a file that ended or held up the library, through the program's own child process."""
+    number, kind, content = job
+    path, whole = _seed(name, folder)
+    path.write_bytes(content)
+    begun = time.perf_counter()
+    said, change = outcome(path, whole, name)
+    took = time.perf_counter() - begun
+    return (
+        number,
+        kind,
+        f"library ended or hung, program: {said}, {'hang' if took > 60 else 'in time'}",
+        change,
+    )
+
+
+def run(name: str, jobs: list[tuple[int, str, bytes]], label: str) -> None:
+    """Judge a block and add one line to the results."""
+    counts: Counter[str] = Counter()
+    changes: list[tuple[int, str, float]] = []
+    for number, kind, said, change in judged(name, jobs):
+        counts[f"{kind}|{said}"] += 1
+        if said.startswith(("silent", "traceback", "library")):
+            changes.append((number, said, change))
+    line = {"format": name, "block": label, "files": len(jobs), "counts": dict(counts), "told": changes}
+    RESULTS.parent.mkdir(exist_ok=True)
+    with RESULTS.open("a") as out:
+        out.write(json.dumps(line) + "\n")
+
+
+def lines() -> list[dict[str, Any]]:
+    """Results so far."""
+    return [json.loads(line) for line in RESULTS.read_text().splitlines()] if RESULTS.is_file() else []
+
+
+def summary() -> None:
+    """Print outcomes by format, and the sizes of silent changes."""
+    total: Counter[str] = Counter()
+    for name in WRITERS:
+        mine: Counter[str] = Counter()
+        for line in lines():
+            if line["format"] == name:
+                for key, count in line["counts"].items():
+                    mine[key.split("|")[1].split(":")[0] if "traceback" in key else key.split("|")[1]] += (
+                        count
+                    )
+        total += mine
+        print(f"{name:16} {sum(mine.values()):6} {dict(mine)}")
+    sizes = [c for line in lines() for _, said, c in line["told"] if said.startswith("silent: values")]
+    print(f"all {sum(total.values())} {dict(total)}")
+    if sizes:
+        um = 1e6 * np.array(sizes)
+        print(f"silent values: {len(um)}, median {np.median(um):.3g} um, {int(np.sum(um > 5.0))} above 5 um")
+
+
+def main() -> None:
+    """Run what the command line says."""
+    name = sys.argv[1]
+    if name == "summary":
+        summary()
+        return
+    there = {(line["format"], line["block"]) for line in lines()}
+    with tempfile.TemporaryDirectory() as folder:
+        content = _seed(name, Path(folder))[0].read_bytes()
+    if sys.argv[2] == "cut":
+        starts = range(0, len(content), 1000)
+        blocks = {f"cut {a}": range(a, min(a + 1000, len(content))) for a in starts}
+    else:
+        blocks = {f"{a}": range(a, a + BLOCK) for a in range(0, int(sys.argv[2]), BLOCK)}
+    for label, numbers in blocks.items():
+        if (name, label) in there:
+            continue
+        if label.startswith("cut"):
+            run(name, [(i, "every byte", content[:i]) for i in numbers], label)
+        else:
+            base = zlib.crc32(name.encode())
+            run(name, [(i, *damaged(content, (base << 20) + i)) for i in numbers], label)
+
+
+if __name__ == "__main__":
+    main()

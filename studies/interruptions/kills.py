@@ -1,0 +1,125 @@
+"""Kill whole commands at random moments and see whether anything is lost or half written.
+
+Usage: python studies/interruptions/kills.py COUNT
+
+Every command writes over outputs of an earlier run. After a kill each output must be whole, the earlier or the
+new one, the inputs must be untouched, and after one more run nothing hidden may be left. One line of
+``results/kills.jsonl`` each; a run that was stopped goes on where it was.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+
+import h5py
+
+from rotordrop.machine import example_path
+from rotordrop.measurement import example_record_path
+
+RESULTS = Path(__file__).parent / "results" / "kills.jsonl"
+COMMANDS = {
+    "look": "look {record} machine.toml --report out.html --json out.json",
+    "check": "check machine.toml --report out.html --json out.json",
+    "init": "init out.toml --force",
+    "profile": "profile {record} -o out.toml",
+    "simulate": "simulate machine.toml --speed 60Hz --duration 0.02s -o out.h5 --json out.json",
+    "synthesize": "synthesize machine.toml --speed 60Hz --duration 0.05s -o made --seed 3",
+}
+
+
+def whole(path: Path) -> bool:
+    """Whether a file is complete by its kind."""
+    try:
+        if path.suffix == ".json":
+            json.loads(path.read_text())
+        elif path.suffix in (".html", ".toml", ".csv"):
+            text = path.read_text()
+            return text.rstrip().endswith("</html>") if path.suffix == ".html" else text.endswith("\n")
+        elif path.suffix == ".h5":
+            with h5py.File(path) as file:
+                return len(file) > 0
+    except (OSError, ValueError):
+        return False
+    return True
+
+
+def _start(folder: Path, words: list[str]) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "rotordrop", *words]
+    quiet = subprocess.DEVNULL
+    return subprocess.Popen(command, cwd=folder, stdout=quiet, stderr=quiet, start_new_session=True)
+
+
+def _folder(path: Path) -> tuple[list[Path], str]:
+    source = Path(example_path("lp400"))
+    for extra in source.parent.glob(f"{source.stem}*"):
+        shutil.copy(extra, path / extra.name.replace(f"{source.stem}.toml", "machine.toml"))
+    record = path / "record.h5"
+    shutil.copy(example_record_path("lp400_drop_060"), record)
+    return [path / "machine.toml", record], record.name
+
+
+def _hashes(paths: list[Path]) -> list[str]:
+    return [hashlib.sha256(path.read_bytes()).hexdigest() for path in paths]
+
+
+def one(
+    number: int, folder: Path, inputs: list[Path], record: str, took: dict[str, float]
+) -> dict[str, object]:
+    """Kill one command and look at what is there."""
+    name = list(COMMANDS)[number % len(COMMANDS)]
+    words = COMMANDS[name].format(record=record).split()
+    if name not in took:
+        begun = time.perf_counter()
+        _start(folder, words).wait()
+        took[name] = time.perf_counter() - begun
+    before = _hashes(inputs)
+    dice = random.Random(number)
+    running = _start(folder, words)
+    time.sleep(dice.uniform(0.3, 1.05) * took[name])
+    ended = running.poll()
+    if ended is None:
+        os.killpg(running.pid, signal.SIGKILL)
+        running.wait()
+    files = [path for path in folder.rglob("*") if path.is_file() and path not in inputs]
+    shown = [path for path in files if not path.name.startswith(".")]
+    return {
+        "number": number,
+        "command": name,
+        "killed": ended is None,
+        "broken": [path.name for path in shown if not whole(path)],
+        "inputs kept": before == _hashes(inputs),
+        "hidden": len(files) - len(shown),
+    }
+
+
+def main() -> None:
+    """Run what is missing and print the sums."""
+    RESULTS.parent.mkdir(exist_ok=True)
+    lines = [json.loads(line) for line in RESULTS.read_text().splitlines()] if RESULTS.is_file() else []
+    took: dict[str, float] = {}
+    with tempfile.TemporaryDirectory() as name, RESULTS.open("a") as out:
+        folder = Path(name)
+        inputs, record = _folder(folder)
+        for number in range(len(lines), int(sys.argv[1])):
+            line = one(number, folder, inputs, record, took)
+            lines.append(line)
+            out.write(json.dumps(line) + "\n")
+            out.flush()
+    print(Counter((line["command"], line["killed"]) for line in lines))
+    broken = [line for line in lines if line["broken"] or not line["inputs kept"]]
+    print(f"{len(lines)} runs, {sum(line['killed'] for line in lines)} killed, broken: {broken}")
+
+
+if __name__ == "__main__":
+    main()
