@@ -2,9 +2,9 @@
 
 Usage: python studies/damaged/machines.py COUNT
 
-Four files, damaged in eight ways: characters, lines, numbers, units, words, brackets. Each is read, and summed
-up where it is accepted. One line per 250 files in ``results/machines.jsonl``; a block that is there is not made
-again.
+Four files, damaged in eight ways: characters, lines, numbers, units, words, brackets. Each is read, summed
+up where it is accepted. One line per 250 files in ``results/machines.jsonl``; a block that is there is not
+made again.
 """
 
 from __future__ import annotations

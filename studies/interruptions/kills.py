@@ -2,8 +2,8 @@
 
 Usage: python studies/interruptions/kills.py COUNT
 
-Every command writes over outputs of an earlier run. After a kill each output must be whole, the earlier or the
-new one, the inputs must be untouched, and after one more run nothing hidden may be left. One line of
+Every command writes over outputs of an earlier run. After a kill each output must be whole, the earlier or
+the new one, the inputs must be untouched, and after one more run nothing hidden may be left. One line of
 ``results/kills.jsonl`` each; a run that was stopped goes on where it was.
 """
 

@@ -190,9 +190,9 @@ def _jumps(record: Record) -> list[Finding]:
     many = np.sum(kink > limit, axis=1) >= enough
     # where the rotor moves along one sensor, one channel jumps far and the others less
     far = np.max(kink / np.maximum(8.0 * np.percentile(kink, 99.9, axis=0), limit), axis=1) > 1.0
-    for at in np.flatnonzero(far & ~many):
-        nearby = np.median(kink[max(at - _AROUND, 0) : at + _AROUND], axis=0)
-        many[at] = np.sum(kink[at] > 6.0 * np.maximum(nearby, usual)) >= enough
+    for jump in np.flatnonzero(far & ~many).tolist():
+        nearby = np.median(kink[max(jump - _AROUND, 0) : jump + _AROUND], axis=0)
+        many[jump] = np.sum(kink[jump] > 6.0 * np.maximum(nearby, usual)) >= enough
     beside = np.append(many[1:], False) | np.append(False, many[:-1])
     alone = np.flatnonzero(many & ~beside)  # a spike makes two such steps in a row
     if not len(alone):

@@ -85,7 +85,9 @@ def check_ends(
     decided = _decide(mine, cases, finals)
     if decided.kind not in (UNDECIDED_ENDS, "wrong gain"):
         return [decided]
-    return read_otherwise(record, planes, levitated, own) or [decided]
+    named = read_otherwise(record, planes, levitated, own)
+    stop = decided.severity == "stop"
+    return [replace(found, severity="stop") if stop else found for found in named] or [decided]
 
 
 def _implausible_lift(fall: Fall, machine: Machine) -> list[Finding]:
