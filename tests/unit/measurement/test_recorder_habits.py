@@ -261,3 +261,15 @@ def test_excel(machine, tmp_path):
     path.write_bytes(path.read_bytes()[:-500])
     with pytest.raises(RecordError, match=r"cannot be read as a workbook"):
         read_record(path, machine)
+
+
+@pytest.mark.parametrize("key", ["Samples", "Number of samples", "Anzahl Messwerte", "Record length"])
+def test_rows_missing_at_the_end_show_by_the_length_the_header_declares(key, machine, tmp_path):
+    """Cut behind a whole row, a text shows no damage by itself."""
+    lines = table(seconds).split("\n")
+    path = tmp_path / "drop.csv"
+    path.write_text("\n".join([f"{key}: {COUNT}", *lines]))
+    assert read_record(path, machine).warnings == ()
+    path.write_text("\n".join([f"{key}: {COUNT}", *lines[:-9]]) + "\n")
+    (told,) = read_record(path, machine).warnings
+    assert f"declares {COUNT} samples and {COUNT - 8} are present" in told

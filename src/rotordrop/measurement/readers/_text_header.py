@@ -13,6 +13,10 @@ _STEP = ("dt", "step", "increment", "sampleinterval", "samplinginterval", "abtas
 _RATE = ("fs", "samplerate", "samplingrate", "samplingfrequency", "abtastrate", "abtastfrequenz", "rate")
 _TRIGGER = ("triggersample", "triggerindex", "triggerposition", "pretriggersamples")
 _PRE_TRIGGER = ("pretrigger", "pretriggertime", "vorlauf")
+_COUNT = (
+    *("samples", "samplecount", "numberofsamples", "numsamples", "nsamples", "points", "numberofpoints"),
+    *("recordlength", "anzahlwerte", "anzahlmesswerte", "anzahlabtastwerte", "messwerte"),
+)
 _START = ("t0", "starttime", "firstsample", "startoffset")
 _SENSITIVITY = re.compile(r"(\d+(?:[.,]\d+)?)\s*(m?V)\s*/\s*([uµμm]?m|mil)\b")
 _VOLTAGE_OFFSET = re.compile(r"offset\s*[:=]?\s*([+-]?\d+(?:[.,]\d+)?)\s*(m?V)\b", re.IGNORECASE)
@@ -32,6 +36,8 @@ class Header:
         Time of the first sample [s].
     trigger_sample : int, optional
         Sample at which the record time is zero.
+    count : int, optional
+        Number of samples.
     sensitivity : float, optional
         Volts per metre [V/m].
     voltage_offset : float
@@ -42,6 +48,7 @@ class Header:
     step: float | None
     start: float | None
     trigger_sample: int | None
+    count: int | None
     sensitivity: float | None
     voltage_offset: float
 
@@ -66,6 +73,7 @@ def read_header(lines: list[str], separator: str) -> Header:
         step=step,
         start=start,
         trigger_sample=None if trigger is None else round(trigger),
+        count=_whole(entries, _COUNT),
         sensitivity=_sensitivity(text),
         voltage_offset=_voltage_offset(text),
     )
@@ -119,6 +127,12 @@ def _plain(entries: dict[str, str], names: tuple[str, ...]) -> float | None:
     found = _find(entries, names)
     match = re.match(r"\d+", found[0]) if found else None
     return float(match.group()) if match else None
+
+
+def _whole(entries: dict[str, str], names: tuple[str, ...]) -> int | None:
+    """A whole number and nothing else: "Samples: 5 per channel" declares no length."""
+    found = _find(entries, names)
+    return int(found[0]) if found and re.fullmatch(r"[1-9]\d{0,9}", found[0].strip()) else None
 
 
 def _sensitivity(text: str) -> float | None:

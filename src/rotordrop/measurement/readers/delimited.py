@@ -67,6 +67,10 @@ def recording_of_lines(
     )
     texts = [labels[i] for i, kind in enumerate(layout.kinds) if kind == "text"]
     notes += [f"left out, no numbers: {', '.join(texts)}"] if texts else []
+    if header.count is not None and len(rows) < header.count:
+        warnings.append(
+            f"the header declares {header.count} samples and {len(rows)} are present: the file is truncated"
+        )
     return Recording(
         channels=channels,
         metadata=header.entries,
