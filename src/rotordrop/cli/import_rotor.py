@@ -50,11 +50,11 @@ def import_rotor(
     from rotordrop.machine import machine_text
     from rotordrop.machine.simple import SimpleMachine, drafted_machine
 
-    if len({spring.node for spring in imported.springs}) < 2:
+    if len({spring.node for spring in imported.springs if spring.kind == "BearingElement"}) < 2:
         last = len(imported.rotor.node_positions)
         nodes = (max(1, round(0.1 * last)), min(last, round(0.9 * last)))
     else:
-        ends = sorted(spring.node for spring in imported.springs)
+        ends = sorted(spring.node for spring in imported.springs if spring.kind == "BearingElement")
         nodes = (ends[0], ends[-1])
     if nodes[0] == nodes[1]:
         raise UsageError("the rotor has too few nodes for two bearings; cut it into more elements")

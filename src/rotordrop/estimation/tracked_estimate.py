@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError
-from rotordrop.estimated import IdentifiedValue
+from rotordrop.estimated import NINETY, IdentifiedValue
 from rotordrop.estimation.advice import Advice
 from rotordrop.estimation.assumptions import twin_assumptions
 from rotordrop.estimation.bearing_drop import BearingDrop
@@ -28,6 +28,7 @@ from rotordrop.estimation.record_facts import RecordFacts
 from rotordrop.estimation.structure_sentence import structure_of
 from rotordrop.estimation.tracked import TrackedDrop
 from rotordrop.estimation.tracked_loads import (
+    BEAM_FORCE_SIGMA,
     INCONSISTENT_WIDENING,
     Loads,
     bearing_drop,
@@ -45,6 +46,7 @@ from rotordrop.estimation.tracked_parameters import (
     sensor_errors,
 )
 from rotordrop.model.bearing_numbers import numbers_of
+from rotordrop.model.rotor_form import is_beam
 from rotordrop.tracking.consistency import NIS_RANGE, Check
 from rotordrop.tracking.input_state import (
     InputEstimate,
@@ -52,6 +54,7 @@ from rotordrop.tracking.input_state import (
     input_state_estimate,
     lent_by_record,
 )
+from rotordrop.tracking.problem import DropProblem
 
 Array = NDArray[np.float64]
 
@@ -159,7 +162,7 @@ def _cross_checked(drop: TrackedDrop, method: Tracked) -> tuple[TrackedDrop, Inp
     if not drop.sees_all_directions or (drop.consistent and method.quick and not with_play):
         return drop, None
     if drop.consistent:
-        check = input_state_estimate(problem, lent_by_record(problem))
+        check = _without_contact_law(problem)
         apart = [
             f"the peak force at {name} is {peak:.0f} N, without a contact law {check.peak[b]:.0f} N"
             for b, name in enumerate(problem.model.bearing_names)
@@ -169,7 +172,20 @@ def _cross_checked(drop: TrackedDrop, method: Tracked) -> tuple[TrackedDrop, Inp
             return drop, check
         failed = Check(name="cross-check", passed=False, message="; ".join(apart))
         return replace(drop, checks=(*drop.checks, failed)), check
-    return drop, input_state_estimate(problem, lent_by_record(problem))
+    return drop, _without_contact_law(problem)
+
+
+def _without_contact_law(problem: DropProblem) -> InputEstimate:
+    """The cross-check, with the error of a beam where one stands for the rotor."""
+    check = input_state_estimate(problem, lent_by_record(problem))
+    if not is_beam(problem.model.machine.rotor):
+        return check
+    beam = NINETY * BEAM_FORCE_SIGMA
+    return replace(
+        check,
+        peak_error=np.hypot(check.peak_error, beam),
+        stress_error=np.hypot(check.stress_error, beam / 3.0),
+    )
 
 
 def _judge(drop: TrackedDrop, check: InputEstimate | None) -> _Judgement:

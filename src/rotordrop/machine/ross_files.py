@@ -50,6 +50,8 @@ class Spring:
         In x and y [N/m], [N s/m]; where the source has them by speed, the first of its table.
     cross_stiffness, cross_damping : tuple of float
         Force in x against motion in y, and in y against motion in x.
+    kind : str
+        What it is in the source; seals are held in the same way.
     told : dict of str to tuple of float
         All coefficients of the source by its own names, over ``frequency`` [rad/s]; written back as they are.
     """
@@ -60,6 +62,7 @@ class Spring:
     damping: tuple[float, float]
     cross_stiffness: tuple[float, float] = (0.0, 0.0)
     cross_damping: tuple[float, float] = (0.0, 0.0)
+    kind: str = "BearingElement"
     told: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     @property
@@ -207,7 +210,9 @@ def _imported(
             ],
         }
     )
-    springs = tuple(_spring(k, item, nodes) for k, (kind, item) in enumerate(elements) if _is_bearing(kind))
+    springs = tuple(
+        _spring(k, kind, item, nodes) for k, (kind, item) in enumerate(elements) if _is_spring(kind)
+    )
     notes += _left_out(elements)
     return ImportedRotor(
         rotor=rotor,
@@ -346,11 +351,11 @@ def _disc(kind: str, item: Mapping[str, Any], nodes: list[int]) -> dict[str, Any
     return disc
 
 
-def _is_bearing(kind: str) -> bool:
-    return "Bearing" in kind
+def _is_spring(kind: str) -> bool:
+    return "Bearing" in kind or kind == "SealElement"
 
 
-def _spring(k: int, item: Mapping[str, Any], nodes: list[int]) -> Spring:
+def _spring(k: int, kind: str, item: Mapping[str, Any], nodes: list[int]) -> Spring:
     told = {key: _numbers(item[key]) for key in item if _COEFFICIENT.fullmatch(key) and item[key] is not None}
     told = {key: values for key, values in told.items() if values}
 
@@ -365,6 +370,7 @@ def _spring(k: int, item: Mapping[str, Any], nodes: list[int]) -> Spring:
         damping=both("c", "xx", "yy", "same"),
         cross_stiffness=both("k", "xy", "yx", "zero"),
         cross_damping=both("c", "xy", "yx", "zero"),
+        kind="SealElement" if kind == "SealElement" else "BearingElement",
         told=told if _says_more(told) else {},
     )
 
@@ -384,7 +390,7 @@ def _numbers(value: Any) -> tuple[float, ...]:
 def _left_out(elements: Iterable[tuple[str, dict[str, Any]]]) -> list[str]:
     kinds = [kind for kind, _ in elements]
     known = ("DiskElement", "PointMass")
-    others = [k for k in kinds if not k.startswith("ShaftElement") and k not in known and not _is_bearing(k)]
+    others = [k for k in kinds if not k.startswith("ShaftElement") and k not in known and not _is_spring(k)]
     return [f"{others.count(kind)} {kind} left out" for kind in dict.fromkeys(others)]
 
 
@@ -428,7 +434,7 @@ def write_ross(rotor: Rotor, path: str | Path, springs: Iterable[Spring] = ()) -
             "color": "Firebrick",
         }
     for spring in springs:
-        content[f"BearingElement_{spring.name}"] = {
+        content[f"{spring.kind}_{spring.name}"] = {
             "n": spring.node - 1,
             "tag": spring.name,
             **(

@@ -94,10 +94,10 @@ def test_cones_keep_their_mass_and_are_told(written):
 
 
 def test_what_is_left_out_or_switched_is_told(written):
-    seal = {"n": 3, "kxx": [1.0]}
+    coupling = {"n": 3, "kt_x": 1.0}
     stiff = shaft(2, shear_effects=False)
-    imported = read_ross(written(published() | {"SealElement_1": seal, "ShaftElement_2": stiff}))
-    assert "1 SealElement left out" in imported.notes
+    imported = read_ross(written(published() | {"CouplingElement_1": coupling, "ShaftElement_2": stiff}))
+    assert "1 CouplingElement left out" in imported.notes
     assert "the source switched shear effects off; it acts here" in imported.notes
 
 
@@ -132,3 +132,27 @@ def test_the_command_refuses_what_is_no_rotor(tmp_path, capsys):
     (tmp_path / "rotor.pdf").write_text("x")
     assert run(["import-rotor", str(tmp_path / "rotor.pdf")]) == 2
     assert "'.pdf' is no format of a rotor" in capsys.readouterr().err
+
+
+def test_coupled_coefficients_tables_by_speed_and_seals_go_there_and_back(written, tmp_path):
+    table = {
+        "frequency": [0.0, 100.0],
+        "kxx": [1e6, 2e6],
+        "kyy": [1e6, 3e6],
+        "kxy": [1e5, 2e5],
+        "kyx": [-1e5, -4e5],
+    }
+    seal = {"n": 3, "tag": "Seal 1", "kxx": [1e4], "kyx": [-2e3], "cxx": [50.0]}
+    content = published() | {"BearingElement_0": {"n": 0, "tag": "Bearing 0", **table}, "SealElement_1": seal}
+    imported = read_ross(written(content))
+    bearing, told = (next(s for s in imported.springs if s.name == name) for name in ("Bearing 0", "Seal 1"))
+    assert told.kind == "SealElement"
+    assert told.stiffness_matrix == ((1e4, 0.0), (-2e3, 1e4))
+    assert told.damping_matrix == ((50.0, 0.0), (0.0, 50.0))
+    middle = bearing.at_speed(50.0)
+    assert middle.stiffness_matrix == ((1.5e6, 1.5e5), (-2.5e5, 2e6))
+    assert bearing.at_speed(900.0).stiffness == (2e6, 3e6)
+    assert told.at_speed(50.0) is told
+    assert imported.nodes == (1, 2, 3, 4, 5, 6, 7)
+    write_ross(imported.rotor, tmp_path / "back.toml", imported.springs)
+    assert read_ross(tmp_path / "back.toml").springs == imported.springs

@@ -100,6 +100,13 @@ def test_a_whirl_has_its_sense_frequency_and_turns(frequency, sense, tmp_path):
     assert (whirl.start, whirl.end) == pytest.approx((0.4, 0.6), abs=0.02)
 
 
+def test_a_gap_may_be_a_text_with_its_unit_and_a_bare_speed_is_refused():
+    path = example_record_path("lp400_drop_060")
+    assert [one.gap for one in look(path, gap="0.28 mm").planes] == pytest.approx([0.28e-3, 0.28e-3])
+    with pytest.raises(UsageError, match="speed = 60 has no unit; write '60 Hz' or '60 rpm'"):
+        look(path, gap="0.28 mm", speed=60)
+
+
 def test_the_velocity_index_of_a_synchronous_whirl_at_full_gap_is_one(tmp_path):
     time, path, _ = fall_and_bounce(restitution=0.05)
     spell = time >= RELEASE + 0.02

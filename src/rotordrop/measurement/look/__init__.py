@@ -29,6 +29,7 @@ from rotordrop.measurement.quality.finding import ranked
 from rotordrop.measurement.readers import read_recording
 from rotordrop.measurement.record import Record, record_of, sha256_of
 from rotordrop.measurement.synchronous import Synchronous, synchronous_motion
+from rotordrop.units import in_si
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
@@ -226,8 +227,8 @@ def look(
     record: str | FilePath | Record,
     *,
     machine: Machine | None = None,
-    gap: float | None = None,
-    speed: float | None = None,
+    gap: float | str | None = None,
+    speed: float | str | None = None,
     mapping: Sequence[str] = (),
     profile: Profile | str | FilePath | None = None,
 ) -> Look:
@@ -239,10 +240,10 @@ def look(
         The recording, or one that was read before.
     machine : Machine, optional
         Names and places the sensors and gives the air gaps.
-    gap : float, optional
-        Air gap of all planes [m].
-    speed : float, optional
-        Shaft speed before the drop [rad/s], where the recording has none.
+    gap : float or str, optional
+        Air gap of all planes [m], or a text such as "0.28 mm".
+    speed : float or str, optional
+        Shaft speed before the drop [rad/s], or a text such as "60 Hz", where the recording has none.
     mapping : sequence of str
         Planes with channels and angles, ``"NDE: X1 0 deg, Y1 90 deg"``.
     profile : Profile or path-like, optional
@@ -260,6 +261,8 @@ def look(
     at `PlaneLook`. Displacements are those of the sensor planes.
     Not validated: impacts are those of the displacement alone, without a model of the contact.
     """
+    gap = None if gap is None else in_si(gap, "length", "gap")
+    speed = None if speed is None else in_si(speed, "speed", "speed")
     read, arrangement = _read(record, machine, speed, mapping, profile)
     findings = _checked(read, machine)
     blocking = [found for found in findings if found.kind in _UNREADABLE and found.severity == "stop"]
