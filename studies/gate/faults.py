@@ -142,7 +142,8 @@ def late_channel(record: Record, tail: Record, random: Random) -> Made:
     late, column = _log(random, 2e-4, 2e-3), _channel(record, random)
 
     def change(signals: Array) -> None:
-        signals[:, column] = np.interp(record.time - late, record.time, signals[:, column])
+        moved = np.interp(record.time - late, record.time, signals[:, column])
+        signals[:, column] = np.where(record.time - late < record.time[0], signals[:, column], moved)
 
     return _with(record, change), tail, f"{late * 1e3:.2f} ms"
 

@@ -8,6 +8,8 @@ from scipy.signal import butter, sosfilt
 
 from rotordrop.measurement import check_record
 from rotordrop.measurement.quality.recorder import check_filters
+from rotordrop.synthesis import hidden_machine, synthesize_drop
+from rotordrop.synthesis.sensor_chain import PERFECT
 
 
 def filtered(signals, rate, corner, kind):
@@ -142,8 +144,32 @@ def test_a_speed_that_is_wrong_by_two(factor, drop, machine):
     assert "so the speed is wrong" in found.message
 
 
+def test_sensors_without_noise_are_not_judged_finer_than_the_model_is(machine):
+    hidden = hidden_machine(machine, 3)
+    made = synthesize_drop(hidden, 2 * np.pi * 90.0, 3, sensor_chain=PERFECT, duration=0.1, tolerance=1e-6)
+    kinds = {found.kind for found in check_record(made.record, machine, made.tail)}
+    assert not kinds & {"late channel", "wrong gain", "soft saturation", "turned sensors"}
+
+
 @pytest.mark.parametrize("gain", [0.9, 1.1])
 def test_a_tenth_in_all_gains_shows_in_no_fall(gain, drop, tail, machine):
     """Less lift that remains fits as well: the record does not say it, and nothing is invented."""
     wrong = [replace(one, signals=gain * one.signals) for one in (drop, tail)]
     assert "wrong gain" not in {finding.kind for finding in check_record(*wrong[:1], machine, wrong[1])}
+
+
+def test_hum_on_the_tail_is_no_exchanged_channel(whole_drop, tail, machine):
+    """Mains hum moves all channels alike, at an angle to the race that looked like a crossed channel."""
+    humming = tail.signals + 20e-6 * np.sin(2 * np.pi * 50.0 * tail.time)[:, None]
+    kinds = {found.kind for found in check_record(whole_drop, machine, replace(tail, signals=humming))}
+    assert "swapped channels" not in kinds
+
+
+def test_a_single_run_of_equal_readings_is_stuck(drop, machine):
+    """A recorder of many bits repeats no reading: the one run was compared with itself and passed."""
+    rng = np.random.default_rng(5)
+    signals = drop.signals + rng.normal(0.0, 1e-9, drop.signals.shape)
+    signals[6000:6014, 2] = signals[6000, 2]
+    found = first_stop(replace(drop, signals=signals), machine)
+    assert (found.kind, found.channel) == ("stuck channel", drop.channel_names[2])
+    assert "14 samples (0.7 ms)" in found.message

@@ -90,7 +90,8 @@ def _stuck(record: Record, channel: str, values: Array) -> Finding | None:
         return None
     longest = int(np.argmax(lengths))
     count = int(lengths[longest]) + 1
-    usual = int(np.percentile(lengths, 99.9, method="lower")) + 1  # coarse steps make runs everywhere
+    others = np.append(np.delete(lengths, longest), 0)  # coarse steps make runs everywhere
+    usual = int(np.percentile(others, 99.9, method="lower")) + 1
     if count < max(_STUCK_SAMPLES, 4 * usual):
         return None
     if values[starts[longest]] in (np.min(values), np.max(values)):

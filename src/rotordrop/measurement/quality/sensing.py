@@ -32,6 +32,9 @@ TURNED = "turned sensors"
 SUSPECT = 14.0
 """Chi square of one fault from which on it is named: one good fall in 500 has as much by chance [1]."""
 
+_MODEL_ERROR = 3e-4
+"""What the model of the fall leaves out, over how far the rotor falls [1]."""
+
 _EXPLAINED = 0.5
 """Share of the chi square beyond noise that a fault has to take away where the fall is not at noise level."""
 
@@ -83,7 +86,8 @@ def read_otherwise(
     )
     gained, size, best = found[0]
     beyond = float(residual @ residual) - len(residual)
-    if gained < max(SUSPECT, _EXPLAINED * beyond):
+    trusted = _trust(levitated, fall)
+    if trusted * gained < max(SUSPECT, _EXPLAINED * trusted * beyond):
         return []
     near = [
         other.words(value)
@@ -94,8 +98,8 @@ def read_otherwise(
     return [
         Finding(
             kind=best.kind,
-            message=f"the fall under gravity looks like that of {best.words(size)}, by {gained**0.5:.1f} "
-            f"standard deviations{also}",
+            message=f"the fall under gravity looks like that of {best.words(size)}, by "
+            f"{(trusted * gained) ** 0.5:.1f} standard deviations{also}",
             remedy=_REMEDIES[best.kind],
             severity="warning",
             channel=", ".join(best.channels),
@@ -103,10 +107,18 @@ def read_otherwise(
     ]
 
 
+def _trust(levitated: LevitatedModel, fall: Fall) -> float:
+    """Share of the variance of a reading that is noise; the rest is what the model of the fall leaves out."""
+    time = np.linspace(fall.start, fall.end, 50)
+    reach = float(np.max(np.abs(fall.predicted(time) - levitated.readings(time))))
+    noise = float(np.median(levitated.noise))
+    return noise**2 / (noise**2 + (_MODEL_ERROR * reach) ** 2)
+
+
 def _gain(fault: _Fault, residual: Array, basis: Array, levitated: LevitatedModel) -> tuple[float, float]:
     """Chi square that a fault takes away beyond what everything sought can take, and its size."""
     added = np.zeros(len(residual))
-    added[: fault.slope.size] = (fault.slope / levitated.noise).ravel()
+    added[: fault.slope.size] = (fault.slope / np.maximum(levitated.noise, 1e-12)).ravel()
     added -= basis @ (basis.T @ added)
     size = float(added @ residual) / max(float(added @ added), 1e-300)
     return size * float(added @ residual), size

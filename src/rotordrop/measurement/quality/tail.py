@@ -9,7 +9,9 @@ import numpy as np
 from rotordrop.errors import RecordError
 from rotordrop.measurement.axes import Plane, along_sensors, planar_of
 from rotordrop.measurement.events import gap_of
+from rotordrop.measurement.levitated import MAINS
 from rotordrop.measurement.quality.finding import Finding
+from rotordrop.measurement.quality.sensing import TURNED
 from rotordrop.measurement.recording import Array
 from rotordrop.measurement.settled import settled_tail
 from rotordrop.units import format_quantity
@@ -22,6 +24,9 @@ MOST_LEAN = 25.0
 """A rotor at rest may lie this far from straight below its levitated position [deg]."""
 
 _SOME_LEAN = 10.0
+
+_TURNED_LEAN = 65.0
+"""A rest that leans less has turned sensors: exchanged or inverted ones turn it by a quarter [deg]."""
 
 DEPTH = (0.6, 1.7)
 """How far it may lie below it, in nominal air gaps."""
@@ -61,7 +66,7 @@ def check_tail(tail: Record, machine: Machine, planes: tuple[Plane, ...], level:
     findings = []
     for number, plane in enumerate(planes):
         findings += _place(path[:, number], plane, gap_of(machine, plane))
-        findings += _swing(path[:, number], plane)
+        findings += _swing(path[:, number], plane, tail.sampling_rate)
     return findings
 
 
@@ -95,7 +100,7 @@ def _place(path: Array, plane: Plane, gap: float) -> list[Finding]:
     if lean > MOST_LEAN:
         return [
             Finding(
-                kind="swapped axes",
+                kind="swapped axes" if lean > _TURNED_LEAN else TURNED,
                 message=f"tail: the rotor rests at x = {x * 1e6:+.4g} µm, y = {y * 1e6:+.4g} µm from its "
                 "levitated "
                 f"position, {lean:.0f}° from straight below",
@@ -108,9 +113,17 @@ def _place(path: Array, plane: Plane, gap: float) -> list[Finding]:
     return []
 
 
-def _swing(path: Array, plane: Plane) -> list[Finding]:
+def _without_hum(path: Array, rate: float) -> Array:
+    """Motion about the mean without what the mains add to it."""
+    time = np.arange(len(path)) / rate
+    waves = [part(2.0 * np.pi * mains * time) for mains in MAINS for part in (np.cos, np.sin)]
+    design = np.column_stack([np.ones(len(path)), *waves])
+    return np.asarray(path - design @ np.linalg.lstsq(design, path, rcond=None)[0])
+
+
+def _swing(path: Array, plane: Plane, rate: float) -> list[Finding]:
     """A rotor that rests on the race can only swing along it: level at the bottom."""
-    deviation = path - np.mean(path, axis=0)
+    deviation = _without_hum(path, rate)
     values, vectors = np.linalg.eigh(deviation.T @ deviation / len(deviation))
     size = float(np.sqrt(2 * values[1]))
     if size < _VISIBLE_SWING or values[1] < 9.0 * values[0]:
