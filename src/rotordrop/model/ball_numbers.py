@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -47,6 +47,12 @@ CENTRIFUGAL_SHARE = 0.25
 _STEEL = (208e9, 0.3)
 
 
+@lru_cache(maxsize=64)
+def _constants(balls: BallBearing) -> BearingConstants:
+    """Found once for equal bearings: a study asks for them six times a drop, and they cost milliseconds."""
+    return bearing_constants(balls)
+
+
 @dataclass(frozen=True, eq=False)
 class BallNumbers(BearingNumbers):
     """The numbers of a ball bearing, from its description."""
@@ -56,7 +62,7 @@ class BallNumbers(BearingNumbers):
     @cached_property
     def constants(self) -> BearingConstants:
         """What does not change during a drop."""
-        return bearing_constants(self.balls)
+        return _constants(self.balls)
 
     @property
     def held(self) -> bool:

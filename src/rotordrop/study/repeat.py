@@ -34,6 +34,8 @@ COMPARED: Mapping[str, str] = {
     "severity.skid_energy_J": "contact_energy",
 }
 """Numbers of an estimate, and the column of a study below its bearing that is the same."""
+RAYLEIGH_MEDIAN, RAYLEIGH_SPREAD = math.sqrt(2.0 * math.log(2.0)), math.pi / math.sqrt(24.0)
+"""Median and standard deviation of the logarithm of the length of two normal parts of unit spread [1]."""
 USUAL_REMANENCE = 2e-3
 """Time constant of remanent lift where the machine file says nothing [s]."""
 
@@ -83,8 +85,8 @@ def repeat_study(
 ) -> Study:
     """Study of the drops that could have happened at a speed [rad/s].
 
-    What is calibrated varies by its joint distribution, the rotor angle over the whole turn, remanent lift
-    and its time as a filter takes them before it reads a record.
+    What is calibrated varies by its joint distribution, the rotor angle over the whole turn, remanent lift,
+    its time and the unbalances as a filter takes them before it reads a record: no calibration keeps these.
     """
     if not machine.ambs:
         raise UsageError("a virtual repeat starts levitated, but the machine has no AMBs; describe them")
@@ -98,6 +100,10 @@ def repeat_study(
         ),
         "remanence_time": Distribution(shape="log_normal", numbers=(time, row.guess_sigma)),
     }
+    for k, unbalance in enumerate(machine.unbalances):
+        median = RAYLEIGH_MEDIAN * max(float(unbalance.amount), 1e-9)
+        vary[f"unbalance.{k}.amount"] = Distribution(shape="log_normal", numbers=(median, RAYLEIGH_SPREAD))
+        vary[f"unbalance.{k}.phase"] = Distribution(shape="uniform", numbers=(0.0, 2.0 * math.pi))
     return Study(
         name=f"virtual repeat of {machine.name} at {speed / (2.0 * math.pi):.4g} Hz",
         machine=machine,

@@ -89,7 +89,14 @@ def test_numbers_of_an_estimate_are_found_by_their_column():
 
 def test_chances_are_those_of_a_drop():
     study = repeat_study(MACHINE, 2.0 * math.pi * 100.0, duration=0.2)
-    assert set(study.varied) == {"remanent_share", "remanence_time", "rotor_angle"}
+    planes = {f"unbalance.{k}.{part}" for k in range(len(MACHINE.unbalances)) for part in ("amount", "phase")}
+    assert planes
+    assert set(study.varied) == {"remanent_share", "remanence_time", "rotor_angle", *planes}
+    drawn = study.values(0, 4000)[:, list(study.varied).index("unbalance.0.amount")]
+    described = float(MACHINE.unbalances[0].amount)
+    assert np.median(drawn) == pytest.approx(
+        np.median(np.hypot(*np.random.default_rng(1).normal(0, described, (2, 40_000)))), rel=0.05
+    )
     assert not study.calibrated
 
 
