@@ -3,7 +3,7 @@
     python studies/atlas/atlas.py run FOLDER --minutes 9      # as often as it takes; continues where it was
     python studies/atlas/atlas.py show FOLDER --out studies/atlas
 
-The plan has 100,000 drops (Sobol points). What is finished is an unbroken row of them: part of it is a smaller
+The plan has 100,000 drops (Sobol points). What is finished is an unbroken row of them: part of it is a small
 atlas of the same plan.
 """
 

@@ -88,12 +88,15 @@ def log(
     if action is Action.export:
         typer.echo(_csv(found), nl=False)
         return
+    rising = book.trends(where, machine=machine)
     content = {
         "drops": {str(number): asdict(drop) for number, drop in found.items()},
         "used": [{**asdict(share), "sentence": share.sentence()} for share in shares],
+        "trends": [{**asdict(one), "sentence": one.sentence()} for one in rising],
         "statement": book.STATEMENT,
     }
-    deliver(content, json_file, lambda out: _summary(out, found, [share.sentence() for share in shares]))
+    said = [one.sentence() for one in (*shares, *rising)]
+    deliver(content, json_file, lambda out: _summary(out, found, said))
 
 
 def _say_whose(machine: str, logged: set[str]) -> None:

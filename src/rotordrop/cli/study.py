@@ -70,7 +70,8 @@ def study(
         ),
     ] = None,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Write all drops as HDF5 (NetCDF4).")
+        Path | None,
+        typer.Option("--output", "-o", metavar="FILE", help="Write all drops as HDF5 (NetCDF4) or .parquet."),
     ] = None,
     report: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write the report as one HTML file.")

@@ -7,4 +7,5 @@ from rotordrop.ledger.book import Severity as Severity
 from rotordrop.ledger.book import add_drop as add_drop
 from rotordrop.ledger.book import allow as allow
 from rotordrop.ledger.book import logged_drops as logged_drops
+from rotordrop.ledger.book import trends as trends
 from rotordrop.ledger.book import used_shares as used_shares

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -247,7 +248,7 @@ class EarlyEnd:
 
 
 def save_results(results: StudyResults, path: str | Path) -> None:
-    """Write all drops as one columnar HDF5 file that opens as NetCDF4, complete or not at all.
+    """Write all drops as one columnar file, complete or not at all: ``.parquet``, else HDF5 (NetCDF4).
 
     Raises
     ------
@@ -260,6 +261,9 @@ def save_results(results: StudyResults, path: str | Path) -> None:
 
     if not len(results):
         raise OutputError(f"{path}: the study has no finished drops yet; run it first")
+    if Path(path).suffix.lower() == ".parquet":
+        _save_parquet(results, Path(path))
+        return
     with atomic_path(Path(path)) as temporary, h5py.File(temporary, "w", track_order=True) as file:
         file.attrs["format"] = "rotordrop study results 1"
         file.attrs["study"] = results.study.name
@@ -274,3 +278,23 @@ def save_results(results: StudyResults, path: str | Path) -> None:
             dataset.dims[0].attach_scale(file["drop"])
         reasons = np.array([reason.encode() for reason in results.reasons], dtype="S160")
         file.create_dataset("failure", data=reasons, compression="gzip").dims[0].attach_scale(file["drop"])
+
+
+def _save_parquet(results: StudyResults, path: Path) -> None:
+    """One column a value; units and digest in the metadata of the file."""
+    from importlib.util import find_spec
+
+    from rotordrop.atomic_file import atomic_path
+
+    if find_spec("pyarrow") is None:
+        raise OutputError(
+            f"{path}: Parquet needs a package that is not installed; install rotordrop[parquet], or write .h5"
+        )
+    import pyarrow
+    from pyarrow import parquet
+
+    columns = {"drop": results.drop, **results.varied, **results.numbers, "failure": list(results.reasons)}
+    units = {q.name: q.unit for q in results.columns}
+    told = {"study": results.study.name, "digest": results.study.digest, "units": json.dumps(units)}
+    with atomic_path(path) as temporary:
+        parquet.write_table(pyarrow.table(columns).replace_schema_metadata(told), temporary)

@@ -260,3 +260,20 @@ def test_a_log_that_others_are_making_is_waited_for():
     assert there.asked[-1] == "PRAGMA journal_mode"
     with pytest.raises(sqlite3.OperationalError, match="disk"):
         _make_wal(Busy("disk I/O error"))
+
+
+def test_a_trend_is_told_and_chance_is_not(log):
+    from rotordrop.ledger import trends
+
+    steady = (5.0, 3.0, 6.0, 2.0, 7.0, 4.0, 5.5, 3.5)
+    for k in range(8):
+        severity = (
+            replace(PEAK, value=3000.0 + 100.0 * k, lower=2900.0, upper=4000.0),
+            replace(PEAK, bearing="DE", value=steady[k], lower=0.0, upper=9.0),
+        )
+        recorded = f"2026-01-{1 + k:02d}"
+        add_drop(log, replace(DROP, sha256=f"{k:064d}", recorded=recorded, severity=severity))
+    (one,) = trends(log)
+    assert (one.bearing, one.quantity, one.drops, one.tau) == ("NDE", "peak_force_N", 8, pytest.approx(1.0))
+    assert "peak_force_N at NDE rises over 8 drops" in one.sentence()
+    assert trends(log, machine="another") == ()

@@ -311,6 +311,41 @@ def test_the_end_is_looked_for_without_reading_a_shard_twice(tmp_path, monkeypat
     assert read == [0, 1, 2]
 
 
+def test_results_are_written_as_parquet(serial, tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    save_results(serial[1], tmp_path / "results.parquet")
+    table = parquet.read_table(tmp_path / "results.parquet")
+    assert table.num_rows == 12
+    np.testing.assert_array_equal(table["NDE.peak_force"].to_numpy(), serial[1].numbers["NDE.peak_force"])
+    assert json.loads(table.schema.metadata[b"units"])["NDE.peak_force"] == "N"
+
+
+def test_a_full_disk_is_said_and_the_study_goes_on_later(serial, tmp_path):
+    """A limit on the size of files stands for the disk."""
+    folder = tmp_path / "study"
+    open_folder(study_with(), folder)
+    assert work_on(folder, 0)
+    before = (folder / "shards" / "000000.npy").read_bytes()
+    limited = (
+        "import resource, sys\n"
+        "from rotordrop.errors import OutputError\n"
+        "from rotordrop.study.folder import study_of\n"
+        "from rotordrop.study.run import run_study\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))\n"
+        "try:\n"
+        "    run_study(study_of(sys.argv[1]), sys.argv[1], threads=1)\n"
+        "except OutputError as error:\n"
+        "    sys.exit(str(error))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", limited, str(folder)], capture_output=True, text=True)
+    assert done.returncode == 1
+    assert "000001.npy" in done.stderr
+    assert sorted(file.name for file in (folder / "shards").iterdir()) == ["000000.npy"]
+    assert (folder / "shards" / "000000.npy").read_bytes() == before
+    run_study(study_with(), folder, threads=1)
+    same_shards(serial[0], folder)
+
+
 def test_results_are_written_with_units(serial, tmp_path):
     import h5py
 
