@@ -331,7 +331,7 @@ def test_a_full_disk_is_said_and_the_study_goes_on_later(serial, tmp_path):
         "from rotordrop.errors import OutputError\n"
         "from rotordrop.study.folder import study_of\n"
         "from rotordrop.study.run import run_study\n"
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))\n"
         "try:\n"
         "    run_study(study_of(sys.argv[1]), sys.argv[1], threads=1)\n"
         "except OutputError as error:\n"
