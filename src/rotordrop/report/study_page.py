@@ -18,7 +18,7 @@ from rotordrop.report.content import Cell, Figure, ReportContent, Section, State
 from rotordrop.report.quantity import display_unit
 from rotordrop.report.style import SERIES, axis_title, fit_legend, panels, plain
 from rotordrop.simulation.fingerprint import fingerprint
-from rotordrop.study.plan import CASE_KINDS
+from rotordrop.study.plan import case_kind
 from rotordrop.study.quantities import Quantity
 from rotordrop.study.sensitivity import Share, influences
 from rotordrop.study.summary import Known, StudyResults
@@ -144,8 +144,8 @@ def _text(known: Known, kind: str) -> str:
 
 
 def _kind(results: StudyResults, name: str) -> str:
-    if name in CASE_KINDS:
-        return CASE_KINDS[name]
+    if (kind := case_kind(results.study.machine, name)) is not None:
+        return kind
     first = results.study.machine.touchdown_bearings[0].name
     return kind_of_path(results.study.machine, name.replace("*", first, 1))
 

@@ -6,6 +6,7 @@ only save work: a shard computed twice has the same bits, so that a lost or stol
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import secrets
@@ -172,8 +173,10 @@ def publish(folder: StudyFolder, study: Study, shard: int, found: Shard) -> None
     target = folder.shard_path(shard)
     for left in folder.shards.glob(f".{target.stem}.*"):  # of a writer that was killed
         left.unlink(missing_ok=True)
+    content = io.BytesIO()  # numpy's own way into a file drops the error of a full disk, and what did not fit
+    np.lib.format.write_array(content, table, allow_pickle=False)
     with atomic_path(target) as temporary, temporary.open("wb") as file:
-        np.lib.format.write_array(file, table, allow_pickle=False)
+        file.write(content.getbuffer())
 
 
 def shard_type(study: Study) -> np.dtype[Any]:

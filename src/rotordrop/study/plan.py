@@ -38,6 +38,17 @@ CASE_KINDS: Mapping[str, str] = {
 }
 """What of a case may be varied beside the machine, with its kind; ``remanent_share`` counts in weights."""
 
+MAGNET_KINDS: Mapping[str, str] = {
+    "remanent_share": "dimensionless",
+    "remanent_share_x": "dimensionless",
+    "offset_x": "length",
+    "offset_y": "length",
+    "orbit": "length",
+    "orbit_phase": "angle",
+}
+"""What may be varied of the start at one magnet, after its name, ``"AMB1.offset_x"``: lift up and sideways in
+shares of the weight it carries, where it holds the rotor, radius and angle of a synchronous orbit there."""
+
 TURN = Distribution(shape="uniform", numbers=(0.0, 2.0 * math.pi))
 _KEYS = (
     "name", "machine", "drops", "seed", "duration", "output_step", "tolerance", "reduction", "start",
@@ -200,7 +211,7 @@ class Study:
         """Machine values by full path [SI]; a star stands for every touchdown bearing."""
         found: dict[str, float] = {}
         for path, value in values.items():
-            if path not in CASE_KINDS:
+            if case_kind(self.machine, path) is None:
                 found |= dict.fromkeys(_starred(self.machine, path), value)
         if self.joint is not None:
             for path in [path for path in self.joint.paths if path.endswith("friction.dynamic")]:
@@ -222,14 +233,21 @@ class Study:
             return DropCase(speed=speed, **settings)
         magnets = len(self.machine.ambs)
         weight = self.machine.rotor.mass * float(self.machine.gravity)
-        lift = np.zeros((magnets, 2))
-        lift[:, 1] = values.get("remanent_share", 0.0) * weight / max(magnets, 1)
-        offset = np.tile([values.get("offset_x", 0.0), values.get("offset_y", 0.0)], (magnets, 1))
+        share = weight / max(magnets, 1)
+
+        def each(name: str) -> Array:
+            """A value at every magnet: its own, else that of all."""
+            common = values.get(name, 0.0)
+            return np.array([values.get(f"{amb.name}.{name}", common) for amb in self.machine.ambs])
+
+        lift = share * np.column_stack([each("remanent_share_x"), each("remanent_share")])
+        orbit = each("orbit") * np.exp(1j * each("orbit_phase"))
         start = LevitatedStart(
             rotor_angle=values["rotor_angle"],
-            remanent_force=lift if "remanent_share" in values else None,
+            remanent_force=lift if np.any(lift) else None,
             remanence_time_constant=values.get("remanence_time", REMANENCE_TIME),
-            offset=offset,
+            offset=np.column_stack([each("offset_x"), each("offset_y")]),
+            orbit=orbit if np.any(orbit) else None,
         )
         return DropCase(speed=speed, start=start, **settings)
 
@@ -252,6 +270,14 @@ class Study:
         """SHA-256 of plan and machine: two studies with the same one give the same numbers."""
         plan = json.dumps(self.document(), sort_keys=True, allow_nan=False)
         return hashlib.sha256((plan + "\n" + machine_text(self.machine)).encode()).hexdigest()
+
+
+def case_kind(machine: Machine, name: str) -> str | None:
+    """Kind of a varied value of the case, such as ``"AMB1.offset_x"``; None for values of the machine."""
+    owner, _, part = name.rpartition(".")
+    if owner and any(amb.name == owner for amb in machine.ambs):
+        return MAGNET_KINDS.get(part)
+    return CASE_KINDS.get(name)
 
 
 def _starred(machine: Machine, path: str) -> list[str]:
@@ -282,7 +308,7 @@ def _check_vary(study: Study) -> None:
             'the drops start levitated, but the machine has no AMBs; describe them or write start = "centred"'
         )
     for name in study.vary:
-        if name in CASE_KINDS:
+        if case_kind(study.machine, name) is not None:
             if name != "speed" and not study.levitated:
                 raise UsageError(f'{name} is varied, which needs start = "levitated"')
             continue
@@ -387,10 +413,7 @@ def _quantity(key: str, raw: Any, kind: str) -> float:
 
 
 def _reader(machine: Machine, name: str) -> Any:
-    if name in CASE_KINDS:
-        kind = CASE_KINDS[name]
-    else:
-        kind = kind_of_path(machine, _starred(machine, name)[0])
+    kind = case_kind(machine, name) or kind_of_path(machine, _starred(machine, name)[0])
     return lambda raw: _quantity(name, raw, kind)
 
 

@@ -21,6 +21,8 @@ from rotordrop.errors import UsageError
 from rotordrop.estimated import NINETY
 from rotordrop.machine import Machine
 from rotordrop.model.parameter_table import parameter
+from rotordrop.model.unknowns import smallest_gap
+from rotordrop.simulation.case import REMANENCE_TIME
 from rotordrop.study.distributions import Distribution
 from rotordrop.study.plan import Study
 from rotordrop.study.summary import COVER, Known, StudyResults, quantile
@@ -36,8 +38,9 @@ COMPARED: Mapping[str, str] = {
 """Numbers of an estimate, and the column of a study below its bearing that is the same."""
 RAYLEIGH_MEDIAN, RAYLEIGH_SPREAD = math.sqrt(2.0 * math.log(2.0)), math.pi / math.sqrt(24.0)
 """Median and standard deviation of the logarithm of the length of two normal parts of unit spread [1]."""
-USUAL_REMANENCE = 2e-3
-"""Time constant of remanent lift where the machine file says nothing [s]."""
+OFF_CENTRE, LARGEST_ORBIT = 0.05, 0.05
+"""Standard deviation of where a magnet holds the rotor, and largest synchronous orbit there, over the
+smallest air gap [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,21 +88,25 @@ def repeat_study(
 ) -> Study:
     """Study of the drops that could have happened at a speed [rad/s].
 
-    What is calibrated varies by its joint distribution, the rotor angle over the whole turn, remanent lift,
-    its time and the unbalances as a filter takes them before it reads a record: no calibration keeps these.
+    What is calibrated varies by its joint distribution, the rotor angle over the whole turn, remanent lift of
+    each magnet, its time and the unbalances as a filter takes them before it reads a record: no calibration
+    keeps these. Each magnet holds the rotor beside its centre, on an orbit of its own.
     """
     if not machine.ambs:
         raise UsageError("a virtual repeat starts levitated, but the machine has no AMBs; describe them")
     joint = machine.calibration is not None and machine.calibration.joint is not None
     described = machine.remanence_time_constant
-    time = USUAL_REMANENCE if described is None else float(described)
+    time = REMANENCE_TIME if described is None else float(described)
     row = parameter("remanence.time_constant", "drop")
-    vary = {
-        "remanent_share": Distribution(
-            shape="normal", numbers=(0.0, parameter("remanent_force.y", "magnet").guess_sigma)
-        ),
-        "remanence_time": Distribution(shape="log_normal", numbers=(time, row.guess_sigma)),
-    }
+    vary = {"remanence_time": Distribution(shape="log_normal", numbers=(time, row.guess_sigma))}
+    lift = Distribution(shape="normal", numbers=(0.0, parameter("remanent_force.y", "magnet").guess_sigma))
+    gap = smallest_gap(machine)
+    for amb in machine.ambs:
+        vary |= {f"{amb.name}.{name}": lift for name in ("remanent_share", "remanent_share_x")}
+        beside = Distribution(shape="normal", numbers=(0.0, OFF_CENTRE * gap))
+        vary |= {f"{amb.name}.{name}": beside for name in ("offset_x", "offset_y")}
+        vary[f"{amb.name}.orbit"] = Distribution(shape="uniform", numbers=(0.0, LARGEST_ORBIT * gap))
+        vary[f"{amb.name}.orbit_phase"] = Distribution(shape="uniform", numbers=(0.0, 2.0 * math.pi))
     for k, unbalance in enumerate(machine.unbalances):
         median = RAYLEIGH_MEDIAN * max(float(unbalance.amount), 1e-9)
         vary[f"unbalance.{k}.amount"] = Distribution(shape="log_normal", numbers=(median, RAYLEIGH_SPREAD))

@@ -91,7 +91,17 @@ def test_chances_are_those_of_a_drop():
     study = repeat_study(MACHINE, 2.0 * math.pi * 100.0, duration=0.2)
     planes = {f"unbalance.{k}.{part}" for k in range(len(MACHINE.unbalances)) for part in ("amount", "phase")}
     assert planes
-    assert set(study.varied) == {"remanent_share", "remanence_time", "rotor_angle", *planes}
+    parts = ("remanent_share", "remanent_share_x", "offset_x", "offset_y", "orbit", "orbit_phase")
+    magnets = {f"{amb.name}.{part}" for amb in MACHINE.ambs for part in parts}
+    assert set(study.varied) == {"remanence_time", "rotor_angle", *planes, *magnets}
+    values = dict(zip(study.varied, study.values(0, 1)[0].tolist(), strict=True))
+    start = study.case(values).start
+    first = MACHINE.ambs[0].name
+    weight = MACHINE.rotor.mass * float(MACHINE.gravity) / len(MACHINE.ambs)
+    assert start.remanent_force[0, 1] == pytest.approx(values[f"{first}.remanent_share"] * weight)
+    assert start.offset[0, 0] == values[f"{first}.offset_x"]
+    assert abs(start.orbit[0]) == pytest.approx(values[f"{first}.orbit"])
+    assert study.machine_values(values).keys() == planes
     drawn = study.values(0, 4000)[:, list(study.varied).index("unbalance.0.amount")]
     described = float(MACHINE.unbalances[0].amount)
     assert np.median(drawn) == pytest.approx(
