@@ -95,7 +95,7 @@ def log(
         "trends": [{**asdict(one), "sentence": one.sentence()} for one in rising],
         "statement": book.STATEMENT,
     }
-    said = [one.sentence() for one in (*shares, *rising)]
+    said = [share.sentence() for share in shares] + [one.sentence() for one in rising]
     deliver(content, json_file, lambda out: _summary(out, found, said))
 
 

@@ -46,7 +46,7 @@ MAGNET_KINDS: Mapping[str, str] = {
     "orbit": "length",
     "orbit_phase": "angle",
 }
-"""What may be varied of the start at one magnet, after its name, ``"AMB1.offset_x"``: lift up and sideways in
+"""What may be varied of the start at one magnet, after its name, ``"DE.offset_x"``: lift up and sideways in
 shares of the weight it carries, where it holds the rotor, radius and angle of a synchronous orbit there."""
 
 TURN = Distribution(shape="uniform", numbers=(0.0, 2.0 * math.pi))
@@ -273,7 +273,7 @@ class Study:
 
 
 def case_kind(machine: Machine, name: str) -> str | None:
-    """Kind of a varied value of the case, such as ``"AMB1.offset_x"``; None for values of the machine."""
+    """Kind of a varied value of the case, such as ``"DE.offset_x"``; None for values of the machine."""
     owner, _, part = name.rpartition(".")
     if owner and any(amb.name == owner for amb in machine.ambs):
         return MAGNET_KINDS.get(part)

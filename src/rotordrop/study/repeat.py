@@ -20,9 +20,9 @@ from scipy.stats import beta
 from rotordrop.errors import UsageError
 from rotordrop.estimated import NINETY
 from rotordrop.machine import Machine
+from rotordrop.machine.amb import REMANENCE_TIME
 from rotordrop.model.parameter_table import parameter
 from rotordrop.model.unknowns import smallest_gap
-from rotordrop.simulation.case import REMANENCE_TIME
 from rotordrop.study.distributions import Distribution
 from rotordrop.study.plan import Study
 from rotordrop.study.summary import COVER, Known, StudyResults, quantile
