@@ -57,14 +57,13 @@ def waterfall(
     points: Annotated[int, typer.Option(min=16, help="Samples per frame; the paper's by default.")] = 32768,
     overlap: Annotated[float, typer.Option(min=0.0, max=0.95, help="Share used again.")] = 0.5,
     highest: Annotated[
-        float,
+        float | None,
         typer.Option(
             parser=quantity("frequency"),
             metavar="FREQUENCY",
-            help="Highest frequency drawn.",
-            show_default="600 Hz",
+            help="Highest frequency drawn; as far as anything happens when left out.",
         ),
-    ] = 600.0,
+    ] = None,
     profile: Annotated[Path | None, typer.Option(metavar="FILE", help="Channel map of the recorder.")] = None,
     output: Annotated[
         Path | None,
@@ -100,7 +99,7 @@ def waterfall(
     choice = WaterfallChoice(
         components=tuple(direction.value for direction in component or tuple(Direction)),
         amplitude_kind=amplitude.value,
-        highest_frequency=highest,
+        highest_frequency=highest or WaterfallChoice().highest_frequency,
         settings=WaterfallSettings(points=points, overlap=overlap),
     )
     candidates = machine_candidates(
@@ -118,6 +117,7 @@ def waterfall(
         ),
         simulated=simulated,
         against=against.value,
+        highest=highest,
     )
     if output is not None:
         write_findings(found, output)

@@ -145,13 +145,21 @@ def _verdict(
     return tuple(statements)
 
 
+def _judged(factor: float, apart: float, needed: float) -> tuple[str, str]:
+    """Margin required and verdict; a peak whose half power is not reached has no factor to ask one by."""
+    if math.isnan(factor):
+        return "–", "factor not known"
+    if factor < LEAST_FACTOR:
+        return "none", "critically damped"
+    return f"{100.0 * needed:.1f} %", "met" if apart >= needed else "not met"
+
+
 def peak_table(found: Sequence[tuple[str, int, tuple[ResponsePeak, ...]]], nominal: float) -> Table:
     """Peaks of every plane with amplification factor and margin from the nominal speed."""
     rows = []
     for name, node, peaks in found:
         for peak in peaks:
             apart, needed = _margin(peak, nominal)
-            damped = peak.factor < LEAST_FACTOR
             rows.append(
                 (
                     f"{name}, node {node}",
@@ -159,8 +167,7 @@ def peak_table(found: Sequence[tuple[str, int, tuple[ResponsePeak, ...]]], nomin
                     Quantity(value=peak.amplitude, kind="length", digits=3),
                     "–" if math.isnan(peak.factor) else f"{peak.factor:.2f}",
                     f"{100.0 * apart:.1f} %",
-                    "none" if damped else f"{100.0 * needed:.1f} %",
-                    "critically damped" if damped else "met" if apart >= needed else "not met",
+                    *_judged(peak.factor, apart, needed),
                 )
             )
     return Table(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import plotly.graph_objects as go
@@ -14,6 +16,9 @@ from rotordrop.report.style import INK, MICRO, SERIES, axis_title, fit_legend, p
 from rotordrop.spectrum.lines import Line
 from rotordrop.spectrum.orders import OrderTrack
 from rotordrop.spectrum.waterfall import Waterfall
+
+if TYPE_CHECKING:
+    from rotordrop.spectrum.coast_down import CoastDownAnalysis
 
 Array = NDArray[np.float64]
 
@@ -29,8 +34,28 @@ TITLE_SHIFT = 40
 """Room above a waterfall [px] for the frequencies of the lines, below its title."""
 
 
+DRAWN_ORDERS = (0.5, 1.0, 2.0, 3.0)
+"""Multiples of the speed whose course is drawn over a waterfall [1]."""
+BEYOND = 1.2
+"""How far a waterfall is drawn beyond the last thing in it [1]."""
+
+
+def highest_shown(analysis: CoastDownAnalysis) -> float:
+    """Highest frequency worth drawing [Hz]: a little beyond the lines found, and beyond twice the speed."""
+    falls = [fall for plane in analysis.planes.values() for fall in plane.waterfalls]
+    reached = [float(np.max(line.path.frequency)) for line in analysis.lines]
+    reached += [2.0 * float(np.max(fall.speed)) / TURN for fall in falls if fall.speed is not None]
+    most = max((float(fall.frequency[-1]) for fall in falls), default=math.inf)
+    return min(BEYOND * max(reached, default=most), most)
+
+
 def waterfall_figure(
-    fall: Waterfall, plane: str, lines: Sequence[Line] = (), *, against: str = "time"
+    fall: Waterfall,
+    plane: str,
+    lines: Sequence[Line] = (),
+    *,
+    against: str = "time",
+    highest: float | None = None,
 ) -> go.Figure:
     """Draw a waterfall as a map: frequency to the right, time or speed upwards, amplitude as colour.
 
@@ -44,6 +69,8 @@ def waterfall_figure(
         Named steady lines to be marked above the map.
     against : {"time", "speed"}
         What goes upwards.
+    highest : float, optional
+        Highest frequency drawn [Hz].
 
     Returns
     -------
@@ -52,6 +79,9 @@ def waterfall_figure(
     """
     if against == "speed" and fall.speed is None:
         raise UsageError("a waterfall against speed needs the rotor speed; this signal has none")
+    if highest is not None:
+        kept = np.abs(fall.frequency) <= highest
+        fall = replace(fall, frequency=fall.frequency[kept], amplitude=fall.amplitude[:, kept])
     figure = panels((f"{plane}: {COMPONENT_TITLES[fall.component]}",), height=380)
     frequency, amplitude = _thinned(fall)
     order = np.arange(len(fall.time))
@@ -76,6 +106,7 @@ def waterfall_figure(
         )
     )
     _mark_lines(figure, fall, lines)
+    _mark_orders(figure, fall, level, order)
     sense = ", negative: backward" if fall.component == "full" else ""
     figure.update_xaxes(title_text=axis_title("frequency", "Hz") + sense)
     figure.update_yaxes(title_text=title)
@@ -139,6 +170,37 @@ def _colour_bar(shown: Array, kind: str) -> dict[str, object]:
         "ticktext": [f"{10.0**tick:g}" for tick in ticks],
         "thickness": 14,
     }
+
+
+def _mark_orders(figure: go.Figure, fall: Waterfall, level: Array, rows: NDArray[np.intp]) -> None:
+    """Draw where the multiples of the speed are, and name them where they begin."""
+    if fall.speed is None:
+        return
+    turning = fall.speed[rows] / TURN
+    for k in [*(-k for k in DRAWN_ORDERS if fall.component == "full"), *DRAWN_ORDERS]:
+        inside = (k * turning >= fall.frequency[0]) & (k * turning <= fall.frequency[-1])
+        if not inside.any():
+            continue
+        figure.add_trace(
+            go.Scatter(
+                x=single(k * turning[inside]),
+                y=single(level[inside]),
+                mode="lines",
+                line={"color": "#ffffff", "width": 1.0, "dash": "dash"},
+                showlegend=False,
+                hoverinfo="skip",
+            )
+        )
+        first = int(np.flatnonzero(inside)[np.argmax(turning[inside])])
+        figure.add_annotation(
+            x=float(k * turning[first]),
+            y=float(level[first]),
+            text=plain(f"{k:g}X".replace("-", "\N{MINUS SIGN}")),
+            showarrow=False,
+            xanchor="left",
+            yanchor="bottom",
+            font={"size": 11, "color": "#ffffff"},
+        )
 
 
 def _mark_lines(figure: go.Figure, fall: Waterfall, lines: Sequence[Line]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +11,7 @@ from rotordrop._version import __version__
 from rotordrop.report.coast_down_figures import displacement_history_figure, speed_law_figure
 from rotordrop.report.content import Card, Figure, KeyFigure, ReportContent, Section, Statement, Table
 from rotordrop.report.quantity import Quantity, with_error, written
-from rotordrop.report.waterfall_figure import order_figure, waterfall_figure
+from rotordrop.report.waterfall_figure import highest_shown, order_figure, waterfall_figure
 from rotordrop.spectrum.coast_down import RACES_SPUN_UP, SENSOR_NOISE, SHORTEST_LAW
 from rotordrop.spectrum.indentation import held_maximum
 
@@ -42,6 +43,7 @@ def waterfall_page(
     facts: tuple[tuple[str, str], ...] = (),
     simulated: str = "",
     against: str = "time",
+    highest: float | None = None,
 ) -> ReportContent:
     """Build the report on the frequencies of a coast-down.
 
@@ -57,6 +59,8 @@ def waterfall_page(
         Sentence that says the record is simulated; empty for a measured one.
     against : {"time", "speed"}
         What goes upwards in the waterfalls.
+    highest : float, optional
+        Highest frequency drawn [Hz]; as far as anything happens by default.
     """
     return ReportContent(
         title=title,
@@ -64,16 +68,18 @@ def waterfall_page(
         verdict=_verdict(analysis),
         cards=tuple(_card(name, plane) for name, plane in analysis.planes.items()),
         facts=(*facts, ("rotordrop", __version__)),
-        summary=(line_table(analysis),),
-        sections=frequency_sections(analysis, against),
+        summary=(line_table(analysis),),  # for the terminal; on the page it stands with the lines
+        sections=frequency_sections(analysis, against, highest),
     )
 
 
-def frequency_sections(analysis: CoastDownAnalysis, against: str = "time") -> tuple[Section, ...]:
+def frequency_sections(
+    analysis: CoastDownAnalysis, against: str = "time", highest: float | None = None
+) -> tuple[Section, ...]:
     """Displacement, waterfalls, lines, orders with the resonances they pass, and the speed law."""
     sections = [
         _displacement_section(analysis),
-        _waterfall_section(analysis, against),
+        _waterfall_section(analysis, against, highest),
         _line_section(analysis),
     ]
     if any(plane.track is not None for plane in analysis.planes.values()):
@@ -154,7 +160,7 @@ def line_table(analysis: CoastDownAnalysis) -> Table:
         rows.append(
             (
                 line.label,
-                _where(line),
+                where_of(line),
                 Quantity(value=line.amplitude, kind="length", digits=3),
                 f"{line.ratio:.0f}",
                 "below resolution" if line.width == 0.0 else f"{line.width:.2f} Hz",
@@ -173,9 +179,12 @@ def line_table(analysis: CoastDownAnalysis) -> Table:
     )
 
 
-def _where(line: Line) -> str:
+def where_of(line: Line) -> str:
     """Order or frequency of a line with its error."""
-    if line.order is None:
+    matches = line.name.matches
+    # Where the speed changed too little to tell, the name says which of the two it is.
+    an_order = line.kind == "order" or bool(matches and matches[0].candidate.kind == "order")
+    if line.order is None or not an_order:
         return with_error(line.frequency, line.frequency_error, "Hz").replace(" ", NO_BREAK)
     return with_error(line.order, line.order_error, "X").replace(" ", NO_BREAK)
 
@@ -191,14 +200,15 @@ def _displacement_section(analysis: CoastDownAnalysis) -> Section:
     return Section(heading="Displacement over the coast-down", figures=(figure,))
 
 
-def _waterfall_section(analysis: CoastDownAnalysis, against: str) -> Section:
+def _waterfall_section(analysis: CoastDownAnalysis, against: str, highest: float | None) -> Section:
     figures = []
+    shown = highest_shown(analysis) if highest is None else highest
     for name, plane in analysis.planes.items():
         for fall in plane.waterfalls:
             lines = [line for line in analysis.lines if name in line.forward and line.named]
             figures.append(
                 Figure(
-                    chart=waterfall_figure(fall, name, lines, against=against),
+                    chart=waterfall_figure(fall, name, lines, against=against, highest=shown),
                     caption=f"{name}, {_COMPONENTS[fall.component]}: amplitude {fall.amplitude_kind} of "
                     f"frames of {fall.settings.points} points, Hann window, "
                     f"{100 * fall.settings.overlap:.0f} % overlap, lines "
@@ -213,12 +223,10 @@ def _waterfall_section(analysis: CoastDownAnalysis, against: str) -> Section:
 
 
 def _line_section(analysis: CoastDownAnalysis) -> Section:
-    reasons = Table(
-        columns=("line", "reason for its name"),
-        rows=tuple((line.label, line.reason) for line in analysis.lines),
-        caption="Why the lines are called so",
-    )
-    return Section(heading="Lines", tables=(line_table(analysis), reasons))
+    table = line_table(analysis)
+    rows = tuple((*row, line.reason) for row, line in zip(table.rows, analysis.lines, strict=True))
+    columns = (*table.columns, "reason for its name")
+    return Section(heading="Lines", tables=(replace(table, columns=columns, rows=rows),))
 
 
 def _order_section(analysis: CoastDownAnalysis) -> Section:

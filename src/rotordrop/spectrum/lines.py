@@ -208,7 +208,7 @@ def _named(
     swings = [
         (name.label, line)
         for (_, line), name in zip(single, first, strict=True)
-        if name.named and name.kind == "steady" and _swings(name)
+        if name.named and name.kind in ("steady", "undecided") and _swings(name)
     ]
     lines = [named(plane, line, (*candidates, *_harmonics(line, swings))) for plane, line in single]
     label = {

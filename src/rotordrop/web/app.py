@@ -45,6 +45,7 @@ ASSETS = {
     "tables.js": "text/javascript",
     "figures.js": "text/javascript",
     "units.js": "text/javascript",
+    "waterfall.js": "text/javascript",
     "page.css": "text/css",
     "uplot.js": "text/javascript",
     "uplot.css": "text/css",
@@ -151,8 +152,11 @@ def _told(job: Job) -> dict[str, Any]:
 
 
 async def _jobs(desk: Desk, request: Request) -> Response:
-    return JSONResponse({"jobs": [_told(job) for job in desk.space.jobs()], "used": desk.space.used(),
-                         "quota": desk.space.quota})  # fmt: skip
+    told = []
+    for job in desk.space.jobs():
+        with contextlib.suppress(FileNotFoundError):  # one that is removed meanwhile hides no other
+            told.append(_told(job))
+    return JSONResponse({"jobs": told, "used": desk.space.used(), "quota": desk.space.quota})
 
 
 async def _new_job(desk: Desk, request: Request) -> Response:
@@ -178,6 +182,7 @@ async def _upload(desk: Desk, request: Request) -> Response:
     length = int(declared) if declared.isascii() and declared.isdigit() else None
     name = request.query_params.get("name", "")
     entry = await receive(desk.space, job, cast("Role", role), name, length, request.stream())
+    await asyncio.to_thread(desk.runner.forget, job)
     return JSONResponse(entry, status_code=201)
 
 
@@ -202,6 +207,23 @@ async def _found_page(desk: Desk, request: Request) -> Response:
 
 async def _found_document(desk: Desk, request: Request) -> Response:
     return FileResponse(desk.found(request) / "document.json", media_type="application/json")
+
+
+async def _field(desk: Desk, request: Request) -> Response:
+    """Amplitudes of one waterfall [m], frame after frame, in single precision."""
+    from rotordrop.web.drawn import field_name
+
+    told = _page_of(desk.found(request))
+    if "parts" not in told:
+        raise NotThereError("this result has no waterfall")
+    plane, part = _number(request, "plane", 0), request.query_params.get("part", told["parts"][0])
+    if plane not in range(len(told["planes"])) or part not in told["parts"]:
+        raise UsageError(
+            f"there is no waterfall of plane {plane:g}, part {labelled(part)!r}; there are planes 0 to "
+            f"{len(told['planes']) - 1} and parts {', '.join(told['parts'])}"
+        )
+    place = desk.found(request) / field_name(int(plane), part)
+    return FileResponse(place, media_type="application/octet-stream")
 
 
 async def _window(desk: Desk, request: Request) -> Response:
@@ -236,12 +258,18 @@ def _asked_window(folder: Path, request: Request) -> tuple[Traces, list[int], fl
     return traces, rows, start, end
 
 
-@lru_cache(maxsize=64)
 def _traces_of(folder: Path) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads((folder / "page.json").read_text(encoding="utf-8"))
+    found = _page_of(folder)
     if "traces" not in found:
         raise NotThereError("this result has no histories")
     return dict(found["traces"])
+
+
+@lru_cache(maxsize=64)
+def _page_of(folder: Path) -> dict[str, Any]:
+    """What the routes need of the content of a page."""
+    found: dict[str, Any] = json.loads((folder / "page.json").read_text(encoding="utf-8"))
+    return {key: found[key] for key in ("traces", "planes", "parts") if key in found}
 
 
 def _number(request: Request, name: str, usual: float) -> float:
@@ -352,6 +380,7 @@ OPERATIONS = (
     Operation("GET", f"{_RESULT}/page", _found_page),
     Operation("GET", f"{_RESULT}/document", _found_document),
     Operation("GET", f"{_RESULT}/window", _window, WINDOW),
+    Operation("GET", f"{_RESULT}/field", _field, ("plane", "part")),
     Operation("GET", f"{_RESULT}/csv", _csv, WINDOW[:3]),
     Operation("POST", f"{_RESULT}/report", _ticket),
 )

@@ -58,7 +58,8 @@ def main(order: dict[str, Any]) -> None:
 
 def _without_folder(message: str, job: Job) -> str:
     """A message that names files as the user does, not where the page keeps them."""
-    for entry in job.read()["files"].values():
+    files = sorted(job.read()["files"].values(), key=lambda entry: -len(entry["stored"]))
+    for entry in files:  # the longest first: record.csv is part of record.csv.gz
         message = message.replace(str(job.path / "files" / entry["stored"]), entry["name"])
     return message.replace(str(job.path), "")
 
@@ -193,7 +194,7 @@ def _waterfall(job: Job, made: Path, told: dict[str, Any]) -> None:
     candidates = machine_candidates(with_found_air_gaps(machine, signal), planes)
     found = analyse_coast_down(signal, candidates, progress=progress)
     progress("drawing", 1.0)
-    write_waterfall(found, machine, record, made)
+    write_waterfall(found, machine, record, job, made)
 
 
 _WORK = {"look": _look, "estimate": _estimate, "waterfall": _waterfall}

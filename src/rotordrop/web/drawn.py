@@ -19,7 +19,7 @@ from rotordrop.atomic_file import write_json
 from rotordrop.report.content import Card, Cell, ReportContent, Statement, Table
 from rotordrop.report.origin import Origin, UsedFile, command_line, now
 from rotordrop.report.quantity import Quantity, System, display_unit
-from rotordrop.web.python_lines import estimate_lines, look_lines
+from rotordrop.web.python_lines import estimate_lines, look_lines, waterfall_lines
 from rotordrop.web.traces import write_traces
 from rotordrop.web.workspace import Job
 
@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 SYSTEMS: tuple[System, ...] = ("SI", "US")
+MOST_PLACES = 200
+"""Places of a line that are drawn [1]."""
 SHOWN_KINDS = ("length", "force", "pressure", "speed", "velocity")
 
 
@@ -115,8 +117,13 @@ def write_estimate(estimate: Estimate, job: Job, made: Path, options: Mapping[st
     )
 
 
-def write_waterfall(found: CoastDownAnalysis, machine: Machine, record: Record, made: Path) -> None:
-    """Write the frequencies of a coast-down: their document and the report that shows them."""
+def field_name(plane: int, part: str) -> str:
+    """File of the amplitudes of one waterfall."""
+    return f"field {plane} {part}.f4"
+
+
+def write_waterfall(found: CoastDownAnalysis, machine: Machine, record: Record, job: Job, made: Path) -> None:
+    """Write the frequencies of a coast-down: waterfalls and lines, their document, and their report."""
     from rotordrop.measurement.simulated import is_simulated
     from rotordrop.report.content import SIMULATED_RECORD
     from rotordrop.report.page import write_page
@@ -135,7 +142,55 @@ def write_waterfall(found: CoastDownAnalysis, machine: Machine, record: Record, 
     )
     write_page(content, made / "report.html")
     write_json(made / "document.json", found.as_json())
-    write_json(made / "page.json", content_json(content))
+    write_json(made / "page.json", {**content_json(content), **_falls(found, job, made)})
+
+
+def _falls(found: CoastDownAnalysis, job: Job, made: Path) -> dict[str, Any]:
+    """Write the amplitudes of every waterfall, and tell what the page draws over them."""
+    from rotordrop.report.waterfall_figure import DRAWN_ORDERS, highest_shown
+    from rotordrop.report.waterfall_page import where_of
+
+    planes = list(found.planes)
+    falls = found.planes[planes[0]].waterfalls
+    if not falls:
+        return {"planes": planes, "parts": []}
+    for number, plane in enumerate(found.planes.values()):
+        for fall in plane.waterfalls:
+            (made / field_name(number, fall.component)).write_bytes(fall.amplitude.astype("<f4").tobytes())
+    parts = sorted((fall.component for fall in falls), key=("full", "y", "x").index)
+    speed = falls[0].speed
+    return {
+        "version": __version__,
+        "units": _units(),
+        "planes": planes,
+        "parts": parts,
+        "time": falls[0].time.tolist(),
+        "frequency": {fall.component: fall.frequency.tolist() for fall in falls},
+        "speed": None if speed is None else (speed / (2.0 * math.pi)).tolist(),
+        "orders": list(DRAWN_ORDERS),
+        "highest": highest_shown(found),
+        "amplitude_kind": falls[0].amplitude_kind,
+        "lines": [
+            {
+                "label": line.label,
+                "named": line.named,
+                "kind": line.kind,
+                "where": where_of(line),
+                "frequency": line.frequency,
+                "amplitude": quantity_json(Quantity(value=line.amplitude, kind="length", digits=3)),
+                "confidence": quantity_json(Quantity(value=line.confidence, kind="probability")),
+                "reason": line.reason,
+                "planes": list(line.forward),
+                "seen": f"{line.first_seen:.0f} to {line.last_seen:.0f} s",
+                "path": {
+                    "time": line.path.time[:: max(len(line.path.time) // MOST_PLACES, 1)].tolist(),
+                    "frequency": line.path.frequency[:: max(len(line.path.time) // MOST_PLACES, 1)].tolist(),
+                },
+            }
+            for line in found.lines
+        ],
+        "python": waterfall_lines(job.read()["files"], planes, parts),
+    }
 
 
 def _origin(job: Job, options: Mapping[str, Any]) -> Origin:
@@ -162,8 +217,12 @@ def _common(name: str, columns: tuple[str, ...], time: Array) -> dict[str, Any]:
     return {
         "version": __version__,
         "traces": {"name": name, "columns": list(columns), "start": float(time[0]), "end": float(time[-1])},
-        "units": {kind: {system: display_unit(kind, system) for system in SYSTEMS} for kind in SHOWN_KINDS},
+        "units": _units(),
     }
+
+
+def _units() -> dict[str, Any]:
+    return {kind: {system: display_unit(kind, system) for system in SYSTEMS} for kind in SHOWN_KINDS}
 
 
 def _histories(estimate: Estimate) -> tuple[list[dict[str, Any]], Array, dict[str, Array]]:

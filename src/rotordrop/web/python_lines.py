@@ -59,3 +59,33 @@ def estimate_lines(files: Files, options: Mapping[str, Any], bearings: Sequence[
         motion = f"motions = estimate.bearing({name!r}).motions  # each .time [s] and .displacement [m]"
         last |= {f"motion {number}": motion, f"orbit {number}": motion}
     return {figure: "\n".join([*lines, line, ""]) for figure, line in last.items()}
+
+
+def waterfall_lines(files: Files, planes: Sequence[str], parts: Sequence[str]) -> dict[str, str]:
+    """Lines for every waterfall of a coast-down."""
+    head = [
+        "from rotordrop import load_machine, read_record",
+        "from rotordrop.estimation.recorded_coast_down import recorded_coast_down, with_found_air_gaps",
+        "from rotordrop.spectrum.coast_down import analyse_coast_down",
+        "from rotordrop.spectrum.machine_candidates import machine_candidates",
+        "",
+        f"machine = load_machine({files['machine']['name']!r})",
+        f"record = read_record({files['record']['name']!r}, machine)",
+        "signal = recorded_coast_down(machine, record)",
+        "planes = {name: name for name in signal.planes}",
+        "candidates = machine_candidates(with_found_air_gaps(machine, signal), planes)",
+        "found = analyse_coast_down(signal, candidates)",
+        "lines = [(line.label, line.frequency, line.amplitude) for line in found.lines]  # [Hz], [m]",
+    ]
+    return {
+        f"{number} {part}": "\n".join(
+            [
+                *head,
+                f"fall = next(f for f in found.planes[{name!r}].waterfalls if f.component == {part!r})",
+                "time, frequency, amplitude = fall.time, fall.frequency, fall.amplitude  # [s], [Hz], [m]",
+                "",
+            ]
+        )
+        for number, name in enumerate(planes)
+        for part in parts
+    }

@@ -179,6 +179,16 @@ class Runner:
             time.sleep(0.02)
         return True
 
+    def forget(self, job: Job) -> None:
+        """Stop what a job computes and drop what it found: it was of other files."""
+        with self._one:
+            for verb in VERBS:
+                self._cancel(job, verb)
+                self._open.pop((job.number, verb), None)
+                (job.path / f"{verb}.result.json").unlink(missing_ok=True)
+                state_file(job, verb).unlink(missing_ok=True)
+                clear(job, verb)
+
     def remove(self, job: Job) -> None:
         """Stop what a job computes and remove it."""
         with self._one:

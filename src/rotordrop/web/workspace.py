@@ -119,8 +119,12 @@ class Workspace:
 
     def jobs(self) -> list[Job]:
         """All jobs, the newest first."""
-        found = [job for name in os.listdir(self.jobs_folder) if (job := self.job(name))]  # noqa: PTH208
-        return sorted(found, key=lambda job: -float(job.read()["created"]))
+        found = []
+        for name in os.listdir(self.jobs_folder):  # noqa: PTH208
+            with suppress(FileNotFoundError):  # removed meanwhile
+                if (job := self.job(name)) is not None:
+                    found.append((-float(job.read()["created"]), job.number, job))
+        return [job for _, _, job in sorted(found, key=lambda entry: entry[:2])]
 
     def used(self) -> int:
         """Bytes in the folder."""
@@ -190,6 +194,8 @@ async def receive(
         When the name cannot be one.
     """
     label, stored = labelled(name), stored_as(role, name)
+    key = role if role != "beside" else f"beside {stored}"
+    _refuse_clash(job, key, label, stored)
     limit = min(LARGEST[role], space.quota - space.used())
     if role == "beside" and len(beside(job)) >= MOST_BESIDE:
         raise UsageError(f"a job takes {MOST_BESIDE} files beside machine and record")
@@ -205,11 +211,28 @@ async def receive(
             stream.write(part)
         if counted == 0:
             raise UsageError(f"{label} is empty")
+        # From here to the new name nothing else runs: of uploads side by side only those that fit get in.
+        _refuse_clash(job, key, label, stored)
+        stream.flush()
+        if space.used() > space.quota:
+            raise _too_large(label, 0)
     told = job.read()
     entry = {"name": label, "stored": stored, "bytes": counted, "sha256": digest.hexdigest()}
-    told["files"][role if role != "beside" else f"beside {stored}"] = entry
+    before = told["files"].get(key)
+    told["files"][key] = entry
     job.write(told)
+    if before is not None and before["stored"] != stored:
+        (job.path / "files" / before["stored"]).unlink(missing_ok=True)
     return entry
+
+
+def _refuse_clash(job: Job, key: str, label: str, stored: str) -> None:
+    """Two files of a job that would lie under one name, whatever the case of its letters."""
+    for other, entry in job.read()["files"].items():
+        if other != key and entry["stored"].lower() == stored.lower():
+            raise UsageError(
+                f"{label} would lie where {entry['name']} lies; send it to a job of its own, or as what it is"
+            )
 
 
 def _too_large(label: str, limit: int) -> TooLargeError:

@@ -17,6 +17,7 @@ from rotordrop.model.separation import (
     separations,
 )
 from rotordrop.model.unbalanced import machine_response, orbit_axis, resolved_response
+from rotordrop.report.unbalance_page import _judged
 
 
 @pytest.mark.parametrize(
@@ -127,3 +128,9 @@ def test_a_sharp_peak_has_the_height_and_width_of_a_grid_thirty_times_finer():
     assert peak.factor == pytest.approx(known.factor, rel=1e-2)
     speeds = [one.speed for one in response_peaks(found.speed, found.major_axis(node))]
     assert np.min(np.diff(speeds)) > 2.0 * np.pi
+
+
+def test_a_peak_without_a_factor_is_not_called_met():
+    assert _judged(math.nan, 0.01, 0.0) == ("–", "factor not known")
+    assert _judged(2.0, 0.01, 0.0) == ("none", "critically damped")
+    assert _judged(10.0, 0.10, 0.15) == ("15.0 %", "not met")

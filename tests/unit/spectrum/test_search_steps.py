@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,12 +16,17 @@ from rotordrop.spectrum import coast_down, lines
 from rotordrop.spectrum._clock import View
 from rotordrop.spectrum._found_line import FoundLine
 from rotordrop.spectrum._search import BRIEF, LineSearch
-from rotordrop.spectrum.candidates import bearing_defect_candidates, mode_candidate, order_candidates
+from rotordrop.spectrum.candidates import (
+    bearing_defect_candidates,
+    mode_candidate,
+    order_candidates,
+    pendulum_candidate,
+)
 from rotordrop.spectrum.coast_down_law import _inflation
 from rotordrop.spectrum.detection import DetectionSettings, _half_power_width, clearest_peak
 from rotordrop.spectrum.line_settings import LineSettings
 from rotordrop.spectrum.line_spectra import FramePower
-from rotordrop.spectrum.lines import SWING_ERROR, _harmonics, find_lines
+from rotordrop.spectrum.lines import SWING_ERROR, _harmonics, _named, find_lines
 from rotordrop.spectrum.naming import LineEvidence, _density
 from rotordrop.spectrum.waterfall import WaterfallSettings, waterfall
 
@@ -279,3 +285,22 @@ def test_the_average_over_frames_is_that_of_the_power() -> None:
     found = waterfall(xy, rate, component="x", settings=WaterfallSettings(points=points, overlap=0.0))
     assert found.amplitude.shape[0] == 8
     assert found.average()[50] == pytest.approx(math.sqrt(0.5 * (9.0 + 16.0)) * 1e-6, rel=1e-9)
+
+
+def test_twice_a_swing_is_its_harmonic_in_a_record_too_short_to_decide() -> None:
+    """In two seconds the speed hardly falls: no line is known to stand still, yet 57.4 Hz is 2 × 28.7 Hz."""
+    time = np.arange(0.0, 2.0, 1e-3)
+    swing, twice = (
+        replace(
+            taken("undecided", frequency, 1e3, time),
+            order=frequency / 60.0,
+            order_error=0.003,
+            forward=np.array([5e-5]),
+            backward=np.array([5e-5]),
+            power=np.ones(len(time), dtype=np.float32),
+        )
+        for frequency in (28.7, 57.4)
+    )
+    known = (pendulum_candidate("pendulum", 28.3, 29.8),)
+    names = [line.label for line in _named([("DE", swing), ("DE", twice)], known, 285e-6, (450.0, 20.0))]
+    assert names == ["pendulum", "pendulum, harmonic 2"]

@@ -275,3 +275,40 @@ def _fall() -> list[float]:
             height, speed = -250.0, -0.4 * speed if n < 1500 else 0.0
         path.append(height + 0.3 * (-1) ** n)
     return path
+
+
+@pytest.mark.slow
+def test_the_waterfall_by_keys_shows_lines_with_their_reason(browser, tmp_path, files):
+    with serving(tmp_path / "served") as server:
+        browser.open(server.address)
+        send(browser, list(files.values()))
+        browser.until(LOOKED)
+        browser.key("w")
+        browser.until("!document.getElementById('fall').hidden", 400)
+        browser.until("document.querySelectorAll('#falllines tr').length > 3")
+        assert browser.evaluate("document.activeElement.id") == "fallmap"
+        browser.key("ArrowRight")
+        browser.until("document.getElementById('fallclock').innerText.includes('Hz')")
+        first = words(browser, "#fallclock")
+        browser.key("ArrowUp")
+        browser.until(f"document.getElementById('fallclock').innerText !== {json.dumps(first)}")
+        for _ in range(20):
+            browser.key("Tab")
+            if browser.evaluate("document.activeElement.closest('#falllines tr') !== null"):
+                break
+        browser.key("Enter")
+        browser.until("document.querySelector('#falllines .reason')")
+        assert "expected" in words(browser, "#falllines .reason")
+        assert browser.evaluate("document.querySelector('#falllines [aria-pressed=true]') !== null")
+        before = words(browser, "#falllines")
+        browser.key("u")
+        browser.until(f"document.getElementById('falllines').innerText !== {json.dumps(before)}")
+        browser.key("u")
+        browser.evaluate("[...document.querySelectorAll('#fallfiles button')].at(-1).click()")
+        browser.until("document.getElementById('lines').open")
+        assert "analyse_coast_down" in words(browser, "#code")
+        browser.key("Escape")
+        browser.until("!document.getElementById('lines').open")
+        browser.key("Escape")
+        browser.until("document.getElementById('fall').hidden && !document.getElementById('main').hidden")
+        quiet(browser)

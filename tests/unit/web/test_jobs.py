@@ -19,7 +19,7 @@ from rotordrop import load_machine, look
 from rotordrop.cli.app import run
 from rotordrop.web import running
 from rotordrop.web.running import Runner, published_run, result_folder, state_of
-from rotordrop.web.workspace import Workspace
+from rotordrop.web.workspace import Job, Workspace
 
 posix = pytest.mark.skipif(os.name != "posix", reason="locks are inherited on POSIX systems only")
 
@@ -80,6 +80,28 @@ def test_a_waterfall_has_its_report_and_document_and_no_histories(served, files)
     assert "Frequencies of a coast-down of LP-400" in report.text
     window = served.ask("GET", f"/api/jobs/{job}/waterfall/window?column=x0")
     assert (window.status, window.text) == (404, "this result has no histories")
+    page = served.ask("GET", f"/api/jobs/{job}/waterfall/page").told
+    assert page["parts"] == ["full", "y", "x"] and page["highest"] < 200.0
+    assert [line["label"] for line in page["lines"]] == [line["label"] for line in document["lines"]]
+    for number, name in enumerate(page["planes"]):
+        for fall in document["planes"][name]["waterfalls"]:
+            part = fall["component"]
+            sent = served.ask("GET", f"/api/jobs/{job}/waterfall/field?plane={number}&part={part}").body
+            field = np.frombuffer(sent, "<f4").reshape(fall["frames"], -1)
+            rms = np.sqrt(np.mean(field.astype(float) ** 2, axis=0))
+            assert rms == pytest.approx(np.array(fall["rms_over_frames_m"]), rel=1e-5)
+            assert f"found.planes[{name!r}]" in page["python"][f"{number} {part}"]
+    for asked in (
+        "plane=2&part=x",
+        "plane=-1&part=x",
+        "plane=0.5&part=x",
+        "plane=0&part=../page",
+        "plane=nan",
+    ):
+        refused = served.ask("GET", f"/api/jobs/{job}/waterfall/field?{asked}")
+        assert refused.status == 400, asked
+    none = served.ask("GET", f"/api/jobs/{job}/look/field?plane=0&part=x")
+    assert none.status == 404
 
 
 @pytest.mark.parametrize("verb", ["estimate", "waterfall"])
@@ -186,7 +208,7 @@ _KILLED_SERVER = """
 import sys, time
 from pathlib import Path
 from rotordrop.web.running import Runner
-from rotordrop.web.workspace import Workspace
+from rotordrop.web.workspace import Job, Workspace
 space = Workspace(Path(sys.argv[1])); space.prepare()
 runner = Runner(space); runner.take_over()
 for job in space.jobs():
@@ -289,3 +311,37 @@ def test_a_damaged_token_is_replaced(tmp_path):
     made = space.token()
     assert len(made) == 43
     assert space.token() == made
+
+
+def test_a_new_record_drops_what_was_found_of_the_old_one(served, files):
+    job = served.new_job({"record": files["record"]}, gap="300 um", speed="60 Hz")
+    served.order(f"/api/jobs/{job}/look")
+    assert served.settled(job, "look")["state"] == "done"
+    assert served.ask("PUT", f"/api/jobs/{job}/files/record?name=other.csv", b"time [s]\n").status == 201
+    assert served.ask("GET", f"/api/jobs/{job}").told["states"] == {}
+    assert served.ask("GET", f"/api/jobs/{job}/look/page").status == 404
+
+
+def test_a_new_record_during_a_look_ends_the_look(served, files):
+    job = served.new_job({"record": files["record"]}, gap="300 um", speed="60 Hz")
+    served.order(f"/api/jobs/{job}/look")
+    assert served.ask("PUT", f"/api/jobs/{job}/files/record?name=other.csv", b"time [s]\n").status == 201
+    served.order(f"/api/jobs/{job}/look")
+    assert served.settled(job, "look")["state"] == "failed"
+    assert served.ask("GET", f"/api/jobs/{job}/look/page").status == 404
+
+
+def test_a_job_removed_meanwhile_hides_no_other(served, files, monkeypatch):
+    kept, gone = served.new_job({}), served.new_job({})
+    read = Job.read
+
+    def removed_before_it_is_read(job):
+        if job.number == gone:
+            raise FileNotFoundError(job.path)
+        return read(job)
+
+    monkeypatch.setattr(Job, "read", removed_before_it_is_read)
+    found = served.ask("GET", "/api/jobs")
+    assert found.status == 200
+    assert kept in [one["id"] for one in found.told["jobs"]]
+    assert gone not in [one["id"] for one in found.told["jobs"]]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import gzip
 import pickle
 import socket
@@ -15,7 +16,7 @@ from tests.unit.web.serving import Served
 
 from rotordrop.errors import UsageError
 from rotordrop.web import workspace
-from rotordrop.web.workspace import Workspace, labelled, stored_as
+from rotordrop.web.workspace import Workspace, labelled, receive, stored_as
 
 
 def left_over(served: Served, job: str) -> list[str]:
@@ -175,3 +176,37 @@ def test_a_machine_file_may_name_no_file_elsewhere(served, files):
     state = served.settled(job, "look")
     assert state["state"] == "failed"
     assert "names the shaft table '/etc/hostname'" in state["error"]
+
+
+def test_uploads_side_by_side_do_not_outgrow_the_folder(tmp_path):
+    space = Workspace(tmp_path, quota=10_000)
+    space.prepare()
+    jobs = [space.new_job("drop", {}) for _ in range(2)]
+
+    async def slow():
+        for _ in range(6):
+            await asyncio.sleep(0.01)
+            yield b"x" * 1000
+
+    async def both():
+        coming = [receive(space, job, "record", "a.csv", None, slow()) for job in jobs]
+        return await asyncio.gather(*coming, return_exceptions=True)
+
+    told = asyncio.run(both())
+    assert sorted(type(one).__name__ for one in told) == ["TooLargeError", "dict"]
+    assert space.used() <= 10_000
+
+
+def test_a_record_of_another_format_replaces_the_one_before(served):
+    job = served.new_job({"record": ("a.csv", b"old")})
+    assert served.ask("PUT", f"/api/jobs/{job}/files/record?name=b.txt", b"new").status == 201
+    assert left_over(served, job) == ["record.txt"]
+
+
+@pytest.mark.parametrize("order", [("record", "beside"), ("beside", "record")])
+def test_two_files_that_would_lie_under_one_name_are_refused(served, order):
+    job = served.new_job({})
+    answers = [served.ask("PUT", f"/api/jobs/{job}/files/{role}?name={role}.dat", b"x") for role in order]
+    assert [answer.status for answer in answers] == [201, 400]
+    assert f"{order[1]}.dat would lie where {order[0]}.dat lies" in answers[1].text
+    assert left_over(served, job) == ["record.dat"]

@@ -39,6 +39,7 @@ export function canvasPen(canvas) {
       points.forEach(([x, y], i) => (i ? c.lineTo(x, y) : c.moveTo(x, y)));
       c.closePath(); c.fillStyle = colour; c.fill();
     },
+    image(source, x, y, wide, high) { c.imageSmoothingEnabled = false; c.drawImage(source, x, y, wide, high); },
     circle(x, y, radius, stroke, size = 1, fill = null, dash = []) {
       c.beginPath(); c.arc(x, y, Math.max(radius, 0), 0, 2 * Math.PI); c.setLineDash(dash);
       if (fill) { c.fillStyle = fill; c.fill(); }
@@ -52,6 +53,8 @@ export function canvasPen(canvas) {
     }
   };
 }
+
+canvasPen.size = (canvas) => ({ width: canvas.clientWidth, height: canvas.clientHeight });
 
 export function svgPen(width, height, back, title) {
   const root = document.createElementNS(SVG, "svg");
@@ -79,6 +82,7 @@ export function svgPen(width, height, back, title) {
     line: (points, colour, size = 1, dash = []) => put("path", {
       d: path(points), fill: "none", stroke: colour, "stroke-width": size, "stroke-dasharray": dash.join(" ")
     }),
+    image: (source, x, y, width, height) => put("image", { href: source.toDataURL(), x, y, width, height, preserveAspectRatio: "none", style: "image-rendering: pixelated" }),
     area: (points, colour) => put("path", { d: `${path(points)}Z`, fill: colour }),
     circle: (x, y, radius, stroke, size = 1, fill = null, dash = []) => put("circle", {
       cx: x, cy: y, r: Math.max(radius, 0), stroke: stroke || "none", "stroke-width": size, fill: fill || "none",

@@ -4,6 +4,7 @@ import { canvasPen, colours, faint, keep, keepPng, keepSvg, placeColour, svgPen,
 import { drawOrbit, nearest, orbitPicture } from "./orbit.js";
 import { clearPlots, drawOverview, drawPanel, follow } from "./plots.js";
 import { cards, facts, findings, impactTable, make, sentence, table, timeline } from "./tables.js";
+import { drawFall, fallFiles, openFall } from "./waterfall.js";
 import * as units from "./units.js";
 
 const by = (id) => document.getElementById(id);
@@ -193,7 +194,8 @@ function readout() {
   for (const [i, { verb, found }] of motions().entries()) {
     const place = state[verb].places[i], role = place.estimated ? "estimated" : "measured";
     const [x, y] = at === null ? [NaN, NaN] : place[role].map((name) => value(found, name));
-    const cells = [units.shown(x, "length", 4), units.shown(y, "length", 4), place.gap ? units.written(Math.hypot(x, y) / place.gap[1], 3) : "–"];
+    const cells = [units.shown(x, "length", 4), units.shown(y, "length", 4), place.gap ? units.written(Math.hypot(x, y) / place.gap[1], 3) : "–",
+      Number.isFinite(x) ? `${Math.round((Math.atan2(y, x) * 180) / Math.PI)}°`.replace("-", "−") : "–"];
     if (state.estimate) {
       for (const [panel, kind] of [[force, "force"], [stress, "pressure"]]) {
         const names = verb === "estimate" ? place[kind === "force" ? "force" : "stress"] : [];
@@ -204,7 +206,7 @@ function readout() {
     rows.push(make("tr", { of: [make("th", { scope: "row", text: place.name }), ...cells.map((cell) => (Array.isArray(cell)
       ? make("td", { class: "number", of: [make("span", { text: cell[0] }), make("span", { class: "interval", text: cell[1] })] }) : make("td", { class: "number", text: cell })))] }));
   }
-  const columns = ["", "x", "y", "radius / gap", ...(state.estimate ? ["force", "stress"] : [])];
+  const columns = ["", "x", "y", "radius / gap", "ring angle", ...(state.estimate ? ["force", "stress"] : [])];
   by("readhead").replaceChildren(make("tr", { of: columns.map((text, i) => make("th", { scope: "col", text, class: i ? "number" : null })) }));
   by("readout").replaceChildren(...rows);
 }
@@ -293,7 +295,6 @@ function showStatus() {
   by("estimate").title = state.job.files.machine ? "Estimate force and stress" : "An estimate needs the machine file";
   by("report").disabled = by("document").disabled = !(estimate && estimate.result);
   by("waterfall").disabled = !(waterfall && waterfall.result) && by("estimate").disabled;
-  by("waterfall").textContent = waterfall && waterfall.result ? "Waterfall ↗" : "Waterfall";
   by("waterfall").title = "Frequencies of the coast-down, found and named; needs a record to standstill, or nearly";
   if (running) {
     const verb = Object.keys(states).find((one) => states[one] === running), share = running.fraction || 0;
@@ -329,17 +330,19 @@ async function refresh() {
   state.job = job;
   const done = (verb) => (job.states[verb] && job.states[verb].result) || "";
   const now = `${id} ${done("look")} ${done("estimate")}`;
+  if (wantsFall === id && done("waterfall")) { wantsFall = ""; await showFall(); }
   if (now !== shown) {
     const [look, estimate] = await Promise.all(["look", "estimate"].map((verb) => (done(verb) ? server.page(id, verb) : null)));
     if (state.job.id !== id) { return; }
     shown = now;
     Object.assign(state, { look, estimate, panels: [] });
-    by("main").hidden = !look;
+    by("main").hidden = !look || !by("fall").hidden;
     if (look) {
       units.learn(look.units);
       const columns = look.places.map((place) => place.radius), [first, last] = span();
       state.view = homeView(); state.cursor = null; state.impact = -1;
       const found = await samples("look", columns, first, last, 2400);
+      if (state.job.id !== id || shown !== now) { return; }
       state.overview = { time: found.time, data: { time: found.time, curves: columns.map((name) => ({ values: found[name] })) } };
       showTab(state.tab);
       await loadView();
@@ -361,6 +364,7 @@ async function listJobs(choose) {
   const wantedJob = choose || localStorage.getItem("rotordrop job");
   const job = jobs.find((one) => one.id === wantedJob) || jobs[0];
   if (!job) { state.job = null; by("main").hidden = true; say("No drop yet.", "notice"); return; }
+  if (state.job && state.job.id !== job.id) { leaveFall(); }
   by("jobs").value = job.id;
   localStorage.setItem("rotordrop job", job.id);
   state.job = job;
@@ -420,12 +424,34 @@ async function openReport(verb) {
   if (opened) { opened.opener = null; opened.location = address; } else { location.assign(address); }
 }
 click("report", () => openReport("estimate"));
-click("waterfall", async () => {
-  const { waterfall } = state.job.states;
-  if (waterfall && waterfall.result) { await openReport("waterfall"); return; }
+let wantsFall = "";
+async function showFall() {
+  const { id } = state.job, page = await server.page(id, "waterfall");
+  if (state.job.id !== id) { return; }
+  play(false);
+  by("main").hidden = true;
+  by("fall").hidden = false;
+  await openFall(id, page);
+  by("fallmap").focus();
+}
+function leaveFall() {
+  if (by("fall").hidden) { return; }
+  by("fall").hidden = true;
+  by("main").hidden = !state.look;
+  if (state.panels.length) { drawAll(); }
+  by("waterfall").focus();
+}
+async function waterfall() {
+  const told = state.job.states.waterfall;
+  if (told && told.result) { await showFall(); return; }
+  wantsFall = state.job.id;
   state.job = await server.begin(state.job.id, "waterfall", {});
   await refresh();
-});
+}
+click("waterfall", waterfall);
+click("fallback", leaveFall);
+click("fallreport", () => openReport("waterfall"));
+by("fallfiles").replaceChildren(files("Waterfall", { csv: fallFiles.CSV, svg: fallFiles.SVG, png: fallFiles.PNG, python: () => { by("code").textContent = fallFiles.Python(); by("lines").showModal(); } }));
 click("document", async () => keep(new Blob([await server.documentText(state.job.id, "estimate")], { type: "application/json" }), `${state.job.name}.json`));
 click("remove", () => by("sure").showModal());
 by("sure").addEventListener("close", async () => {
@@ -446,14 +472,14 @@ for (const id of ["from", "to"]) {
   });
 }
 by("signal").addEventListener("change", () => state.view && loadView());
-function chooseUnits(name) { units.choose(name); by("units").value = name; if (state.look && state.view) { showTab(state.tab); showStatus(); drawAll(); } }
+function chooseUnits(name) { units.choose(name); by("units").value = name; if (state.look && state.view) { showTab(state.tab); showStatus(); redraw(); } }
 by("units").addEventListener("change", () => chooseUnits(by("units").value));
 const dark = matchMedia("(prefers-color-scheme: dark)");
 function chooseTheme(name) {
   localStorage.setItem("rotordrop theme", name);
   by("theme").value = name;
   document.documentElement.dataset.theme = name || (dark.matches ? "dark" : "light");
-  if (state.panels.length) { drawAll(); }
+  redraw();
 }
 by("theme").addEventListener("change", () => chooseTheme(by("theme").value));
 dark.addEventListener("change", () => chooseTheme(by("theme").value));
@@ -487,13 +513,17 @@ document.addEventListener("keydown", (event) => {
   if (typing || event.ctrlKey || event.metaKey || event.altKey || (event.key === " " && event.target.closest("button"))) { return; }
   if (event.key === "?") { by("keys").showModal(); return; }
   if (event.key === "o") { openFiles(); return; }
+  if (event.key === "w" && !by("waterfall").disabled && !by("actions").hidden) { (by("fall").hidden ? waterfall : leaveFall)(); return; }
+  if (event.key === "Escape") { leaveFall(); return; }
+  if (!by("fall").hidden && !"ut".includes(event.key)) { return; }
   if (state.look && state.view && KEYS[event.key]) { event.preventDefault(); KEYS[event.key](event); }
 });
 document.addEventListener("dragover", (event) => { event.preventDefault(); document.body.classList.add("over"); });
 document.addEventListener("dragleave", (event) => { if (!event.relatedTarget) { document.body.classList.remove("over"); } });
 document.addEventListener("drop", (event) => { event.preventDefault(); document.body.classList.remove("over"); chooseFiles(event.dataTransfer.files); });
+const redraw = () => { if (!by("fall").hidden) { drawFall(); } else if (state.panels.length) { drawAll(); } };
 let waiting = 0;
-window.addEventListener("resize", () => { clearTimeout(waiting); waiting = setTimeout(() => state.panels.length && drawAll(), 120); });
+window.addEventListener("resize", () => { clearTimeout(waiting); waiting = setTimeout(redraw, 120); });
 
 by("units").value = units.chosen();
 chooseTheme(localStorage.getItem("rotordrop theme") || "");

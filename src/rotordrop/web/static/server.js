@@ -30,6 +30,8 @@ export const send = (id, role, file) =>
 export const begin = async (id, verb, options) => (await ask("POST", `/api/jobs/${id}/${verb}`, order(options))).json();
 export const cancel = async (id, verb) => (await ask("POST", result(id, verb, "cancel"))).json();
 export const page = async (id, verb) => (await ask("GET", result(id, verb, "page"))).json();
+export const field = async (id, plane, part) =>
+  new Float32Array(await (await ask("GET", `${result(id, "waterfall", "field")}?plane=${plane}&part=${part}`)).arrayBuffer());
 export const documentText = async (id, verb) => (await ask("GET", result(id, verb, "document"))).text();
 export const reportAddress = async (id, verb) => (await (await ask("POST", result(id, verb, "report"))).json()).address;
 

@@ -1,0 +1,252 @@
+// The waterfall: a map of amplitude over frequency and time, its orders and lines, and a cut through one of them.
+import { canvasPen, colours, keep, keepPng, keepSvg, svgPen, ticks } from "./figures.js";
+import { make } from "./tables.js";
+import * as server from "./server.js";
+import * as units from "./units.js";
+
+const by = (id) => document.getElementById(id);
+const VIRIDIS = [[68, 1, 84], [71, 44, 122], [59, 81, 139], [44, 113, 142], [33, 144, 141], [39, 173, 129], [92, 200, 99], [170, 220, 50], [253, 231, 37]];
+const PARTS = { full: "full spectrum, backward to the left", y: "vertical", x: "horizontal" };
+const fall = { id: null, page: null, plane: 0, part: "full", field: null, to: 0, at: null, line: null, heat: null };
+
+const frequencies = () => fall.page.frequency[fall.part];
+const span = () => [fall.part === "full" ? -fall.to : 0, fall.to];
+const linesHere = () => fall.page.lines.filter((line) => line.planes.includes(fall.page.planes[fall.plane]));
+const value = (frame, bin) => fall.field[frame * frequencies().length + bin];
+function binOf(frequency) {
+  const all = frequencies(), step = (all.at(-1) - all[0]) / (all.length - 1);
+  return Math.min(Math.max(Math.round((frequency - all[0]) / step), 0), all.length - 1);
+}
+function along({ time, frequency }, t) {
+  if (t < time[0] || t > time.at(-1)) { return NaN; }
+  const after = time.findIndex((one) => one >= t), before = Math.max(after - 1, 0);
+  const share = after === before ? 0 : (t - time[before]) / (time[after] - time[before]);
+  return frequency[before] + share * (frequency[after] - frequency[before]);
+}
+const frameOf = (t) => fall.page.time.reduce((best, one, i) => (Math.abs(one - t) < Math.abs(fall.page.time[best] - t) ? i : best), 0);
+
+export async function openFall(id, page) {
+  if (fall.id !== id || fall.page !== page) {
+    Object.assign(fall, { id, page, plane: 0, part: page.parts[0], to: page.highest, at: null, line: null });
+    units.learn(page.units);
+    by("fallplane").replaceChildren(...page.planes.map((name, i) => make("option", { value: i, text: name })));
+    by("fallpart").replaceChildren(...page.parts.map((part) => make("option", { value: part, text: PARTS[part] })));
+    by("fallto").value = Number(page.highest.toPrecision(4));
+  }
+  await load();
+}
+
+async function load() {
+  const { id, plane, part } = fall;
+  const field = await server.field(id, plane, part);
+  if (fall.id !== id || fall.plane !== plane || fall.part !== part) { return; }
+  fall.field = field;
+  fall.heat = null;
+  drawFall();
+}
+
+// The largest of neighbouring values stands for a column, so that no line is lost between pixels.
+function heat() {
+  if (fall.heat) { return fall.heat; }
+  const [low, high] = span(), first = binOf(low), last = binOf(high), frames = fall.page.time.length;
+  const columns = Math.min(last - first + 1, 1200), each = (last - first + 1) / columns;
+  const canvas = make("canvas", { width: columns, height: frames }), c = canvas.getContext("2d"), image = c.createImageData(columns, frames);
+  const sorted = Float32Array.from(fall.field).sort(), top = Math.log10(sorted.at(-1));
+  const floor = Math.log10(Math.max(sorted[sorted.length >> 1], 1e-5 * sorted.at(-1)));
+  for (let row = 0; row < frames; row += 1) {
+    for (let column = 0; column < columns; column += 1) {
+      let most = 0;
+      for (let bin = first + Math.floor(column * each); bin < first + Math.floor((column + 1) * each); bin += 1) { most = Math.max(most, value(row, bin)); }
+      const share = 8 * Math.min(Math.max((Math.log10(most || 1e-30) - floor) / (top - floor), 0), 1), stop = Math.min(Math.floor(share), 7);
+      const at = 4 * ((frames - 1 - row) * columns + column);
+      for (let k = 0; k < 3; k += 1) { image.data[at + k] = VIRIDIS[stop][k] + (share - stop) * (VIRIDIS[stop + 1][k] - VIRIDIS[stop][k]); }
+      image.data[at + 3] = 255;
+    }
+  }
+  c.putImageData(image, 0, 0);
+  fall.heat = { canvas, floor: 10 ** floor, top: 10 ** top };
+  return fall.heat;
+}
+
+function frameBox(pen) {
+  const { time } = fall.page, [low, high] = span(), step = time.length > 1 ? time[1] - time[0] : 1;
+  const box = { left: 56, right: pen.width - 84, top: 22, bottom: pen.height - 40 }, begin = time[0] - step / 2, end = time.at(-1) + step / 2;
+  return { box, begin, end,
+    px: (f) => box.left + ((f - low) / (high - low)) * (box.right - box.left),
+    py: (t) => box.bottom - ((t - begin) / (end - begin)) * (box.bottom - box.top) };
+}
+
+function axes(pen, { box, px, py, begin, end }, tone) {
+  for (const f of ticks(...span(), 8)) { pen.text(String(f).replace("-", "−"), px(f), box.bottom + 14, tone.ink, { align: "center" }); }
+  for (const t of ticks(begin, end, 6)) { pen.text(String(t), box.left - 6, py(t) + 4, tone.ink, { align: "right" }); }
+  pen.text("frequency [Hz]", (box.left + box.right) / 2, pen.height - 8, tone.ink, { align: "center", size: 12 });
+  pen.text("time from power-off [s]", 14, (box.top + box.bottom) / 2, tone.ink, { align: "center", size: 12, turned: true });
+}
+
+function colourBar(pen, { box }, tone) {
+  const { floor, top } = heat(), left = box.right + 12, height = box.bottom - box.top;
+  for (let k = 0; k < 40; k += 1) {
+    const share = (8 * k) / 40, stop = Math.floor(share), part = VIRIDIS[stop].map((v, i) => Math.round(v + (share - stop) * (VIRIDIS[stop + 1][i] - v)));
+    const y = box.bottom - (height * k) / 40, up = height / 40 + 0.5;
+    pen.area([[left, y], [left + 10, y], [left + 10, y - up], [left, y - up]], `rgb(${part.join(",")})`);
+  }
+  const f = units.factor("length");
+  for (let power = Math.ceil(Math.log10(floor / f)); power <= Math.log10(top / f); power += 1) {
+    const y = box.bottom - (height * (power - Math.log10(floor / f))) / Math.log10(top / floor);
+    pen.text(`${Number((10 ** power).toPrecision(1))}`, left + 14, y + 4, tone.ink, { size: 10 });
+  }
+  pen.text(units.unit("length"), left, box.top - 8, tone.ink, { size: 11 });
+}
+
+function drawMap(pen, withCursor) {
+  const tone = colours(), frame = frameBox(pen), { box, px, py } = frame, { time, speed, orders } = fall.page;
+  pen.image(heat().canvas, box.left, box.top, box.right - box.left, box.bottom - box.top);
+  const inside = (f) => (f >= span()[0] && f <= span()[1] ? px(f) : NaN);
+  if (speed && by("fallorders").checked) {
+    for (const order of fall.part === "full" ? [...orders.map((k) => -k), ...orders] : orders) {
+      const points = time.map((t, i) => [inside(order * speed[i]), py(t)]), seen = points.find(([x]) => Number.isFinite(x));
+      pen.line(points, "#ffffff", 0.9, [4, 3]);
+      if (seen) {
+        const atEnd = seen[0] > box.right - 30;
+        pen.text(`${order}X`.replace("-", "−"), seen[0] + (atEnd ? -3 : 3), seen[1] - 3, "#ffffff", { size: 10.5, weight: "600", align: atEnd ? "right" : "left" });
+      }
+    }
+  }
+  let last = -Infinity;
+  for (const line of [...linesHere()].sort((a, b) => a.frequency - b.frequency)) {
+    const chosen = line === fall.line;
+    if (line.kind === "order" && !chosen) { continue; }
+    pen.line(line.path.time.map((t, i) => [t < frame.begin || t > frame.end ? NaN : inside(line.path.frequency[i]), py(t)]), chosen ? "#ff4d4d" : "#ffffff", chosen ? 2 : 0.7, chosen ? [] : [1, 3]);
+    const x = line.kind === "order" ? NaN : inside(line.frequency);
+    if (Number.isFinite(x) && x - last > 34) { pen.text(line.frequency.toFixed(1), x, box.top - 6, chosen ? tone.limit : tone.ink, { align: "center", size: 10 }); last = x; }
+  }
+  if (withCursor && fall.at) {
+    pen.line([[px(fall.at.f), box.top], [px(fall.at.f), box.bottom]], "#ffffff", 1);
+    pen.line([[box.left, py(fall.at.t)], [box.right, py(fall.at.t)]], "#ffffff", 1);
+  }
+  axes(pen, frame, tone);
+  colourBar(pen, frame, tone);
+}
+
+// Amplitude of a line in every frame: the largest value within one resolution of where it is then.
+function courseOf(line) {
+  return fall.page.time.map((t) => {
+    const f = along(line.path, t), sides = fall.part === "full" ? [f, -f] : [f];
+    return Number.isFinite(f) ? Math.max(...sides.flatMap((one) => [-1, 0, 1].map((k) => value(frameOf(t), Math.min(Math.max(binOf(one) + k, 0), frequencies().length - 1))))) : NaN;
+  });
+}
+
+function drawCut(pen, box, { x, y, title, label, mark }) {
+  const tone = colours(), f = units.factor("length"), known = y.filter((v) => v > 0);
+  if (!known.length) { pen.text(title, box.left, box.top - 6, tone.ink, { size: 12, weight: "600" }); return; }
+  const high = Math.log10(Math.max(...known) / f) + 0.1, low = Math.max(Math.log10(Math.min(...known) / f), high - 5);
+  const px = (v) => box.left + ((v - x[0]) / (x.at(-1) - x[0])) * (box.right - box.left);
+  const py = (v) => box.bottom - ((Math.log10(v / f) - low) / (high - low)) * (box.bottom - box.top);
+  for (let power = Math.ceil(low); power <= high; power += 1) {
+    pen.line([[box.left, py(f * 10 ** power)], [box.right, py(f * 10 ** power)]], tone.line);
+    pen.text(String(Number((10 ** power).toPrecision(1))), box.left - 5, py(f * 10 ** power) + 4, tone.ink, { align: "right", size: 10 });
+  }
+  for (const v of ticks(x[0], x.at(-1), 6)) { pen.text(String(v).replace("-", "−"), px(v), box.bottom + 13, tone.ink, { align: "center", size: 10 }); }
+  pen.line(x.map((v, i) => [px(v), y[i] > 0 ? Math.min(py(y[i]), box.bottom) : NaN]), tone.estimated, 1.2);
+  if (Number.isFinite(mark)) { pen.line([[px(mark), box.top], [px(mark), box.bottom]], tone.limit, 1, [3, 3]); }
+  pen.text(title, box.left, box.top - 6, tone.ink, { size: 12, weight: "600" });
+  pen.text(label, (box.left + box.right) / 2, box.bottom + 28, tone.ink, { align: "center", size: 11 });
+}
+
+function drawCuts(pen) {
+  const [low, high] = span(), first = binOf(low), last = binOf(high), frame = fall.at ? frameOf(fall.at.t) : 0, middle = pen.height / 2;
+  const x = frequencies().slice(first, last + 1), where = { left: 46, right: pen.width - 10 };
+  drawCut(pen, { ...where, top: 20, bottom: middle - 36 }, { x, y: x.map((_, i) => value(frame, first + i)), mark: fall.at ? fall.at.f : NaN,
+    title: `Spectrum at ${fall.page.time[frame].toFixed(2)} s [${units.unit("length")}, ${fall.page.amplitude_kind}]`, label: "frequency [Hz]" });
+  if (fall.line) {
+    drawCut(pen, { ...where, top: middle + 20, bottom: pen.height - 36 }, { x: fall.page.time, y: courseOf(fall.line), mark: fall.at ? fall.at.t : NaN,
+      title: `${fall.line.label} over time [${units.unit("length")}]`, label: "time from power-off [s]" });
+  }
+}
+
+function readFall() {
+  if (!fall.at) { by("fallclock").textContent = "point at the map, or choose a line"; return; }
+  const frame = frameOf(fall.at.t), speed = fall.page.speed && fall.page.speed[frame];
+  const order = speed > 0.5 ? `, ${(fall.at.f / speed).toFixed(3).replace("-", "−")} X at ${units.shown(2 * Math.PI * speed, "speed")}` : "";
+  by("fallclock").textContent = `${fall.at.f.toFixed(2).replace("-", "−")} Hz, ${fall.page.time[frame].toFixed(2)} s: ${units.shown(value(frame, binOf(fall.at.f)), "length", 3)}${order}`;
+}
+
+function lineList() {
+  const cell = ({ SI, US }) => (units.chosen() === "SI" ? SI : US)[0];
+  by("falllines").replaceChildren(make("table", { of: [make("caption", { text: "Lines: a click shows cut, name and reason" }),
+    make("tbody", { of: linesHere().map((line) => make("tr", { class: line === fall.line ? "here" : null, on: { click: () => choose(line) }, of: [
+      make("th", { scope: "row", of: [make("button", { class: "link", text: line.label, "aria-pressed": String(line === fall.line), on: { click: (event) => { event.stopPropagation(); choose(line); } } })] }),
+      make("td", { class: "number", text: line.where }), make("td", { class: "number", text: cell(line.amplitude) })] })) })] }),
+  ...(fall.line ? [make("p", { class: "reason", of: [make("strong", { text: fall.line.label }), make("span", { text: ` (${fall.line.named ? `confidence ${cell(fall.line.confidence)}` : "no name"}, seen from ${fall.line.seen}): ${fall.line.reason}` })] })] : []));
+}
+
+function choose(line) {
+  fall.line = line;
+  const seen = Math.max(0, line.path.time.findIndex((t) => t >= fall.page.time[0]));
+  fall.at = { t: line.path.time[Math.min(seen, line.path.time.length - 1)], f: line.frequency };
+  if (line.frequency > fall.to) { setTo(1.2 * line.frequency); }
+  drawFall();
+  const button = [...by("falllines").querySelectorAll("button")][linesHere().indexOf(line)];
+  if (button) { button.focus(); }
+}
+
+export function drawFall() {
+  if (!fall.field || by("fall").hidden) { return; }
+  drawMap(canvasPen(by("fallmap")), true);
+  drawCuts(canvasPen(by("fallcut")));
+  by("fallmap").setAttribute("aria-label", `Waterfall of ${fall.page.planes[fall.plane]}, ${PARTS[fall.part]}, to ${Math.round(fall.to)} Hz; arrow keys move the cursor`);
+  readFall();
+  lineList();
+}
+
+function setTo(to) {
+  const most = frequencies().at(-1);
+  if (!(to > 0)) { return; }
+  fall.to = Math.min(to, most);
+  fall.heat = null;
+  by("fallto").value = Number(fall.to.toPrecision(4));
+}
+
+function picture(draw, title) {
+  const pen = svgPen(1000, 640, colours().back, title);
+  draw(pen);
+  return pen;
+}
+
+const title = () => `waterfall_${fall.page.planes[fall.plane]}_${fall.part}`.replace(/[^\w.-]+/g, "_");
+function csv() {
+  const head = ["time [s]", ...frequencies().map((f) => `${f} Hz [m]`)].join(",");
+  const rows = fall.page.time.map((t, i) => [t, ...frequencies().map((_, k) => value(i, k).toPrecision(7))].join(","));
+  keep(new Blob([[head, ...rows, ""].join("\n")], { type: "text/csv" }), `${title()}.csv`);
+}
+export const fallFiles = {
+  CSV: csv, SVG: () => keepSvg(picture((pen) => drawMap(pen, false), title()), title()), PNG: () => keepPng(picture((pen) => drawMap(pen, false), title()), title()),
+  Python: () => fall.page.python[`${fall.plane} ${fall.part}`]
+};
+
+const placeOf = (event) => {
+  const { box, begin, end } = frameBox(canvasPen.size(by("fallmap"))), [low, high] = span(), inside = (v) => Math.min(Math.max(v, 0), 1);
+  return { f: low + inside((event.offsetX - box.left) / (box.right - box.left)) * (high - low), t: begin + inside((box.bottom - event.offsetY) / (box.bottom - box.top)) * (end - begin) };
+};
+by("fallmap").addEventListener("pointermove", (event) => { if (fall.field) { fall.at = placeOf(event); drawFall(); } });
+by("fallmap").addEventListener("click", (event) => {
+  const at = placeOf(event), reach = 0.015 * (span()[1] - span()[0]);
+  const near = linesHere().map((line) => [Math.abs(Math.abs(at.f) - along(line.path, at.t)), line]).filter(([apart]) => apart < reach).sort((a, b) => a[0] - b[0])[0];
+  if (near) { fall.line = near[1]; }
+  fall.at = at;
+  drawFall();
+});
+by("fallmap").addEventListener("keydown", (event) => {
+  const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
+  if (!step || !fall.field) { return; }
+  event.preventDefault();
+  event.stopPropagation();
+  const { time } = fall.page, wide = event.shiftKey ? 10 : 1, bin = binOf(fall.at ? fall.at.f : 0) + wide * step[0];
+  const frame = Math.min(Math.max((fall.at ? frameOf(fall.at.t) : 0) + wide * step[1], 0), time.length - 1);
+  fall.at = { f: Math.min(Math.max(frequencies()[Math.min(Math.max(bin, 0), frequencies().length - 1)], span()[0]), span()[1]), t: time[frame] };
+  drawFall();
+});
+by("fallplane").addEventListener("change", () => { fall.plane = Number(by("fallplane").value); fall.line = null; load(); });
+by("fallpart").addEventListener("change", () => { fall.part = by("fallpart").value; load(); });
+by("fallto").addEventListener("change", () => { setTo(Number(by("fallto").value.replace(",", "."))); drawFall(); });
+by("fallorders").addEventListener("change", drawFall);
