@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -223,10 +222,8 @@ def _waterfall_section(analysis: CoastDownAnalysis, against: str, highest: float
 
 
 def _line_section(analysis: CoastDownAnalysis) -> Section:
-    table = line_table(analysis)
-    rows = tuple((*row, line.reason) for row, line in zip(table.rows, analysis.lines, strict=True))
-    columns = (*table.columns, "reason for its name")
-    return Section(heading="Lines", tables=(replace(table, columns=columns, rows=rows),))
+    reasons = tuple(f"{line.label}: {line.reason}." for line in analysis.lines)
+    return Section(heading="Lines", text=reasons, tables=(line_table(analysis),))
 
 
 def _order_section(analysis: CoastDownAnalysis) -> Section:
