@@ -71,7 +71,8 @@ def response(rotor: rs.Rotor) -> dict[str, object]:
 
 def tabled_speeds(rotor: rs.Rotor) -> np.ndarray | None:
     """Speeds at which the bearings have coefficients; None where these are the same at all speeds."""
-    tables = [np.atleast_1d(b.frequency) for b in rotor.bearing_elements if b.frequency is not None]
+    told = [getattr(b, "frequency", getattr(b, "speed", None)) for b in rotor.bearing_elements]
+    tables = [np.atleast_1d(one) for one in told if one is not None]
     longest = max(tables, key=len, default=np.zeros(0))
     return longest if len(longest) > 1 else None
 

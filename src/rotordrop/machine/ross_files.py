@@ -10,14 +10,14 @@ import json
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from rotordrop.atomic_file import write_text
 from rotordrop.errors import MachineFileError, UsageError
 from rotordrop.machine.rotor import Rotor
+from rotordrop.machine.source_bearing import Spring as Spring
 
 _FORMAT_VERSION = "2.3.0"
 _CONE_CUTS = 8
@@ -34,83 +34,6 @@ _BUILT_IN = {
     "brass": (8600.0, 105e9, 39.3e9),
 }
 """Density [kg/m³], elastic and shear modulus [Pa] of materials that old files only name."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Spring:
-    """A bearing of the source.
-
-    Attributes
-    ----------
-    node : int
-        Node here.
-    name : str
-        Its name.
-    stiffness, damping : tuple of float
-        In x and y [N/m], [N s/m]; where the source has them by speed, the first of its table.
-    cross_stiffness, cross_damping : tuple of float
-        Force in x against motion in y, and in y against motion in x.
-    kind : str
-        What it is in the source; seals are held in the same way.
-    told : dict of str to tuple of float
-        All coefficients of the source by its own names, over ``frequency`` [rad/s]; written back as they are.
-    """
-
-    node: int
-    name: str
-    stiffness: tuple[float, float]
-    damping: tuple[float, float]
-    cross_stiffness: tuple[float, float] = (0.0, 0.0)
-    cross_damping: tuple[float, float] = (0.0, 0.0)
-    kind: str = "BearingElement"
-    told: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
-
-    @property
-    def stiffness_matrix(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Force in (x, y) against displacement in (x, y) [N/m]."""
-        return _matrix(self.stiffness, self.cross_stiffness)
-
-    @property
-    def damping_matrix(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Force in (x, y) against velocity in (x, y) [N s/m]."""
-        return _matrix(self.damping, self.cross_damping)
-
-    def at_speed(self, speed: float) -> Spring:
-        """The bearing with its coefficients at a speed [rad/s], straight between those of its table."""
-        speeds = self.told.get("frequency", ())
-        if len(speeds) < 2:
-            return self
-
-        def between(key: str, otherwise: float) -> float:
-            values = self.told.get(key)
-            return otherwise if values is None or len(values) < 2 else _between(speed, speeds, values)
-
-        def pair(kind: str, keys: tuple[str, str], now: tuple[float, float]) -> tuple[float, float]:
-            first, second = (between(f"{kind}{key}", value) for key, value in zip(keys, now, strict=True))
-            return first, second
-
-        own, cross = ("xx", "yy"), ("xy", "yx")
-        return replace(
-            self,
-            stiffness=pair("k", own, self.stiffness),
-            damping=pair("c", own, self.damping),
-            cross_stiffness=pair("k", cross, self.cross_stiffness),
-            cross_damping=pair("c", cross, self.cross_damping),
-        )
-
-
-def _between(at: float, places: tuple[float, ...], values: tuple[float, ...]) -> float:
-    """Value on the straight line between two of a table; the end one beyond it."""
-    for (a, u), (b, v) in pairwise(zip(places, values, strict=True)):
-        if at <= b:
-            return u if at <= a else u + (v - u) * (at - a) / (b - a)
-    return values[-1]
-
-
-def _matrix(
-    own: tuple[float, float], cross: tuple[float, float]
-) -> tuple[tuple[float, float], tuple[float, float]]:
-    return (own[0], cross[0]), (cross[1], own[1])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,18 +70,19 @@ def read_ross(path: str | Path) -> ImportedRotor:
         If the file is none of ROSS, or holds a shaft that has no counterpart here.
     """
     path = Path(path)
-    elements, version = _elements(path)
+    elements, version, damped = _elements(path)
     shaft = [item for kind, item in elements if kind.startswith("ShaftElement")]
     if not shaft:
         raise MachineFileError("there is no ShaftElement in it; is it a rotor saved by ROSS?", file=path)
     try:
-        return _imported(elements, shaft, version)
+        return _imported(elements, shaft, version, damped)
     except (KeyError, TypeError, ValueError, UsageError) as error:
         said = f"no {error} in an element" if isinstance(error, KeyError) else str(error)
         raise MachineFileError(f"cannot take the rotor over: {said}", file=path) from error
 
 
-def _elements(path: Path) -> tuple[list[tuple[str, dict[str, Any]]], str]:
+def _elements(path: Path) -> tuple[list[tuple[str, dict[str, Any]]], str, bool]:
+    """Elements by kind, the version, and whether the rotor as a whole has proportional damping."""
     try:
         text = path.read_text(encoding="utf-8-sig")
         content = json.loads(text) if path.suffix.lower() == ".json" else tomllib.loads(text)
@@ -171,13 +95,15 @@ def _elements(path: Path) -> tuple[list[tuple[str, dict[str, Any]]], str]:
         for name, item in content.items()
         if isinstance(item, dict) and name not in _PASSED_OVER
     ]
-    return found, str(content.get("ross_version", "before 2.0"))
+    whole = content.get("parameters")
+    damped = isinstance(whole, dict) and any(whole.get(name) for name in ("alpha", "beta"))
+    return found, str(content.get("ross_version", "before 2.0")), damped
 
 
 def _imported(
-    elements: list[tuple[str, dict[str, Any]]], shaft: list[dict[str, Any]], version: str
+    elements: list[tuple[str, dict[str, Any]]], shaft: list[dict[str, Any]], version: str, damped: bool
 ) -> ImportedRotor:
-    notes: list[str] = []
+    notes = ["proportional damping of the rotor is left out"] if damped else []
     spans: dict[int, list[dict[str, Any]]] = {}
     for item in _numbered(shaft):
         spans.setdefault(item["n"], []).append(item)
@@ -356,8 +282,13 @@ def _is_spring(kind: str) -> bool:
 
 
 def _spring(k: int, kind: str, item: Mapping[str, Any], nodes: list[int]) -> Spring:
+    # Version 3 calls the speeds of a table what they are.
+    item = {("frequency" if key == "speed" else key): value for key, value in item.items()}
     told = {key: _numbers(item[key]) for key in item if _COEFFICIENT.fullmatch(key) and item[key] is not None}
     told = {key: values for key, values in told.items() if values}
+    for letter in ("k", "c"):  # what is not given in y is as in x, at every speed
+        if f"{letter}xx" in told:
+            told.setdefault(f"{letter}yy", told[f"{letter}xx"])
 
     def both(kind: str, first: str, second: str, otherwise: str) -> tuple[float, float]:
         one = told.get(f"{kind}{first}", (0.0,))[0]

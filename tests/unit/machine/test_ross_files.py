@@ -2,6 +2,7 @@
 
 import json
 import math
+from pathlib import Path
 
 import pytest
 
@@ -156,3 +157,27 @@ def test_coupled_coefficients_tables_by_speed_and_seals_go_there_and_back(writte
     assert imported.nodes == (1, 2, 3, 4, 5, 6, 7)
     write_ross(imported.rotor, tmp_path / "back.toml", imported.springs)
     assert read_ross(tmp_path / "back.toml").springs == imported.springs
+
+
+def test_files_of_version_3_have_speeds_in_their_tables_and_damping_of_the_whole_rotor(written):
+    table = {"n": 0, "tag": "Bearing 0", "speed": [0.0, 100.0], "kxx": [1e6, 2e6], "interpolation": "pchip"}
+    content = published() | {"ross_version": "3.1.0", "BearingElement_0": table}
+    content["parameters"] = {"default_damping_ratio": 0.0, "alpha": 8.05, "beta": 1e-5}
+    imported = read_ross(written(content))
+    assert imported.source == "ROSS 3.1.0"
+    assert imported.notes == ("proportional damping of the rotor is left out",)
+    assert imported.springs[0].at_speed(25.0).stiffness == (1.25e6, 1.25e6)
+
+
+@pytest.mark.parametrize("version", ["2.3.0", "3.1.0"])
+def test_the_examples_of_ross_were_compared_with_both_versions(version):
+    """Raw results of studies/ross: where nothing was left out, all agrees within 0.1 %."""
+    file = Path(__file__).parents[3] / "studies" / "ross" / "results" / f"ross_{version}.json"
+    rotors = json.loads(file.read_text())["rotors"]
+    plain = [name for name in rotors if name.startswith(("rotor_example.", "friswell"))]
+    assert len(plain) == 14
+    for name in plain:
+        errors = [max(map(abs, v)) for key, v in rotors[name].items() if key.startswith("frequencies")]
+        assert max(errors) < 1e-3
+        assert rotors[name]["response"] < 1e-3
+        assert rotors[name]["read back equal"]
