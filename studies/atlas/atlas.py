@@ -28,6 +28,8 @@ from rotordrop.study.summary import load_results
 
 BY = ("speed", "unbalance.0.amount", "*.friction.dynamic", "*.support.damping")
 LIMITS = {"peak_stress": 2.2e9}
+KEPT = ("peak_force", "peak_stress", "settling_time", "backward_whirl", "whirl_frequency", "sliding_energy")
+"""Quantities whose quantiles stand in the summary."""
 
 
 def plan() -> Study:
@@ -73,6 +75,15 @@ def run(folder: Path, minutes: float) -> None:
         file.write(json.dumps(cost) + "\n")
 
 
+def rounded(tree: Any) -> Any:
+    """The same content with five digits."""
+    if isinstance(tree, dict):
+        return {key: rounded(value) for key, value in tree.items()}
+    if isinstance(tree, list):
+        return [rounded(value) for value in tree]
+    return float(f"{tree:.5g}") if isinstance(tree, float) else tree
+
+
 def show(folder: Path, out: Path) -> None:
     """Summary with maps, and the page to look at."""
     results = load_results(folder)
@@ -87,8 +98,11 @@ def show(folder: Path, out: Path) -> None:
         "processor_hours_for_1e7": 1e7 * seconds / max(drops, 1.0) / 3600.0,
         "bytes_per_shard": StudyFolder(folder).shard_path(0).stat().st_size,
     }
+    numbers["quantiles"] = {k: v for k, v in numbers["quantiles"].items() if k.split(".")[-1] in KEPT}
     out.mkdir(parents=True, exist_ok=True)
-    (out / "summary.json").write_text(json.dumps(numbers, indent=1) + "\n", encoding="utf-8")
+    (out / "summary.json").write_text(
+        json.dumps(rounded(numbers), separators=(",", ":")) + "\n", encoding="utf-8"
+    )
     write_page(study_page(results, BY, LIMITS), folder / "atlas.html")
     print(json.dumps(numbers["cost"], indent=1))
 
