@@ -1,5 +1,7 @@
 """A rail with noise on it and a block of zeros are found; impacts, orbits and rests are none."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -55,3 +57,20 @@ def test_zeros_of_a_coarse_recorder_while_the_rotor_floats_at_zero_are_none(drop
     rounded = edited(drop, lambda signals: 1e-6 * np.rint((signals - level) / 1e-6))
     assert np.any(rounded.signals[:4000] == 0.0)
     assert "zeroed block" not in [one.kind for one in check_record(rounded, machine)]
+
+
+def test_turning_points_short_of_the_extreme_are_no_rail(drop, machine):
+    """A light rotor turned back four times at one depth and once went deeper: it was called clipped."""
+    rng = np.random.default_rng(2)
+    rate, time = drop.sampling_rate, drop.time
+    values = np.where(time < 0.0, 0.0, -100e-6 - 60e-6 * np.cos(2 * np.pi * 40.0 * time))
+    for start in (0.05, 0.1, 0.15, 0.2):
+        first = int(np.searchsorted(time, start))
+        values[first : first + round(1e-3 * rate)] = -200e-6
+    values[int(np.searchsorted(time, 0.24))] = -206e-6
+    values = values + rng.normal(0.0, 0.8e-6, len(values))
+    assert check_rail(replace(drop, signals=np.column_stack([values] * 4))) == []
+    values[int(np.searchsorted(time, 0.24))] = -200e-6
+    assert {found.kind for found in check_rail(replace(drop, signals=np.column_stack([values] * 4)))} == {
+        "clipping"
+    }
