@@ -273,3 +273,23 @@ def test_rows_missing_at_the_end_show_by_the_length_the_header_declares(key, mac
     path.write_text("\n".join([f"{key}: {COUNT}", *lines[:-9]]) + "\n")
     (told,) = read_record(path, machine).warnings
     assert f"declares {COUNT} samples and {COUNT - 8} are present" in told
+
+
+def test_a_damaged_head_of_an_array_is_a_sentence(tmp_path):
+    """Brackets that do not close ended in a traceback of the tokenizer."""
+    np.save(tmp_path / "drop.npy", READINGS)
+    content = (tmp_path / "drop.npy").read_bytes()
+    (tmp_path / "drop.npy").write_bytes(content.replace(b"(40, 4), }", b"((40, 4,  "))
+    with pytest.raises(RecordError, match=r"is no intact NPY array"):
+        read_recording(tmp_path / "drop.npy", BY_PROFILE)
+
+
+def test_a_configuration_with_a_damaged_rate(machine, tmp_path):
+    as_comtrade(tmp_path, "ASCII")
+    text = (tmp_path / "drop.cfg").read_text()
+    (tmp_path / "drop.cfg").write_text(text.replace("20000,40", "20000,4°", 1), encoding="latin-1")
+    with pytest.raises(RecordError, match=r"line \d+: .*the configuration is damaged"):
+        read_record(tmp_path / "drop.cfg", machine)
+    (tmp_path / "drop.cfg").write_text(text.replace("20000,40", "26000,40", 1))
+    (told,) = read_record(tmp_path / "drop.cfg", machine).warnings
+    assert "0.0015 s by the sampling rates and 0.00195 s by their time stamps" in told

@@ -63,7 +63,20 @@ def read_comtrade(path: Path, profile: Profile) -> Recording:
         )
         for i, entry in enumerate(told.analogue)
     ]
-    return Recording(channels=tuple(channels), metadata=told.entries)
+    return Recording(
+        channels=tuple(channels), metadata=told.entries, warnings=_disagreement(time, stamps, told)
+    )
+
+
+def _disagreement(time: Array, stamps: Array, told: _Configuration) -> tuple[str, ...]:
+    """Rates and time stamps say the same twice; where they do not, one of them is damaged."""
+    by_rates, by_stamps = float(time[-1] - time[0]), float(stamps[-1] - stamps[0]) * told.time_factor
+    if not by_stamps > 0.0 or by_rates <= 0.0 or abs(by_stamps / by_rates - 1.0) < 0.01:
+        return ()
+    return (
+        f"the samples last {by_rates:.6g} s by the sampling rates and {by_stamps:.6g} s by their time stamps; "
+        "the rates are used",
+    )
 
 
 def _beside(path: Path, suffix: str) -> Path:
@@ -98,6 +111,7 @@ def _configuration(path: Path) -> _Configuration:
             row(2)
         row(1)
         declared = [row(2) for _ in range(max(int(row(1)[0]), 1))]
+        rates = tuple((float(rate), int(last)) for rate, last, *_ in declared)
         start, trigger = _instant(row(2)), _instant(row(2))
         kind = row(1)[0].upper()
         factor = float(rows[number][0]) if number < len(rows) and rows[number][0].strip() else 1.0
@@ -108,7 +122,7 @@ def _configuration(path: Path) -> _Configuration:
     return _Configuration(
         analogue=analogue,
         digital=digital_count,
-        rates=tuple((float(rate), int(last)) for rate, last, *_ in declared),
+        rates=rates,
         start=(start[0] - trigger[0]) + (start[1] - trigger[1]),
         kind=kind,
         time_factor=factor * 1e-6,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zipfile
 from pathlib import Path
+from tokenize import TokenError
 from typing import IO, Any
 
 import numpy as np
@@ -74,5 +75,5 @@ def _array(stream: IO[bytes], size: int, name: str, path: Path) -> np.ndarray[An
             )
         values = np.frombuffer(stream.read(declared), dtype=kind)
         return values.reshape(shape, order="F" if columns_first else "C")
-    except (ValueError, TypeError, SyntaxError, OverflowError, EOFError) as error:
+    except (ValueError, TypeError, SyntaxError, TokenError, OverflowError, EOFError) as error:
         raise RecordError(f"{path}: {name} is no intact NPY array ({error}); save it again") from error
