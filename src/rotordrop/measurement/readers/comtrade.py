@@ -74,8 +74,8 @@ def _disagreement(time: Array, stamps: Array, told: _Configuration) -> tuple[str
     if not by_stamps > 0.0 or by_rates <= 0.0 or abs(by_stamps / by_rates - 1.0) < 0.01:
         return ()
     return (
-        f"the samples last {by_rates:.6g} s by the sampling rates and {by_stamps:.6g} s by their time stamps; "
-        "the rates are used",
+        f"the samples last {by_rates:.6g} s by the sampling rates and {by_stamps:.6g} s by their time "
+        "stamps; the rates are used",
     )
 
 
