@@ -21,6 +21,7 @@ class Document(StrEnum):
     """Documents with a published schema."""
 
     machine = "machine"
+    numbers = "numbers"
     violations = "violations"
     estimate = "estimate"
     look = "look"
@@ -30,7 +31,8 @@ def schema(
     document: Annotated[
         Document,
         typer.Argument(
-            help="A machine file, violations for 'synthesize', or what 'rotordrop estimate --json' writes."
+            help="A machine file, the numbers of 'init --simple', violations for 'synthesize', or what "
+            "'rotordrop estimate --json' writes."
         ),
     ] = Document.machine,
     output: Annotated[
@@ -42,6 +44,8 @@ def schema(
     """Print the JSON Schema of a file or of an estimate, for editors and programs."""
     if document is Document.machine:
         from rotordrop.machine import machine_schema as schema_of
+    elif document is Document.numbers:
+        from rotordrop.machine.simple import simple_schema as schema_of
     elif document is Document.violations:
         from rotordrop.synthesis.violations import violations_schema as schema_of
     elif document is Document.look:

@@ -11,6 +11,7 @@ from rotordrop.errors import UsageError
 from rotordrop.machine.catalog import find_bearing
 from rotordrop.machine.machine import Machine
 from rotordrop.machine.rotor import Rotor
+from rotordrop.machine.schema import attribute_meanings
 from rotordrop.units import InSI, format_quantity, in_si
 
 STEEL_DENSITY, STEEL_MODULUS = 7850.0, 206e9
@@ -47,10 +48,16 @@ class SimpleMachine:
 
     Attributes
     ----------
-    mass, length, centre : float
-        Mass [kg] and length [m] of the rotor, and its centre of mass [m from its NDE end].
-    bearings, sensors : tuple of float
-        Two planes of touchdown bearings and two of sensors [m from the NDE end].
+    mass : float
+        Mass of the rotor [kg].
+    centre : float
+        Its centre of mass [m from its NDE end].
+    length : float
+        Length of the rotor [m].
+    bearings : tuple of float
+        Two planes of touchdown bearings [m from the NDE end].
+    sensors : tuple of float
+        Two planes of sensors [m from the NDE end].
     sensor_angle : float
         Direction of the first sensor of each plane, from +x [rad]; the second stands 90° before it.
     designation : str
@@ -82,6 +89,38 @@ class SimpleMachine:
     support: Literal["stiff", "soft"] | str
     preload: str | None = None
     name: str = "my machine"
+
+
+EXAMPLES = {
+    "mass": "60 kg",
+    "centre": "520 mm",
+    "length": "1.1 m",
+    "bearings": "110 mm, 980 mm",
+    "sensors": "180 mm, 900 mm",
+    "sensor_angle": "135 deg",
+    "designation": "7014 ACD/HCP4A",
+    "gap": "0.25 mm",
+    "speed": "9000 rpm",
+    "grade": "G 2.5",
+    "support": "stiff",
+    "preload": "300 N",
+}
+
+
+def simple_schema() -> dict[str, Any]:
+    """Give the JSON Schema (draft 2020-12) of the twelve numbers, as texts with units."""
+    meanings = attribute_meanings(str(SimpleMachine.__doc__))
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "rotordrop machine of twelve numbers",
+        "type": "object",
+        "properties": {
+            name: {"type": "string", "description": meanings[name], "examples": [example]}
+            for name, example in EXAMPLES.items()
+        },
+        "required": [name for name in EXAMPLES if name != "preload"],
+        "additionalProperties": False,
+    }
 
 
 def simple_machine(known: SimpleMachine) -> Machine:

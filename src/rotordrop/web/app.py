@@ -22,6 +22,7 @@ from starlette.routing import Route
 
 from rotordrop.errors import RotordropError, UsageError
 from rotordrop.web.guard import App, Guard
+from rotordrop.web.numbers import machine_of_numbers, schema_of_numbers
 from rotordrop.web.running import VERBS, Runner, Verb, published_run, result_folder, state_of
 from rotordrop.web.workspace import (
     LONGEST_OPTION,
@@ -364,6 +365,24 @@ def _options(given: Any) -> dict[str, Any]:
     return {name: value for name, value in given.items() if value != ""}
 
 
+async def _numbers(desk: Desk, request: Request) -> Response:
+    """The schema of the twelve numbers, from which the page makes its form."""
+    return Response(await asyncio.to_thread(schema_of_numbers), media_type="application/json")
+
+
+async def _machine_of_numbers(desk: Desk, request: Request) -> Response:
+    """Make the machine file of a job of twelve numbers."""
+    job, given = desk.job(request), await _order(request)
+    text = await asyncio.to_thread(machine_of_numbers, given)
+
+    async def body() -> AsyncIterator[bytes]:
+        yield text.encode()
+
+    entry = await receive(desk.space, job, "machine", "twelve_numbers.toml", None, body())
+    await asyncio.to_thread(desk.runner.forget, job)
+    return JSONResponse(entry, status_code=201)
+
+
 _RESULT = "/api/jobs/{job}/{verb}"
 WINDOW = ("column", "start", "end", "points")
 OPERATIONS = (
@@ -375,6 +394,8 @@ OPERATIONS = (
     Operation("GET", "/api/jobs/{job}", _job),
     Operation("DELETE", "/api/jobs/{job}", _remove),
     Operation("PUT", "/api/jobs/{job}/files/{role}", _upload, ("name",)),
+    Operation("GET", "/api/numbers", _numbers),
+    Operation("POST", "/api/jobs/{job}/numbers", _machine_of_numbers),
     Operation("POST", _RESULT, _ask),
     Operation("POST", f"{_RESULT}/cancel", _cancel),
     Operation("GET", f"{_RESULT}/page", _found_page),

@@ -392,6 +392,18 @@ async function chooseFiles(list) {
   };
 }
 
+by("numbers").addEventListener("toggle", async () => {
+  if (!by("numbers").open || by("numberfields").children.length) { return; }
+  try {
+    const { properties, required } = await server.numbers();
+    by("numberfields").replaceChildren(...Object.entries(properties).map(([name, { description, examples }]) => make("label", {
+      of: [make("span", { text: required.includes(name) ? description : `${description} (optional)` }), make("input", { name, placeholder: examples[0], maxlength: 120, autocomplete: "off" })]
+    })));
+    by("numberfields").querySelector("input").focus();
+  } catch (error) { say(error.message, "bad"); }
+});
+const numbersGiven = () => Object.fromEntries([...by("numberfields").querySelectorAll("input")].map((one) => [one.name, one.value.trim()]).filter(([, value]) => value));
+
 async function sendFiles(pairs) {
   const records = pairs.filter(([what]) => what === "record"), others = pairs.filter(([what]) => what !== "record");
   if (!records.length) { say("None of these files is a record.", "bad"); return; }
@@ -403,6 +415,8 @@ async function sendFiles(pairs) {
         say(`Sending ${file.name} …`, "notice");
         await server.send(job.id, what, file);
       }
+      const numbers = numbersGiven();
+      if (Object.keys(numbers).length && !others.some(([what]) => what === "machine")) { await server.sendNumbers(job.id, numbers); }
       await server.begin(job.id, "look");
     } catch (error) { await server.remove(job.id); throw error; }
     last = job.id;

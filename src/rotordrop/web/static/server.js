@@ -28,6 +28,8 @@ export const remove = (id) => ask("DELETE", `/api/jobs/${id}`);
 export const send = (id, role, file) =>
   ask("PUT", `/api/jobs/${id}/files/${role}?name=${encodeURIComponent(file.name)}`, file);
 export const begin = async (id, verb, options) => (await ask("POST", `/api/jobs/${id}/${verb}`, order(options))).json();
+export const numbers = async () => (await ask("GET", "/api/numbers")).json();
+export const sendNumbers = (id, values) => ask("POST", `/api/jobs/${id}/numbers`, order(values));
 export const cancel = async (id, verb) => (await ask("POST", result(id, verb, "cancel"))).json();
 export const page = async (id, verb) => (await ask("GET", result(id, verb, "page"))).json();
 export const field = async (id, plane, part) =>

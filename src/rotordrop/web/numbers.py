@@ -1,0 +1,75 @@
+"""A machine of twelve numbers: schema and machine file come from the commands, in a process of their own."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from functools import lru_cache
+from typing import Any
+
+from rotordrop.errors import UsageError
+from rotordrop.web.workspace import LONGEST_OPTION, labelled
+
+PATIENCE_S = 60.0
+_PROGRAM = (
+    "import json, sys; order = json.loads(sys.argv[1]); sys.path[:] = order['sys_path']; "
+    "sys.argv[:] = ['rotordrop', *order['arguments']]; from rotordrop.__main__ import main; main()"
+)
+
+
+@lru_cache(maxsize=1)
+def schema_of_numbers() -> str:
+    """The JSON Schema of the twelve numbers."""
+    return _said_by(["schema", "numbers"])
+
+
+def machine_of_numbers(given: dict[str, Any]) -> str:
+    """The text of a machine file of twelve numbers.
+
+    Parameters
+    ----------
+    given : dict
+        Texts with units by name, as the schema says.
+
+    Raises
+    ------
+    UsageError
+        When one is missing, unknown or no text, or they make no machine.
+    """
+    schema = json.loads(schema_of_numbers())
+    for name, value in given.items():
+        if name not in schema["properties"]:
+            raise UsageError(
+                f"there is no number {labelled(name)!r}; there are {', '.join(schema['properties'])}"
+            )
+        if not isinstance(value, str) or len(value) > LONGEST_OPTION or "\0" in value:
+            raise UsageError(f"{name} is {labelled(str(value))!r}; expected a short text with a unit")
+    said = {name: value.strip() for name, value in given.items() if value.strip()}
+    missing = [name for name in schema["required"] if name not in said]
+    if missing:
+        raise UsageError(f"of the twelve numbers {', '.join(missing)} are missing")
+    options = [f"--{name.replace('_', '-')}={value}" for name, value in said.items()]
+    return _said_by(["init", "--simple", *options, "-"])
+
+
+def _said_by(arguments: list[str]) -> str:
+    order = {"sys_path": [entry for entry in sys.path if entry], "arguments": arguments}
+    try:
+        order_text = json.dumps(order)
+        done = subprocess.run(
+            [sys.executable, "-I", "-c", _PROGRAM, order_text],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            timeout=PATIENCE_S,
+            env=os.environ | {"NO_COLOR": "1", "COLUMNS": "1000", "PYTHONIOENCODING": "utf-8"},
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        raise UsageError(f"these numbers gave no machine within {PATIENCE_S:g} s") from None
+    except (ValueError, UnicodeError):
+        raise UsageError("these numbers cannot be read; give texts with units") from None
+    if done.returncode != 0:
+        raise UsageError(done.stderr.decode("utf-8", "replace").strip() or "these numbers make no machine")
+    return done.stdout.decode("utf-8")
