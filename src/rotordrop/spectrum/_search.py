@@ -13,7 +13,7 @@ from scipy.ndimage import label
 from rotordrop.spectrum._clock import TURN, Clock, View
 from rotordrop.spectrum._found_line import FIVE_MOMENTS, FoundLine, path_range, radius
 from rotordrop.spectrum.detection import Peak, clearest_peak, median_of_known, stretches_of
-from rotordrop.spectrum.line_extraction import Envelope, Offset, drift_phase, mean_offset, smooth
+from rotordrop.spectrum.line_extraction import Envelope, Offset, drift_phase, mean_offset, power_share, smooth
 from rotordrop.spectrum.line_settings import LineSettings
 from rotordrop.spectrum.line_spectra import offset_power
 from rotordrop.spectrum.naming import LineKind
@@ -321,7 +321,7 @@ class LineSearch:
         coordinate: float,
         error: float,
     ) -> FoundLine:
-        weight = _weight(envelope, present)
+        weight = power_share(envelope, present)
         frequency = self._clock.rate_of(envelope.phase)
         mean = float(np.sum(weight * frequency))
         speed = float(np.sum(weight * self._clock.speed))
@@ -471,7 +471,7 @@ class LineSearch:
             taken,
             peak,
             kind="combination",
-            frequency=float(np.sum(_weight(envelope, present) * frequency)),
+            frequency=float(np.sum(power_share(envelope, present) * frequency)),
             frequency_error=partner.frequency_error,
             order=None,
             order_error=None,
@@ -497,9 +497,3 @@ def _closed(mask: Mask, gap: int) -> Mask:
         if begin - end < gap:
             filled[end:begin] = True
     return filled
-
-
-def _weight(envelope: Envelope, present: Mask) -> Array:
-    """Share of the line's power at each sample [1], where it is present."""
-    power = np.where(present[:, None], np.abs(envelope.value) ** 2, 0.0).sum(axis=1)
-    return cast(Array, power / power.sum())

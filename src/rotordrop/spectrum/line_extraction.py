@@ -101,6 +101,12 @@ def extract(signal: Array, sampling_rate: float, phase: Array, *, bandwidth: flo
     return Envelope(value=found, phase=phase)
 
 
+def power_share(envelope: Envelope, present: NDArray[np.bool_]) -> Array:
+    """Share of the line's power at each sample [1], where it is present."""
+    power = np.where(present[:, None], np.abs(envelope.value) ** 2, 0.0).sum(axis=1)
+    return cast(Array, power / power.sum())
+
+
 @dataclass(frozen=True, kw_only=True)
 class Offset:
     """How far a line's true frequency (or order) lies from the assumed one.
