@@ -58,7 +58,13 @@ def rest_on(
     scale = float(np.max(np.diag(fe.stiffness)))
     system = np.block([[fe.stiffness, -scale * rows.T], [-scale * rows, -(scale**2) * give]])
     right = np.concatenate([weight_vector(fe, gravity), np.zeros(held)])
-    solution = solve(system, right)
+    try:
+        solution = solve(system, right)
+    except np.linalg.LinAlgError as error:
+        raise SimulationError(
+            "the shaft cannot hold its own weight: some of it is too thin or soft beside the rest for the "
+            "numbers of a computer; check the diameters of the sections and the moduli of the materials"
+        ) from error
     return solution[: fe.size], scale * solution[fe.size :]
 
 
