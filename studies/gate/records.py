@@ -2,8 +2,8 @@
 
 Usage: python studies/gate/records.py FOLDER FIRST LAST
 
-A seed draws rotor, hidden machine, speed, sampling rate, noise and converter. Seeds below 1000 were used
-while the gate was built, those from 1000 on only to score it.
+A seed draws rotor, hidden machine, speed, sampling rate, noise and converter. Seeds below 1020 were used
+while the gate was built, those from 1020 on only to score it.
 """
 
 from __future__ import annotations
