@@ -152,6 +152,7 @@ def parameter_scores(calibration: Any, made: SyntheticDrop) -> dict[str, Any]:
             ("friction.dynamic", truth["contact"][i]["mu_d"]),
             ("preload", truth["bearing"][i]["preload_N"]),
             ("race.inertia", truth["ring"][i]["Ip"]),
+            ("damping_time", truth["bearing"][i]["Cb_over_Kb"]),
         ):
             value = calibration.values[f"{name}.{path}"]
             scores[f"{name}.{path}"] = {

@@ -112,14 +112,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("kind", choices=("lp400", "small"))
     parser.add_argument("seeds", type=int, nargs="*")
+    parser.add_argument("--out", type=Path, default=RESULTS)
     chosen = parser.parse_args()
-    RESULTS.mkdir(parents=True, exist_ok=True)
+    chosen.out.mkdir(parents=True, exist_ok=True)
     for seed in chosen.seeds:
         drops = study(chosen.kind, seed)
-        target = RESULTS / f"{chosen.kind}_{seed}.json"
+        target = chosen.out / f"{chosen.kind}_{seed}.json"
         target.write_text(json.dumps({"kind": chosen.kind, "seed": seed, "drops": drops}, indent=1) + "\n")
-    text = summary(RESULTS)
-    (RESULTS / "summary.md").write_text(text + "\n")
+    text = summary(chosen.out)
+    (chosen.out / "summary.md").write_text(text + "\n")
     print(text)
 
 

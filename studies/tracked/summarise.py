@@ -205,6 +205,7 @@ def main() -> None:
     for name, results in right.items():
         figures = collect(results)
         figures["replay"] = replayed(folder, results[0]["kind"])
+        route = f"; the paper's route failed on {len(figures['replay']['failed'])} drops"
         summary[name] = figures
         lines += [
             f"## {name}",
@@ -212,13 +213,14 @@ def main() -> None:
             f"{figures['machines']} machines, {figures['drops']} drops, {figures['lost']} lost, flagged "
             f"inconsistent {shown('', figures['flagged_inconsistent'])}, "
             f"{figures['seconds_per_drop_median']:.1f} s per drop, "
-            f"{figures['seconds_per_calibration_median']:.1f} s per calibration on busy cores; the paper's "
-            f"route failed on {len(figures['replay']['failed'])} drops.",
+            f"{figures['seconds_per_calibration_median']:.1f} s per calibration on busy cores"
+            f"{route if figures['replay']['errors'] else ''}.",
             "",
             *kind_table(figures),
             "",
         ]
-    lines += ["## Wrong structure", "", *violation_table(wrong), ""]
+    if wrong:
+        lines += ["## Wrong structure", "", *violation_table(wrong), ""]
     for name, results in wrong.items():
         summary[name] = collect(results)
     (folder / "summary.json").write_text(json.dumps(summary, indent=1))

@@ -103,7 +103,11 @@ def _bearing(
         float(bearing.friction.static) / float(bearing.friction.dynamic), values["friction.dynamic"]
     )
     values["equivalent_stiffness_N_per_m"] = equivalent_stiffness(
-        bearing, float(evidence.model.load_shares[b]), values["support.stiffness_N_per_m"]
+        evidence.model.machine,
+        b,
+        float(evidence.model.load_shares[b]),
+        values["support.stiffness_N_per_m"],
+        values.get("preload_N"),
     )
     inferred = numbers_of(bearing).stress_sigma
     means = {

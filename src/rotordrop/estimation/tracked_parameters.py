@@ -11,7 +11,7 @@ import numpy as np
 from rotordrop.estimated import NINETY, IdentifiedValue, Verdict
 from rotordrop.estimation.estimate import FittedParameter, SensorErrors
 from rotordrop.estimation.tracked_loads import INCONSISTENT, OF_CROSS_CHECK, with_interval
-from rotordrop.machine import TouchdownBearing
+from rotordrop.machine import Machine
 from rotordrop.model.bearing_numbers import numbers_of
 from rotordrop.model.parameter import Parameter
 from rotordrop.model.parameter_table import parameter, published
@@ -141,7 +141,11 @@ def bearing_values(
         ratio = float(bearing.friction.static) / float(bearing.friction.dynamic)
         values["friction.static"] = static_friction(ratio, values["friction.dynamic"])
     values["equivalent_stiffness_N_per_m"] = equivalent_stiffness(
-        bearing, float(problem.model.load_shares[b]), values["support.stiffness_N_per_m"]
+        problem.model.machine,
+        b,
+        float(problem.model.load_shares[b]),
+        values["support.stiffness_N_per_m"],
+        values.get("preload_N"),
     )
     return values
 
@@ -158,21 +162,40 @@ def static_friction(ratio: float, dynamic: IdentifiedValue) -> IdentifiedValue:
     )
 
 
-def equivalent_stiffness(bearing: TouchdownBearing, load: float, support: IdentifiedValue) -> IdentifiedValue:
-    """Support and bearing in series [N/m], the bearing by its tangent at its static load [N]."""
-    races = numbers_of(bearing).tangent_stiffness(load)
+def equivalent_stiffness(
+    machine: Machine, b: int, load: float, support: IdentifiedValue, preload: IdentifiedValue | None
+) -> IdentifiedValue:
+    """Support and bearing in series [N/m], the bearing by its tangent at its static load [N].
+
+    What holds the balls is not well known, the preload from the record or a clearance from the machine file,
+    and the interval holds it beside that of the support.
+    """
+    bearing = machine.touchdown_bearings[b]
+    path = "preload" if preload is not None else "clearance"
+    held = preload if preload is not None else getattr(bearing.bearing, path, None)
+
+    def races(value: float) -> float:
+        changed = machine.with_values({f"{bearing.name}.bearing.{path}": value})
+        return numbers_of(changed.touchdown_bearings[b]).tangent_stiffness(load)
+
+    within = (held.interval_90 or getattr(held, "range", None)) if held is not None else None
+    own = numbers_of(bearing).tangent_stiffness(load) if held is None else races(float(held))
+    softer, stiffer = (own, own) if within is None else sorted(map(races, within))
+    value = _series(support.value, own)
     low, high = support.interval_90 or (support.value, support.value)
-
-    def series(stiffness: float) -> float:
-        return stiffness * races / (stiffness + races)
-
+    down = math.hypot(value - _series(low, own), value - _series(support.value, softer))
+    up = math.hypot(_series(high, own) - value, _series(support.value, stiffer) - value)
     return replace(
         support,
-        value=series(support.value),
-        interval_90=(series(low), series(high)),
-        standard_error=(series(high) - series(low)) / (2.0 * NINETY),
+        value=value,
+        interval_90=(value - down, value + up),
+        standard_error=(down + up) / (2.0 * NINETY),
         start=None,
     )
+
+
+def _series(one: float, other: float) -> float:
+    return one * other / (one + other)
 
 
 def sensor_errors(

@@ -226,12 +226,20 @@ def add_support_form(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
 
 
 @inner_kernel
+def elastic_ball_force(b: int, y: Array, p: KernelParameters, work: Array) -> tuple[float, float]:
+    """Elastic force [N] of the balls of one bearing against the deflection of its race, x and y."""
+    race_x, race_y = race_deflection(b, y, p)
+    return ball_set_force(p.bearing[b, L.BALL_SET : L.BALL_SET_END], p.balls[b], race_x, race_y, work)
+
+
+@inner_kernel
 def bearing_accelerations(
-    b: int, y: Array, omega: float, p: KernelParameters, dy: Array, work: Array
+    b: int, y: Array, omega: float, p: KernelParameters, F_x: float, F_y: float, dy: Array
 ) -> tuple[float, float]:
     """Forces at one touchdown bearing, added to rotor, race, support and spin.
 
-    Returns the friction torque on the rotor [N m] (positive drives it) and the power dissipated [W].
+    ``F_x`` and ``F_y`` are the `elastic_ball_force` [N]. Returns the friction torque on the rotor [N m]
+    (positive drives it) and the power dissipated [W].
     """
     n_q = p.rotor_at[L.N_COORDINATES]
     r, h, spin = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.RACE_SPIN]
@@ -239,8 +247,6 @@ def bearing_accelerations(
     shape = p.bearing_shape[b]
     ux, uy, vx, vy = relative_motion(b, y, p)
     delta, F_r, mu, nx, ny, v_t, elastic = contact_state(ux, uy, vx, vy, omega, y[spin], row)
-    race_x, race_y = race_deflection(b, y, p)
-    F_x, F_y = ball_set_force(row[L.BALL_SET : L.BALL_SET_END], p.balls[b], race_x, race_y, work)
     drag = race_drag_torque(
         math.sqrt(F_x * F_x + F_y * F_y),
         y[spin],
@@ -304,16 +310,30 @@ def drop_derivative(t: float, y: Array, p: KernelParameters, dy: Array, work: Ar
     """
     n_q, i_w = p.rotor_at[L.N_COORDINATES], p.rotor_at[L.ROTOR_SPEED]
     omega = y[i_w]
-    rates, accelerations = dy[:n_q], dy[n_q : 2 * n_q]
-    velocities = y[n_q : 2 * n_q]
+    accelerations = dy[n_q : 2 * n_q]
     for i in range(n_q):
         accelerations[i] = 0.0
     contact_torque = 0.0
     dissipated = 0.0
     for b in range(p.bearing.shape[0]):
-        torque, lost = bearing_accelerations(b, y, omega, p, dy, work)
+        F_x, F_y = elastic_ball_force(b, y, p, work)
+        torque, lost = bearing_accelerations(b, y, omega, p, F_x, F_y, dy)
         contact_torque += torque
         dissipated += lost
+    add_rotor_rates(t, y, contact_torque, dissipated, p, dy)
+
+
+@inner_kernel
+def add_rotor_rates(
+    t: float, y: Array, contact_torque: float, dissipated: float, p: KernelParameters, dy: Array
+) -> None:
+    """Add what is the rotor's own to the forces of the bearings: its spin, its lateral motion, the books.
+
+    ``contact_torque`` [N m] is what the bearings drive it with, ``dissipated`` [W] what is lost there.
+    """
+    n_q, i_w = p.rotor_at[L.N_COORDINATES], p.rotor_at[L.ROTOR_SPEED]
+    omega = y[i_w]
+    rates, velocities = dy[:n_q], y[n_q : 2 * n_q]
     air = aerodynamic_deceleration(t, omega, p)
     omega_dot = air
     put_in = p.spin[L.POLAR_INERTIA] * air * omega

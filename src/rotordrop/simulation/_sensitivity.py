@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rotordrop.model import layout as L
 from rotordrop.model.layout import KernelParameters
 from rotordrop.physics import aerodynamics, contact, support
-from rotordrop.physics._compile import kernel
+from rotordrop.physics._compile import kernel, lean_kernel
 from rotordrop.physics.ball_set import ball_set_gradient
 from rotordrop.physics.elementary import sine_cosine, tanh
 from rotordrop.physics.friction import stribeck_gradient
@@ -32,7 +32,7 @@ PRESCRIBED = aerodynamics.PRESCRIBED_SPEED
 OF_SPEED = aerodynamics.FUNCTION_OF_SPEED
 
 
-@kernel
+@lean_kernel
 def contact_gradient(
     ux: float, uy: float, vx: float, vy: float, omega: float, omega_i: float, bearing: Array, g: Array
 ) -> bool:
@@ -86,7 +86,7 @@ def contact_gradient(
     return True
 
 
-@kernel
+@lean_kernel
 def _rotor_jacobian(y: Array, p: KernelParameters, J: Array) -> None:
     m = p.eigenvalue.shape[0]
     x, z, n_q = p.rotor_at[L.MODES_X], p.rotor_at[L.MODES_Y], p.rotor_at[L.N_COORDINATES]
@@ -117,7 +117,7 @@ def _rotor_jacobian(y: Array, p: KernelParameters, J: Array) -> None:
         J[ry, i_a] += w2 * (uc * c - us * s)
 
 
-@kernel
+@lean_kernel
 def _contact_jacobian(b: int, g: Array, p: KernelParameters, J: Array) -> None:
     x, z, n_q = p.rotor_at[L.MODES_X], p.rotor_at[L.MODES_Y], p.rotor_at[L.N_COORDINATES]
     r, spin = p.bearing_at[b, L.RACE], p.bearing_at[b, L.RACE_SPIN]
@@ -145,7 +145,7 @@ def _contact_jacobian(b: int, g: Array, p: KernelParameters, J: Array) -> None:
         _spread(n_q + z + k, -shape[k], g[1], b, p, J)
 
 
-@kernel
+@lean_kernel
 def _spread(place: int, factor: float, g: Array, b: int, p: KernelParameters, J: Array) -> None:
     """Add one row of the contact derivatives to the columns of rotor modes, race and spins."""
     x, z, n_q = p.rotor_at[L.MODES_X], p.rotor_at[L.MODES_Y], p.rotor_at[L.N_COORDINATES]
@@ -168,7 +168,7 @@ def _spread(place: int, factor: float, g: Array, b: int, p: KernelParameters, J:
     J[place, p.bearing_at[b, L.RACE_SPIN]] += factor * g[5]
 
 
-@kernel
+@lean_kernel
 def _support_form_jacobian(b: int, y: Array, p: KernelParameters, J: Array) -> None:
     """Add the derivative of `add_support_form`."""
     n_q, h, own = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.BEARING_OWN]
@@ -204,7 +204,7 @@ def _support_form_jacobian(b: int, y: Array, p: KernelParameters, J: Array) -> N
             J[own + 2 + i, own + 2 + i] -= 2.0 * form[support.FOUNDATION_DAMPING] * speed
 
 
-@kernel
+@lean_kernel
 def _bearing_jacobian(b: int, y: Array, p: KernelParameters, J: Array, g: Array) -> bool:
     n_q = p.rotor_at[L.N_COORDINATES]
     r, h, spin = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.RACE_SPIN]
@@ -263,7 +263,7 @@ def drop_jacobian(t: float, y: Array, p: KernelParameters, J: Array) -> None:
     _deceleration_jacobian(t, y, p, J)
 
 
-@kernel
+@lean_kernel
 def _deceleration_jacobian(t: float, y: Array, p: KernelParameters, J: Array) -> None:
     m = p.eigenvalue.shape[0]
     x, z, n_q = p.rotor_at[L.MODES_X], p.rotor_at[L.MODES_Y], p.rotor_at[L.N_COORDINATES]
@@ -274,7 +274,7 @@ def _deceleration_jacobian(t: float, y: Array, p: KernelParameters, J: Array) ->
             J[n_q + z + k, x + j] += omega_dot * p.polar[k, j]
 
 
-@kernel
+@lean_kernel
 def drop_jacobian_parts(
     t: float, y: Array, p: KernelParameters, J: Array, g: Array, touching: IntArray
 ) -> None:
@@ -298,7 +298,7 @@ def drop_jacobian_parts(
         _magnet_jacobian(p, J)
 
 
-@kernel
+@lean_kernel
 def _magnet_jacobian(p: KernelParameters, J: Array) -> None:
     m, n_q = p.eigenvalue.shape[0], p.rotor_at[L.N_COORDINATES]
     for a in range(p.magnet.shape[0]):

@@ -14,16 +14,13 @@ from numpy.typing import NDArray
 from rotordrop.model import layout as L
 from rotordrop.model.layout import KernelParameters
 from rotordrop.physics._compile import inner_kernel, kernel
-from rotordrop.physics.aerodynamics import PRESCRIBED_SPEED
 from rotordrop.physics.ball_set import ball_set_force, ball_set_load
 from rotordrop.physics.contact import contact_force
 from rotordrop.physics.elementary import exp, sine_cosine
 from rotordrop.physics.friction import stribeck_coefficient
 from rotordrop.physics.spin import race_drag_torque, surface_speed
 from rotordrop.simulation._rhs import (
-    add_magnet_forces,
-    add_rotor_accelerations,
-    aerodynamic_deceleration,
+    add_rotor_rates,
     modal_parts,
 )
 
@@ -272,8 +269,7 @@ def race_tilts(force_x: float, force_y: float, e: int, y: Array, s: Array, dy: A
 @inner_kernel
 def hidden_derivative(t: float, y: Array, p: KernelParameters, s: Array, dy: Array, work: Array) -> None:
     """Time derivative of the state of a hidden machine; bearings first, for their torque turns the rotor."""
-    n_q, i_w = p.rotor_at[L.N_COORDINATES], p.rotor_at[L.ROTOR_SPEED]
-    omega = y[i_w]
+    n_q = p.rotor_at[L.N_COORDINATES]
     for i in range(n_q, 2 * n_q):
         dy[i] = 0.0
     torque = 0.0
@@ -282,22 +278,7 @@ def hidden_derivative(t: float, y: Array, p: KernelParameters, s: Array, dy: Arr
         drives, lost = hidden_bearing(t, b, y, p, s, dy, work)
         torque += drives
         dissipated += lost
-    air = aerodynamic_deceleration(t, omega, p)
-    omega_dot = air
-    put_in = p.spin[L.POLAR_INERTIA] * air * omega
-    if p.flags[L.SPIN_MODE] != PRESCRIBED_SPEED:
-        omega_dot += torque / p.spin[L.POLAR_INERTIA]
-    else:
-        put_in -= torque * omega
-    lost, gained = add_rotor_accelerations(y, omega, omega_dot, p, dy)
-    if p.flags[L.MAGNETS_ACT] != 0:
-        gained += add_magnet_forces(t, y, p, dy)
-    for i in range(n_q):
-        dy[i] = y[n_q + i]
-    dy[i_w] = omega_dot
-    dy[p.rotor_at[L.ROTOR_ANGLE]] = omega
-    dy[p.rotor_at[L.DISSIPATED]] = dissipated + lost
-    dy[p.rotor_at[L.WORK_IN]] = put_in + gained
+    add_rotor_rates(t, y, torque, dissipated, p, dy)
 
 
 @kernel

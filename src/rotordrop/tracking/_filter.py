@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from rotordrop.model import layout as L
 from rotordrop.model.layout import KernelParameters
-from rotordrop.physics._compile import kernel
+from rotordrop.physics._compile import kernel, lean_kernel
 from rotordrop.physics.elementary import exp, sine_cosine
 from rotordrop.tracking._propagation import (
     FilterSettings,
@@ -55,7 +55,7 @@ class SensorForm(NamedTuple):
     longest: Array
 
 
-@kernel
+@lean_kernel
 def seen_by(c: int, at: Array, sensor_row: Array, form: SensorForm, s: int) -> float:
     """Displacement [m] that sensor ``c`` sees of a state, with the terms of its form."""
     seen = 0.0
@@ -93,7 +93,7 @@ def lag_step(before: Array, after: Array, form: SensorForm, dt: float, F: Array)
         after[i] = a * before[i] + (b - a) * first + (1.0 - b) * last
 
 
-@kernel
+@lean_kernel
 def _add_seen(c: int, i: int, at: Array, form: SensorForm, weight: float, F: Array) -> None:
     """Add to row ``i`` of ``F`` the derivative of what sensor ``c`` saw at the sample before."""
     s = F.shape[0]
@@ -126,7 +126,7 @@ def _add_seen_after(c: int, i: int, at: Array, form: SensorForm, weight: float, 
                 F[i, e] += weight * row[j] * F[j, e]
 
 
-@kernel
+@lean_kernel
 def scalar_update(
     mean: Array, P: Array, row: Array, innovation: float, variance: float, gain: Array
 ) -> float:
@@ -163,7 +163,7 @@ def scalar_update(
     return S
 
 
-@kernel
+@lean_kernel
 def measurement_row(
     c: int, at: Array, angle: float, sensor_row: Array, first: int, n_c: int, form: SensorForm, row: Array
 ) -> float:
@@ -200,7 +200,7 @@ def measurement_row(
     return predicted
 
 
-@kernel
+@lean_kernel
 def soften_friction(P: Array, least: Array, p: KernelParameters) -> None:
     """Smooth the sign of friction by how well each race spin is known, never less than ``least`` (B,) [m/s].
 
@@ -214,7 +214,7 @@ def soften_friction(P: Array, least: Array, p: KernelParameters) -> None:
         p.bearing[b, L.SMOOTHING_SPEED] = math.sqrt(least[b] * least[b] + spread * spread)
 
 
-@kernel
+@lean_kernel
 def symmetrise(P: Array) -> None:
     """Replace a matrix by its symmetric part in place."""
     for i in range(P.shape[0]):
@@ -222,6 +222,27 @@ def symmetrise(P: Array) -> None:
             value = 0.5 * (P[i, j] + P[j, i])
             P[i, j] = value
             P[j, i] = value
+
+
+@lean_kernel
+def pack(P: Array, out: Compact) -> None:
+    """Store the lower half of a symmetric matrix (n, n) row by row in ``out`` (n (n + 1) / 2,)."""
+    e = 0
+    for i in range(P.shape[0]):
+        for j in range(i + 1):
+            out[e] = P[i, j]
+            e += 1
+
+
+@lean_kernel
+def unpack(packed: Compact, P: Array) -> None:
+    """Fill a symmetric matrix (n, n) from what `pack` stored."""
+    e = 0
+    for i in range(P.shape[0]):
+        for j in range(i + 1):
+            P[i, j] = packed[e]
+            P[j, i] = packed[e]
+            e += 1
 
 
 @kernel
@@ -264,8 +285,8 @@ def forward_pass(
         What the sensors do beyond gain, offset and runout.
     reference : ndarray, shape (M, n)
         Trajectory to linearise at for the first M samples; the filter's own mean afterwards.
-    means, covariances : ndarray, shapes (N, n), (N, n, n) or (N, 0, 0)
-        Filled with the filtered estimate; covariances only when there is room.
+    means, covariances : ndarray, shapes (N, n), (N, n (n + 1) / 2) or (N, 0)
+        Filled with the filtered estimate; covariances, as `pack` stores them, only when there is room.
     transitions : ndarray, shape (N, s, s + P) or (0, ...)
         Filled with the sensitivity from the sample before.
     rows, gains : ndarray, shape (N, C + 1, n) or (0, ...)
@@ -363,7 +384,7 @@ def forward_pass(
         symmetrise(P)
         means[i] = mean
         if covariances.shape[1] > 0:
-            covariances[i] = P
+            pack(P, covariances[i])
         if not is_covariance(P) or not is_plausible(mean, p):
             return i
     return len(times)
@@ -381,7 +402,7 @@ def is_plausible(mean: Array, p: KernelParameters) -> bool:
     return good
 
 
-@kernel
+@lean_kernel
 def is_covariance(P: Array) -> bool:
     """Whether all variances are finite and none is negative; what fails was a filter that diverged."""
     good = True
@@ -433,10 +454,11 @@ def backward_pass(
     # its curvature. That way no covariance is inverted, and a parameter known exactly does no harm.
     lam = final_score
     Lam = final_information
+    P = np.empty((n, n))
     seen = np.empty(n, dtype=np.int64)
     left = kept.shape[0] - 1
     for i in range(n_t - 1, -1, -1):
-        P = covariances[i].astype(np.float64)
+        unpack(covariances[i], P)
         smoothed[i] = means[i] - np.dot(P, lam)
         spread = np.dot(watched, P)
         blocks[i] = np.dot(spread, watched.T) - np.dot(np.dot(spread, Lam), spread.T)

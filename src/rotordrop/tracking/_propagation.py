@@ -9,11 +9,16 @@ from numpy.typing import NDArray
 
 from rotordrop.model import layout as L
 from rotordrop.model.layout import KernelParameters
-from rotordrop.physics._compile import kernel
+from rotordrop.physics._compile import kernel, lean_kernel
 from rotordrop.physics.aerodynamics import PRESCRIBED_SPEED
 from rotordrop.physics.elementary import exp, power
 from rotordrop.simulation._loop import contact_at
-from rotordrop.simulation._rhs import drop_derivative
+from rotordrop.simulation._rhs import (
+    add_rotor_rates,
+    bearing_accelerations,
+    drop_derivative,
+    elastic_ball_force,
+)
 from rotordrop.simulation._sensitivity import drop_jacobian_parts
 
 Array = NDArray[np.float64]
@@ -28,6 +33,9 @@ SCALE_BEARING = 4
 AT_TYPICAL_DEPTH = 5
 SCALE_MODES = 6
 
+# How a parameter acts on an owner.
+NOT, PLAINLY, BY_BALLS = range(3)
+
 
 class ParameterTargets(NamedTuple):
     """Which kernel entries the unknown parameters set; R targets, P parameters, U unbalance planes.
@@ -37,10 +45,16 @@ class ParameterTargets(NamedTuple):
     standard deviation of the random walk of each parameter per square root of a second, ``late_drift`` the
     same later in a drop; ``plane_shape`` (U, m) mode shapes of the planes. Beyond ``lower`` and ``upper``
     (P,) the model takes the bound: what drifts without being seen must not make it unstable. ``mean`` (P,)
-    is the prior mean. ``eigenvalue`` (m,) are those of the rotor as described.
+    is the prior mean. ``eigenvalue`` (m,) are those of the rotor as described. ``acts`` (P, B + 1) says
+    whether a parameter acts on the forces of a bearing, with its balls or without, and in the last column
+    whether on the rotor's own. ``together`` lists for each parameter, from ``starts`` (P + 1,) on, the
+    targets that write where it writes, in their order: what has to be written again when it alone changes.
     """
 
     target: IntArray
+    acts: IntArray
+    together: IntArray
+    starts: IntArray
     factor: Array
     logarithmic: IntArray
     step: Array
@@ -80,20 +94,21 @@ def apply_parameters(theta: Array, targets: ParameterTargets, p: KernelParameter
     for k in range(theta.shape[0]):
         values[k] = bounded_value(k, theta[k], targets, 0.0)
     powers = np.ones(targets.target.shape[0])
-    for k in range(theta.shape[0]):
-        update_powers(k, values[k], targets, powers)
-    write_values(values, powers, targets, p)
+    every = np.arange(targets.target.shape[0])
+    update_powers(every, values, targets, powers)
+    write_values(every, values, powers, targets, p)
 
 
-@kernel
-def update_powers(k: int, value: float, targets: ParameterTargets, powers: Array) -> None:
-    """Factors on entries that follow parameter ``k`` as a power of a typical depth, one for each target."""
-    for i in range(targets.target.shape[0]):
-        if targets.target[i, 0] == k and targets.target[i, 1] == AT_TYPICAL_DEPTH:
-            powers[i] = power(targets.factor[i], exp(targets.mean[k]) - value)
+@lean_kernel
+def update_powers(which: IntArray, values: Array, targets: ParameterTargets, powers: Array) -> None:
+    """Factors on entries that follow a parameter as a power of a typical depth, for some of the targets."""
+    for i in which:
+        if targets.target[i, 1] == AT_TYPICAL_DEPTH:
+            k = targets.target[i, 0]
+            powers[i] = power(targets.factor[i], exp(targets.mean[k]) - values[k])
 
 
-@kernel
+@lean_kernel
 def bounded_value(k: int, theta: float, targets: ParameterTargets, step: float) -> float:
     """Parameter ``k`` as the model takes it: within its bounds, then a step on, and no longer a logarithm."""
     # The step comes after the bounds: at its bound a parameter keeps a slope and can be led back.
@@ -101,11 +116,13 @@ def bounded_value(k: int, theta: float, targets: ParameterTargets, step: float) 
     return exp(within) if targets.logarithmic[k] != 0 else within
 
 
-@kernel
-def write_values(values: Array, powers: Array, targets: ParameterTargets, p: KernelParameters) -> None:
-    """Write parameters into the kernel arrays; logarithmic ones come as the values themselves."""
+@lean_kernel
+def write_values(
+    which: IntArray, values: Array, powers: Array, targets: ParameterTargets, p: KernelParameters
+) -> None:
+    """Write some of the targets into the kernel arrays; logarithmic ones come as the values themselves."""
     cleared = False
-    for i in range(targets.target.shape[0]):
+    for i in which:
         kind = targets.target[i, 1]
         row = targets.target[i, 2]
         column = targets.target[i, 3]
@@ -137,6 +154,26 @@ def write_values(values: Array, powers: Array, targets: ParameterTargets, p: Ker
                     p.unbalance_sin[j] += value * targets.plane_shape[row, j]
 
 
+@lean_kernel
+def rates_by_owner(
+    t: float, owner: int, y: Array, p: KernelParameters, ball_force: Array, torque: float, out: Array
+) -> float:
+    """The part of the right-hand side that one bearing gives, or with owner −1 the rotor's own, in ``out``.
+
+    ``ball_force`` (2,) is the elastic force of the balls [N], ``torque`` [N m] what the bearings drive the
+    rotor with. Returns the torque that this bearing gives.
+    """
+    for i in range(out.shape[0]):
+        out[i] = 0.0
+    if owner < 0:
+        add_rotor_rates(t, y, torque, 0.0, p, out)
+        return 0.0
+    driven, _lost = bearing_accelerations(
+        owner, y, y[p.rotor_at[L.ROTOR_SPEED]], p, ball_force[0], ball_force[1], out
+    )
+    return driven
+
+
 @kernel
 def parameter_jacobian(
     t: float,
@@ -149,29 +186,56 @@ def parameter_jacobian(
     work: Array,
     B: Array,
 ) -> None:
-    """Derivative of the right-hand side by the parameters, shape (s, P), by one-sided differences."""
-    drop_derivative(t, y, p, base, work)
-    s = B.shape[0]
+    """Derivative of the right-hand side by the parameters, shape (s, P), by one-sided differences.
+
+    A parameter of a bearing changes the forces at this bearing alone, and the ball forces, nine tenths of the
+    work, only where it is one of the balls. The effect of its torque on the ω̇ terms of eq. (1) is left out,
+    as in the derivative by the state. ``base`` (B + 1, n) and ``other`` (n,) are scratch.
+    """
+    s, i_w = B.shape[0], p.rotor_at[L.ROTOR_SPEED]
+    n_b = p.bearing.shape[0]
+    balls, changed = np.empty((n_b, 2)), np.empty(2)
+    torques = np.empty(n_b)
+    torque = 0.0
+    free = p.flags[L.SPIN_MODE] != PRESCRIBED_SPEED
+    for b in range(n_b):
+        balls[b, 0], balls[b, 1] = elastic_ball_force(b, y, p, work)
+        torques[b] = rates_by_owner(t, b, y, p, balls[b], 0.0, base[b])
+        torque += torques[b]
+    rates_by_owner(t, -1, y, p, changed, torque, base[n_b])
     values = np.empty(theta.shape[0])
-    for k in range(theta.shape[0]):
-        values[k] = bounded_value(k, theta[k], targets, 0.0)
     powers = np.ones(targets.target.shape[0])
     for k in range(theta.shape[0]):
-        update_powers(k, values[k], targets, powers)
+        values[k] = bounded_value(k, theta[k], targets, 0.0)
+    update_powers(np.arange(targets.target.shape[0]), values, targets, powers)
+    B[:, :] = 0.0
     for k in range(theta.shape[0]):
-        value = values[k]
-        values[k] = bounded_value(k, theta[k], targets, targets.step[k])
-        update_powers(k, values[k], targets, powers)
-        write_values(values, powers, targets, p)
-        drop_derivative(t, y, p, other, work)
+        value, step = values[k], targets.step[k]
+        which = targets.together[targets.starts[k] : targets.starts[k + 1]]
+        values[k] = bounded_value(k, theta[k], targets, step)
+        update_powers(which, values, targets, powers)
+        write_values(which, values, powers, targets, p)
+        for b in range(n_b):
+            if targets.acts[k, b] == NOT:
+                continue
+            changed[:] = balls[b]
+            if targets.acts[k, b] == BY_BALLS:
+                changed[0], changed[1] = elastic_ball_force(b, y, p, work)
+            driven = rates_by_owner(t, b, y, p, changed, 0.0, other)
+            for i in range(s):
+                B[i, k] += (other[i] - base[b, i]) / step
+            if free:
+                B[i_w, k] += (driven - torques[b]) / (step * p.spin[L.POLAR_INERTIA])
+        if targets.acts[k, n_b] != NOT:
+            rates_by_owner(t, -1, y, p, changed, torque, other)
+            for i in range(s):
+                B[i, k] += (other[i] - base[n_b, i]) / step
         values[k] = value
-        update_powers(k, value, targets, powers)
-        for i in range(s):
-            B[i, k] = (other[i] - base[i]) / targets.step[k]
-    write_values(values, powers, targets, p)
+        update_powers(which, values, targets, powers)
+        write_values(which, values, powers, targets, p)
 
 
-@kernel
+@lean_kernel
 def gather_entries(J: Array, entries: Array, columns: IntArray, starts: IntArray) -> None:
     """List the entries of a mostly empty square matrix row by row, for fast products."""
     n = J.shape[0]
@@ -186,7 +250,7 @@ def gather_entries(J: Array, entries: Array, columns: IntArray, starts: IntArray
     starts[n] = count
 
 
-@kernel
+@lean_kernel
 def sparse_product(entries: Array, columns: IntArray, starts: IntArray, V: Array, out: Array) -> None:
     """Product of a listed matrix (see `gather_entries`) with a full one; rows of ``V`` are contiguous."""
     c = V.shape[1]
@@ -200,7 +264,7 @@ def sparse_product(entries: Array, columns: IntArray, starts: IntArray, V: Array
                 out[i, j] += value * V[k, j]
 
 
-@kernel
+@lean_kernel
 def add_contact_product(b: int, g: Array, p: KernelParameters, V: Array, moved: Array, out: Array) -> None:
     """Add to ``out`` the product of one contact's part of the Jacobian with ``V``, both (s, c).
 
@@ -240,14 +304,14 @@ def add_contact_product(b: int, g: Array, p: KernelParameters, V: Array, moved: 
         add_row(-row[L.ROTOR_RADIUS] / p.spin[L.POLAR_INERTIA], moved[6], out[i_w])
 
 
-@kernel
+@lean_kernel
 def add_row(weight: float, source: Array, target: Array) -> None:
     """Add a weighted row to another."""
     for j in range(source.shape[0]):
         target[j] += weight * source[j]
 
 
-@kernel
+@lean_kernel
 def jacobian_product(
     entries: Array,
     columns: IntArray,
@@ -266,7 +330,7 @@ def jacobian_product(
             add_contact_product(b, g[b], p, V, moved, out)
 
 
-@kernel
+@lean_kernel
 def rk4_step(t: float, h: float, y: Array, p: KernelParameters, k: Array, trial: Array, work: Array) -> None:
     """One classical Runge–Kutta step in place; ``k`` (5, n) and ``trial`` (n,) are scratch."""
     n = y.shape[0]
@@ -312,6 +376,7 @@ def propagate(
     k = np.zeros((5, n))  # what a sensor has got to stays: `lag_step` moves it
     trial = np.empty(n)
     work = np.empty((2, p.balls.shape[2]))
+    base, other = np.zeros((p.bearing.shape[0] + 1, n)), np.zeros(n)
     contact = np.empty(6)
     g = np.zeros((p.bearing.shape[0], 3, 6))
     touching = np.zeros(p.bearing.shape[0], dtype=np.int64)
@@ -330,7 +395,7 @@ def propagate(
         gather_entries(J, entries, places, starts)
         # at every substep: position and gap must see the same contact, or the gap looks too well known
         if columns > s:
-            parameter_jacobian(now + 0.5 * h, middle, theta, targets, p, k[0], k[1], work, B)
+            parameter_jacobian(now + 0.5 * h, middle, theta, targets, p, base, other, work, B)
         # What the contact law gets wrong is a share of what it gives; process noise is scaled by the impulse.
         for b in range(p.bearing.shape[0]):
             contact_at(b, middle, p, contact)

@@ -17,7 +17,15 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError
 from rotordrop.tracking.problem import DropProblem
-from rotordrop.tracking.smoother import Forward, PassSettings, Smoothed, forward, pass_settings, smooth
+from rotordrop.tracking.smoother import (
+    Forward,
+    PassSettings,
+    Smoothed,
+    Storage,
+    forward,
+    pass_settings,
+    smooth,
+)
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -172,14 +180,20 @@ def track(
     total = sum(stage.until * stage.passes for stage in schedule)
     done = 0.0
     smoothed: list[Smoothed] = []
+    storages = [Storage() for _ in problems]
     for stage in schedule:
         settings = stage_settings(problems[0], stage, noise_factor)
         for _ in range(stage.passes):
             if progress is not None:
                 progress(f"fitting the first {1e3 * stage.until:.0f} ms", done / total)
-            smoothed = []  # a pass fills hundreds of megabytes: the one before must be gone by then
+            smoothed = []  # the next pass writes over what the one before left in its storage
             smoothed = one_pass(
-                _softened(problems, stage), settings, trajectories, stage.until, from_guesses=from_guesses
+                _softened(problems, stage),
+                settings,
+                trajectories,
+                stage.until,
+                from_guesses=from_guesses,
+                storages=storages,
             )
             from_guesses = False
             trajectories = [s.means for s in smoothed]
@@ -218,8 +232,12 @@ def one_pass(
     until: float,
     *,
     from_guesses: bool = False,
+    storages: Sequence[Storage] = (),
 ) -> list[Smoothed]:
-    """One forward pass through the chain of drops and one backward pass through it."""
+    """One forward pass through the chain of drops and one backward pass through it.
+
+    ``storages``, one for each drop if given, hold what the passes leave.
+    """
     shared = problems[0].machine_indices
     filtered: list[Forward] = []
     mean = problems[0].start if from_guesses else problems[0].mean
@@ -228,7 +246,8 @@ def one_pass(
         if d > 0:
             mean, covariance = _handed_on(filtered[-1], problem, shared)
         samples = int(np.searchsorted(problem.time, until, side="right"))
-        result = _followed(problem, settings, mean, covariance, references[d], samples)
+        storage = storages[d] if storages else Storage()
+        result = _followed(problem, settings, mean, covariance, references[d], samples, storage)
         if result.done < min(samples, 10):
             raise IdentificationError(
                 f"the filter lost the drop after {result.done} of {samples} samples; the machine's guesses "
@@ -255,10 +274,17 @@ def _followed(
     covariance: Array,
     reference: Array | None,
     samples: int,
+    storage: Storage,
 ) -> Forward:
     """A pass along the reference; one that loses the drop is repeated without it, then more loosely."""
     result = forward(
-        problem, settings, mean=mean, covariance=covariance, reference=reference, samples=samples
+        problem,
+        settings,
+        mean=mean,
+        covariance=covariance,
+        reference=reference,
+        samples=samples,
+        storage=storage,
     )
     for factor in LOOSER if reference is not None else LOOSER[1:]:
         if result.done == samples:
@@ -276,5 +302,5 @@ def _handed_on(before: Forward, problem: DropProblem, shared: NDArray[np.int64])
     mean[shared] = before.means[last][shared]
     covariance[shared, :] = 0.0
     covariance[:, shared] = 0.0
-    covariance[np.ix_(shared, shared)] = before.covariances[last][np.ix_(shared, shared)]
+    covariance[np.ix_(shared, shared)] = before.covariance(last)[np.ix_(shared, shared)]
     return mean, covariance

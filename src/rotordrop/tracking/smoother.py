@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,8 @@ from rotordrop.tracking.problem import DropProblem, Fall, private_copy
 Array = NDArray[np.float64]
 Compact = NDArray[np.float32]
 """What a pass stores for the smoother: hundreds of megabytes, of which seven digits are plenty."""
+
+Number = TypeVar("Number", np.float32, np.float64)
 
 REFERENCE_STEP = 50e-6
 """Time for which the numbers of `PassSettings` hold [s]."""
@@ -110,13 +113,32 @@ def pass_settings(problem: DropProblem, *, force: float, share: float, substeps:
     )
 
 
+class Storage:
+    """Memory of the passes over one drop: each writes where the one before it did.
+
+    Hundreds of megabytes asked of the system anew are as slow to fill for the first time as the filter.
+    """
+
+    def __init__(self) -> None:
+        self._blocks: dict[str, NDArray[Any]] = {}
+
+    def array(self, name: str, shape: tuple[int, ...], kind: type[Number]) -> NDArray[Number]:
+        """An array of any content; those of the same name share their memory."""
+        size = math.prod(shape)
+        block = self._blocks.get(name)
+        if block is None or block.size < size or block.dtype != kind:
+            self._blocks[name] = block = np.empty(size, dtype=kind)
+        return block[:size].reshape(shape)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Forward:
     """What a forward pass leaves: filtered estimates and what the smoother needs; N samples, n estimated.
 
     ``done`` is the number of samples reached; ``innovations`` and ``innovation_variances`` have one column
     per channel and one for the speed, NaN where nothing was measured; ``impulse`` is the size of the
-    unknown impulses of the pass [N s]; ``parameter_sample`` is where parameters are read.
+    unknown impulses of the pass [N s]; ``parameter_sample`` is where parameters are read. The covariances
+    are stored packed; `covariance` gives one.
     """
 
     done: int
@@ -129,6 +151,13 @@ class Forward:
     innovations: Array
     innovation_variances: Array
     parameter_sample: int
+
+    def covariance(self, sample: int) -> Array:
+        """Filtered covariance at a sample, shape (n, n); single precision."""
+        n = self.means.shape[1]
+        P = np.empty((n, n))
+        F.unpack(self.covariances[sample], P)
+        return P
 
     @property
     def nis(self) -> float:
@@ -163,6 +192,7 @@ def forward(
     reference: Array | None = None,
     samples: int | None = None,
     smoothing: bool = True,
+    storage: Storage | None = None,
 ) -> Forward:
     """Run the filter over the first samples of a problem.
 
@@ -176,6 +206,8 @@ def forward(
         Number of samples; all by default.
     smoothing : bool
         Keep what the smoother needs.
+    storage : Storage, optional
+        Where to keep it: what an earlier pass left there is overwritten.
     """
     count = len(problem.time) if samples is None else min(samples, len(problem.time))
     mean = problem.mean if mean is None else mean
@@ -184,14 +216,15 @@ def forward(
     kept = count if smoothing else 0
     columns = s + len(problem.unknowns)
     dt = float(problem.time[1] - problem.time[0])
+    array = (storage or Storage()).array
     result = Forward(
         done=0,
         impulse=settings.impulse,
         means=np.empty((count, n)),
-        covariances=np.empty((count, n, n) if smoothing else (count, 0, 0), dtype=np.float32),
-        transitions=np.empty((kept, s, columns), dtype=np.float32),
-        rows=np.empty((kept, n_c + 1, n)),
-        gains=np.empty((kept, n_c + 1, n)),
+        covariances=array("covariances", (count, n * (n + 1) // 2 if smoothing else 0), np.float32),
+        transitions=array("transitions", (kept, s, columns), np.float32),
+        rows=array("rows", (kept, n_c + 1, n), np.float64),
+        gains=array("gains", (kept, n_c + 1, n), np.float64),
         innovations=np.empty((count, n_c + 1)),
         innovation_variances=np.empty((count, n_c + 1)),
         parameter_sample=int(np.searchsorted(problem.time, problem.parameter_time)),
@@ -252,7 +285,7 @@ class Smoothed:
         found = np.flatnonzero(self.kept == sample)
         if len(found) == 0:
             raise IndexError(f"the covariance of sample {sample} was not kept; kept are {self.kept.tolist()}")
-        P = self.filtered.covariances[sample].astype(np.float64)
+        P = self.filtered.covariance(sample)
         return np.asarray(P - P @ self.information[found[0]] @ P)
 
 

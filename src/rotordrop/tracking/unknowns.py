@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
+from rotordrop.model import layout as L
 from rotordrop.model.parameter import Rule
 from rotordrop.model.parameters import DropModel
 from rotordrop.model.unknowns import Target, Unknown
@@ -23,6 +25,31 @@ def _kind(target: Target) -> int:
     return _KIND_OF_RULE.get(target.entry.rule, _KIND_OF_ARRAY[target.entry.array])
 
 
+def _acts(targets: list[tuple[int, Target]], count: int, bearings: int) -> NDArray[np.int64]:
+    """How each of ``count`` parameters acts on each bearing and, in the last column, on the rotor's own."""
+    acts = np.full((count, bearings + 1), P.NOT)
+    for k, target in targets:
+        owner = target.row if target.entry.array == "bearing" else bearings
+        of_balls = owner < bearings and L.BALL_SET <= target.entry.column < L.BALL_SET_END
+        acts[k, owner] = max(acts[k, owner], P.BY_BALLS if of_balls else P.PLAINLY)
+    return acts
+
+
+def _together(targets: list[tuple[int, Target]], count: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """For each of ``count`` parameters the targets that write where it writes, and where its list begins."""
+    # All unbalances add up in the same entries; a gap is also the radius of the rotor.
+    places = [
+        (t.entry.array,) if t.entry.array == "unbalance" else (t.entry.array, t.row, t.entry.column)
+        for _, t in targets
+    ]
+    lists = []
+    for k in range(count):
+        own = {place for place, (j, _) in zip(places, targets, strict=True) if j == k}
+        lists.append([i for i, place in enumerate(places) if place in own])
+    starts = np.cumsum([0, *map(len, lists)])
+    return np.array([i for chosen in lists for i in chosen], dtype=np.int64), starts.astype(np.int64)
+
+
 def parameter_targets(model: DropModel, unknowns: tuple[Unknown, ...]) -> P.ParameterTargets:
     """Flat table of what the unknowns set in the kernel, in the order given."""
     targets = [(k, target) for k, unknown in enumerate(unknowns) for target in unknown.targets]
@@ -31,10 +58,14 @@ def parameter_targets(model: DropModel, unknowns: tuple[Unknown, ...]) -> P.Para
     planes = [model.basis.node_row(unbalance.node) for unbalance in model.machine.unbalances]
     shape = np.array(planes) if planes else np.zeros((0, model.layout.n_modes))
     drift = np.array([u.drift for u in unknowns])
+    together, starts = _together(targets, len(unknowns))
     return P.ParameterTargets(
         target=np.array([(k, _kind(t), t.row, t.entry.column) for k, t in targets], dtype=np.int64).reshape(
             -1, 4
         ),
+        acts=_acts(targets, len(unknowns), len(model.parameters.bearing)),
+        together=together,
+        starts=starts,
         factor=np.array([t.factor for _, t in targets]),
         logarithmic=np.array([int(u.logarithmic) for u in unknowns], dtype=np.int64),
         drift=drift,

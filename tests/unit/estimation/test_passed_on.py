@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rotordrop.estimated import IdentifiedValue
 from rotordrop.estimation import simulated_coast_down, tracked, tracked_estimate
 from rotordrop.estimation.bearing_drop import Motion, deepest
 from rotordrop.estimation.calibrated import CONFOUNDED, _confounded, _values
@@ -20,11 +21,13 @@ from rotordrop.estimation.tracked import NOISE_FACTORS, best_noise_factor
 from rotordrop.estimation.tracked_loads import twin_impacts
 from rotordrop.estimation.tracked_parameters import (
     PARAMETER_WIDENING,
+    equivalent_stiffness,
     parameter_widening,
     sensor_errors,
     within_bounds,
 )
 from rotordrop.machine import example_machine
+from rotordrop.model.bearing_numbers import numbers_of
 from rotordrop.model.parameter_table import parameter
 from rotordrop.model.parameters import build_drop_model
 from rotordrop.model.unknowns import all_unknowns
@@ -314,3 +317,24 @@ def test_a_simulated_coast_down_is_seen_where_the_sensors_are(monkeypatch: pytes
     del planes[nodes["DE"]]
     assert set(simulated_coast_down.simulated_coast_down(Path("c.h5"), machine).planes) == set(nodes)
     assert seen.profile.speed_at([0.0])[0] == pytest.approx(300.0) and not seen.recorded
+
+
+def test_the_equivalent_stiffness_is_as_unsure_as_what_holds_the_balls() -> None:
+    """The bearing at the preload that was found, not that of the file; both widths of both parts."""
+    machine = example_machine("lp400")
+    support = IdentifiedValue(value=80e6, interval_90=(78e6, 82e6), unit="N/m")
+    preload = IdentifiedValue(value=700.0, interval_90=(500.0, 900.0), unit="N")
+    found = equivalent_stiffness(machine, 0, 300.0, support, preload)
+
+    def series(held: float, stiffness: float) -> float:
+        name = machine.touchdown_bearings[0].name
+        bearing = machine.with_values({f"{name}.preload": held}).touchdown_bearings[0]
+        races = numbers_of(bearing).tangent_stiffness(300.0)
+        return 1.0 / (1.0 / races + 1.0 / stiffness)
+
+    value = series(700.0, 80e6)
+    low = value - math.hypot(value - series(500.0, 80e6), value - series(700.0, 78e6))
+    high = value + math.hypot(series(900.0, 80e6) - value, series(700.0, 82e6) - value)
+    assert found.value == pytest.approx(value, rel=1e-12)
+    assert found.interval_90 == pytest.approx((low, high), rel=1e-12)
+    assert high - low > 1.1 * (series(700.0, 82e6) - series(700.0, 78e6))

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from rotordrop.tracking import _propagation as P
-from rotordrop.tracking._filter import is_covariance
+from rotordrop.tracking._filter import is_covariance, pack, unpack
 from rotordrop.tracking.calibration import one_pass
 from rotordrop.tracking.problem import DropProblem, private_copy
-from rotordrop.tracking.smoother import PassSettings, fastest_frequency, forward, smooth
+from rotordrop.tracking.smoother import PassSettings, Storage, fastest_frequency, forward, smooth
 
 SETTINGS = PassSettings(impulse=1e-3, share=0.01)
 
@@ -134,7 +134,7 @@ def test_the_forward_filter_is_the_plain_one(flight, plain, filtered):
     for i in range(filtered.done):
         assert in_deviations(filtered.means[i] - plain.means[i], plain.covariances[i]) < 1e-6
         unit = deviations_of(plain.covariances[i])
-        difference = (filtered.covariances[i] - plain.covariances[i]) / np.outer(unit, unit)
+        difference = (filtered.covariance(i) - plain.covariances[i]) / np.outer(unit, unit)
         assert np.abs(difference).max() < 1e-6
     innovations, sizes = np.array(plain.innovations).T
     used = np.isfinite(filtered.innovations)
@@ -159,16 +159,42 @@ def test_the_backward_pass_is_the_plain_smoother(flight, plain, filtered):
         assert np.abs(difference).max() < 1e-3
 
 
+def test_a_packed_covariance_comes_back_whole(random):
+    half = random.normal(size=(7, 7)).astype(np.float32)
+    whole = np.asarray(half + half.T, dtype=np.float64)
+    packed, back = np.full(28, np.nan, dtype=np.float32), np.full((7, 7), np.nan)
+    pack(whole, packed)
+    unpack(packed, back)
+    np.testing.assert_array_equal(back, whole)
+
+
+def test_a_pass_in_the_memory_of_another_is_the_same(flight, filtered):
+    """Shorter, then whole: nothing of the pass before is left in what the next one gives."""
+    storage = Storage()
+    first = forward(flight, SETTINGS, samples=25, storage=storage)
+    again = forward(flight, SETTINGS, storage=storage)
+    shorter = forward(flight, SETTINGS, samples=25, storage=storage)
+    assert np.shares_memory(again.covariances, shorter.covariances)
+    assert not np.shares_memory(first.covariances, again.covariances)  # it had no room for the longer one
+    for one, count in ((first, 25), (shorter, 25)):
+        np.testing.assert_array_equal(one.covariance(24), filtered.covariance(24))
+        np.testing.assert_array_equal(
+            smooth(one).means, smooth(forward(flight, SETTINGS, samples=count)).means
+        )
+    whole = smooth(forward(flight, SETTINGS, storage=storage))
+    np.testing.assert_array_equal(whole.means, smooth(filtered).means)
+
+
 def test_the_last_sample_has_nothing_to_be_smoothed(filtered):
     smoothed = smooth(filtered)
     np.testing.assert_array_equal(smoothed.means[-1], filtered.means[-1])
-    np.testing.assert_array_equal(smoothed.covariance(filtered.done - 1), filtered.covariances[-1])
+    np.testing.assert_array_equal(smoothed.covariance(filtered.done - 1), filtered.covariance(-1))
 
 
 def test_a_later_sample_only_narrows(flight, filtered):
     smoothed = smooth(filtered, kept=(0, 20, 40))
     for i in (0, 20, 40):
-        before, after = np.diag(filtered.covariances[i]), np.diag(smoothed.covariance(i))
+        before, after = np.diag(filtered.covariance(i)), np.diag(smoothed.covariance(i))
         assert np.all(after <= before * (1.0 + 1e-6))
         assert np.all(after >= 0.0)
         assert np.all(after[before > 0.0] > 0.0)
@@ -215,7 +241,7 @@ def test_missing_readings_are_left_out(flight):
     place = flight.n_dynamic + len(flight.unknowns) + 2
     others = [place - 2, place - 1, place + 1]
     prior = deviations_of(flight.covariance) ** 2
-    shrunk = np.diag(found.covariances[-1]) / prior
+    shrunk = np.diag(found.covariance(-1)) / prior
     assert shrunk[place] > 0.999 * np.max(shrunk[others])
     plain = PlainFilter(partial).run()
     assert in_deviations(found.means[-1] - plain.means[-1], plain.covariances[-1]) < 1e-6
@@ -236,12 +262,12 @@ def test_the_covariance_stays_positive_definite_through_impacts(impacts, impacts
     assert np.all(contacts > 0.2e-6)  # both races were hit
     smoothed = smooth(impacts_filtered, kept=range(0, impacts_filtered.done, 15))
     for i in range(0, impacts_filtered.done, 15):
-        for covariance in (impacts_filtered.covariances[i].astype(float), smoothed.covariance(i)):
+        for covariance in (impacts_filtered.covariance(i), smoothed.covariance(i)):
             unit = deviations_of(covariance)
             assert np.all(np.isfinite(unit)) and np.all(np.diag(covariance) >= 0.0)
             lowest = np.linalg.eigvalsh(covariance / np.outer(unit, unit))[0]
             assert lowest > -2e-6  # stored with seven digits
-        filtered = impacts_filtered.covariances[i]
+        filtered = impacts_filtered.covariance(i)
         np.testing.assert_array_equal(filtered, filtered.T)
 
 
@@ -266,8 +292,8 @@ def test_with_a_reference_the_estimate_is_linear_in_the_readings(flight, filtere
     ]
     for i in (0, 30, 59):
         whole, half = means[2][i] - means[0][i], means[1][i] - means[0][i]
-        assert in_deviations(whole, filtered.covariances[i]) > 0.1
-        assert in_deviations(whole - 2.0 * half, filtered.covariances[i]) < 1e-5
+        assert in_deviations(whole, filtered.covariance(i)) > 0.1
+        assert in_deviations(whole - 2.0 * half, filtered.covariance(i)) < 1e-5
 
 
 def quiet(problem: DropProblem) -> DropProblem:
@@ -373,12 +399,12 @@ def test_what_belongs_to_one_drop_does_not_reach_the_other(flight):
     paths = [unknown.path for unknown in first.unknowns]
     lift = first.n_dynamic + paths.index("NDE.remanent_force.y")
     offset = first.n_dynamic + len(first.unknowns) + first.n_channels
-    start, prior = (np.diag(c) for c in (chained[1].filtered.covariances[0], first.covariance))
-    alone = np.diag(chained[0].filtered.covariances[0])
+    start, prior = (np.diag(c) for c in (chained[1].filtered.covariance(0), first.covariance))
+    alone = np.diag(chained[0].filtered.covariance(0))
     assert lift not in first.machine_indices
     assert offset in first.machine_indices
     assert start[lift] == pytest.approx(prior[lift], rel=1e-6)
-    assert chained[0].filtered.covariances[-1][lift, lift] < 0.9 * prior[lift]
+    assert chained[0].filtered.covariance(-1)[lift, lift] < 0.9 * prior[lift]
     assert start[offset] < 0.98 * alone[offset]
 
 
@@ -404,7 +430,7 @@ def test_a_pass_that_loses_the_drop_is_repeated_more_loosely(flight, monkeypatch
     """First without the reference, then with larger unknown impulses; the size that followed is kept."""
     asked = []
 
-    def giving_up(problem, settings, *, mean, covariance, reference=None, samples=None):
+    def giving_up(problem, settings, *, mean, covariance, reference=None, samples=None, storage=None):
         result = forward(problem, settings, mean=mean, covariance=covariance, samples=samples)
         asked.append((settings.impulse, reference is not None))
         return result if settings.impulse > 2.0 * SETTINGS.impulse else replace(result, done=3)

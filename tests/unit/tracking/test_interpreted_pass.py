@@ -55,7 +55,7 @@ def in_contact(problem: DropProblem, filtered: Forward) -> DropProblem:
         readings=problem.readings[chosen],
         speed=problem.speed[chosen],
         mean=means[first],
-        covariance=filtered.covariances[first].astype(np.float64),
+        covariance=filtered.covariance(first),
     )
 
 

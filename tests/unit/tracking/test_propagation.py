@@ -11,6 +11,7 @@ from scipy.special import erf
 
 from rotordrop.model import layout as L
 from rotordrop.model.parameters import DropModel
+from rotordrop.simulation._rhs import drop_derivative
 from rotordrop.tracking import _propagation as P
 from rotordrop.tracking._filter import soften_friction
 from rotordrop.tracking.problem import DropProblem, private_copy
@@ -113,6 +114,33 @@ def test_the_sensitivity_is_that_of_finite_differences(flight, indentation, touc
     errors = relative_errors(flight, F, finite_differences(flight, y, theta, 64))
     assert errors[: flight.n_dynamic].max() < 3e-4
     assert errors.max() < 5e-3
+
+
+@pytest.mark.parametrize("indentation", [-60e-6, 4e-6])
+def test_a_parameter_moves_its_owners_part_and_leaves_the_others_as_they_were(flight, indentation):
+    """The derivative taken owner by owner is that of the whole right-hand side, written anew each time."""
+    y, theta = start_of(flight.model, indentation), theta_of(flight)
+    targets, p = flight.targets, private_copy(flight.model.parameters)
+    work, n_p = np.empty((2, p.balls.shape[2])), len(theta)
+    P.apply_parameters(theta, targets, p)
+    before = private_copy(p)
+    base, other = np.zeros((len(p.bearing) + 1, len(y))), np.zeros(len(y))
+    B = np.full((flight.n_dynamic, n_p), np.nan)
+    P.parameter_jacobian(2e-4, y, theta, targets, p, base, other, work, B)
+    for name in p._fields:
+        np.testing.assert_array_equal(getattr(p, name), getattr(before, name), err_msg=name)
+    rates = np.zeros((2, len(y)))
+    for k in range(n_p):
+        for side, sign in enumerate((-1.0, 1.0)):
+            moved = theta.copy()
+            moved[k] += sign * targets.step[k]
+            P.apply_parameters(moved, targets, p)
+            drop_derivative(2e-4, y, p, rates[side], work)
+        expected = (rates[1] - rates[0])[: flight.n_dynamic] / (2.0 * targets.step[k])
+        size = max(np.abs(expected).max(), 1.0)
+        np.testing.assert_allclose(
+            B[:, k] / size, expected / size, atol=2e-3, err_msg=flight.unknowns[k].path
+        )
 
 
 def test_with_the_steps_of_the_filter_it_is_good_to_some_percent_and_converges(flight):
