@@ -19,6 +19,7 @@ from rotordrop.model import layout as L
 from rotordrop.model.layout import KernelParameters
 from rotordrop.physics._compile import kernel, lean_kernel
 from rotordrop.physics.elementary import exp, sine_cosine
+from rotordrop.tracking._covariance import is_covariance, pack, symmetrise, unpack
 from rotordrop.tracking._propagation import (
     FilterSettings,
     ParameterTargets,
@@ -32,7 +33,6 @@ Compact = NDArray[np.float32]
 IntArray = NDArray[np.int64]
 
 
-LARGEST_VARIANCE = 1e20
 LARGEST_DEFLECTION = 4.0
 """Way of a race or a support from its place, over the air gap, from which a filter has diverged [1]."""
 SIGN_WIDTH = math.sqrt(0.5 * math.pi)
@@ -214,37 +214,6 @@ def soften_friction(P: Array, least: Array, p: KernelParameters) -> None:
         p.bearing[b, L.SMOOTHING_SPEED] = math.sqrt(least[b] * least[b] + spread * spread)
 
 
-@lean_kernel
-def symmetrise(P: Array) -> None:
-    """Replace a matrix by its symmetric part in place."""
-    for i in range(P.shape[0]):
-        for j in range(i):
-            value = 0.5 * (P[i, j] + P[j, i])
-            P[i, j] = value
-            P[j, i] = value
-
-
-@lean_kernel
-def pack(P: Array, out: Compact) -> None:
-    """Store the lower half of a symmetric matrix (n, n) row by row in ``out`` (n (n + 1) / 2,)."""
-    e = 0
-    for i in range(P.shape[0]):
-        for j in range(i + 1):
-            out[e] = P[i, j]
-            e += 1
-
-
-@lean_kernel
-def unpack(packed: Compact, P: Array) -> None:
-    """Fill a symmetric matrix (n, n) from what `pack` stored."""
-    e = 0
-    for i in range(P.shape[0]):
-        for j in range(i + 1):
-            P[i, j] = packed[e]
-            P[j, i] = packed[e]
-            e += 1
-
-
 @kernel
 def forward_pass(
     mean_0: Array,
@@ -399,15 +368,6 @@ def is_plausible(mean: Array, p: KernelParameters) -> bool:
         for body in (L.RACE, L.SUPPORT):
             i = p.bearing_at[b, body]
             good = good and abs(mean[i]) < limit and abs(mean[i + 1]) < limit
-    return good
-
-
-@lean_kernel
-def is_covariance(P: Array) -> bool:
-    """Whether all variances are finite and none is negative; what fails was a filter that diverged."""
-    good = True
-    for i in range(P.shape[0]):
-        good = good and P[i, i] >= 0.0 and P[i, i] < LARGEST_VARIANCE
     return good
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rotordrop.model import layout as L
 from rotordrop.tracking import _filter as F
 from rotordrop.tracking import _propagation as P
+from rotordrop.tracking._covariance import unpack
 from rotordrop.tracking.problem import DropProblem, Fall, private_copy
 
 Array = NDArray[np.float64]
@@ -156,7 +157,7 @@ class Forward:
         """Filtered covariance at a sample, shape (n, n); single precision."""
         n = self.means.shape[1]
         P = np.empty((n, n))
-        F.unpack(self.covariances[sample], P)
+        unpack(self.covariances[sample], P)
         return P
 
     @property

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rotordrop.tracking import _propagation as P
-from rotordrop.tracking._filter import is_covariance, pack, unpack
+from rotordrop.tracking._covariance import is_covariance, pack, unpack
 from rotordrop.tracking.calibration import one_pass
 from rotordrop.tracking.problem import DropProblem, private_copy
 from rotordrop.tracking.smoother import PassSettings, Storage, fastest_frequency, forward, smooth
