@@ -1,4 +1,4 @@
-"""Say what changed on a machine between two recorded drops: gap, support, friction, drag.
+"""Say what changed on a machine between two recorded drops.
 
 Reads two estimates that were made with one machine file.
 """

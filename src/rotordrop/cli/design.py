@@ -1,4 +1,4 @@
-"""Choose supports, damping, gap or preload: the designs that no other one beats.
+"""Choose supports, gap or preload for the mildest drops.
 
 All candidates meet the same chances; the best are drawn again with fresh ones, which shows what was luck.
 """

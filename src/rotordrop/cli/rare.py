@@ -1,4 +1,4 @@
-"""Find the probability of a rare drop, down to one in a million, in thousands of drops.
+"""Find the probability of a rare drop, to one in a million.
 
 Reads a study file: its machine, its case and what varies. Subset simulation in independent repeats.
 """

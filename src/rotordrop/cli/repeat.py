@@ -1,4 +1,4 @@
-"""See what else could have happened: where a recorded drop lies among its virtual repeats, and the worst.
+"""See what else could have happened at a recorded drop.
 
 With another speed: what the next drop will be, said before it happens.
 """

@@ -272,11 +272,12 @@ def sinking(low: NDArray[np.bool_]) -> int:
     return int(np.min(np.where(high.any(axis=0), both + 1 - np.argmax(high[::-1], axis=0), 0)))
 
 
-def fall_acceleration(away: Array, reach: float, rate: float) -> float:
-    """Acceleration with which a plane goes from a tenth of its way to `FALLEN_SHARE` of it [m/s²].
+def fall_accelerations(away: Array, reach: float, rate: float) -> Array:
+    """Accelerations of a plane from a tenth of its way to `FALLEN_SHARE` of it [m/s²], one for each time.
 
     A falling rotor has up to that of gravity; a swing along the race goes slower, by its amplitude over the
-    air gap. No machine, unit or direction need be known; a wrong clock shows by its square.
+    air gap. No machine, unit or direction need be known; a wrong clock shows by its square. The first way is
+    the fall, unless the record begins while the rotor is still being lifted; later ones are rebounds too.
 
     Parameters
     ----------
@@ -287,12 +288,15 @@ def fall_acceleration(away: Array, reach: float, rate: float) -> float:
     rate : float
         Samples per second [Hz].
     """
-    far = int(np.argmax(away > FALLEN_SHARE * reach))
-    near = np.flatnonzero(away[: far + 1] < 0.1 * reach)
-    if not len(near):
-        return float("inf")  # it circled as wide as this before the fall
-    took = max(far - int(near[-1]), 1) / rate
-    return 2.0 * reach * float(np.sqrt(FALLEN_SHARE) - np.sqrt(0.1)) ** 2 / took**2
+    beyond = away > FALLEN_SHARE * reach
+    begins = np.flatnonzero(beyond & ~np.append(False, beyond[:-1]))
+    near = np.flatnonzero(away < 0.1 * reach)
+    before = np.searchsorted(near, begins) - 1
+    if not len(begins) or before[0] < 0:
+        return np.array([np.inf])  # it circled as wide as this before the fall
+    took = (begins - near[before]) / rate
+    found: Array = 2.0 * reach * (np.sqrt(FALLEN_SHARE) - np.sqrt(0.1)) ** 2 / took**2
+    return found
 
 
 def _first(far: NDArray[np.bool_]) -> int:

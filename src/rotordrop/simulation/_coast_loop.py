@@ -166,7 +166,7 @@ def integrate_window(  # noqa: C901, PLR0915  one compiled loop
         The loop ends when the rotor turns no faster than this [rad/s]; negative: never.
     states : ndarray, shape (T, n)
         Filled with the states on the grid, as far as they were reached.
-    log : ndarray, shape (R, 8)
+    log : ndarray, shape (R, 9)
         Contacts; the first entries are those still open.
     running : ndarray, shape (B, 5)
         The running contacts.

@@ -49,9 +49,10 @@ STRESS_POINTS = 41
 """Forces at which the stress of a bearing is computed; between them by straight lines."""
 LEAST_PEAK_ERROR, PUT_BACK_ERROR = 0.11, 3.8
 """Relative error of a largest peak [1], at least and over the part of it that twicing has put back, through
-which sampling rate, noise, weight and contact time act: it held 11 of 12 peaks (13, 60 kg; 0.45, 2 µm noise).
+which sampling rate, noise, weight and contact time act: it held 11 of the 12 peaks that set it (13, 60 kg;
+0.45, 2 µm noise) and 95 of 96 at 10 to 100 kHz (studies/cross_check).
 
-Not validated: other rotors and rates than 20 kHz."""
+Not validated: other rotors."""
 LEAST_STRESS_ERROR, STRESS_PER_PEAK = 0.015, 0.4
 """Relative error of a largest stress [1], at least (preload) and over that of the peak (third root of it)."""
 MEAN_ERROR = 0.05
@@ -124,10 +125,11 @@ class Lent:
 
 
 def lent_by_record(problem: DropProblem) -> Lent:
-    """What settled tail and machine file say alone, for a twin that has lost its record.
+    """What settled tail and machine file say alone: the cross-check takes nothing from the twin.
 
-    The rotor counts as clear of a race only where it is so by twice the error of gap and sensors: a gate that
-    closes during a contact would take force away, one that opens too early only lets a little noise in.
+    The rotor counts as clear of a race only where it is so by twice the error of gap and sensors and by
+    `GATE_MARGIN` of the gap, which it may bend beside the line through its sensors: a gate that closes during
+    a contact would take force away, one that opens too early only lets a little noise in.
     """
     gain_errors, offsets = problem.sensor_errors(problem.mean)
     entries = problem.gap_entries

@@ -247,7 +247,7 @@ def test_an_impact_lasts_from_its_first_to_its_last_indented_sample() -> None:
 
 def test_a_speed_is_written_in_turns_per_second() -> None:
     estimate: Any = SimpleNamespace(
-        record=SimpleNamespace(path=None, sha256="ab"),
+        record=SimpleNamespace(path=None, sha256="ab", metadata={"Date": "2024-05-06"}),
         method=tracked_estimate.Tracked(quick=True),
         verdict=Verdict.CONSISTENT,
         consistent=True,
@@ -262,6 +262,7 @@ def test_a_speed_is_written_in_turns_per_second() -> None:
     assert written["speed_Hz"] == pytest.approx(60.0)
     assert written["drop_instant_interval_90_s"] == [0.24, 0.26]
     assert (written["method"], written["quick"], written["record"]) == ("tracked", True, "drop")
+    assert written["recorded"] == "2024-05-06"
 
 
 @pytest.mark.parametrize(

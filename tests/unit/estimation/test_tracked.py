@@ -86,7 +86,7 @@ def half_widths(drop: Estimate, field: str) -> list[float]:
 
 
 def assert_right(drop: Estimate, truth: SyntheticDrop, factor: float = 1.0) -> None:
-    scores = score_estimate(document(drop), truth.truth)["bearings"]
+    scores = score_estimate(document(drop), truth.truth, drop=drop.name)["bearings"]
     for name in BEARINGS:
         for field, limit in LIMITS.items():
             assert abs(scores[name][field]["relative_error"]) < factor * limit, (name, field)
@@ -94,7 +94,7 @@ def assert_right(drop: Estimate, truth: SyntheticDrop, factor: float = 1.0) -> N
 
 
 def assert_right_or_wide(drop: Estimate, truth: SyntheticDrop) -> None:
-    scores = score_estimate(document(drop), truth.truth)["bearings"]
+    scores = score_estimate(document(drop), truth.truth, drop=drop.name)["bearings"]
     for name in BEARINGS:
         for field in LIMITS:
             assert scores[name][field]["covered"], (name, field)

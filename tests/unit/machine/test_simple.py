@@ -1,6 +1,7 @@
 """A machine of twelve numbers, and shaft tables as other programs call their columns."""
 
 import math
+from types import SimpleNamespace
 
 import pytest
 
@@ -126,6 +127,7 @@ def test_the_command_takes_options_and_asks_for_the_rest(tmp_path, monkeypatch):
         return "soft"
 
     monkeypatch.setattr("typer.prompt", answer)
+    monkeypatch.setattr("sys.stdin", SimpleNamespace(isatty=lambda: True))
     said = {key: ", ".join(value) if isinstance(value, tuple) else value for key, value in NUMBERS.items()}
     options = [f"--{key.replace('_', '-')}={value}" for key, value in said.items() if key != "support"]
     target = tmp_path / "machine.toml"

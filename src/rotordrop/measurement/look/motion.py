@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import RecordError
 from rotordrop.measurement.axes import along_sensors, planar_of, sensor_planes
-from rotordrop.measurement.events import FALLEN_SHARE, fall_acceleration
+from rotordrop.measurement.events import FALLEN_SHARE, fall_accelerations
 from rotordrop.measurement.record import Record
 from rotordrop.measurement.recording import Array
 from rotordrop.series import noise_by_differences, runs_of
@@ -137,7 +137,7 @@ def _first_fall(raw: Array, rate: float) -> tuple[int, int]:
         )
     moved = np.min(away / reach, axis=1) > FALLEN_SHARE
     sunk = int(np.argmax(moved))
-    fastest = max(fall_acceleration(path, far, rate) for path, far in zip(away.T, reach, strict=True))
+    fastest = max(fall_accelerations(path, far, rate).max() for path, far in zip(away.T, reach, strict=True))
     if fastest < _SLOWEST_FALL * GRAVITY:
         raise RecordError(
             f"nothing falls in the record: the shaft moves away by {1e6 * float(np.max(reach)):.3g} µm, but "

@@ -9,7 +9,7 @@ import numpy as np
 
 from rotordrop.errors import RecordError
 from rotordrop.measurement.axes import Plane
-from rotordrop.measurement.events import FALLEN_SHARE, fall_acceleration, gap_of
+from rotordrop.measurement.events import FALLEN_SHARE, fall_accelerations, gap_of
 from rotordrop.measurement.levitated import LevitatedModel
 from rotordrop.measurement.quality.finding import Finding
 from rotordrop.measurement.recording import Array
@@ -205,7 +205,7 @@ def _fall_share(record: Record) -> float:
     level = first_motion(record)[1]
     away = np.abs(record.signals - level)
     reach = np.percentile(away, 98, axis=0)
-    found = [fall_acceleration(a, r, record.sampling_rate) for a, r in zip(away.T, reach, strict=True)]
+    found = [fall_accelerations(a, r, record.sampling_rate)[0] for a, r in zip(away.T, reach, strict=True)]
     middle = float(np.median(found))
     return middle / GRAVITY
 
