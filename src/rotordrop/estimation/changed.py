@@ -127,7 +127,7 @@ def changes(first: Mapping[str, Any], second: Mapping[str, Any]) -> Changes:
     What was known before stands in both estimates; it is taken out of each (the quotient of posterior and
     prior), so that two records of an unchanged machine differ by their own errors alone, and a tight prior
     does not hide a change. Every parameter may change; none is assumed to. Of m parameters the level of each
-    is `FALSE_ALARM` over m (Bonferroni). Source: Gaussian fusion; Differs from a common fit of both records:
+    is `FALSE_ALARM` over m (Bonferroni). Differs from a common fit of both records:
     correlations between parameters are not used, so a change must show in one of them alone.
 
     Raises

@@ -21,6 +21,7 @@ from rotordrop.estimation.tracked import NOISE_FACTORS, best_noise_factor
 from rotordrop.estimation.tracked_loads import twin_impacts
 from rotordrop.estimation.tracked_parameters import (
     PARAMETER_WIDENING,
+    determination,
     equivalent_stiffness,
     parameter_widening,
     sensor_errors,
@@ -339,3 +340,13 @@ def test_the_equivalent_stiffness_is_as_unsure_as_what_holds_the_balls() -> None
     assert found.value == pytest.approx(value, rel=1e-12)
     assert found.interval_90 == pytest.approx((low, high), rel=1e-12)
     assert high - low > 1.1 * (series(700.0, 82e6) - series(700.0, 78e6))
+
+
+def test_the_verdict_on_a_parameter_goes_by_how_much_of_its_prior_is_left() -> None:
+    shares = (0.0, 0.29, 0.31, 0.69, 0.71, 1.0)
+    said = [determination(share) for share in shares]
+    assert said[:2] == ["determined"] * 2
+    assert said[2:4] == ["weakly determined"] * 2
+    assert said[4:] == ["the record does not determine it"] * 2
+    assert determination(0.9, calibrated=True) == "known from the calibration"
+    assert determination(0.5, calibrated=True) == "weakly determined"

@@ -9,7 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rotordrop.tracking.consistency import CORRELATION_LIMIT, _innovation_checks
+from rotordrop.machine import example_machine
+from rotordrop.model.parameters import build_drop_model
+from rotordrop.model.unknowns import all_unknowns
+from rotordrop.tracking.consistency import CORRELATION_LIMIT, _innovation_checks, _nuisance_check
 from rotordrop.tracking.forces import _displacements
 from rotordrop.tracking.problem import _first_level
 from rotordrop.tracking.smoother import Forward
@@ -91,3 +94,20 @@ def test_a_filter_that_lost_the_drop_is_judged_by_what_it_followed() -> None:
     squares, logs = np.array(terms).T
     assert made.nis == pytest.approx(squares.mean())
     assert made.negative_log_likelihood == pytest.approx(0.5 * (squares.sum() + logs.sum()))
+
+
+@pytest.mark.parametrize("path", ["unbalance.1.sine", "remanence.time_constant", "speed.aero_time_constant"])
+@pytest.mark.parametrize(("sigmas", "white"), [(1.0, True), (9.0, True), (9.0, False)])
+def test_what_is_unusual_in_one_drop_is_a_note_while_its_innovations_are_white(
+    path: str, sigmas: float, white: bool
+) -> None:
+    """Unbalance beyond its grade, long remanence, strong drag are news of the machine, no faults of a fit."""
+    unknowns = all_unknowns(build_drop_model(example_machine("lp400"), "quick"))
+    theta = np.array([u.mean + (sigmas * u.sigma if u.path == path else 0.0) for u in unknowns])
+    problem: Any = SimpleNamespace(unknowns=unknowns, parameter_slice=slice(0, len(unknowns)))
+    smoothed: Any = SimpleNamespace(means=theta[None], filtered=SimpleNamespace(parameter_sample=0))
+    found = _nuisance_check(problem, smoothed, white)
+    assert found.passed is (white or sigmas < 5.0)
+    assert f"{path} departs by {sigmas:.1f} prior standard deviations" in found.message
+    assert bool(found.note) is (white and sigmas > 5.0)
+    assert not found.note or found.note == f"{found.message}; the readings are followed all the same"
