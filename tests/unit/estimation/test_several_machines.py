@@ -59,9 +59,10 @@ def numbers_of(name: str, seed: int) -> list[Number]:
     speed = 2.0 * math.pi * SPEEDS[name]
     drop = synthesize_drop(hidden, speed, 10 * seed, duration=0.22, tolerance=1e-7)
     machine = calibrated_about(known, hidden, seed, 1.0)
-    written = estimate_document(estimate_drop(machine, drop.record, drop.tail, method=Tracked(quick=True)))
+    estimate = estimate_drop(machine, drop.record, drop.tail, method=Tracked(quick=True))
+    written = estimate_document(estimate)
     assert written["consistency"]["consistent"], (name, seed, written["consistency"])
-    scores = score_estimate(written, drop.truth)["bearings"]
+    scores = score_estimate(written, drop.truth, drop=estimate.name)["bearings"]
     found = []
     for bearing in machine.touchdown_bearings:
         for field in ERRORS:
