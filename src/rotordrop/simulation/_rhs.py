@@ -226,20 +226,12 @@ def add_support_form(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
 
 
 @inner_kernel
-def elastic_ball_force(b: int, y: Array, p: KernelParameters, work: Array) -> tuple[float, float]:
-    """Elastic force [N] of the balls of one bearing against the deflection of its race, x and y."""
-    race_x, race_y = race_deflection(b, y, p)
-    return ball_set_force(p.bearing[b, L.BALL_SET : L.BALL_SET_END], p.balls[b], race_x, race_y, work)
-
-
-@inner_kernel
 def bearing_accelerations(
-    b: int, y: Array, omega: float, p: KernelParameters, F_x: float, F_y: float, dy: Array
+    b: int, y: Array, omega: float, p: KernelParameters, dy: Array, work: Array
 ) -> tuple[float, float]:
     """Forces at one touchdown bearing, added to rotor, race, support and spin.
 
-    ``F_x`` and ``F_y`` are the `elastic_ball_force` [N]. Returns the friction torque on the rotor [N m]
-    (positive drives it) and the power dissipated [W].
+    Returns the friction torque on the rotor [N m] (positive drives it) and the power dissipated [W].
     """
     n_q = p.rotor_at[L.N_COORDINATES]
     r, h, spin = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.RACE_SPIN]
@@ -247,6 +239,8 @@ def bearing_accelerations(
     shape = p.bearing_shape[b]
     ux, uy, vx, vy = relative_motion(b, y, p)
     delta, F_r, mu, nx, ny, v_t, elastic = contact_state(ux, uy, vx, vy, omega, y[spin], row)
+    race_x, race_y = race_deflection(b, y, p)
+    F_x, F_y = ball_set_force(row[L.BALL_SET : L.BALL_SET_END], p.balls[b], race_x, race_y, work)
     drag = race_drag_torque(
         math.sqrt(F_x * F_x + F_y * F_y),
         y[spin],
@@ -316,8 +310,7 @@ def drop_derivative(t: float, y: Array, p: KernelParameters, dy: Array, work: Ar
     contact_torque = 0.0
     dissipated = 0.0
     for b in range(p.bearing.shape[0]):
-        F_x, F_y = elastic_ball_force(b, y, p, work)
-        torque, lost = bearing_accelerations(b, y, omega, p, F_x, F_y, dy)
+        torque, lost = bearing_accelerations(b, y, omega, p, dy, work)
         contact_torque += torque
         dissipated += lost
     add_rotor_rates(t, y, contact_torque, dissipated, p, dy)

@@ -17,12 +17,12 @@ from rotordrop.simulation._rhs import (
     add_rotor_rates,
     bearing_accelerations,
     drop_derivative,
-    elastic_ball_force,
 )
 from rotordrop.simulation._sensitivity import drop_jacobian_parts
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 # What a parameter acts on.
 ON_BEARING = 0
@@ -33,9 +33,6 @@ SCALE_BEARING = 4
 AT_TYPICAL_DEPTH = 5
 SCALE_MODES = 6
 
-# How a parameter acts on an owner.
-NOT, PLAINLY, BY_BALLS = range(3)
-
 
 class ParameterTargets(NamedTuple):
     """Which kernel entries the unknown parameters set; R targets, P parameters, U unbalance planes.
@@ -45,14 +42,14 @@ class ParameterTargets(NamedTuple):
     standard deviation of the random walk of each parameter per square root of a second, ``late_drift`` the
     same later in a drop; ``plane_shape`` (U, m) mode shapes of the planes. Beyond ``lower`` and ``upper``
     (P,) the model takes the bound: what drifts without being seen must not make it unstable. ``mean`` (P,)
-    is the prior mean. ``eigenvalue`` (m,) are those of the rotor as described. ``acts`` (P, B + 1) says
-    whether a parameter acts on the forces of a bearing, with its balls or without, and in the last column
-    whether on the rotor's own. ``together`` lists for each parameter, from ``starts`` (P + 1,) on, the
-    targets that write where it writes, in their order: what has to be written again when it alone changes.
+    is the prior mean. ``eigenvalue`` (m,) are those of the rotor as described. ``acts`` (P, B + 1) flags
+    the bearings on whose forces a parameter acts, and in the last column whether it acts on the rotor's
+    own. ``together`` lists for each parameter, from ``starts`` (P + 1,) on, the targets that write where it
+    writes, in their order: what has to be written again when it alone changes.
     """
 
     target: IntArray
-    acts: IntArray
+    acts: Flags
     together: IntArray
     starts: IntArray
     factor: Array
@@ -156,21 +153,18 @@ def write_values(
 
 @lean_kernel
 def rates_by_owner(
-    t: float, owner: int, y: Array, p: KernelParameters, ball_force: Array, torque: float, out: Array
+    t: float, owner: int, y: Array, p: KernelParameters, torque: float, out: Array, work: Array
 ) -> float:
-    """The part of the right-hand side that one bearing gives, or with owner −1 the rotor's own, in ``out``.
+    """The part of the right-hand side that one bearing gives, or the rotor's own behind the last, in ``out``.
 
-    ``ball_force`` (2,) is the elastic force of the balls [N], ``torque`` [N m] what the bearings drive the
-    rotor with. Returns the torque that this bearing gives.
+    ``torque`` [N m] is what the bearings drive the rotor with. Returns the torque that this bearing gives.
     """
     for i in range(out.shape[0]):
         out[i] = 0.0
-    if owner < 0:
+    if owner == p.bearing.shape[0]:
         add_rotor_rates(t, y, torque, 0.0, p, out)
         return 0.0
-    driven, _lost = bearing_accelerations(
-        owner, y, y[p.rotor_at[L.ROTOR_SPEED]], p, ball_force[0], ball_force[1], out
-    )
+    driven, _lost = bearing_accelerations(owner, y, y[p.rotor_at[L.ROTOR_SPEED]], p, out, work)
     return driven
 
 
@@ -188,21 +182,18 @@ def parameter_jacobian(
 ) -> None:
     """Derivative of the right-hand side by the parameters, shape (s, P), by one-sided differences.
 
-    A parameter of a bearing changes the forces at this bearing alone, and the ball forces, nine tenths of the
-    work, only where it is one of the balls. The effect of its torque on the ω̇ terms of eq. (1) is left out,
-    as in the derivative by the state. ``base`` (B + 1, n) and ``other`` (n,) are scratch.
+    A parameter of a bearing changes the forces at this bearing alone; the rest is not computed again. The
+    effect of its torque on the ω̇ terms of eq. (1) is left out, as in the derivative by the state. ``base``
+    (B + 1, n) and ``other`` (n,) are scratch.
     """
-    s, i_w = B.shape[0], p.rotor_at[L.ROTOR_SPEED]
-    n_b = p.bearing.shape[0]
-    balls, changed = np.empty((n_b, 2)), np.empty(2)
+    s, n_b, i_w = B.shape[0], p.bearing.shape[0], p.rotor_at[L.ROTOR_SPEED]
+    free = p.flags[L.SPIN_MODE] != PRESCRIBED_SPEED
     torques = np.empty(n_b)
     torque = 0.0
-    free = p.flags[L.SPIN_MODE] != PRESCRIBED_SPEED
     for b in range(n_b):
-        balls[b, 0], balls[b, 1] = elastic_ball_force(b, y, p, work)
-        torques[b] = rates_by_owner(t, b, y, p, balls[b], 0.0, base[b])
+        torques[b] = rates_by_owner(t, b, y, p, 0.0, base[b], work)
         torque += torques[b]
-    rates_by_owner(t, -1, y, p, changed, torque, base[n_b])
+    rates_by_owner(t, n_b, y, p, torque, base[n_b], work)
     values = np.empty(theta.shape[0])
     powers = np.ones(targets.target.shape[0])
     for k in range(theta.shape[0]):
@@ -215,21 +206,14 @@ def parameter_jacobian(
         values[k] = bounded_value(k, theta[k], targets, step)
         update_powers(which, values, targets, powers)
         write_values(which, values, powers, targets, p)
-        for b in range(n_b):
-            if targets.acts[k, b] == NOT:
+        for owner in range(n_b + 1):
+            if not targets.acts[k, owner]:
                 continue
-            changed[:] = balls[b]
-            if targets.acts[k, b] == BY_BALLS:
-                changed[0], changed[1] = elastic_ball_force(b, y, p, work)
-            driven = rates_by_owner(t, b, y, p, changed, 0.0, other)
+            driven = rates_by_owner(t, owner, y, p, torque, other, work)
             for i in range(s):
-                B[i, k] += (other[i] - base[b, i]) / step
-            if free:
-                B[i_w, k] += (driven - torques[b]) / (step * p.spin[L.POLAR_INERTIA])
-        if targets.acts[k, n_b] != NOT:
-            rates_by_owner(t, -1, y, p, changed, torque, other)
-            for i in range(s):
-                B[i, k] += (other[i] - base[n_b, i]) / step
+                B[i, k] += (other[i] - base[owner, i]) / step
+            if free and owner < n_b:
+                B[i_w, k] += (driven - torques[owner]) / (step * p.spin[L.POLAR_INERTIA])
         values[k] = value
         update_powers(which, values, targets, powers)
         write_values(which, values, powers, targets, p)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.model import layout as L
 from rotordrop.model.parameter import Rule
 from rotordrop.model.parameters import DropModel
 from rotordrop.model.unknowns import Target, Unknown
@@ -25,13 +24,11 @@ def _kind(target: Target) -> int:
     return _KIND_OF_RULE.get(target.entry.rule, _KIND_OF_ARRAY[target.entry.array])
 
 
-def _acts(targets: list[tuple[int, Target]], count: int, bearings: int) -> NDArray[np.int64]:
-    """How each of ``count`` parameters acts on each bearing and, in the last column, on the rotor's own."""
-    acts = np.full((count, bearings + 1), P.NOT)
+def _acts(targets: list[tuple[int, Target]], count: int, bearings: int) -> NDArray[np.bool_]:
+    """Which of ``count`` parameters act on each bearing and, in the last column, on the rotor itself."""
+    acts = np.zeros((count, bearings + 1), dtype=np.bool_)
     for k, target in targets:
-        owner = target.row if target.entry.array == "bearing" else bearings
-        of_balls = owner < bearings and L.BALL_SET <= target.entry.column < L.BALL_SET_END
-        acts[k, owner] = max(acts[k, owner], P.BY_BALLS if of_balls else P.PLAINLY)
+        acts[k, target.row if target.entry.array == "bearing" else bearings] = True
     return acts
 
 
