@@ -74,3 +74,7 @@ PlanesOption = Annotated[
 ReportOption = Annotated[
     Path | None, typer.Option("--report", metavar="FILE", help="Write the report, one offline HTML file.")
 ]
+
+ThreadsOption = Annotated[
+    int | None, typer.Option("--threads", min=1, metavar="N", help="Threads; all cores by default.")
+]

@@ -16,6 +16,8 @@ from rotordrop.errors import OutputError, UsageError
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from rotordrop.study.run import Report, StudyProgress
+
 STANDARD_OUTPUT = Path("-")
 _PLAIN_WIDTH = 110
 
@@ -143,3 +145,12 @@ def progress_bar(title: str) -> Iterator[Progress]:
             bars.update(task, completed=fraction, description=stage or title)
 
         yield report
+
+
+def drops_shown(bar: Progress) -> Report:
+    """Make what a study calls with its progress, to be shown by a bar."""
+
+    def show(progress: StudyProgress) -> None:
+        bar(f"{progress.drops} of {progress.of} drops, {progress.rate:.1f}/s", progress.drops / progress.of)
+
+    return show

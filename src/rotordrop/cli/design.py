@@ -6,16 +6,12 @@ All candidates meet the same chances; the best are drawn again with fresh ones, 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from rotordrop.cli._options import JsonOption, ReportOption
-from rotordrop.cli._output import deliver, progress_bar, require_places
-
-if TYPE_CHECKING:
-    from rotordrop.cli._output import Progress
-    from rotordrop.study.run import Report, StudyProgress
+from rotordrop.cli._options import JsonOption, ReportOption, ThreadsOption
+from rotordrop.cli._output import deliver, drops_shown, progress_bar, require_places
 
 
 def design(
@@ -24,9 +20,7 @@ def design(
         Path | None,
         typer.Option(metavar="FOLDER", help="Folder of the drops; the name of the file by default."),
     ] = None,
-    threads: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="Threads; all cores by default.")
-    ] = None,
+    threads: ThreadsOption = None,
     report: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
@@ -39,15 +33,8 @@ def design(
     require_places(json, report)
     read = load_design(plan)
     with progress_bar(read.study.name) as bar:
-        found = best_designs(read, folder or plan.with_suffix(""), threads=threads, report=_shown(bar))
+        found = best_designs(read, folder or plan.with_suffix(""), threads=threads, report=drops_shown(bar))
     page = design_page(read, found)
     if report is not None:
         write_page(page, report)
     deliver(design_numbers(read, found), json, lambda out: print_summary(page, out))
-
-
-def _shown(bar: Progress) -> Report:
-    def show(progress: StudyProgress) -> None:
-        bar(f"{progress.drops} of {progress.of} drops, {progress.rate:.1f}/s", progress.drops / progress.of)
-
-    return show

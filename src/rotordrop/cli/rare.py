@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rotordrop.cli._options import JsonOption
+from rotordrop.cli._options import JsonOption, ThreadsOption
 from rotordrop.cli._output import deliver, progress_bar, require_places
 from rotordrop.errors import UsageError
 
@@ -29,9 +29,7 @@ def rare(
     above: Annotated[str, typer.Option(metavar="LIMIT", help='Limit with its unit, such as "12 kN".')],
     samples: Annotated[int, typer.Option(metavar="N", help="Points of a level, a multiple of ten.")] = 500,
     repeats: Annotated[int, typer.Option(metavar="N", help="Independent repeats.")] = 8,
-    threads: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="Threads; all cores by default.")
-    ] = None,
+    threads: ThreadsOption = None,
     json: JsonOption = None,
 ) -> None:
     """Find the probability that a drop exceeds a limit, where that is rare."""

@@ -7,17 +7,13 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
-from rotordrop.cli._options import JsonOption, MachineArgument, ReportOption, quantity
-from rotordrop.cli._output import deliver, progress_bar, require_places
+from rotordrop.cli._options import JsonOption, MachineArgument, ReportOption, ThreadsOption, quantity
+from rotordrop.cli._output import deliver, drops_shown, progress_bar, require_places
 from rotordrop.errors import UsageError
-
-if TYPE_CHECKING:
-    from rotordrop.cli._output import Progress
-    from rotordrop.study.run import Report, StudyProgress
 
 
 def repeat(
@@ -37,9 +33,7 @@ def repeat(
     drops: Annotated[int, typer.Option(min=20, metavar="N", help="Drops to simulate.")] = 500,
     worst_of: Annotated[int, typer.Option(min=2, metavar="N", help="Worst of how many drops.")] = 100,
     seed: Annotated[int, typer.Option(min=0, metavar="N", help="Key of the random numbers.")] = 1,
-    threads: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="Threads; all cores by default.")
-    ] = None,
+    threads: ThreadsOption = None,
     report: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
@@ -62,7 +56,7 @@ def repeat(
     length = float(document["estimated_until_s"]) if document is not None else 0.2
     study = repeat_study(described, omega, duration=length, drops=drops, seed=seed)
     with progress_bar(study.name) as bar:
-        results = run_study(study, folder, threads=threads, report=_shown(bar))
+        results = run_study(study, folder, threads=threads, report=drops_shown(bar))
     told = recorded_numbers(document) if own and document is not None else {}
     found = repeats(results, told, worst_of=worst_of)
     page = repeat_page(results, found)
@@ -80,10 +74,3 @@ def _document(path: Path | None) -> dict[str, Any] | None:
     document = read_estimate(path)
     recorded_numbers(document)  # refuses what is no estimate before hours of drops
     return document
-
-
-def _shown(bar: Progress) -> Report:
-    def show(progress: StudyProgress) -> None:
-        bar(f"{progress.drops} of {progress.of} drops, {progress.rate:.1f}/s", progress.drops / progress.of)
-
-    return show

@@ -11,16 +11,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rotordrop.cli._options import DataOption, JsonOption
-from rotordrop.cli._output import console, deliver, progress_bar, require_places
+from rotordrop.cli._options import DataOption, JsonOption, ThreadsOption
+from rotordrop.cli._output import console, deliver, drops_shown, progress_bar, require_places
 from rotordrop.errors import UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rotordrop.cli._output import Progress
     from rotordrop.study.plan import Study
-    from rotordrop.study.run import Report
     from rotordrop.study.summary import StudyResults
 
 
@@ -44,9 +42,7 @@ def study(
         Path | None,
         typer.Option(metavar="FOLDER", help="Folder of the study; the name of its file by default."),
     ] = None,
-    threads: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="Threads; all cores by default.")
-    ] = None,
+    threads: ThreadsOption = None,
     claim: Annotated[
         bool,
         typer.Option(
@@ -93,7 +89,7 @@ def study(
         planned, home = _opened(place, folder)
         with progress_bar(planned.name) as bar:
             results = run_study(
-                planned, home, threads=threads, dask=dask, wait_for_others=not claim, report=_shown(bar)
+                planned, home, threads=threads, dask=dask, wait_for_others=not claim, report=drops_shown(bar)
             )
     if not len(results):
         console().print(f"{place}: no drop is finished yet")
@@ -138,13 +134,3 @@ def _limits(results: StudyResults, written: Sequence[str]) -> dict[str, float]:
             raise UsageError(f"--above: {unknown_key(name.strip(), tuple(kinds))}")
         found[name.strip()] = parse_quantity(limit.strip(), kinds[name.strip()])
     return found
-
-
-def _shown(bar: Progress) -> Report:
-    def show(progress: object) -> None:
-        from rotordrop.study.run import StudyProgress
-
-        assert isinstance(progress, StudyProgress)
-        bar(f"{progress.drops} of {progress.of} drops, {progress.rate:.1f}/s", progress.drops / progress.of)
-
-    return show

@@ -24,7 +24,7 @@ from rotordrop.estimation.tracked_parameters import (
     parameter_widening,
 )
 from rotordrop.identification.evidence import read_evidence
-from rotordrop.machine import CalibrationDrop, CalibrationOrigin, Machine
+from rotordrop.machine import CalibrationDrop, CalibrationOrigin, Machine, RecordedLift
 from rotordrop.measurement.record import Record
 from rotordrop.model.parameter import Parameter
 from rotordrop.model.parameter_table import parameter, row_of, rows, separating_measurement
@@ -33,7 +33,7 @@ from rotordrop.model.statics import bearing_load_shares
 from rotordrop.model.unknowns import typical_depth
 from rotordrop.tracking.consistency import Check, consistency_checks
 from rotordrop.tracking.problem import DropProblem
-from rotordrop.tracking.smoother import parameter_sample
+from rotordrop.tracking.smoother import Smoothed, parameter_sample
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -163,7 +163,12 @@ def calibrate_machine(
     fitted = machine_values(bearings, known, source)
     joint = joint_spread(problem, mean, covariance, known)
     said = values | _of_drop(problem, mean, covariance)
-    drops = [CalibrationDrop(name=n, sha256=r.sha256) for n, r in zip(stems, records, strict=True)]
+    drops = [
+        CalibrationDrop(name=name, sha256=record.sha256, lift=_lift(one, followed))
+        for name, record, one, followed in zip(
+            stems, records, tracked.problems, tracked.smoothed, strict=True
+        )
+    ]
     origin = CalibrationOrigin(drops=tuple(drops), consistent=consistent, joint=joint)
     return Calibration(
         machine=_possible(_with_unbalance(machine, said), fitted, stems).calibrated_on(origin),
@@ -186,6 +191,32 @@ def _of_drop(problem: DropProblem, mean: Array, covariance: Array) -> dict[str, 
         for k, unknown in enumerate(problem.unknowns)
         if unknown.scope == "drop"
     }
+
+
+def _lift(problem: DropProblem, smoothed: Smoothed) -> tuple[RecordedLift, ...]:
+    """What a drop shows of the remanent force of each magnet, in shares of the weight it carries."""
+    at, machine = parameter_sample(smoothed), problem.model.machine
+    mean, sigma = smoothed.means[at], np.sqrt(np.maximum(np.diag(smoothed.covariance(at)), 0.0))
+    share = machine.rotor.mass * float(machine.gravity) / max(len(machine.ambs), 1)
+    found = {
+        unknown.path: (
+            float(mean[problem.n_dynamic + k]) / share,
+            float(sigma[problem.n_dynamic + k]) / share,
+        )
+        for k, unknown in enumerate(problem.unknowns)
+        if unknown.parameter.owner == "magnet"
+    }
+    sideways, up = (parameter(f"remanent_force.{axis}", "magnet") for axis in "xy")
+    return tuple(
+        RecordedLift(
+            magnet=amb.name,
+            sideways=found[sideways.path_of(amb.name)][0],
+            sideways_error=found[sideways.path_of(amb.name)][1],
+            up=found[up.path_of(amb.name)][0],
+            up_error=found[up.path_of(amb.name)][1],
+        )
+        for amb in machine.ambs
+    )
 
 
 def _with_unbalance(machine: Machine, said: Mapping[str, IdentifiedValue]) -> Machine:

@@ -13,8 +13,9 @@ from scipy.special import ndtr, ndtri
 
 from rotordrop.errors import UsageError
 from rotordrop.estimated import NINETY
+from rotordrop.estimation.tracked_parameters import PARAMETER_WIDENING
 from rotordrop.model.parameter import Parameter
-from rotordrop.model.parameter_table import row_of
+from rotordrop.model.parameter_table import fitted_row, row_of
 
 Array = NDArray[np.float64]
 
@@ -22,6 +23,11 @@ FALSE_ALARM = 0.01
 """Probability that anything is named of two drops between which nothing changed [1]."""
 BY_PRIOR = 0.95
 """Standard deviation over that of the prior from which a record says nothing of its own [1]."""
+SURE, LITTLE = 1e-8, 1e-6
+"""Smallest variance of a record's estimate and smallest information on a change, over the prior's [1]: the
+filter keeps seven digits, and a record may say nothing."""
+UNKNOWN_CHANGE = math.sqrt(2.0 / (BY_PRIOR**-2 - 1.0))
+"""Standard error of a change, over the prior's deviation, from which the records say nothing of it [1]."""
 WATCHED: Mapping[str, float] = {
     "air_gap": 10e-6,
     "support.stiffness": math.log(1.1),
@@ -126,9 +132,12 @@ def changes(first: Mapping[str, Any], second: Mapping[str, Any]) -> Changes:
     -----
     What was known before stands in both estimates; it is taken out of each (the quotient of posterior and
     prior), so that two records of an unchanged machine differ by their own errors alone, and a tight prior
-    does not hide a change. Every parameter may change; none is assumed to. Of m parameters the level of each
-    is `FALSE_ALARM` over m (Bonferroni). Differs from a common fit of both records:
-    correlations between parameters are not used, so a change must show in one of them alone.
+    does not hide a change. Of m parameters the level of each is `FALSE_ALARM` over m (Bonferroni).
+
+    Where both documents hold their joint estimate, it is one fit to both records: everything is shared but
+    what changed, sensors too, so that what confounds a parameter in both records alike does not blur its
+    change. Parameters are let change one after the other, the surest first, while one is beyond chance.
+    Else every parameter is compared by itself.
 
     Raises
     ------
@@ -144,10 +153,12 @@ def changes(first: Mapping[str, Any], second: Mapping[str, Any]) -> Changes:
         )
     told = [{one["path"]: one for one in document["parameters"]} for document in (first, second)]
     paths = [path for path in told[0] if path in told[1] and _watched(path) is not None]
-    pairs = {path: [_alone(one[path], row_of(path)) for one in told] for path in paths}
-    count = sum(None not in pair for pair in pairs.values())
-    level = float(-ndtri(0.5 * FALSE_ALARM / max(count, 1)))
-    found = [_change(path, told, pair, level) for path, pair in pairs.items()]
+    if first.get("joint") and second.get("joint"):
+        found = _jointly(first["joint"], second["joint"], told, paths)
+    else:
+        pairs = {path: [_alone(one[path], row_of(path)) for one in told] for path in paths}
+        level = _level(sum(None not in pair for pair in pairs.values()))
+        found = [_compared(path, told, pair, level) for path, pair in pairs.items()]
     return Changes(
         first=str(first.get("record", "the first")),
         second=str(second.get("record", "the second")),
@@ -168,7 +179,8 @@ def _require(document: Mapping[str, Any]) -> None:
 
 
 def _watched(path: str) -> float | None:
-    return next((least for name, least in WATCHED.items() if path.endswith(f".{name}")), None)
+    row = fitted_row(path)
+    return None if row is None else WATCHED.get(row.path)
 
 
 def _alone(entry: Mapping[str, Any], row: Parameter) -> _Told | None:
@@ -194,29 +206,119 @@ def _measured(known: Mapping[str, Any], row: Parameter) -> tuple[float, float]:
     return math.log(known["value"]), max(math.log(high / low) / (2.0 * NINETY), 1e-12)
 
 
-def _change(
+def _level(count: int) -> float:
+    """Standard deviations beyond which one of so many changes is no chance."""
+    return float(-ndtri(0.5 * FALSE_ALARM / max(count, 1)))
+
+
+def _compared(
     path: str, told: Sequence[Mapping[str, Any]], pair: Sequence[_Told | None], level: float
 ) -> Change:
-    factor, least = row_of(path).logarithmic, _watched(path)
-    values = [one[path]["estimate"]["value"] for one in told]
     one, other = pair
-    if one is None or other is None or least is None:
+    if one is None or other is None:
+        return _change(path, told, 0.0, math.inf, named=False)
+    moved, sigma = other.mean - one.mean, math.hypot(one.sigma, other.sigma)
+    return _change(path, told, moved, sigma, named=abs(moved) > level * sigma)
+
+
+def _change(
+    path: str, told: Sequence[Mapping[str, Any]], moved: float, sigma: float, *, named: bool
+) -> Change:
+    """A change and its standard error in the measure of the parameter; infinite where nothing is known."""
+    factor, least = row_of(path).logarithmic, _watched(path)
+    assert least is not None
+    before, after = (one[path]["estimate"]["value"] for one in told)
+    if math.isinf(sigma):
         nothing = (0.0, math.inf) if factor else (-math.inf, math.inf)
         return Change(
-            path=path, before=values[0], after=values[1], change=1.0 if factor else 0.0, interval_90=nothing,
+            path=path, before=before, after=after, change=1.0 if factor else 0.0, interval_90=nothing,
             factor=factor, probability=0.0, named=False, determined=False,
         )  # fmt: skip
-    moved, sigma = other.mean - one.mean, math.hypot(one.sigma, other.sigma)
     ends = (moved - NINETY * sigma, moved, moved + NINETY * sigma)
     low, middle, high = (math.exp(end) for end in ends) if factor else ends
     beyond = float(ndtr((moved - least) / sigma) + ndtr((-moved - least) / sigma))
     return Change(
         path=path,
-        before=values[0],
-        after=values[1],
+        before=before,
+        after=after,
         change=middle,
         interval_90=(low, high),
         factor=factor,
         probability=beyond,
-        named=abs(moved) > level * sigma,
+        named=named,
     )
+
+
+def _jointly(
+    first: Mapping[str, Any],
+    second: Mapping[str, Any],
+    told: Sequence[Mapping[str, Any]],
+    paths: Sequence[str],
+) -> list[Change]:
+    """Changes by one fit to both records that shares everything else."""
+    common = [path for path in first["paths"] if path in second["paths"]]
+    fit = _CommonFit([_own(one, common) for one in (first, second)])
+    scale = dict(zip(first["paths"], first["prior_standard_deviation"], strict=True))
+    watched = [path for path in paths if path in common]
+    chosen: list[str] = []
+    level = _level(len(watched))
+    while rest := [path for path in watched if path not in chosen]:
+        sure = {path: fit.change([common.index(one) for one in (*chosen, path)]) for path in rest}
+        best = max(rest, key=lambda path: abs(sure[path][0]) / sure[path][1])
+        if abs(sure[best][0]) <= level * sure[best][1]:
+            break
+        chosen.append(best)
+    found = []
+    for path in watched:
+        others = [one for one in chosen if one != path]
+        moved, sigma = fit.change([common.index(one) for one in (*others, path)])
+        known = sigma < UNKNOWN_CHANGE
+        found.append(
+            _change(
+                path,
+                told,
+                moved * scale[path],
+                sigma * scale[path] if known else math.inf,
+                named=path in chosen and known,
+            )
+        )
+    return found
+
+
+def _own(joint: Mapping[str, Any], common: Sequence[str]) -> tuple[Array, Array]:
+    """What a record alone says, in standard deviations of the prior about its middle.
+
+    Information matrix and information vector: posterior less prior. Errors are as much wider than the filter
+    holds as those of published parameters are.
+    """
+    n, at = len(joint["paths"]), [joint["paths"].index(path) for path in common]
+    lower = np.zeros((n, n))
+    lower[np.tril_indices(n)] = joint["covariance"]
+    sigma = np.array(joint["prior_standard_deviation"])
+    whole = (lower + np.tril(lower, -1).T) / np.outer(sigma, sigma)
+    mean = (np.array(joint["mean"]) - np.array(joint["prior_mean"])) / sigma
+    size, turn = np.linalg.eigh(whole[np.ix_(at, at)])
+    size = np.maximum(size, SURE)
+    gained = np.maximum(1.0 / size - 1.0, 0.0) / PARAMETER_WIDENING**2
+    # the record's own middle is the posterior's, moved away from the prior as far as the prior drew it
+    vector = np.where(gained > 0.0, (turn.T @ mean[at]) / size / PARAMETER_WIDENING**2, 0.0)
+    return (turn * gained) @ turn.T, turn @ vector
+
+
+class _CommonFit:
+    """One fit to two records; every parameter is shared but those that are let change."""
+
+    def __init__(self, own: Sequence[tuple[Array, Array]]) -> None:
+        (one, seen), (self._other, self._read) = own
+        self._shared = one + self._other + np.eye(len(one))
+        self._sum = seen + self._read
+
+    def change(self, places: Sequence[int]) -> tuple[float, float]:
+        """Change of the last of some places while all of them may change, and its standard error."""
+        inside = self._other[:, places]
+        carried = np.linalg.solve(self._shared, np.column_stack([inside, self._sum]))
+        known = self._other[np.ix_(places, places)] - inside.T @ carried[:, :-1]
+        known += LITTLE * np.eye(len(places))
+        spread = np.linalg.inv(known)
+        moved = spread @ (self._read[places] - inside.T @ carried[:, -1])
+        return float(moved[-1]), math.sqrt(float(spread[-1, -1]))

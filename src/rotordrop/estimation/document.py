@@ -14,7 +14,7 @@ from rotordrop.estimated import IdentifiedValue
 from rotordrop.estimation.advice import Advice
 from rotordrop.estimation.agreement import Agreement
 from rotordrop.estimation.bearing_drop import BearingDrop, Impact, Peak
-from rotordrop.estimation.estimate import Estimate, ReplaySteps, Structure
+from rotordrop.estimation.estimate import Estimate, JointEstimate, ReplaySteps, Structure
 from rotordrop.estimation.methods import Replay
 from rotordrop.estimation.severity_numbers import severity_values
 from rotordrop.identification.first_contact import TimedContact
@@ -48,6 +48,7 @@ def estimate_document(estimate: Estimate) -> dict[str, Any]:
             }
             for one in estimate.parameters
         ],
+        "joint": None if estimate.joint is None else _joint(estimate.joint),
         "sensors": {
             one.sensor: {
                 "gain_error": one.gain_error.as_json(),
@@ -121,6 +122,17 @@ def structure_json(structure: Sequence[Structure]) -> list[dict[str, Any]]:
         {"name": one.name, "log_likelihood_rise": _finite(one.gain), "sentence": one.sentence}
         for one in structure
     ]
+
+
+def _joint(joint: JointEstimate) -> dict[str, Any]:
+    lower = joint.covariance[np.tril_indices(len(joint.paths))]
+    return {
+        "paths": list(joint.paths),
+        "mean": joint.mean.tolist(),
+        "covariance": [float(f"{value:.9g}") for value in lower],
+        "prior_mean": joint.prior_mean.tolist(),
+        "prior_standard_deviation": joint.prior_sigma.tolist(),
+    }
 
 
 def _cross_check(one: Any) -> dict[str, Any]:

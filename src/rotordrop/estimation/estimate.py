@@ -131,6 +131,27 @@ class FittedParameter:
 
 
 @dataclass(frozen=True, kw_only=True)
+class JointEstimate:
+    """How the errors of what belongs to the machine hang together, in the measures it is estimated in.
+
+    Attributes
+    ----------
+    paths : tuple of str, length n
+        Parameters, gains and offsets of the sensors.
+    mean, prior_mean, prior_sigma : ndarray, shape (n,)
+        What the record made of them, and what was known before.
+    covariance : ndarray, shape (n, n)
+        Of the errors of the mean, as the filter holds it.
+    """
+
+    paths: tuple[str, ...]
+    mean: Array
+    covariance: Array
+    prior_mean: Array
+    prior_sigma: Array
+
+
+@dataclass(frozen=True, kw_only=True)
 class Structure:
     """Something the machine has beyond the usual model, as far as the record says.
 
@@ -252,6 +273,8 @@ class Estimate:
         Every unknown with prior and estimate.
     sensors : tuple of SensorErrors
         Gain, offset and noise of every sensor; empty for a replay.
+    joint : JointEstimate or None
+        How the errors of parameters and sensors hang together; None where they are not held together.
     structure : tuple of Structure
         What the machine has beyond the usual model; empty where that does.
     cross_check : tuple of CrossCheck
@@ -288,6 +311,7 @@ class Estimate:
     parameters: tuple[FittedParameter, ...]
     checks: tuple[Check, ...] = ()
     sensors: tuple[SensorErrors, ...] = ()
+    joint: JointEstimate | None = None
     structure: tuple[Structure, ...] = ()
     cross_check: tuple[CrossCheck, ...] = ()
     innovations: Innovations | None = None

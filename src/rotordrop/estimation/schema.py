@@ -125,6 +125,14 @@ _PARAMETER = closed(
     prior={"oneOf": [_VALUE_REF, {"type": "null"}]},
     estimate=_VALUE_REF,
 )
+_JOINT = closed(
+    {},
+    paths=TEXTS,
+    mean={**NUMBERS, "description": "In the measures of the estimate, mostly logarithms."},
+    covariance={**NUMBERS, "description": "Lower triangle, row by row, of the errors of the mean."},
+    prior_mean=NUMBERS,
+    prior_standard_deviation=NUMBERS,
+)
 _SENSOR = closed({}, gain_error=_VALUE_REF, offset_m=_VALUE_REF, noise_m=NUMBER)
 _SPEED = closed(
     {},
@@ -233,6 +241,10 @@ _DROP = closed(
     cross_check={"type": "array", "items": _CROSS_CHECK},
     later_motion={"type": "array", "items": _LATER},
     parameters={"type": "array", "items": _PARAMETER},
+    joint={
+        "oneOf": [_JOINT, {"type": "null"}],
+        "description": "How the errors of what belongs to the machine hang together.",
+    },
     sensors=by_name(_SENSOR),
 )
 

@@ -42,6 +42,7 @@ from rotordrop.estimation.tracked_parameters import (
     bearing_values,
     gap_of_record,
     is_lost,
+    joint_estimate,
     parameters,
     sensor_errors,
 )
@@ -114,6 +115,7 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
         parameters=judged.parameters,
         checks=drop.checks,
         sensors=judged.sensors,
+        joint=joint_estimate(problem, drop.smoothed) if judged.fits else None,
         structure=_structure(drop, judged),
         cross_check=_comparisons(drop, judged),
         innovations=_innovations(drop),

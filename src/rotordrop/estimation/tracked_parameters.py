@@ -7,18 +7,21 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotordrop.estimated import NINETY, IdentifiedValue, Verdict
-from rotordrop.estimation.estimate import FittedParameter, SensorErrors
+from rotordrop.estimation.estimate import FittedParameter, JointEstimate, SensorErrors
 from rotordrop.estimation.tracked_loads import INCONSISTENT, OF_CROSS_CHECK, with_interval
 from rotordrop.machine import Machine
 from rotordrop.model.bearing_numbers import numbers_of
 from rotordrop.model.parameter import Parameter
 from rotordrop.model.parameter_table import parameter, published
-from rotordrop.model.unknowns import Unknown
+from rotordrop.model.unknowns import Unknown, sensor_prior, smallest_gap
 from rotordrop.tracking.consistency import PARAMETER_LIMIT
 from rotordrop.tracking.problem import DropProblem
 from rotordrop.tracking.smoother import Smoothed, parameter_sample
+
+Array = NDArray[np.float64]
 
 MODEL_GAP_SIGMA = 0.01
 """Standard deviation of a gap, over it, by what confounds it with gains and offsets beyond the fit [1]."""
@@ -98,6 +101,39 @@ def parameters(
             value = replace(value, status=INCONSISTENT, interval_90=_hull(value, prior))
         found.append(FittedParameter(row=unknown.parameter, owner=unknown.owner, prior=prior, estimate=value))
     return tuple(found)
+
+
+def joint_estimate(problem: DropProblem, smoothed: Smoothed) -> JointEstimate:
+    """What belongs to the machine as it was shortly after the first contacts, with all covariances."""
+    at, places = parameter_sample(smoothed), problem.machine_indices
+    sensors = problem.model.machine.sensors
+    paths = [unknown.path for unknown in problem.unknowns if unknown.scope == "machine"]
+    paths += [parameter(part, "sensor").path_of(s.name) for part in ("gain", "offset") for s in sensors]
+    before = prior_of(problem)
+    return JointEstimate(
+        paths=tuple(paths),
+        mean=smoothed.means[at][places],
+        covariance=smoothed.covariance(at)[np.ix_(places, places)],
+        prior_mean=before[0][places],
+        prior_sigma=before[1][places],
+    )
+
+
+def prior_of(problem: DropProblem) -> tuple[Array, Array]:
+    """Mean and standard deviation of every entry of an estimate before anything of its record was read.
+
+    The prior of the problem itself knows the settled tail already.
+    """
+    mean, sigma = problem.mean.copy(), np.sqrt(np.diag(problem.covariance))
+    gap = smallest_gap(problem.model.machine)
+    for place, unknown in enumerate(problem.unknowns, start=problem.n_dynamic):
+        mean[place], sigma[place] = unknown.mean, unknown.sigma
+    first = problem.parameter_slice.stop
+    for c, sensor in enumerate(problem.model.machine.sensors):
+        known = sensor_prior(parameter("offset", "sensor"), sensor.offset, gap)
+        offset = first + problem.n_channels + c
+        mean[offset], sigma[offset] = known.mean, known.sigma
+    return mean, sigma
 
 
 def _hull(one: IdentifiedValue, other: IdentifiedValue) -> tuple[float, float]:

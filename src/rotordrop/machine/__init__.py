@@ -2,7 +2,7 @@
 
 from rotordrop.machine.amb import ActiveMagneticBearing
 from rotordrop.machine.ball_bearing import BallBearing
-from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin, JointSpread
+from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin, JointSpread, RecordedLift
 from rotordrop.machine.examples import example_machine, example_names, example_path
 from rotordrop.machine.loading import load_machine, loads_machine
 from rotordrop.machine.machine import Machine
@@ -33,6 +33,7 @@ __all__ = [
     "Machine",
     "Material",
     "Race",
+    "RecordedLift",
     "Rotor",
     "Section",
     "SectionByLength",

@@ -9,6 +9,26 @@ from pydantic import Field, StrictBool
 from rotordrop.machine.description import Description, Misfit, Text
 
 
+class RecordedLift(Description):
+    """The remanent force of one magnet in one recorded drop, over the weight that the magnet carries.
+
+    Attributes
+    ----------
+    magnet : str
+        Name of the magnet.
+    sideways, up : float
+        Its two parts [1].
+    sideways_error, up_error : float
+        Their standard errors, what was known before the record included [1].
+    """
+
+    magnet: Text
+    sideways: float
+    sideways_error: float = Field(gt=0.0)
+    up: float
+    up_error: float = Field(gt=0.0)
+
+
 class CalibrationDrop(Description):
     """One recorded drop that a machine was calibrated on.
 
@@ -18,10 +38,15 @@ class CalibrationDrop(Description):
         Name of the recording, as it is, with commas and blanks.
     sha256 : str
         Hash of its file; empty where there was no file.
+    lift : tuple of RecordedLift
+        What the drop showed of the remanent force of each magnet; no other drop need have it.
     """
 
     name: Text
     sha256: Text = Field(default="", description="SHA-256 of the file of the recording")
+    lift: tuple[RecordedLift, ...] = Field(
+        default=(), description="Remanent force of each magnet in this drop, over the weight it carries"
+    )
 
 
 class JointSpread(Description):

@@ -358,6 +358,12 @@ def row_of(path: str) -> Parameter:
     return _BY_PATH.get(("bearing", path)) or _BY_PATH["bearing", rest]
 
 
+def fitted_row(path: str) -> Parameter | None:
+    """Row of a path of the machine file; none for what is fitted by its ratio to another value there."""
+    owner, _, rest = path.partition(".")
+    return None if owner in ("sensors", "rotor") else _BY_PATH.get(("bearing", rest))
+
+
 def published() -> dict[str, Parameter]:
     """Rows of bearings by their field in the JSON document."""
     return {row.field: row for row in rows("bearing") if row.field}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import UsageError
-from rotordrop.machine import Machine, load_machine
+from rotordrop.machine import Machine
 from rotordrop.machine.description import unknown_key
-from rotordrop.study.plan import Study, read_study
+from rotordrop.study.plan import Study, read_file, read_study
 from rotordrop.study.quantities import columns_of
 from rotordrop.study.run import Report, run_study
 from rotordrop.study.summary import Known, StudyResults, exceedance, quantile
@@ -290,17 +289,4 @@ def _aim(machine: Machine, raw: Any) -> Aim:
 
 def load_design(path: str | Path) -> DesignPlan:
     """Read a design file (TOML); its machine file counts from its folder."""
-    file = Path(path)
-    try:
-        table = tomllib.loads(file.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise UsageError(f"{file}: cannot read the design file: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UsageError(f"{file}: not valid TOML: {error}") from error
-    named = table.get("machine")
-    if not isinstance(named, str):
-        raise UsageError(f'{file}: machine = {named!r}; expected the name of a machine file, "machine.toml"')
-    try:
-        return read_design(table, load_machine(file.parent / named))
-    except UsageError as error:
-        raise UsageError(f"{file}: {error}") from error
+    return read_file(path, "design", read_design)

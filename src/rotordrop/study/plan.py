@@ -6,11 +6,11 @@ import hashlib
 import json
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +21,14 @@ from rotordrop.machine.amb import REMANENCE_TIME
 from rotordrop.machine.description import unknown_key
 from rotordrop.machine.parameter_paths import kind_of_path, value_of_path
 from rotordrop.machine.saving import machine_text
+from rotordrop.model.parameter_table import fitted_row, parameter
 from rotordrop.simulation.case import DropCase, LevitatedStart
 from rotordrop.study import sampling
 from rotordrop.study.distributions import Distribution, read_distribution
 from rotordrop.units import parse_quantity
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 
 CASE_KINDS: Mapping[str, str] = {
     "speed": "speed",
@@ -214,8 +216,9 @@ class Study:
             if case_kind(self.machine, path) is None:
                 found |= dict.fromkeys(_starred(self.machine, path), value)
         if self.joint is not None:
-            for path in [path for path in self.joint.paths if path.endswith("friction.dynamic")]:
-                static = path.replace("dynamic", "static")  # known by its ratio alone
+            dynamic, static_row = parameter("friction.dynamic"), parameter("friction.static")
+            for path in [path for path in self.joint.paths if fitted_row(path) is dynamic]:
+                static = static_row.path_of(path.partition(".")[0])  # known by its ratio alone
                 ratio = value_of_path(self.machine, static) / value_of_path(self.machine, path)
                 found.setdefault(static, ratio * found[path])
         return found
@@ -439,11 +442,16 @@ def load_study(path: str | Path) -> Study:
     UsageError
         If the study cannot be used; the message names the file.
     """
+    return read_file(path, "study", read_study)
+
+
+def read_file(path: str | Path, what: str, read: Callable[[Mapping[str, Any], Machine], T]) -> T:
+    """Read a plan (TOML) with the machine it names; every message names the file."""
     file = Path(path)
     try:
         table = tomllib.loads(file.read_text(encoding="utf-8-sig"))
     except OSError as error:
-        raise UsageError(f"{file}: cannot read the study file: {error.strerror}") from error
+        raise UsageError(f"{file}: cannot read the {what} file: {error.strerror}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise UsageError(f"{file}: not valid TOML: {error}") from error
     named = table.get("machine")
@@ -451,6 +459,6 @@ def load_study(path: str | Path) -> Study:
         raise UsageError(f'{file}: machine = {named!r}; expected the name of a machine file, "machine.toml"')
     machine = load_machine(file.parent / named)
     try:
-        return read_study(table, machine)
+        return read(table, machine)
     except UsageError as error:
         raise UsageError(f"{file}: {error}") from error

@@ -23,6 +23,7 @@ from rotordrop.machine import Machine
 from rotordrop.machine.amb import REMANENCE_TIME
 from rotordrop.model.parameter_table import parameter
 from rotordrop.model.unknowns import smallest_gap
+from rotordrop.study.between_drops import next_draw
 from rotordrop.study.distributions import Distribution
 from rotordrop.study.plan import Study
 from rotordrop.study.summary import COVER, Known, StudyResults, quantile
@@ -88,21 +89,26 @@ def repeat_study(
 ) -> Study:
     """Study of the drops that could have happened at a speed [rad/s].
 
-    What is calibrated varies by its joint distribution, the rotor angle over the whole turn, remanent lift of
-    each magnet, its time and the unbalances as a filter takes them before it reads a record: no calibration
-    keeps these. Each magnet holds the rotor beside its centre, on an orbit of its own.
+    What is calibrated varies by its joint distribution, the rotor angle over the whole turn. The remanent
+    lift of each magnet is that of another drop, as `next_draw` has it from the drops of the calibration; its
+    time and the unbalances are as a filter takes them before it reads a record. Each magnet holds the rotor
+    beside its centre, on an orbit of its own.
     """
     if not machine.ambs:
         raise UsageError("a virtual repeat starts levitated, but the machine has no AMBs; describe them")
-    joint = machine.calibration is not None and machine.calibration.joint is not None
+    origin = machine.calibration
+    joint = origin is not None and origin.joint is not None
     described = machine.remanence_time_constant
     time = REMANENCE_TIME if described is None else float(described)
     row = parameter("remanence.time_constant", "drop")
     vary = {"remanence_time": Distribution(shape="log_normal", numbers=(time, row.guess_sigma))}
-    lift = Distribution(shape="normal", numbers=(0.0, parameter("remanent_force.y", "magnet").guess_sigma))
+    lifts = () if origin is None else [lift for drop in origin.drops for lift in drop.lift]
+    spread = parameter("remanent_force.y", "magnet").guess_sigma
+    up = next_draw([(lift.up, lift.up_error) for lift in lifts], spread)
+    sideways = next_draw([(lift.sideways, lift.sideways_error) for lift in lifts], spread)
     gap = smallest_gap(machine)
     for amb in machine.ambs:
-        vary |= {f"{amb.name}.{name}": lift for name in ("remanent_share", "remanent_share_x")}
+        vary |= {f"{amb.name}.remanent_share": up, f"{amb.name}.remanent_share_x": sideways}
         beside = Distribution(shape="normal", numbers=(0.0, OFF_CENTRE * gap))
         vary |= {f"{amb.name}.{name}": beside for name in ("offset_x", "offset_y")}
         vary[f"{amb.name}.orbit"] = Distribution(shape="uniform", numbers=(0.0, LARGEST_ORBIT * gap))

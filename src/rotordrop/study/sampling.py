@@ -13,13 +13,14 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
 from rotordrop.machine.parameter_paths import value_of_path
-from rotordrop.model.parameter_table import row_of
-from rotordrop.study.distributions import Distribution
+from rotordrop.model.parameter_table import fitted_row
+from rotordrop.physics.elementary import exp_each, ln_each
+from rotordrop.physics.linear_algebra import product, symmetric_eigen
+from rotordrop.study.distributions import Distribution, normal_score
 
 Array = NDArray[np.float64]
 
@@ -131,12 +132,10 @@ class Joint:
 
     def values(self, share: Array) -> Array:
         """Values [SI], shape (n, V), at independent shares of the probability, shape (n, V)."""
-        score = ndtri(np.clip(share, 1e-16, 1.0 - 1e-16))
-        drawn: Array = self.middle + score @ self.root.T
-        drawn[:, self.logarithmic] = np.exp(drawn[:, self.logarithmic])
+        drawn: Array = self.middle + product(normal_score(share), self.root.T)
+        drawn[:, self.logarithmic] = exp_each(drawn[:, self.logarithmic])
         for k, path in enumerate(self.paths):
-            if not path.endswith("_horizontal"):
-                row = row_of(path)
+            if (row := fitted_row(path)) is not None:
                 drawn[:, k] = [row.within(value) for value in drawn[:, k].tolist()]
         return drawn
 
@@ -165,8 +164,8 @@ def joint_of(machine: Machine) -> Joint:
     spread = origin.joint
     logs = np.array(spread.logarithmic)
     middle = np.array([value_of_path(machine, path) for path in spread.paths])
-    middle[logs] = np.log(middle[logs])
-    size, turn = np.linalg.eigh(spread.matrix)
+    middle[logs] = ln_each(middle[logs])
+    size, turn = symmetric_eigen(spread.matrix)
     # rows of the symmetric root: the same numbers whatever sign an eigenvector has
-    root = (turn * np.sqrt(np.maximum(size, 0.0))) @ turn.T
+    root = product(turn * np.sqrt(np.maximum(size, 0.0)), turn.T)
     return Joint(paths=spread.paths, logarithmic=logs, middle=middle, root=root)

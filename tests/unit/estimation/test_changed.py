@@ -10,6 +10,7 @@ import pytest
 from rotordrop.errors import UsageError
 from rotordrop.estimated import NINETY
 from rotordrop.estimation.changed import WATCHED, changes
+from rotordrop.estimation.tracked_parameters import PARAMETER_WIDENING
 
 TRUTH = {
     "air_gap": 275e-6,
@@ -129,3 +130,84 @@ def test_other_machines_and_estimates_beside_their_record_are_refused():
         changes({**one, "consistent": False}, one)
     with pytest.raises(UsageError, match=r"is no estimate of one drop"):
         changes({"drops": {}}, one)
+
+
+CONFOUNDED = ("NDE.air_gap", "NDE.support.stiffness", "NDE.friction.dynamic", "sensors.X.gain")
+BEFORE = np.array([22e-6, 0.5, 0.4, 0.03])
+MIDDLE = np.array([275e-6, math.log(1e8), math.log(0.1), 0.0])
+
+
+def joint_document(random, truth, name):
+    """An estimate of a linear record that sees gap and gain as one sum, and hardly tells them apart."""
+    seen = np.zeros((5, 4))
+    seen[0, [0, 3]] = 1e6, 275.0  # [µm]
+    seen[1, 3] = 27.5
+    seen[2, 1], seen[3, 2] = 1.0 / 0.015, 1.0 / 0.03
+    seen[4, 1:3] = 20.0
+    read = seen @ (truth - MIDDLE) + PARAMETER_WIDENING * random.standard_normal(5)
+    covariance = np.linalg.inv(seen.T @ seen + np.diag(BEFORE**-2))
+    mean = MIDDLE + covariance @ (seen.T @ read)
+    values = {"NDE.air_gap": mean[0], **dict(zip(CONFOUNDED[1:3], np.exp(mean[1:3]), strict=True))}
+    return {
+        "machine": "m",
+        "record": name,
+        "parameters": [
+            {"path": path, "prior": None, "estimate": {"value": value, "interval_90": None}}
+            for path, value in values.items()
+        ],
+        "joint": {
+            "paths": list(CONFOUNDED),
+            "mean": mean.tolist(),
+            "covariance": covariance[np.tril_indices(4)].tolist(),
+            "prior_mean": MIDDLE.tolist(),
+            "prior_standard_deviation": BEFORE.tolist(),
+        },
+    }
+
+
+def hidden_truth(random):
+    return MIDDLE + BEFORE * random.standard_normal(4)
+
+
+def test_what_both_records_confound_alike_does_not_blur_a_change():
+    """A gap known to 6 µm in each record, and its change to 2 µm, since the gain of the sensor is one."""
+    random, found, held, alarms = np.random.default_rng(8), 0, 0, 0
+    for _ in range(400):
+        truth = hidden_truth(random)
+        first, same = (joint_document(random, truth, name) for name in "ab")
+        alarms += bool(changes(first, same).named)
+        after = changes(first, joint_document(random, truth + np.array([10e-6, 0, 0, 0]), "c"))
+        found += [one.path for one in after.named] == ["NDE.air_gap"]
+        gap = next(one for one in after.found if one.path == "NDE.air_gap")
+        held += gap.interval_90[0] <= 10e-6 <= gap.interval_90[1]
+    covariance = np.zeros((4, 4))
+    covariance[np.tril_indices(4)] = first["joint"]["covariance"]
+    assert math.sqrt(covariance[0, 0]) > 5e-6
+    assert found >= 0.9 * 400
+    assert alarms <= 10  # one in a hundred, and what chance adds
+    assert 0.86 * 400 <= held <= 0.94 * 400
+
+
+def test_two_changes_at_once_are_both_named():
+    random, truth = np.random.default_rng(9), MIDDLE
+    moved = truth + np.array([15e-6, -0.15, 0.0, 0.0])
+    found = changes(joint_document(random, truth, "a"), joint_document(random, moved, "b"))
+    assert {one.path for one in found.named} == {"NDE.air_gap", "NDE.support.stiffness"}
+    stiffness = next(one for one in found.found if one.path == "NDE.support.stiffness")
+    assert stiffness.factor
+    assert stiffness.interval_90[0] < math.exp(-0.15) < stiffness.interval_90[1]
+
+
+def test_a_joint_record_that_says_nothing_of_a_parameter_says_nothing_of_its_change():
+    random = np.random.default_rng(10)
+    first, second = (joint_document(random, MIDDLE, name) for name in "ab")
+    for one in (first, second):
+        n = len(CONFOUNDED)
+        covariance = np.zeros((n, n))
+        covariance[np.tril_indices(n)] = one["joint"]["covariance"]
+        covariance[2, :], covariance[:, 2] = 0.0, 0.0
+        covariance[2, 2] = BEFORE[2] ** 2
+        one["joint"]["covariance"] = covariance[np.tril_indices(n)].tolist()
+        one["joint"]["mean"][2] = MIDDLE[2]
+    friction = next(one for one in changes(first, second).found if one.path == "NDE.friction.dynamic")
+    assert not friction.determined
