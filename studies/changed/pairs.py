@@ -1,9 +1,11 @@
-"""Pairs of recorded drops of a hidden machine: unchanged, and with a change of the size that is asked for.
+"""Pairs of recorded drops of a hidden machine: unchanged, and with changes of the sizes that are asked for.
 
     python studies/changed/pairs.py SEED [SEED ...] --out FOLDER
 
-Three drops of each machine are estimated from guesses: two as it is, one after a change of gap (+10 µm), of
-support stiffness (−10 %), friction (+20 %) or drag (× 2) at one bearing, in turn by seed.
+Four drops of each machine are estimated from guesses: two as it is, one after a change of gap (+10 µm) at one
+bearing, support stiffness (-10 %) and drag (x 2) at the other, one after a change of friction (+20 %) and of
+support damping (+20 %). Which bearing is which goes by the seed. Estimates are kept; a second call with the
+same folder compares them again.
 """
 
 from __future__ import annotations
@@ -24,50 +26,87 @@ from rotordrop.synthesis.event import FINER, HiddenMachine, hidden_machine
 from rotordrop.synthesis.recording import synthesize_drop
 
 HZ = 2.0 * math.pi
+BEARINGS = ("NDE", "DE")
 CHANGES = (
-    ("NDE.air_gap", lambda value: value + 10e-6),
-    ("DE.support.stiffness", lambda value: 0.9 * value),
-    ("NDE.friction.dynamic", lambda value: 1.2 * value),
-    ("DE.race.drag_coefficient", lambda value: 2.0 * value),
+    (("air_gap", 0), ("support.stiffness", 1), ("race.drag_coefficient", 1)),
+    (("friction.dynamic", 0), ("support.damping", 1)),
 )
+"""What is changed together: the parameter, and at which of two bearings."""
+CHANGED = {
+    "air_gap": lambda value: value + 10e-6,
+    "support.stiffness": lambda value: 0.9 * value,
+    "support.damping": lambda value: 1.2 * value,
+    "friction.dynamic": lambda value: 1.2 * value,
+    "race.drag_coefficient": lambda value: 2.0 * value,
+}
+WITH_IT = {
+    "support.stiffness": "support.stiffness_horizontal",
+    "support.damping": "support.damping_horizontal",
+    "friction.dynamic": "friction.static",
+}
+"""What follows a changed value."""
 
 
-def altered(hidden: HiddenMachine, path: str, change: Any) -> HiddenMachine:
-    """The same machine after a change of one value."""
-    values = {path: change(value_of_path(hidden.machine, path))}
-    if path.endswith("support.stiffness"):
-        sideways = f"{path}_horizontal"
-        values[sideways] = change(value_of_path(hidden.machine, sideways))
-    if path.endswith("friction.dynamic"):
-        static = path.replace("dynamic", "static")
-        values[static] = change(value_of_path(hidden.machine, static))
+def altered(hidden: HiddenMachine, what: tuple[tuple[str, int], ...]) -> tuple[HiddenMachine, list[str]]:
+    """The same machine after some changes, and the paths of what was changed."""
+    values, paths = {}, []
+    for part, place in what:
+        name = BEARINGS[(place + hidden.seed) % 2]
+        paths.append(f"{name}.{part}")
+        for one in (part, WITH_IT.get(part)):
+            if one is not None:
+                values[f"{name}.{one}"] = CHANGED[part](value_of_path(hidden.machine, f"{name}.{one}"))
     machine = hidden.machine.with_values(values)
-    return replace(hidden, machine=machine, model=build_drop_model(machine, FINER))
+    return replace(hidden, machine=machine, model=build_drop_model(machine, FINER)), paths
 
 
-def scored(seed: int) -> dict[str, Any]:
-    """What is named between the unchanged drops, and between them and the changed one."""
+def documents_of(seed: int, folder: Path) -> tuple[dict[str, Any], dict[str, list[str]]]:
+    """Estimates of the four drops by name, and what was changed before each."""
     known = example_machine("lp400")
     hidden = hidden_machine(known, seed)
-    path, change = CHANGES[seed % len(CHANGES)]
+    one, first = altered(hidden, CHANGES[0])
+    two, second = altered(hidden, CHANGES[1])
     drops = (
-        ("first", hidden, 60.0),
-        ("second", hidden, 100.0),
-        ("changed", altered(hidden, path, change), 100.0),
+        ("first", hidden, 60.0, []),
+        ("unchanged", hidden, 100.0, []),
+        ("changed", one, 100.0, first),
+        ("changed otherwise", two, 100.0, second),
     )
-    documents = {}
-    for k, (name, machine, speed) in enumerate(drops):
-        made = synthesize_drop(machine, HZ * speed, 100 * seed + k, duration=0.23, name=name)
-        documents[name] = estimate_drop(known, made.record, made.tail, method=Tracked()).to_dict()
-        print(seed, name, documents[name]["verdict"], flush=True)
-    row: dict[str, Any] = {"seed": seed, "changed": path}
-    for label, pair in (("unchanged", ("first", "second")), ("after", ("first", "changed"))):
-        found = changes(documents[pair[0]], documents[pair[1]])
-        row[label] = {"named": [one.path for one in found.named], "sentence": found.sentence()}
-        row[f"{label}_all"] = [
-            [one.path, one.change, *one.interval_90, one.probability] for one in found.found if one.determined
-        ]
-    return row
+    documents, paths = {}, {}
+    for k, (name, machine, speed, changed) in enumerate(drops):
+        file = folder / f"{seed}_{k}.json"
+        if not file.exists():
+            made = synthesize_drop(machine, HZ * speed, 100 * seed + k, duration=0.23, name=name)
+            found = estimate_drop(known, made.record, made.tail, method=Tracked()).to_dict()
+            kept = ("record", "machine", "consistent", "verdict", "parameters", "joint")
+            file.write_text(json.dumps({key: found[key] for key in kept}), encoding="utf-8")
+        documents[name], paths[name] = json.loads(file.read_text()), changed
+    return documents, paths
+
+
+def scored(seed: int, folder: Path) -> dict[str, Any]:
+    """What is named between the first drop and each of the others."""
+    documents, paths = documents_of(seed, folder)
+    first, rows = documents["first"], []
+    for name, document in documents.items():
+        if name == "first":
+            continue
+        for way, drop in (("joint", {}), ("alone", {"joint": None})):
+            found = changes({**first, **drop}, {**document, **drop})
+            rows.append(
+                {
+                    "pair": name,
+                    "way": way,
+                    "changed": paths[name],
+                    "named": [one.path for one in found.named],
+                    "of_the_changed": [
+                        [one.path, one.change, *one.interval_90, one.probability, one.determined]
+                        for one in found.found
+                        if one.path in paths[name]
+                    ],
+                }
+            )
+    return {"seed": seed, "pairs": rows}
 
 
 def main() -> None:
@@ -78,7 +117,7 @@ def main() -> None:
     asked.out.mkdir(parents=True, exist_ok=True)
     for seed in asked.seeds:
         try:
-            row = scored(seed)
+            row = scored(seed, asked.out)
         except Exception as error:  # a drop that cannot be judged is a result
             row = {"seed": seed, "refused": str(error)}
         (asked.out / f"pair_{seed}.json").write_text(json.dumps(row, indent=1) + "\n", encoding="utf-8")

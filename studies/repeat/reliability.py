@@ -14,17 +14,27 @@ import time
 from pathlib import Path
 from typing import Any
 
-from prediction import TRUTHS, true_drop
+from prediction import DURATION, HZ, PREDICTED_AT
 
 from rotordrop.errors import RotordropError
 from rotordrop.estimation import Tracked, estimate_drop
 from rotordrop.machine import Machine, example_machine, load_machine
 from rotordrop.synthesis.event import HiddenMachine, hidden_machine
+from rotordrop.synthesis.recording import synthesize_drop
+
+TRUTHS = (("peak_force", "peak_force_N", 1.0), ("peak_stress", "max_stress_MPa", 1e6))
 
 
 def estimated(hidden: HiddenMachine, machine: Machine, seed: int, number: int) -> dict[str, Any]:
     """Estimate of one true drop beside its truth."""
-    made = true_drop(hidden, seed, number)
+    made = synthesize_drop(
+        hidden,
+        HZ * PREDICTED_AT,
+        7000 * seed + number,
+        duration=DURATION + 0.03,
+        tail=False,
+        name=f"{seed}_{number}",
+    )
     row: dict[str, Any] = {"seed": seed, "number": number}
     began = time.process_time()
     try:

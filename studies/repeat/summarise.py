@@ -1,6 +1,10 @@
 """Join the predictions of several hidden machines into one summary.
 
-python studies/repeat/summarise.py FOLDER --out studies/repeat/prediction.json
+    python studies/repeat/summarise.py FOLDER --out studies/repeat/prediction.json
+
+The drops of one machine share the error of its calibration, so that their places hang together. Beside the
+test of Kolmogorov and Smirnov on all places stands how far the mean places of machines scatter, over what
+independent places would give.
 """
 
 from __future__ import annotations
@@ -8,9 +12,32 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.stats import kstest
+
+SHARES = (0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95)
+
+
+def summary_of(rows: list[dict[str, Any]], name: str) -> dict[str, Any]:
+    """Reliability of one predicted quantity."""
+    of_machines = [np.array(row["places"][name]) for row in rows]
+    places = np.concatenate(of_machines)
+    means = [float(one.mean()) for one in of_machines]
+    alone = np.sqrt(1.0 / 12.0 / len(of_machines[0]))
+    return {
+        "true_drops": len(places),
+        "inside_90": float(np.mean((places > 0.05) & (places < 0.95))),
+        "below_predicted_share": {str(share): float(np.mean(places < share)) for share in SHARES},
+        "mean_place": float(places.mean()),
+        "mean_place_of_each_machine": means,
+        "scatter_of_machines_over_independent": float(np.std(means, ddof=1) / alone)
+        if len(means) > 1
+        else None,
+        "kolmogorov_smirnov": float(kstest(places, "uniform").statistic),
+        "kolmogorov_smirnov_p": float(kstest(places, "uniform").pvalue),
+    }
 
 
 def main() -> None:
@@ -19,18 +46,12 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     asked = parser.parse_args()
     rows = [json.loads(file.read_text()) for file in sorted(asked.folder.glob("prediction_*.json"))]
-    summary = {"machines": [row["seed"] for row in rows], "quantities": {}}
-    for name in rows[0]["places"]:
-        places = np.concatenate([row["places"][name] for row in rows])
-        summary["quantities"][name] = {
-            "true_drops": len(places),
-            "inside_90": float(np.mean((places > 0.05) & (places < 0.95))),
-            "mean_place": float(places.mean()),
-            "mean_place_of_each_machine": [row["mean_place"][name] for row in rows],
-            "kolmogorov_smirnov_p": float(kstest(places, "uniform").pvalue),
-        }
-    asked.out.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
-    print(json.dumps(summary, indent=1))
+    content = {
+        "machines": rows,
+        "quantities": {name: summary_of(rows, name) for name in rows[0]["places"]},
+    }
+    asked.out.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    print(json.dumps(content["quantities"], indent=1))
 
 
 if __name__ == "__main__":
