@@ -7,6 +7,21 @@ from rotordrop.machine import Machine, loads_machine
 MASS_AT_ONE = 32.7
 """Mass [kg] of the machine whose bearings have a bore of 60 mm."""
 
+TWELVE_NUMBERS = {
+    "mass": "60 kg",
+    "length": "1.1 m",
+    "centre": "520 mm",
+    "bearings": ("110 mm", "980 mm"),
+    "sensors": ("180 mm", "900 mm"),
+    "sensor_angle": "135 deg",
+    "designation": "XCB71914-E",
+    "gap": "0.25 mm",
+    "speed": "9000 rpm",
+    "grade": "G 2.5",
+    "support": "stiff",
+}
+"""What somebody knows who has no drawing of the rotor."""
+
 
 def scaled_machine(
     mass: float, *, slenderness: float = 1.0, bearing: str = "", sensor_places: tuple[float, ...] = (0.2, 0.8)

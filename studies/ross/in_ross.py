@@ -71,7 +71,7 @@ def response(rotor: rs.Rotor) -> dict[str, object]:
 
 def tabled_speeds(rotor: rs.Rotor) -> np.ndarray | None:
     """Speeds at which the bearings have coefficients; None where these are the same at all speeds."""
-    told = [getattr(b, "frequency", getattr(b, "speed", None)) for b in rotor.bearing_elements]
+    told = [getattr(b, key, None) for b in rotor.bearing_elements for key in ("frequency", "speed")]
     tables = [np.atleast_1d(one) for one in told if one is not None]
     longest = max(tables, key=len, default=np.zeros(0))
     return longest if len(longest) > 1 else None

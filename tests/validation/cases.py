@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 FOLDER = Path(__file__).resolve().parent / "cases"
 KINDS = ("analytical", "published code", "catalogue", "paper", "own reference", "metamorphic")
 
@@ -100,6 +102,13 @@ def check(case: Case, computed: Mapping[str, float]) -> None:
     )
     wrong = [_disagreement(e, computed[e.name]) for e in case.expected if not e.holds(computed[e.name])]
     assert not wrong, f"{case.id} ({case.title}):\n  " + "\n  ".join(wrong)
+
+
+def fails_with(name: str, change: Mapping[str, Any], compute: Mapping[str, Compute]) -> None:
+    """Insist that a case fails when its inputs are changed."""
+    case = load_case(name).with_inputs(**change)
+    with pytest.raises(AssertionError, match=rf"{name} .*\n.*deviation .* tolerance"):
+        check(case, compute[name](case.inputs))
 
 
 def _disagreement(expected: Expected, value: float) -> str:

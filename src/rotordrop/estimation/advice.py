@@ -20,12 +20,15 @@ class Advice:
         Parameters that it would give.
     half_widths, narrowed : dict of str to float
         Half the 90 % interval of the peak force of every bearing as it is, and as it would be [N].
+    at_most : bool
+        Whether the interval may become narrower than said, because the model does not fit without it.
     """
 
     measurement: str
     paths: tuple[str, ...]
     half_widths: dict[str, float]
     narrowed: dict[str, float]
+    at_most: bool = False
 
     @property
     def left(self) -> float:
@@ -39,4 +42,5 @@ class Advice:
             for name, half in self.half_widths.items()
             if self.narrowed[name] < WORTH_SAYING * half
         ]
-        return f"{self.measurement} would narrow the peak force: {', '.join(parts)}"
+        less = " or less; the model may well fit then" if self.at_most else ""
+        return f"{self.measurement} would narrow the peak force: {', '.join(parts)}{less}"

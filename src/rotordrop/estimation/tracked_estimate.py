@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError
-from rotordrop.estimated import NINETY, IdentifiedValue
+from rotordrop.estimated import IdentifiedValue
 from rotordrop.estimation.advice import Advice
 from rotordrop.estimation.assumptions import twin_assumptions
 from rotordrop.estimation.bearing_drop import BearingDrop
@@ -23,19 +23,21 @@ from rotordrop.estimation.estimate import (
 )
 from rotordrop.estimation.later_motion import LaterMotion, later_motion
 from rotordrop.estimation.methods import Tracked
-from rotordrop.estimation.narrowing import narrowing
+from rotordrop.estimation.narrowing import DRAWING, narrowing
 from rotordrop.estimation.record_facts import RecordFacts
 from rotordrop.estimation.structure_sentence import structure_of
 from rotordrop.estimation.tracked import TrackedDrop
 from rotordrop.estimation.tracked_loads import (
-    BEAM_FORCE_SIGMA,
     INCONSISTENT_WIDENING,
     Loads,
     bearing_drop,
+    check_of_a_beam,
+    check_of_the_rotor,
     cross_checks,
     holding_cross_check,
     is_beside,
     loads_of_cross_check,
+    of_the_rotor,
     twin_loads,
 )
 from rotordrop.estimation.tracked_parameters import (
@@ -140,9 +142,32 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
 def _advice(drop: TrackedDrop, judged: _Judgement) -> tuple[Advice, ...]:
     """What to measure of a machine whose rotor is not known by its drawing; of others it costs a pass."""
     unsure = any(unknown.parameter.owner == "rotor" for unknown in drop.problem.unknowns)
-    if not (unsure and judged.fits and drop.drops == 1):
+    if not unsure or drop.drops != 1:
         return ()
-    return narrowing(drop.problem, drop.smoothed, drop.forces, judged.widening)
+    if judged.fits:
+        return narrowing(drop.problem, drop.smoothed, drop.forces, judged.widening)
+    return _by_a_drawing(drop, judged)
+
+
+def _by_a_drawing(drop: TrackedDrop, judged: _Judgement) -> tuple[Advice, ...]:
+    """What a drawing of the rotor brings at least, where the twin with a beam does not fit the record.
+
+    Its covariances say nothing then, so no other number can be weighed. The error of a beam is known and
+    falls away; the rest stays as wide as the cross-check leaves it, though a twin of the rotor may well fit.
+    """
+    if judged.check is None or not is_beam(drop.problem.model.machine.rotor):
+        return ()
+    drawn = replace(drop, forces=of_the_rotor(drop.forces))
+    known = replace(judged, check=check_of_the_rotor(judged.check))
+    before, after = (
+        {
+            name: 0.5 * (high - low)
+            for b, name in enumerate(drop.problem.model.bearing_names)
+            for low, high in [_loads(one, by, b).peak_force.interval_90 or (0.0, 0.0)]
+        }
+        for one, by in ((drop, judged), (drawn, known))
+    )
+    return (Advice(measurement=DRAWING, paths=("rotor",), half_widths=before, narrowed=after, at_most=True),)
 
 
 def _structure(drop: TrackedDrop, judged: _Judgement) -> tuple[Structure, ...]:
@@ -180,14 +205,7 @@ def _cross_checked(drop: TrackedDrop, method: Tracked) -> tuple[TrackedDrop, Inp
 def _without_contact_law(problem: DropProblem) -> InputEstimate:
     """The cross-check, with the error of a beam where one stands for the rotor."""
     check = input_state_estimate(problem, lent_by_record(problem))
-    if not is_beam(problem.model.machine.rotor):
-        return check
-    beam = NINETY * BEAM_FORCE_SIGMA
-    return replace(
-        check,
-        peak_error=np.hypot(check.peak_error, beam),
-        stress_error=np.hypot(check.stress_error, beam / 3.0),
-    )
+    return check_of_a_beam(check) if is_beam(problem.model.machine.rotor) else check
 
 
 def _judge(drop: TrackedDrop, check: InputEstimate | None) -> _Judgement:

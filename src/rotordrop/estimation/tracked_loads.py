@@ -80,6 +80,39 @@ def of_a_beam(forces: ForceHistory) -> ForceHistory:
     )
 
 
+def of_the_rotor(forces: ForceHistory) -> ForceHistory:
+    """Forces without the error of a beam, as the rotor itself in its place would leave them."""
+    return replace(
+        forces,
+        magnitude_sigma=_without(forces.magnitude_sigma, BEAM_FORCE_SIGMA * forces.magnitude),
+        stress_sigma=_without(forces.stress_sigma, BEAM_FORCE_SIGMA / 3.0 * forces.stress),
+    )
+
+
+def check_of_a_beam(check: InputEstimate) -> InputEstimate:
+    """The cross-check with the error of a beam that stands for the rotor."""
+    beam = NINETY * BEAM_FORCE_SIGMA
+    return replace(
+        check,
+        peak_error=np.hypot(check.peak_error, beam),
+        stress_error=np.hypot(check.stress_error, beam / 3.0),
+    )
+
+
+def check_of_the_rotor(check: InputEstimate) -> InputEstimate:
+    """The cross-check without the error of a beam."""
+    beam = NINETY * BEAM_FORCE_SIGMA
+    return replace(
+        check,
+        peak_error=_without(check.peak_error, np.full_like(check.peak_error, beam)),
+        stress_error=_without(check.stress_error, np.full_like(check.stress_error, beam / 3.0)),
+    )
+
+
+def _without(sigma: Array, part: Array) -> Array:
+    return np.sqrt(np.maximum(sigma * sigma - part * part, 0.0))
+
+
 def with_interval(value: float, sigma: float, widening: float = 1.0, unit: str = "") -> IdentifiedValue:
     """A magnitude with a symmetric 90 % interval, which does not go below zero."""
     half = NINETY * sigma * widening

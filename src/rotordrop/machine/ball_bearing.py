@@ -14,6 +14,7 @@ from rotordrop.machine.catalog import (
     PRELOAD_FACTOR,
     BallComplement,
     CatalogueBearing,
+    PairRigidity,
     PreloadClass,
     find_bearing,
 )
@@ -33,6 +34,7 @@ from rotordrop.machine.values import (
     PositiveLength,
     PositiveSpeed,
     Pressure,
+    Stiffness,
     default,
     follows,
 )
@@ -108,6 +110,8 @@ class BallBearing(RaceBearing):
         Speed up to which the maker allows the bearing [rad/s].
     static_load_rating, dynamic_load_rating : Estimated, optional
         Static and dynamic load rating C_0 and C of one row [N]; they narrow balls that are inferred.
+    axial_rigidity : Estimated, optional
+        Axial rigidity of the pair at its preload, as a catalogue states it [N/m]; narrows them further.
     ball_count_range : tuple of int, optional
         90 % interval of the number of balls, where it is inferred.
     """
@@ -150,6 +154,9 @@ class BallBearing(RaceBearing):
     )
     dynamic_load_rating: PositiveForce | None = Field(
         default=None, description="Dynamic load rating of one row"
+    )
+    axial_rigidity: Stiffness | None = Field(
+        default=None, description="Axial rigidity of the pair at the preload that is given"
     )
     ball_count_range: tuple[int, int] | None = Field(
         default=None, description="90 % interval of the balls per row where they are inferred"
@@ -249,11 +256,26 @@ class BallBearing(RaceBearing):
             if name in known
         }
         try:
-            return find_bearing(self.designation, **ratings)
+            return find_bearing(self.designation, **ratings, rigidity=self._stated_rigidity())
         except LookupError as error:
             if described:
                 return None
             raise Misfit(str(error), ("designation",)) from None
+
+    def _stated_rigidity(self) -> PairRigidity | None:
+        """The axial rigidity that is given, with the preload and the balls it holds for."""
+        if self.axial_rigidity is None:
+            return None
+        known = self.model_fields_set
+        if "preload" not in known or not self.preload.value > 0.0:
+            shown = format_quantity(self.axial_rigidity.value, "stiffness")
+            told = (
+                f"axial_rigidity = {shown} holds at a preload; add the force it is listed for, for example "
+                'preload = "100 N"'
+            )
+            raise Misfit(told, ("axial_rigidity",))
+        hybrid = self.ball_material == "silicon nitride" if "ball_material" in known else None
+        return PairRigidity(value=self.axial_rigidity.value, preload=self.preload.value, hybrid=hybrid)
 
     def left_out(self) -> dict[str, Any]:
         """Take what was left out from the catalogue and the material of the balls."""

@@ -14,6 +14,7 @@ from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.model.bearing_numbers import Spread, numbers_of
 from rotordrop.model.parameters import DropModel, build_drop_model
 from rotordrop.model.reduction import Reduction
+from rotordrop.model.structure_table import structure_rows as structure_rows_of
 from rotordrop.simulation.case import LevitatedStart
 from rotordrop.synthesis.random_streams import stream
 from rotordrop.synthesis.structure import structure_rows, violated, without_structure
@@ -57,6 +58,19 @@ class HiddenMachine:
     violations: Violations
     model: DropModel = field(repr=False)
     structure: Array | None = field(default=None, repr=False)
+
+
+def _refuse_own_structure(machine: Machine) -> None:
+    """Refuse a machine file whose own structures the kernels of violations do not have."""
+    for bearing in machine.touchdown_bearings:
+        for row in structure_rows_of("bearing"):
+            own = row.stated(bearing)
+            if own is not None and float(own) != 0.0:
+                raise UsageError(
+                    f"the machine file states {bearing.name}.{row.path} = {float(own):.4g} and the drop has "
+                    "violations too, which would take its place; leave it out of the machine file and give "
+                    "it as a violation (support.axes_angle, support.hardening or foundation)"
+                )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,6 +126,8 @@ def hidden_machine(
     model = build_drop_model(true, reduction)
     rows = structure_rows(true, broken)
     acts = broken.unbalance_jump is not None or not without_structure(rows)
+    if acts:
+        _refuse_own_structure(true)
     return HiddenMachine(
         machine=true,
         known=machine,

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import fields
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +15,12 @@ from rotordrop.estimation.advice import Advice
 from rotordrop.estimation.narrowing import explained
 from rotordrop.estimation.rotor_search import with_found_rotor
 from rotordrop.estimation.tracked import recorded_drop
+from rotordrop.estimation.tracked_loads import (
+    check_of_a_beam,
+    check_of_the_rotor,
+    of_a_beam,
+    of_the_rotor,
+)
 from rotordrop.identification.evidence import read_evidence
 from rotordrop.machine import example_machine
 from rotordrop.machine.simple import SimpleMachine, simple_machine
@@ -20,6 +29,8 @@ from rotordrop.model.assembly import rotor_fe
 from rotordrop.model.modes import free_free_modes
 from rotordrop.model.parameters import build_drop_model
 from rotordrop.model.rotor_form import FORM
+from rotordrop.tracking.forces import ForceHistory
+from rotordrop.tracking.input_state import InputEstimate
 
 RECORDS = Path(rotordrop.__file__).parent / "examples" / "lp400"
 
@@ -102,3 +113,30 @@ def test_advice_names_the_measurement_and_what_it_would_bring():
     assert one.left == pytest.approx(0.5)
     said = "a lift check at DE (rotordrop clearance) would narrow the peak force: DE from ± 300 N to ± 150 N"
     assert one.sentence() == said
+
+
+def test_advice_where_the_twin_does_not_fit_is_a_bound_and_says_so():
+    one = Advice(
+        measurement="the rotor by its sections, from a drawing,",
+        paths=("rotor",),
+        half_widths={"NDE": 400.0},
+        narrowed={"NDE": 300.0},
+        at_most=True,
+    )
+    assert one.sentence().endswith("NDE from ± 400 N to ± 300 N or less; the model may well fit then")
+
+
+def test_the_error_of_a_beam_is_taken_back_from_forces_and_cross_check():
+    """What a drawing of the rotor brings at least, where the twin of a beam does not fit the record."""
+    forces = SimpleNamespace(magnitude=1e3, magnitude_sigma=30.0, stress=1e9, stress_sigma=2e7)
+    forces = ForceHistory(
+        **{f.name: np.array([[getattr(forces, f.name, 0.0)]]) for f in fields(ForceHistory)}
+    )
+    beam = of_a_beam(forces)
+    assert beam.magnitude_sigma[0, 0] == pytest.approx(math.hypot(30.0, 80.0))
+    assert of_the_rotor(beam).magnitude_sigma[0, 0] == pytest.approx(30.0)
+    assert of_the_rotor(beam).stress_sigma[0, 0] == pytest.approx(2e7)
+    check = InputEstimate(**{f.name: np.array([0.1]) for f in fields(InputEstimate)})
+    assert check_of_a_beam(check).peak_error[0] == pytest.approx(math.hypot(0.1, 1.6449 * 0.08), rel=1e-4)
+    assert check_of_the_rotor(check_of_a_beam(check)).peak_error == pytest.approx(check.peak_error)
+    assert check_of_the_rotor(check_of_a_beam(check)).stress_error == pytest.approx(check.stress_error)

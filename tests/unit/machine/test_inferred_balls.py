@@ -6,10 +6,12 @@ import pytest
 
 from rotordrop.errors import MachineFileError
 from rotordrop.machine import loads_machine
-from rotordrop.machine.catalog import designations, find_bearing, read_designation
+from rotordrop.machine.catalog import PairRigidity, designations, find_bearing, read_designation
 from rotordrop.machine.catalog.boundary import DIMENSION_SERIES, boundary_dimensions
-from rotordrop.machine.catalog.inference import dynamic_rating, infer_balls, static_rating
+from rotordrop.machine.catalog.inference import dynamic_rating, infer_balls, pair_rigidity, static_rating
 from rotordrop.model.inferred_balls import inferred_stress_sigma
+from rotordrop.physics.ball_bearing import axial_rigidity, bearing_constants
+from rotordrop.physics.ball_bearing_geometry import BallBearingGeometry
 from rotordrop.physics.hertz import compliance, race_contact
 
 
@@ -144,3 +146,56 @@ def test_balls_that_are_listed_leave_the_stress_as_it_is_and_inferred_ones_do_no
     bearing = described(small_text, 'designation = "7014 ACD/P4A"')
     sigma = inferred_stress_sigma(bearing)
     assert 0.03 < sigma < 0.12
+
+
+@pytest.mark.parametrize("name", ["B7016C.T.P4S", "HCB71914E.T.P4S", "S 6016 E TA", "B706C.T.P4S"])
+@pytest.mark.parametrize("preload_class", ["light", "heavy"])
+def test_the_rigidity_of_a_pair_is_that_of_the_simulated_bearing(name, preload_class):
+    """In closed form for the catalogue, by Hertz contacts for the simulation."""
+    bearing, balls = find_bearing(name), find_bearing(name).complement
+    preload, hybrid = bearing.preload[preload_class], bearing.ball_material != "steel"
+    modulus, poisson = (315e9, 0.26) if hybrid else (208e9, 0.3)
+    simulated = bearing_constants(
+        BallBearingGeometry(
+            ball_diameter=balls.ball_diameter,
+            ball_count=balls.ball_count,
+            pitch_diameter=balls.pitch_diameter,
+            contact_angle=bearing.contact_angle,
+            conformity_inner=balls.conformity,
+            conformity_outer=balls.conformity,
+            ball_youngs_modulus=modulus,
+            ball_poisson_ratio=poisson,
+            preload=preload,
+        )
+    )
+    row = (balls.ball_count, balls.ball_diameter, balls.pitch_diameter, bearing.contact_angle)
+    closed = pair_rigidity(row, balls.conformity, preload, hybrid=hybrid)
+    assert closed == pytest.approx(axial_rigidity(simulated), rel=0.01)
+
+
+def test_a_rigidity_narrows_what_size_and_ratings_leave_open():
+    """The balls come back from which the rigidity was computed; the grooves are known from nothing else."""
+    row, conformity = (20, 11.1125e-3, 0.09, math.radians(15.0)), 0.52
+    size = {
+        "kind": "angular contact",
+        "dimension_series": "10",
+        "bore": 0.07,
+        "outside_diameter": 0.11,
+        "contact_angle": row[3],
+    }
+    rigidity = PairRigidity(value=pair_rigidity(row, conformity, 290.0), preload=290.0)
+    alone, known = infer_balls(**size), infer_balls(**size, rigidity=rigidity)
+    assert "boundary dimensions and its axial rigidity" in known.basis
+    assert alone.conformity == (0.53, 0.011)
+    assert known.conformity[1] < 0.9 * alone.conformity[1]
+    assert abs(known.conformity[0] - conformity) < abs(alone.conformity[0] - conformity)
+
+
+def test_a_rigidity_in_the_file_narrows_the_grooves_and_needs_its_preload(small_text):
+    rated = 'static_load_rating = "43 kN"\ndynamic_load_rating = "47 kN"'
+    stiff = 'designation = "7014 CD"\npreload = "290 N"\naxial_rigidity = "88 N/um"\n' + rated
+    known = described(small_text, stiff).conformity_inner.range
+    alone = described(small_text, 'designation = "7014 CD"\npreload = "290 N"\n' + rated)
+    assert known[1] - known[0] < alone.conformity_inner.range[1] - alone.conformity_inner.range[0]
+    with pytest.raises(MachineFileError, match=r"axial_rigidity = 88\.0 MN/m holds at a preload"):
+        described(small_text, 'designation = "7014 CD"\naxial_rigidity = "88 N/um"')

@@ -4,6 +4,7 @@ import math
 from types import SimpleNamespace
 
 import pytest
+from tests.scaled_machines import TWELVE_NUMBERS
 
 from rotordrop.cli.app import run
 from rotordrop.errors import UsageError
@@ -15,23 +16,9 @@ from rotordrop.model.machine_summary import summarise_machine
 from rotordrop.model.modes import free_free_modes
 from rotordrop.synthesis.bench.rotors import ROTORS
 
-NUMBERS = {
-    "mass": "60 kg",
-    "length": "1.1 m",
-    "centre": "520 mm",
-    "bearings": ("110 mm", "980 mm"),
-    "sensors": ("180 mm", "900 mm"),
-    "sensor_angle": "135 deg",
-    "designation": "XCB71914-E",
-    "gap": "0.25 mm",
-    "speed": "9000 rpm",
-    "grade": "G 2.5",
-    "support": "stiff",
-}
-
 
 def test_mass_and_centre_of_mass_are_those_given_and_planes_are_nodes():
-    machine = simple_machine(SimpleMachine(**NUMBERS))
+    machine = simple_machine(SimpleMachine(**TWELVE_NUMBERS))
     assert machine.rotor.mass == pytest.approx(60.0)
     assert machine.rotor.centre_of_gravity == pytest.approx(0.52)
     nodes = machine.rotor.node_positions
@@ -46,7 +33,7 @@ def test_mass_and_centre_of_mass_are_those_given_and_planes_are_nodes():
 
 def test_its_bending_is_that_of_the_beam():
     """Uniform free-free beam, first bending (4.730)² √(EI/ρA)/(2π L²), less what shear takes."""
-    guessed = simple_machine(SimpleMachine(**(NUMBERS | {"centre": "550 mm"})))
+    guessed = simple_machine(SimpleMachine(**(TWELVE_NUMBERS | {"centre": "550 mm"})))
     machine = guessed.with_values({"rotor.stiffness_factor": 1.0, "rotor.mass_to_ends": 0.0})
     assert guessed.rotor.stiffness_factor.range == (0.16, 1.0)
     d = machine.rotor.elements[0].outer_diameter
@@ -57,7 +44,7 @@ def test_its_bending_is_that_of_the_beam():
 
 
 def test_the_file_reads_back_as_the_same_machine():
-    machine = simple_machine(SimpleMachine(**NUMBERS))
+    machine = simple_machine(SimpleMachine(**TWELVE_NUMBERS))
     assert loads_machine(machine_text(machine)) == machine
     assert any("0.4 to 1.0 of a steel cylinder's" in note for note in machine.notes)
 
@@ -70,7 +57,7 @@ def test_the_ranges_of_the_beam_hold_the_rotors_at_hand(rotor):
     beam = simple_machine(
         SimpleMachine(
             **(
-                NUMBERS
+                TWELVE_NUMBERS
                 | numbers
                 | {"centre": described.centre_of_gravity}
                 | {
@@ -89,7 +76,9 @@ def test_the_ranges_of_the_beam_hold_the_rotors_at_hand(rotor):
 
 def test_a_support_without_a_number_goes_with_the_size_of_the_rotor():
     small, large = (
-        simple_machine(SimpleMachine(**(NUMBERS | {"mass": mass}))).touchdown_bearings[0].support.stiffness
+        simple_machine(SimpleMachine(**(TWELVE_NUMBERS | {"mass": mass})))
+        .touchdown_bearings[0]
+        .support.stiffness
         for mass in ("7.5 kg", "60 kg")
     )
     assert float(large) == pytest.approx(2.0 * float(small), rel=1e-5)
@@ -113,10 +102,10 @@ def test_a_support_without_a_number_goes_with_the_size_of_the_rotor():
 )
 def test_numbers_that_do_not_fit_are_named(change, message):
     if message is None:
-        assert simple_machine(SimpleMachine(**(NUMBERS | change))).rotor.mass == pytest.approx(60.0)
+        assert simple_machine(SimpleMachine(**(TWELVE_NUMBERS | change))).rotor.mass == pytest.approx(60.0)
         return
     with pytest.raises(UsageError, match=message):
-        simple_machine(SimpleMachine(**(NUMBERS | change)))
+        simple_machine(SimpleMachine(**(TWELVE_NUMBERS | change)))
 
 
 def test_the_command_takes_options_and_asks_for_the_rest(tmp_path, monkeypatch):
@@ -128,7 +117,9 @@ def test_the_command_takes_options_and_asks_for_the_rest(tmp_path, monkeypatch):
 
     monkeypatch.setattr("typer.prompt", answer)
     monkeypatch.setattr("sys.stdin", SimpleNamespace(isatty=lambda: True))
-    said = {key: ", ".join(value) if isinstance(value, tuple) else value for key, value in NUMBERS.items()}
+    said = {
+        key: ", ".join(value) if isinstance(value, tuple) else value for key, value in TWELVE_NUMBERS.items()
+    }
     options = [f"--{key.replace('_', '-')}={value}" for key, value in said.items() if key != "support"]
     target = tmp_path / "machine.toml"
     assert run(["init", "--simple", str(target), *options]) == 0

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.scaled_machines import TWELVE_NUMBERS
 
 from rotordrop.errors import UsageError
 from rotordrop.machine.simple import SimpleMachine, simple_machine
@@ -10,25 +11,12 @@ from rotordrop.model.modes import free_free_modes
 from rotordrop.model.rotor_form import FORM, element_factors, is_beam
 from rotordrop.model.structure_table import structure_rows
 
-NUMBERS = {
-    "mass": "60 kg",
-    "centre": "500 mm",
-    "length": "1.1 m",
-    "bearings": ("110 mm", "980 mm"),
-    "sensors": ("180 mm", "900 mm"),
-    "sensor_angle": "135 deg",
-    "designation": "XCB71914-E",
-    "gap": "0.25 mm",
-    "speed": "9000 rpm",
-    "grade": "G 2.5",
-    "support": "stiff",
-}
 PLAIN = {f"rotor.{row.path}": 0.0 for row in FORM} | {"rotor.stiffness_factor": 1.0}
 
 
 @pytest.fixture(scope="module")
 def beam():
-    return simple_machine(SimpleMachine(**NUMBERS)).with_values(PLAIN)
+    return simple_machine(SimpleMachine(**TWELVE_NUMBERS)).with_values(PLAIN)
 
 
 @pytest.mark.parametrize("row", FORM, ids=lambda row: row.path)
@@ -36,7 +24,7 @@ def beam():
 def test_mass_and_centre_of_mass_stay_whatever_moves(beam, row, amount):
     fe = rotor_fe(beam.with_values({f"rotor.{row.path}": amount}).rotor)
     assert fe.total_mass == pytest.approx(60.0, rel=1e-9)
-    assert fe.centre_of_gravity == pytest.approx(0.5, rel=1e-9)
+    assert fe.centre_of_gravity == pytest.approx(0.52, rel=1e-9)
 
 
 def test_mass_at_the_ends_turns_harder_and_bends_slower(beam):

@@ -1,6 +1,7 @@
 """What Python asks of an estimate: tables, data sets, files, figures and pages by name."""
 
 import csv
+import sys
 
 import h5py
 import numpy as np
@@ -61,18 +62,19 @@ def test_a_format_nobody_knows_is_refused(estimate, tmp_path):
         estimate.save(tmp_path / "histories.xls")
 
 
-def test_parquet_is_written_or_says_what_it_needs(estimate, tmp_path):
+def test_parquet_is_written(estimate, tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
     path = tmp_path / "histories.parquet"
-    try:
-        from pyarrow import parquet
-    except ModuleNotFoundError:
-        with pytest.raises(OutputError, match=r"Parquet needs a package .* rotordrop\[parquet\]"):
-            estimate.save(path)
-        return
     estimate.save(path)
     np.testing.assert_array_equal(
         parquet.read_table(path)["DE force [N]"], estimate.bearing("DE").force.values
     )
+
+
+def test_parquet_without_its_package_says_what_it_needs(estimate, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(OutputError, match=r"Parquet needs a package .* rotordrop\[parquet\]"):
+        estimate.save(tmp_path / "histories.parquet")
 
 
 def test_figures_are_asked_for_by_name_and_are_those_of_the_page(estimate):

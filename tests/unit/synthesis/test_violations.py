@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import MachineFileError, UsageError
+from rotordrop.machine import example_machine
 from rotordrop.synthesis import Violations, hidden_machine, load_violations, score_estimate, synthesize_drop
 from rotordrop.synthesis.event import drop_conditions
 from rotordrop.synthesis.sensor_chain import PERFECT, lagging
@@ -238,3 +239,11 @@ def test_the_truth_holds_what_structures_are(known):
     assert scored["named"] == ["foundation mode"]
     assert scored["violated"] == ["turned support axes", "foundation mode"]
     assert scored["coverage"] == {"intervals": 1, "covered": 1, "fraction": 1.0}
+
+
+def test_a_structure_of_the_machine_file_is_not_lost_beside_violations():
+    """The kernels of violations do not have it: it used to be left out without a word."""
+    coupled = example_machine("small").with_values({"NDE.support.coupling": 0.4})
+    assert hidden_machine(coupled, 1, "none").structure is None
+    with pytest.raises(UsageError, match=r"states NDE\.support\.coupling = 0\.4 .*support\.axes_angle"):
+        hidden_machine(coupled, 1, Violations.model_validate({"support": {"axes_angle": "20 deg"}}))

@@ -1,6 +1,7 @@
 """Bearings by designation: catalogue values, and ball complements where the maker does not publish them."""
 
 from rotordrop.machine.catalog.designation import Designation, read_designation
+from rotordrop.machine.catalog.inference import PairRigidity
 from rotordrop.machine.catalog.lookup import (
     PRELOAD_FACTOR,
     BallComplement,
@@ -17,6 +18,7 @@ __all__ = [
     "BallComplement",
     "CatalogueBearing",
     "Designation",
+    "PairRigidity",
     "PreloadClass",
     "ball_size",
     "designations",

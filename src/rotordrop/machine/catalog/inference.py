@@ -25,6 +25,9 @@ _GROOVE_FILLING = (188.0, 7.0)
 _RATING_SIGMA = (0.05, 0.07)
 """Standard deviation of the logarithm of a maker's ratings, static and dynamic, about the formulas."""
 
+_RIGIDITY_SIGMA = 0.04
+"""Standard deviation of the logarithm of a maker's axial rigidity about the formulas [1]."""
+
 _CONFORMITY = (0.53, 0.011)
 _MATERIAL_FACTOR = 1.3
 _THIRTY_SECOND, _ONE_INCH = 0.79375, 25.4
@@ -39,6 +42,25 @@ _DYNAMIC = (
     *(29.1, 35.8, 40.3, 43.8, 46.7, 49.1, 51.1, 52.8, 54.3, 55.5, 56.6, 57.5, 58.2, 58.8, 59.3, 59.6),
     *(59.8, 59.9, 60.0, 59.9, 59.8, 59.6, 59.3, 59.0, 58.6, 58.2, 57.7, 57.1, 56.6, 56.0),
 )
+
+
+@dataclass(frozen=True, kw_only=True)
+class PairRigidity:
+    """What a catalogue says of the axial rigidity of a pair.
+
+    Attributes
+    ----------
+    value : float
+        Axial rigidity of an X or O pair without load [N/m].
+    preload : float
+        Preload it is stated for [N].
+    hybrid : bool, optional
+        Whether the balls are of silicon nitride; None where the designation says it.
+    """
+
+    value: float
+    preload: float
+    hybrid: bool | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,6 +113,45 @@ def dynamic_rating(
     return float(_MATERIAL_FACTOR * factor * cosine**0.7 * ball_count ** (2.0 / 3.0) * size)
 
 
+def pair_rigidity(
+    row: tuple[int, float, float, float], conformity: float, preload: float, *, hybrid: bool = False
+) -> float:
+    """Axial rigidity [N/m] of a pair of rows (count, D_w, D_pw, contact angle) [1, m, m, rad].
+
+    Every ball takes its share of the preload [N] at the angle that the axial approach gives it; the pair has
+    twice the tangent stiffness of a row.
+    Source: Harris, Rolling Bearing Analysis; contacts by Brewe and Hamrock 1977, within 1 % of Hertz.
+    """
+    count, D_w, D_pw, alpha = row
+    A_0, gamma = (2.0 * conformity - 1.0) * D_w, D_w * math.cos(alpha) / D_pw
+    contacts = [_point_stiffness(D_w, D_w / 2 * (1 - side * gamma), conformity, hybrid) for side in (1, -1)]
+    K = math.fsum(one ** (-2.0 / 3.0) for one in contacts) ** -1.5
+    radial, start = A_0 * math.cos(alpha), A_0 * math.sin(alpha)
+
+    def force(approach: float) -> float:
+        distance = math.hypot(radial, start + approach)
+        return float(count * K * max(distance - A_0, 0.0) ** 1.5 * (start + approach) / distance)
+
+    low, high = 0.0, A_0
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if force(middle) < preload else (low, middle)
+    step = 1e-3 * high
+    return (force(high + step) - force(high - step)) / step
+
+
+def _point_stiffness(D_w: float, rolling: float, conformity: float, hybrid: bool) -> float:
+    """Stiffness [N/m^1.5] of a ball on its groove, whose radius in the plane of rolling is given [m]."""
+    across = conformity * D_w / (2.0 * conformity - 1.0)
+    ratio = across / rolling
+    shape = 1.0339 * ratio**0.636
+    first, second = 1.0003 + 0.5968 / ratio, 1.5277 + 0.6023 * math.log(ratio)
+    modulus, poisson = (315e9, 0.26) if hybrid else (208e9, 0.3)
+    reduced = 2.0 / ((1.0 - 0.3**2) / 208e9 + (1.0 - poisson**2) / modulus)
+    radius = across * rolling / (across + rolling)
+    return float(math.pi * shape * reduced * math.sqrt(radius * first / (4.5 * second**3)))
+
+
 def infer_balls(
     *,
     kind: Kind,
@@ -101,19 +162,18 @@ def infer_balls(
     small_balls: bool = False,
     static_load_rating: float | None = None,
     dynamic_load_rating: float | None = None,
+    rigidity: PairRigidity | None = None,
 ) -> InferredBalls:
-    """Infer the balls of a row from boundary dimensions [m] and load ratings [N].
+    """Infer the balls of a row from boundary dimensions [m], load ratings [N] and the rigidity of a pair.
 
     Every standard ball and every count gets a weight: how usual such a ball is in the cross-section, how
-    usual that filling of the pitch circle is, and how well the load ratings come out. The heaviest is the
-    value; the interval holds 90 % of the weight. Deep grooves fill by the angle through which balls can be
-    put between offset rings.
-
-    Not validated: beyond the catalogues of two makers of spindle bearings.
+    usual that filling of the pitch circle is, and how well load ratings and rigidity come out. The heaviest
+    is the value; the interval holds 90 % of the weight. Deep grooves fill by the angle through which balls
+    can be put between offset rings. A rigidity says of the grooves what size and ratings do not.
     """
     pitch, height = 0.5 * (bore + outside_diameter), 0.5 * (outside_diameter - bore)
     share, fill = _priors(dimension_series, small_balls, bore)
-    weights: dict[tuple[float, int], float] = {}
+    weights: dict[tuple[float, int, float], float] = {}
     for diameter in _standard_balls(1e3 * height):
         for count in range(5, int(math.pi * pitch / diameter) + 1):
             error = _squared((diameter / height - share[0]) / share[1])
@@ -125,28 +185,57 @@ def infer_balls(
             ):
                 if rating is not None:
                     error += _squared(math.log(rating / formula(*row)) / sigma)
-            weights[diameter, count] = math.exp(-0.5 * error)
-    diameter, count = max(weights, key=lambda key: weights[key])
-    counts = _interval([(float(z), w) for (_, z), w in weights.items()])
-    diameters = _interval([(d, w) for (d, _), w in weights.items()])
+            for conformity, unusual in _conformities(rigidity):
+                stiff = _rigidity_error(rigidity, row, conformity)
+                weights[diameter, count, conformity] = math.exp(-0.5 * (error + unusual + stiff))
+    diameter, count, conformity = max(weights, key=lambda key: weights[key])
+    counts = _interval([(float(z), w) for (_, z, _), w in weights.items()])
+    diameters = _interval([(d, w) for (d, _, _), w in weights.items()])
     rated = [
         name
         for name, rating in (("static", static_load_rating), ("dynamic", dynamic_load_rating))
         if rating is not None
     ]
     source = f" and its {' and '.join(rated)} load rating (ISO 76, ISO 281)" if rated else ""
+    source += " and its axial rigidity" if rigidity else ""
     return InferredBalls(
         ball_count=count,
         ball_diameter=diameter,
         pitch_diameter=pitch,
         count_range=(int(counts[0]), int(counts[1])),
         diameter_range=diameters,
-        conformity=_CONFORMITY,
+        conformity=_CONFORMITY
+        if rigidity is None
+        else _moments([(f, w) for (_, _, f), w in weights.items()]),
         basis=(
             f"inferred from the boundary dimensions{source}: {counts[0]:.0f} to {counts[1]:.0f} balls of "
             f"{1e3 * diameters[0]:.4g} to {1e3 * diameters[1]:.4g} mm, 90 %"
         ),
     )
+
+
+def _conformities(rigidity: PairRigidity | None) -> list[tuple[float, float]]:
+    """Conformities that are tried, and how unusual each is; one where nothing tells them apart."""
+    middle, sigma = _CONFORMITY
+    if rigidity is None:
+        return [(middle, 0.0)]
+    return [(middle + 0.5 * k * sigma, _squared(0.5 * k)) for k in range(-5, 6)]
+
+
+def _rigidity_error(
+    rigidity: PairRigidity | None, row: tuple[int, float, float, float], conformity: float
+) -> float:
+    if rigidity is None:
+        return 0.0
+    found = pair_rigidity(row, conformity, rigidity.preload, hybrid=bool(rigidity.hybrid))
+    return _squared(math.log(rigidity.value / found) / _RIGIDITY_SIGMA)
+
+
+def _moments(weighted: list[tuple[float, float]]) -> tuple[float, float]:
+    """Mean and standard deviation."""
+    total = sum(weight for _, weight in weighted)
+    mean = sum(value * weight for value, weight in weighted) / total
+    return mean, math.sqrt(sum(_squared(value - mean) * weight for value, weight in weighted) / total)
 
 
 def _priors(series: str, small: bool, bore: float) -> tuple[tuple[float, float], tuple[float, float]]:

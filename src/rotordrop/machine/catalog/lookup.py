@@ -14,7 +14,7 @@ from typing import Any, Literal
 from rotordrop.estimated import NINETY
 from rotordrop.machine.catalog.boundary import DIMENSION_SERIES, boundary_dimensions, known_bores
 from rotordrop.machine.catalog.designation import Designation, Kind, read_designation
-from rotordrop.machine.catalog.inference import infer_balls
+from rotordrop.machine.catalog.inference import PairRigidity, infer_balls
 
 PreloadClass = Literal["light", "medium", "heavy"]
 _CLASSES: tuple[PreloadClass, ...] = ("light", "medium", "heavy")
@@ -112,12 +112,13 @@ def find_bearing(
     *,
     static_load_rating: float | None = None,
     dynamic_load_rating: float | None = None,
+    rigidity: PairRigidity | None = None,
 ) -> CatalogueBearing:
     """Find a bearing by designation, however it is written.
 
     A bearing of the catalogue comes with the numbers of its maker. Of any other of the series 60, 62, 618,
     619, 70, 72, 718 and 719 the boundary dimensions are those of ISO 15 and the balls are inferred from them
-    and from the load ratings [N] where these are given.
+    and from the load ratings [N] and the axial rigidity of a pair where these are given.
 
     Raises
     ------
@@ -135,7 +136,7 @@ def find_bearing(
         return replace(listed, read=read)
     if _is_mistyped(read):
         raise LookupError(_unknown(designation, _nearest(designation)))
-    return infer_from_designation(read, static_load_rating, dynamic_load_rating)
+    return infer_from_designation(read, static_load_rating, dynamic_load_rating, rigidity)
 
 
 def search_bearings(text: str) -> list[CatalogueBearing]:
@@ -183,9 +184,12 @@ def _listed_name(read: Designation) -> str:
 
 
 def infer_from_designation(
-    read: Designation, static: float | None = None, dynamic: float | None = None
+    read: Designation,
+    static: float | None = None,
+    dynamic: float | None = None,
+    rigidity: PairRigidity | None = None,
 ) -> CatalogueBearing:
-    """A bearing of which only the designation, and perhaps its load ratings [N], are known."""
+    """A bearing of which only the designation, and perhaps its load ratings [N] or rigidity, are known."""
     size = boundary_dimensions(read.series, read.bore)
     if size is None:
         near = sorted(known_bores(read.series), key=lambda bore: abs(bore - read.bore))[:3]
@@ -207,6 +211,9 @@ def infer_from_designation(
         small_balls=read.balls == "small",
         static_load_rating=static,
         dynamic_load_rating=dynamic,
+        rigidity=rigidity
+        if rigidity is None or rigidity.hybrid is not None
+        else replace(rigidity, hybrid=read.hybrid),
     )
     preload, basis = _usual_preload(read, size[0], angle)
     middle, sigma = balls.conformity
