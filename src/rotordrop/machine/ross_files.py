@@ -336,7 +336,7 @@ def _density(value: float) -> str:
 def write_ross(rotor: Rotor, path: str | Path, springs: Iterable[Spring] = ()) -> None:
     """Write a rotor as a file that ROSS loads, TOML or JSON by its suffix; `read_ross` gives it back.
 
-    A layer becomes an element around the shaft that carries no load.
+    A layer becomes an element around the shaft that carries no load. ROSS wants materials without blanks.
     """
     path = Path(path)
     content: dict[str, Any] = {"ross_version": _FORMAT_VERSION, "parameters": {}}
@@ -346,7 +346,7 @@ def write_ross(rotor: Rotor, path: str | Path, springs: Iterable[Spring] = ()) -
         content |= _shaft_entry(n, element.length, element.inner_diameter, element.outer_diameter, core)
         if element.layer_diameter is not None:
             soft = (
-                f"layer {element.layer_density:g}",
+                f"layer_{element.layer_density:g}",
                 element.layer_density,
                 _LAYER_MODULUS,
                 _LAYER_MODULUS / 2.6,
@@ -355,7 +355,7 @@ def write_ross(rotor: Rotor, path: str | Path, springs: Iterable[Spring] = ()) -
             content |= _shaft_entry(n, element.length, *sizes, soft, " layer")
     for k, disc in enumerate(rotor.discs):
         tag = disc.name or f"Disk {k}"
-        content[f"DiskElement_{tag}"] = {
+        content[_free(f"DiskElement_{tag}", content)] = {
             "n": disc.node - 1,
             "m": disc.mass.value,
             "Id": disc.diametral_inertia.value,
@@ -365,7 +365,7 @@ def write_ross(rotor: Rotor, path: str | Path, springs: Iterable[Spring] = ()) -
             "color": "Firebrick",
         }
     for spring in springs:
-        content[f"{spring.kind}_{spring.name}"] = {
+        content[_free(f"{spring.kind}_{spring.name}", content)] = {
             "n": spring.node - 1,
             "tag": spring.name,
             **(
@@ -383,6 +383,11 @@ def write_ross(rotor: Rotor, path: str | Path, springs: Iterable[Spring] = ()) -
             ),
         }
     write_text(path, json.dumps(content, indent=2) if path.suffix.lower() == ".json" else _toml(content))
+
+
+def _free(key: str, content: Mapping[str, Any]) -> str:
+    """The key, or one that is not taken: discs and bearings of one name are still several."""
+    return key if key not in content else f"{key}_{len(content)}"
 
 
 def _shaft_entry(
@@ -412,7 +417,7 @@ def _shaft_entry(
             "tag": tag,
             "alpha": 0.0,
             "beta": 0.0,
-            "material": {"name": name, "rho": rho, "E": E, "G_s": G, "color": "#525252"},
+            "material": {"name": "_".join(name.split()), "rho": rho, "E": E, "G_s": G, "color": "#525252"},
         }
     }
 

@@ -181,3 +181,15 @@ def test_the_examples_of_ross_were_compared_with_both_versions(version):
         assert max(errors) < 1e-3
         assert rotors[name]["response"] < 1e-3
         assert rotors[name]["read back equal"]
+
+
+def test_names_of_materials_have_no_blanks_and_discs_of_one_name_are_several(tmp_path):
+    """ROSS refuses blanks there; layers were written with one."""
+    machine = example_machine("lp400")
+    rotor = machine.rotor.changed(discs=tuple(one.changed(name="wheel") for one in machine.rotor.discs))
+    write_ross(rotor, tmp_path / "rotor.json")
+    content = json.loads((tmp_path / "rotor.json").read_text())
+    shafts = [one for key, one in content.items() if key.startswith("ShaftElement")]
+    assert any(key.endswith(" layer") for key in content)
+    assert not any(" " in one["material"]["name"] for one in shafts)
+    assert len(read_ross(tmp_path / "rotor.json").rotor.discs) == len(machine.rotor.discs) > 1
