@@ -2,7 +2,8 @@
 
     python studies/engines/kills.py --kills 20 --out studies/engines/kills.json
 
-Engines: threads of one process; two processes that claim shards; the driver of a local Dask cluster.
+Engines: threads of one process; two processes that claim shards; the driver of a local Dask cluster; two
+processes and a cluster in one folder.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ TABLE = {
     "seed": 7,
     "vary": {"speed": {"uniform": ["60 Hz", "200 Hz"]}, "*.friction.dynamic": {"uniform": [0.05, 0.2]}},
 }
-ENGINES = ("threads", "claim", "dask")
+ENGINES = ("threads", "claim", "dask", "mixed")
 
 
 def study() -> Study:
@@ -57,10 +58,14 @@ def work(engine: str, folder: Path) -> None:
 
 def started(engine: str, folder: Path) -> list[subprocess.Popen[bytes]]:
     """The processes of an engine, each in a group of its own."""
-    command = [sys.executable, __file__, "--work", engine, str(folder)]
-    count = 2 if engine == "claim" else 1
+    everybody = {"claim": ["claim"] * 2, "mixed": ["claim", "claim", "dask"]}.get(engine, [engine])
     quiet = subprocess.DEVNULL
-    return [subprocess.Popen(command, start_new_session=True, stderr=quiet) for _ in range(count)]
+    return [
+        subprocess.Popen(
+            [sys.executable, __file__, "--work", one, str(folder)], start_new_session=True, stderr=quiet
+        )
+        for one in everybody
+    ]
 
 
 def killed(engine: str, serial: dict[str, str], kills: int, chance: random.Random) -> dict[str, Any]:
@@ -117,6 +122,9 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--work", nargs=2)
     parser.add_argument("--kills", type=int, default=20)
+    parser.add_argument(
+        "--seed", type=int, default=1, help="moments of the kills; --out is added to"
+    )
     parser.add_argument("--engine", action="append", choices=ENGINES)
     parser.add_argument("--out", type=Path)
     asked = parser.parse_args()
@@ -126,9 +134,12 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as place:
         run_study(study(), Path(place) / "serial", threads=1)
         serial = hashes(Path(place) / "serial")
-    chance, summary = random.Random(1), {}
+    chance = random.Random(asked.seed)
+    summary = json.loads(asked.out.read_text()) if asked.out and asked.out.exists() else {}
     for engine in asked.engine or ENGINES:
-        summary[engine] = killed(engine, serial, asked.kills, chance)
+        found = killed(engine, serial, asked.kills, chance)
+        known = summary.get(engine, {})
+        summary[engine] = {key: value + known.get(key, 0) for key, value in found.items()}
         print(engine, json.dumps(summary[engine]), flush=True)
         if asked.out:
             asked.out.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")

@@ -66,6 +66,17 @@ def test_the_calibrated_machine_loads_again(calibration: Calibration, known: Mac
             assert quantity.interval_90[0] < float(quantity) < quantity.interval_90[1]
 
 
+def test_each_drop_says_how_its_magnets_lifted(calibration: Calibration, synthetic: SyntheticDrop) -> None:
+    """What a virtual repeat draws the lift of another drop from."""
+    origin = calibration.machine.calibration
+    assert origin is not None
+    assert [len(drop.lift) for drop in origin.drops] == [2, 2]
+    carried = calibration.machine.rotor.mass * float(calibration.machine.gravity) / 2.0
+    for lift, true in zip(origin.drops[0].lift, synthetic.truth["remanent_force"], strict=True):
+        assert abs(lift.up - true["vertical_N"] / carried) < 4.0 * lift.up_error < 0.4
+        assert abs(lift.sideways - true["x_N"] / carried) < 4.0 * lift.sideways_error
+
+
 def test_what_the_records_determine_and_what_not(calibration: Calibration) -> None:
     verdicts = {entry.path: entry.verdict for entry in calibration.identifiability}
     for name in BEARINGS:

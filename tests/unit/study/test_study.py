@@ -259,13 +259,16 @@ if __name__ == "__main__":
 """
 
 
-def test_a_cluster_computes_the_same_bits(serial, tmp_path):
-    """Where the extra "cluster" is installed; workers of a cluster import the program that started it."""
+@pytest.mark.parametrize("helpers", [0, 2])
+def test_a_cluster_computes_the_same_bits(helpers, serial, tmp_path):
+    """Where the extra "cluster" is installed, alone and beside processes that claim in the same folder."""
     pytest.importorskip("distributed")
     open_folder(study_with(), tmp_path / "study")
-    program = tmp_path / "program.py"
+    program = tmp_path / "program.py"  # workers of a cluster import the program that started it
     program.write_text(PROGRAM_ON_DASK)
-    subprocess.run([sys.executable, str(program), str(tmp_path / "study")], check=True, timeout=300)
+    commands = [[str(program)], *[["-c", PROGRAM]] * helpers]
+    children = [subprocess.Popen([sys.executable, *one, str(tmp_path / "study")]) for one in commands]
+    assert [child.wait(timeout=300) for child in children] == [0] * (1 + helpers)
     same_shards(serial[0], tmp_path / "study")
 
 
