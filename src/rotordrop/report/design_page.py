@@ -56,8 +56,8 @@ def _verdict(plan: DesignPlan, result: DesignResult) -> tuple[Statement, ...]:
     kept = sum(one.on_front for one in result.front)
     said = [
         Statement(
-            text=f"{len(result.front)} candidates are beaten by no other in every aim; {kept} of them still "
-            "are when drawn again with fresh chances."
+            text=f"Of {len(result.candidates)} candidates {len(result.front)} on the front: no other is "
+            f"better in every aim. Drawn again with fresh chances, {kept} of {len(result.front)} still on it."
         )
     ]
     for number, aim in enumerate(result.aims):

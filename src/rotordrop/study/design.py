@@ -58,9 +58,12 @@ class Aim:
     @property
     def name(self) -> str:
         """The aim in words."""
+        owner, _, quantity = self.column.rpartition(".")
+        where = {"": "", "*": " at the worst bearing"}.get(owner, f" at {owner}")
+        words = f"{quantity.replace('_', ' ')}{where}"
         if self.above is not None:
-            return f"P({self.column} > {self.above:g} SI)"
-        return f"{100 * (self.quantile or 0.0):g} % quantile of {self.column}"
+            return f"P({words} > {self.above:g}{' SI' if self.above else ''})"
+        return f"{100 * (self.quantile or 0.0):g} % quantile of {words}"
 
 
 USUAL = (Aim(column="*.peak_stress", quantile=0.9), Aim(column="*.backward_whirl", above=0.0))

@@ -42,10 +42,14 @@ def sobol(seed: int, first: int, last: int, width: int) -> Array:
     """Points of a scrambled Sobol sequence, shape (n, width)."""
     from scipy.stats import qmc
 
+    if first == last:
+        return np.empty((0, width))
     sequence = qmc.Sobol(width, scramble=True, rng=_generator(seed))
     if first:
         sequence.fast_forward(first)
-    return np.asarray(sequence.random(last - first))
+        return np.asarray(sequence.random(last - first))
+    # the first point by itself: a first draw that is no power of two is warned of, and pieces are meant here
+    return np.asarray(np.concatenate([sequence.random(1), sequence.random(last - 1)]))
 
 
 @lru_cache(maxsize=4)

@@ -96,7 +96,10 @@ def test_the_verb(tmp_path, capsys):
     assert run([*call, "--json", str(tmp_path / "d.json"), "--report", str(tmp_path / "d.html")]) == 0
     assert "as described" in capsys.readouterr().out
     content = json.loads((tmp_path / "d.json").read_text())
-    assert content["aims"] == ["90 % quantile of *.peak_stress", "P(*.backward_whirl > 0 SI)"]
+    assert content["aims"] == [
+        "90 % quantile of peak stress at the worst bearing",
+        "P(backward whirl at the worst bearing > 0)",
+    ]
     assert len(content["candidates"]) == 2
     call = ["rare", str(tmp_path / "design.toml"), "--column", "NDE.peak_forc", "--above", "1 kN"]
     assert run(call) == 64

@@ -21,6 +21,7 @@ from rotordrop.study.folder import StudyFolder, claimed, open_folder, read_shard
 from rotordrop.study.plan import Study, load_study, read_study
 from rotordrop.study.quantities import columns_of
 from rotordrop.study.run import compute_shard, one_drop, run_study, work_on
+from rotordrop.study.sampling import sobol
 from rotordrop.study.summary import EarlyEnd, load_results, save_results
 
 MACHINE = example_machine("lp400")
@@ -79,6 +80,13 @@ def test_values_of_a_drop_do_not_depend_on_where_a_draw_begins(design):
     whole = study.values(0, 64)
     np.testing.assert_array_equal(study.values(17, 23), whole[17:23])
     assert len(np.unique(whole[:, 0])) == 64
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_sobol_sequence_in_pieces_is_the_whole_and_warns_of_nothing():
+    whole = sobol(3, 0, 7, 4)
+    np.testing.assert_array_equal(np.concatenate([sobol(3, 0, 3, 4), sobol(3, 3, 7, 4)]), whole)
+    assert sobol(3, 0, 0, 4).shape == (0, 4)
 
 
 def test_a_grid_visits_every_cell_alike():
