@@ -122,9 +122,7 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--work", nargs=2)
     parser.add_argument("--kills", type=int, default=20)
-    parser.add_argument(
-        "--seed", type=int, default=1, help="moments of the kills; --out is added to"
-    )
+    parser.add_argument("--seed", type=int, default=1, help="moments of the kills; --out is added to")
     parser.add_argument("--engine", action="append", choices=ENGINES)
     parser.add_argument("--out", type=Path)
     asked = parser.parse_args()
