@@ -11,6 +11,7 @@ import pytest
 
 import rotordrop
 from rotordrop.cli import app
+from rotordrop.cli._examples import EXAMPLES
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXTS = [
@@ -46,6 +47,17 @@ def test_every_command_shown_exists_with_its_options(file, verb, options):
     assert verb in app.verbs(), f"{file} shows 'rotordrop {verb}'"
     known = {name for parameter in app.load_verb(verb).params for name in parameter.opts}
     assert set(options) <= known, f"{file} shows 'rotordrop {verb}' with options it does not have"
+
+
+def test_the_help_of_every_verb_ends_with_an_example_that_has_its_options():
+    assert set(EXAMPLES) == set(app.verbs())
+    for verb, line in EXAMPLES.items():
+        command = app.load_verb(verb)
+        assert command.epilog == f"Example: {line}"
+        assert line.startswith(f"rotordrop {verb}")
+        known = {name for parameter in command.params for name in parameter.opts}
+        options = set(re.findall(r"(?<=\s)(--?[a-z][a-z-]*)", line))
+        assert options <= known or verb in ("study", "log", "bench"), line
 
 
 def test_the_files_of_the_demo_exist():

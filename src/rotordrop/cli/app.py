@@ -25,6 +25,7 @@ from typer.core import TyperCommand, TyperGroup
 from rotordrop._version import __version__
 from rotordrop.cli import INTERRUPTED as INTERRUPTED
 from rotordrop.cli import STOPPED
+from rotordrop.cli._examples import EXAMPLES
 from rotordrop.cli._interruption import interruptions_kept
 from rotordrop.cli._output import read_by_this_command, require_places
 from rotordrop.cli._streams import open_streams, printable
@@ -92,7 +93,8 @@ def load_verb(name: str) -> TyperCommand:
     """Import the file of a verb and make its function a command."""
     module = import_module(f"rotordrop.cli.{name.replace('-', '_')}")
     single = typer.Typer(add_completion=False, rich_markup_mode=None)
-    single.command(name)(_with_files_apart(getattr(module, name.replace("-", "_"))))
+    example = f"Example: {EXAMPLES[name]}" if name in EXAMPLES else None
+    single.command(name, epilog=example)(_with_files_apart(getattr(module, name.replace("-", "_"))))
     command = typer.main.get_command(single)
     assert isinstance(command, TyperCommand)
     return command

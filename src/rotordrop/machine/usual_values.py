@@ -159,18 +159,22 @@ def _bounded(part: Description, field: str, value: Estimated, name: str) -> Iter
     yield from _outside(label, name, value.value, usual.least, usual.most, usual.kind, usual.look)
 
 
-def _of_the_rotor(machine: Machine) -> Iterator[Doubt]:
-    rotor, length = machine.rotor, machine.rotor.node_positions[-1]
-    widest = max(e.layer_diameter or e.outer_diameter for e in rotor.elements)
-    surface = 0.5 * widest * machine.speed.nominal.value
+def doubts_of_speed(machine: Machine, speed: float, label: str = "speed") -> Iterator[Doubt]:
+    """A doubt about a speed [rad/s] at which no rotor of this diameter holds together."""
+    widest = max(e.layer_diameter or e.outer_diameter for e in machine.rotor.elements)
+    surface = 0.5 * widest * abs(speed)
     if surface > SURFACE_SPEED:
-        speed, across = format_quantity(machine.speed.nominal.value, "speed"), _length(widest)
         text = (
-            f"a nominal speed of {speed} gives the diameter of {across} "
+            f"a {label} of {format_quantity(speed, 'speed')} gives the diameter of {_length(widest)} "
             f"a surface speed of {surface:.4g} m/s, and no rotor withstands "
             f"more than about {SURFACE_SPEED:g} m/s; check the unit (Hz or rpm)"
         )
-        yield _doubt("nominal speed", "machine", surface, SURFACE_SPEED, text)
+        yield _doubt(label, "machine", surface, SURFACE_SPEED, text)
+
+
+def _of_the_rotor(machine: Machine) -> Iterator[Doubt]:
+    rotor, length = machine.rotor, machine.rotor.node_positions[-1]
+    yield from doubts_of_speed(machine, machine.speed.nominal.value, "nominal speed")
     for number, element in enumerate(rotor.elements, start=1):
         if not length / SLENDERNESS <= element.outer_diameter <= 2.0 * length:
             text = (

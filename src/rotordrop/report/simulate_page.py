@@ -8,6 +8,7 @@ import numpy as np
 
 from rotordrop._version import __version__
 from rotordrop.estimation.bearing_drop import BearingDrop, History, simulated_bearings
+from rotordrop.machine.usual_values import doubts_of_speed
 from rotordrop.report.content import Card, Figure, KeyFigure, ReportContent, Section, Statement
 from rotordrop.report.drop_sections import drop_sections, speed_figure, static_limit_statement
 from rotordrop.report.estimate_numbers import headline_card
@@ -75,6 +76,7 @@ def _verdict(
     result: DropResult, bearings: tuple[BearingDrop, ...], machine: Machine | None
 ) -> tuple[Statement, ...]:
     statements = [Statement(text=result.outcome, level="good" if result.finished else "bad")]
+    statements += _doubts(result, machine)
     statements.append(_certificate(result))
     statements.append(
         Statement(
@@ -90,6 +92,18 @@ def _verdict(
         )
         statements.append(Statement(text=text, level="notice"))
     return tuple(statements)
+
+
+def _doubts(result: DropResult, machine: Machine | None) -> list[Statement]:
+    """What is unusual about the speed that was asked for."""
+    found = []
+    if result.initial_speed < 0.0:
+        text = "The speed is negative: the shaft turns from y towards x, clockwise seen from the DE."
+        found.append(Statement(text=text, level="notice"))
+    if machine is not None:
+        doubts = doubts_of_speed(machine, result.initial_speed)
+        found += [Statement(text=f"{doubt.message}.", level="warning") for doubt in doubts]
+    return found
 
 
 def _certificate(result: DropResult) -> Statement:

@@ -115,3 +115,15 @@ def test_a_name_in_the_machine_file_stays_text(drop_result: DropResult) -> None:
     assert "<script>alert" not in html
     assert "<b>NDE" not in html
     assert "&lt;script&gt;alert(1)&lt;/script&gt;" in html
+
+
+def test_a_speed_that_no_rotor_withstands_and_a_negative_one_are_told(drop_result: DropResult) -> None:
+    machine = example_machine("lp400")
+    quiet = " ".join(one.text for one in simulate_page(drop_result, machine).verdict)
+    assert "no rotor withstands" not in quiet
+    assert "clockwise" not in quiet
+    turned = replace(drop_result, initial_speed=-2.0 * np.pi * 6000.0)
+    said = {one.level: one.text for one in simulate_page(turned, machine).verdict}
+    assert "a speed of −6000 Hz" in said["warning"].replace("-", "−")
+    assert "no rotor withstands more than about 700 m/s" in said["warning"]
+    assert any("clockwise seen from the DE" in one.text for one in simulate_page(turned, machine).verdict)
