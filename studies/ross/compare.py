@@ -66,6 +66,20 @@ def compared(imported: ImportedRotor, numbers: dict[str, Any]) -> dict[str, Any]
     return row
 
 
+def back_in_ross(back: dict[str, Any], numbers: dict[str, Any]) -> dict[str, float]:
+    """Largest relative errors of what ROSS computes of the rotor that was written here."""
+    before = {float(key): np.array(one) for key, one in numbers["frequencies"].items()}
+    errors = {
+        f"frequencies at {key} rad/s": float(np.max(np.abs(matched(np.array(new), before[float(key)]))))
+        for key, new in back["frequencies"].items()
+    }
+    old, new = (np.array(one["response"]["magnitude"]) for one in (numbers, back))
+    if old.shape == new.shape:
+        scale = np.max(old, axis=(1, 2), keepdims=True)
+        errors["response"] = float(np.max(np.abs(new - old) / scale))
+    return errors
+
+
 def matched(found: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.float64]:
     """Relative error of the nearest frequency found, for every wanted one."""
     nearest = found[np.argmin(np.abs(found[:, None] - wanted), axis=0)]
@@ -102,10 +116,7 @@ def main() -> None:
             )
             if back is not None:
                 assert row is not None
-                row["back in ROSS"] = {
-                    key: float(np.max(np.abs(np.array(new) / np.array(numbers["frequencies"][key]) - 1.0)))
-                    for key, new in back["rotors"][again.name]["frequencies"].items()
-                }
+                row["back in ROSS"] = back_in_ross(back["rotors"][again.name], numbers)
             results["rotors"][file.name] = row
     for name, row in results["rotors"].items():
         print(name, {key: value for key, value in row.items() if key != "notes"})

@@ -51,6 +51,7 @@ def critical_speeds(
     from rotordrop.machine import load_machine
     from rotordrop.model.campbell import campbell_diagram
     from rotordrop.model.critical_speeds import WHIRLS, critical_speed_map
+    from rotordrop.model.stability import stability_map
     from rotordrop.report.critical_speeds_page import critical_speeds_json, critical_speeds_page
     from rotordrop.report.page import write_page
     from rotordrop.report.terminal import print_summary
@@ -68,11 +69,12 @@ def critical_speeds(
         for number, item in enumerate(chosen, start=len(WHIRLS)):
             progress(f"Campbell diagram, {item.value}", number / parts)
             diagrams[item.value] = campbell_diagram(described, grid, item.value)
-    page = critical_speeds_page(described, maps, diagrams)
+    stability = [stability_map(described, item.value) for item in chosen if item is not Held.free_free]
+    page = critical_speeds_page(described, maps, diagrams, stability)
     if report is not None:
         write_page(page, report)
     if data is not None:
         from rotordrop.report.csv_files import write_data
 
         write_data(page, data)
-    deliver(critical_speeds_json(maps, diagrams), json_file, lambda out: print_summary(page, out))
+    deliver(critical_speeds_json(maps, diagrams, stability), json_file, lambda out: print_summary(page, out))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rotordrop.model.campbell import CampbellDiagram
 from rotordrop.model.critical_speeds import CriticalSpeedMap
+from rotordrop.model.stability import StabilityMap
 from rotordrop.report.style import (
     INK,
     LIMIT,
@@ -171,6 +172,26 @@ def _add_own_speed(figure: go.Figure, diagram: CampbellDiagram, highest: float) 
             row=1,
             col=1,
         )
+
+
+def stability_figure(found: Sequence[StabilityMap]) -> go.Figure:
+    """Draw the least logarithmic decrement against cross-coupled stiffness, a line for each suspension."""
+    figure = panels(("least logarithmic decrement of the lowest modes",), height=320)
+    for k, one in enumerate(found):
+        figure.add_trace(
+            go.Scatter(
+                x=single(1e-6 * one.coupling),
+                y=single(one.decrement),
+                mode="lines",
+                line={"color": SERIES[k], "width": 1.5},
+                name=one.suspension,
+                hovertemplate="%{x:.4~g} N/µm: %{y:.3~g}<extra>" + plain(one.suspension) + "</extra>",
+            )
+        )
+    figure.add_hline(y=0.0, line={"color": LIMIT, "width": 1.2, "dash": "dash"})
+    figure.update_xaxes(title_text=axis_title("cross-coupled stiffness in mid-span", "N/µm"))
+    figure.update_yaxes(title_text=axis_title("logarithmic decrement", ""))
+    return fit_legend(figure)
 
 
 def mode_shape_figure(

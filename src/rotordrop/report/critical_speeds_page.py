@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,8 +12,14 @@ from rotordrop._version import __version__
 from rotordrop.model.campbell import CampbellDiagram
 from rotordrop.model.critical_speeds import CriticalSpeedMap
 from rotordrop.model.separation import Separation, amplification_factor, separations
+from rotordrop.model.stability import StabilityMap
 from rotordrop.report.content import Card, Figure, KeyFigure, ReportContent, Section, Statement, Table
-from rotordrop.report.critical_speeds_figure import campbell_figure, critical_speed_figure, mode_shape_figure
+from rotordrop.report.critical_speeds_figure import (
+    campbell_figure,
+    critical_speed_figure,
+    mode_shape_figure,
+    stability_figure,
+)
 from rotordrop.report.machine_sections import defaults_section
 from rotordrop.report.quantity import Quantity
 
@@ -37,7 +43,10 @@ _WHIRL_WORDS = {
 
 
 def critical_speeds_page(
-    machine: Machine, maps: Mapping[str, CriticalSpeedMap], diagrams: Mapping[str, CampbellDiagram]
+    machine: Machine,
+    maps: Mapping[str, CriticalSpeedMap],
+    diagrams: Mapping[str, CampbellDiagram],
+    stability: Sequence[StabilityMap] = (),
 ) -> ReportContent:
     """Build the report on critical speeds.
 
@@ -49,6 +58,8 @@ def critical_speeds_page(
         By whirl: "standstill" as in the paper, "forward", "backward".
     diagrams : mapping of str to CampbellDiagram
         By what holds the rotor.
+    stability : sequence of StabilityMap
+        One for each suspension that has one.
     """
     return ReportContent(
         title=f"Critical speeds of {machine.name}",
@@ -59,18 +70,31 @@ def critical_speeds_page(
         sections=(
             *(_map_section(found) for found in maps.values()),
             *(_campbell_section(machine, diagram) for diagram in diagrams.values()),
+            *(_stability_section(machine, stability) if stability else ()),
             *defaults_section(machine),
         ),
     )
 
 
 def critical_speeds_json(
-    maps: Mapping[str, CriticalSpeedMap], diagrams: Mapping[str, CampbellDiagram]
+    maps: Mapping[str, CriticalSpeedMap],
+    diagrams: Mapping[str, CampbellDiagram],
+    stability: Sequence[StabilityMap] = (),
 ) -> dict[str, Any]:
     """Everything the page shows, ready for JSON, SI units; null where there is no line."""
     return {
         "maps": {name: _map_json(found) for name, found in maps.items()},
         "campbell": {name: _campbell_json(diagram) for name, diagram in diagrams.items()},
+        "stability": {
+            one.suspension: {
+                "speed_Hz": one.speed / TURN,
+                "node": one.node,
+                "coupling_N_m": one.coupling.tolist(),
+                "logarithmic_decrement": one.decrement.tolist(),
+                "limit_N_m": one.limit if math.isfinite(one.limit) else None,
+            }
+            for one in stability
+        },
     }
 
 
@@ -228,6 +252,37 @@ def _campbell_section(machine: Machine, diagram: CampbellDiagram) -> Section:
         ),
     )
     return Section(heading=f"{_held(diagram.suspension)}: Campbell diagram and shapes", figures=figures)
+
+
+def _stability_section(machine: Machine, stability: Sequence[StabilityMap]) -> tuple[Section, ...]:
+    node, speed = stability[0].node, _speed_text(float(machine.speed.nominal))
+    text = (
+        f"A cross-coupled stiffness at node {node}, in the middle of the bearings, stands for what seals and "
+        f"impellers do to the rotor at {speed}: so API 617, part 1, screens it. What yours do is not known "
+        "here; it asks for a decrement of at least 0.1 with them."
+    )
+    rows = tuple(
+        (
+            one.suspension,
+            f"{one.decrement[0]:.3g}",
+            Quantity(value=one.limit, kind="stiffness", digits=4)
+            if math.isfinite(one.limit)
+            else "none found",
+        )
+        for one in stability
+    )
+    figure = Figure(
+        chart=stability_figure(stability),
+        caption="Least logarithmic decrement against cross-coupled stiffness; below zero the rotor whirls "
+        "by itself.",
+        name="stability",
+    )
+    table = Table(
+        caption="Stability at the nominal speed",
+        columns=("held by", "decrement without coupling", "coupling at the limit"),
+        rows=rows,
+    )
+    return (Section(heading="Stability map", text=(text,), figures=(figure,), tables=(table,)),)
 
 
 def _map_json(found: CriticalSpeedMap) -> dict[str, Any]:

@@ -8,7 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rotordrop.report.critical_speeds_page import _verdict
+from rotordrop.model.stability import StabilityMap
+from rotordrop.report.critical_speeds_page import _stability_section, _verdict, critical_speeds_json
 
 AT_LINES = {"tangent": np.array([100.0]), "with support mass": np.array([90.0])}
 
@@ -33,3 +34,21 @@ def test_a_mode_further_off_or_against_the_spin_is_none():
     assert said(455.0) == []
     assert said(700.0) == []
     assert said(548.4, "backward") == []
+
+
+def test_the_stability_map_is_drawn_told_and_in_the_json():
+    found = StabilityMap(
+        suspension="AMBs",
+        speed=100.0,
+        node=7,
+        coupling=np.array([0.0, 2e6, 4e6]),
+        decrement=np.array([0.3, 0.1, -0.1]),
+        limit=3e6,
+    )
+    (section,) = _stability_section(SimpleNamespace(speed=SimpleNamespace(nominal=100.0)), [found])
+    assert "node 7" in section.text[0]
+    assert section.tables[0].rows[0][2].value == 3e6
+    np.testing.assert_allclose(section.figures[0].chart.data[0].y, found.decrement, rtol=1e-6)
+    told = critical_speeds_json({}, {}, [found])["stability"]["AMBs"]
+    assert told["limit_N_m"] == 3e6
+    assert told["logarithmic_decrement"] == [0.3, 0.1, -0.1]
