@@ -53,6 +53,28 @@ class RecordError(RotordropError):
     exit_code: ClassVar[int] = 3
 
 
+class NoDropError(RecordError):
+    """A record does not show a rotor that levitates and then falls.
+
+    Parameters
+    ----------
+    record : str
+        Name of the record.
+    seen : str
+        What it shows.
+    remedy : str
+        The way out.
+    begins_late : bool
+        Whether what is missing is the levitated part before the drop.
+    """
+
+    def __init__(self, record: str, seen: str, remedy: str, *, begins_late: bool) -> None:
+        self.seen = seen
+        self.remedy = remedy
+        self.begins_late = begins_late
+        super().__init__(f"{record}: {seen}; {remedy}")
+
+
 class IdentificationError(RotordropError):
     """An unknown parameter cannot be found from the recording."""
 

@@ -1,7 +1,8 @@
 """Damage small recordings of every format and see what the program makes of them.
 
 Usage: python studies/damaged/records.py FORMAT COUNT      random damage up to number COUNT, 250 at a time
-       python studies/damaged/records.py FORMAT cut         cut after every byte
+       python studies/damaged/records.py FORMAT cut         cut after every byte, 1000 at a time
+       FORMAT may be all
        python studies/damaged/records.py summary
 
 Number and format are the seed of a damage. A block that is in ``results/records.jsonl`` is not made again.
@@ -210,20 +211,16 @@ def summary() -> None:
         print(f"silent values: {len(um)}, median {np.median(um):.3g} um, {int(np.sum(um > 5.0))} above 5 um")
 
 
-def main() -> None:
-    """Run what the command line says."""
-    name = sys.argv[1]
-    if name == "summary":
-        summary()
-        return
+def run_format(name: str, wanted: str) -> None:
+    """Judge what is missing of a format."""
     there = {(line["format"], line["block"]) for line in lines()}
     with tempfile.TemporaryDirectory() as folder:
         content = _seed(name, Path(folder))[0].read_bytes()
-    if sys.argv[2] == "cut":
+    if wanted == "cut":
         starts = range(0, len(content), 1000)
         blocks = {f"cut {a}": range(a, min(a + 1000, len(content))) for a in starts}
     else:
-        blocks = {f"{a}": range(a, a + BLOCK) for a in range(0, int(sys.argv[2]), BLOCK)}
+        blocks = {f"{a}": range(a, a + BLOCK) for a in range(0, int(wanted), BLOCK)}
     for label, numbers in blocks.items():
         if (name, label) in there:
             continue
@@ -232,6 +229,15 @@ def main() -> None:
         else:
             base = zlib.crc32(name.encode())
             run(name, [(i, *damaged(content, (base << 20) + i)) for i in numbers], label)
+
+
+def main() -> None:
+    """Run what the command line says."""
+    if sys.argv[1] == "summary":
+        summary()
+        return
+    for name in WRITERS if sys.argv[1] == "all" else (sys.argv[1],):
+        run_format(name, sys.argv[2])
 
 
 if __name__ == "__main__":

@@ -3,27 +3,30 @@
 Usage: python studies/interruptions/kills.py COUNT
 
 Every command writes over outputs of an earlier run. After a kill each output must be whole, the earlier or
-the new one, the inputs must be untouched, and after one more run nothing hidden may be left. One line of
-``results/kills.jsonl`` each; a run that was stopped goes on where it was.
+the new one, the inputs must be untouched, and after one more run nothing hidden may be left. A command runs
+in a copy of this process that has imported and compiled all it needs, so that most kills meet its work and
+not its start. One line of ``results/kills.jsonl`` each; a run that was stopped goes on where it was.
 """
 
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import os
 import random
 import shutil
 import signal
-import subprocess
 import sys
 import tempfile
 import time
 from collections import Counter
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import h5py
 
+from rotordrop.cli.app import run
 from rotordrop.machine import example_path
 from rotordrop.measurement import example_record_path
 
@@ -54,10 +57,20 @@ def whole(path: Path) -> bool:
     return True
 
 
-def _start(folder: Path, words: list[str]) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", "rotordrop", *words]
-    quiet = subprocess.DEVNULL
-    return subprocess.Popen(command, cwd=folder, stdout=quiet, stderr=quiet, start_new_session=True)
+def _start(words: list[str]) -> int:
+    """Run a command in a copy of this process with a group of its own; its number."""
+    number = os.fork()
+    if number:
+        return number
+    os.setsid()
+    quiet = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(quiet, 1)
+    os.dup2(quiet, 2)
+    os._exit(run(words))
+
+
+def _ended(number: int) -> bool:
+    return os.waitpid(number, os.WNOHANG)[0] == number
 
 
 def _folder(path: Path) -> tuple[list[Path], str]:
@@ -80,23 +93,25 @@ def one(
     name = list(COMMANDS)[number % len(COMMANDS)]
     words = COMMANDS[name].format(record=record).split()
     if name not in took:
-        begun = time.perf_counter()
-        _start(folder, words).wait()
+        with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
+            run(words)
+            begun = time.perf_counter()
+            run(words)
         took[name] = time.perf_counter() - begun
     before = _hashes(inputs)
     dice = random.Random(number)
-    running = _start(folder, words)
-    time.sleep(dice.uniform(0.3, 1.05) * took[name])
-    ended = running.poll()
-    if ended is None:
-        os.killpg(running.pid, signal.SIGKILL)
-        running.wait()
+    running = _start(words)
+    time.sleep(dice.uniform(0.02, 1.05) * took[name])
+    ended = _ended(running)
+    if not ended:
+        os.killpg(running, signal.SIGKILL)
+        os.waitpid(running, 0)
     files = [path for path in folder.rglob("*") if path.is_file() and path not in inputs]
     shown = [path for path in files if not path.name.startswith(".")]
     return {
         "number": number,
         "command": name,
-        "killed": ended is None,
+        "killed": not ended,
         "broken": [path.name for path in shown if not whole(path)],
         "inputs kept": before == _hashes(inputs),
         "hidden": len(files) - len(shown),
@@ -111,6 +126,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name, RESULTS.open("a") as out:
         folder = Path(name)
         inputs, record = _folder(folder)
+        os.chdir(folder)
         for number in range(len(lines), int(sys.argv[1])):
             line = one(number, folder, inputs, record, took)
             lines.append(line)

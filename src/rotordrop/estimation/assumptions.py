@@ -9,6 +9,8 @@ import numpy as np
 
 from rotordrop.estimated import NINETY
 from rotordrop.identification.evidence import Evidence, Missing, strongest_slowing
+from rotordrop.model.parameter_table import parameter
+from rotordrop.model.unknowns import sensor_prior, smallest_gap
 from rotordrop.tracking.problem import DropProblem, rough_noise
 from rotordrop.units import format_quantity
 
@@ -36,6 +38,7 @@ def twin_assumptions(evidence: Evidence, problem: DropProblem) -> tuple[str, ...
     return (
         *evidence_assumptions(evidence),
         *_noise(evidence, problem),
+        *_gains(problem),
         *_level(evidence),
         *_gaps(evidence, problem),
         *_air(problem),
@@ -52,6 +55,21 @@ def _noise(evidence: Evidence, problem: DropProblem) -> Iterator[str]:
         size = format_quantity(math.sqrt(float(problem.variances[c])), "length")
         origin = "the roughness of its readings" if np.isfinite(rough[c]) else "what is usual"
         yield f"{sensor.name}: no levitated readings tell its noise; {size} (rms) is taken from {origin}"
+
+
+def _gains(problem: DropProblem) -> Iterator[str]:
+    """Gains nobody stated: an error that all sensors share is in every force, and no record shows it."""
+    machine = problem.model.machine
+    taken = [sensor for sensor in machine.sensors if sensor.gain.status == "default"]
+    if not taken:
+        return
+    within = NINETY * sensor_prior(parameter("gain", "sensor"), taken[0].gain, smallest_gap(machine)).sigma
+    yield (
+        f"the machine file states no gain of {', '.join(sensor.name for sensor in taken)}: taken as "
+        f"calibrated, each within ±{within:.1%} (90 %). An error that all share goes into forces and gaps in "
+        "proportion and shows in no record; a tolerance such as gain = { guess = 1.0, range = [0.9, 1.1] } "
+        "makes the intervals hold it"
+    )
 
 
 def _level(evidence: Evidence) -> Iterator[str]:

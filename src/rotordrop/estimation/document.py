@@ -57,6 +57,15 @@ def estimate_document(estimate: Estimate) -> dict[str, Any]:
             }
             for one in estimate.sensors
         },
+        "unbalance": [
+            {
+                "node": one.node,
+                "amount_kg_m": one.amount.as_json(),
+                "phase_rad": None if one.phase is None else one.phase.as_json(),
+                "sentence": one.sentence(),
+            }
+            for one in estimate.unbalance
+        ],
         **({} if estimate.replay is None else _replay(estimate, estimate.replay)),
     }
 

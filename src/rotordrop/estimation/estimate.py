@@ -25,6 +25,7 @@ from rotordrop.estimation.agreement import Agreement
 from rotordrop.estimation.bearing_drop import BearingDrop
 from rotordrop.estimation.later_motion import LaterMotion
 from rotordrop.estimation.methods import Method
+from rotordrop.estimation.unbalance import PlaneUnbalance
 from rotordrop.identification.first_contact import TimedContact as TimedContact
 from rotordrop.identification.friction import FrictionSweep as FrictionSweep
 from rotordrop.identification.speed import SpeedFit
@@ -275,6 +276,8 @@ class Estimate:
         Gain, offset and noise of every sensor; empty for a replay.
     joint : JointEstimate or None
         How the errors of parameters and sensors hang together; None where they are not held together.
+    unbalance : tuple of PlaneUnbalance
+        Amount and phase of the unbalance of every plane; empty for a replay.
     structure : tuple of Structure
         What the machine has beyond the usual model; empty where that does.
     cross_check : tuple of CrossCheck
@@ -312,6 +315,7 @@ class Estimate:
     checks: tuple[Check, ...] = ()
     sensors: tuple[SensorErrors, ...] = ()
     joint: JointEstimate | None = None
+    unbalance: tuple[PlaneUnbalance, ...] = ()
     structure: tuple[Structure, ...] = ()
     cross_check: tuple[CrossCheck, ...] = ()
     innovations: Innovations | None = None

@@ -134,6 +134,17 @@ _JOINT = closed(
     prior_standard_deviation=NUMBERS,
 )
 _SENSOR = closed({}, gain_error=_VALUE_REF, offset_m=_VALUE_REF, noise_m=NUMBER)
+_UNBALANCE = closed(
+    {},
+    node={**COUNT, "description": "Node of the plane, counted from 1."},
+    amount_kg_m=_VALUE_REF,
+    phase_rad={
+        "oneOf": [_VALUE_REF, {"type": "null"}],
+        "description": "Heavy spot when the mark of the shaft passes, from +y, positive with the spin; null "
+        "where the record has no mark or tells no direction.",
+    },
+    sentence=TEXT,
+)
 _SPEED = closed(
     {},
     aero_time_constant_s={"oneOf": [_VALUE_REF, {"type": "null"}]},
@@ -246,6 +257,7 @@ _DROP = closed(
         "description": "How the errors of what belongs to the machine hang together.",
     },
     sensors=by_name(_SENSOR),
+    unbalance={"type": "array", "items": _UNBALANCE},
 )
 
 

@@ -48,6 +48,8 @@ from rotordrop.estimation.tracked_parameters import (
     parameters,
     sensor_errors,
 )
+from rotordrop.estimation.tracked_unbalance import plane_unbalances
+from rotordrop.estimation.unbalance import PlaneUnbalance, unbalance_notes
 from rotordrop.model.bearing_numbers import numbers_of
 from rotordrop.model.rotor_form import is_beam
 from rotordrop.tracking.consistency import NIS_RANGE, Check
@@ -103,6 +105,7 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
     judged = _judge(drop, check)
     later = _later(drop, judged)
     advice = _advice(drop, judged)
+    unbalance = _unbalance(drop, judged)
     quick = (QUICK.format("" if judged.check else "without the independent cross-check and "),)
     return Estimate(
         name=evidence.name,
@@ -118,6 +121,7 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
         checks=drop.checks,
         sensors=judged.sensors,
         joint=joint_estimate(problem, drop.smoothed) if judged.fits else None,
+        unbalance=unbalance,
         structure=_structure(drop, judged),
         cross_check=_comparisons(drop, judged),
         innovations=_innovations(drop),
@@ -133,6 +137,7 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
             *twin_assumptions(evidence, problem),
             *(check.note for check in drop.checks if check.note),
             *(f"a further number: {one.sentence()}" for one in advice),
+            *unbalance_notes(unbalance),
             *(quick if method.quick else ()),
         ),
         simulated_record=facts.simulated,
@@ -168,6 +173,18 @@ def _by_a_drawing(drop: TrackedDrop, judged: _Judgement) -> tuple[Advice, ...]:
         for one, by in ((drop, judged), (drawn, known))
     )
     return (Advice(measurement=DRAWING, paths=("rotor",), half_widths=before, narrowed=after, at_most=True),)
+
+
+def _unbalance(drop: TrackedDrop, judged: _Judgement) -> tuple[PlaneUnbalance, ...]:
+    evidence = drop.evidence
+    return plane_unbalances(
+        drop.problem,
+        drop.smoothed,
+        evidence.record.marks,
+        evidence.power_off.value,
+        fits=judged.fits,
+        widening=judged.widening,
+    )
 
 
 def _structure(drop: TrackedDrop, judged: _Judgement) -> tuple[Structure, ...]:

@@ -51,6 +51,10 @@ class Misfit(ValueError):
         super().__init__(message)
 
 
+class UnknownKey(Misfit):
+    """A key that nobody knows: the key is to blame, not its value."""
+
+
 class Description(BaseModel):
     """A part of a machine: frozen, with no key that is not known."""
 
@@ -72,7 +76,7 @@ class Description(BaseModel):
                     what = f"{key!r} is reserved for {cls.reserved[key]}"
                     raise Misfit(f"{what}, which is not yet supported; leave it out", (key,))
                 if key not in cls.model_fields:
-                    raise Misfit(unknown_key(str(key), cls.known_keys()), (str(key),))
+                    raise UnknownKey(unknown_key(str(key), cls.known_keys()), (str(key),))
         return raw
 
     @model_validator(mode="after")

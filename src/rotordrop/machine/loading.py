@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from rotordrop.errors import MachineFileError, UsageError
-from rotordrop.machine.description import Description, Misfit
+from rotordrop.machine.description import Description, Misfit, UnknownKey
 from rotordrop.machine.machine import Machine
 from rotordrop.machine.provenance import kind_of
 from rotordrop.machine.shaft_table import SECTION_LINE, read_shaft_table
@@ -228,7 +228,7 @@ def _message(entry: Any, place: tuple[str | int, ...]) -> tuple[str, bool]:
     """Say what is wrong, and whether the key rather than the value is to blame."""
     cause = entry.get("ctx", {}).get("error")
     if isinstance(cause, Misfit):
-        return cause.message, cause.message.startswith("unknown")
+        return cause.message, isinstance(cause, UnknownKey)
     if isinstance(cause, UsageError):
         return str(cause), False
     if entry["type"] == "missing":

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,7 @@ from rotordrop.measurement.quality.finding import refuse_unusable
 from rotordrop.measurement.readers import read_recording
 from rotordrop.measurement.record import Record, record_of, sha256_of
 from rotordrop.measurement.recording import Array
+from rotordrop.series import noise_by_differences
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
@@ -28,15 +30,24 @@ if TYPE_CHECKING:
 BLOCK = 0.02
 """Readings are averaged over this long: the shaft is moved by hand [s]."""
 
-SECTORS = 72
-"""Directions told apart; the outermost place in each counts."""
+_PLACE = math.radians(10.0)
+"""Readings at the wall within this angle are one place [rad]."""
 
-_LEAST_SECTORS = 5
+_LEAST_PLACES = 5
 _WIDEST_OPENING = 150.0
 """Directions without a reading at the wall may span this much [deg]."""
 
-_INWARD = 3.0
-"""A place this many standard deviations inside the circle was not at the wall."""
+_APART = 3.0
+"""A place this many standard deviations off the circle was not at the wall [1]."""
+
+_OUTSIDE = 3.0
+"""Weight of a place outside a circle over that of one inside [1]: no shaft goes through a wall."""
+
+_TOUCHING = 4.0
+"""Readings at the wall lie within this many standard deviations of the outermost of them [1]."""
+
+_ROUND = 1.5e-6
+"""How far places at a sound wall lie off a circle [m]."""
 
 _AT_WALL = 2e-6
 """Places this close to the circle are at the wall however round it is [m]."""
@@ -198,7 +209,7 @@ def _averaged(path: Array, rate: float) -> Array:
     """Means of blocks of readings, shape (K, P, 2)."""
     block = max(int(BLOCK * rate), 1)
     count = len(path) // block
-    if count < 2 * _LEAST_SECTORS:
+    if count < 2 * _LEAST_PLACES:
         raise RecordError(
             f"{len(path) / rate:.3g} s are too short for a lift check; record while the shaft is pushed round"
         )
@@ -214,57 +225,94 @@ def _carried(machine: Machine, nodes: list[int]) -> Array:
 
 
 def _clearance(path: Array, name: str, record: str) -> Clearance:
-    centre, radius = 0.5 * (path.min(axis=0) + path.max(axis=0)), 0.25 * float(np.sum(np.ptp(path, axis=0)))
-    wall, scatter = path, _LEAST_SCATTER
-    for _ in range(12):
-        wall = _outermost(path, centre)
-        wall = wall[np.hypot(*(wall - centre).T) > 0.7 * radius]
-        for _ in range(12):
-            _refuse_open(wall, centre, name, record)
-            centre, radius, scatter = _circle(wall)
-            inside = np.hypot(*(wall - centre).T) - radius
-            keep = inside > -_INWARD * scatter
-            if keep.all():
-                break
-            wall = wall[keep]
-    # the outermost of many readings lies outside by their noise: the mean of those at the wall does not
+    corners = _corners(path, name, record)
+    wall = _agreeing(_mean_places(corners, np.mean(corners, axis=0)))
+    _refuse_open(wall, np.mean(corners, axis=0) if len(wall) < 3 else _circle(wall)[0], name, record)
+    centre, radius, scatter = _circle(wall)
+    # corners lie outside by the noise of the readings: the mean of those at the wall does not
     distance = np.hypot(*(path - centre).T)
-    wall = _mean_places(path[np.abs(distance - radius) < max(_INWARD * scatter, _AT_WALL)], centre)
-    _refuse_open(wall, centre, name, record)
-    return _found(wall, *_circle(wall), name)
+    near = path[np.abs(distance - radius) < max(_APART * scatter, _AT_WALL)]
+    aside = np.angle(np.exp(1j * (_direction(near, centre)[:, None] - _direction(wall, centre))))
+    at_wall = near[np.min(np.abs(aside), axis=1) < 0.5 * _PLACE]
+    places = _mean_places(at_wall, centre, _TOUCHING * noise_by_differences(path, 3))
+    _refuse_open(places, centre, name, record)
+    return _found(places, *_circle(places), name)
 
 
-def _mean_places(path: Array, centre: Array) -> Array:
-    """Mean place in every direction that was visited."""
-    sector = _sectors(path - centre)
-    return np.array([path[sector == number].mean(axis=0) for number in np.unique(sector)])
+def _agreeing(places: Array) -> Array:
+    """The places on the circle that most of them share; all of them where no half of them shares one.
+
+    A push that fell short, a stretch where the shaft was lifted off, dirt and a groove lie off that circle.
+    Every circle through three places is tried, and places off it count alike however far they are; those
+    outside count more, since a shaft that is lifted off for a quarter of the round shows a smaller circle.
+    """
+    trios = np.array(list(combinations(range(len(places)), 3)))
+    if not len(trios):
+        return places
+    a, b, c = (places[trios[:, k]] for k in range(3))
+    sides = np.stack([b - a, c - a], axis=1)
+    flat = np.abs(np.linalg.det(sides)) < 1e-3 * np.sum(sides**2, axis=(1, 2))
+    sides[flat] = np.eye(2)
+    centres = a + np.linalg.solve(sides, 0.5 * np.sum(sides**2, axis=2)[..., None])[..., 0]
+    radii = np.hypot(*(a - centres).T)
+    rest = np.hypot(*(places - centres[:, None]).transpose(2, 0, 1)) - radii[:, None]
+    off = np.minimum(np.abs(rest) / _ROUND, _APART) ** 2
+    cost = np.sum(np.where(rest > 0.0, _OUTSIDE * off, off), axis=1)
+    cost[flat] = np.inf
+    shared = np.abs(rest[int(np.argmin(cost))]) < _APART * _ROUND
+    return places[shared] if 2 * np.count_nonzero(shared) > len(places) else places
 
 
-def _sectors(offset: Array) -> Array:
-    turns = np.arctan2(offset[:, 1], offset[:, 0]) / (2 * np.pi) + 0.5
-    return np.asarray(np.floor(turns * SECTORS))
+def _corners(path: Array, name: str, record: str) -> Array:
+    """Corners of the convex hull of the path: on its straight way from place to place a shaft is inside."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        return np.asarray(path[ConvexHull(path).vertices])
+    except QhullError as error:
+        raise RecordError(
+            f"{record}, {name}: the shaft did not move, or along a line only; push it round the whole bearing"
+        ) from error
 
 
-def _outermost(path: Array, centre: Array) -> Array:
-    """The place furthest from the centre in every direction that was visited."""
-    offset = path - centre
-    sector = _sectors(offset)
-    distance = np.hypot(*offset.T)
-    order = np.lexsort((distance, sector))
-    last = np.append(np.diff(sector[order]) > 0, True)
-    return np.asarray(path[order[last]])
+def _direction(places: Array, centre: Array) -> Array:
+    return np.asarray(np.arctan2(*(places - centre).T[::-1]))
+
+
+def _mean_places(path: Array, centre: Array, depth: float = math.inf) -> Array:
+    """Mean place of every direction that was visited; one push is one place however it trembles.
+
+    What lies deeper [m] than the outermost of a place was on its way to the wall and does not count. Distance
+    and direction are averaged: the mean of points along an arc would lie inside it.
+    """
+    order = np.argsort(_direction(path, centre))
+    angle = _direction(path, centre)[order]
+    opening = np.diff(np.append(angle, angle[0] + 2.0 * np.pi))
+    first = int(np.argmax(opening)) + 1
+    turned = np.mod(np.roll(angle, -first) - angle[first % len(angle)], 2.0 * np.pi)
+    starts = [0]
+    for k in range(1, len(turned)):
+        if turned[k] - turned[starts[-1]] > _PLACE:
+            starts.append(k)
+    means = []
+    for group in np.split(path[np.roll(order, -first)], starts[1:]):
+        distance = np.hypot(*(group - centre).T)
+        touching = distance > np.max(distance) - depth
+        along = group[touching].mean(axis=0) - centre
+        means.append(centre + along * float(np.mean(distance[touching])) / math.hypot(*along))
+    return np.array(means)
 
 
 def _refuse_open(wall: Array, centre: Array, name: str, record: str) -> None:
     angle = np.sort(np.degrees(np.arctan2(*(wall - centre).T[::-1])))
     gaps = np.diff(np.append(angle, angle[0] + 360.0)) if len(angle) else np.array([360.0])
-    if len(wall) >= _LEAST_SECTORS and float(np.max(gaps)) <= _WIDEST_OPENING:
+    if len(wall) >= _LEAST_PLACES and float(np.max(gaps)) <= _WIDEST_OPENING:
         return
     at = int(np.argmax(gaps))
     where = f"between {angle[at]:.0f}° and {angle[at] + gaps[at]:.0f}°" if len(angle) else "anywhere"
     raise RecordError(
         f"{record}, {name}: the shaft was at the wall in {len(wall)} directions and not {where}; push it "
-        f"round the whole bearing, at least {_LEAST_SECTORS} directions with none of {_WIDEST_OPENING:.0f}° "
+        f"round the whole bearing, at least {_LEAST_PLACES} directions with none of {_WIDEST_OPENING:.0f}° "
         "left out"
     )
 

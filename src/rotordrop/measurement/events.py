@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.errors import RecordError
+from rotordrop.errors import NoDropError, RecordError
 from rotordrop.estimated import NINETY
 from rotordrop.measurement.axes import Plane, along_sensors, planar_of, sensor_planes
 from rotordrop.measurement.levitated import LevitatedModel, fit_levitated
@@ -37,6 +37,11 @@ AFTER_FALL = 2.0
 
 _BLOCK = 65536
 _CONTACT_FILTER = 1e-3
+_NO_BEGINNING = "the levitated part before the drop is missing"
+
+_THROWN = 1.0
+"""Range over the air gap that no levitated rotor has [1]: that of the limit C/D of ISO 14839-2."""
+
 _UNSURE = 3e-3
 """How far the first guess of the drop may be off [s]."""
 
@@ -243,16 +248,17 @@ def _coarse_drop(
     deepest = float(np.max((start - np.min(height, axis=0)) / gaps))
     low = start - height > FALLEN_SHARE * gaps
     if not low.all(axis=1).any():
-        _refuse_without_drop(record, height, start, gaps, deepest)
+        _refuse_without_drop(record, shape, start, gaps, deepest)
     sunk = sinking(low)
     fastest = float(np.max(start - height[sunk]))
     instant = record.time[sunk] - float(np.sqrt(2 * fastest / float(machine.gravity)))
     if instant < record.time[0] or record.time[sunk] - record.time[0] < first / record.sampling_rate:
-        raise RecordError(
-            f"{record.name}: the rotor has sunk by {format_quantity(fastest, 'length')} at "
-            f"{record.time[sunk]:.6g} s, {(record.time[sunk] - record.time[0]) * 1e3:.3g} ms after the "
-            "record begins: "
-            "the levitated part before the drop is missing; record with pre-trigger"
+        raise NoDropError(
+            record.name,
+            f"the rotor has sunk by {format_quantity(fastest, 'length')} at {record.time[sunk]:.6g} s, "
+            f"{(record.time[sunk] - record.time[0]) * 1e3:.3g} ms after the record begins: {_NO_BEGINNING}",
+            "record with pre-trigger",
+            begins_late=True,
         )
     before = speed_time < instant
     speed = float(np.median(readings[before])) if before.any() else float(readings[0])
@@ -316,22 +322,27 @@ def gap_of(machine: Machine, plane: Plane) -> float:
     return float(nearest.air_gap)
 
 
-def _refuse_without_drop(record: Record, height: Array, start: Array, gaps: Array, deepest: float) -> None:
+def _refuse_without_drop(record: Record, path: Array, start: Array, gaps: Array, deepest: float) -> None:
+    height = path[:, :, 1]
     ranges = ", ".join(format_quantity(float(r), "length") for r in np.ptp(height, axis=0))
     sunk_now = start < -FALLEN_SHARE * gaps
-    if sunk_now.any() and deepest < FALLEN_SHARE:
-        raise RecordError(
-            f"{record.name}: no drop in the record, and it begins with the rotor at "
-            f"{format_quantity(float(np.min(start)), 'length')}: the levitated part before the drop is "
-            "missing; record "
-            "with pre-trigger"
+    thrown = np.ptp(path, axis=0).max() > _THROWN * float(np.min(gaps))
+    if thrown or (sunk_now.any() and deepest < FALLEN_SHARE):
+        raise NoDropError(
+            record.name,
+            f"no drop in the record, and it begins with the rotor at "
+            f"{format_quantity(float(np.min(start)), 'length')} and moving by up to "
+            f"{format_quantity(float(np.ptp(path, axis=0).max()), 'length')}: {_NO_BEGINNING}",
+            "record with pre-trigger",
+            begins_late=True,
         )
-    raise RecordError(
-        f"{record.name}: no drop in the record: the vertical displacement spans {ranges} in its planes and "
-        "sinks by "
+    raise NoDropError(
+        record.name,
+        f"no drop in the record: the vertical displacement spans {ranges} in its planes and sinks by "
         f"{deepest:.0%} of the nominal air gap at most, a dropped rotor by more than {FALLEN_SHARE:.0%} in "
-        "all planes; "
-        "check that this is the recording of a drop and that its polarity and unit are right"
+        "all planes",
+        "check that this is the recording of a drop and that its polarity and unit are right",
+        begins_late=False,
     )
 
 

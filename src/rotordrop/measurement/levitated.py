@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotordrop.errors import RecordError
+from rotordrop.errors import NoDropError
 from rotordrop.measurement.recording import Array
 
 if TYPE_CHECKING:
@@ -129,7 +129,7 @@ def fit_levitated(record: Record, end: float, *, speed: float, start: float | No
 
     Raises
     ------
-    RecordError
+    NoDropError
         When fewer than two revolutions, or hardly any samples, lie before the drop.
     """
     start = float(record.time[0]) if start is None else start
@@ -138,11 +138,12 @@ def fit_levitated(record: Record, end: float, *, speed: float, start: float | No
     span = float(time[-1] - time[0]) if len(time) > 1 else 0.0
     nominal = abs(speed) / (2 * np.pi)
     if span * nominal < _FEWEST_TURNS or len(time) < _FEWEST_SAMPLES:
-        raise RecordError(
-            f"{record.name}: {max(span, 0.0) * 1e3:.3g} ms of levitated rotor before {end:.6g} s are "
-            f"{max(span * nominal, 0.0):.2g} revolutions; at least {_FEWEST_TURNS:g} are needed: record with "
-            "more "
-            "pre-trigger"
+        raise NoDropError(
+            record.name,
+            f"{max(span, 0.0) * 1e3:.3g} ms of levitated rotor before {end:.6g} s are "
+            f"{max(span * nominal, 0.0):.2g} revolutions",
+            f"at least {_FEWEST_TURNS:g} are needed: record with more pre-trigger",
+            begins_late=True,
         )
     hum = _choose_hum(time, signals, nominal, span)
     frequency = _refined(time, signals, nominal, hum, span)

@@ -1,4 +1,4 @@
-"""The synchronous motion before a drop against the mark of the shaft: amplitude and phase of 1X."""
+"""What the mark of the shaft says: amplitude and phase of 1X before a drop, and the rotor angle at one."""
 
 from __future__ import annotations
 
@@ -15,6 +15,15 @@ FEWEST_TURNS = 4
 
 CONFIDENCE = 0.95
 """Quantile of Student's t of a two-sided 90 % interval [1]."""
+
+FEWEST_MARKS, FEWEST_FOR_SLOWING = 3, 8
+"""Passages of the mark from which an angle, and from which an even slowing too, is fitted [1]."""
+
+MISSED_MARKS = 3.0
+"""Turns after the last passage beyond which the angle is no longer told [1]."""
+
+MARK_SPAN = 0.5
+"""Passages up to this long before an instant say where the shaft stands at it [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,3 +111,45 @@ def _turn(time: Array, position: Array, begin: float, end: float) -> complex:
     design = np.column_stack([np.exp(1j * angle), np.exp(-1j * angle), np.ones(len(angle))])
     path = position[inside, 0] + 1j * position[inside, 1]
     return complex(np.linalg.lstsq(design, path, rcond=None)[0][0])
+
+
+@dataclass(frozen=True, kw_only=True)
+class MarkAngle:
+    """How far the shaft has turned since its mark passed, and the standard error of that [rad]."""
+
+    angle: float
+    error: float
+
+
+def angle_since_mark(marks: Array, when: float, *, span: float = MARK_SPAN) -> MarkAngle | None:
+    """How far the shaft has turned at an instant since the mark passed last, from the passages before.
+
+    Friction changes the speed within a fraction of a turn after the first contact, so passages after the
+    instant are not asked; before it a levitated rotor turns evenly, or slows evenly where that shows.
+
+    Parameters
+    ----------
+    marks : array, shape (M,)
+        When the mark passed [s].
+    when : float
+        The instant, shortly after the last passage that counts [s].
+    span : float
+        Passages up to this long before the instant are used [s].
+
+    Returns
+    -------
+    MarkAngle or None
+        None where fewer than three passages lie before, or the last one far before the instant.
+    """
+    used = marks[(marks <= when) & (marks >= when - span)]
+    if len(used) < FEWEST_MARKS or when - used[-1] > MISSED_MARKS * float(np.median(np.diff(used))):
+        return None
+    turns = np.cumsum(np.append(0.0, np.round(np.diff(used) / float(np.median(np.diff(used))))))
+    degree = 2 if len(used) > FEWEST_FOR_SLOWING else 1
+    since = (used - when) / span
+    design = np.vander(since, degree + 1, increasing=True)
+    fitted, *_ = np.linalg.lstsq(design, 2.0 * np.pi * turns, rcond=None)
+    rest = 2.0 * np.pi * turns - design @ fitted
+    scatter = float(np.sqrt(np.sum(rest**2) / max(len(used) - degree - 1, 1)))
+    error = scatter * math.sqrt(float(np.linalg.pinv(design.T @ design)[0, 0]))
+    return MarkAngle(angle=math.remainder(float(fitted[0]), 2.0 * math.pi), error=error)

@@ -186,6 +186,8 @@ def _parameters(estimate: Estimate) -> Section:
         tables.append(parameter_table(rows["drop"], caption="Unknowns of this drop"))
     if estimate.sensors:
         tables.append(_sensors(estimate))
+    if estimate.unbalance:
+        tables.append(_unbalance(estimate))
     steps = estimate.replay
     if steps is not None and steps.correlations:
         tables.append(correlation_table(steps.correlations))
@@ -226,6 +228,24 @@ def _sensors(estimate: Estimate) -> Table:
         ),
         caption="Sensors",
         note="Gains and offsets are estimated with the motion; the settled tail ties them to the air gap.",
+    )
+
+
+def _unbalance(estimate: Estimate) -> Table:
+    certain = estimate.consistent
+    return Table(
+        columns=("node", "amount", "phase against the mark", "verdict"),
+        rows=tuple(
+            (
+                str(one.node),
+                Quantity.of(one.amount, "unbalance", range_only=not certain),
+                one.reason if one.phase is None else Quantity.of(one.phase, "angle"),
+                one.amount.status if one.phase is None else one.phase.status,
+            )
+            for one in estimate.unbalance
+        ),
+        caption="Unbalance",
+        note="Phase: direction of the heavy spot when the mark of the shaft passes, from +y with the spin.",
     )
 
 

@@ -23,6 +23,7 @@ DISPLAY: dict[str, tuple[float, str]] = {
     "impulse": (1.0, "N s"),
     "energy": (1.0, "J"),
     "inertia": (1e-6, "kg mm²"),
+    "unbalance": (1e-6, "g mm"),
     "contact_stiffness": (1e9, "GN/mⁿ"),
     "short_time": (1e-6, "µs"),
     "voltage_sensitivity": (1e3, "mV/µm"),

@@ -71,6 +71,48 @@ def test_the_interval_holds_the_true_radius_as_often_as_it_says(lp400):
     assert np.median(wide) < 3e-6, "intervals that say nothing would hold everything"
 
 
+def straight_ways(rng, gap, places, short):
+    """From place to place at the wall by straight ways, as a hand takes them; one push falls short of it."""
+    angle = 2.0 * np.pi * np.arange(places) / places + rng.uniform(0, 6)
+    corners = gap * np.column_stack([np.cos(angle), np.sin(angle)])
+    corners[0] *= 1.0 - short / gap
+    pieces = []
+    for one, other in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        s = np.linspace(0.0, 1.0, int(0.3 * RATE))[:, None]
+        pieces += [
+            np.repeat(one[None], int(0.4 * RATE), axis=0),
+            one + (other - one) * s**2 * (3.0 - 2.0 * s),
+        ]
+    path = np.vstack(pieces)
+    return path + rng.normal(0.0, 0.5e-6, path.shape)
+
+
+@pytest.mark.parametrize(("places", "short"), [(6, 0.0), (8, 0.0), (8, 30e-6), (10, 12e-6)])
+def test_straight_ways_between_the_places_are_not_the_wall(lp400, places, short):
+    rng = np.random.default_rng(places)
+    path = straight_ways(rng, 250e-6, places, short)
+    for found in measure_clearance(record_of_paths([path, path], lp400)):
+        assert found.interval_90[0] <= 250e-6 <= found.interval_90[1]
+        assert found.gap == pytest.approx(250e-6, abs=0.5e-6)
+
+
+def test_a_quarter_of_the_round_off_the_wall_shows_no_smaller_hole(lp400):
+    rng = np.random.default_rng(2)
+    angle = np.linspace(0.0, 2.5 * np.pi, int(12 * RATE))
+    aside = np.angle(np.exp(1j * (angle - 2.0)))
+    radius = 250e-6 - 60e-6 * np.exp(-0.5 * (aside / 0.6) ** 2) * (angle < 2.0 * np.pi)
+    path = np.column_stack([np.cos(angle), np.sin(angle)]) * radius[:, None]
+    path += rng.normal(0.0, 0.5e-6, path.shape)
+    for found in measure_clearance(record_of_paths([path, path], lp400)):
+        assert found.gap == pytest.approx(250e-6, abs=0.5e-6)
+
+
+def test_a_shaft_that_does_not_move_is_refused(lp400):
+    path = np.zeros((int(4 * RATE), 2)) + 1e-6
+    with pytest.raises(RecordError, match=r"did not move|dead"):
+        measure_clearance(record_of_paths([path, path], lp400))
+
+
 def test_wear_is_the_difference_with_its_interval(lp400):
     rng = np.random.default_rng(5)
     before = measure_clearance(record_of_paths([pushed(rng, 250e-6, 0.0)] * 2, lp400))

@@ -9,6 +9,7 @@ import pytest
 from rotordrop.errors import RecordError
 from rotordrop.estimated import Estimated
 from rotordrop.measurement import check_record, refuse_unusable
+from rotordrop.measurement.quality import sensing
 from rotordrop.measurement.quality.clock import check_clock
 from rotordrop.measurement.quality.motion import check_rotation_line, first_motion
 from rotordrop.synthesis import hidden_machine, synthesize_drop
@@ -135,6 +136,17 @@ class TestSingleChannels:
         assert [one.channel for one in found] == list(drop.channel_names)
         assert all("50 Hz with 6." in one.message or "50 Hz with 5." in one.message for one in found)
 
+    def test_hum_above_the_line_of_the_rotor_is_no_wrong_speed(self, drop, machine):
+        loud = replace(drop, signals=drop.signals + 25e-6 * np.cos(HZ * 50 * drop.time)[:, None])
+        stops = {one.kind for one in check_record(loud, machine) if one.severity == "stop"}
+        assert not stops & {"wrong speed", "wrong sampling rate", "wrong speed unit"}
+        assert len(findings(loud, machine, None, "hum")) == len(drop.channel_names)
+
+    def test_steps_of_a_coarse_converter_are_no_spikes(self, drop, machine, edited):
+        found = check_record(edited(drop, lambda signals: np.round(signals / 7e-6) * 7e-6), machine)
+        assert "coarse quantisation" in {one.kind for one in found}
+        assert "spikes" not in {one.kind for one in found}
+
     def test_noise(self, drop, tail, machine):
         rng = np.random.default_rng(2)
         noisy = drop.signals.copy()
@@ -183,6 +195,10 @@ class TestClock:
         assert [one.kind for one in found] == ["jittered clock"]
         assert "µs scatters by 11" in found[0].message
 
+    def test_a_clock_that_scatters_everywhere_drops_no_block(self, drop):
+        late = 0.4 * 5e-5 * np.random.default_rng(0).uniform(-1.0, 1.0, len(drop.time))
+        assert [one.kind for one in check_clock(replace(drop, time=drop.time + late))] == ["jittered clock"]
+
     def test_a_rate_that_contradicts_the_header(self, drop):
         found = check_clock(replace(drop, metadata={"fs [Hz]": "25000"}))
         assert [one.kind for one in found] == ["wrong sampling rate"]
@@ -230,6 +246,12 @@ class TestSpeed:
         assert found.kind == "wrong speed unit"
         assert "3600 Hz by the speed channel" in found.message
         assert "rpm taken for Hz" in found.message
+
+    def test_hertz_taken_for_rpm(self, drop, machine):
+        slow = replace(drop, speed=drop.speed / 60.0, speed_readings=drop.speed_readings / 60.0)
+        found = only(slow, machine)
+        assert found.kind == "wrong speed unit"
+        assert "at 1 Hz by the speed channel" in found.message and "Hz taken for rpm" in found.message
 
     def test_the_direction_of_rotation_is_no_fault(self, drop):
         for way in (-1.0, 1.0):
@@ -286,6 +308,25 @@ class TestUnits:
         found = only(scaled(edited, drop, 2.0, 2), machine, tail, severity="warning")
         assert (found.kind, found.channel) == ("wrong gain", "S_DE_A")
         assert "S_DE_A reading about 1.6 × what it should" in found.message
+
+    def test_a_gain_within_the_tolerance_of_sensors_is_not_named(self, drop, machine, monkeypatch):
+        """A score test of small noise sees a gain of a few per cent, which any sensor may have."""
+        for size, named in ((0.03, 0), (-0.04, 0), (0.3, 1)):
+
+            def gained(fault, *_, size=size):
+                return (1e4, size) if fault.kind == "wrong gain" and len(fault.channels) == 1 else (0.0, 0.0)
+
+            monkeypatch.setattr(sensing, "_gain", gained)
+            assert len(findings(drop, machine, kind="wrong gain")) == named
+
+    def test_a_tail_without_its_level_is_coupled_and_not_in_another_unit(self, drop, tail, machine, edited):
+        level = np.mean(drop.signals[drop.time < -0.02], axis=0)
+        found = check_record(
+            drop, machine, edited(tail, lambda signals: signals - np.mean(signals, axis=0) + level)
+        )
+        assert [(one.kind, one.severity) for one in found] == [("AC coupling", "stop")]
+        small = edited(tail, lambda signals: 0.02 * (signals - level) + level)
+        assert {one.kind for one in check_record(drop, machine, small)} == {"wrong unit factor"}
 
     def test_a_tail_in_another_unit(self, drop, tail, machine, edited):
         found = check_record(drop, machine, scaled(edited, tail, 2.0))
@@ -412,6 +453,11 @@ class TestLength:
         found = only(drop.window(start, 0.3), machine)
         assert found.kind == "missing pre-trigger"
         assert "pre-trigger" in found.remedy
+
+    def test_a_rotor_that_is_thrown_about_from_the_beginning_was_dropped_before(self, whole_drop, machine):
+        late = whole_drop.window(0.035, 0.6)
+        found = only(late, machine)
+        assert found.kind == "missing pre-trigger", found.message
 
     def test_a_short_record(self, drop, tail, machine):
         found = only(drop.window(-0.25, 0.1), machine, tail, severity="warning")

@@ -14,7 +14,7 @@ from rotordrop.measurement.examples import example_record_path
 from rotordrop.measurement.profile import Profile, SpeedSource
 from rotordrop.measurement.record import read_record, record_of, save_record
 from rotordrop.measurement.recording import Channel, Recording
-from rotordrop.measurement.synchronous import synchronous_motion
+from rotordrop.measurement.synchronous import angle_since_mark, synchronous_motion
 
 RATE = 20_000.0
 RADIUS, PHASE = 3.2e-6, 2.0
@@ -121,3 +121,44 @@ def test_a_speed_in_volts_is_told_how_to_be_read_as_pulses():
     tacho = Channel(name="Tacho", label="Tacho", unit="V", values=0.0 * time, time=time)
     with pytest.raises(RecordError, match='pulses = "Tacho"'):
         record_of(Recording(channels=(*channels, tacho)), example_machine("lp400").sensors)
+
+
+class TestAngleSinceMark:
+    @pytest.mark.parametrize("slowing", [0.0, 0.004])
+    def test_it_is_that_of_the_shaft(self, slowing):
+        # marks of a shaft that slows evenly, each read 5 us off at random
+        rng = np.random.default_rng(3)
+        turns = np.arange(40.0)
+        passed = turns / 60.0 * (1.0 + slowing * turns / 60.0) + rng.normal(0.0, 5e-6, 40)
+        when = 39.4 / 60.0 * (1.0 + slowing * 39.4 / 60.0)
+        found = angle_since_mark(passed, when)
+        assert found is not None
+        assert found.angle == pytest.approx(0.4 * 2.0 * np.pi, abs=4.0 * max(found.error, 1e-4))
+        assert found.error < 0.01
+
+    def test_its_error_is_that_of_the_passages(self):
+        rng = np.random.default_rng(7)
+        wrong, errors = [], []
+        for _ in range(200):
+            passed = np.arange(12.0) / 60.0 + rng.normal(0.0, 5e-5, 12)
+            found = angle_since_mark(passed, 11.5 / 60.0)
+            assert found is not None
+            wrong.append(np.remainder(found.angle - np.pi + 0.5, 2.0 * np.pi) - 0.5)
+            errors.append(found.error)
+        assert np.std(wrong) == pytest.approx(np.median(errors), rel=0.25)
+
+    def test_a_missing_pulse_is_no_missing_turn(self):
+        passed = np.delete(np.arange(20.0) / 50.0, [4, 5, 11])
+        found = angle_since_mark(passed, 19.25 / 50.0)
+        assert found is not None
+        assert found.angle == pytest.approx(0.5 * np.pi, abs=1e-9)
+
+    def test_nothing_is_told_far_from_the_last_passage_or_of_two(self):
+        passed = np.arange(20.0) / 50.0
+        assert angle_since_mark(passed, 19.0 / 50.0 + 0.1) is None
+        assert angle_since_mark(passed[:2], 0.03) is None
+
+    def test_what_comes_after_is_not_asked(self):
+        passed = np.arange(20.0) / 50.0
+        slowed = np.concatenate([passed, passed[-1] + np.array([0.05, 0.12])])
+        assert angle_since_mark(slowed, passed[-1] + 0.01) == angle_since_mark(passed, passed[-1] + 0.01)

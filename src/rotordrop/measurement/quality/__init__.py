@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotordrop.errors import RecordError
+from rotordrop.errors import NoDropError, RecordError
 from rotordrop.measurement.axes import sensor_planes
 from rotordrop.measurement.events import coarse_drop, with_whole_planes
 from rotordrop.measurement.levitated import LevitatedModel, fit_levitated
@@ -41,6 +41,9 @@ if TYPE_CHECKING:
 
 _MARGIN = 3e-3
 """Time kept clear before the first guess of the drop [s]."""
+
+_NEAR = 0.5
+"""Time after the drop that the comparison with a free fall is given [s]."""
 
 _FALL_TIME = 8e-3
 """Longest plausible time from power-off to visible sinking [s]."""
@@ -99,9 +102,9 @@ def _check_motion(record: Record, machine: Machine, tail: Record | None) -> list
     before = float(record.time[sunk_at]) - _FALL_TIME
     levitated = _levitated(record, before)
     findings: list[Finding] = []
+    assert record.speed_readings is not None
+    findings += check_rotation_line(record, before, float(record.speed_readings[0]))
     if levitated is not None:
-        assert record.speed_readings is not None
-        findings += check_rotation_line(record, before, float(record.speed_readings[0]))
         level = levitated.mean
     if levitated is not None and not stops(findings):
         findings += check_planes(planes, fall_of(record, level, sunk_at), levitated.amplitudes[0])
@@ -110,17 +113,18 @@ def _check_motion(record: Record, machine: Machine, tail: Record | None) -> list
     try:
         coarse = coarse_drop(record, machine, planes)
         levitated = fit_levitated(record, coarse.instant - _MARGIN, speed=coarse.speed)
-    except RecordError as error:
-        return [no_drop(error, record)]
+    except NoDropError as error:
+        return [no_drop(error)]
     # a high-pass bends a rest into what looks like a rail; what a filter explains is none
-    findings += [*check_filters(record, coarse.instant), *check_again(record)] or check_rail(record)
+    findings += [*check_filters(record, coarse.instant), *check_again(record)] or check_rail(record, sunk_at)
     if stops(findings):
         return findings
     findings += check_levitated(levitated, record)
     findings += check_length(record, coarse.instant, tail is not None)
-    findings = _not_both(findings, check_ends(record, machine, planes, levitated, coarse))
+    near = record.window(-np.inf, coarse.instant + _NEAR)
+    findings = _not_both(findings, check_ends(near, machine, planes, levitated, coarse))
     if tail is not None and not stops(findings):
-        findings += check_tail(tail, machine, planes, levitated.mean)
+        findings += check_tail(tail, machine, planes, levitated)
     return findings
 
 

@@ -28,6 +28,8 @@ COARSE_STEP = 1e-6
 _STUCK_SAMPLES = 8
 _SPIKE = 12.0
 _SPIKE_LEAST = 5e-6
+_SPIKE_STEPS = 2.5
+"""A spike is higher than this many steps of the converter [1]."""
 
 
 def check_channels(record: Record) -> list[Finding]:
@@ -137,6 +139,8 @@ def _spikes(record: Record, channel: str, values: Array) -> Finding | None:
     limit = max(_SPIKE * usual, _SPIKE_LEAST)
     across = np.abs(values[2:] - values[:-2])
     spikes = np.flatnonzero((np.abs(middle) > limit) & (across < 0.5 * np.abs(middle)))
+    if len(spikes):  # the steps of a coarse converter are none
+        spikes = spikes[np.abs(middle[spikes]) > _SPIKE_STEPS * _step_of(values)]
     if not len(spikes):
         return _steps(record, channel, values)
     at = float(record.time[spikes[0] + 1])
@@ -156,6 +160,8 @@ def _steps(record: Record, channel: str, values: Array) -> Finding | None:
     step = np.abs(np.diff(values))
     limit = max(8.0 * float(np.percentile(step, 99.9)), _SPIKE_LEAST)
     steps = np.flatnonzero(step > limit)
+    if len(steps):
+        steps = steps[step[steps] > _SPIKE_STEPS * _step_of(values)]
     if not len(steps):
         return None
     at = float(record.time[steps[0] + 1])
@@ -170,15 +176,20 @@ def _steps(record: Record, channel: str, values: Array) -> Finding | None:
     )
 
 
-def _coarse(record: Record, channel: str, values: Array) -> Finding | None:
+def _step_of(values: Array) -> float:
+    """Usual distance between readings that differ [m]."""
     levels = np.unique(values)
-    step = float(np.median(np.diff(levels))) if len(levels) > 1 else 0.0
+    return float(np.median(np.diff(levels))) if len(levels) > 1 else 0.0
+
+
+def _coarse(record: Record, channel: str, values: Array) -> Finding | None:
+    step = _step_of(values)
     if step < COARSE_STEP:
         return None
+    count = len(np.unique(values))
     return Finding(
         kind="coarse quantisation",
-        message=f"readings come in steps of {format_quantity(step, 'length')} ({len(levels)} different "
-        "values)",
+        message=f"readings come in steps of {format_quantity(step, 'length')} ({count} different values)",
         remedy="use more bits or a smaller input range of the recorder",
         severity="warning",
         channel=channel,

@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 SLOWEST = 2000.0
 """Sampling rate a drop should have at least [Hz]."""
 
-_GAP = 1.5
+_GAP, _JITTERED_GAP = 1.5, 2.5
+"""Interval over the usual one from which a sample is missing [1]; the second where all intervals scatter."""
+
 _JITTER = 0.02
 _SHORTEST_COPY = 24
 _AROUND = 20
@@ -42,9 +44,9 @@ def check_clock(record: Record, *, drop: bool = True) -> list[Finding]:
     findings = _backward(record, steps)
     if findings:
         return findings
-    findings += _gaps(record, steps, usual)
     even = steps[steps < _GAP * usual]
     jitter = float(np.std(even)) / usual
+    findings += _gaps(record, steps, usual, _JITTERED_GAP if jitter > _JITTER else _GAP)
     if jitter > _JITTER:
         worst = int(np.argmax(np.abs(steps - usual)))
         findings.append(
@@ -89,8 +91,8 @@ def _backward(record: Record, steps: Array) -> list[Finding]:
     ]
 
 
-def _gaps(record: Record, steps: Array, usual: float) -> list[Finding]:
-    gaps = np.flatnonzero(steps > _GAP * usual)
+def _gaps(record: Record, steps: Array, usual: float, limit: float) -> list[Finding]:
+    gaps = np.flatnonzero(steps > limit * usual)
     if not len(gaps):
         return []
     at = int(gaps[0])
@@ -181,7 +183,9 @@ def _jumps(record: Record) -> list[Finding]:
     if len(signals) < 50:
         return []
     step = np.diff(signals, axis=0)
-    around = np.median(np.stack([step[:-4], step[1:-3], step[3:-1], step[4:]]), axis=0)
+    near = np.stack([step[:-4], step[1:-3], step[3:-1], step[4:]])
+    # the median of four, several times faster than by sorting
+    around = 0.5 * (np.sum(near, axis=0) - np.max(near, axis=0) - np.min(near, axis=0))
     kink = np.abs(step[2:-2] - around)
     usual = np.maximum(1.4826 * np.median(kink, axis=0), 1e-12)
     finest = np.array([np.min(np.diff(np.unique(column)), initial=np.inf) for column in signals.T])

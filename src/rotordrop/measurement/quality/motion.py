@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotordrop.errors import RecordError
+from rotordrop.errors import NoDropError
 from rotordrop.measurement.axes import Plane
-from rotordrop.measurement.events import FALLEN_SHARE, fall_accelerations, gap_of
-from rotordrop.measurement.levitated import LevitatedModel
+from rotordrop.measurement.events import fall_accelerations, gap_of
+from rotordrop.measurement.levitated import MAINS, OTHER_SUPPLIES, LevitatedModel
 from rotordrop.measurement.quality.finding import Finding
 from rotordrop.measurement.recording import Array
 from rotordrop.units import format_quantity
@@ -31,6 +31,9 @@ _FACTORS = {
     1e-3: "mm taken for µm, or µm for nm",
     1e-6: "m taken for µm, or the like",
 }
+_FEWEST_TURNS = 4.0
+"""Turns of a line before the drop from which it is a speed [1]."""
+
 _NO_HALF = 1e-3
 """Power at half the strongest line over that at it, below which the half is no line [1]."""
 
@@ -159,12 +162,18 @@ def check_rotation_line(record: Record, end: float, speed: float) -> list[Findin
         return []
     frequency, resolution, at_half = line
     expected = abs(speed) / (2 * np.pi)
-    ratio = frequency / expected
-    if abs(ratio - 1.0) * expected <= max(1.5 * resolution, 0.01 * expected):
+    near = max(1.5 * resolution, 0.01 * expected)
+    if abs(frequency - expected) <= near:
         return []
-    twice = abs(ratio - 2.0) * expected <= max(1.5 * resolution, 0.01 * expected)
-    if twice and at_half > _NO_HALF:
+    if abs(frequency - 2.0 * expected) <= near and at_half > _NO_HALF:
         return []  # the second harmonic of a rotor whose first is there too
+    mains = min((*MAINS, *OTHER_SUPPLIES), key=lambda supply: abs(frequency - supply))
+    if abs(frequency - mains) < resolution:
+        beside = _strongest_line(record, end, without=mains)
+        if beside is not None and min(abs(beside[0] - k * expected) for k in (1, 2)) <= near:
+            return []  # hum, which has its own name, above the line of the rotor
+    if frequency * (end - float(record.time[0])) < _FEWEST_TURNS:
+        return []
     return [_other_frequency(record, frequency, expected)]
 
 
@@ -210,10 +219,12 @@ def _fall_share(record: Record) -> float:
     return middle / GRAVITY
 
 
-def _strongest_line(record: Record, end: float) -> tuple[float, float, float] | None:
+def _strongest_line(
+    record: Record, end: float, without: float | None = None
+) -> tuple[float, float, float] | None:
     """Strongest line before `end` and the resolution [Hz], and the power at half of it over that at it.
 
-    None where none stands out.
+    None where none stands out; a line ``without`` [Hz] is taken off before.
     """
     keep = record.time < end
     count = int(keep.sum())
@@ -221,6 +232,10 @@ def _strongest_line(record: Record, end: float) -> tuple[float, float, float] | 
         return None
     window = np.hanning(count)[:, None]
     part = record.signals[keep] - np.mean(record.signals[keep], axis=0)
+    if without is not None:
+        turned = 2.0 * np.pi * without * record.time[keep]
+        waves = np.column_stack([np.cos(turned), np.sin(turned)])
+        part = part - waves @ np.linalg.lstsq(waves, part, rcond=None)[0]
     scale = np.maximum(np.std(part, axis=0), 1e-12)
     power = np.sum(np.abs(np.fft.rfft(window * part / scale, 8 * count, axis=0)) ** 2, axis=1)
     frequencies = np.fft.rfftfreq(8 * count, 1.0 / record.sampling_rate)
@@ -296,15 +311,12 @@ def check_length(record: Record, drop: float, has_tail: bool) -> list[Finding]:
     return findings
 
 
-def no_drop(error: RecordError, record: Record) -> Finding:
-    """Turn the message of the drop search into a finding."""
-    text = str(error).removeprefix(f"{record.name}: ").removeprefix("no drop in the record: ")
-    begins = "pre-trigger" in text
-    message, _, remedy = text.rpartition("; ")
+def no_drop(error: NoDropError) -> Finding:
+    """What the search for a drop did not find, as a finding."""
     return Finding(
-        kind="missing pre-trigger" if begins else "no drop in the record",
-        message=message,
-        remedy=remedy or f"a drop sinks by more than {FALLEN_SHARE:.0%} of the air gap",
+        kind="missing pre-trigger" if error.begins_late else "no drop in the record",
+        message=error.seen,
+        remedy=error.remedy,
         severity="stop",
     )
 

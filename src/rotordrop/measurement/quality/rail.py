@@ -75,7 +75,7 @@ def zeroed(record: Record, channel: str, values: Array) -> Finding | None:
     )
 
 
-def check_rail(record: Record) -> list[Finding]:
+def check_rail(record: Record, fallen: int | None = None) -> list[Finding]:
     """Find channels whose readings run into one and the same level again and again, with noise on them.
 
     A rotor that bounces turns back at a depth of its own each time, in an arc; one that rests does not run
@@ -85,7 +85,7 @@ def check_rail(record: Record) -> list[Finding]:
     rate = record.sampling_rate
     if not 0.0 < rate < np.inf or round(FLAT_S * rate) < FEWEST_SAMPLES:
         return []
-    fallen = first_motion(record)[0]
+    fallen = first_motion(record)[0] if fallen is None else fallen
     found = (
         _railed(name, record.time[fallen:], record.signals[fallen:, column], round(FLAT_S * rate))
         for column, name in enumerate(record.channel_names)

@@ -32,6 +32,9 @@ TURNED = "turned sensors"
 SUSPECT = 14.0
 """Chi square of one fault from which on it is named: one good fall in 500 has as much by chance [1]."""
 
+_WITHIN_TOLERANCE = 0.05
+"""Error of a gain that calibrated sensors may have [1]: that of the scale factor by API 670."""
+
 _MODEL_ERROR = 3e-4
 """What the model of the fall leaves out, over how far the rotor falls [1]."""
 
@@ -88,6 +91,8 @@ def read_otherwise(
     beyond = float(residual @ residual) - len(residual)
     trusted = _trust(levitated, fall)
     if trusted * gained < max(SUSPECT, _EXPLAINED * trusted * beyond):
+        return []
+    if best.kind == "wrong gain" and abs(size) < _WITHIN_TOLERANCE:
         return []
     near = [
         other.words(value)

@@ -9,11 +9,12 @@ import numpy as np
 from rotordrop.errors import RecordError
 from rotordrop.measurement.axes import Plane, along_sensors, planar_of
 from rotordrop.measurement.events import gap_of
-from rotordrop.measurement.levitated import MAINS
+from rotordrop.measurement.levitated import MAINS, LevitatedModel
 from rotordrop.measurement.quality.finding import Finding
 from rotordrop.measurement.quality.sensing import TURNED
 from rotordrop.measurement.recording import Array
 from rotordrop.measurement.settled import settled_tail
+from rotordrop.series import noise_by_differences
 from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
@@ -33,8 +34,13 @@ DEPTH = (0.6, 1.7)
 
 _VISIBLE_SWING = 4e-6
 
+_NO_DEPTH, _SAME_NOISE = 0.2, 0.2
+"""A level that is not recorded: distance over the air gap, and noise over that of the record [1]."""
 
-def check_tail(tail: Record, machine: Machine, planes: tuple[Plane, ...], level: Array) -> list[Finding]:
+
+def check_tail(
+    tail: Record, machine: Machine, planes: tuple[Plane, ...], levitated: LevitatedModel
+) -> list[Finding]:
     """Check where the rotor came to rest and in which direction it swings.
 
     Parameters
@@ -45,8 +51,8 @@ def check_tail(tail: Record, machine: Machine, planes: tuple[Plane, ...], level:
         The machine.
     planes : tuple of Plane
         Sensor planes.
-    level : array, shape (S,)
-        Mean levitated readings [m].
+    levitated : LevitatedModel
+        The readings before the drop.
     """
     try:
         settled = settled_tail(tail, machine)
@@ -62,12 +68,33 @@ def check_tail(tail: Record, machine: Machine, planes: tuple[Plane, ...], level:
             )
         ]
     rest = tail.window(settled.start, settled.end)
+    level = levitated.mean
     path = planar_of(along_sensors(rest.signals, rest.sensors) - along_sensors(level, rest.sensors), planes)
+    if _without_level(rest, path, [gap_of(machine, plane) for plane in planes], levitated.noise):
+        return [
+            Finding(
+                kind="AC coupling",
+                message="tail: the rotor rests where it levitated in all planes, with the noise that the "
+                "record has too: the level is not recorded",
+                remedy="record with DC coupling; a high-pass takes away where the rotor lies",
+                severity="stop",
+            )
+        ]
     findings = []
     for number, plane in enumerate(planes):
         findings += _place(path[:, number], plane, gap_of(machine, plane))
         findings += _swing(path[:, number], plane, tail.sampling_rate)
     return findings
+
+
+def _without_level(rest: Record, path: Array, gaps: list[float], noise: Array) -> bool:
+    """Whether a tail shows no rest although its readings are no smaller than those of the record.
+
+    A unit that is wrong makes the noise as small as the distance, a high-pass takes the distance alone.
+    """
+    still = np.hypot(*np.mean(path, axis=0).T) < _NO_DEPTH * np.array(gaps)
+    own = np.array([noise_by_differences(column, 3) for column in rest.signals.T])
+    return bool(np.all(still)) and float(np.nanmedian(own / noise)) > _SAME_NOISE
 
 
 def _place(path: Array, plane: Plane, gap: float) -> list[Finding]:
