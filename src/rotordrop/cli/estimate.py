@@ -6,10 +6,10 @@ Prints the verdict; writes the numbers as JSON and an offline report on request.
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -59,6 +59,10 @@ def estimate(
         Path | None,
         typer.Option("--report", metavar="FILE", help="Write the report, one offline HTML file per drop."),
     ] = None,
+    since: Annotated[
+        Path | None,
+        typer.Option("--since", metavar="FILE", help="Earlier estimate (.json), for what changed."),
+    ] = None,
     operator: Annotated[str, typer.Option("--operator", metavar="NAME", help="Who, for the report.")] = "",
     output: Annotated[
         Path | None,
@@ -73,16 +77,18 @@ def estimate(
     json: JsonOption = None,
 ) -> None:
     """Estimate touchdown-bearing force and stress from recorded drops."""
+    from rotordrop.cli.compare import read_estimate
     from rotordrop.estimation import Replay, Tracked, estimate_drops
     from rotordrop.estimation.histories import require_format
     from rotordrop.machine import load_machine
     from rotordrop.measurement.record import read_record
+    from rotordrop.report.origin import origin_here
 
     if fixed is not None and method is not Method.replay:
         raise UsageError(
             "--fixed belongs to --method replay; the tracked twin uses a calibrated machine file instead."
         )
-    description = load_machine(machine)
+    description, earlier = load_machine(machine), None if since is None else read_estimate(since)
     require_own_names(records)
     require_own_content(records)
     if quick and method is Method.tracked:
@@ -106,8 +112,9 @@ def estimate(
         ("machine file", machine),
         *(("record", path) for path in records),
         *(("tail", path) for path in tail or []),
+        *(() if since is None else (("earlier estimate", since),)),
     ]
-    _write(estimates, reports, [*outputs, *folders], json, _origin(used, operator))
+    _write(estimates, reports, [*outputs, *folders], json, origin_here(sys.argv[1:], used, operator), earlier)
 
 
 def _places(named: Path | None, records: Sequence[Path]) -> list[Path]:
@@ -130,28 +137,20 @@ def _require_calibrated(description: Machine, file: Path) -> None:
         )
 
 
-def _origin(used: Sequence[tuple[str, Path]], operator: str) -> Origin:
-    from rotordrop.report.origin import Origin, UsedFile, command_line, now
-    from rotordrop.simulation.fingerprint import fingerprint
-
-    return Origin(
-        command=command_line(sys.argv[1:]),
-        files=tuple(UsedFile.of(role, path) for role, path in used),
-        operator=operator,
-        made=now(),
-        fingerprint=fingerprint(),
-    )
-
-
 def _write(
-    estimates: Sequence[Estimate], reports: list[Path], others: list[Path], json: Path | None, origin: Origin
+    estimates: Sequence[Estimate],
+    reports: list[Path],
+    others: list[Path],
+    json: Path | None,
+    origin: Origin,
+    since: Mapping[str, Any] | None,
 ) -> None:
     from rotordrop.estimation.document import combined, estimate_document
     from rotordrop.report.estimate_page import estimate_page
     from rotordrop.report.page import write_page
     from rotordrop.report.terminal import print_summary
 
-    pages = [estimate_page(estimate, origin) for estimate in estimates]
+    pages = [estimate_page(estimate, origin, since) for estimate in estimates]
     for page, place in zip(pages, reports, strict=False):
         write_page(page, place)
 

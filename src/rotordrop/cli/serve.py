@@ -25,6 +25,10 @@ def serve(
     port: Annotated[
         int, typer.Option("--port", min=0, max=65535, help="Where to listen; 0 takes a free port.")
     ] = USUAL_PORT,
+    log: Annotated[
+        str | None,
+        typer.Option("--log", metavar="LOG", help="Log of drops that the page compares with."),
+    ] = None,
     open_page: Annotated[bool, typer.Option("--open", help="Open the page in the browser.")] = False,
 ) -> None:
     """Serve a local page: look at drops, estimate, read reports."""
@@ -39,7 +43,7 @@ def serve(
         if open_page:
             typer.launch(address)
 
-    serve_page(place, port, announce)
+    serve_page(place, port, announce, log)
 
 
 def data_folder() -> Path:

@@ -5,6 +5,7 @@ Waterfalls as in the paper, orders without smear, lines with names, resonances, 
 
 from __future__ import annotations
 
+import sys
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -83,6 +84,7 @@ def waterfall(
     """Find and name the frequencies of a coast-down, and say whether 0.2 s held the maximum."""
     from rotordrop.estimation.recorded_coast_down import with_found_air_gaps
     from rotordrop.machine import load_machine
+    from rotordrop.report.origin import origin_here
     from rotordrop.report.page import write_page
     from rotordrop.report.terminal import print_summary
     from rotordrop.report.waterfall_page import waterfall_page
@@ -114,6 +116,7 @@ def waterfall(
             ("machine", f"{described.name} ({machine.name})"),
             ("record", record.name),
             ("centre of the bearings", signal.centre),
+            *origin_here(sys.argv[1:], [("machine file", machine), ("record", record)]).facts(),
         ),
         simulated=simulated,
         against=against.value,

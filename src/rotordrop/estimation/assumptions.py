@@ -102,6 +102,6 @@ def _air(problem: DropProblem) -> Iterator[str]:
     unknown = next(u for u in problem.unknowns if u.path == "speed.aero_time_constant")
     low, value, high = (math.exp(unknown.mean + k * NINETY * unknown.sigma) for k in (-1.0, 0.0, 1.0))
     yield (
-        "the machine file has no speed.aero_time_constant: the drag of the air begins at a time constant of "
+        "the machine file gives no time constant of the drag of the air: it begins at "
         f"{value:.3g} s (90 %: {low:.2g} to {high:.2g} s)"
     )

@@ -69,7 +69,7 @@ class SimpleMachine:
     grade : str
         Balance grade, such as "G 2.5".
     support : str
-        "stiff", "soft" or a stiffness such as "1e8 N/m".
+        Support of the touchdown bearings: "stiff", "soft" or a stiffness such as "1e8 N/m".
     preload : str, optional
         Preload of the bearings, where their designation leaves it open.
     name : str

@@ -11,6 +11,7 @@ from rotordrop._version import __version__
 from rotordrop.machine import Machine
 from rotordrop.machine.parameter_paths import kind_of_path
 from rotordrop.report.content import Cell, Figure, ReportContent, Section, Statement, Table
+from rotordrop.report.origin import study_facts
 from rotordrop.report.quantity import display_unit
 from rotordrop.report.style import SERIES, axis_title, fit_legend, panels, plain
 from rotordrop.simulation.fingerprint import fingerprint
@@ -28,12 +29,7 @@ def design_page(plan: DesignPlan, result: DesignResult) -> ReportContent:
         subtitle=f"{study.machine.name}, {len(result.candidates)} candidates, {study.repeats} drops each",
         verdict=_verdict(plan, result),
         summary=(_table(plan, result),),
-        facts=(
-            ("machine", study.machine.name),
-            ("seed", str(study.seed)),
-            ("digest", study.digest),
-            ("rotordrop", __version__),
-        ),
+        facts=study_facts(study),
         sections=(
             Section(
                 heading="Front",

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rotordrop.estimated import IdentifiedValue
-from rotordrop.estimation.bearing_drop import BearingDrop, Origin
+from rotordrop.estimation.bearing_drop import BearingDrop
 from rotordrop.model.parameter import Role
 from rotordrop.model.parameter_table import LOADS, published
 from rotordrop.report.content import Card, Cell, KeyFigure, Table
@@ -47,9 +47,8 @@ def headline_card(bearing: BearingDrop, *, certain: bool = True) -> Card:
             words.insert(0, f"at {Quantity(value=times[field], kind='time', digits=3).text}")
         note = "; ".join(word for word in words if word)
         figures.append(KeyFigure(label=label if certain else f"{label}, range", value=value, note=note))
-    origin = bearing.peak_force.origin
-    source = f", by the {origin.value}" if origin is Origin.CROSS_CHECK else ""
-    return Card(title=f"{bearing.name} touchdown bearing{source}", figures=tuple(figures))
+    source = f"by the {bearing.peak_force.origin.value}"
+    return Card(title=f"{bearing.name} touchdown bearing, {source}", figures=tuple(figures))
 
 
 def identified_table(bearings: Sequence[BearingDrop], *, taken_over: str = "", certain: bool = True) -> Table:

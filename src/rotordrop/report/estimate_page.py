@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from rotordrop.estimation.bearing_drop import History
 from rotordrop.estimation.estimate import CrossCheck, Estimate, FittedParameter, Innovations, ReplaySteps
 from rotordrop.estimation.methods import Replay
 from rotordrop.measurement.event_date import event_date
+from rotordrop.report.changed_section import changed_section
 from rotordrop.report.content import (
     SIMULATED_RECORD,
     Figure,
@@ -45,7 +47,9 @@ PRIOR_NOTE = (
 )
 
 
-def estimate_page(estimate: Estimate, origin: Origin | None = None) -> ReportContent:
+def estimate_page(
+    estimate: Estimate, origin: Origin | None = None, since: Mapping[str, Any] | None = None
+) -> ReportContent:
     """Build the report on one recorded drop, followed or replayed.
 
     Parameters
@@ -54,6 +58,8 @@ def estimate_page(estimate: Estimate, origin: Origin | None = None) -> ReportCon
         Everything the page says of the drop comes from it.
     origin : Origin, optional
         Who made it, when, by which command, from which files.
+    since : mapping, optional
+        Document of an earlier estimate of the machine, with which this one is compared.
     """
     speed = Quantity(value=estimate.speed, kind="speed", digits=4)
     replayed = isinstance(estimate.method, Replay)
@@ -66,7 +72,7 @@ def estimate_page(estimate: Estimate, origin: Origin | None = None) -> ReportCon
         cards=tuple(headline_card(b, certain=estimate.consistent) for b in estimate.bearings),
         summary=(identified_table(estimate.bearings, taken_over=fixed, certain=estimate.consistent),),
         facts=(*_facts(estimate), *(origin or Origin()).facts(estimate.record.sha256)),
-        sections=_sections(estimate),
+        sections=_sections(estimate, since),
     )
 
 
@@ -82,10 +88,10 @@ def _verdict(estimate: Estimate) -> tuple[Statement, ...]:
     return (
         _judgement(estimate),
         _part(estimate),
-        *(Statement(text=warning, level="warning") for warning in estimate.warnings),
+        *(Statement(text=_in_words(estimate, text), level="warning") for text in estimate.warnings),
         *cross_check_statements(estimate.cross_check),
         *serious,
-        *(Statement(text=note) for note in estimate.notes),
+        *(Statement(text=_in_words(estimate, note)) for note in estimate.notes),
         *(static_limit_statement(b, certain=estimate.consistent) for b in estimate.bearings),
     )
 
@@ -139,7 +145,7 @@ def _draws(steps: ReplaySteps) -> str:
     return "none" if steps.draws is None else f"{steps.draws} drops, {steps.rejected} rejected"
 
 
-def _sections(estimate: Estimate) -> tuple[Section, ...]:
+def _sections(estimate: Estimate, since: Mapping[str, Any] | None) -> tuple[Section, ...]:
     names = [bearing.name for bearing in estimate.bearings]
     steps = estimate.replay
     tables = () if steps is None else (first_contact_table(names, steps.contacts),)
@@ -153,6 +159,7 @@ def _sections(estimate: Estimate) -> tuple[Section, ...]:
             contact_tables=tables,
         ),
         severity_section(estimate),
+        changed_section(estimate, since),
         *_agreement(estimate, names),
         _parameters(estimate),
         *_friction(steps),
@@ -213,6 +220,13 @@ def spoken(one: FittedParameter) -> str:
     return f"{one.owner}: {one.row.label}" if one.owner else one.row.label
 
 
+def _in_words(estimate: Estimate, text: str) -> str:
+    """A sentence with its unknowns named as the tables name them."""
+    for one in sorted(estimate.parameters, key=lambda one: -len(one.path)):
+        text = text.replace(one.path, spoken(one))
+    return text
+
+
 def _sensors(estimate: Estimate) -> Table:
     certain = estimate.consistent
     return Table(
@@ -256,7 +270,10 @@ def _consistency(estimate: Estimate) -> tuple[Section, ...]:
     figures = () if estimate.innovations is None else _innovations(estimate.innovations)
     table = Table(
         columns=("check", "passed", "numbers compared"),
-        rows=tuple((check.name, "yes" if check.passed else "no", check.message) for check in estimate.checks),
+        rows=tuple(
+            (check.name, "yes" if check.passed else "no", _in_words(estimate, check.message))
+            for check in estimate.checks
+        ),
         caption="Consistency of model and record",
         note="The checks see what moves the readings; a contact stiffness or exponent that hardly does "
         "enters by its prior, and its verdict says so.",

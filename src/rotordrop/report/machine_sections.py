@@ -52,7 +52,7 @@ def defaults_section(machine: Machine) -> tuple[Section, ...]:
     tables = tuple(
         Table(
             columns=("value of the machine", "used", "why"),
-            rows=tuple(found),
+            rows=tuple((spoken_key(key), *told) for key, *told in found),
             caption=caption,
         )
         for caption, found in (("Defaults in use", machine.defaults_in_use), ("Inferred", machine.inferred))
@@ -60,6 +60,19 @@ def defaults_section(machine: Machine) -> tuple[Section, ...]:
     )
     text = "These values were not in the machine file. Give them there if they are known."
     return (Section(heading="Values that were not given", text=(text,), tables=tables),) if tables else ()
+
+
+def spoken_key(key: str) -> str:
+    """A key of the machine file in words; entries of a list count from one."""
+    words: list[str] = []
+    for part in key.replace("_", " ").split("."):
+        if part == "*" and words:
+            words[-1] = f"every one of {words[-1]}"
+        elif part.isdigit() and words:
+            words[-1] = f"{words[-1]} {int(part) + 1}"
+        else:
+            words.append(part)
+    return ", ".join(words)
 
 
 def weight_shares(machine: Machine | None) -> dict[str, float]:

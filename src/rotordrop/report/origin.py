@@ -7,8 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from rotordrop._version import __version__
 from rotordrop.measurement.record import sha256_of
+
+if TYPE_CHECKING:
+    from rotordrop.study.plan import Study
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,6 +64,39 @@ class Origin:
         ]
         told.append(("arithmetic", f"fingerprint {self.fingerprint[:16]}" if self.fingerprint else ""))
         return tuple((name, text) for name, text in told if text)
+
+
+def origin_here(arguments: Sequence[str], files: Sequence[tuple[str, Path]], operator: str = "") -> Origin:
+    """What a report says of a result that a command makes here and now.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        Of the command.
+    files : sequence of (str, Path)
+        What was read: what for, and where it lies.
+    operator : str
+        Who made it.
+    """
+    from rotordrop.simulation.fingerprint import fingerprint
+
+    return Origin(
+        command=command_line(arguments),
+        files=tuple(UsedFile.of(role, path) for role, path in files),
+        operator=operator,
+        made=now(),
+        fingerprint=fingerprint(),
+    )
+
+
+def study_facts(study: Study) -> tuple[tuple[str, str], ...]:
+    """Lines for a report on simulated drops: what makes the same ones again."""
+    return (
+        ("machine", study.machine.name),
+        ("seed", str(study.seed)),
+        ("digest", study.digest),
+        ("rotordrop", __version__),
+    )
 
 
 def now() -> str:

@@ -11,6 +11,7 @@ import plotly.graph_objects as go
 
 from rotordrop._version import __version__
 from rotordrop.report.content import Cell, Figure, ReportContent, Section, Statement, Table
+from rotordrop.report.origin import study_facts
 from rotordrop.report.quantity import display_unit
 from rotordrop.report.style import SERIES, axis_title, fit_legend, panels
 from rotordrop.simulation.fingerprint import fingerprint
@@ -30,12 +31,7 @@ def repeat_page(results: StudyResults, found: Sequence[Repeat]) -> ReportContent
         subtitle=f"{study.machine.name}, {1e3 * study.duration:g} ms each",
         verdict=_verdict(results, found),
         summary=(_table(results, found),),
-        facts=(
-            ("machine", study.machine.name),
-            ("seed", str(study.seed)),
-            ("digest", study.digest),
-            ("rotordrop", __version__),
-        ),
+        facts=study_facts(study),
         sections=(
             Section(
                 heading="Distribution",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,6 +28,7 @@ SHORT_SPEED = (
     "speed law."
 )
 AS_READ = f" The simulated motion was given the noise of a usual sensor, {1e6 * SENSOR_NOISE:g} µm rms."
+LINES = "Lines"
 NO_BREAK = "\u00a0"
 _COMPONENTS = {
     "x": "horizontal",
@@ -67,8 +69,11 @@ def waterfall_page(
         verdict=_verdict(analysis),
         cards=tuple(_card(name, plane) for name, plane in analysis.planes.items()),
         facts=(*facts, ("rotordrop", __version__)),
-        summary=(line_table(analysis),),  # for the terminal; on the page it stands with the lines
-        sections=frequency_sections(analysis, against, highest),
+        summary=(line_table(analysis),),
+        sections=tuple(
+            replace(section, tables=()) if section.heading == LINES else section  # it stands in the summary
+            for section in frequency_sections(analysis, against, highest)
+        ),
     )
 
 
@@ -223,7 +228,7 @@ def _waterfall_section(analysis: CoastDownAnalysis, against: str, highest: float
 
 def _line_section(analysis: CoastDownAnalysis) -> Section:
     reasons = tuple(f"{line.label}: {line.reason}." for line in analysis.lines)
-    return Section(heading="Lines", text=reasons, tables=(line_table(analysis),))
+    return Section(heading=LINES, text=reasons, tables=(line_table(analysis),))
 
 
 def _order_section(analysis: CoastDownAnalysis) -> Section:

@@ -6,6 +6,7 @@ nobody, so that neither page nor server has to be there when it ends.
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 import time
@@ -18,16 +19,22 @@ from typing import TYPE_CHECKING, Any
 
 from rotordrop.atomic_file import write_json
 from rotordrop.errors import MachineFileError, RotordropError, UsageError
-from rotordrop.web.running import Verb, clear, publish, state_file, state_of
-from rotordrop.web.workspace import Job, is_path
+from rotordrop.web.running import Verb, clear, publish, result_folder, state_file, state_of
+from rotordrop.web.workspace import Job, Workspace, is_path
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
+    from rotordrop.measurement.profile import Profile
     from rotordrop.measurement.record import Record
 
-MEMORY: dict[str, int] = {"look": 2 * 2**30, "estimate": 8 * 2**30, "waterfall": 8 * 2**30}
+MEMORY: dict[str, int] = {
+    "channels": 2 * 2**30,
+    "look": 2 * 2**30,
+    "estimate": 8 * 2**30,
+    "waterfall": 8 * 2**30,
+}
 MEMORY_PER_BYTE = 40
-CPU_S: dict[str, int] = {"look": 300, "estimate": 4 * 3600, "waterfall": 4 * 3600}
+CPU_S: dict[str, int] = {"channels": 300, "look": 300, "estimate": 4 * 3600, "waterfall": 4 * 3600}
 BETWEEN_WORDS_S = 0.3
 
 
@@ -36,12 +43,13 @@ def main(order: dict[str, Any]) -> None:
     job, verb = Job(Path(order["job"])), order["verb"]
     told = state_of(job, verb)
     assert told is not None
+    of = job.digests()
     try:
         _limit(job, verb)
         made = job.path / f"{verb}.part-{told['run']}"
         made.mkdir()
         _WORK[verb](job, made, told)
-        publish(job, verb, told["run"], made)
+        publish(job, verb, told["run"], made, of)
         ended = {"state": "done", "fraction": 1.0, "stage": ""}
     except RotordropError as error:
         ended = {"state": "failed", "error": _without_folder(str(error), job)}
@@ -110,17 +118,71 @@ def machine_of(job: Job) -> Machine | None:
     return machine
 
 
-def record_of(job: Job, machine: Machine, role: str) -> Record | None:
+def profile_of(job: Job, options: dict[str, Any]) -> Profile:
+    """Reading rules of a job: of the profile that was sent, and the speed where it was given by hand."""
+    from rotordrop.measurement.profile import Profile, SpeedSource, load_profile
+    from rotordrop.units import parse_quantity
+
+    file = job.file("profile")
+    rules = Profile() if file is None else load_profile(file)
+    if options.get("speed"):
+        turning = parse_quantity(options["speed"], "speed")
+        rules = rules.model_copy(update={"speed": SpeedSource(constant=f"{turning!r} rad/s")})
+    return rules
+
+
+def record_of(job: Job, machine: Machine, role: str, options: dict[str, Any]) -> Record | None:
     """Read the record or the tail of a job; None where none was sent."""
     from rotordrop.measurement.record import read_record
 
     file = job.file(role)
-    return None if file is None else named(read_record(file, machine), job, role)
+    if file is None:
+        return None
+    return named(read_record(file, machine, profile=profile_of(job, options)), job, role)
 
 
 def named(record: Record, job: Job, role: str) -> Record:
     """A record under the name that its file has for the user."""
     return replace(record, path=Path(job.read()["files"][role]["name"]))
+
+
+def _record_file(job: Job) -> Path:
+    file = job.file("record")
+    if file is None:
+        raise UsageError("no record was sent; drop one on the page")
+    return file
+
+
+def _channels(job: Job, made: Path, told: dict[str, Any]) -> None:
+    """What a recording holds, which sensors look for a channel, and what could be guessed."""
+    from rotordrop.measurement.profile_guess import guess_profile
+    from rotordrop.measurement.readers import read_recording
+
+    machine, given = machine_of(job), profile_of(job, told["options"])
+    recording = read_recording(_record_file(job), given)
+    guess = guess_profile(recording, given, () if machine is None else machine.sensors)
+    found = [
+        {
+            "label": channel.label,
+            "unit": given.units.get(channel.label) or channel.unit or given.unit or "",
+            "low": float(channel.values.min()) if len(channel.values) else None,
+            "high": float(channel.values.max()) if len(channel.values) else None,
+        }
+        for channel in recording.channels
+    ]
+    sensors = [
+        {"name": sensor.name, "plane": sensor.bearing or f"node {sensor.node}", "angle": float(sensor.angle)}
+        for sensor in (() if machine is None else machine.sensors)
+    ]
+    write_json(
+        made / "page.json",
+        {
+            "channels": found,
+            "sensors": sensors,
+            "profile": guess.profile.model_dump(exclude_defaults=True, exclude_none=True),
+            "missing": list(guess.missing),
+        },
+    )
 
 
 def _look(job: Job, made: Path, told: dict[str, Any]) -> None:
@@ -129,15 +191,13 @@ def _look(job: Job, made: Path, told: dict[str, Any]) -> None:
     from rotordrop.web.drawn import write_look
 
     options = told["options"]
-    file = job.file("record")
-    if file is None:
-        raise UsageError("no record was sent; drop one on the page")
-    gap, speed = options.get("gap"), options.get("speed")
+    gap = options.get("gap")
     seen = look(
-        file,
+        _record_file(job),
         machine=machine_of(job),
         gap=parse_quantity(gap, "length") if gap else None,
-        speed=parse_quantity(speed, "speed") if speed else None,
+        mapping=tuple(filter(None, map(str.strip, options.get("planes", "").split(";")))),
+        profile=profile_of(job, options),
     )
     write_look(replace(seen, record=named(seen.record, job, "record")), job, made, options)
 
@@ -155,11 +215,11 @@ def _told_progress(job: Job, verb: Verb, told: dict[str, Any]) -> Callable[[str,
     return progress
 
 
-def _machine_and_record(job: Job) -> tuple[Machine, Record]:
+def _machine_and_record(job: Job, options: dict[str, Any]) -> tuple[Machine, Record]:
     machine = machine_of(job)
     if machine is None:
         raise UsageError("this needs the machine file; drop it on the page beside the record")
-    record = record_of(job, machine, "record")
+    record = record_of(job, machine, "record", options)
     if record is None:
         raise UsageError("no record was sent; drop one on the page")
     return machine, record
@@ -171,13 +231,27 @@ def _estimate(job: Job, made: Path, told: dict[str, Any]) -> None:
 
     progress = _told_progress(job, "estimate", told)
     progress("reading machine and record", 0.0)
-    machine, record = _machine_and_record(job)
-    options, tail = told["options"], record_of(job, machine, "tail")
+    options = told["options"]
+    machine, record = _machine_and_record(job, options)
+    tail = record_of(job, machine, "tail", options)
     method = Replay() if options.get("method") == "replay" else Tracked(quick=bool(options.get("quick")))
     name = job.read()["name"]
     estimate = estimate_drop(machine, record, tail, method=method, name=name, progress=progress)
     progress("drawing", 1.0)
-    write_estimate(estimate, job, made, options)
+    write_estimate(estimate, job, made, options, _since(job))
+
+
+def _since(job: Job) -> dict[str, Any] | None:
+    """Document of the estimate of the last drop that came before with the same machine file."""
+    told = job.read()
+    machine, before = told["files"]["machine"]["sha256"], None
+    for other in Workspace(job.path.parent.parent).jobs():  # the newest first
+        folder, known = result_folder(other, "estimate"), other.read()
+        same = known["files"].get("machine", {}).get("sha256") == machine
+        if before is None and folder is not None and same and known["created"] < told["created"]:
+            with suppress(OSError, ValueError):
+                before = json.loads((folder / "document.json").read_text(encoding="utf-8"))
+    return before
 
 
 def _waterfall(job: Job, made: Path, told: dict[str, Any]) -> None:
@@ -188,13 +262,13 @@ def _waterfall(job: Job, made: Path, told: dict[str, Any]) -> None:
 
     progress = _told_progress(job, "waterfall", told)
     progress("reading machine and record", 0.0)
-    machine, record = _machine_and_record(job)
+    machine, record = _machine_and_record(job, told["options"])
     signal = recorded_coast_down(machine, record)
     planes = {name: name for name in signal.planes}
     candidates = machine_candidates(with_found_air_gaps(machine, signal), planes)
     found = analyse_coast_down(signal, candidates, progress=progress)
     progress("drawing", 1.0)
-    write_waterfall(found, machine, record, job, made)
+    write_waterfall(found, machine, record, job, made, told["options"])
 
 
-_WORK = {"look": _look, "estimate": _estimate, "waterfall": _waterfall}
+_WORK = {"channels": _channels, "look": _look, "estimate": _estimate, "waterfall": _waterfall}

@@ -19,7 +19,7 @@ from rotordrop.atomic_file import write_json
 from rotordrop.report.content import Card, Cell, ReportContent, Statement, Table
 from rotordrop.report.origin import Origin, UsedFile, command_line, now
 from rotordrop.report.quantity import Quantity, System, display_unit
-from rotordrop.web.python_lines import estimate_lines, look_lines, waterfall_lines
+from rotordrop.web.python_lines import course_lines, estimate_lines, look_lines, waterfall_lines
 from rotordrop.web.traces import write_traces
 from rotordrop.web.workspace import Job
 
@@ -90,13 +90,19 @@ def write_look(seen: Look, job: Job, made: Path, options: Mapping[str, Any]) -> 
     )
 
 
-def write_estimate(estimate: Estimate, job: Job, made: Path, options: Mapping[str, Any]) -> None:
+def write_estimate(
+    estimate: Estimate,
+    job: Job,
+    made: Path,
+    options: Mapping[str, Any],
+    since: Mapping[str, Any] | None = None,
+) -> None:
     """Write what an estimate says: histories with bands, its document, its report, and its page as JSON."""
     from rotordrop.estimation.document import estimate_document
     from rotordrop.report.estimate_page import estimate_page
     from rotordrop.report.page import write_page
 
-    content = estimate_page(estimate, _origin(job, options))
+    content = estimate_page(estimate, _origin(job, options), since)
     names, grid, columns = _histories(estimate)
     write_traces(made, "drop", grid, columns)
     write_page(content, made / "report.html")
@@ -117,12 +123,26 @@ def write_estimate(estimate: Estimate, job: Job, made: Path, options: Mapping[st
     )
 
 
+_OUTSIDE: dict[str, float] = {"left": math.nan, "right": math.nan}
+
+
+def _finite(values: Array) -> list[float | None]:
+    return [float(value) if math.isfinite(value) else None for value in values]
+
+
 def field_name(plane: int, part: str) -> str:
     """File of the amplitudes of one waterfall."""
     return f"field {plane} {part}.f4"
 
 
-def write_waterfall(found: CoastDownAnalysis, machine: Machine, record: Record, job: Job, made: Path) -> None:
+def write_waterfall(
+    found: CoastDownAnalysis,
+    machine: Machine,
+    record: Record,
+    job: Job,
+    made: Path,
+    options: Mapping[str, Any],
+) -> None:
     """Write the frequencies of a coast-down: waterfalls and lines, their document, and their report."""
     from rotordrop.measurement.simulated import is_simulated
     from rotordrop.report.content import SIMULATED_RECORD
@@ -137,15 +157,16 @@ def write_waterfall(found: CoastDownAnalysis, machine: Machine, record: Record, 
             ("record", f"{record.path.name if record.path else record.name}"),
             ("SHA-256", record.sha256),
             ("centre of the bearings", found.signal.centre),
+            *_origin(job, options, "waterfall").facts(record.sha256),
         ),
         simulated=SIMULATED_RECORD if is_simulated(record) else "",
     )
     write_page(content, made / "report.html")
     write_json(made / "document.json", found.as_json())
-    write_json(made / "page.json", {**content_json(content), **_falls(found, job, made)})
+    write_json(made / "page.json", {**content_json(content), **_falls(found, job, made, options)})
 
 
-def _falls(found: CoastDownAnalysis, job: Job, made: Path) -> dict[str, Any]:
+def _falls(found: CoastDownAnalysis, job: Job, made: Path, options: Mapping[str, Any]) -> dict[str, Any]:
     """Write the amplitudes of every waterfall, and tell what the page draws over them."""
     from rotordrop.report.waterfall_figure import DRAWN_ORDERS, highest_shown
     from rotordrop.report.waterfall_page import where_of
@@ -182,6 +203,8 @@ def _falls(found: CoastDownAnalysis, job: Job, made: Path) -> dict[str, Any]:
                 "reason": line.reason,
                 "planes": list(line.forward),
                 "seen": f"{line.first_seen:.0f} to {line.last_seen:.0f} s",
+                "python": course_lines(line.label),
+                "frames": _finite(np.interp(falls[0].time, line.path.time, line.path.frequency, **_OUTSIDE)),
                 "path": {
                     "time": line.path.time[:: max(len(line.path.time) // MOST_PLACES, 1)].tolist(),
                     "frequency": line.path.frequency[:: max(len(line.path.time) // MOST_PLACES, 1)].tolist(),
@@ -189,21 +212,23 @@ def _falls(found: CoastDownAnalysis, job: Job, made: Path) -> dict[str, Any]:
             }
             for line in found.lines
         ],
-        "python": waterfall_lines(job.read()["files"], planes, parts),
+        "python": waterfall_lines(job.read()["files"], options, planes, parts),
     }
 
 
-def _origin(job: Job, options: Mapping[str, Any]) -> Origin:
+def _origin(job: Job, options: Mapping[str, Any], verb: str = "estimate") -> Origin:
     from rotordrop.simulation.fingerprint import fingerprint
 
     told = job.read()["files"]
     named = {"machine": "machine file"}
-    command = ["estimate", told["machine"]["name"], told["record"]["name"]]
-    command += ["--tail", told["tail"]["name"]] if "tail" in told else []
+    command = [verb, told["machine"]["name"], told["record"]["name"]]
+    command += ["--tail", told["tail"]["name"]] if "tail" in told and verb == "estimate" else []
+    command += ["--profile", told["profile"]["name"]] if "profile" in told else []
     command += ["--method", "replay"] if options.get("method") == "replay" else []
     command += ["--quick"] if options.get("quick") else []
     return Origin(
         command=command_line(command),
+        operator=str(options.get("operator", "")),
         files=tuple(
             UsedFile(role=named.get(role, role.split(" ")[0]), name=file["name"], sha256=file["sha256"])
             for role, file in told.items()

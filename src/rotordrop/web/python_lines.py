@@ -8,21 +8,37 @@ from typing import Any
 Files = Mapping[str, Mapping[str, Any]]
 
 
+def _profile(files: Files, options: Mapping[str, Any]) -> list[str]:
+    """Lines that make the reading rules; none where the recording speaks for itself."""
+    lines = []
+    if "profile" in files:
+        lines.append("from rotordrop.measurement.profile import load_profile")
+        lines.append(f"profile = load_profile({files['profile']['name']!r})")
+    if options.get("speed"):
+        lines.insert(0, "from rotordrop.measurement.profile import Profile, SpeedSource")
+        given = "profile" if "profile" in files else "Profile()"
+        source = f"SpeedSource(constant={options['speed']!r})"
+        lines.append(f'profile = {given}.model_copy(update={{"speed": {source}}})')
+    return lines
+
+
 def look_lines(files: Files, options: Mapping[str, Any], planes: int) -> dict[str, str]:
     """Lines for every figure of a look."""
-    imports = ["from rotordrop import look"]
+    imports, rules = "from rotordrop import look", _profile(files, options)
     given = [repr(files["record"]["name"])]
     if "machine" in files:
-        imports = ["from rotordrop import load_machine, look"]
+        imports = "from rotordrop import load_machine, look"
         given.append(f"machine=load_machine({files['machine']['name']!r})")
-    if options.get("gap") or options.get("speed"):
-        imports[0] += ", parse_quantity"
-    for name, kind in (("gap", "length"), ("speed", "speed")):
-        if options.get(name):
-            given.append(f"{name}=parse_quantity({options[name]!r}, {kind!r})")
-    head = [*imports, "", f"seen = look({', '.join(given)})"]
+    if options.get("gap"):
+        given.append(f"gap={options['gap']!r}")
+    if options.get("planes"):
+        given.append(f"mapping={[plane.strip() for plane in options['planes'].split(';') if plane.strip()]}")
+    if rules:
+        given.append("profile=profile")
+    head = [imports, *rules, "", f"seen = look({', '.join(given)})"]
+    radius = "time, radius = seen.motion.time, [p.radius for p in seen.motion.paths]  # [s], [m]"
     tail = {
-        "overview": "time, radius = seen.motion.time, [p.radius for p in seen.motion.paths]  # [s], [m]",
+        "overview": radius,
         "impacts": "impacts = [(i.plane, i.time, i.azimuth, i.depth) for i in seen.impacts]  # s, rad, m",
     }
     for number in range(planes):
@@ -34,17 +50,19 @@ def look_lines(files: Files, options: Mapping[str, Any], planes: int) -> dict[st
 def estimate_lines(files: Files, options: Mapping[str, Any], bearings: Sequence[str]) -> dict[str, str]:
     """Lines for every figure of an estimate."""
     replayed = options.get("method") == "replay"
-    imports = "from rotordrop import estimate_drop, load_machine, read_record"
-    lines = [imports]
-    extra = ""
+    lines, rules = (
+        ["from rotordrop import estimate_drop, load_machine, read_record"],
+        _profile(files, options),
+    )
+    extra, by_rules = "", ", profile=profile" if rules else ""
     if replayed or options.get("quick"):
         lines.append(f"from rotordrop.estimation import {'Replay' if replayed else 'Tracked'}")
         extra = f", method={'Replay()' if replayed else 'Tracked(quick=True)'}"
-    lines += ["", f"machine = load_machine({files['machine']['name']!r})"]
-    lines.append(f"record = read_record({files['record']['name']!r}, machine)")
+    lines += [*rules, "", f"machine = load_machine({files['machine']['name']!r})"]
+    lines.append(f"record = read_record({files['record']['name']!r}, machine{by_rules})")
     tail = "None"
     if "tail" in files:
-        lines.append(f"tail = read_record({files['tail']['name']!r}, machine)")
+        lines.append(f"tail = read_record({files['tail']['name']!r}, machine{by_rules})")
         tail = "tail"
     lines.append(f"estimate = estimate_drop(machine, record, {tail}{extra})")
     last = {
@@ -55,22 +73,29 @@ def estimate_lines(files: Files, options: Mapping[str, Any], bearings: Sequence[
         "impacts = [(b.name, i.peak_time, i.azimuth, i.peak_force.value) for b in estimate.bearings "
         "for i in b.impacts]  # [s], [rad], [N]"
     )
+    last["peaks"] = (
+        "peaks = {b.name: (b.peak_force.known, b.peak_stress.known) for b in estimate.bearings}  # [N], [Pa]"
+    )
     for number, name in enumerate(bearings):
         motion = f"motions = estimate.bearing({name!r}).motions  # each .time [s] and .displacement [m]"
         last |= {f"motion {number}": motion, f"orbit {number}": motion}
     return {figure: "\n".join([*lines, line, ""]) for figure, line in last.items()}
 
 
-def waterfall_lines(files: Files, planes: Sequence[str], parts: Sequence[str]) -> dict[str, str]:
-    """Lines for every waterfall of a coast-down."""
+def waterfall_lines(
+    files: Files, options: Mapping[str, Any], planes: Sequence[str], parts: Sequence[str]
+) -> dict[str, str]:
+    """Lines for every waterfall of a coast-down, for its cuts, and for the course of its lines."""
+    rules = _profile(files, options)
     head = [
         "from rotordrop import load_machine, read_record",
         "from rotordrop.estimation.recorded_coast_down import recorded_coast_down, with_found_air_gaps",
         "from rotordrop.spectrum.coast_down import analyse_coast_down",
         "from rotordrop.spectrum.machine_candidates import machine_candidates",
+        *rules,
         "",
         f"machine = load_machine({files['machine']['name']!r})",
-        f"record = read_record({files['record']['name']!r}, machine)",
+        f"record = read_record({files['record']['name']!r}, machine{', profile=profile' if rules else ''})",
         "signal = recorded_coast_down(machine, record)",
         "planes = {name: name for name in signal.planes}",
         "candidates = machine_candidates(with_found_air_gaps(machine, signal), planes)",
@@ -89,3 +114,19 @@ def waterfall_lines(files: Files, planes: Sequence[str], parts: Sequence[str]) -
         for number, name in enumerate(planes)
         for part in parts
     }
+
+
+def course_lines(label: str) -> str:
+    """Lines that follow a line of a waterfall over time, after those of the waterfall."""
+    return "\n".join(
+        [
+            "import numpy as np",
+            f"line = next(line for line in found.lines if line.label == {label!r})",
+            "path = np.interp(time, line.path.time, line.path.frequency, left=np.nan, right=np.nan)",
+            "sides = (1, -1) if fall.component == 'full' else (1,)",
+            "bins = [[abs(frequency - s * f).argmin() + k for s in sides for k in (-1, 0, 1)] for f in path]",
+            "course = [amplitude[row, near].max() if np.isfinite(f) else np.nan "
+            "for row, (near, f) in enumerate(zip(bins, path))]  # [m]",
+            "",
+        ]
+    )

@@ -23,10 +23,15 @@ from typing import Any, Literal, TypeAlias
 from rotordrop.atomic_file import write_json
 from rotordrop.web.workspace import Job, Workspace
 
-Verb: TypeAlias = Literal["look", "estimate", "waterfall"]
+Verb: TypeAlias = Literal["channels", "look", "estimate", "waterfall"]
 Key: TypeAlias = tuple[str, Verb]
-VERBS: tuple[Verb, ...] = ("look", "estimate", "waterfall")
-AT_ONCE: dict[Verb, int] = {"look": 2, "estimate": max(1, (os.cpu_count() or 2) // 2), "waterfall": 1}
+VERBS: tuple[Verb, ...] = ("channels", "look", "estimate", "waterfall")
+AT_ONCE: dict[Verb, int] = {
+    "channels": 2,
+    "look": 2,
+    "estimate": max(1, (os.cpu_count() or 2) // 2),
+    "waterfall": 1,
+}
 """Computations of one verb that run beside each other; others wait."""
 
 _PROGRAM = (
@@ -57,16 +62,18 @@ def result_folder(job: Job, verb: Verb) -> Path | None:
 
 
 def published_run(job: Job, verb: Verb) -> str | None:
-    """Which computation the result is of."""
+    """Which computation the result is of; none where the files it was of have been replaced since."""
     with suppress(FileNotFoundError):
-        return str(json.loads((job.path / f"{verb}.result.json").read_text(encoding="utf-8"))["run"])
+        told = json.loads((job.path / f"{verb}.result.json").read_text(encoding="utf-8"))
+        if told.get("of") in (None, job.digests()):
+            return str(told["run"])
     return None
 
 
-def publish(job: Job, verb: Verb, run: str, made: Path) -> None:
-    """Make a finished folder the result: its name first, then the word that it counts."""
+def publish(job: Job, verb: Verb, run: str, made: Path, of: dict[str, str] | None = None) -> None:
+    """Make a finished folder the result of files by their content: its name first, then that it counts."""
     made.rename(job.path / f"{verb}.{run}")
-    write_json(job.path / f"{verb}.result.json", {"run": run})
+    write_json(job.path / f"{verb}.result.json", {"run": run, "of": job.digests() if of is None else of})
 
 
 @dataclass

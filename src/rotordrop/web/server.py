@@ -10,7 +10,7 @@ from rotordrop.errors import UsageError
 from rotordrop.web.workspace import Workspace
 
 
-def serve(folder: Path, port: int, announce: Callable[[str], None]) -> None:
+def serve(folder: Path, port: int, announce: Callable[[str], None], log: str | None = None) -> None:
     """Serve the page until it is interrupted; computations that run go on without it.
 
     Parameters
@@ -21,6 +21,8 @@ def serve(folder: Path, port: int, announce: Callable[[str], None]) -> None:
         Where to listen, on the loopback address only; 0 takes a free one.
     announce : callable
         Told the address with its token once the server listens.
+    log : str, optional
+        Log of drops to compare with.
 
     Raises
     ------
@@ -38,7 +40,7 @@ def serve(folder: Path, port: int, announce: Callable[[str], None]) -> None:
     listening = listening_at(port)
     port = listening.getsockname()[1]
     space = Workspace(folder)
-    app = make_app(space, port=port)
+    app = make_app(space, port=port, log=log)
     announce(f"http://127.0.0.1:{port}/#token={space.token()}")
     config = uvicorn.Config(
         app, log_level="warning", access_log=False, ws="none", server_header=False, date_header=False,
@@ -59,6 +61,7 @@ def listening_at(port: int) -> socket.socket:
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listening.bind(("127.0.0.1", port))
+        listening.listen(128)  # whoever asks before the server has begun waits for it
     except OSError as error:
         listening.close()
         raise UsageError(

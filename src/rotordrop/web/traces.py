@@ -8,6 +8,7 @@ sent is a sample.
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -148,8 +149,13 @@ def write_traces(folder: Path, name: str, time: Array, columns: Mapping[str, Arr
     values = np.stack([np.asarray(column, dtype=np.float32) for column in columns.values()])
     levels = np.stack([_extremes_of_blocks(row) for row in values])
     for part, array in (("time", np.asarray(time, dtype=np.float64)), ("values", values), ("levels", levels)):
+        head = (
+            io.BytesIO()
+        )  # numpy's own way into a file drops the error of a full disk, and what did not fit
+        np.lib.format.write_array_header_1_0(head, np.lib.format.header_data_from_array_1_0(array))
         with atomic_path(folder / f"{name}.{part}.npy") as place, place.open("wb") as stream:
-            np.save(stream, array, allow_pickle=False)
+            stream.write(head.getbuffer())
+            stream.write(np.ascontiguousarray(array).reshape(-1).view(np.uint8).data)
 
 
 def _extremes_of_blocks(values: NDArray[np.float32]) -> NDArray[np.int32]:

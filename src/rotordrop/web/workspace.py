@@ -15,20 +15,26 @@ import shutil
 import time
 from collections.abc import AsyncIterable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any, Literal, TypeAlias
 
 from rotordrop.atomic_file import atomic_path, write_json, write_text
 from rotordrop.errors import OutputError, UsageError
 
-Role: TypeAlias = Literal["machine", "record", "tail", "beside"]
-ROLES: tuple[Role, ...] = ("machine", "record", "tail", "beside")
+Role: TypeAlias = Literal["machine", "profile", "record", "tail", "beside"]
+ROLES: tuple[Role, ...] = ("machine", "profile", "record", "tail", "beside")
 
 QUOTA = 8 * 2**30
 """Bytes the folder may hold before uploads are refused."""
 
-LARGEST: dict[str, int] = {"machine": 16 * 2**20, "record": 2 * 2**30, "tail": 2 * 2**30, "beside": 2**30}
+LARGEST: dict[str, int] = {
+    "machine": 16 * 2**20,
+    "profile": 2**20,
+    "record": 2 * 2**30,
+    "tail": 2 * 2**30,
+    "beside": 2**30,
+}
 """Bytes of one upload."""
 
 MOST_JOBS = 500
@@ -45,12 +51,29 @@ class TooLargeError(OutputError):
     """An upload is larger than allowed, or the folder is full."""
 
 
+@dataclass
+class Room:
+    """What uploads that run side by side take of the room that is left [byte].
+
+    Attributes
+    ----------
+    kept : int
+        What lies in the folder, uploads that still come in left out.
+    coming : dict
+        What each of these has brought, or said it will bring.
+    """
+
+    kept: int = 0
+    coming: dict[object, int] = field(default_factory=dict)
+
+
 @dataclass(frozen=True)
 class Workspace:
     """Where the jobs lie."""
 
     path: Path
     quota: int = QUOTA
+    room: Room = field(default_factory=Room, compare=False)
 
     def prepare(self) -> None:
         """Make the folder, for nobody else to read, and remove what a killed server left half written.
@@ -127,12 +150,13 @@ class Workspace:
         return [job for _, _, job in sorted(found, key=lambda entry: entry[:2])]
 
     def used(self) -> int:
-        """Bytes in the folder."""
+        """Bytes in the folder, what uploads have brought so far left out."""
         total = 0
         for folder, _, names in os.walk(self.path):
             for name in names:
-                with suppress(OSError):
-                    total += (Path(folder) / name).lstat().st_size
+                if not (name.startswith(".") and ".part" in name):
+                    with suppress(OSError):
+                        total += (Path(folder) / name).lstat().st_size
         return total
 
 
@@ -155,6 +179,10 @@ class Job:
     def write(self, told: dict[str, Any]) -> None:
         """Keep name, options and files."""
         write_json(self.path / "job.json", told)
+
+    def digests(self) -> dict[str, str]:
+        """Which files the job has, by their content."""
+        return {role: entry["sha256"] for role, entry in self.read()["files"].items()}
 
     def file(self, role: str) -> Path | None:
         """Where the file of a role lies; None where none was sent."""
@@ -196,26 +224,34 @@ async def receive(
     label, stored = labelled(name), stored_as(role, name)
     key = role if role != "beside" else f"beside {stored}"
     _refuse_clash(job, key, label, stored)
-    limit = min(LARGEST[role], space.quota - space.used())
     if role == "beside" and len(beside(job)) >= MOST_BESIDE:
         raise UsageError(f"a job takes {MOST_BESIDE} files beside machine and record")
-    if declared is not None and declared > limit:
-        raise _too_large(label, limit)
-    counted, digest = 0, hashlib.sha256()
-    with atomic_path(job.path / "files" / stored) as place, place.open("wb") as stream:
-        async for part in body:
-            counted += len(part)
-            if counted > limit:
-                raise _too_large(label, limit)
-            digest.update(part)
-            stream.write(part)
-        if counted == 0:
-            raise UsageError(f"{label} is empty")
-        # From here to the new name nothing else runs: of uploads side by side only those that fit get in.
-        _refuse_clash(job, key, label, stored)
-        stream.flush()
-        if space.used() > space.quota:
-            raise _too_large(label, 0)
+    counted, digest, room, mine = 0, hashlib.sha256(), space.room, object()
+    room.kept = space.used()
+
+    def claim(length: int) -> None:
+        """Let nothing in that does not fit beside what the other uploads have brought or will bring."""
+        others = sum(length for one, length in room.coming.items() if one is not mine)
+        limit = min(LARGEST[role], space.quota - room.kept - others)
+        if length > limit:
+            raise _too_large(label, limit)
+        room.coming[mine] = max(length, declared or 0)
+
+    try:
+        claim(declared or 0)
+        with atomic_path(job.path / "files" / stored) as place, place.open("wb") as stream:
+            async for part in body:
+                counted += len(part)
+                claim(counted)
+                digest.update(part)
+                stream.write(part)
+            if counted == 0:
+                raise UsageError(f"{label} is empty")
+            # From here to the new name nothing else runs: of uploads side by side only one gets a name.
+            _refuse_clash(job, key, label, stored)
+        room.kept += counted
+    finally:
+        room.coming.pop(mine, None)
     told = job.read()
     entry = {"name": label, "stored": stored, "bytes": counted, "sha256": digest.hexdigest()}
     before = told["files"].get(key)
@@ -261,17 +297,13 @@ def stored_as(role: Role, name: str) -> str:
     UsageError
         When the name has no suffix that can be one, or that of a file beside is not a plain one.
     """
-    if role == "machine":
-        return "machine.toml"
+    if role in ("machine", "profile"):
+        return f"{role}.toml"
     if role == "beside" and name.lower().endswith(".dat"):
         return "record.dat"  # the samples of a COMTRADE recording, whose configuration is the record
     if role == "beside":
         plain = _PLAIN.fullmatch(name) and len(name) <= LONGEST_NAME and not is_path(name)
-        if (
-            not plain
-            or name.split(".")[0].lower() in ("machine", "record", "tail")
-            or name.endswith((" ", "."))
-        ):
+        if not plain or name.split(".")[0].lower() in ROLES or name.endswith((" ", ".")):
             raise UsageError(
                 f"{labelled(name)!r} cannot be the name of a file beside; use letters and digits"
             )

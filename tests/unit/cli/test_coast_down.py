@@ -198,6 +198,7 @@ def test_the_page_says_when_the_rotor_stopped(standstill, sentence, tmp_path):
     cells = [str(cell) for row in law.rows for cell in row]
     assert sum("Hz/s" in cell for cell in cells) == 6
     assert not any(re.search(r"\de[-+]|rad", cell) for cell in cells)
+    assert next(section for section in page.sections if section.heading == "Lines").tables == ()
 
 
 def test_orders_of_a_simulation_are_those_a_sensor_would_show(tmp_path):

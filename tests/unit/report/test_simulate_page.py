@@ -10,7 +10,7 @@ import pytest
 from rotordrop.estimation.bearing_drop import simulated_bearings, simulated_gap
 from rotordrop.machine import example_machine
 from rotordrop.report.content import ReportContent
-from rotordrop.report.machine_sections import defaults_section, friction_section, weight_shares
+from rotordrop.report.machine_sections import defaults_section, friction_section, spoken_key, weight_shares
 from rotordrop.report.page import render_page
 from rotordrop.report.simulate_page import simulate_page
 from rotordrop.simulation.result import DropResult
@@ -96,7 +96,7 @@ def test_a_page_with_the_machine_shows_weight_friction_and_defaults(drop_result:
         assert heading in headings
     (section,) = defaults_section(machine)
     listed = {row[0] for table in section.tables for row in table.rows}
-    assert listed == {entry[0] for entry in (*machine.defaults_in_use, *machine.inferred)}
+    assert listed == {spoken_key(entry[0]) for entry in (*machine.defaults_in_use, *machine.inferred)}
     shares = weight_shares(machine)
     assert shares["NDE"] == pytest.approx(174.6, abs=0.1)
     assert shares["DE"] == pytest.approx(409.1, abs=0.1)

@@ -84,7 +84,7 @@ class Browser:
         assert "exceptionDetails" not in found, found["exceptionDetails"]
         return found["result"].get("value")
 
-    def until(self, expression: str, patience: float = 30.0) -> None:
+    def until(self, expression: str, patience: float = 120.0) -> None:
         end = time.monotonic() + patience
         while time.monotonic() < end:
             if self.evaluate(f"Boolean({expression})"):

@@ -35,10 +35,10 @@ class Answer:
 class Served:
     """A running server; `ask` carries host, origin and token of the own page unless told otherwise."""
 
-    def __init__(self, space: Workspace, port: int = 0) -> None:
+    def __init__(self, space: Workspace, port: int = 0, log: str | None = None) -> None:
         socket = listening_at(port)
         self.space, self.port = space, socket.getsockname()[1]
-        self.app = make_app(space, port=self.port)
+        self.app = make_app(space, port=self.port, log=log)
         self.token = space.token()
         config = uvicorn.Config(self.app, log_level="critical", ws="none", timeout_graceful_shutdown=1)
         self._server = uvicorn.Server(config)

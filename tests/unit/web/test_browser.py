@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,14 +11,13 @@ import numpy as np
 import pytest
 from tests.unit.web.browser import CHROMIUM, Browser
 from tests.unit.web.serving import Served
+from tests.unit.web.steps import LOOKED, look_at, press, quiet, send, serving, words
 
 from rotordrop.web.running import publish, result_folder, state_file
 from rotordrop.web.traces import write_traces
 from rotordrop.web.workspace import Job, Workspace
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here")
-
-LOOKED = "document.querySelectorAll('.panel canvas').length >= 2"
 
 
 @pytest.fixture
@@ -29,30 +27,6 @@ def browser(tmp_path: Path) -> Iterator[Browser]:
     page.close()
 
 
-@contextlib.contextmanager
-def serving(folder: Path) -> Iterator[Served]:
-    server = Served(Workspace(folder))
-    try:
-        yield server
-    finally:
-        server.stop()
-
-
-def send(browser: Browser, files: list[Path]) -> None:
-    browser.choose_files("#files", files)
-    browser.until("document.getElementById('sending').open")
-    browser.key("Enter")
-
-
-def quiet(browser: Browser) -> None:
-    assert browser.messages() == []
-    assert browser.foreign() == []
-
-
-def words(browser: Browser, selector: str) -> str:
-    return str(browser.evaluate(f"document.querySelector({selector!r})?.innerText"))
-
-
 def test_from_upload_by_keys_to_figures_and_again_after_a_reload(browser, tmp_path, files):
     with serving(tmp_path / "served") as server:
         browser.open(server.address)
@@ -60,7 +34,7 @@ def test_from_upload_by_keys_to_figures_and_again_after_a_reload(browser, tmp_pa
         assert server.token not in browser.evaluate("location.href")
         send(browser, list(files.values()))
         browser.until(LOOKED)
-        assert "The rotor was released at" in words(browser, "#status")
+        browser.until("document.getElementById('status').innerText.includes('The rotor was released at')")
         browser.key("n")
         browser.until("document.querySelector('tr.here')")
         first = words(browser, "tr.here")
@@ -70,7 +44,7 @@ def test_from_upload_by_keys_to_figures_and_again_after_a_reload(browser, tmp_pa
         browser.key("p")
         browser.until(f"document.querySelector('tr.here').innerText === {json.dumps(first)}")
         browser.key("u")
-        browser.until("document.querySelector('#readout').innerText.includes('mil')")
+        browser.until("document.querySelector('#readhead').innerText.includes('mil')")
         browser.key("u")
         before = browser.evaluate("document.documentElement.dataset.theme")
         browser.key("t")
@@ -95,10 +69,8 @@ def test_from_upload_by_keys_to_figures_and_again_after_a_reload(browser, tmp_pa
 def test_an_estimate_goes_on_over_reload_and_restart_and_is_cancelled(browser, tmp_path, files):
     with serving(tmp_path / "served") as server:
         port = server.port
-        browser.open(server.address)
-        send(browser, list(files.values()))
-        browser.until(LOOKED)
-        browser.evaluate("document.getElementById('estimate').click()")
+        look_at(browser, server, list(files.values()))
+        press(browser, "estimate")
         browser.until("document.getElementById('cancel')")
         browser.call("Page.reload")
         browser.until("document.getElementById('cancel')")
@@ -108,7 +80,7 @@ def test_an_estimate_goes_on_over_reload_and_restart_and_is_cancelled(browser, t
         browser.until("document.getElementById('cancel') || document.body.innerText.includes('tries again')")
         browser.call("Page.reload")
         browser.until("document.getElementById('cancel')")
-        browser.evaluate("document.getElementById('cancel').click()")
+        press(browser, "cancel")
         browser.until("document.body.innerText.includes('The estimate was cancelled')")
         job = server.ask("GET", "/api/jobs").told["jobs"][0]
         assert job["states"]["estimate"]["state"] == "cancelled"
@@ -116,13 +88,80 @@ def test_an_estimate_goes_on_over_reload_and_restart_and_is_cancelled(browser, t
         server.stop()
 
 
+def renamed(files, folder: Path) -> Path:
+    """The record with channels that no machine file names."""
+    import h5py
+
+    named = folder / "mine.h5"
+    named.write_bytes(files["record"].read_bytes())
+    with h5py.File(named, "a") as file:
+        for old, new in (("S_NDE_A", "X1"), ("S_NDE_B", "Y1"), ("S_DE_A", "X2"), ("S_DE_B", "Y2")):
+            place = next(name for name in every(file) if name.endswith(old))
+            file.move(place, place.removesuffix(old) + new)
+    return named
+
+
+def every(file) -> list[str]:
+    found: list[str] = []
+    file.visit(found.append)
+    return found
+
+
+def test_twelve_numbers_and_a_record_with_names_of_its_own_get_to_an_estimate(browser, tmp_path, files):
+    with serving(tmp_path / "served") as server:
+        browser.open(server.address)
+        browser.choose_files("#files", [renamed(files, tmp_path)])
+        browser.until("document.getElementById('sending').open")
+        browser.evaluate("document.querySelector('#numbers summary').click()")
+        browser.until("document.querySelectorAll('#numberfields input').length >= 11")
+        fields = "document.querySelectorAll('#numberfields input')"
+        filled = f"for (const one of {fields}) {{one.value = one.placeholder}}"
+        browser.evaluate(filled)
+        press(browser, "send")
+        browser.until("document.getElementById('mapping').open", 120)
+        assert "NDE_A" in words(browser, "#channelrows")
+        chosen = "[...document.querySelectorAll('#channelrows select')].map(one => one.value).join()"
+        assert browser.evaluate(chosen).replace("displacement/", "") == "X1,Y1,X2,Y2"
+        browser.evaluate("document.querySelector('#mapping .main').click()")
+        browser.until(LOOKED, 120)
+        browser.until("!document.getElementById('estimate').disabled")
+        press(browser, "estimate")
+        browser.until("/Estimating: (?!waiting|compiling|reading)/.test(document.body.innerText)", 240)
+        press(browser, "cancel")
+        browser.until("document.body.innerText.includes('The estimate was cancelled')", 60)
+        quiet(browser)
+
+
+def test_other_drops_are_drawn_on_the_axes_of_this_one(browser, tmp_path, files):
+    with serving(tmp_path / "served") as server:
+        for name in ("first", "second"):
+            number = server.new_job(files)
+            server.space.job(number).write({**server.space.job(number).read(), "name": name})
+            server.order(f"/api/jobs/{number}/look")
+            assert server.settled(number, "look")["state"] == "done"
+        browser.open(server.address)
+        browser.until(LOOKED)
+        browser.key("c")
+        browser.until("document.getElementById('compare').open")
+        browser.evaluate("document.querySelector('#dropsfound input').click()")
+        browser.evaluate("document.querySelector('#compare .main').click()")
+        browser.until("document.querySelectorAll('.panel .key').length === 4")
+        assert "first" in words(browser, ".panel header")
+        dashes = (
+            "[...document.querySelectorAll('.panel .key line')].map(l => l.getAttribute('stroke-dasharray'))"
+        )
+        assert browser.evaluate(f"{dashes}.join('|')") == "|7 4||7 4"
+        assert "dashed" in words(browser, "#tabpanel")
+        browser.key("n")
+        browser.until("/[0-9]X/.test(document.getElementById('readout').innerText)")
+        quiet(browser)
+
+
 @pytest.mark.slow
 def test_an_estimate_from_the_button_to_the_report(browser, tmp_path, files):
     with serving(tmp_path / "served") as server:
-        browser.open(server.address)
-        send(browser, list(files.values()))
-        browser.until(LOOKED)
-        browser.evaluate("document.getElementById('estimate').click()")
+        look_at(browser, server, list(files.values()))
+        press(browser, "estimate")
         browser.until("document.querySelectorAll('.panel canvas').length === 4", 560)
         browser.until(
             "document.getElementById('status').innerText.includes('The model is consistent with the record.')"
@@ -152,10 +191,10 @@ def test_more_sensor_planes_than_bearings_are_drawn(browser, tmp_path, files):
         browser.until("document.querySelectorAll('.panel canvas').length === 4")
         orbits = "[...document.querySelectorAll('#orbits canvas')].map(c => c.ariaLabel.split(' ')[2]).join()"
         assert browser.evaluate(orbits) == "NDE,DE"
-        browser.evaluate("document.getElementById('whole').click()")
+        press(browser, "whole")
         browser.until("document.querySelectorAll('.panel canvas').length === 5")
         assert browser.evaluate(orbits) == "NDE,DE,MID"
-        browser.evaluate("document.getElementById('early').click()")
+        press(browser, "early")
         browser.until("document.querySelectorAll('.panel canvas').length === 4")
         assert browser.evaluate(orbits) == "NDE,DE"
         quiet(browser)
@@ -227,6 +266,12 @@ def payloads() -> list[str]:
     return [wrapping.format(script) for wrapping in WRAPPED for script in SCRIPTS]
 
 
+def choose(browser: Browser, job: str) -> None:
+    browser.evaluate(
+        f"s=document.getElementById('jobs');s.value='{job}';s.dispatchEvent(new Event('change'))"
+    )
+
+
 def test_no_script_in_a_name_is_executed(browser, tmp_path):
     """In the name of a job, of its files, of a plane and a channel, in a header entry, in an option."""
     assert len(payloads()) >= 100
@@ -235,7 +280,9 @@ def test_no_script_in_a_name_is_executed(browser, tmp_path):
             plain = script.replace(";", "").replace("[", "").replace("\n", "")
             rows = [f"0.{n:04d};{y:.2f};0;{y:.2f};0" for n, y in enumerate(_fall())]
             head = f"# {plain}\ntime [s];X {plain} [um];Y {plain} [um];X2{plain} [um];Y2{plain} [um]\n"
-            job = server.order("/api/jobs", {"name": script, "options": {"gap": script}}).told["id"]
+            job = server.order(
+                "/api/jobs", {"name": script, "options": {"gap": script, "operator": script}}
+            ).told["id"]
             name = script.replace("/", "|").replace("#", "").replace("?", "") + ".csv"
             sent = (head + "\n".join(rows)).encode()
             done = server.ask("PUT", f"/api/jobs/{job}/files/record?name={quote(name)}", sent)
@@ -249,19 +296,28 @@ def test_no_script_in_a_name_is_executed(browser, tmp_path):
         jobs = [one["id"] for one in server.ask("GET", "/api/jobs").told["jobs"]]
         assert len(jobs) == len(payloads())
         browser.open(server.address)
-        looked = 0
+        looked: list[str] = []
         for job in jobs:
             states = server.ask("GET", f"/api/jobs/{job}").told["states"]
             if "look" in states:
-                looked += server.settled(job, "look")["state"] == "done"
-            chosen = f"s=document.getElementById('jobs');s.value='{job}';s.dispatchEvent(new Event('change'))"
-            browser.evaluate(chosen)
+                looked += [job] if server.settled(job, "look")["state"] == "done" else []
+            choose(browser, job)
             if "look" in states:
                 browser.until("!document.getElementById('status').innerText.includes('Looking')")
-                for tab in ("Events", "Numbers", "Quality", "All", "Origin", "Impacts"):
+                for tab in ("Events", "Numbers", "Quality", "All", "Compare", "Origin", "Impacts"):
                     tabs = "[...document.querySelectorAll('[role=tab]')]"
                     browser.evaluate(f"{tabs}.find(t => t.innerText === '{tab}')?.click()")
-        assert looked >= 8
+        assert len(looked) >= 8
+        choose(browser, looked[0])
+        browser.until("document.querySelector('.panel canvas')")
+        press(browser, "channels")
+        browser.until("document.getElementById('mapping').open")
+        browser.evaluate("document.getElementById('mapping').close()")
+        browser.evaluate("[...document.querySelectorAll('[role=tab]')].at(-2).click()")
+        browser.until("document.getElementById('choosedrops')")
+        press(browser, "choosedrops")
+        browser.until("document.getElementById('compare').open")
+        assert len(payloads()) // 20 <= browser.evaluate("document.querySelectorAll('.choice').length")
         assert browser.evaluate("window.stolen") is None
         quiet(browser)
 
@@ -282,9 +338,7 @@ def _fall() -> list[float]:
 @pytest.mark.slow
 def test_the_waterfall_by_keys_shows_lines_with_their_reason(browser, tmp_path, files):
     with serving(tmp_path / "served") as server:
-        browser.open(server.address)
-        send(browser, list(files.values()))
-        browser.until(LOOKED)
+        look_at(browser, server, list(files.values()))
         browser.key("w")
         browser.until("!document.getElementById('fall').hidden", 400)
         browser.until("document.querySelectorAll('#falllines tr').length > 3")
@@ -309,6 +363,11 @@ def test_the_waterfall_by_keys_shows_lines_with_their_reason(browser, tmp_path, 
         browser.evaluate("[...document.querySelectorAll('#fallfiles button')].at(-1).click()")
         browser.until("document.getElementById('lines').open")
         assert "analyse_coast_down" in words(browser, "#code")
+        browser.key("Escape")
+        browser.until("!document.getElementById('lines').open")
+        browser.evaluate("[...document.querySelectorAll('#cutfiles button')].at(-1).click()")
+        browser.until("document.getElementById('lines').open")
+        assert "course = " in words(browser, "#code") and "spectrum = " in words(browser, "#code")
         browser.key("Escape")
         browser.until("!document.getElementById('lines').open && !document.activeElement.closest('dialog')")
         left = "document.getElementById('fall').hidden && !document.getElementById('main').hidden"

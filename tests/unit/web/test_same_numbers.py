@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import html
 import json
 import re
@@ -15,6 +16,8 @@ import pytest
 from tests.unit.report.conftest import estimate as estimate
 
 from rotordrop.estimation.estimate import Estimate
+from rotordrop.estimation.severity_numbers import severity_values
+from rotordrop.machine.ball_bearing import STATIC_STRESS
 from rotordrop.model.parameter_table import LOADS, published
 from rotordrop.report.quantity import IN_OTHER_UNITS
 from rotordrop.web.drawn import write_estimate, write_look
@@ -258,3 +261,57 @@ def test_the_lines_of_python_of_a_look_run(
     exec(lines["impacts"], told)
     found = [(one["place"], one["time"], one["azimuth"]) for one in page["impacts"]]
     assert [entry[:3] for entry in told["impacts"]] == found
+
+
+def in_json(told: Any) -> Iterator[float]:
+    if isinstance(told, dict | list):
+        for part in told.values() if isinstance(told, dict) else told:
+            yield from in_json(part)
+    elif isinstance(told, int | float) and not isinstance(told, bool):
+        yield float(told)
+
+
+def in_python(told: Any, seen: set[int]) -> Iterator[float]:
+    if id(told) in seen:
+        return
+    seen.add(id(told))
+    if isinstance(told, int | float | np.floating):
+        yield float(told)
+    elif isinstance(told, dict | list | tuple):
+        for part in told.values() if isinstance(told, dict) else told:
+            yield from in_python(part, seen)
+    elif isinstance(told, np.ndarray) and told.size < 100 and told.dtype.kind == "f":
+        yield from (float(one) for one in told.ravel())
+    elif dataclasses.is_dataclass(told):
+        for field in dataclasses.fields(told):
+            yield from in_python(getattr(told, field.name), seen)
+
+
+def derived(document: dict[str, Any]) -> Iterator[float]:
+    """What the page says by a difference of two numbers of the document, and the limit it compares with."""
+    for bearing in document["bearings"].values():
+        yield from (one["end_s"] - one["start_s"] for one in bearing["impacts"])
+    yield from (one["cross_check"] / one["estimate"] - 1.0 for one in document["cross_check"])
+    yield STATIC_STRESS
+
+
+def test_no_number_of_the_page_is_missing_in_the_document_or_in_python(
+    estimate: Estimate, page: dict[str, Any], document: dict[str, Any]
+) -> None:
+    written, seen = {*in_json(document), *derived(document)}, set[int]()
+    known = {*in_python(estimate, seen), *derived(document)}
+    for bearing in estimate.bearings:
+        known |= {*in_python([*severity_values(estimate, bearing).values()], set())}
+        known |= {
+            *in_python([bearing.peak_force.known, bearing.peak_stress.known, bearing.statistics], set())
+        }
+        known |= {one.value for one in bearing.values.values()}
+    compared = 0
+    for part in ("cards", "summary", "sections", "impacts"):
+        for number in numbers(page[part]):
+            value = number["value"]
+            if value is not None:
+                for where, found in (("JSON", written), ("Python", known)):
+                    assert any(abs(value - one) <= 1e-12 * abs(value) for one in found), (where, number)
+                compared += 1
+    assert compared > 100

@@ -139,17 +139,17 @@ export function tracePicture(pen, { title, x, y, curves, bands, levels }) {
     pen.line([[box.left, py(value)], [box.right, py(value)]], colour, 1, [5, 4]);
     pen.text(name, box.right - 4 - 150 * (place || 0), py(value) - 4, colour, { align: "right", size: 10 });
   }
-  for (const { time, values, colour, width = 1.3 } of curves) {
-    pen.line(Array.from(time, (t, i) => [px(t), py(clip(values[i]))]), colour, width);
+  for (const { time, values, colour, width = 1.3, dash = [] } of curves) {
+    pen.line(Array.from(time, (t, i) => [px(t), py(clip(values[i]))]), colour, width, dash);
   }
   pen.line([[box.left, box.top], [box.right, box.top], [box.right, box.bottom], [box.left, box.bottom], [box.left, box.top]],
     tone.muted);
   pen.text(title, box.left, 18, tone.ink, { size: 13, weight: "600" });
   let at = box.left;
-  for (const { label, colour } of curves) {
-    pen.line([[at, 33], [at + 18, 33]], colour, 2);
-    pen.text(label, at + 23, 37, tone.ink);
-    at += 40 + 6.2 * label.length;
+  for (const { label, colour, dash = [] } of curves) {
+    pen.line([[at, 33], [at + 26, 33]], colour, 2, dash);
+    pen.text(label, at + 31, 37, tone.ink);
+    at += 46 + 6.2 * label.length;
   }
   pen.text(x.label, 0.5 * (box.left + box.right), pen.height - 10, tone.ink, { align: "center", size: 12 });
   pen.text(y.label, 16, 0.5 * (box.top + box.bottom), tone.ink, { align: "center", size: 12, turned: true });

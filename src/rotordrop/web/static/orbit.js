@@ -1,5 +1,5 @@
 // The path of the shaft centre in its clearance circle, with the force, at the cursor.
-import { arrow, colours, faint, svgPen } from "./figures.js";
+import { arrow, colours, faint, placeColour, svgPen } from "./figures.js";
 import { factor, shown, unit, written } from "./units.js";
 
 export const nearest = (time, t) => {
@@ -12,11 +12,11 @@ export const nearest = (time, t) => {
 };
 
 // paths: [{role, time, x, y}]; force: {value, largest} or null; impacts: azimuths; angle of the shaft or null
-export function drawOrbit(pen, { name, gap, paths, cursor, force, impacts, angle }) {
+export function drawOrbit(pen, { name, gap, paths, others = [], cursor, force, impacts, angle }) {
   const tone = colours(), size = Math.min(pen.width, pen.height);
   const cx = pen.width / 2, cy = pen.height / 2 + 4, radius = 0.5 * size - 26;
   let reach = gap ? gap[1] : 0;
-  for (const { x, y } of paths) {
+  for (const { x, y } of [...paths, ...others]) {
     for (let i = 0; i < x.length; i += 1) { reach = Math.max(reach, Math.hypot(x[i], y[i]) || 0); }
   }
   const scale = radius / (1.04 * (reach || 1)), at = (x, y) => [cx + scale * x, cy - scale * y];
@@ -29,6 +29,9 @@ export function drawOrbit(pen, { name, gap, paths, cursor, force, impacts, angle
       const tick = (share) => at(share * gap[1] * Math.cos(azimuth), share * gap[1] * Math.sin(azimuth));
       pen.line([tick(1.0), tick(1.07)], tone.muted, 1.5);
     }
+  }
+  for (const { x, y, k, dash } of others) {
+    pen.line(Array.from(x, (v, i) => at(v, y[i])), placeColour(tone, k + 1), 1, dash);
   }
   for (const { role, x, y } of paths) {
     pen.line(Array.from(x, (v, i) => at(v, y[i])), role === "estimated" ? faint(tone.estimated, 0.6) : tone[role], role === "measured" ? 0.9 : 2.4);

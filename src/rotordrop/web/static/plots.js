@@ -28,16 +28,23 @@ function levelsOn(u, levels) {
 // A panel: {element, kind, axis, curves: [{label, colour, values, lower, upper}], levels, time, fromZero}
 export function drawPanel(panel, view, on) {
   const tone = colours(), [scale, timeName] = timeScale(view.to - view.from), f = factor(panel.kind);
-  const data = [Float64Array.from(panel.time, (t) => t / scale)], series = [{}], bands = [];
-  const add = (array, made) => { data.push(Array.from(array, (v) => (Number.isFinite(v) ? v / f : null))); series.push(made); };
-  for (const { label, colour, values: drawn, lower, upper, width } of panel.curves) {
+  const own = [Float64Array.from(panel.time, (t) => t / scale)], others = [], series = [{}], bands = [];
+  const finite = (array) => Array.from(array, (v) => (Number.isFinite(v) ? v / f : null));
+  const add = (array, made) => { own.push(finite(array)); series.push(made); };
+  for (const { label, colour, values: drawn, lower, upper, width, dash, time } of panel.curves) {
+    if (time) { // of another drop, which has a clock of its own
+      others.push([Float64Array.from(time, (t) => t / scale), finite(drawn)]);
+      series.push({ label, stroke: colour, width, dash, points: { show: false } });
+      continue;
+    }
     if (lower) {
       bands.push({ series: [series.length, series.length + 1], fill: faint(colour, 0.22) });
       const edge = { stroke: faint(colour, 0.35), width: 0.5, points: { show: false } };
       add(upper, { label: `${label}, upper`, ...edge }); add(lower, { label: `${label}, lower`, ...edge });
     }
-    add(drawn, { label, stroke: colour, width: width || 1.3, points: { show: false } });
+    add(drawn, { label, stroke: colour, width: width || 1.3, dash, points: { show: false } });
   }
+  const data = others.length ? uPlot.join([own, ...others]) : own;
   const axis = { stroke: tone.ink, grid: { stroke: tone.line, width: 1 }, ticks: { stroke: tone.line, width: 1 }, font: "11px system-ui, sans-serif", labelFont: "11px system-ui, sans-serif" };
   const levels = panel.levels.map((level) => ({ ...level, value: level.value / f }));
   const range = (u, low, high) => {
@@ -49,7 +56,7 @@ export function drawPanel(panel, view, on) {
     width: panel.element.clientWidth, height: panel.element.clientHeight, legend: { show: false },
     cursor: { sync: { key: "time" }, drag: { x: true, y: false, setScale: false }, y: false, points: { show: false } },
     scales: { x: { time: false, range: () => [view.from / scale, view.to / scale] }, y: { range } },
-    padding: [8, 8, panel.lowest ? 0 : 4, 0],
+    padding: [8, 16, panel.lowest ? 0 : 4, 0],
     axes: [{ ...axis, size: panel.lowest ? 22 : 3, values: panel.lowest ? values(8) : () => [], gap: 2, ...(panel.lowest ? { label: `time from power-off [${timeName}]`, labelSize: 14, labelGap: 0 } : {}) },
       { ...axis, size: 54, values: values(8), label: `${panel.axis} [${unit(panel.kind)}]`, labelSize: 16, labelGap: 0, gap: 3 }],
     series, bands,
@@ -92,8 +99,10 @@ export function follow(cursor) {
 }
 
 // data: {time, curves: [{values}]}; events: [{time, words}]
-export function drawOverview(canvas, { data, events, impacts, view, span }) {
-  const pen = canvasPen(canvas), tone = colours(), top = 4, bottom = pen.height - 16;
+export const drawOverview = (canvas, told) => stripOn(canvasPen(canvas), told);
+
+export function stripOn(pen, { data, events, impacts, view, span }) {
+  const tone = colours(), top = 4, bottom = pen.height - 16;
   const px = (t) => ((t - span[0]) / (span[1] - span[0])) * pen.width;
   let high = 0;
   for (const { values: drawn } of data.curves) { for (const v of drawn) { if (v > high) { high = v; } } }

@@ -27,6 +27,10 @@ export const newJob = async (name, options) => (await ask("POST", "/api/jobs", o
 export const remove = (id) => ask("DELETE", `/api/jobs/${id}`);
 export const send = (id, role, file) =>
   ask("PUT", `/api/jobs/${id}/files/${role}?name=${encodeURIComponent(file.name)}`, file);
+export const setOptions = async (id, options) => (await ask("POST", `/api/jobs/${id}/options`, order(options))).json();
+export const sentFile = async (id, role) => (await ask("GET", `/api/jobs/${id}/files/${role}`)).blob();
+export const formats = async () => (await ask("GET", "/api/formats")).json();
+export const drops = async () => (await ask("GET", "/api/drops")).json();
 export const begin = async (id, verb, options) => (await ask("POST", `/api/jobs/${id}/${verb}`, order(options))).json();
 export const numbers = async () => (await ask("GET", "/api/numbers")).json();
 export const sendNumbers = (id, values) => ask("POST", `/api/jobs/${id}/numbers`, order(values));

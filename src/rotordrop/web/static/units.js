@@ -18,7 +18,7 @@ export function written(value, digits = 4) {
   const grouped = whole.replace(/\B(?=(\d{3})+$)/g, "\u202f");
   return rest ? `${grouped}.${rest}` : grouped;
 }
-export const shown = (value, kind, digits) => `${written(value / factor(kind), digits)} ${unit(kind)}`;
+export const shown = (value, kind, digits) => (Number.isFinite(value) ? `${written(value / factor(kind), digits)} ${unit(kind)}` : "–");
 
 // Time from power-off: milliseconds in short windows, seconds in long ones.
 export const timeScale = (span) => (span > 3 ? [1, "s"] : [1e-3, "ms"]);

@@ -130,10 +130,9 @@ function drawMap(pen, withCursor) {
 
 // Amplitude of a line in every frame: the largest value within one resolution of where it is then.
 function courseOf(line) {
-  return fall.page.time.map((t) => {
-    const f = along(line.path, t), sides = fall.part === "full" ? [f, -f] : [f];
-    return Number.isFinite(f) ? Math.max(...sides.flatMap((one) => [-1, 0, 1].map((k) => value(frameOf(t), Math.min(Math.max(binOf(one) + k, 0), frequencies().length - 1))))) : NaN;
-  });
+  return line.frames.map((f, row) => (f === null ? NaN
+    : Math.max(...(fall.part === "full" ? [f, -f] : [f]).flatMap((one) => [-1, 0, 1].map((k) => value(row, Math.min(Math.max(binOf(one) + k, 0), frequencies().length - 1))))))
+  );
 }
 
 function drawCut(pen, box, { x, y, title, label, mark }) {
@@ -153,8 +152,9 @@ function drawCut(pen, box, { x, y, title, label, mark }) {
   pen.text(label, (box.left + box.right) / 2, box.bottom + 28, tone.ink, { align: "center", size: 11 });
 }
 
+const cutFrame = () => (fall.at ? frameOf(fall.at.t) : 0);
 function drawCuts(pen) {
-  const [low, high] = span(), first = binOf(low), last = binOf(high), frame = fall.at ? frameOf(fall.at.t) : 0, middle = pen.height / 2;
+  const [low, high] = span(), first = binOf(low), last = binOf(high), frame = cutFrame(), middle = pen.height / 2;
   const x = frequencies().slice(first, last + 1), where = { left: 46, right: pen.width - 10 };
   drawCut(pen, { ...where, top: 20, bottom: middle - 36 }, { x, y: x.map((_, i) => value(frame, first + i)), mark: fall.at ? fall.at.f : NaN,
     title: `Spectrum at ${fall.page.time[frame].toFixed(2)} s [${units.unit("length")}, ${fall.page.amplitude_kind}]`, label: "frequency [Hz]" });
@@ -222,6 +222,18 @@ function csv() {
 export const fallFiles = {
   CSV: csv, SVG: () => keepSvg(picture((pen) => drawMap(pen, false), title()), title()), PNG: () => keepPng(picture((pen) => drawMap(pen, false), title()), title()),
   Python: () => fall.page.python[`${fall.plane} ${fall.part}`]
+};
+
+// The spectrum at the cursor and, where a line is chosen, its course: one table under the other.
+const cutTitle = () => `${title()}_${fall.page.time[cutFrame()].toFixed(2)}_s`;
+function cutCsv() {
+  const frame = cutFrame(), rows = [`frequency [Hz],amplitude at ${fall.page.time[frame]} s [m]`, ...Array.from(frequencies(), (f, k) => `${f},${value(frame, k).toPrecision(7)}`)];
+  if (fall.line) { rows.push("", `time [s],${JSON.stringify(fall.line.label)} [m]`, ...courseOf(fall.line).map((v, i) => `${fall.page.time[i]},${Number.isFinite(v) ? v.toPrecision(7) : ""}`)); }
+  keep(new Blob([[...rows, ""].join("\n")], { type: "text/csv" }), `${cutTitle()}.csv`);
+}
+export const cutFiles = {
+  CSV: cutCsv, SVG: () => keepSvg(picture(drawCuts, cutTitle()), cutTitle()), PNG: () => keepPng(picture(drawCuts, cutTitle()), cutTitle()),
+  Python: () => `${fallFiles.Python()}spectrum = amplitude[abs(time - ${fall.page.time[cutFrame()]}).argmin()]  # [m]\n${fall.line ? `\n${fall.line.python}` : ""}`
 };
 
 const placeOf = (event) => {

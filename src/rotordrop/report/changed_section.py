@@ -1,0 +1,69 @@
+"""What changed on the machine since an earlier drop, parameter by parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from rotordrop.errors import UsageError
+from rotordrop.estimation.changed import Change, changes
+from rotordrop.estimation.document import estimate_document
+from rotordrop.estimation.estimate import Estimate
+from rotordrop.model.parameter_table import row_of
+from rotordrop.report.content import Cell, Section, Statement, Table
+from rotordrop.report.quantity import Quantity, written
+
+HEADING = "Since the last drop"
+NOTHING_GIVEN = "No earlier estimate of this machine was given to compare with."
+NOTE = (
+    "Asked for: 10 µm of a gap, 10 % of a stiffness, 20 % of damping and friction, a factor of two of the "
+    "drag; the last column is the probability of at least that."
+)
+
+
+def changed_section(estimate: Estimate, since: Mapping[str, Any] | None) -> Section:
+    """Compare a drop with an earlier one.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        The drop.
+    since : mapping, optional
+        Document of the earlier estimate, as ``rotordrop estimate --json`` writes it.
+    """
+    if since is None:
+        return Section(heading=HEADING, text=(NOTHING_GIVEN,))
+    try:
+        found = changes(since, estimate_document(estimate))
+    except UsageError as error:
+        return Section(heading=HEADING, text=(f"{since.get('record', 'the earlier drop')}: {error}.",))
+    sentence = found.sentence()
+    for one in found.named:
+        sentence = sentence.replace(one.path, spoken_path(one.path))
+    table = Table(
+        columns=("parameter", "before", "now", "change (90 % interval)", "changed that much"),
+        rows=tuple(_row(one) for one in found.found),
+        caption=f"Changes since {found.first}",
+        note=NOTE,
+    )
+    statement = Statement(text=sentence, level="warning" if found.named else "good")
+    return Section(heading=HEADING, statements=(statement,), tables=(table,) if found.found else ())
+
+
+def spoken_path(path: str) -> str:
+    """Name of a parameter for people: what it belongs to, and what it is."""
+    return f"{path.partition('.')[0]}: {row_of(path).label}"
+
+
+def _row(one: Change) -> tuple[Cell, ...]:
+    kind = row_of(one.path).display_kind
+    before, after = (Quantity(value=value, kind=kind) for value in (one.before, one.after))
+    if not one.determined:
+        return (spoken_path(one.path), before, after, "the records do not say", "–")
+    low, high = one.interval_90
+    if one.factor:
+        text = f"× {one.change:.3g} ({low:.3g} to {high:.3g})"
+    else:
+        ends = (written(1e6 * end, 1) for end in (one.change, low, high))
+        text = "{} µm ({} to {} µm)".format(*ends)
+    return (spoken_path(one.path), before, after, text, f"{one.probability:.0%}")

@@ -1,0 +1,83 @@
+"""Drops that a drop is compared with: estimates that are here, and entries of a log of drops."""
+
+from __future__ import annotations
+
+import json
+import math
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from rotordrop.errors import UsageError
+from rotordrop.ledger.book import LoggedDrop, drop_of_estimate, logged_drops
+from rotordrop.model.parameter_table import LOADS
+from rotordrop.report.quantity import Quantity
+from rotordrop.web.drawn import quantity_json
+from rotordrop.web.running import result_folder
+from rotordrop.web.workspace import Job, Workspace
+
+_KINDS = {"N": "force", "Pa": "pressure"}
+_LABELS = {load.field: load.label for load in LOADS}
+
+
+def compared_drops(space: Workspace, log: str | None) -> list[dict[str, Any]]:
+    """Every drop with an estimate, and every drop of the log whose recording is not among them.
+
+    Their numbers are those of the log: a number without an interval is no evidence.
+
+    Raises
+    ------
+    OutputError
+        When the log cannot be read.
+    """
+    drops, seen = [], set()
+    for job in space.jobs():
+        drop = _estimated(job)
+        if drop is not None:
+            seen.add(drop.sha256)
+            drops.append({**_told(drop), "job": job.number, "name": job.read()["name"]})
+    for number, drop in logged_drops(log).items() if log is not None else ():
+        if drop.sha256 not in seen:
+            lines = f"from rotordrop.ledger.book import logged_drops\n\ndrop = logged_drops(LOG)[{number}]\n"
+            drops.append({**_told(drop), "log": number, "name": drop.record, "python": lines})
+    return drops
+
+
+def _estimated(job: Job) -> LoggedDrop | None:
+    try:
+        folder = result_folder(job, "estimate")
+        return None if folder is None else _drop_of(folder)
+    except (FileNotFoundError, UsageError):  # removed meanwhile, or of nothing that can be compared
+        return None
+
+
+@lru_cache(maxsize=512)
+def _drop_of(folder: Path) -> LoggedDrop:
+    document = json.loads((folder / "document.json").read_text(encoding="utf-8"))
+    return drop_of_estimate(document, "", recorded=document.get("recorded") or "")
+
+
+def _told(drop: LoggedDrop) -> dict[str, Any]:
+    return {
+        "machine": drop.machine,
+        "recorded": drop.recorded,
+        "method": drop.method,
+        "verdict": drop.verdict,
+        "speed": quantity_json(Quantity(value=drop.speed, kind="speed")),
+        "numbers": [
+            {
+                "bearing": one.bearing,
+                "quantity": _LABELS[one.quantity],
+                "lower": one.lower,
+                "upper": one.upper,
+                **quantity_json(
+                    Quantity(
+                        value=math.nan if one.value is None else one.value,
+                        kind=_KINDS[one.unit],
+                        interval_90=(one.lower, one.upper),
+                    )
+                ),
+            }
+            for one in drop.severity
+        ],
+    }

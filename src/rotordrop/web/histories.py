@@ -1,0 +1,109 @@
+"""Windows of the histories of a result: drawn from few points, or as a table of every sample."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import AsyncIterator
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from starlette.requests import Request
+from starlette.responses import FileResponse, Response, StreamingResponse
+
+from rotordrop.errors import UsageError
+from rotordrop.web.desk import Desk, NotThereError, number
+from rotordrop.web.workspace import labelled
+
+if TYPE_CHECKING:
+    from rotordrop.web.traces import Traces
+
+CSV_ROWS = 20_000
+
+
+async def field(desk: Desk, request: Request) -> Response:
+    """Amplitudes of one waterfall [m], frame after frame, in single precision."""
+    from rotordrop.web.drawn import field_name
+
+    told = _page_of(desk.found(request))
+    if "parts" not in told:
+        raise NotThereError("this result has no waterfall")
+    plane, part = number(request, "plane", 0), request.query_params.get("part", told["parts"][0])
+    if plane not in range(len(told["planes"])) or part not in told["parts"]:
+        raise UsageError(
+            f"there is no waterfall of plane {plane:g}, part {labelled(part)!r}; there are planes 0 to "
+            f"{len(told['planes']) - 1} and parts {', '.join(told['parts'])}"
+        )
+    place = desk.found(request) / field_name(int(plane), part)
+    return FileResponse(place, media_type="application/octet-stream")
+
+
+async def window(desk: Desk, request: Request) -> Response:
+    """Few samples that show a window of histories, in single precision."""
+    folder = desk.found(request)
+    traces, rows, start, end = await asyncio.to_thread(_asked_window, folder, request)
+    return Response(
+        await asyncio.to_thread(_samples, traces, rows, start, end, request),
+        media_type="application/octet-stream",
+    )
+
+
+def _samples(traces: Traces, rows: list[int], start: float, end: float, request: Request) -> bytes:
+    from rotordrop.web.traces import FEWEST_POINTS, MOST_POINTS, sent
+
+    points = int(number(request, "points", MOST_POINTS))
+    if not FEWEST_POINTS <= points <= MOST_POINTS:
+        raise UsageError(f"{points} points asked for; {FEWEST_POINTS} to {MOST_POINTS} are sent")
+    return sent(traces, rows, traces.window(rows, start, end, points))
+
+
+def _asked_window(folder: Path, request: Request) -> tuple[Traces, list[int], float, float]:
+    from rotordrop.web.traces import open_traces
+
+    told = _traces_of(folder)
+    traces = open_traces(folder, told["name"], tuple(told["columns"]))
+    rows = traces.chosen(tuple(request.query_params.getlist("column")))
+    start, end = number(request, "start", told["start"]), number(request, "end", told["end"])
+    if not start < end:
+        raise UsageError(
+            f"the window from {start:g} s to {end:g} s holds nothing; give an end after its start"
+        )
+    return traces, rows, start, end
+
+
+def _traces_of(folder: Path) -> dict[str, Any]:
+    found = _page_of(folder)
+    if "traces" not in found:
+        raise NotThereError("this result has no histories")
+    return dict(found["traces"])
+
+
+@lru_cache(maxsize=64)
+def _page_of(folder: Path) -> dict[str, Any]:
+    """What the routes need of the content of a page."""
+    found: dict[str, Any] = json.loads((folder / "page.json").read_text(encoding="utf-8"))
+    return {key: found[key] for key in ("traces", "planes", "parts") if key in found}
+
+
+async def csv(desk: Desk, request: Request) -> Response:
+    """Every sample of a window as a table, in SI units."""
+    traces, rows, start, end = await asyncio.to_thread(_asked_window, desk.found(request), request)
+    headers = {"content-disposition": 'attachment; filename="rotordrop.csv"'}
+    return StreamingResponse(
+        _table(traces, rows, start, end), media_type="text/csv; charset=utf-8", headers=headers
+    )
+
+
+async def _table(traces: Traces, rows: list[int], start: float, end: float) -> AsyncIterator[str]:
+    import numpy as np
+
+    first = int(np.searchsorted(traces.time, start))
+    last = int(np.searchsorted(traces.time, end, side="right"))
+    yield ",".join(["time [s]", *(f"{traces.columns[row]} [SI]" for row in rows)]) + "\n"
+    for begin in range(first, last, CSV_ROWS):
+        stop = min(begin + CSV_ROWS, last)
+        table = [[repr(float(time)) for time in traces.time[begin:stop]]]
+        table += [[f"{value:.9g}" for value in traces.values[row, begin:stop].tolist()] for row in rows]
+        yield "".join(",".join(line) + "\n" for line in zip(*table, strict=True))
+        await asyncio.sleep(0)

@@ -1,0 +1,159 @@
+// Window and cursor: where they are, what is read at the cursor, and the orbits that follow it.
+import { canvasPen, keepPng, keepSvg } from "./figures.js";
+import { dashOf } from "./compare.js";
+import { drawOrbit, nearest, orbitPicture } from "./orbit.js";
+import { csv, drawStrip, lines, loadView } from "./panels.js";
+import { follow } from "./plots.js";
+import { by, fileName, files, impacts, showLines, span, state, zero } from "./state.js";
+import { make } from "./tables.js";
+import * as units from "./units.js";
+
+const motions = () => state.panels.filter((panel) => panel.id.startsWith("motion "));
+
+function orbitOf(index) {
+  const panel = state.panels[index], place = state[panel.verb].places[index], forcePanel = state.panels.find((one) => one.id === "force");
+  const paths = ["estimated", "measured"].filter((role) => place[role]).map((role) => ({ role, time: panel.time, x: panel.found[place[role][0]], y: panel.found[place[role][1]] }));
+  const others = panel.found.others.map(({ found, columns: [x, y], k }) => ({ x: found[x], y: found[y], k, dash: dashOf(k) }));
+  let force = null;
+  if (forcePanel && panel.verb === "estimate" && state.cursor !== null) {
+    force = { value: forcePanel.found[place.force[0]][nearest(forcePanel.time, state.cursor)], largest: place.peaks.force.value };
+  }
+  const turning = state.estimate ? state.estimate.speed : null;
+  return { name: place.name, gap: place.gap, paths, others, cursor: state.cursor, force,
+    impacts: impacts().filter((one) => one.place === place.name && one.time >= state.view.from && one.time <= state.view.to).map((one) => one.azimuth),
+    angle: turning && state.cursor !== null && state.view.to - state.view.from < 2 ? turning * state.cursor : null };
+}
+
+export function makeOrbits() {
+  const names = motions().map(({ verb }, i) => state[verb].places[i].name), box = by("orbits");
+  if (box.dataset.names !== names.join("\n")) {
+    box.dataset.names = names.join("\n");
+    box.replaceChildren(...names.map((name, i) => {
+      const title = `Orbit ${name}`;
+      return make("figure", { class: "orbit", of: [make("canvas", { role: "img" }), make("header", { of: [files(title, {
+        csv: () => csv({ ...state.panels[i], title }), svg: () => keepSvg(orbitPicture(orbitOf(i)), fileName(title)),
+        png: () => keepPng(orbitPicture(orbitOf(i)), fileName(title)), python: () => showLines(lines(state.panels[i].verb, `orbit ${i}`))
+      })] })] });
+    }));
+  }
+  drawOrbits();
+}
+
+function drawOrbits() {
+  [...by("orbits").querySelectorAll("canvas")].forEach((canvas, i) => {
+    if (!motions()[i]) { return; }
+    const told = orbitOf(i);
+    drawOrbit(canvasPen(canvas), told);
+    canvas.setAttribute("aria-label", `Orbit at ${told.name} in its clearance circle, ${told.paths.map((one) => one.role).join(" and ")}, ${told.impacts.length} impacts in the window`);
+  });
+  readout();
+}
+
+// Shaft speed [rad/s] at a time: as recorded, or that of the estimate.
+function speedAt(t) {
+  const { speed } = state, found = speed && speed.time.length ? speed.speed[nearest(speed.time, t)] : NaN;
+  return Number.isFinite(found) ? found : state.estimate?.speed ?? state.look.speed ?? NaN;
+}
+
+// Turns of the shaft centre round the middle per turn of the shaft, over half a turn of the shaft about a time: forward
+// positive. Where samples were left out, or such a time lies outside the window, it is not known.
+export function orderAt(time, x, y, t, speed) {
+  const half = Math.PI / 2 / speed, first = nearest(time, t - half), last = nearest(time, t + half);
+  if (!(speed > 0) || last - first < 16 || time[first] > t - 0.9 * half || time[last] < t + 0.9 * half) { return NaN; }
+  let turned = 0;
+  for (let i = first + 1; i <= last; i += 1) {
+    const step = Math.atan2(x[i - 1] * y[i] - y[i - 1] * x[i], x[i - 1] * x[i] + y[i - 1] * y[i]);
+    if (Math.abs(step) > 2) { return NaN; }
+    turned += step;
+  }
+  return turned / (speed * (time[last] - time[first]));
+}
+
+function cellsOf({ verb, found }, place, at) {
+  const value = (from, name) => (from[name] ? from[name][nearest(from.time, at)] : NaN);
+  const role = place.estimated ? "estimated" : "measured", [x, y] = at === null ? [NaN, NaN] : place[role].map((name) => value(found, name));
+  const order = at === null ? NaN : orderAt(found.time, ...place[role].map((name) => found[name]), at, speedAt(at));
+  const cells = [units.written(x / units.factor("length"), 4), units.written(y / units.factor("length"), 4), place.gap ? units.written(Math.hypot(x, y) / place.gap[1], 3) : "–",
+    Number.isFinite(x) ? `${Math.round((Math.atan2(y, x) * 180) / Math.PI)}°`.replace("-", "−") : "–",
+    Number.isFinite(order) ? `${order.toFixed(2).replace("-", "−")}X` : "–"];
+  for (const [id, name, kind] of state.estimate ? [["force", "force", "force"], ["stress", "stress", "pressure"]] : []) {
+    const panel = state.panels.find((one) => one.id === id), names = verb === "estimate" ? place[name] : [];
+    const [now, low, high] = names.map((column) => (at !== null ? value(panel.found, column) / units.factor(kind) : NaN));
+    cells.push(Number.isFinite(now) ? [units.written(now, 4), names[1] ? `${units.written(low, 3)} to ${units.written(high, 3)}` : ""] : "–");
+  }
+  return cells;
+}
+
+function readout() {
+  const at = state.cursor, speed = at === null ? NaN : speedAt(at);
+  by("clock").textContent = at === null ? "point at a trace"
+    : `${units.timeText(at, state.view.to - state.view.from)} · record ${(at + zero()).toFixed(5)} s${speed > 0 ? ` · ${units.shown(speed, "speed", 4)}` : ""}`;
+  const rows = motions().map((panel, i) => {
+    const place = state[panel.verb].places[i];
+    return make("tr", { of: [make("th", { scope: "row", text: place.name }), ...cellsOf(panel, place, at).map((cell) => (Array.isArray(cell)
+      ? make("td", { class: "number", of: [make("span", { text: cell[0] }), make("span", { class: "interval", text: cell[1] })] }) : make("td", { class: "number", text: cell })))] });
+  });
+  const of = (name, kind) => `${name} [${units.unit(kind)}]`;
+  const columns = ["", of("x", "length"), of("y", "length"), "radius/gap", "angle", "order", ...(state.estimate ? [of("force", "force"), of("stress", "pressure")] : [])];
+  const meant = { angle: "Angle on the ring, from +x", order: "Turns of the shaft centre per turn of the shaft, over half a turn of the shaft about the cursor; forward positive" };
+  by("readhead").replaceChildren(make("tr", { of: columns.map((text, i) => make("th", { scope: "col", text, title: meant[text] || null, class: i ? "number" : null })) }));
+  by("readout").replaceChildren(...rows);
+}
+
+// ---- where window and cursor are
+
+export function setView({ from, to }) {
+  const [first, last] = span(), least = 1e-4, width = Math.min(Math.max(to - from, least), last - first);
+  const begin = Math.min(Math.max(from, first), last - width);
+  state.view = { from: begin, to: begin + width };
+  drawStrip();
+  loadView();
+}
+export const setWindow = (from, to) => setView({ from: Math.min(from, to), to: Math.max(from, to) });
+export function zoom(share, about) {
+  const { from, to } = state.view, centre = about ?? (state.cursor !== null && state.cursor > from && state.cursor < to ? state.cursor : (from + to) / 2);
+  setView({ from: centre + share * (from - centre), to: centre + share * (to - centre) });
+}
+export const pan = (direction) => { const by4 = ((state.view.to - state.view.from) / 4) * direction; setView({ from: state.view.from + by4, to: state.view.to + by4 }); };
+export function setCursor(t) { state.cursor = t; drawOrbits(); follow(t); }
+export function stepCursor(direction) {
+  const { time } = state.panels[0], here = state.cursor === null ? 0 : nearest(time, state.cursor);
+  setCursor(time[Math.min(Math.max(here + direction, 0), time.length - 1)]);
+}
+export const nextImpact = (direction) => {
+  if (state.impact >= 0) { return state.impact + direction; }
+  const list = impacts(), at = state.cursor ?? state.view.from;
+  return direction > 0 ? Math.max(0, list.findIndex((one) => one.time > at)) : list.findLastIndex((one) => one.time < at);
+};
+
+export function play(on) {
+  by("play").setAttribute("aria-pressed", String(on));
+  by("play").textContent = on ? "❚❚ pause" : "▶ play";
+  state.playing = on ? performance.now() : null;
+  if (on) { requestAnimationFrame(frame); }
+}
+function frame(now) {
+  if (state.playing === null) { return; }
+  const { from, to } = state.view, step = (now - state.playing) / 1000 / Number(by("slower").value);
+  state.playing = now;
+  const t = (state.cursor === null || state.cursor < from || state.cursor > to ? from : state.cursor) + step;
+  setCursor(t > to ? from : t);
+  requestAnimationFrame(frame);
+}
+
+const overview = by("overview");
+let grabbed = null;
+const timeAt = (event) => { const [first, last] = span(); return first + (event.offsetX / overview.clientWidth) * (last - first); };
+overview.addEventListener("pointerdown", (event) => { grabbed = timeAt(event); overview.setPointerCapture(event.pointerId); });
+overview.addEventListener("pointerup", (event) => {
+  if (grabbed === null) { return; }
+  const until = timeAt(event), wide = Math.abs(until - grabbed) > 0.004 * (span()[1] - span()[0]), half = (state.view.to - state.view.from) / 2;
+  if (wide) { setWindow(grabbed, until); } else { setView({ from: until - half, to: until + half }); }
+  grabbed = null;
+});
+for (const id of ["from", "to"]) {
+  by(id).addEventListener("change", () => {
+    const [scale] = units.timeScale(state.view.to - state.view.from), [from, to] = ["from", "to"].map((name) => scale * Number(by(name).value.replace(",", ".").replace("−", "-")));
+    if (Number.isFinite(from) && to > from) { setWindow(from, to); }
+  });
+}

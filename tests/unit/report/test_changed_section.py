@@ -1,0 +1,49 @@
+"""What changed since the last drop stands in the report, in the words of its tables."""
+
+from __future__ import annotations
+
+import copy
+
+from rotordrop.estimation.document import estimate_document
+from rotordrop.estimation.estimate import Estimate
+from rotordrop.report.changed_section import HEADING, NOTHING_GIVEN, changed_section
+from rotordrop.report.estimate_page import estimate_page
+from rotordrop.report.machine_sections import spoken_key
+
+
+def test_without_an_earlier_estimate_it_says_so(estimate: Estimate) -> None:
+    section = next(part for part in estimate_page(estimate).sections if part.heading == HEADING)
+    assert section.text == (NOTHING_GIVEN,)
+
+
+def test_the_same_drop_twice_shows_no_change_and_names_no_path(estimate: Estimate) -> None:
+    document = copy.deepcopy(estimate_document(estimate))
+    section = changed_section(estimate, document)
+    assert "no parameter changed beyond chance" in section.statements[0].text
+    names = [str(row[0]) for row in section.tables[0].rows]
+    assert "NDE: air gap" in names
+    assert not any("_" in name or "." in name for name in names)
+
+
+def test_a_wider_gap_before_is_named_in_words(estimate: Estimate) -> None:
+    document = copy.deepcopy(estimate_document(estimate))
+    for one in document["parameters"]:
+        if one["path"] == "NDE.air_gap":
+            known = one["estimate"]
+            known["value"] -= 60e-6
+            known["interval_90"] = [end - 60e-6 for end in known["interval_90"]]
+    document.pop("joint", None)
+    section = changed_section(estimate, document)
+    assert section.statements[0].level == "warning"
+    assert "NDE: air gap (" in section.statements[0].text
+
+
+def test_another_machine_is_a_sentence(estimate: Estimate) -> None:
+    document = {**estimate_document(estimate), "machine": "another"}
+    assert "only drops of one machine can" in changed_section(estimate, document).text[0]
+
+
+def test_keys_of_the_machine_file_are_words() -> None:
+    assert spoken_key("unbalance.0.amount") == "unbalance 1, amount"
+    assert spoken_key("sensors.*.position_error") == "every one of sensors, position error"
+    assert spoken_key("NDE.race.width") == "NDE, race, width"

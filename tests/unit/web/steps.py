@@ -1,0 +1,51 @@
+"""What a person does on the page, step by step, and what is expected of it at every step."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from tests.unit.web.browser import Browser
+from tests.unit.web.serving import Served
+
+from rotordrop.web.workspace import Workspace
+
+LOOKED = "document.querySelectorAll('.panel canvas').length >= 2"
+PRESS = "document.getElementById('{}').click()"
+
+
+@contextlib.contextmanager
+def serving(folder: Path) -> Iterator[Served]:
+    server = Served(Workspace(folder))
+    try:
+        yield server
+    finally:
+        server.stop()
+
+
+def send(browser: Browser, files: Sequence[Path]) -> None:
+    browser.choose_files("#files", list(files))
+    browser.until("document.getElementById('sending').open")
+    browser.key("Enter")
+
+
+def look_at(browser: Browser, server: Served, files: Sequence[Path]) -> None:
+    """Open the page, send the files, and wait until the record is drawn."""
+    browser.open(server.address)
+    browser.until("!document.getElementById('empty').hidden")
+    send(browser, files)
+    browser.until(LOOKED)
+
+
+def press(browser: Browser, button: str) -> None:
+    browser.evaluate(PRESS.format(button))
+
+
+def quiet(browser: Browser) -> None:
+    assert browser.messages() == []
+    assert browser.foreign() == []
+
+
+def words(browser: Browser, selector: str) -> str:
+    return str(browser.evaluate(f"document.querySelector({selector!r})?.innerText"))

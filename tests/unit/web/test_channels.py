@@ -1,0 +1,143 @@
+"""A record whose channels have other names: what it holds is told, and the answer serves all computations."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rotordrop import load_machine, look
+from rotordrop.machine.simple import EXAMPLES
+from rotordrop.measurement.profile import Profile, load_profile
+from rotordrop.web.python_lines import estimate_lines, look_lines
+
+SENSORS = {"NDE_A": "S_NDE_A", "NDE_B": "S_NDE_B", "DE_A": "S_DE_A", "DE_B": "S_DE_B"}
+
+
+def profile_text(**speed: str) -> bytes:
+    text = "[channels]\n" + "".join(f'{sensor} = "{channel}"\n' for sensor, channel in SENSORS.items())
+    return (text + "".join(f'[speed]\n{name} = "{value}"\n' for name, value in speed.items())).encode()
+
+
+@pytest.fixture(scope="module")
+def job(served, files) -> str:
+    number = served.new_job({"record": files["record"]})
+    served.order(f"/api/jobs/{number}/numbers", {k: v for k, v in EXAMPLES.items() if k != "preload"})
+    return str(number)
+
+
+def test_what_a_record_holds_is_told_with_what_is_missing(served, job):
+    served.order(f"/api/jobs/{job}/look")
+    assert "has no channel 'NDE_A' for sensor NDE_A" in served.settled(job, "look")["error"]
+    served.order(f"/api/jobs/{job}/channels")
+    assert served.settled(job, "channels")["state"] == "done"
+    told = served.ask("GET", f"/api/jobs/{job}/channels/page").told
+    held = {one["label"].split("/")[-1] for one in told["channels"] if one["unit"] == "m"}
+    assert held == set(SENSORS.values())
+    assert [sensor["name"] for sensor in told["sensors"]] == list(SENSORS)
+    assert "channels of NDE_A, NDE_B, DE_A, DE_B" in told["missing"][0]
+
+
+def test_the_answer_serves_look_and_lines_of_python(served, job, files, tmp_path, monkeypatch):
+    sent = served.ask("PUT", f"/api/jobs/{job}/files/profile?name=mine.toml", profile_text())
+    assert sent.status == 201, sent.text
+    served.order(f"/api/jobs/{job}/look")
+    assert served.settled(job, "look")["state"] == "done"
+    page = served.ask("GET", f"/api/jobs/{job}/look/page").told
+    for role, name in (("machine", "twelve_numbers.toml"), ("profile", "mine.toml")):
+        (tmp_path / name).write_bytes(served.ask("GET", f"/api/jobs/{job}/files/{role}").body)
+    (tmp_path / "drop_060.h5").write_bytes(files["record"].read_bytes())
+    monkeypatch.chdir(tmp_path)
+    told: dict[str, object] = {}
+    exec(page["python"]["impacts"], told)
+    shown = [(one["place"], one["time"], one["azimuth"]) for one in page["impacts"]]
+    assert [entry[:3] for entry in told["impacts"]] == shown
+    assert len(shown) > 2
+    seen = look("drop_060.h5", machine=load_machine("twelve_numbers.toml"), profile="mine.toml")
+    np.testing.assert_array_equal([one.time for one in seen.impacts], [one[1] for one in shown])
+
+
+def test_planes_named_by_hand_need_no_machine(served, files):
+    number = served.new_job({"record": files["record"]}, gap="250 um")
+    planes = "ONE: S_NDE_A 135 deg, S_NDE_B 45 deg; TWO: S_DE_A 135 deg, S_DE_B 45 deg"
+    changed = served.order(f"/api/jobs/{number}/options", {"planes": planes})
+    assert changed.told["options"] == {"gap": "250 um", "planes": planes}
+    served.order(f"/api/jobs/{number}/look")
+    assert served.settled(number, "look")["state"] == "done"
+    document = served.ask("GET", f"/api/jobs/{number}/look/document").told
+    assert [plane["plane"] for plane in document["planes"]] == ["ONE", "TWO"]
+    page = served.ask("GET", f"/api/jobs/{number}/look/page").told
+    assert "mapping=['ONE: S_NDE_A 135 deg, S_NDE_B 45 deg', 'TWO: " in page["python"]["overview"]
+
+
+def test_options_that_change_drop_what_was_found_without_them(served, files):
+    number = served.new_job({"record": files["record"]}, gap="250 um")
+    served.order(f"/api/jobs/{number}/look")
+    served.settled(number, "look")
+    assert served.order(f"/api/jobs/{number}/options", {"gap": "260 um"}).told["states"] == {}
+    assert served.ask("GET", f"/api/jobs/{number}/look/page").status == 404
+
+
+def test_a_speed_by_hand_is_in_the_lines_of_python(tmp_path, monkeypatch):
+    files = {"machine": {"name": "m.toml"}, "record": {"name": "r.csv"}, "profile": {"name": "p.toml"}}
+    (tmp_path / "p.toml").write_bytes(profile_text())
+    monkeypatch.chdir(tmp_path)
+    for lines in (estimate_lines(files, {"speed": "60 Hz"}, []), look_lines(files, {"speed": "60 Hz"}, 0)):
+        text = lines["impacts"]
+        head = [line for line in text.split("\n") if "profile" in line and "read_record" not in line]
+        told: dict[str, Profile] = {}
+        exec("\n".join(line for line in head if "look(" not in line), told)
+        assert told["profile"].channels == load_profile("p.toml").channels
+        assert told["profile"].speed.constant == "60 Hz"
+        assert "profile=profile" in text
+
+
+def test_a_file_that_was_not_sent_is_not_there(served, job):
+    for role in ("tail", "token", "beside", ".."):
+        assert served.ask("GET", f"/api/jobs/{job}/files/{role}").status == 404
+
+
+def test_the_page_states_what_the_readers_read(served):
+    from rotordrop.measurement.readers import known_formats
+
+    assert tuple(served.ask("GET", "/api/formats").told["formats"]) == known_formats()
+
+
+def test_a_full_disk_leaves_no_history(tmp_path):
+    """What does not fit is an error, never a shorter file."""
+    import resource
+    import subprocess
+    import sys
+
+    program = (
+        "import resource, sys; from pathlib import Path; import numpy as np, signal;"
+        "from rotordrop.web.traces import write_traces; signal.signal(signal.SIGXFSZ, signal.SIG_IGN);"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000));"
+        "write_traces(Path(sys.argv[1]), 'drop', np.arange(1e5), {'a': np.zeros(100_000)})"
+    )
+    assert resource.RLIMIT_FSIZE
+    done = subprocess.run(
+        [sys.executable, "-c", program, str(tmp_path)],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={"PYTHONPATH": ":".join(filter(None, sys.path))},
+    )
+    assert "OutputError" in done.stderr and "drop.time.npy" in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_result_of_files_that_were_replaced_does_not_count(served, files):
+    from rotordrop.web.running import publish, published_run
+
+    number = served.new_job({"record": files["record"]})
+    job = served.space.job(number)
+    before, made = job.digests(), Path(job.path / "look.made")
+    served.ask("PUT", f"/api/jobs/{number}/files/record?name=a.csv", b"other")
+    made.mkdir()
+    publish(job, "look", "0" * 16, made, before)
+    assert published_run(job, "look") is None
+    assert served.ask("GET", f"/api/jobs/{number}/look/page").status == 404
+    json.loads((job.path / "look.result.json").read_text())
