@@ -48,7 +48,7 @@ def init(
     ] = None,
     example: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help='Copy an example machine: "paper", or "lp400" with a recording.'),
+        typer.Option(metavar="NAME", help='Copy an example: "paper", "small", or "lp400" with a recording.'),
     ] = None,
     force: ForceOption = False,
     simple: Annotated[
