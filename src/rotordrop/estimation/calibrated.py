@@ -15,7 +15,7 @@ from rotordrop.estimation.document import structure_json
 from rotordrop.estimation.estimate import Structure
 from rotordrop.estimation.joint_spread import joint_spread
 from rotordrop.estimation.structure_sentence import structure_of
-from rotordrop.estimation.tracked import track_drops
+from rotordrop.estimation.tracked import CALIBRATION_SCHEDULE, track_drops
 from rotordrop.estimation.tracked_loads import INCONSISTENT_WIDENING
 from rotordrop.estimation.tracked_parameters import (
     NOT_DETERMINED,
@@ -33,6 +33,7 @@ from rotordrop.model.statics import bearing_load_shares
 from rotordrop.model.unknowns import typical_depth
 from rotordrop.tracking.consistency import Check, consistency_checks
 from rotordrop.tracking.problem import DropProblem
+from rotordrop.tracking.process_noise import likeliest_noise, with_noise
 from rotordrop.tracking.smoother import Smoothed, parameter_sample
 
 Array = NDArray[np.float64]
@@ -143,10 +144,14 @@ def calibrate_machine(
     model = build_drop_model(machine)
     evidence = [read_evidence(model, r, t, name=n) for r, t, n in zip(records, tails, stems, strict=True)]
     found = track_drops(machine, evidence, calibrate_only=True, progress=progress)
-    machine, tracked = found.machine, found.fit
+    machine, usual = found.machine, found.fit
+    factor = likeliest_noise(usual, CALIBRATION_SCHEDULE[-1])
+    tracked = with_noise(usual, CALIBRATION_SCHEDULE[-1], factor)
     checks = {
-        name: consistency_checks(problem, smoothed, 1.0)
-        for name, problem, smoothed in zip(stems, tracked.problems, tracked.smoothed, strict=True)
+        name: consistency_checks(problem, replace(smoothed, filtered=past.filtered), factor)
+        for name, problem, smoothed, past in zip(
+            stems, tracked.problems, tracked.smoothed, usual.smoothed, strict=True
+        )
     }
     consistent = all(check.passed for one in checks.values() for check in one)
     problem, smoothed = tracked.problems[-1], tracked.smoothed[-1]
@@ -177,7 +182,7 @@ def calibrate_machine(
         confounded=_confounded(problem, covariance),
         checks=checks,
         consistent=consistent,
-        nis=dict(zip(stems, tracked.nis, strict=True)),
+        nis=dict(zip(stems, usual.nis, strict=True)),
         structure=tuple(structure_of(one, machine, said) for one in found.kept),
     )
 

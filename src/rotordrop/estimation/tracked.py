@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -47,7 +46,8 @@ from rotordrop.tracking.calibration import (
 from rotordrop.tracking.consistency import DIRECTIONS, Check, consistency_checks
 from rotordrop.tracking.forces import ForceHistory, force_history
 from rotordrop.tracking.problem import DropProblem, Fall, RecordedDrop, build_problem, fall_time
-from rotordrop.tracking.smoother import Smoothed, forward
+from rotordrop.tracking.process_noise import likeliest_noise, with_noise
+from rotordrop.tracking.smoother import Forward, Smoothed, forward
 from rotordrop.tracking.transfer import transferred
 
 Array = NDArray[np.float64]
@@ -62,17 +62,11 @@ COARSE_REACH, FINE_REACH = 2.25, 6.0
 at mid-span was lost at 2.1 and followed from 3.2 on, one of 1.1 m and 60 kg is followed at 2.4."""
 
 FINE_SCHEDULE: tuple[Stage, ...] = (
-    Stage(until=0.06, force=0.07, share=0.01, passes=2),
-    Stage(until=0.1, force=0.07, share=0.01, passes=1),
-    Stage(until=0.15, force=0.07, share=0.01, passes=1),
-    Stage(until=0.2, force=0.07, share=0.01, passes=2),
+    Stage(until=0.06, force=0.07, share=0.01, passes=1),
+    Stage(until=0.2, force=0.07, share=0.01, passes=1),
 )
-CALIBRATION_SCHEDULE = FINE_SCHEDULE[:1]
+CALIBRATION_SCHEDULE = (replace(FINE_SCHEDULE[0], passes=2),)
 WINDOW = 0.2
-NOISE_FACTORS = (0.5, 1.0, 2.0, 4.0, 8.0)
-NOISE_WINDOW = 8.4
-"""Part of the drop on which the size of the unknown forces is judged, over the time of a free fall [1]."""
-
 MOST_REPEATS, SMALL_RISE = 6, 5.0
 """Repeats of the first window of the finer basis with an extension, and the rise of the log likelihood that
 ends them [1]."""
@@ -96,7 +90,10 @@ class TrackedDrop:
     evidence : Evidence
         What the record says beside the contacts.
     problem, smoothed : DropProblem, Smoothed
-        The estimation problem and its smoothed estimate; hundreds of megabytes.
+        The estimation problem and its smoothed estimate with the likeliest unknown impulses; hundreds of
+        megabytes.
+    usual : Forward
+        The pass with impulses of the usual size, by whose innovations the model is judged.
     forces : ForceHistory
         Force and stress over time with standard deviations.
     checks : tuple of Check
@@ -112,6 +109,7 @@ class TrackedDrop:
     evidence: Evidence
     problem: DropProblem
     smoothed: Smoothed
+    usual: Forward
     forces: ForceHistory
     checks: tuple[Check, ...]
     noise_factor: float
@@ -403,37 +401,11 @@ def _first_contact(item: Evidence) -> float:
     return max(item.power_off.contact - item.power_off.value, 0.002)
 
 
-def best_noise_factor(problem: DropProblem, smoothed: Smoothed, stage: Stage) -> float:
-    """Size of the unknown impulses, relative to the usual one, that makes the first impacts most likely [1].
-
-    Searched upwards or downwards from the usual size; what later impacts miss shows in their innovations.
-    """
-    samples = min(int(np.searchsorted(problem.time, NOISE_WINDOW * problem.fall_time)), len(smoothed.means))
-
-    def improbability(factor: float) -> float:
-        settings = stage_settings(problem, stage, factor)
-        result = forward(problem, settings, reference=smoothed.means, samples=samples, smoothing=False)
-        return result.negative_log_likelihood if result.done == samples else math.inf
-
-    usual = NOISE_FACTORS.index(1.0)
-    with ThreadPoolExecutor(max_workers=2) as pool:
-        nearby = list(pool.map(improbability, NOISE_FACTORS[usual - 1 : usual + 2]))
-    if nearby[0] < min(nearby[1:]):
-        return NOISE_FACTORS[usual - 1]
-    best, least = usual, nearby[1]
-    following = nearby[2]
-    while following < least:
-        best, least = best + 1, following
-        if best + 1 == len(NOISE_FACTORS):
-            break
-        following = improbability(NOISE_FACTORS[best + 1])
-    return NOISE_FACTORS[best]
-
-
 def tracked_drop(
     evidence: Evidence,
     problem: DropProblem,
     smoothed: Smoothed,
+    usual: Forward,
     noise_factor: float,
     drops: int = 1,
     kept: tuple[Kept, ...] = (),
@@ -444,8 +416,9 @@ def tracked_drop(
         evidence=evidence,
         problem=problem,
         smoothed=smoothed,
+        usual=usual,
         forces=of_a_beam(forces) if is_beam(problem.model.machine.rotor) else forces,
-        checks=consistency_checks(problem, smoothed, noise_factor),
+        checks=consistency_checks(problem, replace(smoothed, filtered=usual), noise_factor),
         noise_factor=noise_factor,
         drops=drops,
         kept=kept,
@@ -464,12 +437,12 @@ def followed_drops(
     Each is given away with its arrays, so that no more than one is kept when its result has been made.
     """
     found = track_drops(machine, evidence, quick=quick, progress=progress)
-    tracked, count, kept = found.fit, len(evidence), found.kept
-    waiting = list(zip(evidence, tracked.problems, tracked.smoothed, tracked.noise_factors, strict=True))
-    del tracked, found
+    fit, factor, count, kept = found.fit, 1.0, len(evidence), found.kept
+    usual = [drop.filtered for drop in fit.smoothed]
+    if not quick:
+        factor = likeliest_noise(fit, FINE_SCHEDULE[-1])
+        fit = with_noise(fit, FINE_SCHEDULE[-1], factor)
+    waiting = list(zip(evidence, fit.problems, fit.smoothed, usual, strict=True))
+    del fit, found, usual
     while waiting:
-        item, problem, smoothed, needed = waiting.pop(0)
-        factor = 1.0 if quick else best_noise_factor(problem, smoothed, FINE_SCHEDULE[-1])
-        factor = max(factor, needed) if needed > 1.0 else factor
-        yield tracked_drop(item, problem, smoothed, factor, count, kept)
-        del problem, smoothed
+        yield tracked_drop(*waiting.pop(0), factor, count, kept)

@@ -125,7 +125,7 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
         structure=_structure(drop, judged),
         cross_check=_comparisons(drop, judged),
         innovations=_innovations(drop),
-        nis=drop.smoothed.filtered.nis,
+        nis=drop.usual.nis,
         noise_factor=drop.noise_factor,
         advice=advice,
         later=later,
@@ -332,7 +332,7 @@ def _later(drop: TrackedDrop, judged: _Judgement) -> tuple[LaterMotion, ...]:
 
 
 def _innovations(drop: TrackedDrop) -> Innovations:
-    filtered = drop.smoothed.filtered
+    filtered = drop.usual
     done = filtered.done
     return Innovations(
         channels=tuple(sensor.name for sensor in drop.problem.model.machine.sensors),

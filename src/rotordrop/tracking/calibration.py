@@ -88,7 +88,7 @@ PATIENT_SCHEDULE: tuple[Stage, ...] = (
 
 CALIBRATED_SCHEDULE: tuple[Stage, ...] = (
     Stage(until=0.02, force=0.07, share=0.01, passes=1),
-    Stage(until=0.2, force=0.07, share=0.01, passes=2),
+    Stage(until=0.2, force=0.07, share=0.01, passes=1),
 )
 """With a calibrated machine: what is left is the state, the sensors and the drop's own unknowns."""
 
@@ -244,7 +244,7 @@ def one_pass(
     covariance = problems[0].covariance
     for d, problem in enumerate(problems):
         if d > 0:
-            mean, covariance = _handed_on(filtered[-1], problem, shared)
+            mean, covariance = handed_on(filtered[-1], problem)
         samples = int(np.searchsorted(problem.time, until, side="right"))
         storage = storages[d] if storages else Storage()
         result = _followed(problem, settings, mean, covariance, references[d], samples, storage)
@@ -295,8 +295,9 @@ def _followed(
     return result
 
 
-def _handed_on(before: Forward, problem: DropProblem, shared: NDArray[np.int64]) -> tuple[Array, Array]:
+def handed_on(before: Forward, problem: DropProblem) -> tuple[Array, Array]:
     """Prior of the next drop: its own state, and the machine as known after the drop before."""
+    shared = problem.machine_indices
     last = before.done - 1
     mean, covariance = problem.mean.copy(), problem.covariance.copy()
     mean[shared] = before.means[last][shared]

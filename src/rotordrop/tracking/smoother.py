@@ -123,6 +123,14 @@ class Storage:
     def __init__(self) -> None:
         self._blocks: dict[str, NDArray[Any]] = {}
 
+    @classmethod
+    def of(cls, past: Forward) -> Storage:
+        """The memory that a pass wrote to."""
+        storage = cls()
+        for name in ("covariances", "transitions", "rows", "gains"):
+            storage._blocks[name] = getattr(past, name).reshape(-1)
+        return storage
+
     def array(self, name: str, shape: tuple[int, ...], kind: type[Number]) -> NDArray[Number]:
         """An array of any content; those of the same name share their memory."""
         size = math.prod(shape)
