@@ -22,9 +22,6 @@ Source: one structure each on drops of one machine: without departure all were w
 """
 
 MOST_EXTENSIONS = 2
-PATIENT_TRIES = 3
-"""Extensions tried patiently when none ends at the record in the usual way."""
-
 THREADS = 2
 
 
@@ -55,8 +52,8 @@ class Candidate:
         return any(self.fit.diverged), max(self.fit.noise_factors), improbability(self.fit)
 
 
-USUAL, PATIENT, FIRST_OTHER_START = range(3)
-"""How a fit is attempted: in the usual windows, in patient ones, and from then on from other starts."""
+USUAL, DAMPED, FIRST_OTHER_START = range(3)
+"""How a fit is attempted: in the usual way, in short steps, and from then on from other starts."""
 OTHER_STARTS = 6
 BACK_PASSES = 3
 
@@ -114,13 +111,14 @@ def found_structure(usual: Candidate, fit: Fit, look: Look) -> Candidate:
 
 
 def _best_extension(base: Candidate, fit: Fit) -> Candidate:
-    """The best candidate with one extension more, patiently where none ends at the record; else the base."""
-    tried = [one for one in _tried(base, _left(base), fit, USUAL) if one is not None]
-    tried.sort(key=lambda one: one.rank)
-    if tried and tried[0].beside:
-        first = [one.kept[-1].extension for one in tried[:PATIENT_TRIES]]
-        tried += [one for one in _tried(base, first, fit, PATIENT) if one is not None]
-    return min((base, *tried), key=lambda one: one.rank)
+    """The best candidate with one extension more, in short steps too where none ends at the record."""
+    best = base
+    for attempt in (USUAL, DAMPED):
+        tried = [one for one in _tried(base, _left(base), fit, attempt) if one is not None]
+        best = min((best, *tried), key=lambda one: one.rank)
+        if not best.beside:
+            break
+    return best
 
 
 def _given_back(base: Candidate, better: Candidate, look: Look) -> Candidate:

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from rotordrop.errors import IdentificationError
 from rotordrop.estimation.rotor_search import with_found_rotor
 from rotordrop.estimation.structure_search import (
+    DAMPED,
     FIRST_OTHER_START,
-    PATIENT,
     USUAL,
     Candidate,
     Kept,
@@ -33,6 +33,7 @@ from rotordrop.model.rotor_form import is_beam
 from rotordrop.tracking.calibration import (
     BLIND_SCHEDULE,
     CALIBRATED_SCHEDULE,
+    DAMPED_SCHEDULE,
     LOOSER,
     PATIENT_SCHEDULE,
     QUICK_SCHEDULE,
@@ -263,7 +264,7 @@ class _Search:
 
     def from_guesses(self, machine: Machine, attempt: int) -> TrackedDrops:
         """Fit of a machine by the coarse basis, from its guesses or, in later attempts, from other starts."""
-        schedule = PATIENT_SCHEDULE if attempt == PATIENT else BLIND_SCHEDULE
+        schedule = DAMPED_SCHEDULE if attempt == DAMPED else BLIND_SCHEDULE
         problems = self.coarse(machine)
         if attempt >= FIRST_OTHER_START:
             problems = [_started_elsewhere(problem, attempt) for problem in problems]

@@ -40,6 +40,10 @@ class Stage:
 
     ``noise`` is a factor on the noise of the sensors: above 1, readings pull the estimate only part of the
     way, and the next pass linearises nearer to them.
+
+    ``damping`` holds the parameters to where the pass before had them, that many times as strongly [1] as the
+    prior holds them to the guesses (Levenberg–Marquardt): the first impacts alone leave some of them so free
+    that an undamped step lands in another minimum.
     """
 
     until: float
@@ -48,6 +52,7 @@ class Stage:
     passes: int
     substeps: int = 4
     noise: float = 1.0
+    damping: float = 0.0
 
 
 BLIND_SCHEDULE: tuple[Stage, ...] = (
@@ -85,6 +90,12 @@ PATIENT_SCHEDULE: tuple[Stage, ...] = (
     Stage(until=0.060, force=0.14, share=0.02, passes=2),
 )
 """From nominal guesses when `BLIND_SCHEDULE` ends beside the record: smaller windows, approached softly."""
+
+DAMPED_SCHEDULE: tuple[Stage, ...] = (
+    *(replace(stage, damping=3.0 if stage.until < 0.02 else 1.0) for stage in BLIND_SCHEDULE[:-1]),
+    replace(BLIND_SCHEDULE[-1], passes=6),
+)
+"""From nominal guesses with short steps, and as many more passes at the end: another way to the record."""
 
 CALIBRATED_SCHEDULE: tuple[Stage, ...] = (
     Stage(until=0.02, force=0.07, share=0.01, passes=1),
@@ -188,7 +199,7 @@ def track(
                 progress(f"fitting the first {1e3 * stage.until:.0f} ms", done / total)
             smoothed = []  # the next pass writes over what the one before left in its storage
             smoothed = one_pass(
-                _softened(problems, stage),
+                [_eased(*one, stage) for one in zip(problems, trajectories, strict=True)],
                 settings,
                 trajectories,
                 stage.until,
@@ -214,10 +225,26 @@ def stage_settings(problem: DropProblem, stage: Stage, factor: float = 1.0) -> P
     )
 
 
-def _softened(problems: Sequence[DropProblem], stage: Stage) -> Sequence[DropProblem]:
-    if stage.noise == 1.0:
-        return problems
-    return [replace(problem, variances=problem.variances * stage.noise**2) for problem in problems]
+def _eased(problem: DropProblem, reference: Array | None, stage: Stage) -> DropProblem:
+    """The problem as a stage has it: with noisier sensors, with parameters held to a reference (M, n)."""
+    if stage.noise != 1.0:
+        problem = replace(problem, variances=problem.variances * stage.noise**2)
+    if stage.damping == 0.0:
+        return problem
+    chosen, held = problem.parameter_slice, 1.0 + stage.damping
+    before = problem.start if reference is None else reference[_parameter_sample(problem, reference)]
+    mean, start = problem.mean.copy(), problem.start.copy()
+    mean[chosen] = (mean[chosen] + stage.damping * before[chosen]) / held
+    start[chosen] = (start[chosen] + stage.damping * before[chosen]) / held
+    narrower = np.ones(len(mean))
+    narrower[chosen] = 1.0 / math.sqrt(held)
+    return replace(
+        problem, mean=mean, start=start, covariance=problem.covariance * np.outer(narrower, narrower)
+    )
+
+
+def _parameter_sample(problem: DropProblem, reference: Array) -> int:
+    return min(int(np.searchsorted(problem.time, problem.parameter_time)), len(reference) - 1)
 
 
 def beside_the_record(tracked: TrackedDrops) -> bool:

@@ -42,7 +42,8 @@ def likeliest_noise(fit: TrackedDrops, stage: Stage) -> float:
         lost = any(one.done < len(drop.means) for one, drop in zip(drops, fit.smoothed, strict=True))
         return math.inf if lost else sum(one.negative_log_likelihood for one in drops)
 
-    return min(max(needed * STEP ** _lowest(improbability), SMALLEST), LARGEST)
+    found: float = needed * STEP ** _lowest(improbability)
+    return min(max(found, SMALLEST), LARGEST)
 
 
 def forward_passes(fit: TrackedDrops, stage: Stage, factor: float) -> list[Forward]:

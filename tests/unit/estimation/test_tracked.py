@@ -203,7 +203,7 @@ def test_vertical_impulse_carries_the_weight(workshop: TrackedDrop) -> None:
 
 def followed(machine: Machine, item: Evidence) -> tuple[TrackedDrop, Estimate]:
     fit = track_drops(machine, [item], quick=True).fit
-    drop = tracked_drop(item, fit.problems[0], fit.smoothed[0], 1.0)
+    drop = tracked_drop(item, fit.problems[0], fit.smoothed[0], fit.smoothed[0].filtered, 1.0)
     facts = RecordFacts(findings=(), warnings=(), simulated=True)
     return drop, estimate_of(drop, Tracked(quick=True), facts)
 

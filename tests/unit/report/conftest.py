@@ -94,5 +94,5 @@ def estimate() -> Estimate:
     evidence = read_evidence(build_drop_model(machine), record, tail, name="drop_060")
     problem = drop_problem(build_drop_model(machine, COARSE_BASIS), evidence, until=0.02)
     smoothed = track([problem], CALIBRATED_SCHEDULE[:1]).smoothed[0]
-    drop = tracked_drop(evidence, problem, smoothed, 1.0)
+    drop = tracked_drop(evidence, problem, smoothed, smoothed.filtered, 1.0)
     return estimate_of(drop, Tracked(), facts_of(machine, record, tail, "drop_060"))

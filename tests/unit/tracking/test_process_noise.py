@@ -1,0 +1,76 @@
+"""The size of the unknown impulses is the likeliest one, and the estimate is made with it."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rotordrop.tracking import process_noise
+from rotordrop.tracking.calibration import Stage, track
+from rotordrop.tracking.process_noise import LARGEST, SMALLEST, likeliest_noise, with_noise
+
+STAGE = Stage(until=0.012, force=0.07, share=0.01, passes=1)
+
+
+def fit_that_needs(*factors: float) -> Any:
+    """A fit of two drops whose last passes needed so much larger impulses."""
+    drop = SimpleNamespace(means=np.zeros((10, 1)))
+    return SimpleNamespace(noise_factors=factors, smoothed=[drop] * len(factors))
+
+
+@pytest.mark.parametrize(
+    ("likeliest", "needed"),
+    [(0.125, 1.0), (0.3, 1.0), (0.9, 1.0), (1.1, 1.0), (2.9, 1.0), (30.0, 1.0), (3.0, 8.0), (17.0, 8.0)],
+)
+def test_the_size_is_that_of_the_least_improbability(
+    likeliest: float, needed: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A parabola in the logarithm is found exactly, wherever its lowest point lies."""
+
+    def passes(_fit: Any, _stage: Stage, factor: float) -> list[Any]:
+        value = 30.0 * math.log(factor / likeliest) ** 2
+        return [SimpleNamespace(done=10, negative_log_likelihood=share * value) for share in (0.3, 0.7)]
+
+    monkeypatch.setattr(process_noise, "forward_passes", passes)
+    assert likeliest_noise(fit_that_needs(1.0, needed), STAGE) == pytest.approx(likeliest)
+
+
+@pytest.mark.parametrize(("likeliest", "limit"), [(1e-4, SMALLEST), (1e4, LARGEST)])
+def test_the_size_stays_within_its_limits(
+    likeliest: float, limit: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def passes(_fit: Any, _stage: Stage, factor: float) -> list[Any]:
+        return [SimpleNamespace(done=10, negative_log_likelihood=math.log(factor / likeliest) ** 2)]
+
+    monkeypatch.setattr(process_noise, "forward_passes", passes)
+    assert likeliest_noise(fit_that_needs(1.0), STAGE) == limit
+
+
+def test_a_size_that_loses_a_drop_is_not_the_likeliest(monkeypatch: pytest.MonkeyPatch) -> None:
+    def passes(_fit: Any, _stage: Stage, factor: float) -> list[Any]:
+        return [SimpleNamespace(done=10 if factor >= 1.0 else 9, negative_log_likelihood=factor)]
+
+    monkeypatch.setattr(process_noise, "forward_passes", passes)
+    assert likeliest_noise(fit_that_needs(1.0), STAGE) == 1.0
+
+
+def test_larger_impulses_make_the_readings_say_less(impacts: Any) -> None:
+    fit = track([impacts], (STAGE,))
+    found = likeliest_noise(fit, STAGE)
+    best, other = (
+        sum(one.negative_log_likelihood for one in process_noise.forward_passes(fit, STAGE, factor))
+        for factor in (found, 4.0 * found)
+    )
+    assert best < other + 1.0, "the parabola is no exact one"
+    means = fit.smoothed[0].means.copy()
+    spread = {}
+    for factor in (found, 16.0 * found):
+        again = with_noise(fit, STAGE, factor)
+        spread[factor] = again.smoothed[0].watched[:, 0, 0].copy()
+        assert again.smoothed[0].means.shape == means.shape
+        assert not any(again.diverged)
+    assert np.all(spread[16.0 * found][5:] > spread[found][5:])
