@@ -35,7 +35,8 @@ MODEL_FORCE_SIGMA = 0.005
 """Relative standard deviation of a force peak by what every model here leaves out (basis, sampling) [1].
 
 This and the two below: on 15 drops of four machines of two sizes, the statistical part alone held 90 % of the
-peak forces and mean stresses and 80 % of the peak stresses; ``studies/tracked/noise`` says what they hold elsewhere.
+peak forces and mean stresses and 80 % of the peak stresses; ``studies/tracked/noise`` says what all together
+hold on others.
 """
 MODEL_STRESS_SIGMA = 0.004
 MODEL_MEAN_STRESS_SIGMA = 0.02
