@@ -30,6 +30,8 @@ LONE_GAP_SIGMA = 0.016
 near the bottom gap and sensor offset are hard to tell apart."""
 UNSURE_GAP = 0.05
 """Relative prior standard deviation from which an air gap counts as guessed [1]."""
+PARAMETER_WIDENING = 1.5
+"""Factor on standard errors of parameters for what the linearised fit leaves out [1]."""
 UNDETERMINED: Verdict = "the record does not determine it"
 KNOWN: Verdict = "known from the calibration"
 NOT_DETERMINED: tuple[Verdict, ...] = (UNDETERMINED, KNOWN)
@@ -77,7 +79,7 @@ def model_error(unknown: Unknown, sigma: float, drops: int) -> float:
 
 def parameter_widening(unknown: Unknown, sigma: float, widening: float = 1.0) -> float:
     """Factor on a parameter's standard error [1]; the widened error stays within that of the prior."""
-    return max(1.0, min(widening, unknown.sigma / max(sigma, 1e-300)))
+    return max(1.0, min(PARAMETER_WIDENING * widening, unknown.sigma / max(sigma, 1e-300)))
 
 
 def parameters(

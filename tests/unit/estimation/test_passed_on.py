@@ -19,6 +19,7 @@ from rotordrop.estimation.estimate import Verdict
 from rotordrop.estimation.later_motion import RESOLVED, later_motion
 from rotordrop.estimation.tracked_loads import twin_impacts
 from rotordrop.estimation.tracked_parameters import (
+    PARAMETER_WIDENING,
     determination,
     equivalent_stiffness,
     parameter_widening,
@@ -93,10 +94,10 @@ def test_a_gap_ends_at_zero_and_nothing_else_does() -> None:
 
 def test_a_parameter_is_widened_up_to_its_prior_and_never_narrowed(problem: Any) -> None:
     for unknown in problem.unknowns:
-        for share, factor in ((0.1, 2.0), (0.8, 1.25), (1.0, 1.0), (1.5, 1.0), (0.0, 2.0)):
-            found = parameter_widening(unknown, share * unknown.sigma, 2.0)
+        for share, factor in ((0.1, PARAMETER_WIDENING), (0.8, 1.25), (1.0, 1.0), (1.5, 1.0), (0.0, 1.5)):
+            found = parameter_widening(unknown, share * unknown.sigma)
             assert found == pytest.approx(factor), (unknown.path, share)
-        assert parameter_widening(unknown, 0.1 * unknown.sigma) == 1.0
+        assert parameter_widening(unknown, 0.1 * unknown.sigma, 2.0) == pytest.approx(2 * PARAMETER_WIDENING)
 
 
 def test_sensor_errors_are_those_at_the_end_of_the_drop(problem: Any) -> None:
@@ -168,7 +169,7 @@ def test_innovations_keep_their_channels_and_their_deviation() -> None:
     sensors = tuple(SimpleNamespace(name=name) for name in "ABCD")
     machine = SimpleNamespace(sensors=sensors)
     drop: Any = SimpleNamespace(
-        smoothed=SimpleNamespace(filtered=filtered),
+        usual=filtered,
         problem=SimpleNamespace(time=np.arange(50.0), model=SimpleNamespace(machine=machine)),
     )
     found = tracked_estimate._innovations(drop)
