@@ -33,8 +33,8 @@ from rotordrop.model.statics import bearing_load_shares
 from rotordrop.model.unknowns import typical_depth
 from rotordrop.tracking.consistency import Check, consistency_checks
 from rotordrop.tracking.problem import DropProblem
-from rotordrop.tracking.process_noise import likeliest_noise, with_noise
 from rotordrop.tracking.smoother import Smoothed, parameter_sample
+from rotordrop.tracking.unknown_impulses import likeliest_noise, with_noise
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]

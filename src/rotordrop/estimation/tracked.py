@@ -47,9 +47,9 @@ from rotordrop.tracking.calibration import (
 from rotordrop.tracking.consistency import DIRECTIONS, Check, consistency_checks
 from rotordrop.tracking.forces import ForceHistory, force_history
 from rotordrop.tracking.problem import DropProblem, Fall, RecordedDrop, build_problem, fall_time
-from rotordrop.tracking.process_noise import likeliest_noise, with_noise
 from rotordrop.tracking.smoother import Forward, Smoothed, forward
 from rotordrop.tracking.transfer import transferred
+from rotordrop.tracking.unknown_impulses import likeliest_noise, with_noise
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]

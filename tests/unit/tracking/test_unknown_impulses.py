@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rotordrop.tracking import process_noise
+from rotordrop.tracking import unknown_impulses
 from rotordrop.tracking.calibration import Stage, track
-from rotordrop.tracking.process_noise import LARGEST, SMALLEST, likeliest_noise, with_noise
+from rotordrop.tracking.unknown_impulses import LARGEST, SMALLEST, likeliest_noise, with_noise
 
 STAGE = Stage(until=0.012, force=0.07, share=0.01, passes=1)
 
@@ -35,7 +35,7 @@ def test_the_size_is_that_of_the_least_improbability(
         value = 30.0 * math.log(factor / likeliest) ** 2
         return [SimpleNamespace(done=10, negative_log_likelihood=share * value) for share in (0.3, 0.7)]
 
-    monkeypatch.setattr(process_noise, "forward_passes", passes)
+    monkeypatch.setattr(unknown_impulses, "forward_passes", passes)
     assert likeliest_noise(fit_that_needs(1.0, needed), STAGE) == pytest.approx(likeliest)
 
 
@@ -46,7 +46,7 @@ def test_the_size_stays_within_its_limits(
     def passes(_fit: Any, _stage: Stage, factor: float) -> list[Any]:
         return [SimpleNamespace(done=10, negative_log_likelihood=math.log(factor / likeliest) ** 2)]
 
-    monkeypatch.setattr(process_noise, "forward_passes", passes)
+    monkeypatch.setattr(unknown_impulses, "forward_passes", passes)
     assert likeliest_noise(fit_that_needs(1.0), STAGE) == limit
 
 
@@ -54,7 +54,7 @@ def test_a_size_that_loses_a_drop_is_not_the_likeliest(monkeypatch: pytest.Monke
     def passes(_fit: Any, _stage: Stage, factor: float) -> list[Any]:
         return [SimpleNamespace(done=10 if factor >= 1.0 else 9, negative_log_likelihood=factor)]
 
-    monkeypatch.setattr(process_noise, "forward_passes", passes)
+    monkeypatch.setattr(unknown_impulses, "forward_passes", passes)
     assert likeliest_noise(fit_that_needs(1.0), STAGE) == 1.0
 
 
@@ -62,7 +62,7 @@ def test_larger_impulses_make_the_readings_say_less(impacts: Any) -> None:
     fit = track([impacts], (STAGE,))
     found = likeliest_noise(fit, STAGE)
     best, other = (
-        sum(one.negative_log_likelihood for one in process_noise.forward_passes(fit, STAGE, factor))
+        sum(one.negative_log_likelihood for one in unknown_impulses.forward_passes(fit, STAGE, factor))
         for factor in (found, 4.0 * found)
     )
     assert best < other + 1.0, "the parabola is no exact one"
