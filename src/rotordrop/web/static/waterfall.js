@@ -141,9 +141,11 @@ function drawCut(pen, box, { x, y, title, label, mark }) {
   const high = Math.log10(Math.max(...known) / f) + 0.1, low = Math.max(Math.log10(Math.min(...known) / f), high - 5);
   const px = (v) => box.left + ((v - x[0]) / (x.at(-1) - x[0])) * (box.right - box.left);
   const py = (v) => box.bottom - ((Math.log10(v / f) - low) / (high - low)) * (box.bottom - box.top);
-  for (let power = Math.ceil(low); power <= high; power += 1) {
-    pen.line([[box.left, py(f * 10 ** power)], [box.right, py(f * 10 ** power)]], tone.line);
-    pen.text(String(Number((10 ** power).toPrecision(1))), box.left - 5, py(f * 10 ** power) + 4, tone.ink, { align: "right", size: 10 });
+  for (let power = Math.floor(low); power <= high; power += 1) {
+    for (const v of (high - low < 1.6 ? [1, 2, 5] : [1]).map((part) => part * 10 ** power).filter((one) => Math.log10(one) >= low && Math.log10(one) <= high)) {
+      pen.line([[box.left, py(f * v)], [box.right, py(f * v)]], tone.line);
+      pen.text(String(Number(v.toPrecision(1))), box.left - 5, py(f * v) + 4, tone.ink, { align: "right", size: 10 });
+    }
   }
   for (const v of ticks(x[0], x.at(-1), 6)) { pen.text(String(v).replace("-", "−"), px(v), box.bottom + 13, tone.ink, { align: "center", size: 10 }); }
   pen.line(x.map((v, i) => [px(v), y[i] > 0 ? Math.min(py(y[i]), box.bottom) : NaN]), tone.estimated, 1.2);
