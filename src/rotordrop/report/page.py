@@ -66,9 +66,12 @@ def render_page(content: ReportContent) -> str:
 
 
 def css_text(text: str) -> str:
-    """A text for a string in a style sheet: whatever is not plain is written as its number."""
+    """A text for a string in a style sheet: whatever is not plain is written as its number.
+
+    The blank after a number belongs to it: without one the next blank of the text would be swallowed.
+    """
     return "".join(
-        sign if sign.isascii() and (sign.isalnum() or sign == " ") else f"\\{ord(sign):06x}" for sign in text
+        sign if sign.isascii() and (sign.isalnum() or sign == " ") else f"\\{ord(sign):06x} " for sign in text
     )
 
 

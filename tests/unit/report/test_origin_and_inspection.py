@@ -58,11 +58,11 @@ def test_the_date_of_the_event_comes_from_the_header(metadata: dict[str, str], d
 
 
 def test_a_running_title_cannot_leave_its_string() -> None:
-    assert css_text('a"; } body { x: 1') == "a\\000022\\00003b \\00007d body \\00007b x\\00003a 1"
+    assert css_text('a"; } body { x: 1') == "a\\000022 \\00003b  \\00007d  body \\00007b  x\\00003a  1"
     page = render_page(ReportContent(title='T"</style><script>window.stolen=1</script>', subtitle="µ"))
     assert page.count("<script>window.stolen") == 0
     assert 'page " counter(page)' in page
-    assert '@top-left { content: "T\\000022\\00003c\\00002fstyle' in page
+    assert '@top-left { content: "T\\000022 \\00003c \\00002f style' in page
 
 
 def test_a_reader_without_scripts_is_told_first() -> None:
