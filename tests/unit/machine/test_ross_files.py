@@ -181,6 +181,9 @@ def test_the_examples_of_ross_were_compared_with_both_versions(version):
         assert max(errors) < 1e-3
         assert rotors[name]["response"] < 1e-3
         assert rotors[name]["read back equal"]
+        assert rotors[name]["back in ROSS"]["response"] < 1e-3
+    compressor = rotors["compressor_example.json"]["back in ROSS"]
+    assert max(compressor.values()) < 1e-3
 
 
 def test_names_of_materials_have_no_blanks_and_discs_of_one_name_are_several(tmp_path):
