@@ -75,16 +75,15 @@ def memory(records: Path) -> dict[str, object]:
                 server.ask("GET", f"/api/jobs/{job}/look/csv?{columns}&start=0&end=0.2")
                 server.ask("GET", "/api/drops")
                 seen.append(server.memory())
+                keep("memory", {"analyses": len(seen) - 1, "MB": [round(one, 1) for one in seen]})
                 print(number + 1, f"{seen[-1]:.1f} MB", flush=True)
         finally:
             server.stop()
-    return {
-        "analyses": ANALYSES,
-        "before_MB": seen[0],
-        "after_one_MB": seen[1],
-        "after_ten_MB": seen[10],
-        "after_all_MB": seen[-1],
-    }
+    return {"analyses": len(seen) - 1, "MB": [round(one, 1) for one in seen]}
+
+
+def keep(name: str, told: dict[str, object]) -> None:
+    (HERE / "results" / f"{name}.json").write_text(json.dumps(told) + "\n", encoding="utf-8")
 
 
 def zoom() -> dict[str, object]:
@@ -159,7 +158,7 @@ def main() -> None:
     told = (
         zoom() if given.what == "zoom" else {"memory": memory, "formats": formats}[given.what](given.records)
     )
-    (HERE / "results" / f"{given.what}.json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+    keep(given.what, told)
     print(json.dumps(told, indent=1))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import plotly.graph_objects as go
 
@@ -46,6 +46,43 @@ def rotor_figure(machine: Machine) -> go.Figure:
     figure.update_xaxes(title_text=axis_title("position from node 1", "mm"))
     figure.update_yaxes(title_text=axis_title("radius", "mm"), scaleanchor="x", constrain="domain")
     return figure
+
+
+def rotor_outline(machine: Machine) -> dict[str, Any]:
+    """What the drawing consists of, ready for JSON: lengths [m] from node 1, parts with their names.
+
+    Parameters
+    ----------
+    machine : Machine
+        The machine.
+    """
+    nodes, top = machine.rotor.node_positions, _top(machine)
+    mounted = (
+        ("touchdown bearing", machine.touchdown_bearings, -top),
+        ("AMB", machine.ambs, -1.25 * top),
+        ("sensor", machine.sensors, top),
+    )
+    return {
+        "length": nodes[-1],
+        "top": top,
+        "shaft": [list(piece) for piece in _shaft(machine)],
+        "layers": [list(piece) for piece in _layers(machine)],
+        "discs": [
+            {"name": disc.name or f"disc {number}", "node": disc.node, "position": nodes[disc.node - 1]}
+            for number, disc in enumerate(machine.rotor.discs, start=1)
+        ],
+        "marks": [
+            {
+                "kind": kind,
+                "name": part.name,
+                "node": part.node,
+                "position": nodes[part.node - 1],
+                "height": height,
+            }
+            for kind, parts, height in mounted
+            for part in parts
+        ],
+    }
 
 
 def _top(machine: Machine) -> float:

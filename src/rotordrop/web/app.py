@@ -33,6 +33,7 @@ ASSETS = {
             "cursor.js",
             "sending.js",
             "compare.js",
+            "rotor.js",
             "server.js",
             "plots.js",
             "orbit.js",

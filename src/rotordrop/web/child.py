@@ -192,14 +192,15 @@ def _look(job: Job, made: Path, told: dict[str, Any]) -> None:
 
     options = told["options"]
     gap = options.get("gap")
+    machine = machine_of(job)
     seen = look(
         _record_file(job),
-        machine=machine_of(job),
+        machine=machine,
         gap=parse_quantity(gap, "length") if gap else None,
         mapping=tuple(filter(None, map(str.strip, options.get("planes", "").split(";")))),
         profile=profile_of(job, options),
     )
-    write_look(replace(seen, record=named(seen.record, job, "record")), job, made, options)
+    write_look(replace(seen, record=named(seen.record, job, "record")), job, made, options, machine)
 
 
 def _told_progress(job: Job, verb: Verb, told: dict[str, Any]) -> Callable[[str, float], None]:

@@ -39,9 +39,12 @@ MOST_PLACES = 200
 SHOWN_KINDS = ("length", "force", "pressure", "speed", "velocity")
 
 
-def write_look(seen: Look, job: Job, made: Path, options: Mapping[str, Any]) -> None:
+def write_look(
+    seen: Look, job: Job, made: Path, options: Mapping[str, Any], machine: Machine | None = None
+) -> None:
     """Write what a look shows: motion of every plane with the speed, and its page as JSON."""
     from rotordrop.report.look_page import look_page
+    from rotordrop.report.rotor_drawing import rotor_outline
 
     columns: dict[str, Array] = {}
     for number, path in enumerate(seen.motion.paths):
@@ -57,6 +60,7 @@ def write_look(seen: Look, job: Job, made: Path, options: Mapping[str, Any]) -> 
         {
             **content_json(content),
             **_common("motion", tuple(columns), seen.motion.time),
+            "rotor": None if machine is None else rotor_outline(machine),
             "zero": seen.drops[0].release,
             "places": [
                 {
@@ -101,6 +105,7 @@ def write_estimate(
     from rotordrop.estimation.document import estimate_document
     from rotordrop.report.estimate_page import estimate_page
     from rotordrop.report.page import write_page
+    from rotordrop.report.rotor_drawing import rotor_outline
 
     content = estimate_page(estimate, _origin(job, options), since)
     names, grid, columns = _histories(estimate)
@@ -112,6 +117,7 @@ def write_estimate(
         {
             **content_json(content),
             **_common("drop", tuple(columns), grid),
+            "rotor": rotor_outline(estimate.machine),
             "zero": estimate.drop_instant.value,
             "speed": estimate.speed,
             "places": [_place(bearing, names[b]) for b, bearing in enumerate(estimate.bearings)],

@@ -22,6 +22,20 @@ def _profile(files: Files, options: Mapping[str, Any]) -> list[str]:
     return lines
 
 
+def _rotor_lines(files: Files) -> str:
+    return "\n".join(
+        [
+            "from rotordrop import load_machine",
+            "",
+            f"machine = load_machine({files['machine']['name']!r})",
+            "nodes = machine.rotor.node_positions  # [m]",
+            "bearings = {part.name: nodes[part.node - 1] for part in machine.touchdown_bearings}  # [m]",
+            "sensors = {part.name: nodes[part.node - 1] for part in machine.sensors}  # [m]",
+            "",
+        ]
+    )
+
+
 def look_lines(files: Files, options: Mapping[str, Any], planes: int) -> dict[str, str]:
     """Lines for every figure of a look."""
     imports, rules = "from rotordrop import look", _profile(files, options)
@@ -44,7 +58,8 @@ def look_lines(files: Files, options: Mapping[str, Any], planes: int) -> dict[st
     for number in range(planes):
         motion = f"time, motion = seen.motion.time, seen.motion.paths[{number}].position  # [s], [m]"
         tail |= {f"motion {number}": motion, f"orbit {number}": motion}
-    return {figure: "\n".join([*head, line, ""]) for figure, line in tail.items()}
+    found = {figure: "\n".join([*head, line, ""]) for figure, line in tail.items()}
+    return found | ({"rotor": _rotor_lines(files)} if "machine" in files else {})
 
 
 def estimate_lines(files: Files, options: Mapping[str, Any], bearings: Sequence[str]) -> dict[str, str]:
@@ -79,7 +94,8 @@ def estimate_lines(files: Files, options: Mapping[str, Any], bearings: Sequence[
     for number, name in enumerate(bearings):
         motion = f"motions = estimate.bearing({name!r}).motions  # each .time [s] and .displacement [m]"
         last |= {f"motion {number}": motion, f"orbit {number}": motion}
-    return {figure: "\n".join([*lines, line, ""]) for figure, line in last.items()}
+    found = {figure: "\n".join([*lines, line, ""]) for figure, line in last.items()}
+    return found | {"rotor": _rotor_lines(files)}
 
 
 def waterfall_lines(

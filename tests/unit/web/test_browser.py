@@ -313,7 +313,7 @@ def test_no_script_in_a_name_is_executed(browser, tmp_path):
         press(browser, "channels")
         browser.until("document.getElementById('mapping').open")
         browser.evaluate("document.getElementById('mapping').close()")
-        browser.evaluate("[...document.querySelectorAll('[role=tab]')].at(-2).click()")
+        browser.evaluate("[...document.querySelectorAll('[role=tab]')].at(-3).click()")
         browser.until("document.getElementById('choosedrops')")
         press(browser, "choosedrops")
         browser.until("document.getElementById('compare').open")

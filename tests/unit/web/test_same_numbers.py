@@ -221,6 +221,8 @@ def test_the_lines_of_python_give_these_curves(estimate: Estimate, tmp_path: Pat
     lines = estimate_lines(NAMES, {}, [bearing.name for bearing in estimate.bearings])
     for figure, text in lines.items():
         compile(text, figure, "exec")
+        if figure == "rotor":
+            continue
         *head, last = text.strip().split("\n")
         assert head[-1] == "estimate = estimate_drop(machine, record, tail)"
         told: dict[str, Any] = {"estimate": estimate}
@@ -252,12 +254,16 @@ def test_the_lines_of_python_of_a_look_run(
     space.prepare()
     job = space.new_job("drop_060", {})
     job.write({**job.read(), "files": NAMES})
-    write_look(seen, job, tmp_path, options)
+    write_look(seen, job, tmp_path, options, load_machine("lp400.toml"))
     page = json.loads((tmp_path / "page.json").read_text(encoding="utf-8"))
     document = json.loads((tmp_path / "document.json").read_text(encoding="utf-8"))
     for number, plane in enumerate(document["planes"]):
         assert page["cards"][number]["figures"][0]["value"]["value"] == plane["largest_displacement_m"]
         assert page["places"][number]["gap"] == [plane["air_gap_m"]] * 2
+    exec(lines["rotor"], told)
+    marks = [(one["kind"], one["name"], one["position"]) for one in page["rotor"]["marks"]]
+    assert [("touchdown bearing", *part) for part in told["bearings"].items()] == marks[:2]
+    assert [("sensor", *part) for part in told["sensors"].items()] == marks[-4:]
     exec(lines["impacts"], told)
     found = [(one["place"], one["time"], one["azimuth"]) for one in page["impacts"]]
     assert [entry[:3] for entry in told["impacts"]] == found

@@ -4,6 +4,7 @@ import { chooseOthers, compareTab, learnDrops } from "./compare.js";
 import { nextImpact, pan, play, setView, setWindow, stepCursor, zoom } from "./cursor.js";
 import { keep } from "./figures.js";
 import { drawAll, lines, loadView } from "./panels.js";
+import { rotorTab } from "./rotor.js";
 import * as server from "./server.js";
 import { by, files, homeView, impacts, samples, say, showLines, span, state, zero } from "./state.js";
 import { cards, facts, findings, impactTable, make, sentence, table, timeline } from "./tables.js";
@@ -40,6 +41,7 @@ const TABS = {
   All: () => (state.estimate || state.look).sections.flatMap((part) => [make("h3", { class: "part", text: part.heading }),
     ...part.text.map((text) => make("p", { text })), make("ul", { class: "statements", of: part.statements.map(sentence) }), ...part.tables.map(table)]),
   Compare: compareTab,
+  Rotor: rotorTab,
   Origin: () => [facts((state.estimate || state.look).facts), facts(Object.entries(state.job.files).map(([role, file]) => [role, `${file.name}, ${file.bytes} bytes, SHA-256 ${file.sha256}`])),
     make("p", { of: Object.entries(state.job.files).filter(([role]) => ["machine", "profile"].includes(role)).map(([role, file]) => make("button", { text: `Save ${file.name}`, on: { click: async () => keep(await server.sentFile(state.job.id, role), file.name) } })) })]
 };
@@ -260,7 +262,7 @@ document.addEventListener("dragover", (event) => { event.preventDefault(); docum
 document.addEventListener("dragleave", (event) => { if (!event.relatedTarget) { document.body.classList.remove("over"); } });
 document.addEventListener("drop", (event) => { event.preventDefault(); document.body.classList.remove("over"); openChosen(event.dataTransfer.files); });
 const redraw = () => {
-  if (!by("fall").hidden) { drawFall(); } else if (state.panels.length) { drawAll(); if (state.tab === "Compare") { showTab("Compare"); } }
+  if (!by("fall").hidden) { drawFall(); } else if (state.panels.length) { drawAll(); if (["Compare", "Rotor"].includes(state.tab)) { showTab(state.tab); } }
 };
 let waiting = 0;
 window.addEventListener("resize", () => { clearTimeout(waiting); waiting = setTimeout(redraw, 120); });
