@@ -9,7 +9,8 @@ import pytest
 from rotordrop.errors import RecordError
 from rotordrop.estimated import Estimated
 from rotordrop.measurement import check_record, refuse_unusable
-from rotordrop.measurement.quality import sensing
+from rotordrop.measurement.quality import Finding, _not_both, sensing
+from rotordrop.measurement.quality.arrangement import LEANING
 from rotordrop.measurement.quality.clock import check_clock
 from rotordrop.measurement.quality.motion import check_rotation_line, first_motion
 from rotordrop.synthesis import hidden_machine, synthesize_drop
@@ -495,3 +496,13 @@ def test_an_estimated_air_gap_that_cannot_be_is_named_before_the_unit(drop, mach
     assert (found.kind, found.severity) == ("wrong air gap", "stop")
     assert "× the air gap of the machine file (34 µm, 34 µm; calibrated on drop_060)" in found.message
     assert found.remedy.startswith("use the machine file from before that estimate")
+
+
+@pytest.mark.parametrize(("kind", "severity"), [("turned sensors", "stop"), ("ends", "warning")])
+def test_a_fall_that_leans_stops_only_where_sensors_look_elsewhere(kind, severity):
+    """A free fall that deviates from the rotor model by itself refuses no drop that friction drove aside."""
+    leaning = Finding(kind=LEANING, message="leans 34°", remedy="", severity="warning")
+    other = Finding(kind=kind, message="deviates", remedy="", severity="note")
+    first, second = _not_both([leaning], [other])
+    assert (first.kind, first.severity) == (LEANING, severity)
+    assert second == other

@@ -19,7 +19,7 @@ from rotordrop.measurement.levitated import LevitatedModel, fit_levitated
 from rotordrop.measurement.quality.arrangement import LEANING, check_planes, fall_of
 from rotordrop.measurement.quality.channels import check_channels
 from rotordrop.measurement.quality.clock import check_blocks, check_clock
-from rotordrop.measurement.quality.ends import UNDECIDED_ENDS, check_ends
+from rotordrop.measurement.quality.ends import check_ends
 from rotordrop.measurement.quality.finding import Finding, Severity, ranked, refuse_unusable, stops
 from rotordrop.measurement.quality.motion import (
     check_length,
@@ -129,8 +129,12 @@ def _check_motion(record: Record, machine: Machine, tail: Record | None) -> list
 
 
 def _not_both(findings: list[Finding], of_ends: list[Finding]) -> list[Finding]:
-    """A fall that leans stops only when it fits no free rotor before the first contact either."""
-    if any(found.kind in (UNDECIDED_ENDS, TURNED) for found in of_ends):
+    """A fall that leans stops only when the sensors look in other directions before the first contact too.
+
+    That it deviates there from a free rotor is not enough: of eight drops of small rotors at 500 Hz two did, by
+    some micrometres, and leant because of friction.
+    """
+    if any(found.kind == TURNED for found in of_ends):
         findings = [replace(f, severity="stop") if f.kind == LEANING else f for f in findings]
     return findings + of_ends
 
