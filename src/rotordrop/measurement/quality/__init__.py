@@ -131,8 +131,8 @@ def _check_motion(record: Record, machine: Machine, tail: Record | None) -> list
 def _not_both(findings: list[Finding], of_ends: list[Finding]) -> list[Finding]:
     """A fall that leans stops only when the sensors look in other directions before the first contact too.
 
-    That it deviates there from a free rotor is not enough: of eight drops of small rotors at 500 Hz two did, by
-    some micrometres, and leant because of friction.
+    That it deviates there from a free rotor is not enough: two of eight drops of small rotors at 500 Hz did,
+    and leant because of friction.
     """
     if any(found.kind == TURNED for found in of_ends):
         findings = [replace(f, severity="stop") if f.kind == LEANING else f for f in findings]
