@@ -27,7 +27,7 @@ from rotordrop.study.plan import Study, read_study
 from rotordrop.study.run import run_study
 
 TABLE = {
-    "drops": 240,
+    "drops": 800,
     "shard": 8,
     "duration": "15 ms",
     "reduction": "quick",
@@ -68,6 +68,16 @@ def started(engine: str, folder: Path) -> list[subprocess.Popen[bytes]]:
     ]
 
 
+def awaited(children: list[subprocess.Popen[bytes]], folder: Path, known: int, chance: random.Random) -> None:
+    """Wait for the moment of a kill: now and then while the engine starts, else soon after a new shard."""
+    early = chance.random() < 0.3
+    wait = time.monotonic() + (chance.uniform(0.5, 10.0) if early else 60.0)
+    while any(one.poll() is None for one in children) and time.monotonic() < wait:
+        time.sleep(0.02)
+        if not early and len(hashes(folder)) > known:
+            early, wait = True, time.monotonic() + chance.uniform(0.0, 2.0)
+
+
 def killed(engine: str, serial: dict[str, str], kills: int, chance: random.Random) -> dict[str, Any]:
     """Kill an engine again and again, finish, and compare."""
     lost = changed = rounds = done = orphans = 0
@@ -78,9 +88,7 @@ def killed(engine: str, serial: dict[str, str], kills: int, chance: random.Rando
         before: dict[str, str] = {}
         while len(before) < len(serial):
             children = started(engine, folder)
-            wait = time.monotonic() + chance.uniform(2.0, 12.0)
-            while any(one.poll() is None for one in children) and time.monotonic() < wait:
-                time.sleep(0.05)
+            awaited(children, folder, len(before), chance)
             for one in children:
                 if one.poll() is None:
                     one.send_signal(signal.SIGKILL)  # the driver alone: its workers must not live on
