@@ -58,7 +58,7 @@ def _noise(evidence: Evidence, problem: DropProblem) -> Iterator[str]:
 
 
 def _gains(problem: DropProblem) -> Iterator[str]:
-    """Gains nobody stated: an error that all sensors share is in every force, and no record shows it."""
+    """Gains nobody stated: what holds them keeps an error that all sensors share from being found."""
     machine = problem.model.machine
     taken = [sensor for sensor in machine.sensors if sensor.gain.status == "default"]
     if not taken:
@@ -66,9 +66,8 @@ def _gains(problem: DropProblem) -> Iterator[str]:
     within = NINETY * sensor_prior(parameter("gain", "sensor"), taken[0].gain, smallest_gap(machine)).sigma
     yield (
         f"the machine file states no gain of {', '.join(sensor.name for sensor in taken)}: taken as "
-        f"calibrated, each within ±{within:.1%} (90 %). An error that all share goes into forces and gaps in "
-        "proportion and shows in no record; a tolerance such as gain = { guess = 1.0, range = [0.9, 1.1] } "
-        "makes the intervals hold it"
+        f"calibrated, each within ±{within:.1%} (90 %). A larger error that all share would be in forces and "
+        "gaps; a tolerance such as gain = { guess = 1.0, range = [0.8, 1.2] } lets the estimate find it"
     )
 
 
