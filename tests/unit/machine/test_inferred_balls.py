@@ -199,3 +199,17 @@ def test_a_rigidity_in_the_file_narrows_the_grooves_and_needs_its_preload(small_
     assert known[1] - known[0] < alone.conformity_inner.range[1] - alone.conformity_inner.range[0]
     with pytest.raises(MachineFileError, match=r"axial_rigidity = 88\.0 MN/m holds at a preload"):
         described(small_text, 'designation = "7014 CD"\naxial_rigidity = "88 N/um"')
+
+
+def test_ratings_of_wide_grooves_are_those_of_the_same_balls():
+    """GMN lists S 605 and SM 605 with 8 balls of 2.381 mm and 0.57 of the static rating: other grooves."""
+    size = {"kind": "angular contact", "dimension_series": "10", "bore": 0.005, "outside_diameter": 0.014}
+    for static, dynamic in ((545.0, 1400.0), (310.0, 990.0)):
+        found = infer_balls(
+            **size,
+            contact_angle=math.radians(15.0),
+            static_load_rating=static,
+            dynamic_load_rating=dynamic,
+        )
+        assert found.count_range[0] <= 8 <= found.count_range[1]
+        assert found.diameter_range[0] <= 2.3813e-3 <= found.diameter_range[1] + 1e-6
