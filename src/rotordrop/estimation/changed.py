@@ -153,10 +153,13 @@ def changes(first: Mapping[str, Any], second: Mapping[str, Any]) -> Changes:
         )
     told = [{one["path"]: one for one in document["parameters"]} for document in (first, second)]
     paths = [path for path in told[0] if path in told[1] and _watched(path) is not None]
+    pairs = {path: [_alone(one[path], row_of(path)) for one in told] for path in paths}
     if first.get("joint") and second.get("joint"):
-        found = _jointly(first["joint"], second["joint"], told, paths)
+        # a parameter that hardly leaves its prior is one that the linearised fit knows least of
+        seen = [path for path, pair in pairs.items() if None not in pair]
+        found = _jointly(first["joint"], second["joint"], told, seen)
+        found += [_change(path, told, 0.0, math.inf, named=False) for path in paths if path not in seen]
     else:
-        pairs = {path: [_alone(one[path], row_of(path)) for one in told] for path in paths}
         level = _level(sum(None not in pair for pair in pairs.values()))
         found = [_compared(path, told, pair, level) for path, pair in pairs.items()]
     return Changes(

@@ -211,3 +211,18 @@ def test_a_joint_record_that_says_nothing_of_a_parameter_says_nothing_of_its_cha
         one["joint"]["mean"][2] = MIDDLE[2]
     friction = next(one for one in changes(first, second).found if one.path == "NDE.friction.dynamic")
     assert not friction.determined
+
+
+def test_what_a_record_by_itself_says_nothing_of_is_not_named():
+    """The linearised fit of a parameter that stays in its prior named a drag that had not changed."""
+    random = np.random.default_rng(11)
+    first = joint_document(random, MIDDLE, "a")
+    second = joint_document(random, MIDDLE + np.array([0.0, 0.0, 1.0, 0.0]), "b")
+    assert [one.path for one in changes(first, second).named] == ["NDE.friction.dynamic"]
+    wide = {"value": 0.1, "interval_90": [0.05, 0.2]}
+    for document_ in (first, second):
+        entry_ = next(one for one in document_["parameters"] if one["path"] == "NDE.friction.dynamic")
+        entry_["prior"] = entry_["estimate"] = wide
+    found = changes(first, second)
+    assert not found.named
+    assert "of 1 parameters the records do not say it" in found.sentence()
