@@ -136,10 +136,11 @@ def formats(records: Path) -> dict[str, object]:
                 browser.choose_files("#files", [record, *MACHINE.values()])
                 browser.until("document.getElementById('sending').open")
                 browser.evaluate("document.getElementById('send').click()")
-                chosen = f"document.getElementById('jobs').selectedOptions[0]?.text === {record.stem!r}"
-                browser.until(
-                    f"{chosen} && document.getElementById('status').innerText.includes('released')", 300
-                )
+                browser.until(f"document.getElementById('jobs').options.length === {len(found) + 1}")
+                job = browser.evaluate("document.getElementById('jobs').value")
+                state = server.settled(job, "look", 300)
+                assert state["state"] == "done", (record.name, state)
+                browser.until("!/Sending|Looking/.test(document.getElementById('status').innerText)")
                 browser.until("document.querySelectorAll('.panel canvas').length >= 2", 60)
                 found[record.name] = browser.evaluate("document.getElementById('status').innerText")
                 print(record.name, found[record.name], flush=True)

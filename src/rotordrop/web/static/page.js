@@ -84,7 +84,7 @@ function showStatus() {
   }
   else if (state.look) {
     const told = state.look.verdict[0], stop = state.look.findings.find((one) => one.severity === "stop"), words = estimate && estimate.state === "cancelled" ? "The estimate was cancelled. " : "";
-    say(words + (stop ? stop.message : told.text), stop ? "bad" : told.level);
+    say(words + (stop ? `${stop.message}; ${stop.remedy}` : told.text), stop ? "bad" : told.level);
   } else { say("Nothing was found yet.", "notice"); }
   return false;
 }
