@@ -39,7 +39,7 @@ TABLE = {
 
 
 FAR = 5800.0
-"""A peak force that about one drop in a million exceeds [N]."""
+"""A peak force far beyond that of one drop in a thousand [N]; how rare it is was not computed yet."""
 
 
 def million(out: Path, runs: int) -> None:
