@@ -21,6 +21,7 @@ def test_exit_codes_are_those_documented_and_all_different():
         "RotordropError": 1,
         "MachineFileError": 2,
         "RecordError": 3,
+        "NoDropError": 3,
         "IdentificationError": 4,
         "SimulationError": 5,
         "OutputError": 6,

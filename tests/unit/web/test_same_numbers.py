@@ -139,10 +139,13 @@ def test_every_parameter_and_sensor(
     for row, one in zip(shown, order, strict=True):
         assert row[2]["value"] == one.estimate.value == in_json[one.path]
         assert "." not in row[0]
-    for row, sensor in zip(tables[-1]["rows"], estimate.sensors, strict=True):
+    for row, sensor in zip(tables[2]["rows"], estimate.sensors, strict=True):
         told = document["sensors"][sensor.sensor]
         assert row[1]["value"] == told["gain_error"]["value"] == sensor.gain_error.value
         assert row[2]["value"] == told["offset_m"]["value"] == sensor.offset.value
+    for row, plane, told in zip(tables[3]["rows"], estimate.unbalance, document["unbalance"], strict=True):
+        assert row[1]["value"] == told["amount_kg_m"]["value"] == plane.amount.value
+        assert (plane.phase, row[2]) == (None, plane.reason)  # the record has no mark
 
 
 def test_statistics_and_cross_check(

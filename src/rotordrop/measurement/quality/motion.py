@@ -168,7 +168,7 @@ def check_rotation_line(record: Record, end: float, speed: float) -> list[Findin
     if abs(frequency - 2.0 * expected) <= near and at_half > _NO_HALF:
         return []  # the second harmonic of a rotor whose first is there too
     mains = min((*MAINS, *OTHER_SUPPLIES), key=lambda supply: abs(frequency - supply))
-    if abs(frequency - mains) < resolution:
+    if abs(frequency - mains) < resolution and abs(2.0 * frequency - expected) > near:  # else 1X and its 2X
         beside = _strongest_line(record, end, without=mains)
         if beside is not None and min(abs(beside[0] - k * expected) for k in (1, 2)) <= near:
             return []  # hum, which has its own name, above the line of the rotor
