@@ -40,7 +40,7 @@ def said(machine: Machine, evidence: Evidence) -> str:
 
 
 def test_drag_of_the_air_is_said_with_its_interval(machine: Machine, evidence: Evidence) -> None:
-    assert "time constant of 10 s (90 %: 3.2 to 32 s)" in said(machine, evidence)
+    assert "drag of the air: it begins at 10 s (90 %: 3.2 to 32 s)" in said(machine, evidence)
     told = machine.with_values({"speed.aero_time_constant": 8.0})
     assert "drag of the air" not in said(told, evidence)
 
