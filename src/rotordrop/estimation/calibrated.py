@@ -30,7 +30,7 @@ from rotordrop.model.parameter import Parameter
 from rotordrop.model.parameter_table import parameter, row_of, rows, separating_measurement
 from rotordrop.model.parameters import build_drop_model
 from rotordrop.model.statics import bearing_load_shares
-from rotordrop.model.unknowns import typical_depth
+from rotordrop.model.unknowns import typical_depth, weight_per_magnet
 from rotordrop.tracking.consistency import Check, consistency_checks
 from rotordrop.tracking.problem import DropProblem
 from rotordrop.tracking.smoother import Smoothed, parameter_sample
@@ -202,7 +202,7 @@ def _lift(problem: DropProblem, smoothed: Smoothed) -> tuple[RecordedLift, ...]:
     """What a drop shows of the remanent force of each magnet, in shares of the weight it carries."""
     at, machine = parameter_sample(smoothed), problem.model.machine
     mean, sigma = smoothed.means[at], np.sqrt(np.maximum(np.diag(smoothed.covariance(at)), 0.0))
-    share = machine.rotor.mass * float(machine.gravity) / max(len(machine.ambs), 1)
+    share = weight_per_magnet(machine)
     found = {
         unknown.path: (
             float(mean[problem.n_dynamic + k]) / share,

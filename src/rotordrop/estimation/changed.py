@@ -16,6 +16,7 @@ from rotordrop.estimated import NINETY
 from rotordrop.estimation.tracked_parameters import PARAMETER_WIDENING
 from rotordrop.model.parameter import Parameter
 from rotordrop.model.parameter_table import fitted_row, row_of
+from rotordrop.physics.linear_algebra import solve, symmetric_eigen
 
 Array = NDArray[np.float64]
 
@@ -300,7 +301,7 @@ def _own(joint: Mapping[str, Any], common: Sequence[str]) -> tuple[Array, Array]
     sigma = np.array(joint["prior_standard_deviation"])
     whole = (lower + np.tril(lower, -1).T) / np.outer(sigma, sigma)
     mean = (np.array(joint["mean"]) - np.array(joint["prior_mean"])) / sigma
-    size, turn = np.linalg.eigh(whole[np.ix_(at, at)])
+    size, turn = symmetric_eigen(whole[np.ix_(at, at)])
     size = np.maximum(size, SURE)
     gained = np.maximum(1.0 / size - 1.0, 0.0) / PARAMETER_WIDENING**2
     # the record's own middle is the posterior's, moved away from the prior as far as the prior drew it
@@ -319,9 +320,9 @@ class _CommonFit:
     def change(self, places: Sequence[int]) -> tuple[float, float]:
         """Change of the last of some places while all of them may change, and its standard error."""
         inside = self._other[:, places]
-        carried = np.linalg.solve(self._shared, np.column_stack([inside, self._sum]))
+        carried = solve(self._shared, np.column_stack([inside, self._sum]))
         known = self._other[np.ix_(places, places)] - inside.T @ carried[:, :-1]
         known += LITTLE * np.eye(len(places))
-        spread = np.linalg.inv(known)
+        spread = solve(known, np.eye(len(places)))
         moved = spread @ (self._read[places] - inside.T @ carried[:, -1])
         return float(moved[-1]), math.sqrt(float(spread[-1, -1]))

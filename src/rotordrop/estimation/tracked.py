@@ -438,7 +438,7 @@ def followed_drops(
     Each is given away with its arrays, so that no more than one is kept when its result has been made.
     """
     found = track_drops(machine, evidence, quick=quick, progress=progress)
-    fit, factor, count, kept = found.fit, 1.0, len(evidence), found.kept
+    fit, factor, count, kept = found.fit, max(found.fit.noise_factors), len(evidence), found.kept
     usual = [drop.filtered for drop in fit.smoothed]
     if not quick:
         factor = likeliest_noise(fit, FINE_SCHEDULE[-1])

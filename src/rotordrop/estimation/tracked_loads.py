@@ -110,12 +110,13 @@ def check_of_the_rotor(check: InputEstimate) -> InputEstimate:
     beam = NINETY * BEAM_FORCE_SIGMA
     return replace(
         check,
-        peak_error=_without(check.peak_error, np.full_like(check.peak_error, beam)),
-        stress_error=_without(check.stress_error, np.full_like(check.stress_error, beam / 3.0)),
+        peak_error=_without(check.peak_error, beam),
+        stress_error=_without(check.stress_error, beam / 3.0),
     )
 
 
-def _without(sigma: Array, part: Array) -> Array:
+def _without(sigma: Array, part: Array | float) -> Array:
+    """A standard deviation, shape and unit of ``sigma``, less an independent part of it."""
     return np.sqrt(np.maximum(sigma * sigma - part * part, 0.0))
 
 

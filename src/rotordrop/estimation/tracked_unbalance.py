@@ -73,7 +73,9 @@ def plane_unbalances(
 
 
 def _largest(covariance: Array, entries: NDArray[np.intp]) -> float:
-    return math.sqrt(float(np.linalg.eigvalsh(covariance[np.ix_(entries, entries)])[-1]))
+    """Standard error of two components in the direction where it is largest."""
+    (a, b), (_, d) = covariance[np.ix_(entries, entries)]
+    return math.sqrt(max(0.5 * (a + d) + math.hypot(0.5 * (a - d), b), 0.0))
 
 
 def _polar(

@@ -322,13 +322,18 @@ def smallest_gap(machine: Machine) -> float:
     return min(float(bearing.air_gap) for bearing in machine.touchdown_bearings)
 
 
+def weight_per_magnet(machine: Machine) -> float:
+    """Weight of the rotor over the number of its magnet planes [N], by which remanent forces are measured."""
+    return machine.rotor.mass * float(machine.gravity) / max(len(machine.ambs), 1)
+
+
 def drop_unknowns(model: DropModel) -> Iterator[Unknown]:
     """Unknowns of one drop: unbalance against an unknown mark, remanent forces, aerodynamic constant."""
     machine = model.machine
     for plane, unbalance in enumerate(machine.unbalances):
         for row in rows("unbalance"):
             yield _of_drop(row, str(plane), 0.0, max(float(unbalance.amount), 1e-9), plane)
-    share = machine.rotor.mass * float(machine.gravity) / max(len(machine.ambs), 1)
+    share = weight_per_magnet(machine)
     for a, amb in enumerate(machine.ambs):
         for row in rows("magnet"):
             yield _of_drop(row, amb.name, 0.0, row.guess_sigma * share, a)

@@ -232,7 +232,8 @@ def _eased(problem: DropProblem, reference: Array | None, stage: Stage) -> DropP
     if stage.damping == 0.0:
         return problem
     chosen, held = problem.parameter_slice, 1.0 + stage.damping
-    before = problem.start if reference is None else reference[_parameter_sample(problem, reference)]
+    known = np.atleast_2d(problem.start if reference is None else reference)
+    before = known[min(problem.parameter_sample, len(known) - 1)]
     mean, start = problem.mean.copy(), problem.start.copy()
     mean[chosen] = (mean[chosen] + stage.damping * before[chosen]) / held
     start[chosen] = (start[chosen] + stage.damping * before[chosen]) / held
@@ -241,10 +242,6 @@ def _eased(problem: DropProblem, reference: Array | None, stage: Stage) -> DropP
     return replace(
         problem, mean=mean, start=start, covariance=problem.covariance * np.outer(narrower, narrower)
     )
-
-
-def _parameter_sample(problem: DropProblem, reference: Array) -> int:
-    return min(int(np.searchsorted(problem.time, problem.parameter_time)), len(reference) - 1)
 
 
 def beside_the_record(tracked: TrackedDrops) -> bool:

@@ -51,7 +51,8 @@ def consistency_checks(problem: DropProblem, smoothed: Smoothed, noise_factor: f
         Check(
             name="process noise",
             passed=noise_factor < NOISE_FACTOR_LIMIT,
-            message=f"unknown impulses {noise_factor:g} × their usual size (limit {NOISE_FACTOR_LIMIT:g} ×)",
+            message=f"unknown impulses {noise_factor:.3g} × their usual size "
+            f"(limit {NOISE_FACTOR_LIMIT:g} ×)",
         ),
         Check(
             name="filter",

@@ -161,6 +161,11 @@ class DropProblem:
         return AFTER_FALL * fall_time(self.model.machine, gap)
 
     @property
+    def parameter_sample(self) -> int:
+        """First sample at that time, or behind the last where the window ends before."""
+        return int(np.searchsorted(self.time, self.parameter_time))
+
+    @property
     def fall_time(self) -> float:
         """Time of a free fall through the narrowest air gap [s]."""
         return fall_time(self.model.machine)

@@ -236,7 +236,7 @@ def forward(
         gains=array("gains", (kept, n_c + 1, n), np.float64),
         innovations=np.empty((count, n_c + 1)),
         innovation_variances=np.empty((count, n_c + 1)),
-        parameter_sample=int(np.searchsorted(problem.time, problem.parameter_time)),
+        parameter_sample=problem.parameter_sample,
     )
     done = F.forward_pass(
         np.ascontiguousarray(mean),

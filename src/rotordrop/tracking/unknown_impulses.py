@@ -28,6 +28,8 @@ THREADS = 2
 def likeliest_noise(fit: TrackedDrops, stage: Stage) -> float:
     """Size of the unknown impulses, over the usual one, that makes the readings of all drops likeliest [1].
 
+    It is no smaller than a size without which the filter had lost a drop.
+
     Parameters
     ----------
     fit : TrackedDrops
@@ -43,7 +45,7 @@ def likeliest_noise(fit: TrackedDrops, stage: Stage) -> float:
         return math.inf if lost else sum(one.negative_log_likelihood for one in drops)
 
     found: float = needed * STEP ** _lowest(improbability)
-    return min(max(found, SMALLEST), LARGEST)
+    return min(max(found, needed if needed > 1.0 else SMALLEST), LARGEST)
 
 
 def forward_passes(fit: TrackedDrops, stage: Stage, factor: float) -> list[Forward]:
@@ -73,11 +75,12 @@ def with_noise(fit: TrackedDrops, stage: Stage, factor: float) -> TrackedDrops:
 
     The pass writes where that of the fit did: what the fit says of covariances is gone.
     """
+    drops = zip(fit.problems, fit.smoothed, strict=True)
     again = one_pass(
         fit.problems,
         stage_settings(fit.problems[0], stage, factor),
         [drop.means for drop in fit.smoothed],
-        float(fit.problems[0].time[len(fit.smoothed[0].means) - 1]),
+        max(float(problem.time[len(drop.means) - 1]) for problem, drop in drops),
         storages=[Storage.of(drop.filtered) for drop in fit.smoothed],
     )
     return replace(

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rotordrop.tracking import unknown_impulses
-from rotordrop.tracking.calibration import Stage, track
+from rotordrop.tracking.calibration import Stage, TrackedDrops, track
 from rotordrop.tracking.unknown_impulses import LARGEST, SMALLEST, likeliest_noise, with_noise
 
 STAGE = Stage(until=0.012, force=0.07, share=0.01, passes=1)
@@ -24,7 +24,7 @@ def fit_that_needs(*factors: float) -> Any:
 
 @pytest.mark.parametrize(
     ("likeliest", "needed"),
-    [(0.125, 1.0), (0.3, 1.0), (0.9, 1.0), (1.1, 1.0), (2.9, 1.0), (30.0, 1.0), (3.0, 8.0), (17.0, 8.0)],
+    [(0.125, 1.0), (0.3, 1.0), (0.9, 1.0), (1.1, 1.0), (2.9, 1.0), (30.0, 1.0), (17.0, 8.0)],
 )
 def test_the_size_is_that_of_the_least_improbability(
     likeliest: float, needed: float, monkeypatch: pytest.MonkeyPatch
@@ -48,6 +48,34 @@ def test_the_size_stays_within_its_limits(
 
     monkeypatch.setattr(unknown_impulses, "forward_passes", passes)
     assert likeliest_noise(fit_that_needs(1.0), STAGE) == limit
+
+
+def test_no_size_is_smaller_than_the_one_that_followed_the_drop(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else a drop that the usual impulses lose would be called one that the model follows."""
+
+    def passes(_fit: Any, _stage: Stage, factor: float) -> list[Any]:
+        return [SimpleNamespace(done=10, negative_log_likelihood=math.log(factor / 2.0) ** 2)]
+
+    monkeypatch.setattr(unknown_impulses, "forward_passes", passes)
+    assert likeliest_noise(fit_that_needs(8.0), STAGE) == 8.0
+
+
+def test_the_last_pass_goes_to_the_end_of_the_longest_drop(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where the record of the first one ends before."""
+    ends: list[float] = []
+
+    def one_pass(_problems: Any, _settings: Any, _references: Any, until: float, **_: Any) -> list[Any]:
+        ends.append(until)
+        return []
+
+    monkeypatch.setattr(unknown_impulses, "one_pass", one_pass)
+    monkeypatch.setattr(unknown_impulses, "stage_settings", lambda *_: None)
+    monkeypatch.setattr(unknown_impulses.Storage, "of", lambda _: None)
+    drops = [SimpleNamespace(means=np.zeros((count, 1)), filtered=None) for count in (50, 200)]
+    problems = [SimpleNamespace(time=1e-3 * np.arange(count)) for count in (50, 400)]
+    fit: Any = TrackedDrops(problems=tuple(problems), smoothed=tuple(drops), nis=())  # type: ignore[arg-type]
+    with_noise(fit, STAGE, 1.0)
+    assert ends == [pytest.approx(0.199)]
 
 
 def test_a_size_that_loses_a_drop_is_not_the_likeliest(monkeypatch: pytest.MonkeyPatch) -> None:
