@@ -46,7 +46,7 @@ from rotordrop.synthesis import SensorChain, hidden_machine, synthesize_drop, wr
 from rotordrop.synthesis.bench.drops import SPEEDS
 from rotordrop.synthesis.bench.rotors import ROTORS
 from rotordrop.tracking.input_state import input_state_estimate, lent_by_record
-from rotordrop.tracking.problem import fall_time
+from rotordrop.tracking.prior import fall_time
 
 RESULTS = Path(__file__).parent / "results"
 MEASURED = 0.01

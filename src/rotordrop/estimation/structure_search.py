@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import reduce
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError
 from rotordrop.estimation.structure import EXTENSIONS, Extension
 from rotordrop.machine import Machine
-from rotordrop.tracking.calibration import TrackedDrops, beside_the_record
+from rotordrop.tracking.calibration import THREADS, TrackedDrops, beside_the_record
+from rotordrop.tracking.problem import DropProblem
+
+Array = NDArray[np.float64]
 
 PENALTY = 40.0
 """Rise of the logarithm of the marginal likelihood from which an extension is kept [1].
@@ -22,7 +29,23 @@ Source: one structure each on drops of one machine: without departure all were w
 """
 
 MOST_EXTENSIONS = 2
-THREADS = 2
+
+USUAL, DAMPED, FIRST_OTHER_START = range(3)
+"""How a fit is attempted: in the usual way, in short steps, and from then on from other starts."""
+OTHER_STARTS = 6
+BACK_PASSES = 3
+
+FIRST_CHOICE = 2
+"""Window after which the half that follows the record worse stays behind, and after each one from then on.
+
+Before, the windows hold little more than the first contact. After it the right one of ten extensions was
+among the best two wherever it was found at all (see ``studies/structure``).
+"""
+FEWEST = 2
+
+Rank = tuple[bool, float, float]
+"""Lost, unknown impulses over the usual ones [1], improbability: what is smaller fits better, and
+likelihoods compare at equal unknown impulses only."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,29 +70,43 @@ class Candidate:
         return beside_the_record(self.fit)
 
     @property
-    def rank(self) -> tuple[bool, float, float]:
-        """What is smaller fits better: likelihoods compare at equal unknown impulses only."""
-        return any(self.fit.diverged), max(self.fit.noise_factors), improbability(self.fit)
+    def rank(self) -> Rank:
+        """How it follows the record."""
+        return rank_of(self.fit)
 
 
-USUAL, DAMPED, FIRST_OTHER_START = range(3)
-"""How a fit is attempted: in the usual way, in short steps, and from then on from other starts."""
-OTHER_STARTS = 6
-BACK_PASSES = 3
+@dataclass(frozen=True, kw_only=True)
+class Place:
+    """Where a fit from guesses is after some windows: less than the fit, of which many are on their way."""
 
-Fit = Callable[[Machine, int], TrackedDrops]
-"""A fit from guesses to the record: of a machine, and which attempt."""
-
-Judge = Callable[[TrackedDrops, Machine], float]
-"""Improbability of the readings with a machine, linearised at a fit."""
-
-Look = Callable[[TrackedDrops, Machine, int], TrackedDrops]
-"""Passes over the record, linearised at a fit: the fit, a machine, and how many."""
+    problems: tuple[DropProblem, ...]
+    trajectories: tuple[Array, ...]
+    rank: Rank
 
 
-def improbability(fit: TrackedDrops) -> float:
-    """Negative logarithm of the marginal likelihood of all drops, up to a constant [1]."""
-    return sum(one.filtered.negative_log_likelihood for one in fit.smoothed)
+class Search(Protocol):
+    """Fits of machines to the same drops."""
+
+    @property
+    def windows(self) -> int:
+        """Number of windows from guesses to the first impacts whole."""
+
+    def window(self, machine: Machine, attempt: int, number: int, before: Place | None) -> Place:
+        """A fit of a machine over one window more; from its guesses where nothing is before."""
+
+    def settled(self, place: Place) -> TrackedDrops:
+        """The fit over the last window, repeated while that pays."""
+
+    def judge(self, known: TrackedDrops, machine: Machine) -> float:
+        """Improbability of the readings with a machine, linearised at a fit."""
+
+    def look(self, known: TrackedDrops, machine: Machine, passes: int) -> TrackedDrops:
+        """Passes over the last window with a machine, linearised at a fit."""
+
+
+def rank_of(fit: TrackedDrops) -> Rank:
+    """How a fit follows the record."""
+    return any(fit.diverged), max(fit.noise_factors), fit.improbability
 
 
 def gain_of(candidate: Candidate, before: Candidate) -> float:
@@ -79,7 +116,7 @@ def gain_of(candidate: Candidate, before: Candidate) -> float:
     return before.rank[2] - candidate.rank[2]
 
 
-def found_structure(usual: Candidate, fit: Fit, look: Look) -> Candidate:
+def found_structure(usual: Candidate, search: Search) -> Candidate:
     """The best of the usual model and its extensions, one on top of the other while that pays.
 
     The windows of a search leave it a few passes short, and an extension may have only led to a better start.
@@ -88,82 +125,99 @@ def found_structure(usual: Candidate, fit: Fit, look: Look) -> Candidate:
     Parameters
     ----------
     usual : Candidate
-        The usual model, which ended beside the record.
-    fit : callable
-        Fits a machine to the record.
-    look : callable
-        Passes with another machine, linearised at what was found.
+        The usual model, which does not fit the record.
+    search : Search
+        Fits machines to the record.
     """
-    best = _given_back(usual, usual, look)
+    best = _given_back(usual, usual, search)
     for _ in range(MOST_EXTENSIONS):
-        better = _best_extension(best, fit)
-        if better is best:
+        if (better := _best_extension(best, search)) is None:
             break
-        best = _given_back(best, better, look)
+        best = _given_back(best, better, search)
         if (gain := gain_of(better, best)) < PENALTY:
             break
         kept = replace(better.kept[-1], gain=gain)
         better = replace(better, kept=(*better.kept[:-1], kept))
-        best = _given_back(better, better, look)
+        best = _given_back(better, better, search)
         if not best.beside:
             break
-    return _other_starts(best, fit) if best.beside else best
+    return _other_starts(best, search) if best.beside else best
 
 
-def _best_extension(base: Candidate, fit: Fit) -> Candidate:
-    """The best candidate with one extension more, in short steps too where none ends at the record."""
-    best = base
-    for attempt in (USUAL, DAMPED):
-        tried = [one for one in _tried(base, _left(base), fit, attempt) if one is not None]
-        best = min((best, *tried), key=lambda one: one.rank)
-        if not best.beside:
-            break
-    return best
+def _best_extension(base: Candidate, search: Search) -> Candidate | None:
+    """The best candidate with one extension more, by either way from guesses; None where all were lost."""
+    entrants = [
+        _Entrant(
+            machine=extension.added_to(base.machine),
+            attempt=attempt,
+            kept=(*base.kept, Kept(extension=extension, gain=math.inf)),
+        )
+        for extension in EXTENSIONS
+        if extension.values(base.machine)
+        for attempt in (USUAL, DAMPED)
+    ]
+    return _winner(entrants, search)
 
 
-def _given_back(base: Candidate, better: Candidate, look: Look) -> Candidate:
+def _given_back(base: Candidate, better: Candidate, search: Search) -> Candidate:
     """The base, or what it makes of the place that an extension has found."""
     try:
-        back = replace(base, fit=look(better.fit, base.machine, BACK_PASSES))
+        back = replace(base, fit=search.look(better.fit, base.machine, BACK_PASSES))
     except IdentificationError:
         return base
     return min(base, back, key=lambda one: one.rank)
 
 
-def _other_starts(best: Candidate, fit: Fit) -> Candidate:
+def _other_starts(best: Candidate, search: Search) -> Candidate:
     """The same machine from other places in its prior, where the objective has several minima."""
-    tried = [best]
-    for attempt in range(FIRST_OTHER_START, FIRST_OTHER_START + OTHER_STARTS):
-        with suppress(IdentificationError):
-            tried.append(replace(best, fit=fit(best.machine, attempt)))
-        if not tried[-1].beside:
-            break
-    return min(tried, key=lambda one: one.rank)
+    starts = range(FIRST_OTHER_START, FIRST_OTHER_START + OTHER_STARTS)
+    entrants = [_Entrant(machine=best.machine, attempt=start, kept=best.kept) for start in starts]
+    found = _winner(entrants, search)
+    return best if found is None else min(best, found, key=lambda one: one.rank)
 
 
-def _left(best: Candidate) -> list[Extension]:
-    return [one for one in EXTENSIONS if one.values(best.machine)]
+@dataclass(frozen=True, kw_only=True)
+class _Entrant:
+    """A machine on its way from guesses to the record."""
+
+    machine: Machine
+    attempt: int
+    kept: tuple[Kept, ...]
+    place: Place | None = None
+
+    @property
+    def rank(self) -> Rank:
+        return (True, math.inf, math.inf) if self.place is None else self.place.rank
 
 
-def _tried(
-    base: Candidate, extensions: Iterable[Extension], fit: Fit, attempt: int
-) -> Sequence[Candidate | None]:
-    """Each extension on top of a candidate; None for one with which the filter lost the record."""
+def _winner(entrants: Sequence[_Entrant], search: Search) -> Candidate | None:
+    """Who follows the record best of those that many short windows and few long ones leave.
 
-    def one(extension: Extension) -> Candidate | None:
-        machine = extension.added_to(base.machine)
+    Successive halving: Jamieson & Talwalkar, AISTATS 2016.
+    """
+
+    def further(entrant: _Entrant) -> _Entrant | None:
         try:
-            found = Candidate(machine=machine, fit=fit(machine, attempt))
+            place = search.window(entrant.machine, entrant.attempt, window, entrant.place)
         except IdentificationError:
             return None
-        kept = Kept(extension=extension, gain=gain_of(found, base))
-        return Candidate(machine=machine, fit=found.fit, kept=(*base.kept, kept))
+        return replace(entrant, place=place)
 
     with ThreadPoolExecutor(max_workers=THREADS) as pool:
-        return list(pool.map(one, extensions))
+        for window in range(search.windows):
+            there = [one for one in pool.map(further, entrants) if one is not None]
+            entrants = sorted(there, key=lambda one: one.rank)
+            if window >= FIRST_CHOICE:
+                entrants = entrants[: max(FEWEST, (len(there) + 1) // 2)]
+    found = []
+    for one in entrants[:FEWEST]:
+        with suppress(IdentificationError):
+            assert one.place is not None
+            found.append(Candidate(machine=one.machine, fit=search.settled(one.place), kept=one.kept))
+    return min(found, key=lambda one: one.rank, default=None)
 
 
-def found_sensors(usual: Candidate, judge: Judge, look: Look) -> Candidate:
+def found_sensors(usual: Candidate, search: Search) -> Candidate:
     """The usual model that fits, with the extension of its sensors that pays all the same, if one does.
 
     What sensors do may not show in the size of the innovations, and bias the air gap.
@@ -172,11 +226,10 @@ def found_sensors(usual: Candidate, judge: Judge, look: Look) -> Candidate:
     ----------
     usual : Candidate
         The usual model, which follows the record.
-    judge : callable
-        What the likelihood of another machine is, linearised at what was found.
-    look : callable
-        Passes with another machine, linearised at what was found.
+    search : Search
+        Fits machines to the record.
     """
+    judge, look = search.judge, search.look
     plain = judge(usual.fit, usual.machine)
     of_sensors = [one for one in EXTENSIONS if one.of_sensors and one.values(usual.machine)]
     together = reduce(lambda machine, one: one.added_to(machine), of_sensors, usual.machine)

@@ -14,12 +14,12 @@ from rotordrop.estimation.rotor_search import with_found_rotor
 from rotordrop.estimation.structure_search import (
     DAMPED,
     FIRST_OTHER_START,
-    USUAL,
     Candidate,
     Kept,
+    Place,
     found_sensors,
     found_structure,
-    improbability,
+    rank_of,
 )
 from rotordrop.estimation.tracked_loads import of_a_beam
 from rotordrop.estimation.tracked_parameters import UNSURE_GAP
@@ -35,18 +35,19 @@ from rotordrop.tracking.calibration import (
     CALIBRATED_SCHEDULE,
     DAMPED_SCHEDULE,
     LOOSER,
-    PATIENT_SCHEDULE,
     QUICK_SCHEDULE,
     Stage,
     TrackedDrops,
     beside_the_record,
+    converged,
     shifted,
     stage_settings,
     track,
 )
 from rotordrop.tracking.consistency import DIRECTIONS, Check, consistency_checks
 from rotordrop.tracking.forces import ForceHistory, force_history
-from rotordrop.tracking.problem import DropProblem, Fall, RecordedDrop, build_problem, fall_time
+from rotordrop.tracking.prior import fall_time
+from rotordrop.tracking.problem import DropProblem, Fall, RecordedDrop, build_problem
 from rotordrop.tracking.smoother import Forward, Smoothed, forward
 from rotordrop.tracking.transfer import transferred
 from rotordrop.tracking.unknown_impulses import likeliest_noise, with_noise
@@ -66,11 +67,10 @@ FINE_SCHEDULE: tuple[Stage, ...] = (
     Stage(until=0.06, force=0.07, share=0.01, passes=1),
     Stage(until=0.2, force=0.07, share=0.01, passes=1),
 )
+_WINDOWS = (slice(0, 2), *(slice(k, k + 1) for k in range(2, len(BLIND_SCHEDULE))))
+"""Stages of each window from guesses; of the two of the first, one only finds a place to linearise at."""
 CALIBRATION_SCHEDULE = (replace(FINE_SCHEDULE[0], passes=2),)
 WINDOW = 0.2
-MOST_REPEATS, SMALL_RISE = 6, 5.0
-"""Repeats of the first window of the finer basis with an extension, and the rise of the log likelihood that
-ends them [1]."""
 
 START_SPREAD = 0.8
 """Spread of other starts, in standard deviations of the prior [1]."""
@@ -203,16 +203,18 @@ def track_drops(
         found = Candidate(machine=machine, fit=track(search.problems(machine), schedule, progress=progress))
         if quick or not found.beside:
             return search.not_lost(found)
-        usual = Candidate(machine=machine, fit=search.from_guesses(machine, USUAL))
+        usual = Candidate(machine=machine, fit=search.first_fit(machine))
     else:
         usual = Candidate(machine=machine, fit=search.first_fit(machine))
         if not usual.beside:
-            usual = found_sensors(usual, search.judge, search.look)
+            usual = found_sensors(usual, search)
         # First: the coarse basis alone may end beside a record that the finer one fits.
         found = search.refined(usual)
     # Where a beam stands for a rotor, its form is what does not fit: no extension stands for that.
-    if found.beside and not found.kept and not is_beam(machine.rotor):
-        extended = found_structure(usual, search.from_guesses, search.look)
+    if not found.kept and not is_beam(machine.rotor) and not _fits(found):
+        if progress is not None:
+            progress("trying extensions of the usual model", 0.0)
+        extended = found_structure(usual, search)
         if extended.fit is not usual.fit:
             found = min(found, search.refined(extended), key=lambda one: one.rank)
     return search.not_lost(found)
@@ -259,16 +261,32 @@ class _Search:
         return [drop_problem(model, item, self.until(machine)) for item in items]
 
     def first_fit(self, machine: Machine) -> TrackedDrops:
-        """First fit of a machine of which only guesses are known; a failed one is repeated patiently."""
-        return _from_guesses(self.coarse(machine), self.contact, fall_time(machine), self.progress)
-
-    def from_guesses(self, machine: Machine, attempt: int) -> TrackedDrops:
-        """Fit of a machine by the coarse basis, from its guesses or, in later attempts, from other starts."""
-        schedule = DAMPED_SCHEDULE if attempt == DAMPED else BLIND_SCHEDULE
+        """Fit of a machine from its guesses by the coarse basis; beside the record, again in short steps."""
         problems = self.coarse(machine)
-        if attempt >= FIRST_OTHER_START:
+        found = track(problems, self.shifted(machine, BLIND_SCHEDULE), progress=self.progress)
+        if not beside_the_record(found):
+            return found
+        again = track(problems, self.shifted(machine, DAMPED_SCHEDULE), progress=self.progress)
+        return min(found, self.settled(_place_of(again)), key=rank_of)
+
+    @property
+    def windows(self) -> int:
+        """Number of windows from guesses."""
+        return len(_WINDOWS)
+
+    def window(self, machine: Machine, attempt: int, number: int, before: Place | None) -> Place:
+        """A fit of a machine by the coarse basis over one window more, after what was found before."""
+        stages = (DAMPED_SCHEDULE if attempt == DAMPED else BLIND_SCHEDULE)[_WINDOWS[number]]
+        problems = self.coarse(machine) if before is None else before.problems
+        if before is None and attempt >= FIRST_OTHER_START:
             problems = [_started_elsewhere(problem, attempt) for problem in problems]
-        return track(problems, self.shifted(machine, schedule))
+        references = None if before is None else before.trajectories
+        return _place_of(track(problems, self.shifted(machine, stages), references=references))
+
+    def settled(self, place: Place) -> TrackedDrops:
+        """The fit over the last window of the coarse basis, repeated while that pays."""
+        last = self.shifted(place.problems[0].model.machine, BLIND_SCHEDULE[-1:])[0]
+        return converged(place.problems, last, place.trajectories)
 
     def judge(self, known: TrackedDrops, machine: Machine) -> float:
         """Negative logarithm of the likelihood with another machine, drop by drop, linearised at a fit."""
@@ -292,7 +310,9 @@ class _Search:
         schedule = self.shifted(first.machine, CALIBRATION_SCHEDULE if self.calibrate_only else FINE_SCHEDULE)
         references = _carried(first.fit, fine)
         if first.kept:
-            references = _converged(fine, schedule[0], references)
+            # The finer basis may lie in the valley that the coarse one only came near: turned axes of a
+            # support were found at one bearing by the coarse one and at both by the finer, some passes later.
+            references = converged(fine, schedule[0], references).trajectories
         fit = track(fine, schedule, references=references, progress=self.progress)
         return replace(first, fit=fit)
 
@@ -301,20 +321,19 @@ class _Search:
         return replace(found, fit=_not_lost(found.fit, self.evidence))
 
 
-def _converged(problems: Sequence[DropProblem], stage: Stage, references: list[Array]) -> list[Array]:
-    """Trajectories after as many passes over a window as still raise the likelihood.
+def _place_of(fit: TrackedDrops) -> Place:
+    return Place(problems=fit.problems, trajectories=tuple(fit.trajectories), rank=rank_of(fit))
 
-    The finer basis may lie in the valley that the coarse one only came near: turned axes of a support were
-    found at one bearing by the coarse basis and at both by the finer one, some passes later.
-    """
-    least = math.inf
-    for _ in range(MOST_REPEATS):
-        fit = track(problems, (stage,), references=references)
-        references = [one.means for one in fit.smoothed]
-        if improbability(fit) > least - SMALL_RISE:
-            break
-        least = improbability(fit)
-    return references
+
+def _fits(found: Candidate) -> bool:
+    """Whether model and record agree, as far as another model could make them."""
+    return all(
+        check.passed or check.name == DIRECTIONS
+        for problem, smoothed, factor in zip(
+            found.fit.problems, found.fit.smoothed, found.fit.noise_factors, strict=True
+        )
+        for check in consistency_checks(problem, smoothed, factor)
+    )
 
 
 def _started_elsewhere(problem: DropProblem, attempt: int) -> DropProblem:
@@ -330,8 +349,8 @@ def _started_elsewhere(problem: DropProblem, attempt: int) -> DropProblem:
 
 def _carried(known: TrackedDrops, problems: Sequence[DropProblem]) -> list[Array]:
     """Trajectories of a fit in the coordinates of other problems of the same drops."""
-    drops = zip(known.problems, problems, known.smoothed, strict=True)
-    return [transferred(one, two, drop.means) for one, two, drop in drops]
+    drops = zip(known.problems, problems, known.trajectories, strict=True)
+    return [transferred(one, two, means) for one, two, means in drops]
 
 
 def _basis(machine: Machine, least: Reduction, reach: float) -> Reduction:
@@ -362,17 +381,6 @@ def _with_sensors_of(model: DropModel, evidence: Evidence) -> Evidence:
     names = [sensor.name for sensor in model.machine.sensors]
     columns = [c for c, sensor in enumerate(evidence.record.sensors) if sensor.name in names]
     return evidence if len(columns) == len(evidence.record.sensors) else evidence.of_channels(columns)
-
-
-def _from_guesses(
-    coarse: Sequence[DropProblem], contact: float, fall: float, progress: Progress | None
-) -> TrackedDrops:
-    """First fit of a machine of which only guesses are known; a failed one is repeated more patiently."""
-    found = track(coarse, shifted(BLIND_SCHEDULE, contact, fall), progress=progress)
-    if not beside_the_record(found):
-        return found
-    again = track(coarse, shifted(PATIENT_SCHEDULE, contact, fall), progress=progress)
-    return min(found, again, key=lambda fit: (any(fit.diverged), max(fit.noise_factors), max(fit.nis)))
 
 
 def _tail_first(evidence: Sequence[Evidence]) -> list[Evidence]:

@@ -38,9 +38,6 @@ class Stage:
     ``force`` is the unknown force at each bearing and axis as a part of the weight on a bearing, ``share`` as
     a part of the force of the contact [1]; both are new every `STEP` of a free fall through the gap.
 
-    ``noise`` is a factor on the noise of the sensors: above 1, readings pull the estimate only part of the
-    way, and the next pass linearises nearer to them.
-
     ``damping`` holds the parameters to where the pass before had them, that many times as strongly [1] as the
     prior holds them to the guesses (Levenberg–Marquardt): the first impacts alone leave some of them so free
     that an undamped step lands in another minimum.
@@ -51,7 +48,6 @@ class Stage:
     share: float
     passes: int
     substeps: int = 4
-    noise: float = 1.0
     damping: float = 0.0
 
 
@@ -66,36 +62,11 @@ BLIND_SCHEDULE: tuple[Stage, ...] = (
 )
 """From nominal guesses: windows for a first contact at 7.5 ms, for a gap of 0.25 mm; see `shifted`."""
 
-PATIENT_SCHEDULE: tuple[Stage, ...] = (
-    Stage(until=0.012, force=0.2, share=0.03, passes=3, noise=20.0),
-    *(
-        Stage(until=until, force=0.2, share=0.03, passes=1, noise=noise)
-        for until in (
-            0.012,
-            0.014,
-            0.016,
-            0.018,
-            0.020,
-            0.023,
-            0.026,
-            0.030,
-            0.035,
-            0.040,
-            0.045,
-            0.052,
-            0.060,
-        )
-        for noise in (5.0, 1.0)
-    ),
-    Stage(until=0.060, force=0.14, share=0.02, passes=2),
-)
-"""From nominal guesses when `BLIND_SCHEDULE` ends beside the record: smaller windows, approached softly."""
-
 DAMPED_SCHEDULE: tuple[Stage, ...] = (
     *(replace(stage, damping=3.0 if stage.until < 0.02 else 1.0) for stage in BLIND_SCHEDULE[:-1]),
-    replace(BLIND_SCHEDULE[-1], passes=6),
+    BLIND_SCHEDULE[-1],
 )
-"""From nominal guesses with short steps, and as many more passes at the end: another way to the record."""
+"""The same windows in short steps: another way to the record."""
 
 CALIBRATED_SCHEDULE: tuple[Stage, ...] = (
     Stage(until=0.02, force=0.07, share=0.01, passes=1),
@@ -115,6 +86,10 @@ FITTING_NIS = 1.25
 """Mean normalised innovation squared up to which a model fits its record [1]."""
 LOOSER = (1.0, 8.0, 32.0)
 """Factors on the unknown impulses with which a pass is repeated that lost the drop [1]."""
+MOST_REPEATS, SMALL_RISE = 6, 5.0
+"""Repeats of a window, and the rise of the log likelihood that ends them [1]."""
+THREADS = 2
+"""Passes over the same drops that run side by side [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,6 +115,16 @@ class TrackedDrops:
     nis: tuple[float, ...]
     diverged: tuple[bool, ...] = field(default=())
     noise_factors: tuple[float, ...] = field(default=())
+
+    @property
+    def improbability(self) -> float:
+        """Negative logarithm of the marginal likelihood of all drops, up to a constant [1]."""
+        return sum(one.filtered.negative_log_likelihood for one in self.smoothed)
+
+    @property
+    def trajectories(self) -> list[Array]:
+        """Smoothed means of each drop, shape (M, n)."""
+        return [one.means for one in self.smoothed]
 
 
 def shifted(schedule: Sequence[Stage], first_contact: float, fall: float) -> tuple[Stage, ...]:
@@ -218,6 +203,27 @@ def track(
     )
 
 
+def converged(problems: Sequence[DropProblem], stage: Stage, references: Sequence[Array]) -> TrackedDrops:
+    """A fit after as many passes over a window as still raise the likelihood.
+
+    Parameters
+    ----------
+    problems : sequence of DropProblem
+        The drops.
+    stage : Stage
+        The window; one pass of it is made at a time.
+    references : sequence of ndarray
+        Trajectory of each drop to begin with, shape (M, n).
+    """
+    once = (replace(stage, passes=1),)
+    fit = track(problems, once, references=references)
+    for _ in range(MOST_REPEATS - 1):
+        before, fit = fit.improbability, track(problems, once, references=fit.trajectories)
+        if fit.improbability > before - SMALL_RISE:
+            break
+    return fit
+
+
 def stage_settings(problem: DropProblem, stage: Stage, factor: float = 1.0) -> PassSettings:
     """Settings of the passes of a stage, with the unknown forces larger by a factor [1]."""
     return pass_settings(
@@ -226,9 +232,7 @@ def stage_settings(problem: DropProblem, stage: Stage, factor: float = 1.0) -> P
 
 
 def _eased(problem: DropProblem, reference: Array | None, stage: Stage) -> DropProblem:
-    """The problem as a stage has it: with noisier sensors, with parameters held to a reference (M, n)."""
-    if stage.noise != 1.0:
-        problem = replace(problem, variances=problem.variances * stage.noise**2)
+    """The problem with its parameters held to a reference (M, n), as strongly as a stage says."""
     if stage.damping == 0.0:
         return problem
     chosen, held = problem.parameter_slice, 1.0 + stage.damping

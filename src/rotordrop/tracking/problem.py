@@ -2,38 +2,28 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.machine import Machine
 from rotordrop.model import layout as L
-from rotordrop.model.parameter_table import parameter
 from rotordrop.model.parameters import DropModel
 from rotordrop.model.static_sag import race_sag, static_sag
-from rotordrop.model.statics import levitated_sag, settled_sag
-from rotordrop.model.unknowns import Unknown, all_unknowns, sensor_prior, smallest_gap
+from rotordrop.model.statics import settled_sag
+from rotordrop.model.unknowns import Unknown, all_unknowns, smallest_gap
 from rotordrop.physics import aerodynamics
 from rotordrop.series import noise_by_differences
 from rotordrop.tracking import _filter as F
 from rotordrop.tracking import _propagation as P
-from rotordrop.tracking.sensor_form import begin_caught_up, rest_terms, sensor_form, share_in_groups
+from rotordrop.tracking.prior import fall_time, prior_at_power_off, start_of
+from rotordrop.tracking.sensor_form import rest_terms, sensor_form
 from rotordrop.tracking.unknowns import parameter_targets
 
 Array = NDArray[np.float64]
 
-RUNOUT_SIGMA = 0.5e-6
-START_POSITION_SIGMA, BENDING_POSITION_SIGMA, RACE_POSITION_SIGMA = 0.12, 6e-3, 4e-4
-"""How far the rotor, its first bending and a race may be from where they were seen, over the air gap [1]."""
-START_VELOCITY_SIGMA, BENDING_VELOCITY_SIGMA, RACE_VELOCITY_SIGMA = 0.28, 0.021, 1.4e-3
-"""Their velocities at power-off over that of a free fall through the air gap [1]."""
-START_ORBIT_SIGMA = 0.03
-"""Radius of the orbit of the levitated rotor over the air gap [1]."""
-RACE_SPIN_SIGMA = 0.3
-"""Spin of a race at power-off [rad/s]."""
-SPEED_SIGMA = 0.5
+FIRST_READINGS = 0.07
+"""Time after power-off whose mean reading says where the rotor is, over the time of a free fall [1]."""
 SPEED_READING_SIGMA = 1.0
 SPEED_SPACING = 2.5e-3
 """Time between speed readings that count as independent [s]."""
@@ -41,14 +31,10 @@ AFTER_FALL = 1.4
 """Time at which parameters are read over the time of a free fall through the widest air gap [1]."""
 FEWEST_DIFFERENCES = 50
 """Differences from which their median is a noise [1]."""
-FIRST_READINGS = 0.07
-"""Time after power-off whose mean reading says where the rotor is, over the time of a free fall [1]."""
 NOISE_FLOOR = 0.1e-6
 USUAL_NOISE = 1e-6
 TAIL_VERTICAL_SIGMA, TAIL_HORIZONTAL_SIGMA = 2.8e-3, 0.1
 """How far the resting rotor may be from where gap and sag put it, over the air gap [1]."""
-OWN_SIGMA = (0.3e-6, 0.3e-6, 1e-4, 1e-4)
-"""How far a foundation may be from rest at power-off, displacement [m] and velocity [m/s], x and y."""
 SMOOTHED_FRICTION_SPEED = 0.15
 """Sliding speed [m/s] below which the filter smooths friction: the spin of a race is not known better, so the
 mean of the friction law over what is possible is what a linearisation may use."""
@@ -226,11 +212,6 @@ class DropProblem:
         return np.concatenate([self.watched_rows(name) for name in self.model.bearing_names])
 
 
-def fall_time(machine: Machine, gap: float | None = None) -> float:
-    """Time [s] of a free fall through a gap [m], the narrowest of a machine by default."""
-    return math.sqrt(2.0 * (smallest_gap(machine) if gap is None else gap) / float(machine.gravity))
-
-
 def build_problem(
     model: DropModel,
     drop: RecordedDrop,
@@ -255,7 +236,9 @@ def build_problem(
     inside = (drop.time >= 0.0) & (drop.time <= until)
     readings = drop.readings[inside]
     rows = sensor_rows(model)
-    mean, covariance = _prior(model, unknowns, rows, readings, drop)
+    level = _first_level(drop.time[drop.time >= 0.0], readings, FIRST_READINGS * fall_time(model.machine))
+    speed = drop.initial_speed, drop.initial_speed_error
+    mean, covariance = prior_at_power_off(model, unknowns, rows, level, speed)
     problem = DropProblem(
         model=_prepared(model, drop.initial_speed),
         unknowns=unknowns,
@@ -267,7 +250,7 @@ def build_problem(
         variances=_variances(drop.noise, readings),
         speed_variance=SPEED_READING_SIGMA**2,
         mean=mean,
-        start=_start(mean, model, unknowns),
+        start=start_of(mean, model, unknowns),
         covariance=covariance,
         sensor_form=sensor_form(model, unknowns, rows),
     )
@@ -326,81 +309,6 @@ def sensor_rows(model: DropModel) -> Array:
         rows[c, layout.modal_x] = np.cos(angle) * shape
         rows[c, layout.modal_y] = np.sin(angle) * shape
     return rows
-
-
-def _prior(
-    model: DropModel, unknowns: tuple[Unknown, ...], rows: Array, readings: Array, drop: RecordedDrop
-) -> tuple[Array, Array]:
-    """Prior mean and covariance of the whole estimate at power-off."""
-    layout = model.layout
-    s, n_p, n_c = layout.n_dynamic, len(unknowns), rows.shape[0]
-    mean = np.zeros(s + n_p + 4 * n_c)
-    sigma = np.zeros_like(mean)
-    mean[:s] = model.at_rest()[:s]
-    gap, fall = smallest_gap(model.machine), fall_time(model.machine)
-    level = _first_level(drop.time[drop.time >= 0.0], readings, FIRST_READINGS * fall)
-    _rotor_prior(model, rows, level, drop.initial_speed, mean, sigma)
-    for part in (layout.race, layout.support):
-        sigma[part] = RACE_POSITION_SIGMA * gap
-        sigma[layout.velocity_of(part)] = RACE_VELOCITY_SIGMA * float(model.machine.gravity) * fall
-    sigma[layout.race_spin] = RACE_SPIN_SIGMA
-    mean[layout.rotor_speed] = drop.initial_speed
-    sigma[layout.rotor_speed] = math.hypot(SPEED_SIGMA, drop.initial_speed_error)
-    for i, unknown in enumerate(unknowns):
-        mean[s + i], sigma[s + i] = unknown.mean, unknown.sigma
-    for c, sensor in enumerate(model.machine.sensors):
-        gain, offset = s + n_p + c, s + n_p + n_c + c
-        known = sensor_prior(parameter("gain", "sensor"), sensor.gain, gap)
-        mean[gain], sigma[gain] = 1.0 / known.mean - 1.0, known.sigma
-        known = sensor_prior(parameter("offset", "sensor"), sensor.offset, gap)
-        mean[offset], sigma[offset] = known.mean, known.sigma
-    sigma[s + n_p + 2 * n_c :] = RUNOUT_SIGMA
-    sigma[layout.own] = np.resize(OWN_SIGMA, layout.own.stop - layout.own.start)
-    covariance = np.diag(sigma**2)
-    share_in_groups(model, unknowns, covariance[s : s + n_p, s : s + n_p])
-    if layout.sensor_own:
-        begin_caught_up(layout, rows, mean, covariance)
-    return mean, covariance
-
-
-def _start(mean: Array, model: DropModel, unknowns: tuple[Unknown, ...]) -> Array:
-    """The prior mean with the unknowns at the guesses of the machine file, which need not be the centre."""
-    start = mean.copy()
-    first = model.layout.n_dynamic
-    start[first : first + len(unknowns)] = [unknown.begin for unknown in unknowns]
-    return start
-
-
-def _rotor_prior(
-    model: DropModel, rows: Array, level: Array, omega: float, mean: Array, sigma: Array
-) -> None:
-    layout, basis = model.layout, model.basis
-    gap = smallest_gap(model.machine)
-    falling = float(model.machine.gravity) * fall_time(model.machine)
-    weight = np.sqrt(model.fe.total_mass)
-    frequency = np.sqrt(np.maximum(basis.eigenvalues, 0.0))
-    softer = np.where(frequency > 0.0, frequency[2] / np.maximum(frequency, 1.0), 1.0)
-    sag = np.zeros(basis.shapes.shape[0])
-    if len(model.machine.ambs) >= 2:
-        sag = np.asarray(levitated_sag(model.fe, model.machine), dtype=np.float64)
-    amplitude = basis.shapes.T @ (model.fe.mass @ sag)
-    amplitude[: basis.n_rigid] = 0.0
-    mean[layout.modal_y] = amplitude
-    rigid = slice(0, basis.n_rigid)
-    observed = level - rows[:, : mean.size][:, layout.modal_y] @ amplitude
-    design = np.hstack([rows[:, layout.modal_x][:, rigid], rows[:, layout.modal_y][:, rigid]])
-    seen = np.isfinite(observed)
-    fitted, *_ = np.linalg.lstsq(design[seen], observed[seen], rcond=None)
-    mean[layout.modal_x][rigid] = fitted[: basis.n_rigid]
-    mean[layout.modal_y][rigid] += fitted[basis.n_rigid :]
-    for part in (layout.modal_x, layout.modal_y):
-        position = BENDING_POSITION_SIGMA * gap * weight * softer**2 + 0.2 * np.abs(amplitude)
-        velocity = BENDING_VELOCITY_SIGMA * falling * weight * softer
-        position[rigid] = START_POSITION_SIGMA * gap * weight
-        circling = START_ORBIT_SIGMA * gap * omega
-        velocity[rigid] = math.hypot(START_VELOCITY_SIGMA * falling, circling) * weight
-        sigma[part] = position
-        sigma[layout.velocity_of(part)] = velocity
 
 
 def _first_level(time: Array, readings: Array, until: float) -> Array:

@@ -12,7 +12,14 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
-from rotordrop.tracking.calibration import Stage, TrackedDrops, handed_on, one_pass, stage_settings
+from rotordrop.tracking.calibration import (
+    THREADS,
+    Stage,
+    TrackedDrops,
+    handed_on,
+    one_pass,
+    stage_settings,
+)
 from rotordrop.tracking.smoother import Forward, Storage, forward
 
 SMALLEST, LARGEST = 0.125, 64.0
@@ -21,8 +28,6 @@ values decide: the interval of a peak shrank by less than 6 % from there to a qu
 
 STEP = 4.0
 """Factor between the sizes tried [1]; the likeliest lies on the parabola through the best three."""
-
-THREADS = 2
 
 
 def likeliest_noise(fit: TrackedDrops, stage: Stage) -> float:
@@ -79,7 +84,7 @@ def with_noise(fit: TrackedDrops, stage: Stage, factor: float) -> TrackedDrops:
     again = one_pass(
         fit.problems,
         stage_settings(fit.problems[0], stage, factor),
-        [drop.means for drop in fit.smoothed],
+        fit.trajectories,
         max(float(problem.time[len(drop.means) - 1]) for problem, drop in drops),
         storages=[Storage.of(drop.filtered) for drop in fit.smoothed],
     )

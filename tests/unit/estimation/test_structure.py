@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from types import SimpleNamespace
 from typing import Any
 
@@ -21,8 +22,10 @@ from rotordrop.estimation.structure_search import (
     PENALTY,
     Candidate,
     Kept,
+    Place,
     found_sensors,
     found_structure,
+    rank_of,
 )
 from rotordrop.estimation.structure_sentence import derived, soft_axis, soft_over_stiff, structure_of
 from rotordrop.machine import Machine, example_machine, load_machine, save_machine
@@ -36,9 +39,8 @@ def lp400() -> Machine:
 
 
 def fit_of(improbability: float, nis: float, factor: float = 1.0) -> Any:
-    filtered = SimpleNamespace(negative_log_likelihood=improbability)
     return SimpleNamespace(
-        smoothed=(SimpleNamespace(filtered=filtered),),
+        improbability=improbability,
         nis=(nis,),
         noise_factors=(factor,),
         diverged=(False,),
@@ -64,19 +66,34 @@ def has(machine: Machine) -> frozenset[str]:
 
 
 class Record:
-    """A record by the improbability it gives to machines with certain extensions."""
+    """A record by the improbability it gives to machines with certain extensions, whatever the window."""
+
+    windows = 4
 
     def __init__(self, table: dict[frozenset[str], Any], usual: Any, back: Any = None) -> None:
         self.table, self.usual, self.back = table, usual, back
         self.attempts: list[int] = []
+        self.passed: Counter[int] = Counter()
 
     def fit(self, machine: Machine, attempt: int) -> Any:
         self.attempts.append(attempt)
         return self.table.get(has(machine), self.usual)
 
+    def window(self, machine: Machine, attempt: int, number: int, before: Place | None) -> Place:
+        assert (before is None) == (number == 0)
+        self.passed[number] += 1
+        fit = self.fit(machine, attempt)
+        return Place(problems=(), trajectories=(fit,), rank=rank_of(fit))
+
+    def settled(self, place: Place) -> Any:
+        return place.trajectories[0]
+
     def look(self, _known: Any, machine: Machine, _passes: int) -> Any:
         found = self.table.get(has(machine), self.usual)
         return self.back if self.back is not None and not has(machine) else found
+
+    def judge(self, known: Any, machine: Machine) -> float:
+        return float(self.look(known, machine, 1).improbability)
 
 
 AXES, CUBIC = frozenset({"turned support axes"}), frozenset({"cubic support"})
@@ -89,7 +106,7 @@ def names(found: Candidate) -> list[str]:
 def test_the_extension_that_the_readings_pay_for_is_kept(lp400):
     usual = fit_of(1000.0, 3.0)
     record = Record({AXES: fit_of(500.0, 0.9), CUBIC: fit_of(700.0, 1.1)}, usual)
-    found = found_structure(Candidate(machine=lp400, fit=usual), record.fit, record.look)
+    found = found_structure(Candidate(machine=lp400, fit=usual), record)
     assert names(found) == ["turned support axes"] and found.kept[0].gain == pytest.approx(500.0)
     assert has(found.machine) == AXES
 
@@ -97,7 +114,7 @@ def test_the_extension_that_the_readings_pay_for_is_kept(lp400):
 def test_what_pays_less_than_the_penalty_is_not_named(lp400):
     usual = fit_of(1000.0, 3.0)
     record = Record({AXES: fit_of(1000.0 - 0.9 * PENALTY, 3.0)}, usual)
-    found = found_structure(Candidate(machine=lp400, fit=usual), record.fit, record.look)
+    found = found_structure(Candidate(machine=lp400, fit=usual), record)
     assert names(found) == [] and found.machine == lp400
 
 
@@ -105,7 +122,7 @@ def test_an_extension_that_only_led_to_a_better_start_is_not_named(lp400):
     """The usual model, given the place that the extension has found, follows the record as well."""
     usual, better = fit_of(1000.0, 3.0), fit_of(505.0, 0.95)
     record = Record({AXES: fit_of(500.0, 0.9)}, usual, back=better)
-    found = found_structure(Candidate(machine=lp400, fit=usual), record.fit, record.look)
+    found = found_structure(Candidate(machine=lp400, fit=usual), record)
     assert names(found) == [] and found.fit is better
 
 
@@ -114,7 +131,7 @@ def test_a_second_extension_comes_on_top_of_the_first(lp400):
     record = Record(
         {AXES: fit_of(600.0, 1.6), CUBIC: fit_of(800.0, 2.0), AXES | CUBIC: fit_of(300.0, 0.9)}, usual
     )
-    found = found_structure(Candidate(machine=lp400, fit=usual), record.fit, record.look)
+    found = found_structure(Candidate(machine=lp400, fit=usual), record)
     assert names(found) == ["turned support axes", "cubic support"]
     assert [kept.gain for kept in found.kept] == pytest.approx([400.0, 300.0])
 
@@ -123,22 +140,42 @@ def test_likelihoods_compare_at_equal_unknown_impulses_only(lp400):
     """A structure that follows the record with eight times the impulses is no better for its likelihood."""
     usual = fit_of(1000.0, 3.0)
     record = Record({AXES: fit_of(100.0, 0.98, factor=8.0), CUBIC: fit_of(700.0, 1.1)}, usual)
-    found = found_structure(Candidate(machine=lp400, fit=usual), record.fit, record.look)
+    found = found_structure(Candidate(machine=lp400, fit=usual), record)
     assert names(found) == ["cubic support"]
 
 
-def test_where_nothing_helps_other_starts_are_tried_until_one_does(lp400):
+def test_where_nothing_helps_the_best_of_other_starts_is_taken(lp400):
     usual = fit_of(1000.0, 3.0)
-    record = Record({}, usual)
 
-    def fit(machine: Machine, attempt: int) -> Any:
-        if attempt == FIRST_OTHER_START:
-            raise IdentificationError("lost")
-        return fit_of(400.0, 0.9) if attempt == FIRST_OTHER_START + 1 else record.fit(machine, attempt)
+    class Elsewhere(Record):
+        def fit(self, machine: Machine, attempt: int) -> Any:
+            if attempt == FIRST_OTHER_START:
+                raise IdentificationError("lost")
+            return fit_of(400.0, 0.9) if attempt == FIRST_OTHER_START + 1 else super().fit(machine, attempt)
 
-    found = found_structure(Candidate(machine=lp400, fit=usual), fit, record.look)
+    found = found_structure(Candidate(machine=lp400, fit=usual), Elsewhere({}, usual))
     assert names(found) == [] and found.fit.nis == (0.9,)
-    assert max(record.attempts) < FIRST_OTHER_START
+
+
+def test_the_half_that_follows_the_record_worse_stays_behind_window_by_window(lp400):
+    usual = fit_of(1000.0, 3.0)
+    record = Record({AXES: fit_of(500.0, 0.9)}, usual)
+    found_structure(Candidate(machine=lp400, fit=usual), record)
+    ways = 2 * len(EXTENSIONS)
+    assert [record.passed[k] for k in range(4)] == [ways, ways, ways, ways // 2]
+
+
+def test_an_extension_that_loses_the_record_is_no_candidate(lp400):
+    usual = fit_of(1000.0, 3.0)
+
+    class Lost(Record):
+        def fit(self, machine: Machine, attempt: int) -> Any:
+            if has(machine):
+                raise IdentificationError("lost")
+            return super().fit(machine, attempt)
+
+    found = found_structure(Candidate(machine=lp400, fit=usual), Lost({AXES: fit_of(1.0, 0.9)}, usual))
+    assert names(found) == [] and found.machine == lp400
 
 
 def test_what_sensors_do_is_looked_for_beside_a_model_that_fits(lp400):
@@ -146,15 +183,10 @@ def test_what_sensors_do_is_looked_for_beside_a_model_that_fits(lp400):
     cross = frozenset({"cross-axis sensitivity"})
     every = cross | {"sensor lag", "brackets that follow the housing", "sensor planes elsewhere"}
     table = {cross: fit_of(880.0, 0.9), every: fit_of(890.0, 0.9), AXES: fit_of(500.0, 0.8)}
-    record = Record(table, usual)
-
-    def judge(known: Any, machine: Machine) -> float:
-        return record.look(known, machine, 1).smoothed[0].filtered.negative_log_likelihood
-
-    found = found_sensors(Candidate(machine=lp400, fit=usual), judge, record.look)
+    found = found_sensors(Candidate(machine=lp400, fit=usual), Record(table, usual))
     assert names(found) == ["cross-axis sensitivity"] and found.kept[0].gain == pytest.approx(120.0)
     record = Record({AXES: fit_of(500.0, 0.8)}, usual)
-    assert found_sensors(Candidate(machine=lp400, fit=usual), judge, record.look).kept == ()
+    assert found_sensors(Candidate(machine=lp400, fit=usual), record).kept == ()
 
 
 # sentences

@@ -13,7 +13,8 @@ from rotordrop.estimation.tracked import COARSE_BASIS
 from rotordrop.model.parameters import build_drop_model
 from rotordrop.tracking._filter import is_plausible
 from rotordrop.tracking.calibration import BLIND_SCHEDULE, CALIBRATED_SCHEDULE, shifted, stage_settings
-from rotordrop.tracking.problem import DropProblem, fall_time
+from rotordrop.tracking.prior import fall_time
+from rotordrop.tracking.problem import DropProblem
 from rotordrop.tracking.smoother import PassSettings
 
 LAST = CALIBRATED_SCHEDULE[-1]
