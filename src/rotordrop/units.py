@@ -274,6 +274,12 @@ def format_quantity(value: float, kind: str, digits: int = 3) -> str:
     return f"{number}{unit}" if unit == "°" else f"{number} {unit}".rstrip()
 
 
+def format_moment(time: float, decimals: int = 3) -> str:
+    """Write a time of a record [s] with fixed decimals, as ``"0.214 s"``; never as "-0.000 s"."""
+    text = f"{time:.{decimals}f}"
+    return f"{text.removeprefix('-') if float(text) == 0.0 else text} s"
+
+
 def _kind(kind: str) -> Kind:
     try:
         return KINDS[kind]

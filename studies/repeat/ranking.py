@@ -1,10 +1,11 @@
 """Are drops that are called worse with 93 % worse in 93 of 100 cases?
 
-    python studies/repeat/ranking.py --out studies/repeat/ranking.json [--more FOLDER]
+    python studies/repeat/ranking.py --out studies/repeat/ranking.json
 
 Estimates with their intervals and truths are those of `studies/tracked/scaled` (four drops of each calibrated
-machine, full method) and, where given, those that `reliability.py` left in FOLDER (quick method). Within a
-machine every drop is ranked with every other.
+machine), of `studies/tracked/noise` (the same with the likeliest unknown impulses, as estimates are made now)
+and of `studies/changed` (eight drops of each machine from guesses, likeliest impulses too). Within a machine
+every drop is ranked with every other. `diagram.py` draws what comes out.
 """
 
 from __future__ import annotations
@@ -22,28 +23,28 @@ from numpy.typing import NDArray
 
 from rotordrop.severity.ranking import DropSeverity, worse_probability, worst_probability
 
-SCALED = Path(__file__).parent.parent / "tracked" / "scaled"
+STUDIES = Path(__file__).parent.parent
 EDGES = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99, 1.0)
 Row = tuple[DropSeverity, float]
 
 
-def of_full_method() -> Iterator[tuple[str, str, Row]]:
+def of_calibrated(folder: Path) -> Iterator[tuple[str, str, Row]]:
     """Machine, quantity, and estimate with truth."""
-    for file in sorted(SCALED.glob("*_none.json")):
+    for file in sorted(folder.glob("*_none.json")):
         for k, drop in enumerate(json.loads(file.read_text())["drops"]):
             for bearing, entry in drop["bearings"].items():
                 for field, known in entry.items():
                     if isinstance(known, dict) and known.get("interval_90"):
-                        yield file.stem, f"{bearing} {field}", row(f"{k}", known)
+                        yield f"{folder.name} {file.stem}", f"{bearing} {field}", row(f"{k}", known)
 
 
-def of_quick_method(folder: Path) -> Iterator[tuple[str, str, Row]]:
-    """The same of the drops that were predicted."""
-    for line in (folder / "estimates.jsonl").read_text().splitlines():
+def of_changed(file: Path) -> Iterator[tuple[str, str, Row]]:
+    """The same of the drops that are compared in `studies/changed`."""
+    for line in file.read_text().splitlines():
         one = json.loads(line)
         for field, known in one.items():
             if isinstance(known, dict) and known.get("interval_90"):
-                yield f"predicted {one['seed']}", field, row(str(one["number"]), known)
+                yield f"guessed {one['seed']}", field, row(str(one["drop"]), known)
 
 
 def row(name: str, known: dict[str, Any]) -> Row:
@@ -111,11 +112,15 @@ def scored(rows: Iterator[tuple[str, str, Row]]) -> dict[str, Any]:
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--more", type=Path)
     asked = parser.parse_args()
-    content = {"full method": scored(of_full_method())}
-    if asked.more:
-        content["quick method"] = scored(of_quick_method(asked.more))
+    before = list(of_calibrated(STUDIES / "tracked" / "scaled"))
+    now = list(of_calibrated(STUDIES / "tracked" / "noise"))
+    now += of_changed(STUDIES / "changed" / "drops.jsonl")
+    content = {
+        "usual impulses": scored(iter(before)),
+        "likeliest impulses": scored(iter(now)),
+        "all": scored(iter(before + now)),
+    }
     asked.out.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
     print(json.dumps(content, indent=1))
 

@@ -21,9 +21,15 @@ from tests.reference.ball_bearing_catalogue import (
 
 from rotordrop.machine.catalog import CatalogueBearing, designations, find_bearing
 from rotordrop.physics import hertz
-from rotordrop.physics.ball_bearing import axial_rigidity, bearing_constants, lift_off_force
+from rotordrop.physics.ball_bearing import (
+    BearingConstants,
+    axial_rigidity,
+    bearing_constants,
+    lift_off_force,
+)
 from rotordrop.physics.ball_bearing_geometry import BallBearingGeometry
-from rotordrop.physics.ball_bearing_response import bearing_equilibrium
+from rotordrop.physics.ball_bearing_response import bearing_equilibrium, bearing_response
+from rotordrop.severity.fatigue import ball_row, share_by_16281
 
 pytestmark = pytest.mark.acceptance
 Inputs = Mapping[str, Any]
@@ -64,30 +70,56 @@ def iso_16281_equilibrium(inputs: Inputs) -> dict[str, float]:
         "load case 2: axial displacement (from centred, incl. half axial clearance)",
         "load case 3: radial displacement",
     )
-    grooves = (inputs["ri"] / inputs["Dw"], inputs["re"] / inputs["Dw"])
-    A_0 = inputs["ri"] + inputs["re"] - inputs["Dw"]
     numbers = {}
     for name, load in zip(names, inputs["load_cases"], strict=True):
-        constants = bearing_constants(
-            BallBearingGeometry(
-                ball_diameter=inputs["Dw"],
-                ball_count=inputs["Z"],
-                pitch_diameter=inputs["Dpw"],
-                contact_angle=math.acos(1.0 - load["clearance_s"] / (2.0 * A_0)),
-                conformity_inner=grooves[0],
-                conformity_outer=grooves[1],
-                ring_youngs_modulus=inputs["E"],
-                ring_poisson_ratio=inputs["nu"],
-                ball_youngs_modulus=inputs["E"],
-                ball_poisson_ratio=inputs["nu"],
-                arrangement="single",
-                first_ball_angle=math.pi,
-            )
-        )
-        centred = np.array([0.0, -1e-6, -constants.axial_offset, 0.0, 0.0])
-        force = [0.0, -load["Fr"], load["Fa"], 0.0, load["M"]]
-        q = bearing_equilibrium(constants, force, start=centred)
+        constants, q = deep_groove_equilibrium(inputs, load)
         numbers[name] = -q[1] if load["Fr"] else q[2] + constants.axial_offset
+    return numbers
+
+
+def deep_groove_equilibrium(
+    inputs: Inputs, load: Mapping[str, float]
+) -> tuple[BearingConstants, NDArray[np.float64]]:
+    """The row of H03, and where its race lies under a load case."""
+    A_0 = inputs["ri"] + inputs["re"] - inputs["Dw"]
+    constants = bearing_constants(
+        BallBearingGeometry(
+            ball_diameter=inputs["Dw"],
+            ball_count=inputs["Z"],
+            pitch_diameter=inputs["Dpw"],
+            contact_angle=math.acos(1.0 - load["clearance_s"] / (2.0 * A_0)),
+            conformity_inner=inputs["ri"] / inputs["Dw"],
+            conformity_outer=inputs["re"] / inputs["Dw"],
+            ring_youngs_modulus=inputs["E"],
+            ring_poisson_ratio=inputs["nu"],
+            ball_youngs_modulus=inputs["E"],
+            ball_poisson_ratio=inputs["nu"],
+            arrangement="single",
+            first_ball_angle=math.pi,
+        )
+    )
+    beside = 1e-5 if load["Fr"] and load["Fa"] else 0.0
+    start = np.array([0.0, -1e-6, beside - constants.axial_offset, 0.0, 0.0])
+    return constants, bearing_equilibrium(constants, [0.0, -load["Fr"], load["Fa"], 0.0, 0.0], start=start)
+
+
+def iso_16281_life(inputs: Inputs) -> dict[str, float]:
+    """Revolutions until the share of the rating life is one, under a load that does not change."""
+    row = ball_row(
+        inputs["C"],
+        inputs["Z"],
+        inputs["Dw"] / inputs["Dpw"],
+        1.0,
+        inputs["ri"] / inputs["Dw"],
+        inputs["re"] / inputs["Dw"],
+    )
+    numbers = {}
+    for load in inputs["load_cases"]:
+        balls = bearing_response(*deep_groove_equilibrium(inputs, load)).ball_loads
+        a_turn = share_by_16281(
+            row, np.array([0.0, 1.0]), np.repeat(balls, 2, axis=0), np.full(2, 2.0 * math.pi)
+        )
+        numbers[f"load case {load['case']}: reference rating life"] = 1e-6 / a_turn
     return numbers
 
 
@@ -224,6 +256,7 @@ CASES: dict[str, Compute] = {
     "H01a": contact_parameters,
     "H02": curvatures,
     "H03a": iso_16281_equilibrium,
+    "H03b": iso_16281_life,
     "H05": stribeck_loaded_inner_race,
     "H06a": gmn_catalogue,
     "H07a": fag_catalogue,
@@ -248,6 +281,8 @@ def test_case(name: str) -> None:
         ("H03a", {"ri": 0.0060}),
         ("H03a", {"E": 210.5e9}),
         ("H03a", {"re": 0.0062}),
+        ("H03b", {"ri": 0.0060}),
+        ("H03b", {"C": 23410.0}),
         ("H05", {"groove_radius": 0.004891}),
         ("H05", {"Q": 556.0}),
         ("H08", {"Q": 1001.0}),

@@ -13,7 +13,6 @@ from scipy.special import ndtr, ndtri
 
 from rotordrop.errors import UsageError
 from rotordrop.estimated import NINETY
-from rotordrop.estimation.tracked_parameters import PARAMETER_WIDENING
 from rotordrop.model.parameter import Parameter
 from rotordrop.model.parameter_table import fitted_row, row_of
 from rotordrop.physics.linear_algebra import solve, symmetric_eigen
@@ -22,6 +21,8 @@ Array = NDArray[np.float64]
 
 FALSE_ALARM = 0.01
 """Probability that anything is named of two drops between which nothing changed [1]."""
+FOUND = float(ndtri(0.95))
+"""Standard errors beyond the level of chance from which a change is found in 19 of 20 pairs [1]."""
 BY_PRIOR = 0.95
 """Standard deviation over that of the prior from which a record says nothing of its own [1]."""
 SURE, LITTLE = 1e-8, 1e-6
@@ -29,10 +30,12 @@ SURE, LITTLE = 1e-8, 1e-6
 filter keeps seven digits, and a record may say nothing."""
 UNKNOWN_CHANGE = math.sqrt(2.0 / (BY_PRIOR**-2 - 1.0))
 """Standard error of a change, over the prior's deviation, from which the records say nothing of it [1]."""
+NO_CHANGE = 0.5 / math.sqrt(LITTLE)
+"""Standard error of a change, over the prior's deviation, from which no size of it is worth a number [1]."""
 WATCHED: Mapping[str, float] = {
     "air_gap": 10e-6,
     "support.stiffness": math.log(1.1),
-    "support.damping": math.log(1.2),
+    "support.damping": math.log(1.1),
     "friction.dynamic": math.log(1.2),
     "race.drag_coefficient": math.log(2.0),
 }
@@ -59,6 +62,9 @@ class Change:
         Probability that it changed by more than what is asked for [1].
     named : bool
         Whether the change is beyond chance, of all parameters looked at together.
+    smallest : float
+        Smallest change that these two records show in 19 of 20 cases: difference [SI], or factor where the
+        parameter is positive by nature [1]; infinite where they show none.
     determined : bool
         Whether both records say something of it; else nothing is said.
     """
@@ -71,7 +77,23 @@ class Change:
     factor: bool
     probability: float
     named: bool
+    smallest: float
     determined: bool = True
+
+    @property
+    def may_hide(self) -> bool:
+        """Whether a change of the size that is asked for could have stayed unseen."""
+        least = _watched(self.path)
+        assert least is not None
+        asked = math.exp(least) if self.factor else least
+        return not self.named and (not self.determined or self.smallest > asked)
+
+    @property
+    def smallest_text(self) -> str:
+        """Smallest change that would have been found, in words."""
+        if math.isinf(self.smallest):
+            return "of any size"
+        return f"× {self.smallest:.3g}" if self.factor else f"{1e6 * self.smallest:.2g} µm"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,12 +119,12 @@ class Changes:
 
     def sentence(self) -> str:
         """The outcome in words."""
-        unknown = sum(not one.determined for one in self.found)
-        beside = f"; of {unknown} parameters the records do not say it" if unknown else ""
+        hidden = ", ".join(f"{one.path} {one.smallest_text}" for one in self.found if one.may_hide)
+        beside = f" Smaller changes than these may hide: {hidden}." if hidden else ""
         if not self.named:
-            return f"Between {self.first} and {self.second} no parameter changed beyond chance{beside}."
+            return f"Between {self.first} and {self.second} no parameter changed beyond chance.{beside}"
         parts = [f"{one.path} ({_words(one)}, {one.probability:.0%})" for one in self.named]
-        return f"Between {self.first} and {self.second} changed: {', '.join(parts)}{beside}."
+        return f"Between {self.first} and {self.second} changed: {', '.join(parts)}.{beside}"
 
 
 def _words(one: Change) -> str:
@@ -158,8 +180,7 @@ def changes(first: Mapping[str, Any], second: Mapping[str, Any]) -> Changes:
     if first.get("joint") and second.get("joint"):
         # a parameter that hardly leaves its prior is one that the linearised fit knows least of
         seen = [path for path, pair in pairs.items() if None not in pair]
-        found = _jointly(first["joint"], second["joint"], told, seen)
-        found += [_change(path, told, 0.0, math.inf, named=False) for path in paths if path not in seen]
+        found = _jointly(first["joint"], second["joint"], told, seen, paths)
     else:
         level = _level(sum(None not in pair for pair in pairs.values()))
         found = [_compared(path, told, pair, level) for path, pair in pairs.items()]
@@ -220,23 +241,35 @@ def _compared(
 ) -> Change:
     one, other = pair
     if one is None or other is None:
-        return _change(path, told, 0.0, math.inf, named=False)
+        return _change(path, told, 0.0, math.inf, smallest=math.inf, named=False)
     moved, sigma = other.mean - one.mean, math.hypot(one.sigma, other.sigma)
-    return _change(path, told, moved, sigma, named=abs(moved) > level * sigma)
+    named = abs(moved) > level * sigma
+    return _change(path, told, moved, sigma, smallest=(level + FOUND) * sigma, named=named)
 
 
 def _change(
-    path: str, told: Sequence[Mapping[str, Any]], moved: float, sigma: float, *, named: bool
+    path: str,
+    told: Sequence[Mapping[str, Any]],
+    moved: float,
+    sigma: float,
+    *,
+    smallest: float,
+    named: bool,
 ) -> Change:
-    """A change and its standard error in the measure of the parameter; infinite where nothing is known."""
+    """A change, its standard error and the smallest one that shows, in the measure of the parameter.
+
+    The standard error is infinite where nothing is said. Forces go with the coefficient itself, not with its
+    logarithm: where only a large one shows, it is 1 plus the smallest change, not its exponential.
+    """
     factor, least = row_of(path).logarithmic, _watched(path)
     assert least is not None
     before, after = (one[path]["estimate"]["value"] for one in told)
+    smallest = 1.0 + smallest if factor else smallest
     if math.isinf(sigma):
         nothing = (0.0, math.inf) if factor else (-math.inf, math.inf)
         return Change(
             path=path, before=before, after=after, change=1.0 if factor else 0.0, interval_90=nothing,
-            factor=factor, probability=0.0, named=False, determined=False,
+            factor=factor, probability=0.0, named=False, smallest=smallest, determined=False,
         )  # fmt: skip
     ends = (moved - NINETY * sigma, moved, moved + NINETY * sigma)
     low, middle, high = (math.exp(end) for end in ends) if factor else ends
@@ -250,6 +283,7 @@ def _change(
         factor=factor,
         probability=beyond,
         named=named,
+        smallest=smallest,
     )
 
 
@@ -257,13 +291,19 @@ def _jointly(
     first: Mapping[str, Any],
     second: Mapping[str, Any],
     told: Sequence[Mapping[str, Any]],
+    seen: Sequence[str],
     paths: Sequence[str],
 ) -> list[Change]:
-    """Changes by one fit to both records that shares everything else."""
+    """Changes by one fit to both records that shares everything else; named only what both have seen.
+
+    What one of them has not seen may still have changed, within its prior, and must not look like a change of
+    something else.
+    """
     common = [path for path in first["paths"] if path in second["paths"]]
-    fit = _CommonFit([_own(one, common) for one in (first, second)])
+    unseen = [common.index(path) for path in paths if path in common and path not in seen]
+    fit = _CommonFit([_own(one, common) for one in (first, second)], unseen)
     scale = dict(zip(first["paths"], first["prior_standard_deviation"], strict=True))
-    watched = [path for path in paths if path in common]
+    watched = [path for path in seen if path in common]
     chosen: list[str] = []
     level = _level(len(watched))
     while rest := [path for path in watched if path not in chosen]:
@@ -273,16 +313,20 @@ def _jointly(
             break
         chosen.append(best)
     found = []
-    for path in watched:
+    for path in paths:
+        if path not in common:
+            found.append(_change(path, told, 0.0, math.inf, smallest=math.inf, named=False))
+            continue
         others = [one for one in chosen if one != path]
         moved, sigma = fit.change([common.index(one) for one in (*others, path)])
-        known = sigma < UNKNOWN_CHANGE
+        known = path in watched and sigma < UNKNOWN_CHANGE
         found.append(
             _change(
                 path,
                 told,
                 moved * scale[path],
                 sigma * scale[path] if known else math.inf,
+                smallest=(level + FOUND) * sigma * scale[path] if sigma < NO_CHANGE else math.inf,
                 named=path in chosen and known,
             )
         )
@@ -292,8 +336,9 @@ def _jointly(
 def _own(joint: Mapping[str, Any], common: Sequence[str]) -> tuple[Array, Array]:
     """What a record alone says, in standard deviations of the prior about its middle.
 
-    Information matrix and information vector: posterior less prior. Errors are as much wider than the filter
-    holds as those of published parameters are.
+    Information matrix and information vector: posterior less prior. Published parameters are wider than the
+    filter holds (`PARAMETER_WIDENING`), for what the linearised fit leaves out; that is common to two records
+    of one machine and cancels in a change.
     """
     n, at = len(joint["paths"]), [joint["paths"].index(path) for path in common]
     lower = np.zeros((n, n))
@@ -303,26 +348,33 @@ def _own(joint: Mapping[str, Any], common: Sequence[str]) -> tuple[Array, Array]
     mean = (np.array(joint["mean"]) - np.array(joint["prior_mean"])) / sigma
     size, turn = symmetric_eigen(whole[np.ix_(at, at)])
     size = np.maximum(size, SURE)
-    gained = np.maximum(1.0 / size - 1.0, 0.0) / PARAMETER_WIDENING**2
+    gained = np.maximum(1.0 / size - 1.0, 0.0)
     # the record's own middle is the posterior's, moved away from the prior as far as the prior drew it
-    vector = np.where(gained > 0.0, (turn.T @ mean[at]) / size / PARAMETER_WIDENING**2, 0.0)
+    vector = np.where(gained > 0.0, (turn.T @ mean[at]) / size, 0.0)
     return (turn * gained) @ turn.T, turn @ vector
 
 
 class _CommonFit:
-    """One fit to two records; every parameter is shared but those that are let change."""
+    """One fit to two records; every parameter is shared but those that are let change.
 
-    def __init__(self, own: Sequence[tuple[Array, Array]]) -> None:
+    ``unseen`` may differ always, by as much as two draws from the prior do.
+    """
+
+    def __init__(self, own: Sequence[tuple[Array, Array]], unseen: Sequence[int]) -> None:
         (one, seen), (self._other, self._read) = own
+        self._unseen = list(unseen)
         self._shared = one + self._other + np.eye(len(one))
         self._sum = seen + self._read
 
     def change(self, places: Sequence[int]) -> tuple[float, float]:
         """Change of the last of some places while all of them may change, and its standard error."""
+        beside = [place for place in self._unseen if place not in places]
+        held = np.array([0.5] * len(beside) + [LITTLE] * len(places))
+        places = [*beside, *places]
         inside = self._other[:, places]
         carried = solve(self._shared, np.column_stack([inside, self._sum]))
         known = self._other[np.ix_(places, places)] - inside.T @ carried[:, :-1]
-        known += LITTLE * np.eye(len(places))
+        known += np.diag(held)
         spread = solve(known, np.eye(len(places)))
         moved = spread @ (self._read[places] - inside.T @ carried[:, -1])
         return float(moved[-1]), math.sqrt(float(spread[-1, -1]))

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.units import format_moment
+
 Array = NDArray[np.float64]
 
 RESOLVED = 4.0
@@ -46,9 +48,9 @@ class LaterMotion:
         """What this means for the stated peaks."""
         beyond = 1e6 * (self.later - self.first)
         return (
-            f"{self.bearing}: the rotor went {beyond:.1f} µm further out at {self.later_time:.3f} s than in "
-            "the part of the record that was estimated; the largest force of this drop may be there, and the "
-            "stated peak is not it"
+            f"{self.bearing}: the rotor went {beyond:.1f} µm further out at {format_moment(self.later_time)} "
+            "than in the part of the record that was estimated; the largest force of this drop may be there, "
+            "and the stated peak is not it"
         )
 
 

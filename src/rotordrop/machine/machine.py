@@ -14,7 +14,7 @@ from rotordrop.estimated import Estimated
 from rotordrop.machine.amb import ActiveMagneticBearing
 from rotordrop.machine.calibration import CalibrationOrigin
 from rotordrop.machine.description import Description, Misfit, Text, place_on_nodes
-from rotordrop.machine.parameter_paths import changed_machine_parts
+from rotordrop.machine.parameter_paths import changed_machine_parts, reasons_of
 from rotordrop.machine.provenance import Mention, mentions
 from rotordrop.machine.rotor import Rotor
 from rotordrop.machine.sensor import Sensor, check_sensors_resolve_motion
@@ -206,6 +206,20 @@ class Machine(Description):
         if parts.keys() - {"touchdown_bearings", "speed"}:
             copy.__dict__.update(copy.left_out())
         return copy
+
+    def with_bearing(self, name: str, designation: str) -> Machine:
+        """Give the same machine with another rolling bearing in the touchdown bearing of that name.
+
+        Its values are those of the catalogue; see `TouchdownBearing.with_designation`.
+        """
+        if self.bearing(name).bearing.designation == designation:
+            return self
+        try:
+            changed = self.bearing(name).with_designation(designation)
+        except ValueError as error:
+            raise UsageError(f"{name} cannot have a bearing {designation!r}: {reasons_of(error)}") from error
+        others = tuple(changed if one.name == name else one for one in self.touchdown_bearings)
+        return self.completed_with({"touchdown_bearings": others})
 
     def calibrated_on(self, origin: CalibrationOrigin) -> Machine:
         """Give the same machine, with the drops that its estimates come from."""

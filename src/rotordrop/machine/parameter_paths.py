@@ -77,13 +77,17 @@ def value_of_path(machine: Machine, path: str) -> float:
 
 
 def _refusal(error: ValueError, values: Mapping[str, float | str | Estimated]) -> str:
+    stated = ", ".join(f"{path} = {_shown(value)}" for path, value in values.items())
+    return f"cannot set {stated} (SI units): {reasons_of(error)}"
+
+
+def reasons_of(error: ValueError) -> str:
+    """Why a description was refused, without the places pydantic names."""
     from pydantic import ValidationError
 
-    stated = ", ".join(f"{path} = {_shown(value)}" for path, value in values.items())
-    if isinstance(error, ValidationError):
-        reasons = "; ".join(str(e["msg"]).removeprefix("Value error, ") for e in error.errors())
-        return f"cannot set {stated} (SI units): {reasons}"
-    return f"cannot set {stated} (SI units): {error}"
+    if not isinstance(error, ValidationError):
+        return str(error)
+    return "; ".join(str(e["msg"]).removeprefix("Value error, ") for e in error.errors())
 
 
 def _shown(value: float | str | Estimated) -> str:

@@ -40,6 +40,9 @@ _UNIT_EXPONENT = re.compile(r"m\s*(?:\^|\*\*)\s*([\d.]+)\s*$")
 _STATIC_OVER_DYNAMIC = 1.3
 _DAMPING_RATIO = 0.025
 _STEEL_DENSITY = 7800.0
+_MOUNTING = frozenset(
+    ("arrangement", "first_ball_angle", "second_row_offset", "preload_class", "clearance_class")
+)
 
 
 class Contact(Description):
@@ -323,6 +326,25 @@ class TouchdownBearing(Placed):
                 ("air_gap",),
             )
         self.bearing.check_bore(bore)
+
+    def with_designation(self, designation: str) -> TouchdownBearing:
+        """Give the same touchdown bearing around another rolling bearing, with its catalogue values.
+
+        How it is mounted stays: arrangement, angles of the balls, classes of preload and clearance. Forces
+        and lengths of the bearing before it do not. Mass and inertia of the race change as those of steel
+        rings of both sizes do.
+        """
+        kept = self.bearing.model_fields_set & _MOUNTING
+        mounted = {name: getattr(self.bearing, name) for name in kept}
+        inside = BallBearing.model_validate({"designation": designation} | mounted)
+        race: dict[str, Any] = {name: getattr(self.race, name) for name in self.race.model_fields_set}
+        rings = Race.model_validate({"width": race["width"]} if "width" in race else {})
+        before, sized = self.changed(race=rings), self.changed(race=rings, bearing=inside)
+        for name in race.keys() & {"mass", "inertia"}:
+            factor = getattr(sized.race, name).value / getattr(before.race, name).value
+            why = f"that of {self.bearing.designation or 'the described bearing'}, by the size of both"
+            race[name] = _scaled(race[name], factor, why, race[name].unit)
+        return self.changed(bearing=inside, race=Race.model_validate(race))
 
     def left_out(self) -> dict[str, Any]:
         """Give the race a width, mass and inertia that were left out, from the size of the bearing."""

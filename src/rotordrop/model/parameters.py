@@ -42,7 +42,10 @@ class DropModel:
 
         Only what changes is computed again; the rotor and its basis are kept.
         """
-        machine = self.machine.with_values(values)
+        return self.with_machine(self.machine.with_values(values))
+
+    def with_machine(self, machine: Machine) -> DropModel:
+        """The same model of a machine with the same rotor and other bearings or values."""
         return replace(self, machine=machine, parameters=_with_machine(self, machine))
 
     def at_rest(self) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -16,8 +17,8 @@ from rotordrop.report.quantity import Quantity, written
 HEADING = "Since the last drop"
 NOTHING_GIVEN = "No earlier estimate of this machine was given to compare with."
 NOTE = (
-    "Asked for: 10 µm of a gap, 10 % of a stiffness, 20 % of damping and friction, a factor of two of the "
-    "drag; the last column is the probability of at least that."
+    "Asked for: 10 µm of a gap, 10 % of a stiffness and of damping, 20 % of friction, a factor of two of the "
+    "drag, with the probability of at least that; the last column is the change that shows in 19 of 20 cases."
 )
 
 
@@ -38,10 +39,10 @@ def changed_section(estimate: Estimate, since: Mapping[str, Any] | None) -> Sect
     except UsageError as error:
         return Section(heading=HEADING, text=(f"{since.get('record', 'the earlier drop')}: {error}.",))
     sentence = found.sentence()
-    for one in found.named:
+    for one in found.found:
         sentence = sentence.replace(one.path, spoken_path(one.path))
     table = Table(
-        columns=("parameter", "before", "now", "change (90 % interval)", "changed that much"),
+        columns=("parameter", "before", "now", "change (90 % interval)", "changed that much", "found from"),
         rows=tuple(_row(one) for one in found.found),
         caption=f"Changes since {found.first}",
         note=NOTE,
@@ -58,12 +59,13 @@ def spoken_path(path: str) -> str:
 def _row(one: Change) -> tuple[Cell, ...]:
     kind = row_of(one.path).display_kind
     before, after = (Quantity(value=value, kind=kind) for value in (one.before, one.after))
+    shows = "–" if math.isinf(one.smallest) else one.smallest_text
     if not one.determined:
-        return (spoken_path(one.path), before, after, "the records do not say", "–")
+        return (spoken_path(one.path), before, after, "the records do not say", "–", shows)
     low, high = one.interval_90
     if one.factor:
         text = f"× {one.change:.3g} ({low:.3g} to {high:.3g})"
     else:
         ends = (written(1e6 * end, 1) for end in (one.change, low, high))
         text = "{} µm ({} to {} µm)".format(*ends)
-    return (spoken_path(one.path), before, after, text, f"{one.probability:.0%}")
+    return (spoken_path(one.path), before, after, text, f"{one.probability:.0%}", shows)

@@ -92,10 +92,14 @@ def _text(plan: DesignPlan, aim: Aim, known: Known) -> str:
 def _table(plan: DesignPlan, result: DesignResult) -> Table:
     machine = plan.study.machine
     first = machine.touchdown_bearings[0].name
-    kinds = {name: kind_of_path(machine, name.replace("*", first, 1)) for name in plan.study.choose}
+
+    def text(name: str, value: float | str) -> str:
+        if isinstance(value, str):
+            return value
+        return format_quantity(value, kind_of_path(machine, name.replace("*", first, 1)))
 
     def row(label: str, one: Candidate) -> tuple[Cell, ...]:
-        chosen = [format_quantity(value, kinds[name]) for name, value in one.values.items()]
+        chosen = [text(name, value) for name, value in one.chosen(plan.study).items()]
         return (
             label,
             *chosen,
@@ -160,18 +164,18 @@ def design_numbers(plan: DesignPlan, result: DesignResult) -> dict[str, Any]:
         "rotordrop": __version__,
         "fingerprint": fingerprint(),
         "aims": [aim.name for aim in result.aims],
-        "candidates": [_candidate(one) for one in result.candidates],
-        "front": [_candidate(one) for one in result.front],
-        "described": _candidate(result.described),
+        "candidates": [_candidate(plan, one) for one in result.candidates],
+        "front": [_candidate(plan, one) for one in result.front],
+        "described": _candidate(plan, result.described),
     }
 
 
-def _candidate(one: Candidate) -> dict[str, Any]:
+def _candidate(plan: DesignPlan, one: Candidate) -> dict[str, Any]:
     def finite(value: float) -> float | None:
         return value if math.isfinite(value) else None
 
     return {
-        "values": dict(one.values),
+        "values": one.chosen(plan.study),
         "on_front": one.on_front,
         "aims": [
             {"value": finite(k.value), "interval_90": [finite(k.lower), finite(k.upper)], "drops": k.drops}

@@ -20,6 +20,7 @@ from rotordrop.report.content import (
 from rotordrop.report.drop_sections import motion_section, orbit_section
 from rotordrop.report.quantity import Quantity
 from rotordrop.report.record_quality import quality_statements, record_quality_section
+from rotordrop.units import format_moment
 
 if TYPE_CHECKING:
     from rotordrop.measurement.look import Look, Synchronous
@@ -82,14 +83,14 @@ def _facts(seen: Look) -> tuple[tuple[str, str], ...]:
 def _verdict(seen: Look) -> list[Statement]:
     drop = seen.drops[0]
     contact = drop.permanent_contact
-    ends = "." if contact is None else f"; from {contact:.4g} s on it stayed in contact."
+    ends = "." if contact is None else f"; from {format_moment(contact)} on it stayed in contact."
     told = [
-        f"The rotor was released at {drop.release:.3f} s of the record (± 2 ms), {len(seen.impacts)} "
-        f"impacts{ends}"
+        f"The rotor was released at {format_moment(drop.release)} of the record (± 2 ms), "
+        f"{len(seen.impacts)} impacts{ends}"
     ]
     told += [
         f"{plane.plane}: {_text(plane.excess, 'length')} beyond the air gap of {_text(plane.gap, 'length')} "
-        f"at {plane.largest_time:.4g} s."
+        f"at {format_moment(plane.largest_time)}."
         for plane in seen.planes
         if plane.excess > 0
     ]
@@ -142,7 +143,7 @@ def _synchronous(found: Synchronous) -> list[KeyFigure]:
 
 
 def _timeline(seen: Look) -> Table:
-    rows = tuple((f"{time:.4f} s", words) for time, words in seen.timeline())
+    rows = tuple((format_moment(time, 4), words) for time, words in seen.timeline())
     return Table(columns=("record time", "event"), rows=rows, caption="What happened when")
 
 
@@ -165,7 +166,7 @@ def _impacts(seen: Look) -> Section:
     rows = tuple(
         (
             impact.plane,
-            f"{impact.time:.4f} s",
+            format_moment(impact.time, 4),
             f"{degrees(impact.azimuth):.0f}°",
             Quantity(value=impact.depth, kind="length"),
             Quantity(value=impact.approach, kind="velocity"),

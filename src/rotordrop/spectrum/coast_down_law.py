@@ -15,6 +15,7 @@ from scipy.special import ndtr
 from rotordrop.errors import RecordError
 from rotordrop.estimated import NINETY, IdentifiedValue, Verdict
 from rotordrop.series import noise_by_differences
+from rotordrop.units import format_moment
 
 Array = NDArray[np.float64]
 Model = Callable[[Array], Array]
@@ -359,8 +360,8 @@ def _window(time: ArrayLike, speed: ArrayLike, start: float, end: float | None) 
     t, omega = t[inside], omega[inside]
     if t.size < 8 or float(omega.max()) <= 0.0:
         raise RecordError(
-            f"speed fit: {t.size} recorded speeds between {start:.3f} s and "
-            f"{'the end' if end is None else f'{end:.3f} s'}, at least 8 and a turning rotor are needed"
+            f"speed fit: {t.size} recorded speeds between {format_moment(start)} and "
+            f"{'the end' if end is None else format_moment(end)}, at least 8 and a turning rotor are needed"
         )
     block = -(-t.size // MOST_VALUES)
     whole = t.size // block * block

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rotordrop.errors import RecordError
 from rotordrop.series import noise_by_differences
 from rotordrop.spectrum.waterfall import PlanarSignal
+from rotordrop.units import format_moment
 
 Array = NDArray[np.float64]
 
@@ -211,11 +212,14 @@ def find_settling(
     settled = last < samples - int(sampling_rate)
     if settled:
         text = (
-            f"in contact without interruption from {time:.3f} s on, at {radius * 1e6:.1f} µm from the "
-            f"centre; bounces below {margin * 1e6:.0f} µm count as contact"
+            f"in contact without interruption from {format_moment(time)} on, at {radius * 1e6:.1f} µm from "
+            f"the centre; bounces below {margin * 1e6:.0f} µm count as contact"
         )
     else:
-        text = f"still lifting off at {time:.3f} s, within the last second of the signal: it did not settle"
+        text = (
+            f"still lifting off at {format_moment(time)}, within the last second of the signal: "
+            "it did not settle"
+        )
     return Settling(last_lift_off=time, contact_radius=radius, margin=margin, settled=settled, statement=text)
 
 
@@ -267,11 +271,11 @@ def _window_statement(
     (largest, time), (later, later_time) = maximum, after
     first = (
         f"largest displacement {largest * 1e6:.1f} µm ({(largest - air_gap) * 1e6:+.1f} µm beyond the air "
-        f"gap) at {time:.4f} s"
+        f"gap) at {format_moment(time, 4)}"
     )
     if not np.isfinite(later):
         return f"{first}; the signal ends within {window:g} s"
-    second = f"later than {window:g} s at most {later * 1e6:.1f} µm (at {later_time:.2f} s)"
+    second = f"later than {window:g} s at most {later * 1e6:.1f} µm (at {format_moment(later_time, 2)})"
     if abs(largest - later) <= 2.0 * noise and time <= window:
         return f"{first}; {second}: the noise of {noise * 1e6:.2f} µm leaves open which was larger"
     held = "held the maximum" if time <= window else "did not hold the maximum"

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline, PPoly, make_smoothing_spline
 
 from rotordrop.errors import RecordError
+from rotordrop.units import format_moment
 
 Array = NDArray[np.float64]
 
@@ -114,7 +115,7 @@ def fit_speed_profile(
     before, after = t < start, t >= start
     if after.sum() < 8:
         raise RecordError(
-            f"speed profile: {int(after.sum())} recorded speeds after power-off at {start:.3f} s, "
+            f"speed profile: {int(after.sum())} recorded speeds after power-off at {format_moment(start)}, "
             f"at least 8 are needed"
         )
     log_time = np.log1p((t[after] - start) / LOG_TIME_UNIT)

@@ -1,4 +1,4 @@
-"""Choose supports, damping, gap or preload: the designs that no other one beats in every aim."""
+"""Choose supports, damping, gap, preload or bearing: the designs that no other one beats in every aim."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
 from rotordrop.machine.description import unknown_key
+from rotordrop.study.chosen_bearings import AS_DESCRIBED
+from rotordrop.study.distributions import Distribution
 from rotordrop.study.plan import Study, read_file, read_study
 from rotordrop.study.quantities import columns_of
 from rotordrop.study.run import Report, run_study
@@ -24,6 +26,9 @@ FRESH = 0x5EED
 """What is added to the seed for the drops that draw a front again."""
 STEP = 0.12
 """Width of the steps around a front, as a share of each range [1]."""
+OTHER = 0.25
+"""Share of the candidates around a front that try any bearing of the list [1]: bearings have no order, so
+that none lies beside another."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,11 +77,24 @@ USUAL = (Aim(column="*.peak_stress", quantile=0.9), Aim(column="*.backward_whirl
 
 @dataclass(frozen=True, kw_only=True)
 class Candidate:
-    """One choice of values [SI] with what it gives, and whether any other is better in every aim."""
+    """One choice of values [SI] with what it gives, and whether any other is better in every aim.
+
+    A bearing is the number of its designation in the list, `AS_DESCRIBED` for that of the machine file.
+    """
 
     values: Mapping[str, float]
     aims: tuple[Known, ...]
     on_front: bool
+
+    def chosen(self, study: Study) -> dict[str, float | str]:
+        """The values, bearings by their designation."""
+        return {name: _named(study.choose[name], value) for name, value in self.values.items()}
+
+
+def _named(spread: Distribution, value: float) -> float | str:
+    if not spread.names:
+        return value
+    return "as described" if value == AS_DESCRIBED else spread.names[int(value)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -177,7 +195,10 @@ def _described(study: Study) -> tuple[float, ...]:
     from rotordrop.machine.parameter_paths import value_of_path
 
     first = study.machine.touchdown_bearings[0].name
-    return tuple(value_of_path(study.machine, name.replace("*", first, 1)) for name in study.choose)
+    return tuple(
+        AS_DESCRIBED if spread.names else value_of_path(study.machine, name.replace("*", first, 1))
+        for name, spread in study.choose.items()
+    )
 
 
 def _around(study: Study, tried: Sequence[Candidate], number: int) -> list[tuple[float, ...]]:
@@ -189,7 +210,11 @@ def _around(study: Study, tried: Sequence[Candidate], number: int) -> list[tuple
         values = best[k % len(best)].values
         moved = []
         for name, spread in study.choose.items():
-            share = _share(spread, values[name]) + STEP * float(random.standard_normal())
+            share = _share(spread, values[name])
+            if not spread.names:
+                share += STEP * float(random.standard_normal())
+            elif random.random() < OTHER:
+                share = float(random.random())
             moved.append(float(spread(np.array([min(max(share, 0.0), 1.0 - 1e-12)]))[0]))
         found.append(tuple(moved))
     return found

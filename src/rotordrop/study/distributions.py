@@ -37,10 +37,18 @@ class Distribution:
         One of `SHAPES`.
     numbers : tuple of float
         Its numbers, as `SHAPES` explains them [SI unit of the value, the second of a log-normal 1].
+    names : tuple of str
+        What the numbers stand for, where they count the items of a list.
     """
 
     shape: str
     numbers: tuple[float, ...]
+    names: tuple[str, ...] = ()
+
+    @property
+    def written(self) -> list[float] | list[str]:
+        """Its numbers as a plan keeps them, or what they stand for."""
+        return list(self.names) or list(self.numbers)
 
     def __call__(self, share: Array) -> Array:
         """Values [SI] at the given shares of the probability, shape as given; shares lie between 0 and 1."""

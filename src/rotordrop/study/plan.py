@@ -24,6 +24,7 @@ from rotordrop.machine.saving import machine_text
 from rotordrop.model.parameter_table import fitted_row, parameter
 from rotordrop.simulation.case import DropCase, LevitatedStart
 from rotordrop.study import sampling
+from rotordrop.study.chosen_bearings import bearings_of, is_bearing, read_bearings, with_chosen
 from rotordrop.study.distributions import Distribution, read_distribution
 from rotordrop.units import parse_quantity
 
@@ -213,7 +214,7 @@ class Study:
         """Machine values by full path [SI]; a star stands for every touchdown bearing."""
         found: dict[str, float] = {}
         for path, value in values.items():
-            if case_kind(self.machine, path) is None:
+            if case_kind(self.machine, path) is None and not is_bearing(path):
                 found |= dict.fromkeys(_starred(self.machine, path), value)
         if self.joint is not None:
             dynamic, static_row = parameter("friction.dynamic"), parameter("friction.static")
@@ -222,6 +223,10 @@ class Study:
                 ratio = value_of_path(self.machine, static) / value_of_path(self.machine, path)
                 found.setdefault(static, ratio * found[path])
         return found
+
+    def machine_of(self, values: Mapping[str, float]) -> Machine:
+        """The machine of a drop, with the bearings chosen for it and all varied values [SI]."""
+        return with_chosen(self.machine, self.choose, values).with_values(self.machine_values(values))
 
     def case(self, values: Mapping[str, float]) -> DropCase:
         """Case of a drop whose varied values are given [SI]."""
@@ -262,9 +267,9 @@ class Study:
             "output_step_s": self.output_step,
             "start": "levitated" if self.levitated else "centred",
             "speed_rad_per_s": None if math.isnan(self.speed) else self.speed,
-            "vary": {name: {spread.shape: list(spread.numbers)} for name, spread in self.vary.items()},
+            "vary": {name: {spread.shape: spread.written} for name, spread in self.vary.items()},
             "until": None if self.until is None else dict(self.until.__dict__),
-            "choose": {name: {spread.shape: list(spread.numbers)} for name, spread in self.choose.items()},
+            "choose": {name: {spread.shape: spread.written} for name, spread in self.choose.items()},
             "candidates": [list(one) for one in self.candidates],
         }
 
@@ -332,8 +337,8 @@ def _check_choice(study: Study) -> None:
             f'design = {study.design!r} with {len(study.choose)} values under [choose]; "candidates" '
             "needs at least one of them, and other designs none"
         )
-    for name in study.choose:
-        for path in _starred(study.machine, name):
+    for name, spread in study.choose.items():
+        for path in () if spread.names else _starred(study.machine, name):
             kind_of_path(study.machine, path)
     once = [*study.vary, *study.choose, *(() if study.joint is None else study.joint.paths)]
     paths = [path for name in once for path in _starred(study.machine, name)]
@@ -363,7 +368,9 @@ def read_study(table: Mapping[str, Any], machine: Machine) -> Study:
         settings["calibrated"] = _flag("calibrated", table["calibrated"])
     for part in ("vary", "choose"):
         settings[part] = {
-            name: read_distribution(name, spread, _reader(machine, name))
+            name: read_bearings(machine, name, spread)
+            if part == "choose" and is_bearing(name)
+            else read_distribution(name, spread, _reader(machine, name))
             for name, spread in dict(table.get(part, {})).items()
         }
     if "until" in table:
@@ -390,7 +397,7 @@ def planned_study(document: Mapping[str, Any], machine: Machine) -> Study:
 
 def _spreads(written: Mapping[str, Any]) -> dict[str, Distribution]:
     return {
-        name: Distribution(shape=shape, numbers=tuple(numbers))
+        name: bearings_of(numbers) if is_bearing(name) else Distribution(shape=shape, numbers=tuple(numbers))
         for name, spread in written.items()
         for shape, numbers in spread.items()
     }

@@ -145,7 +145,7 @@ def one_drop(study: Study, model: DropModel, values: dict[str, float]) -> tuple[
     """Numbers of the drop with given varied values [SI], in the order of `columns_of`, and why it failed."""
     nothing = np.nan
     try:
-        drawn = model.with_values(study.machine_values(values))
+        drawn = model.with_machine(study.machine_of(values))
         result = simulate_drop(drawn, study.case(values))
         if not result.finished:
             return nothing, result.outcome

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rotordrop.errors import UsageError
-from rotordrop.units import KINDS, format_quantity, parse_quantity, si_unit
+from rotordrop.units import KINDS, format_moment, format_quantity, parse_quantity, si_unit
 
 
 @pytest.mark.parametrize(
@@ -201,3 +201,11 @@ def test_a_unit_that_would_be_computed_for_ever_is_refused_at_once(text):
 def test_revolutions_per_minute_as_din_writes_them(written):
     assert parse_quantity(written, "speed") == pytest.approx(300 * math.pi, rel=1e-15)
     assert parse_quantity(written, "frequency") == pytest.approx(150.0, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("time", "decimals", "text"),
+    [(-0.0002, 3, "0.000 s"), (-0.0006, 3, "-0.001 s"), (0.21449, 3, "0.214 s"), (-1e-9, 4, "0.0000 s")],
+)
+def test_a_moment_is_never_minus_zero(time, decimals, text):
+    assert format_moment(time, decimals) == text

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,12 @@ import pytest
 from rotordrop import example_machine, save_machine
 from rotordrop.cli.app import run
 from rotordrop.errors import UsageError
+from rotordrop.machine.catalog import find_bearing
+from rotordrop.model.parameters import build_drop_model
 from rotordrop.study.design import Aim, best_designs, front_of, read_design
+from rotordrop.study.folder import study_of
+from rotordrop.study.run import one_drop
+from rotordrop.study.summary import load_results
 
 MACHINE = example_machine("lp400")
 TABLE = {
@@ -103,3 +109,65 @@ def test_the_verb(tmp_path, capsys):
     assert len(content["candidates"]) == 2
     call = ["rare", str(tmp_path / "design.toml"), "--column", "NDE.peak_forc", "--above", "1 kN"]
     assert run(call) == 64
+
+
+BEARINGS = ["HCB71914-E", "XCB71914-E", "B7014-C"]
+
+
+def test_a_chosen_bearing_is_that_of_the_machine_file(tmp_path):
+    table = {**TABLE, "choose": {**TABLE["choose"], "*.bearing": {"choices": BEARINGS}}}
+    plan = read_design({**table, "aims": [{"column": "*.peak_stress", "quantile": 0.5}]}, MACHINE)
+    found = best_designs(plan, tmp_path / "design", threads=1)
+    tried = [one.chosen(plan.study)["*.bearing"] for one in found.candidates]
+    assert set(tried[:4]) <= set(BEARINGS) and len(set(tried)) > 1
+    assert found.described.chosen(plan.study)["*.bearing"] == "as described"
+    assert found.front[0].aims[0].drops == 3
+    kept = load_results(tmp_path / "design" / "again").study
+    assert kept.digest == study_of(tmp_path / "design" / "again").digest
+    assert kept.choose["*.bearing"].names == tuple(BEARINGS)
+
+
+def test_a_drop_with_a_chosen_bearing_is_that_of_its_machine_file():
+    study = read_design({**TABLE, "choose": {"*.bearing": {"choices": BEARINGS}}}, MACHINE).study
+    values = dict(zip(study.varied, study.values(0, 1)[0].tolist(), strict=True)) | {"*.bearing": 2.0}
+    machine = MACHINE.with_bearing("NDE", "B7014-C").with_bearing("DE", "B7014-C")
+    alone = replace(study, machine=machine, choose={}, design="random")
+    of_study, reason = one_drop(study, build_drop_model(MACHINE, "quick"), values)
+    of_file, _ = one_drop(alone, build_drop_model(machine, "quick"), values)
+    assert not reason
+    np.testing.assert_array_equal(of_study, of_file)
+    as_described, _ = one_drop(study, build_drop_model(MACHINE, "quick"), values | {"*.bearing": -1.0})
+    assert np.any(as_described != of_study)
+
+
+def test_another_bearing_keeps_how_it_is_mounted():
+    before, after = (m.bearing("DE") for m in (MACHINE, MACHINE.with_bearing("DE", "B7014-C")))
+    assert (after.bearing.designation, after.bearing.ball_count) == ("B7014-C", 17)
+    assert after.bearing.preload.value == find_bearing("B7014-C").preload["light"]
+    assert after.bearing.arrangement == before.bearing.arrangement
+    assert (after.air_gap, after.support, after.friction) == (before.air_gap, before.support, before.friction)
+    ring = [one.changed(race={}).race for one in (before, after)]
+    for name in ("mass", "inertia"):
+        old, new = (getattr(one.race, name).value for one in (before, after))
+        assert new / old == pytest.approx(
+            getattr(ring[1], name).value / getattr(ring[0], name).value, rel=1e-12
+        )
+    assert MACHINE.with_bearing("DE", "XCB71914-E") is MACHINE
+
+
+@pytest.mark.parametrize(
+    ("choice", "message"),
+    [
+        ({"choices": ["B7014-E", "B71913-E"]}, r"DE cannot have a bearing 'B71913-E': the bore radius 35 mm"),
+        (
+            {"choices": ["B7014-E", "B7914-EE"]},
+            r"NDE cannot have a bearing 'B7914-EE': the catalogue holds no",
+        ),
+        ({"choices": ["B7014-E", "B7014-E"]}, r"\*\.bearing: B7014-E listed twice"),
+        ({"choices": ["B7014-E"]}, r"expected designations, as in"),
+        ({"uniform": [1, 2]}, r"\*\.bearing is chosen from \{'uniform': \[1, 2\]\}; expected designations"),
+    ],
+)
+def test_a_bearing_that_does_not_fit_is_said(choice, message):
+    with pytest.raises(UsageError, match=message):
+        read_design({**TABLE, "choose": {"*.bearing": choice}}, MACHINE)

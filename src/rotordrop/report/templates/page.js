@@ -34,7 +34,7 @@
 
   window.addEventListener("beforeprint", function () {
     while (waiting.length) { draw(waiting.shift()); }
-    resize(695, 0.74);
+    resize(695, 0.65);
   });
   window.addEventListener("afterprint", function () { resize(null, 1.0); });
   drawNext();

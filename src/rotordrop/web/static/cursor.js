@@ -75,7 +75,7 @@ function cellsOf({ verb, found }, place, at) {
   const order = at === null ? NaN : orderAt(found.time, ...place[role].map((name) => found[name]), at, speedAt(at));
   const cells = [units.written(x / units.factor("length"), 4), units.written(y / units.factor("length"), 4), place.gap ? units.written(Math.hypot(x, y) / place.gap[1], 3) : "–",
     Number.isFinite(x) ? `${Math.round((Math.atan2(y, x) * 180) / Math.PI)}°`.replace("-", "−") : "–",
-    Number.isFinite(order) ? `${order.toFixed(2).replace("-", "−")}X` : "–"];
+    Number.isFinite(order) ? `${units.fixed(order, 2)}X` : "–"];
   for (const [id, name, kind] of state.estimate ? [["force", "force", "force"], ["stress", "stress", "pressure"]] : []) {
     const panel = state.panels.find((one) => one.id === id), names = verb === "estimate" ? place[name] : [];
     const [now, low, high] = names.map((column) => (at !== null ? value(panel.found, column) / units.factor(kind) : NaN));
@@ -87,7 +87,7 @@ function cellsOf({ verb, found }, place, at) {
 function readout() {
   const at = state.cursor, speed = at === null ? NaN : speedAt(at);
   by("clock").textContent = at === null ? "point at a trace"
-    : `${units.timeText(at, state.view.to - state.view.from)} · record ${(at + zero()).toFixed(5)} s${speed > 0 ? ` · ${units.shown(speed, "speed", 4)}` : ""}`;
+    : `${units.timeText(at, state.view.to - state.view.from)} · record ${units.fixed(at + zero(), 5)} s${speed > 0 ? ` · ${units.shown(speed, "speed", 4)}` : ""}`;
   const rows = motions().map((panel, i) => {
     const place = state[panel.verb].places[i];
     return make("tr", { of: [make("th", { scope: "row", text: place.name }), ...cellsOf(panel, place, at).map((cell) => (Array.isArray(cell)

@@ -9,11 +9,17 @@ export function learn(units) { known = { ...known, ...units }; }
 export const factor = (kind) => (known[kind] ? known[kind][system][0] : 1);
 export const unit = (kind) => (known[kind] ? known[kind][system][1] : "");
 
+// A minus sign that reads as one, and none before a zero.
+export function fixed(value, places) {
+  const text = value.toFixed(places);
+  return Number(text) === 0 ? text.replace("-", "") : text.replace("-", "−");
+}
+
 export function written(value, digits = 4) {
   if (value === null || value === undefined || !Number.isFinite(value)) { return "–"; }
   const magnitude = value === 0 ? 0 : Math.floor(Math.log10(Math.abs(value)));
   const places = Math.max(0, digits - 1 - magnitude);
-  const text = value.toFixed(Math.min(places, 6)).replace("-", "−");
+  const text = fixed(value, Math.min(places, 6));
   const [whole, rest] = text.split(".");
   const grouped = whole.replace(/\B(?=(\d{3})+$)/g, "\u202f");
   return rest ? `${grouped}.${rest}` : grouped;
@@ -22,9 +28,9 @@ export const shown = (value, kind, digits) => (Number.isFinite(value) ? `${writt
 
 // Time from power-off: milliseconds in short windows, seconds in long ones.
 export const timeScale = (span) => (span > 3 ? [1, "s"] : [1e-3, "ms"]);
-export const eventText = (t) => (Math.abs(t) < 1 ? `${(1e3 * t).toFixed(2)} ms` : `${t.toFixed(4)} s`).replace("-", "−");
+export const eventText = (t) => (Math.abs(t) < 1 ? `${fixed(1e3 * t, 2)} ms` : `${fixed(t, 4)} s`);
 export function timeText(t, span) {
   const [scale, name] = timeScale(span);
   const places = Math.max(0, 3 - Math.floor(Math.log10(span / scale)));
-  return `${(t / scale).toFixed(Math.min(places, 6)).replace("-", "−")} ${name}`;
+  return `${fixed(t / scale, Math.min(places, 6))} ${name}`;
 }

@@ -159,7 +159,7 @@ function drawCuts(pen) {
   const [low, high] = span(), first = binOf(low), last = binOf(high), frame = cutFrame(), middle = pen.height / 2;
   const x = frequencies().slice(first, last + 1), where = { left: 46, right: pen.width - 10 };
   drawCut(pen, { ...where, top: 20, bottom: middle - 36 }, { x, y: x.map((_, i) => value(frame, first + i)), mark: fall.at ? fall.at.f : NaN,
-    title: `Spectrum at ${fall.page.time[frame].toFixed(2)} s [${units.unit("length")}, ${fall.page.amplitude_kind}]`, label: "frequency [Hz]" });
+    title: `Spectrum at ${units.fixed(fall.page.time[frame], 2)} s [${units.unit("length")}, ${fall.page.amplitude_kind}]`, label: "frequency [Hz]" });
   if (fall.line) {
     drawCut(pen, { ...where, top: middle + 20, bottom: pen.height - 36 }, { x: fall.page.time, y: courseOf(fall.line), mark: fall.at ? fall.at.t : NaN,
       title: `${fall.line.label} over time [${units.unit("length")}]`, label: "time from power-off [s]" });
@@ -169,8 +169,8 @@ function drawCuts(pen) {
 function readFall() {
   if (!fall.at) { by("fallclock").textContent = "point at the map, or choose a line"; return; }
   const frame = frameOf(fall.at.t), speed = fall.page.speed && fall.page.speed[frame];
-  const order = speed > 0.5 ? `, ${(fall.at.f / speed).toFixed(3).replace("-", "−")} X at ${units.shown(2 * Math.PI * speed, "speed")}` : "";
-  by("fallclock").textContent = `${fall.at.f.toFixed(2).replace("-", "−")} Hz, ${fall.page.time[frame].toFixed(2)} s: ${units.shown(value(frame, binOf(fall.at.f)), "length", 3)}${order}`;
+  const order = speed > 0.5 ? `, ${units.fixed(fall.at.f / speed, 3)} X at ${units.shown(2 * Math.PI * speed, "speed")}` : "";
+  by("fallclock").textContent = `${units.fixed(fall.at.f, 2)} Hz, ${units.fixed(fall.page.time[frame], 2)} s: ${units.shown(value(frame, binOf(fall.at.f)), "length", 3)}${order}`;
 }
 
 function lineList() {
