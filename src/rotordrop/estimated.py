@@ -87,6 +87,9 @@ class IdentifiedValue:
         Standard error, in the unit of the value.
     interval_90 : tuple of float, optional
         Interval that holds the true value with 90 % probability.
+    allowance_90 : float, optional
+        Half width that the interval has by what the model leaves out alone; with what the record leaves
+        open, as independent errors, it makes up the interval.
     lower, upper : float, optional
         Limits the record itself sets, for example the lower and upper air gap.
     start : float, optional
@@ -101,6 +104,7 @@ class IdentifiedValue:
     status: Verdict = "determined"
     standard_error: float | None = None
     interval_90: tuple[float, float] | None = None
+    allowance_90: float | None = None
     lower: float | None = None
     upper: float | None = None
     start: float | None = None
@@ -117,6 +121,7 @@ class IdentifiedValue:
             status=self.status,
             standard_error=self.standard_error,
             interval_90=self.interval_90,
+            allowance_90=self.allowance_90,
             lower=self.lower,
             upper=self.upper,
             start=self.start,

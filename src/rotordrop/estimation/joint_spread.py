@@ -10,8 +10,13 @@ from numpy.typing import NDArray
 
 from rotordrop.estimated import NINETY, IdentifiedValue
 from rotordrop.machine import JointSpread
-from rotordrop.model.parameter_table import parameter, row_of
-from rotordrop.model.unknowns import typical_depth
+from rotordrop.model.joint_values import (
+    file_of_fitted,
+    file_path,
+    is_logarithmic,
+    is_of_a_bearing,
+    slope_signs,
+)
 from rotordrop.tracking.problem import DropProblem
 
 Array = NDArray[np.float64]
@@ -40,25 +45,20 @@ def joint_spread(
     chosen = [
         (problem.n_dynamic + k, unknown)
         for k, unknown in enumerate(problem.unknowns)
-        if unknown.scope == "machine" and unknown.parameter.owner == "bearing"
+        if is_of_a_bearing(unknown)
     ]
-    places = [place for place, _ in chosen]
-    paths = [unknown.path for _, unknown in chosen]
-    logs = [unknown.logarithmic or unknown.published is not None for _, unknown in chosen]
+    places, unknowns = [place for place, _ in chosen], [unknown for _, unknown in chosen]
+    logs = [is_logarithmic(unknown) for unknown in unknowns]
     block = covariance[np.ix_(places, places)]
     fitted = np.sqrt(np.maximum(np.diag(block), 1e-300))
-    rising = [
-        math.copysign(1.0, u.value_of(mean[i] + 0.1 * s) - u.value_of(mean[i] - 0.1 * s))
-        for (i, u), s in zip(chosen, fitted, strict=True)
-    ]  # an axial offset falls where the preload rises
-    stated = [_spread(known[path], log) for path, log in zip(paths, logs, strict=True)]
-    scale = np.array(rising) * np.array(stated) / fitted
-    through = _as_in_file(problem, known, paths, logs)
+    stated = [_spread(known[one.path], log) for one, log in zip(unknowns, logs, strict=True)]
+    scale = slope_signs(unknowns, mean[places], fitted) * np.array(stated) / fitted
+    through = file_of_fitted(problem.model, unknowns, [known[one.path].value for one in unknowns])
     matrix = through @ (scale[:, None] * block * scale) @ through.T
     return JointSpread(
-        paths=tuple(_file_path(path) for path in paths),
+        paths=tuple(file_path(one.path) for one in unknowns),
         logarithmic=tuple(logs),
-        covariance=tuple(matrix[np.tril_indices(len(paths))].tolist()),
+        covariance=tuple(matrix[np.tril_indices(len(unknowns))].tolist()),
     )
 
 
@@ -70,31 +70,3 @@ def _spread(value: IdentifiedValue, logarithmic: bool) -> float:
     if low <= 0.0:
         return math.log(high / value.value) / NINETY
     return math.log(high / low) / (2.0 * NINETY)
-
-
-def _as_in_file(
-    problem: DropProblem, known: Mapping[str, IdentifiedValue], paths: list[str], logs: list[bool]
-) -> Array:
-    """What a change of each fitted value changes of those in the file, shape (n, n)."""
-    through = np.eye(len(paths))
-    for bearing in problem.model.machine.touchdown_bearings:
-        at = {row: paths.index(p) for row in _COUPLED if (p := parameter(row).path_of(bearing.name)) in paths}
-        if {"contact.stiffness", "contact.exponent"} <= at.keys():
-            # the file's stiffness belongs to the fitted exponent: equal force at the typical indentation
-            depth = typical_depth(bearing, float(np.mean(problem.model.load_shares)))
-            n = at["contact.exponent"]
-            slope = known[paths[n]].value if logs[n] else 1.0
-            through[at["contact.stiffness"], n] = -slope * math.log(depth)
-        if {"support.stiffness", "support.anisotropy"} <= at.keys():
-            through[at["support.anisotropy"], at["support.stiffness"]] = 1.0
-    return through
-
-
-_COUPLED = ("contact.stiffness", "contact.exponent", "support.stiffness", "support.anisotropy")
-
-
-def _file_path(path: str) -> str:
-    """Where the file has it: the horizontal support in place of its ratio to the vertical one."""
-    if row_of(path) is parameter("support.anisotropy"):
-        return path.removesuffix("support.anisotropy") + "support.stiffness_horizontal"
-    return path

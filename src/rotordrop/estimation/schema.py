@@ -33,6 +33,10 @@ _VALUE = closed(
             **PAIR,
             "description": "Interval that holds the true value with 90 % probability.",
         },
+        "allowance_90": {
+            **NUMBER,
+            "description": "Half width of the interval by what the model leaves out alone.",
+        },
         "lower": {**NUMBER, "description": "Lower limit set by the record."},
         "upper": {**NUMBER, "description": "Upper limit set by the record."},
         "status": {**TEXT, "description": "Verdict, or why there is no interval."},

@@ -120,12 +120,21 @@ def _without(sigma: Array, part: Array | float) -> Array:
     return np.sqrt(np.maximum(sigma * sigma - part * part, 0.0))
 
 
-def with_interval(value: float, sigma: float, widening: float = 1.0, unit: str = "") -> IdentifiedValue:
-    """A magnitude with a symmetric 90 % interval, which does not go below zero."""
+def with_interval(
+    value: float, sigma: float, widening: float = 1.0, unit: str = "", left_out: float = 0.0
+) -> IdentifiedValue:
+    """A magnitude with a symmetric 90 % interval, which does not go below zero.
+
+    ``left_out`` is the standard deviation by what the model leaves out alone, independent of the rest.
+    """
     half = NINETY * sigma * widening
     low = max(value - half, 0.0) if value >= 0.0 else value - half
     return IdentifiedValue(
-        value=value, standard_error=sigma * widening, interval_90=(low, value + half), unit=unit
+        value=value,
+        standard_error=sigma * widening,
+        interval_90=(low, value + half),
+        allowance_90=NINETY * left_out * widening if left_out > 0.0 else None,
+        unit=unit,
     )
 
 
@@ -139,19 +148,20 @@ def twin_loads(forces: ForceHistory, b: int, widening: float, ball_sigma: float 
     stress, stress_sigma = _history(forces, forces.stress, forces.stress_sigma, b, model_sigma)
     mean_stress = float(np.mean(stress.values))
     spread = float(np.mean(forces.stress_sigma[:, b]))
-    sigma = math.hypot(spread, math.hypot(MODEL_MEAN_STRESS_SIGMA, ball_sigma) * mean_stress)
-    means = {"mean_stress_Pa": with_interval(mean_stress, sigma, widening, "Pa")}
+    left_out = math.hypot(MODEL_MEAN_STRESS_SIGMA, ball_sigma) * mean_stress
+    sigma = math.hypot(spread, left_out)
+    means = {"mean_stress_Pa": with_interval(mean_stress, sigma, widening, "Pa", left_out)}
     late_mean = mean_late(force)
     if late_mean is not None:
         sigma = MODEL_MEAN_FORCE_SIGMA * late_mean
-        means["mean_force_0p15_0p2_N"] = with_interval(late_mean, sigma, widening, "N")
+        means["mean_force_0p15_0p2_N"] = with_interval(late_mean, sigma, widening, "N", sigma)
     return Loads(
         force=force,
         force_band=_band(force, NINETY * widening * force_sigma),
         stress=stress,
         stress_band=_band(stress, NINETY * widening * stress_sigma),
-        peak_force=_peak(force, force_sigma, widening, "N"),
-        peak_stress=_peak(stress, stress_sigma, widening, "Pa"),
+        peak_force=_peak(force, force_sigma, widening, "N", MODEL_FORCE_SIGMA),
+        peak_stress=_peak(stress, stress_sigma, widening, "Pa", model_sigma),
         means=means,
         missing={} if late_mean is not None else {"mean_force_0p15_0p2_N": NO_LATE_MEAN},
     )
@@ -169,10 +179,11 @@ def _band(history: History, half: Array) -> Band:
     return Band(time=history.time, lower=lower, upper=history.values + half)
 
 
-def _peak(history: History, sigma: Array, widening: float, unit: str) -> Peak:
+def _peak(history: History, sigma: Array, widening: float, unit: str, model_share: float) -> Peak:
     value, moment = refined_peak(history.time, history.values)
     error = float(sigma[int(np.argmax(history.values))])
-    return Peak(known=with_interval(value, error, widening, unit), time=moment, origin=Origin.TWIN)
+    known = with_interval(value, error, widening, unit, model_share * value)
+    return Peak(known=known, time=moment, origin=Origin.TWIN)
 
 
 def holding(value: IdentifiedValue, ratio: float, accuracy: float) -> IdentifiedValue:
@@ -186,6 +197,7 @@ def holding(value: IdentifiedValue, ratio: float, accuracy: float) -> Identified
         value,
         interval_90=(low, high),
         standard_error=(high - low) / (2.0 * NINETY),
+        allowance_90=None,
         status=INCONSISTENT,
     )
 

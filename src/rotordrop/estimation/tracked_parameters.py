@@ -69,12 +69,17 @@ def within_bounds(row: Parameter, interval: tuple[float, float]) -> tuple[float,
     return (max(low, 0.0), max(high, 0.0)) if row is parameter("air_gap") else interval
 
 
+def left_out(unknown: Unknown, drops: int) -> float:
+    """Standard error of a parameter by what the fit to a number of drops leaves out of it."""
+    if unknown.parameter is not parameter("air_gap"):
+        return 0.0
+    lone = drops == 1 and unknown.sigma > UNSURE_GAP * unknown.begin
+    return (LONE_GAP_SIGMA if lone else MODEL_GAP_SIGMA) * unknown.begin
+
+
 def model_error(unknown: Unknown, sigma: float, drops: int) -> float:
     """Standard error of a parameter with what the fit to a number of drops leaves out of it."""
-    if unknown.parameter is not parameter("air_gap"):
-        return sigma
-    lone = drops == 1 and unknown.sigma > UNSURE_GAP * unknown.begin
-    return math.hypot(sigma, (LONE_GAP_SIGMA if lone else MODEL_GAP_SIGMA) * unknown.begin)
+    return math.hypot(sigma, left_out(unknown, drops))
 
 
 def parameter_widening(unknown: Unknown, sigma: float, widening: float = 1.0) -> float:
@@ -96,9 +101,12 @@ def parameters(
     for unknown, t, s in zip(problem.unknowns, theta, sigma, strict=True):
         error = model_error(unknown, float(s), drops)
         prior = identified(unknown, unknown.mean, unknown.sigma)
-        value = identified(unknown, float(t), error, parameter_widening(unknown, error, widening))
+        wider = parameter_widening(unknown, error, widening)
+        value = identified(unknown, float(t), error, wider)
         if not fits:
             value = replace(value, status=INCONSISTENT, interval_90=_hull(value, prior))
+        elif (allowed := left_out(unknown, drops)) > 0.0:
+            value = replace(value, allowance_90=NINETY * wider * allowed)
         found.append(FittedParameter(row=unknown.parameter, owner=unknown.owner, prior=prior, estimate=value))
     return tuple(found)
 

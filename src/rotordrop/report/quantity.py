@@ -48,6 +48,8 @@ IN_OTHER_UNITS: dict[str, tuple[float, str]] = {
 }
 """The same for readers who think in mil, rpm and lbf."""
 
+ALL_OF_IT = 0.01
+"""Part of a half width below which the record has none of it [1]."""
 PLACES_OF_SCIENCE = (-4, 7)
 FIXED_PLACES = {"count": 0, "probability": 1}
 THIN_SPACE = "\u202f"
@@ -65,6 +67,8 @@ class Quantity:
         Kind of quantity, a key of `DISPLAY` or of `rotordrop.units.KINDS`.
     interval_90 : tuple of float, optional
         Interval that holds the true value with 90 % probability.
+    allowance_90 : float, optional
+        Half width of the interval by what the model leaves out alone.
     standard_error : float, optional
         Standard error.
     lower, upper : float, optional
@@ -82,6 +86,7 @@ class Quantity:
     value: float
     kind: str
     interval_90: tuple[float, float] | None = None
+    allowance_90: float | None = None
     standard_error: float | None = None
     lower: float | None = None
     upper: float | None = None
@@ -112,6 +117,7 @@ class Quantity:
             value=known.value,
             kind=kind,
             interval_90=known.interval_90,
+            allowance_90=known.allowance_90 if isinstance(known, IdentifiedValue) else None,
             standard_error=known.standard_error,
             lower=known.lower,
             upper=known.upper,
@@ -163,6 +169,18 @@ class Quantity:
                 + " (standard error)"
             )
         return ""
+
+    @property
+    def parts_text(self) -> str:
+        """Half widths by the record and by what the model leaves out; empty where only the whole is known."""
+        if self.range_only or self.interval_90 is None or not self.allowance_90:
+            return ""
+        whole = 0.5 * (self.interval_90[1] - self.interval_90[0])
+        record = math.sqrt(max(whole**2 - self.allowance_90**2, 0.0))
+        if record < ALL_OF_IT * whole:
+            return "all of it allowance"
+        parts = f"record ± {self._at(record)}, allowance ± {self._at(self.allowance_90)}"
+        return self._with_unit(parts)
 
     def _range(self) -> str:
         return self._with_unit(" to ".join(self._at(limit) for limit in self.interval_90 or ()))

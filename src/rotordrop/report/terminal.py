@@ -108,7 +108,8 @@ def _cell(cell: Cell) -> str:
     value, interval = _safe(cell.text), _safe(cell.interval_text)
     if not interval:
         return value
-    return f"{value}\n{'90 %: ' if cell.interval_90 else ''}{interval}"
+    lines = [value, f"{'90 %: ' if cell.interval_90 else ''}{interval}", _safe(cell.parts_text)]
+    return "\n".join(line for line in lines if line)
 
 
 def _safe(text: str) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.machine import Machine
+from rotordrop.model.joint_values import correlate
 from rotordrop.model.parameter_table import parameter
 from rotordrop.model.parameters import DropModel
 from rotordrop.model.statics import levitated_sag
@@ -79,6 +80,7 @@ def prior_at_power_off(
     sigma[layout.own] = np.resize(OWN_SIGMA, layout.own.stop - layout.own.start)
     covariance = np.diag(sigma**2)
     share_in_groups(model, unknowns, covariance[s : s + n_p, s : s + n_p])
+    correlate(model, unknowns, covariance[s : s + n_p, s : s + n_p])
     if layout.sensor_own:
         begin_caught_up(layout, rows, mean, covariance)
     return mean, covariance

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,6 +13,8 @@ from rotordrop.estimation.calibrated import at_fitted_exponents
 from rotordrop.estimation.joint_spread import joint_spread
 from rotordrop.estimation.tracked_parameters import identified
 from rotordrop.machine import example_machine
+from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin
+from rotordrop.model.joint_values import correlate
 from rotordrop.model.parameters import build_drop_model
 from rotordrop.model.unknowns import bearing_unknowns
 
@@ -98,3 +101,35 @@ def test_contact_stiffness_is_that_of_the_fitted_exponent(problem, covariance):
     paths = [one.path for one in problem.unknowns]
     i = 3 + paths.index("NDE.contact.stiffness")
     assert along @ spread.matrix @ along == pytest.approx(covariance[i, i], rel=0.02)
+
+
+def calibrated_in_file(problem, spread):
+    origin = CalibrationOrigin(drops=(CalibrationDrop(name="one"),), consistent=True, joint=spread)
+    return replace(problem.model, machine=problem.model.machine.model_copy(update={"calibration": origin}))
+
+
+def test_a_later_drop_begins_with_the_correlations_of_the_fit(problem, covariance):
+    """Through the file and back, whatever its values mean, and with the variances that its intervals say."""
+    spread = joint_spread(problem, middle(problem), covariance, stated(problem, covariance, 1.5))
+    unknowns = [replace(one, calibrated=True) for one in problem.unknowns]
+    sigma = 1.0 + np.arange(len(unknowns))
+    block = np.diag(sigma**2)
+    correlate(calibrated_in_file(problem, spread), unknowns, block)
+    fitted = covariance[3:, 3:]
+    own = np.sqrt(np.diag(fitted))
+    assert block / np.outer(sigma, sigma) == pytest.approx(fitted / np.outer(own, own), abs=1e-6)
+
+
+def test_a_value_changed_since_errs_alone(problem, covariance):
+    spread = joint_spread(problem, middle(problem), covariance, stated(problem, covariance, 1.0))
+    unknowns = [replace(one, calibrated=k != 2) for k, one in enumerate(problem.unknowns)]
+    block = np.eye(len(unknowns))
+    correlate(calibrated_in_file(problem, spread), unknowns, block)
+    assert np.count_nonzero(block[2]) == 1 and np.count_nonzero(block[1]) > 2
+    assert np.linalg.eigvalsh(block).min() > 0.0
+
+
+def test_a_file_without_a_joint_distribution_correlates_nothing(problem):
+    block = np.eye(len(problem.unknowns))
+    correlate(problem.model, problem.unknowns, block)
+    assert (block == np.eye(len(problem.unknowns))).all()
