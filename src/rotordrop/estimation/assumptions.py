@@ -9,6 +9,7 @@ import numpy as np
 
 from rotordrop.estimated import NINETY
 from rotordrop.identification.evidence import Evidence, Missing, strongest_slowing
+from rotordrop.model.contact_band import contact_frequency
 from rotordrop.model.parameter_table import parameter
 from rotordrop.model.unknowns import sensor_prior, smallest_gap
 from rotordrop.tracking.problem import DropProblem, rough_noise
@@ -39,6 +40,7 @@ def twin_assumptions(evidence: Evidence, problem: DropProblem) -> tuple[str, ...
         *evidence_assumptions(evidence),
         *_noise(evidence, problem),
         *_gains(problem),
+        *_lag(problem),
         *_level(evidence),
         *_gaps(evidence, problem),
         *_air(problem),
@@ -68,6 +70,29 @@ def _gains(problem: DropProblem) -> Iterator[str]:
         f"the machine file states no gain of {', '.join(sensor.name for sensor in taken)}: taken as "
         f"calibrated, each within ±{within:.1%} (90 %). A larger error that all share would be in forces and "
         "gaps; a tolerance such as gain = { guess = 1.0, range = [0.8, 1.2] } lets the estimate find it"
+    )
+
+
+SMALL_LOSS = 0.01
+"""Loss of a peak by the lag of a sensor that is told [1]."""
+
+
+def _lag(problem: DropProblem) -> Iterator[str]:
+    """Time constants nobody stated: a lag rounds an impact off, and stiffness and mass take that up.
+
+    A first-order lag lowers the amplitude at an angular frequency w by half the square of w times the lag.
+    """
+    machine = problem.model.machine
+    if all(sensor.time_constant is not None for sensor in machine.sensors):
+        return
+    contact = contact_frequency(machine, problem.model.fe)
+    lag = math.sqrt(2.0 * SMALL_LOSS) / (2.0 * math.pi * contact)
+    cut_off = 1.0 / (2.0 * math.pi * lag)
+    yield (
+        "the machine file states no time constant of the sensors: they are taken as fast. A lag of "
+        f"{1e6 * lag:.0f} µs (a bandwidth of {1e-3 * cut_off:.2g} kHz) would hide about "
+        f"{SMALL_LOSS:.0%} of a peak of these contacts of {contact:.0f} Hz, and readings need not show it; "
+        "time_constant in the machine file, for all sensors, takes it into account"
     )
 
 

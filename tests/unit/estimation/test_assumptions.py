@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -64,6 +65,20 @@ def test_gains_that_nobody_stated_are_said_with_what_is_taken(machine: Machine, 
     )
     stated = machine.with_values({f"sensors.{sensor.name}.gain": 1.0 for sensor in machine.sensors})
     assert "states no gain" not in said(stated, evidence)
+
+
+def test_a_bandwidth_that_nobody_stated_is_said_with_what_it_could_hide(
+    machine: Machine, evidence: Evidence
+) -> None:
+    """The lag told lowers the amplitude at the frequency told by 1 %."""
+    text = said(machine, evidence)
+    found = re.search(r"A lag of (\d+) µs \(a bandwidth of ([\d.]+) kHz\).* contacts of (\d+) Hz", text)
+    assert found is not None
+    lag, cut_off, contact = 1e-6 * float(found[1]), 1e3 * float(found[2]), float(found[3])
+    assert cut_off == pytest.approx(1.0 / (2.0 * math.pi * lag), rel=0.05)
+    assert 1.0 - 1.0 / math.hypot(1.0, contact / cut_off) == pytest.approx(0.01, rel=0.1)
+    stated = machine.with_values({f"sensors.{sensor.name}.time_constant": 5e-6 for sensor in machine.sensors})
+    assert "no time constant of the sensors" not in said(stated, evidence)
 
 
 def test_noise_that_nothing_tells_is_said(machine: Machine, evidence: Evidence) -> None:

@@ -38,12 +38,10 @@ from rotordrop.estimation.tracked_loads import (
     INCONSISTENT_WIDENING,
     MODEL_FORCE_SIGMA,
     OF_CROSS_CHECK,
-    holding,
     holding_cross_check,
     is_beside,
     loads_of_cross_check,
     twin_loads,
-    with_interval,
 )
 from rotordrop.estimation.tracked_parameters import gap_of_record, is_lost
 from rotordrop.identification.evidence import Evidence, Missing, read_evidence
@@ -484,13 +482,6 @@ def test_an_estimate_keeps_no_array_of_the_filter(workshop: TrackedDrop, tracked
     """What is kept of a drop is a few megabytes; the workshop has hundreds."""
     kept = len(pickle.dumps(replace(tracked, record=None, machine=None, drop_instant=None)))  # type: ignore[arg-type]
     assert kept < 10e6 < 0.1 * workshop.smoothed.filtered.covariances.nbytes
-
-
-def test_a_magnitude_has_no_interval_below_zero() -> None:
-    assert with_interval(100.0, 200.0).interval_90 == pytest.approx((0.0, 100.0 + NINETY * 200.0))
-    assert with_interval(-5.0, 1.0).interval_90 == pytest.approx((-5.0 - NINETY, -5.0 + NINETY))
-    held = holding(with_interval(100.0, 10.0), 3.0, 0.15).interval_90
-    assert held == pytest.approx((100.0 - NINETY * 10.0, 345.0))
 
 
 def test_nothing_gives_way_to_a_cross_check_that_found_nothing(workshop: TrackedDrop) -> None:
