@@ -280,6 +280,13 @@ def format_moment(time: float, decimals: int = 3) -> str:
     return f"{text.removeprefix('-') if float(text) == 0.0 else text} s"
 
 
+def format_chance(probability: float) -> str:
+    """Write a probability [1] in per cent, ``"93%"``; nothing is certain: the ends are "> 99%" and "< 1%"."""
+    if probability >= 0.995:
+        return "> 99%"
+    return f"{probability:.0%}" if probability > 0.005 else "< 1%"
+
+
 def _kind(kind: str) -> Kind:
     try:
         return KINDS[kind]

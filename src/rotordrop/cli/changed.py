@@ -48,6 +48,7 @@ def _summary(out: Console, found: Changes) -> None:
 
     from rotordrop.model.parameter_table import row_of
     from rotordrop.report.quantity import Quantity
+    from rotordrop.units import format_chance
 
     columns = ("parameter", "before", "after", "change (90 %)", "changed that much", "found from")
     table = Table(*columns, box=None)
@@ -60,7 +61,7 @@ def _summary(out: Console, found: Changes) -> None:
         elif one.determined:
             text = f"{1e6 * one.change:+.3g} µm ({1e6 * low:+.3g} to {1e6 * high:+.3g})"
         before, after = (Quantity(value=value, kind=kind).text for value in (one.before, one.after))
-        share = f"{one.probability:.0%}" if one.determined else "–"
+        share = format_chance(one.probability) if one.determined else "–"
         shows = "–" if math.isinf(one.smallest) else one.smallest_text
         table.add_row(one.path, before, after, text, share, shows)
     out.print(table)

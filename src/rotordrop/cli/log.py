@@ -26,6 +26,10 @@ if TYPE_CHECKING:
     from rotordrop.ledger.book import LoggedDrop
 
 
+WHEN = "add: when it happened, ISO 8601; what the recorder wrote by default."
+WHAT = "add: estimate.json; remove: number of the drop; export: file of the table (.csv)."
+
+
 class Action(StrEnum):
     """What to do with a log."""
 
@@ -42,14 +46,12 @@ def log(
         typer.Argument(metavar="ACTION", help="add an estimate, show, allow, remove a drop, export a table."),
     ],
     where: Annotated[str, typer.Argument(metavar="LOG", help="SQLite file, or postgresql://….")],
-    what: Annotated[
-        str | None, typer.Argument(metavar="[WHAT]", help="add: estimate.json; remove: number of the drop.")
-    ] = None,
+    what: Annotated[str | None, typer.Argument(metavar="[WHAT]", help=WHAT)] = None,
     machine: Annotated[str | None, typer.Option(metavar="NAME", help="Only this machine.")] = None,
     bearings: Annotated[
         str, typer.Option(metavar="NAME", help="Set of touchdown bearings, a name of your own.")
     ] = "1",
-    recorded: Annotated[str, typer.Option(metavar="DATE", help="add: when it happened, ISO 8601.")] = "",
+    recorded: Annotated[str, typer.Option(metavar="DATE", help=WHEN)] = "",
     duration: Annotated[
         float | None,
         typer.Option(
@@ -68,6 +70,10 @@ def log(
     """Add a drop to the log of a machine, list what is there, and count it against an allowance."""
     from rotordrop.ledger import book
 
+    if action is Action.export and what is not None:
+        if Path(what).resolve() == Path(where).resolve():
+            raise UsageError(f"{what} is the log itself; name another file for the table")
+        require_places(Path(what))
     require_places(json_file)
     if action is Action.add:
         drop = book.drop_of_estimate(
@@ -86,7 +92,7 @@ def log(
     found = book.logged_drops(where, machine=machine)
     shares = [share for share in book.used_shares(where) if machine in (None, share.machine)]
     if action is Action.export:
-        typer.echo(_csv(found), nl=False)
+        _export(_csv(found), what)
         return
     rising = book.trends(where, machine=machine)
     content = {
@@ -97,6 +103,16 @@ def log(
     }
     said = [share.sentence() for share in shares] + [one.sentence() for one in rising]
     deliver(content, json_file, lambda out: _summary(out, found, said))
+
+
+def _export(table: str, file: str | None) -> None:
+    from rotordrop.atomic_file import write_text
+
+    if file is None:
+        typer.echo(table, nl=False)
+        return
+    write_text(file, table)
+    console().print(f"Table: {file}")
 
 
 def _say_whose(machine: str, logged: set[str]) -> None:
@@ -122,6 +138,12 @@ def _document(what: str | None) -> dict[str, Any]:
             f"{what} does not hold an estimate; expected what 'rotordrop estimate --json' writes"
         )
     return content
+
+
+def _day(drop: LoggedDrop) -> str:
+    """When it was, to the minute."""
+    shown = (drop.recorded or drop.added)[:16].replace("T", " ")
+    return shown if drop.recorded else f"logged {shown}"
 
 
 def _number(what: str | None) -> int:
@@ -170,7 +192,7 @@ def _summary(out: Console, found: dict[int, LoggedDrop], shares: list[str]) -> N
         lasted = "" if drop.duration is None else f"{drop.duration:.4g} s"
         record = f"{drop.record} (simulated)" if drop.simulated else drop.record
         table.add_row(
-            str(number), drop.machine, drop.bearing_set, drop.recorded or f"logged {drop.added}", record,
+            str(number), drop.machine, drop.bearing_set, _day(drop), record,
             format_quantity(drop.speed, "speed"), lasted, force,
         )  # fmt: skip
     out.print(table)

@@ -16,6 +16,7 @@ from rotordrop.estimated import NINETY
 from rotordrop.model.parameter import Parameter
 from rotordrop.model.parameter_table import fitted_row, row_of
 from rotordrop.physics.linear_algebra import solve, symmetric_eigen
+from rotordrop.units import format_chance
 
 Array = NDArray[np.float64]
 
@@ -123,7 +124,7 @@ class Changes:
         beside = f" Smaller changes than these may hide: {hidden}." if hidden else ""
         if not self.named:
             return f"Between {self.first} and {self.second} no parameter changed beyond chance.{beside}"
-        parts = [f"{one.path} ({_words(one)}, {one.probability:.0%})" for one in self.named]
+        parts = [f"{one.path} ({_words(one)}, {format_chance(one.probability)})" for one in self.named]
         return f"Between {self.first} and {self.second} changed: {', '.join(parts)}.{beside}"
 
 

@@ -268,7 +268,8 @@ def drop_of_estimate(document: Mapping[str, Any], bearing_set: str, **known: Any
     bearing_set : str
         Which set of touchdown bearings the machine had.
     known : optional
-        ``recorded``, ``duration`` [s], ``cause``: what the estimate does not know.
+        ``duration`` [s], ``cause``: what the estimate does not know; ``recorded``, where its recorder wrote
+        no date or a wrong one.
 
     Raises
     ------
@@ -299,7 +300,7 @@ def drop_of_estimate(document: Mapping[str, Any], bearing_set: str, **known: Any
         version=document.get("rotordrop_version", ""),
         fingerprint=str(document.get("fingerprint", "")),
         severity=tuple(_severities(document["bearings"])),
-        **known,
+        **{**known, "recorded": known.get("recorded") or str(document.get("recorded") or "")},
     )
 
 

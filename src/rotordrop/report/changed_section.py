@@ -13,6 +13,7 @@ from rotordrop.estimation.estimate import Estimate
 from rotordrop.model.parameter_table import row_of
 from rotordrop.report.content import Cell, Section, Statement, Table
 from rotordrop.report.quantity import Quantity, written
+from rotordrop.units import format_chance
 
 HEADING = "Since the last drop"
 NOTHING_GIVEN = "No earlier estimate of this machine was given to compare with."
@@ -68,4 +69,4 @@ def _row(one: Change) -> tuple[Cell, ...]:
     else:
         ends = (written(1e6 * end, 1) for end in (one.change, low, high))
         text = "{} µm ({} to {} µm)".format(*ends)
-    return (spoken_path(one.path), before, after, text, f"{one.probability:.0%}", shows)
+    return (spoken_path(one.path), before, after, text, format_chance(one.probability), shows)

@@ -184,7 +184,7 @@ def _number_table(drops: Sequence[ComparedDrop], bearing: str) -> Table:
         rows.append(
             (
                 name,
-                drop.recorded or "–",
+                drop.minute or "–",
                 speed,
                 *(_number(drop, bearing, key, kind) for key, _, kind in LOADS),
             )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -69,7 +70,12 @@ class ComparedDrop:
     def label(self) -> str:
         """Record, date and speed, for a table."""
         speed = Quantity(value=self.speed / (2.0 * math.pi), kind="frequency", digits=3).text
-        return ", ".join(part for part in (self.name, self.recorded, speed) if part)
+        return ", ".join(part for part in (self.name, self.minute, speed) if part)
+
+    @property
+    def minute(self) -> str:
+        """When the recorder says the drop was, without seconds."""
+        return re.sub(r"^(\d{4}-\d\d-\d\d)T(\d\d:\d\d).*$", r"\1 \2", self.recorded)
 
     @classmethod
     def of_document(cls, name: str, document: Mapping[str, Any], *, simulated: bool = False) -> ComparedDrop:

@@ -13,7 +13,7 @@ from rotordrop.machine.description import unknown_key
 from rotordrop.report.compared_drop import LESS_IS_WORSE, NUMBERS, ComparedDrop
 from rotordrop.report.content import Level, Statement
 from rotordrop.report.quantity import Quantity
-from rotordrop.units import parse_quantity
+from rotordrop.units import format_chance, parse_quantity
 
 SURE = 0.95
 """Probability from which a limit counts as kept, or as passed [1]."""
@@ -78,12 +78,12 @@ def _against(drops: Sequence[ComparedDrop], field: str, limit: float) -> tuple[s
     ]
     if not beyond:
         return f"{shown}: no drop states it with an interval", None
-    over = [f"{who} ({p:.0%})" for p, who in beyond if p >= SURE]
+    over = [f"{who} ({format_chance(p)})" for p, who in beyond if p >= SURE]
     if over:
         return f"{shown}: passed by {', '.join(over)}", False
     worst, who = max(beyond)
     if worst > 1.0 - SURE:
-        return f"{shown}: open, passed by {who} with a probability of {worst:.0%}", None
+        return f"{shown}: open, passed by {who} with a probability of {format_chance(worst)}", None
     return f"{shown}: kept by all drops (passed by {who} with {worst:.1%} at most)", True
 
 

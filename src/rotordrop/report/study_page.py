@@ -66,13 +66,26 @@ def study_page(
     )
 
 
+def _what_is_missing(results: StudyResults) -> str:
+    until, planned = results.study.until, results.study.drops
+    missing = f"{planned - len(results)} of {planned} drops are not part of this"
+    if until is None:
+        return f"{missing}."
+    found = results.quantile(until.column, until.quantile)
+    wanted = f"the {100 * until.quantile:g} % quantile of {until.column} is known within ± {until.within:.3g}"
+    reach = 0.5 * (found.upper - found.lower) / abs(found.value)
+    if reach <= until.within:
+        return f"{missing}: {wanted} of itself (± {reach:.2g} now), which ends the study."
+    return f"{missing}; it goes on until {wanted} of itself (± {reach:.2g} now)."
+
+
 def _verdict(results: StudyResults, limits: Mapping[str, float]) -> list[Statement]:
     said = []
-    missing = results.study.drops - len(results)
-    if missing:
-        said.append(
-            Statement(text=f"{missing} of {results.study.drops} drops are not part of this.", level="notice")
-        )
+    if len(results) < results.study.drops:
+        said.append(Statement(text=_what_is_missing(results), level="notice"))
+    if results.study.design == "sensitivity":
+        text = "Drops of one block differ in one value each: intervals of quantiles, which take drops as "
+        said.append(Statement(text=text + "independent, are too narrow here.", level="notice"))
     failed = sum(results.failed.values())
     if failed:
         reasons = "; ".join(f"{count} ×: {reason}" for reason, count in results.failed.items())

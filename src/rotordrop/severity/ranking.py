@@ -13,6 +13,7 @@ from scipy.special import ndtr
 
 from rotordrop.errors import UsageError
 from rotordrop.estimated import NINETY
+from rotordrop.units import format_chance
 
 Array = NDArray[np.float64]
 
@@ -162,13 +163,16 @@ def _statement(
 ) -> str:
     first, drop = names[0], float(worst[0])
     if drop >= CLEAR:
-        text = f"the drop {first} was the worst of those recorded ({drop:.0%})"
+        text = f"the drop {first} was the worst of those recorded ({format_chance(drop)})"
     else:
-        text = f"{first} shows the worst value; that it was the worst drop has a probability of {drop:.0%}"
+        text = f"{first} shows the worst value; that it was the worst drop has a probability of "
+        text += format_chance(drop)
     if len(names) > 2:
-        text += f"; it was worse than {names[1]} with {float(worse_probability(value, error)[0]):.0%}"
+        text += (
+            f"; it was worse than {names[1]} with {format_chance(float(worse_probability(value, error)[0]))}"
+        )
     if condition is None:
         return f"{text}; the scatter between equal drops is unknown, so nothing follows for its conditions"
     sure = float(condition[0])
     verdict = "are the worst" if sure >= CLEAR else "cannot be called the worst"
-    return f"{text}; with the scatter between equal drops its conditions {verdict} ({sure:.0%})"
+    return f"{text}; with the scatter between equal drops its conditions {verdict} ({format_chance(sure)})"

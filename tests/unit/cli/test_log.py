@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+from pathlib import Path
 
 import pytest
 
@@ -48,8 +49,25 @@ def test_a_log_from_the_command_line(tmp_path, estimate, capsys):
         ("DE", "3200.0", "3400.0"),
         ("NDE", "3200.0", "3400.0"),
     ]
+    table = tmp_path / "drops.csv"
+    assert run(["log", "export", log, str(table)]) == 0
+    assert list(csv.DictReader(table.open())) == rows
+    assert f"Table: {table}" in "".join(capsys.readouterr().out.split("\n"))
     assert run(["log", "remove", log, "1"]) == 0
     assert "drop 1 was removed" in capsys.readouterr().out
+
+
+def test_a_drop_is_dated_by_its_recorder_unless_somebody_says_otherwise(tmp_path, estimate, capsys):
+    log, file = str(tmp_path / "drops.db"), tmp_path / "dated.json"
+    document = json.loads(Path(estimate).read_text())
+    file.write_text(json.dumps({**document, "recorded": "2026-03-14T15:09:26Z", "record_sha256": "d" * 64}))
+    assert run(["log", "add", log, str(file)]) == 0
+    assert run(["log", "add", log, estimate, "--recorded", "2026-03-15"]) == 0
+    shown = capsys.readouterr().out
+    assert "logged 2" not in shown
+    assert run(["log", "show", log, "--json", str(tmp_path / "log.json")]) == 0
+    drops = json.loads((tmp_path / "log.json").read_text())["drops"].values()
+    assert [drop["recorded"] for drop in drops] == ["2026-03-14T15:09:26Z", "2026-03-15T00:00:00"]
 
 
 def test_an_allowance_for_a_machine_of_another_name_is_told(tmp_path, estimate, capsys):
@@ -71,6 +89,7 @@ def test_an_allowance_for_a_machine_of_another_name_is_told(tmp_path, estimate, 
         (["add", "{log}"], 64, "nothing to add"),
         (["add", "{log}", "{log}"], 3, "cannot read the estimate"),
         (["add", "{log}", "{estimate}", "--recorded", "14.3.2026"], 64, "'14.3.2026' is not a date"),
+        (["export", "{log}", "{log}"], 64, "is the log itself; name another file"),
         (["remove", "{log}", "first"], 64, "'first' is not the number of a drop"),
         (["allow", "{log}", "--drops", "3", "--source", "x"], 64, "name it with --machine"),
     ],

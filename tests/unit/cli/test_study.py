@@ -52,3 +52,26 @@ def test_what_cannot_be_done_is_said(study_file, tmp_path, capsys):
     assert "did you mean 'speed'" in capsys.readouterr().err
     assert run(["study", "run", str(tmp_path), "--folder", "x"]) == 64
     assert "leave out --folder" in capsys.readouterr().err
+
+
+def test_the_page_says_why_a_study_ended(study_file, tmp_path, capsys):
+    until = 'until = {column = "DE.peak_stress", quantile = 0.5, within = %s}\n'
+    for within, said in (("0.1", "which ends the study"), ("1e-6", "")):
+        file = study_file.with_name(f"until_{within}.toml")
+        file.write_text(
+            until % within + study_file.read_text().replace("drops = 12\nshard = 5", "drops = 16\nshard = 4")
+        )
+        assert run(["study", "run", str(file), "--threads", "1"]) == 0
+        shown = " ".join(capsys.readouterr().out.split())
+        assert (f"{said}." in shown) if said else "not part of this" not in shown
+    (study_file.with_name("until_1e-6") / "shards" / "000001.npy").unlink()
+    assert run(["study", "show", str(study_file.with_name("until_1e-6"))]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "4 of 16 drops are not part of this; it goes on until the 50 % quantile of DE.peak_stress" in shown
+
+
+def test_the_page_says_that_blocks_are_not_independent(study_file, capsys):
+    file = study_file.with_name("blocks.toml")
+    file.write_text('design = "sensitivity"\n' + study_file.read_text())
+    assert run(["study", "run", str(file), "--threads", "1"]) == 0
+    assert "too narrow here" in " ".join(capsys.readouterr().out.split())

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rotordrop.errors import UsageError
-from rotordrop.units import KINDS, format_moment, format_quantity, parse_quantity, si_unit
+from rotordrop.units import KINDS, format_chance, format_moment, format_quantity, parse_quantity, si_unit
 
 
 @pytest.mark.parametrize(
@@ -209,3 +209,11 @@ def test_revolutions_per_minute_as_din_writes_them(written):
 )
 def test_a_moment_is_never_minus_zero(time, decimals, text):
     assert format_moment(time, decimals) == text
+
+
+@pytest.mark.parametrize(
+    ("probability", "text"),
+    [(1.0, "> 99%"), (0.996, "> 99%"), (0.93, "93%"), (0.006, "1%"), (0.005, "< 1%"), (0.0, "< 1%")],
+)
+def test_no_chance_is_certain(probability, text):
+    assert format_chance(probability) == text

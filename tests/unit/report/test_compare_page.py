@@ -220,10 +220,11 @@ def test_severity_of_a_document_is_compared_with_its_worst_impact() -> None:
         ]
         severity = {"static_safety": known(1e10 / peak**2), "impulse_N_s": known(4.0)}
         entry = {"peak_force_N": known(peak), "severity": severity, "impacts": impacts}
-        return {"speed_Hz": 60.0, "recorded": "2026-03-14", "machine": "m", "bearings": {"NDE": entry}}
+        recorded = "2026-03-14T08:05:30.25Z"
+        return {"speed_Hz": 60.0, "recorded": recorded, "machine": "m", "bearings": {"NDE": entry}}
 
     drops = [ComparedDrop.of_document(name, document(p)) for name, p in (("a", 3000.0), ("b", 4000.0))]
-    assert drops[0].label == "a, 2026-03-14, 60.0 Hz"
+    assert drops[0].label == "a, 2026-03-14 08:05, 60.0 Hz"
     content = compare_page(drops)
     table = next(t for t in content.sections[0].tables if t.caption == "NDE: severity of every drop")
     rows = {row[0]: row[1:] for row in table.rows}
