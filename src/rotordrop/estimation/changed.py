@@ -210,7 +210,13 @@ def _watched(path: str) -> float | None:
 
 
 def _alone(entry: Mapping[str, Any], row: Parameter) -> _Told | None:
-    """What the record says beyond the prior; None where that is nothing."""
+    """What the record says beyond the prior; None where that is nothing.
+
+    While a race slides, its spin-up tells (friction less drag) over inertia and none of the two alone: an
+    estimate of the drag is one of the inertia's error, however sure it looks.
+    """
+    if row.spin_up_only:
+        return None
     value, prior = entry["estimate"], entry["prior"]
     mean, sigma = _measured(value, row)
     if prior is None:
@@ -321,13 +327,14 @@ def _jointly(
         others = [one for one in chosen if one != path]
         moved, sigma = fit.change([common.index(one) for one in (*others, path)])
         known = path in watched and sigma < UNKNOWN_CHANGE
+        shows = sigma < NO_CHANGE and not row_of(path).spin_up_only
         found.append(
             _change(
                 path,
                 told,
                 moved * scale[path],
                 sigma * scale[path] if known else math.inf,
-                smallest=(level + FOUND) * sigma * scale[path] if sigma < NO_CHANGE else math.inf,
+                smallest=(level + FOUND) * sigma * scale[path] if shows else math.inf,
                 named=path in chosen and known,
             )
         )
