@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from rotordrop.simulation.result import load_result as load_result
     from rotordrop.study import load_study as load_study
     from rotordrop.study import run_study as run_study
+    from rotordrop.study import sweep as sweep
     from rotordrop.synthesis import score_estimate as score_estimate
     from rotordrop.synthesis import synthesize_drop as synthesize_drop
     from rotordrop.units import format_quantity as format_quantity
@@ -78,6 +79,7 @@ _PUBLIC = {
     "save_machine": "rotordrop.machine",
     "score_estimate": "rotordrop.synthesis",
     "simulate_drop": "rotordrop.simulation.drop",
+    "sweep": "rotordrop.study",
     "synthesize_drop": "rotordrop.synthesis",
 }
 

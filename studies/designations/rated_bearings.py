@@ -9,10 +9,11 @@ inferred_balls.py; the tables are not part of this repository. Results stand in 
 makers that are not in the tables keep theirs.
 
 Published rigidity and ratings are compared as they are. Where balls are not published but rigidities are,
-those balls (with the conformity) are taken that reproduce both ratings and all rigidities best, and the
-largest ball load comes from them: at ten times the second preload radially, at a twentieth of the static
-rating for deep grooves without play. Ratings alone do not tell balls: an error of 5 % in them is one of 36 %
-in the count.
+those balls (with the conformity, which the ratings depend on too) are taken that reproduce both ratings and
+all rigidities best, and the largest ball load comes from them: at ten times the second preload radially, at a
+twentieth of the static rating for deep grooves without play. Ratings alone do not tell balls: an error of 5 %
+in them is one of 36 % in the count. What reconstructed balls are worth is seen where balls are published:
+these bearings are done a second time as if they were not ("MAKER reconstructed").
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ import json
 import math
 import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,13 +31,21 @@ import numpy as np
 
 from rotordrop.machine.catalog import PairRigidity, read_designation
 from rotordrop.machine.catalog.boundary import DIMENSION_SERIES
-from rotordrop.machine.catalog.inference import InferredBalls, dynamic_rating, infer_balls, static_rating
+from rotordrop.machine.catalog.inference import (
+    USUAL_GROOVE,
+    InferredBalls,
+    dynamic_rating,
+    groove_factors,
+    infer_balls,
+    pair_rigidity,
+    static_rating,
+)
 from rotordrop.physics.ball_bearing import axial_rigidity, bearing_constants
 from rotordrop.physics.ball_bearing_geometry import BallBearingGeometry
 from rotordrop.physics.ball_set import ball_set_entries, ball_set_load, balls_of, static_deflection
 
 HERE = Path(__file__).parent
-DRAWS = 15
+DRAWS = 40
 SIGMAS = {"static": 0.05, "dynamic": 0.07, "rigidity": 0.04}
 CONFORMITIES = tuple(0.510 + 0.005 * k for k in range(11))
 KNOWN = ("designation", "and ratings", "and rigidity")
@@ -76,7 +85,13 @@ Balls = tuple[int, float, float]
 def main(tables: list[str]) -> None:
     """Compare every bearing of the tables and print how the errors are spread."""
     random = np.random.Generator(np.random.Philox(2))
-    rows = [row for table in tables for one in listed(Path(table)) for row in compared(one, random)]
+    bearings = [one for table in tables for one in listed(Path(table))]
+    blind = [
+        replace(one, maker=f"{one.maker} reconstructed", balls=None)
+        for one in bearings
+        if one.balls and one.rigidity
+    ]
+    rows = [row for one in (*bearings, *blind) for row in compared(one, random)]
     makers = sorted({row["maker"] for row in rows})
     file = HERE / "results" / "rated_bearings.json"
     result: dict[str, Any] = json.loads(file.read_text()) if file.exists() else {}
@@ -214,23 +229,30 @@ def true_balls(one: Listed) -> Balls:
         candidates = [
             (count, size) for size in sizes for count in range(5, int(math.pi * one.pitch / size) + 1)
         ]
+    grooves = CONFORMITIES if one.rigidity else (USUAL_GROOVE,)
+    tried = sorted(
+        (misfit_of_ratings(one, (count, size, groove)), (count, size, groove))
+        for count, size in candidates
+        for groove in grooves
+    )
     best, least = (0, 0.0, 0.0), math.inf
-    for rated, (count, size) in sorted((misfit_of_ratings(one, *row), row) for row in candidates):
+    for rated, row in tried:
         if rated > least:
             break
-        for conformity in CONFORMITIES if one.rigidity else (0.52,):
-            total = rated + misfit_of_rigidity(one, (count, size, conformity))
-            if total < least:
-                best, least = (count, size, conformity), total
+        total = rated + misfit_of_rigidity(one, row)
+        if total < least:
+            best, least = row, total
     return best
 
 
-def misfit_of_ratings(one: Listed, count: int, size: float) -> float:
+def misfit_of_ratings(one: Listed, balls: Balls) -> float:
     """Squared misfit of both ratings, in standard deviations."""
+    count, size, conformity = balls
     row = (count, size, one.pitch, one.angle)
+    static, dynamic = groove_factors(row, conformity)
     return float(
-        (math.log(one.static / static_rating(*row)) / SIGMAS["static"]) ** 2
-        + (math.log(one.dynamic / dynamic_rating(*row)) / SIGMAS["dynamic"]) ** 2
+        (math.log(one.static / (static * static_rating(*row))) / SIGMAS["static"]) ** 2
+        + (math.log(one.dynamic / (dynamic * dynamic_rating(*row))) / SIGMAS["dynamic"]) ** 2
     )
 
 
@@ -238,7 +260,7 @@ def misfit_of_rigidity(one: Listed, balls: Balls) -> float:
     """Squared misfit of the rigidities of the classes, in standard deviations."""
     return sum(
         (
-            math.log(value / axial_rigidity(bearing_constants(geometry(one, balls, preload))))
+            math.log(value / pair_rigidity((*balls[:2], one.pitch, one.angle), balls[2], preload))
             / SIGMAS["rigidity"]
         )
         ** 2

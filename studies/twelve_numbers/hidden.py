@@ -195,7 +195,7 @@ def study(name: str, seed: int, *, check_only: bool) -> None:
     row: dict[str, Any] = {"rotor": name, "seed": seed, "speed_Hz": SPEEDS[name][0]}
     if file.exists():
         row = json.loads(file.read_text())
-    if "full" in row and (check_only or "advised number" in row):
+    if {"twelve numbers", "full"} <= row.keys() and (check_only or "advised number" in row):
         return
     full = ROTORS[name]()
     hidden = hidden_machine(full, seed, "none")

@@ -31,7 +31,7 @@ from rotordrop.model.parameter_table import parameter, row_of, rows, separating_
 from rotordrop.model.parameters import build_drop_model
 from rotordrop.model.statics import bearing_load_shares
 from rotordrop.model.unknowns import typical_depth, weight_per_magnet
-from rotordrop.tracking.consistency import Check, consistency_checks
+from rotordrop.tracking.consistency import Check, consistency_checks, judged_by
 from rotordrop.tracking.problem import DropProblem
 from rotordrop.tracking.smoother import Smoothed, parameter_sample
 from rotordrop.tracking.unknown_impulses import likeliest_noise, with_noise
@@ -148,7 +148,11 @@ def calibrate_machine(
     factor = likeliest_noise(usual, CALIBRATION_SCHEDULE[-1])
     tracked = with_noise(usual, CALIBRATION_SCHEDULE[-1], factor)
     checks = {
-        name: consistency_checks(problem, replace(smoothed, filtered=past.filtered), factor)
+        name: consistency_checks(
+            problem,
+            replace(smoothed, filtered=judged_by(problem, smoothed.filtered, past.filtered)),
+            factor,
+        )
         for name, problem, smoothed, past in zip(
             stems, tracked.problems, tracked.smoothed, usual.smoothed, strict=True
         )

@@ -44,7 +44,7 @@ from rotordrop.tracking.calibration import (
     stage_settings,
     track,
 )
-from rotordrop.tracking.consistency import DIRECTIONS, Check, consistency_checks
+from rotordrop.tracking.consistency import DIRECTIONS, Check, consistency_checks, judged_by
 from rotordrop.tracking.forces import ForceHistory, force_history
 from rotordrop.tracking.prior import fall_time
 from rotordrop.tracking.problem import DropProblem, Fall, RecordedDrop, build_problem
@@ -93,8 +93,8 @@ class TrackedDrop:
     problem, smoothed : DropProblem, Smoothed
         The estimation problem and its smoothed estimate with the likeliest unknown impulses; hundreds of
         megabytes.
-    usual : Forward
-        The pass with impulses of the usual size, by whose innovations the model is judged.
+    judged : Forward
+        The pass by whose innovations the model is judged.
     forces : ForceHistory
         Force and stress over time with standard deviations.
     checks : tuple of Check
@@ -110,7 +110,7 @@ class TrackedDrop:
     evidence: Evidence
     problem: DropProblem
     smoothed: Smoothed
-    usual: Forward
+    judged: Forward
     forces: ForceHistory
     checks: tuple[Check, ...]
     noise_factor: float
@@ -421,13 +421,14 @@ def tracked_drop(
 ) -> TrackedDrop:
     """Forces and checks of one smoothed drop."""
     forces = force_history(problem, smoothed)
+    seen = judged_by(problem, smoothed.filtered, usual)
     return TrackedDrop(
         evidence=evidence,
         problem=problem,
         smoothed=smoothed,
-        usual=usual,
+        judged=seen,
         forces=of_a_beam(forces) if is_beam(problem.model.machine.rotor) else forces,
-        checks=consistency_checks(problem, replace(smoothed, filtered=usual), noise_factor),
+        checks=consistency_checks(problem, replace(smoothed, filtered=seen), noise_factor),
         noise_factor=noise_factor,
         drops=drops,
         kept=kept,

@@ -210,6 +210,14 @@ def is_beside(peak: float, check: InputEstimate, b: int) -> bool:
     return not 1.0 / FACTOR_APART <= found / peak <= FACTOR_APART
 
 
+def is_apart(peak: float, check: InputEstimate, b: int) -> bool:
+    """Whether a peak lies outside the known accuracy of the cross-check."""
+    found = float(check.peak[b])
+    if not (math.isfinite(found) and found > 0.0 and peak > 0.0):
+        return False
+    return abs(peak / found - 1.0) > float(check.peak_error[b])
+
+
 def holding_cross_check(loads: Loads, forces: ForceHistory, check: InputEstimate, b: int) -> Loads:
     """Force and stress where model and record disagree, with intervals that hold the cross-check.
 

@@ -129,5 +129,9 @@ class ReportContent:
     @property
     def figures(self) -> dict[str, go.Figure]:
         """Figures by name, in the order of the page."""
-        found = [figure for section in self.sections for figure in section.figures]
-        return {figure.name or f"figure {k + 1}": figure.chart for k, figure in enumerate(found)}
+        found: dict[str, go.Figure] = {}
+        for section in self.sections:
+            for figure in section.figures:
+                name = figure.name or section.heading.lower()
+                found[f"{name} {len(found) + 1}" if name in found else name] = figure.chart
+        return found

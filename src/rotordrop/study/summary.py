@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +18,9 @@ from rotordrop.machine.description import unknown_key
 from rotordrop.study.folder import StudyFolder, read_shard, study_of
 from rotordrop.study.plan import Study
 from rotordrop.study.quantities import Quantity, columns_of
+
+if TYPE_CHECKING:
+    import pandas
 
 Array = NDArray[np.float64]
 
@@ -75,6 +78,12 @@ class StudyResults:
             if reason:
                 counts[reason] = counts.get(reason, 0) + 1
         return counts
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """One row per drop: number, varied values, quantities [SI], reason of a failure."""
+        import pandas
+
+        return pandas.DataFrame({"drop": self.drop, **self.varied, **self.numbers, "reason": self.reasons})
 
     def column(self, name: str) -> Array:
         """A quantity or a varied value of every drop, shape (N,) [SI]."""

@@ -169,7 +169,7 @@ def test_innovations_keep_their_channels_and_their_deviation() -> None:
     sensors = tuple(SimpleNamespace(name=name) for name in "ABCD")
     machine = SimpleNamespace(sensors=sensors)
     drop: Any = SimpleNamespace(
-        usual=filtered,
+        judged=filtered,
         problem=SimpleNamespace(time=np.arange(50.0), model=SimpleNamespace(machine=machine)),
     )
     found = tracked_estimate._innovations(drop)

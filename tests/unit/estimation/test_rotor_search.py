@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -18,6 +18,7 @@ from rotordrop.estimation.tracked import recorded_drop
 from rotordrop.estimation.tracked_loads import (
     check_of_a_beam,
     check_of_the_rotor,
+    is_apart,
     of_a_beam,
     of_the_rotor,
 )
@@ -140,3 +141,11 @@ def test_the_error_of_a_beam_is_taken_back_from_forces_and_cross_check():
     assert check_of_a_beam(check).peak_error[0] == pytest.approx(math.hypot(0.1, 1.6449 * 0.08), rel=1e-4)
     assert check_of_the_rotor(check_of_a_beam(check)).peak_error == pytest.approx(check.peak_error)
     assert check_of_the_rotor(check_of_a_beam(check)).stress_error == pytest.approx(check.stress_error)
+
+
+def test_a_peak_beyond_the_accuracy_of_the_cross_check_is_apart():
+    """Where a beam stands for the rotor, the cross-check decides within its accuracy, not by a factor."""
+    check = InputEstimate(**{f.name: np.array([0.2]) for f in fields(InputEstimate)})
+    check = replace(check, peak=np.array([1000.0, 0.0]), peak_error=np.array([0.2, 0.2]))
+    assert [is_apart(peak, check, 0) for peak in (790.0, 810.0, 1190.0, 1210.0)] == [True, False, False, True]
+    assert not is_apart(1e6, check, 1)  # no impact there to be compared with

@@ -51,7 +51,7 @@ def test_the_head_names_the_drop(
     assert document["estimated_until_s"] == workshop.problem.time[-1] == pytest.approx(0.2, abs=1e-4)
     assert (document["method"], document["quick"], document["simulated_record"]) == ("tracked", False, True)
     judged = document["consistency"]
-    assert judged["nis"] == workshop.usual.nis
+    assert judged["nis"] == workshop.judged.nis
     assert judged["process_noise_factor"] == workshop.noise_factor
     assert [(c["name"], c["passed"], c["message"]) for c in judged["checks"]] == [
         (c.name, c.passed, c.message) for c in workshop.checks
@@ -100,7 +100,7 @@ def test_every_impact_lasts_as_long_as_the_indentation(
 
 def test_innovations_are_those_of_the_displacement_channels(tracked: Estimate, workshop: TrackedDrop) -> None:
     """Reading minus prediction over its deviation: squares near one where the model fits."""
-    found, filtered = tracked.innovations, workshop.usual
+    found, filtered = tracked.innovations, workshop.judged
     assert found is not None
     sensors = workshop.problem.model.machine.sensors
     assert found.channels == tuple(sensor.name for sensor in sensors)

@@ -416,6 +416,14 @@ class TestArrangement:
         found = only(reordered(edited, fast_drop, order), machine)
         assert (found.kind, found.channel) == ("swapped channels", pair)
 
+    def test_nothing_is_refused_for_the_fall_of_a_beam(self, fast_drop, machine, edited):
+        """A beam in place of the rotor bends otherwise: what its fall seems to say is a warning."""
+        beam = machine.changed(rotor=machine.rotor.changed(mass_to_ends=0.0))
+        every = check_record(reordered(edited, fast_drop, [2, 1, 0, 3]), beam)
+        (found,) = (one for one in every if one.kind == "swapped channels")
+        assert (found.severity, found.channel) == ("warning", "S_NDE_A, S_DE_A")
+        assert "a beam stands for the rotor" in found.message
+
     def test_crossed_channels_show_in_the_swing_of_the_tail(self, drop, tail, machine, edited):
         found = check_record(drop, machine, reordered(edited, tail, [2, 1, 0, 3]))
         stops = [one for one in found if one.severity == "stop"]

@@ -14,6 +14,7 @@ from rotordrop.tracking.consistency import (
     NOISE_FACTOR_LIMIT,
     SENSOR_LIMIT,
     consistency_checks,
+    judged_by,
     normalised_innovations,
 )
 from rotordrop.tracking.smoother import PassSettings, forward, smooth
@@ -124,3 +125,21 @@ def test_a_lost_channel_is_not_judged(impacts):
     for name in ("innovation size", "innovation whiteness"):
         assert "nan" not in checks[name].message
         assert "S_NDE_B" not in checks[name].message
+
+
+def test_a_beam_is_judged_with_its_own_error(impacts, impacts_smoothed):
+    """Innovations with the likeliest impulses, gains within what a beam bends otherwise; and it is said."""
+    machine = impacts.model.machine
+    beam = machine.changed(rotor=machine.rotor.changed(mass_to_ends=0.0))
+    of_beam = replace(impacts, model=replace(impacts.model, machine=beam))
+    usual, likeliest = impacts_smoothed.filtered, replace(impacts_smoothed.filtered, done=499)
+    assert judged_by(impacts, likeliest, usual) is usual
+    assert judged_by(of_beam, likeliest, usual) is likeliest
+    means = impacts_smoothed.means.copy()
+    means[:, impacts.n_dynamic + len(impacts.unknowns)] += 0.05  # the gain of the first channel
+    passed = {}
+    for problem in (impacts, of_beam):
+        checks = {c.name: c for c in consistency_checks(problem, replace(impacts_smoothed, means=means), 4.1)}
+        passed[problem is of_beam] = checks["sensor errors"].passed
+        assert ("4.1 × their usual size" in checks["process noise"].note) is (problem is of_beam)
+    assert passed == {False: False, True: True}

@@ -227,7 +227,7 @@ def _ratings_error(
 ) -> float:
     """Squared misfit of the load ratings, in standard deviations; wider grooves carry less."""
     error = 0.0
-    factors = _groove_factors(row, conformity)
+    factors = groove_factors(row, conformity)
     rules = (static_rating, dynamic_rating)
     for rating, rule, factor, sigma in zip(ratings, rules, factors, _RATING_SIGMA, strict=True):
         if rating is not None:
@@ -235,7 +235,7 @@ def _ratings_error(
     return error
 
 
-def _groove_factors(row: tuple[int, float, float, float], conformity: float) -> tuple[float, float]:
+def groove_factors(row: tuple[int, float, float, float], conformity: float) -> tuple[float, float]:
     """Static and dynamic rating of a groove over those of the usual one, which the tables of ISO hold for.
 
     Static: load at a given pressure, by Brewe and Hamrock 1977 proportional to k (E R)². Dynamic: the groove
