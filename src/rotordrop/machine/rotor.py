@@ -27,6 +27,10 @@ from rotordrop.machine.values import (
     default,
 )
 
+THINNEST, THICKEST = 1e-4, 100.0
+"""Diameters [m] beyond which a section is a mistake: stiffness goes with the fourth power, and beside a usual
+shaft the numbers of a computer no longer hold both."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Element:
@@ -78,6 +82,14 @@ class Section(Description):
         """Refuse diameters that do not nest."""
         outer, inner = self.outer_diameter.value, self.inner_diameter.value
         text = Physical("length").text
+        for key in ("outer_diameter", "layer_diameter"):
+            given = getattr(self, key)
+            if given is not None and not THINNEST <= given.value <= THICKEST:
+                raise Misfit(
+                    f"{text(given.value)} is no diameter of a rotor, which has {text(THINNEST)} to "
+                    f"{text(THICKEST)}; check the unit",
+                    (key,),
+                )
         if inner >= outer:
             raise Misfit(
                 f"the inner diameter {text(inner)} must be smaller than the outer one, {text(outer)}",

@@ -15,9 +15,9 @@ from rotordrop.measurement.levitated import LevitatedModel
 from rotordrop.measurement.recording import Array
 from rotordrop.measurement.release import (
     ComplexArray,
+    FallResponses,
     FreeRotor,
     response_at,
-    tabulate_response,
 )
 from rotordrop.model.parameter_table import parameter
 from rotordrop.model.unknowns import sensor_prior
@@ -40,14 +40,14 @@ _GROWTH = 4e-4
 _GOOD = 2.0
 """Mean square over the noise up to which a search counts as successful."""
 
+_AHEAD = 10e-3
+"""Responses are tabulated so far ahead of a window that may grow [s]."""
+
 _STILL_FREE = 4.0
 """Mean square over the noise up to which the newest samples count as free fall."""
 
 _STARTS = (0.0, -0.7, 0.6, -1.4, 1.2)
 """Where the search for the release begins, from the first guess [ms]; the later ones only when needed."""
-
-_TABLES = 8
-"""Tabulated responses kept while a release is searched."""
 
 _LEAD = 5e-3
 """Levitated samples kept before the earliest release [s]."""
@@ -104,28 +104,17 @@ class _Problem:
     directions: ComplexArray
     plane_of: NDArray[np.int64]
     rotor: FreeRotor
-    speed: float
     origin: float
-    span: float
-    fixed: tuple[ComplexArray, ...]
+    responses: FallResponses
     prior_mean: Array
     prior_error: Array
-    tables: dict[float, ComplexArray]
-
-    def _fading(self, decay: float) -> ComplexArray:
-        """Response to lift that fades; most steps of the search move the release only and need it again."""
-        if decay not in self.tables:
-            if len(self.tables) > _TABLES:
-                self.tables.clear()
-            self.tables[decay] = tabulate_response(self.rotor, self.speed, 1.0 / decay, self.span)
-        return self.tables[decay]
 
     def columns(self, time: Array, release: float, decay: float) -> tuple[Array, Array]:
         """Fall of the sensors by the lost lift, shape (T, S), and what every unknown adds, (T, S, U)."""
         since = time - release
-        remanent = self._fading(decay)
-        step, forward, backward = (self._seen(response_at(table, since)) for table in self.fixed)
-        left = self._seen(response_at(remanent, since)) * self.rotor.lift
+        fixed = self.responses.fixed
+        step, forward, backward = (self._seen(response_at(table, since)) for table in fixed)
+        left = self._seen(response_at(self.responses.fading(decay), since)) * self.rotor.lift
         fall = (-1j * step * self.rotor.lift).sum(axis=-1).real
         parts = [column for unit in (left, forward, backward) for column in (unit.real, -unit.imag)]
         expected = fall + parts[1].sum(axis=-1) * REMANENT_SHARE[0]
@@ -192,9 +181,13 @@ def fit_fall(
         First guess of the release, a time that is surely in free fall, and the latest end of it [s].
     """
     origin, surely, latest = window
+    tabulated: list[tuple[float, FallResponses]] = []
 
     def until(end: float) -> _Problem:
-        return _problem(record, rotor, levitated, planes, (origin, end))
+        if not tabulated or end > tabulated[-1][0]:
+            ahead = max(end, min(latest, end + _AHEAD))
+            tabulated.append((ahead, _responses(rotor, levitated, ahead - origin)))
+        return _problem(record, rotor, levitated, planes, (origin, end), tabulated[-1][1])
 
     first = until(min(surely, latest))
     # A short window has several minima: the lost lift begins a little earlier or later, and a turning force
@@ -226,7 +219,8 @@ def linearised(
         Its derivatives by forces, gains, release and time constant.
     """
     origin = fall.start + _LEAD - 1e-9  # the samples of the fit, whatever its first guess was
-    problem = _problem(record, fall.rotor, levitated, planes, (origin, fall.end))
+    responses = _responses(fall.rotor, levitated, fall.end - origin)
+    problem = _problem(record, fall.rotor, levitated, planes, (origin, fall.end), responses)
     best = np.array([1e3 * (fall.instant - origin), np.log(fall.remanent_time)])
     unknown, residual = problem.solve(*problem.named(best))
     weight = 1.0 / problem.noise
@@ -324,12 +318,18 @@ def _fall(
     )
 
 
+def _responses(rotor: FreeRotor, levitated: LevitatedModel, length: float) -> FallResponses:
+    """Responses that reach over a fall of some length from the first guess of the release [s]."""
+    return FallResponses.of(rotor, 2 * np.pi * levitated.frequency, length + 2 * _LEAD)
+
+
 def _problem(
     record: Record,
     rotor: FreeRotor,
     levitated: LevitatedModel,
     planes: tuple[Plane, ...],
     window: tuple[float, float],
+    responses: FallResponses,
 ) -> _Problem:
     origin, end = window
     keep = (record.time >= origin - _LEAD) & (record.time <= end)
@@ -338,7 +338,6 @@ def _problem(
     gain = np.array([float(sensor.gain) for sensor in record.sensors])
     unit = sensor_directions(record.sensors)
     speed = 2 * np.pi * levitated.frequency
-    span = end - origin + 2 * _LEAD
     amplitude = float(np.mean(np.abs(levitated.amplitudes[0])))
     mean, error = _priors(rotor, record.sensors, rotor.mass * amplitude * speed**2)
     return _Problem(
@@ -346,19 +345,17 @@ def _problem(
         deviation=deviation * gain,
         noise=np.maximum(levitated.noise * gain, 1e-12),
         directions=unit[:, 0] + 1j * unit[:, 1],
-        plane_of=_plane_of_sensor(planes, len(record.sensors)),
+        plane_of=plane_of_sensor(planes, len(record.sensors)),
         rotor=rotor,
-        speed=speed,
         origin=origin,
-        span=span,
-        fixed=tuple(tabulate_response(rotor, speed, s, span) for s in (0.0, -1j * speed, 1j * speed)),
+        responses=responses,
         prior_mean=mean,
         prior_error=error,
-        tables={},
     )
 
 
-def _plane_of_sensor(planes: tuple[Plane, ...], count: int) -> NDArray[np.int64]:
+def plane_of_sensor(planes: tuple[Plane, ...], count: int) -> NDArray[np.int64]:
+    """Index of the plane of every sensor, shape (S,)."""
     index = np.zeros(count, dtype=np.int64)
     for number, plane in enumerate(planes):
         index[list(plane.columns)] = number

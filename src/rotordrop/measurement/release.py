@@ -149,23 +149,85 @@ def tabulate_response(rotor: FreeRotor, speed: float, exponent: complex, span: f
     array, shape (K, P, A), complex
         Displacement [m/N] at 0, `GRID`, 2 `GRID`, …
     """
-    from scipy.linalg import expm
-
     m, inputs = len(rotor.stiffness), len(rotor.force_rows)
     system = np.zeros((2 * m + inputs, 2 * m + inputs), dtype=np.complex128)
-    system[:m, m : 2 * m] = np.eye(m)
-    system[m : 2 * m, :m] = -np.diag(rotor.stiffness)
-    system[m : 2 * m, m : 2 * m] = -rotor.damping + 1j * speed * rotor.gyroscopic
+    system[: 2 * m, : 2 * m] = _of_motion(rotor, speed)
     system[m : 2 * m, 2 * m :] = rotor.force_rows.T
     system[2 * m :, 2 * m :] = -exponent * np.eye(inputs)
+    states = _stepped(system, np.eye(2 * m + inputs)[:, 2 * m :], span)
+    return np.asarray(rotor.plane_rows @ states[:, :m])
+
+
+def _of_motion(rotor: FreeRotor, speed: float) -> ComplexArray:
+    """Derivative of displacements and velocities of the modes by themselves."""
+    m = len(rotor.stiffness)
+    system = np.zeros((2 * m, 2 * m), dtype=np.complex128)
+    system[:m, m:] = np.eye(m)
+    system[m:, :m] = -np.diag(rotor.stiffness)
+    system[m:, m:] = -rotor.damping + 1j * speed * rotor.gyroscopic
+    return system
+
+
+def _stepped(system: ComplexArray, start: Array, span: float) -> ComplexArray:
+    """States (K, N, C) at 0, `GRID`, 2 `GRID`, … from the columns of a start, by doubling."""
+    from scipy.linalg import expm
+
     step = expm(GRID * system)
-    states = np.zeros((1, 2 * m + inputs, inputs), dtype=np.complex128)
-    states[0, 2 * m :] = np.eye(inputs)
+    states = start[None].astype(np.complex128)
     count = int(span / GRID) + 2
     while len(states) < count:
         states = np.concatenate([states, step @ states])
         step = step @ step
-    return np.asarray(rotor.plane_rows @ states[:count, :m])
+    return states[:count]
+
+
+def response_to_start(rotor: FreeRotor, speed: float, span: float) -> ComplexArray:
+    """Displacement of the planes (K, P, 2 M) by unit displacements and velocities of the modes."""
+    m = len(rotor.stiffness)
+    return np.asarray(rotor.plane_rows @ _stepped(_of_motion(rotor, speed), np.eye(2 * m), span)[:, :m])
+
+
+@dataclass(frozen=True, kw_only=True)
+class FallResponses:
+    """What a released rotor answers to forces that stay, turn with it or fade, tabulated once for a span.
+
+    Attributes
+    ----------
+    fixed : tuple of array, shape (K, P, A), complex
+        Responses to a force that stays, turns with the shaft and against it [m/N].
+    free : array, shape (K, P, 2 M), complex
+        Displacement of the planes left to themselves, by displacements and velocities of the modes.
+    system, inputs : array
+        Derivative of those by themselves and by unit forces at the magnetic bearings.
+    """
+
+    fixed: tuple[ComplexArray, ...]
+    free: ComplexArray
+    system: ComplexArray
+    inputs: Array
+
+    @classmethod
+    def of(cls, rotor: FreeRotor, speed: float, span: float) -> FallResponses:
+        """Tabulate a rotor at a speed [rad/s] over a time from the release on [s]."""
+        system = _of_motion(rotor, speed)
+        return cls(
+            fixed=tuple(tabulate_response(rotor, speed, s, span) for s in (0.0, -1j * speed, 1j * speed)),
+            free=response_to_start(rotor, speed, span),
+            system=system,
+            inputs=np.vstack([np.zeros_like(rotor.force_rows.T), rotor.force_rows.T]),
+        )
+
+    def fading(self, decay: float) -> ComplexArray:
+        """Response (K, P, A) to unit forces that fade with a time constant [s].
+
+        With x' = A x + B exp(−t/τ) and x(0) = 0, x = (exp(A t) − exp(−t/τ)) (A + 1/τ)⁻¹ B.
+        """
+        rate = 1.0 / decay
+        share = np.linalg.solve(self.system + rate * np.eye(len(self.system)), self.inputs)
+        count, planes, _ = self.free.shape
+        fades = np.exp(-rate * GRID * np.arange(count))[:, None, None]
+        released = self.free.reshape(count * planes, -1) @ share
+        return np.asarray(released.reshape(count, planes, -1) - fades * (self.free[0] @ share))
 
 
 def response_at(table: ComplexArray, since: Array) -> ComplexArray:

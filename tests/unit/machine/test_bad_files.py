@@ -166,6 +166,8 @@ BAD = [
     ),
     # magnitudes no arithmetic survives
     ('"60 mm"', '"1e-300 mm"', "'1e-300 mm' is no length that a machine has; write for ex", '"1e-300 mm"'),
+    ('"60 mm"', '"6e-5 mm"', "0.0600 µm is no diameter of a rotor, which has 100 µm to 100 m", '"6e-5 mm"'),
+    ('"60 mm"', '"6e8 mm"', "is no diameter of a rotor, which has 100 µm to 100 m; ch", '"6e8 mm"'),
     ('"60 mm"', '"1e300 mm"', "'1e300 mm' is no length that a machine has; write for ex", '"1e300 mm"'),
     ('"5 kg"', '"1e300 kg"', "'1e300 kg' is no mass that a machine has", '"1e300 kg"'),
     ('preload = "heavy"', 'first_ball_angle = "1e20 deg"', "is not allowed here; at most", '"1e20 deg"'),

@@ -21,6 +21,7 @@ from rotordrop.measurement.quality.channels import check_channels
 from rotordrop.measurement.quality.clock import check_blocks, check_clock
 from rotordrop.measurement.quality.ends import check_ends
 from rotordrop.measurement.quality.finding import Finding, Severity, ranked, refuse_unusable, stops
+from rotordrop.measurement.quality.flight import weighed, with_flights
 from rotordrop.measurement.quality.motion import (
     check_length,
     check_levitated,
@@ -122,7 +123,11 @@ def _check_motion(record: Record, machine: Machine, tail: Record | None) -> list
     findings += check_levitated(levitated, record)
     findings += check_length(record, coarse.instant, tail is not None)
     near = record.window(-np.inf, coarse.instant + _NEAR)
-    findings = _not_both(findings, check_ends(near, machine, planes, levitated, coarse))
+    of_fall = check_ends(near, machine, planes, levitated, coarse)
+    of_fall = with_flights(
+        of_fall, weighed(record, machine, planes, levitated, coarse.instant), record, planes
+    )
+    findings = _not_both(findings, of_fall)
     if tail is not None and not stops(findings):
         findings += check_tail(tail, machine, planes, levitated)
     return findings
