@@ -124,13 +124,13 @@ def weighed(
 def with_flights(
     of_fall: list[Finding], seen: Weighed | None, record: Record, planes: tuple[Plane, ...]
 ) -> list[Finding]:
-    """Findings of the first fall with what the flights say; they refute a gain that the fall suspects."""
+    """Findings of the first fall with what the flights say; they refute gains and angles that it suspects."""
     if seen is None:
         return of_fall
     own = check_flights(seen, record, planes)
     error = np.sqrt(np.diag(seen.covariance))
     right = np.all(np.abs(seen.share - 1.0) + 2.0 * error < _REFUTED)
-    kept = [found for found in of_fall if not (right and found.kind == "wrong gain")]
+    kept = [found for found in of_fall if not (right and found.kind in ("wrong gain", TURNED))]
     return kept + [found for found in own if found.kind not in {other.kind for other in kept}]
 
 
