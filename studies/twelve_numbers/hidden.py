@@ -96,6 +96,7 @@ def estimated(machine: Machine, folder: Path, truth: Mapping[str, Any], describe
     except RotordropError as error:
         return {"refused": str(error), "cpu_s": time.process_time() - began}
     row: dict[str, Any] = {"verdict": found.verdict.name, "cpu_s": round(time.process_time() - began, 1)}
+    row["failed"] = [check.message for check in found.checks if not check.passed]
     for bearing in found.bearings:
         for name, known, true in (
             ("force", bearing.peak_force.known, truth["peak_force_N"][bearing.name]),

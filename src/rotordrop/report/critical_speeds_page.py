@@ -98,6 +98,9 @@ def critical_speeds_json(
     }
 
 
+_WORST_FIRST = ("bad", "good", "warning", "notice")
+
+
 def _verdict(
     machine: Machine, found: CriticalSpeedMap, diagrams: Mapping[str, CampbellDiagram]
 ) -> tuple[Statement, ...]:
@@ -117,7 +120,10 @@ def _verdict(
             text = f"{_held(name)}: forward or mixed modes meet the rotor's own speed at {speeds} Hz"
             statements.append(Statement(text=f"{text}, up to the nominal speed."))
         statements += _margins(name, diagram, top)
-    return tuple(statements)
+    if not any(one.level == "bad" for one in statements):
+        clear = "No critical speed of the held rotor is nearer to the nominal speed than API 617 asks for."
+        statements.append(Statement(text=clear, level="good"))
+    return tuple(sorted(statements, key=lambda one: _WORST_FIRST.index(one.level)))
 
 
 def _margins(name: str, diagram: CampbellDiagram, nominal: float) -> list[Statement]:

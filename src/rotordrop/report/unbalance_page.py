@@ -23,6 +23,8 @@ TURN = 2.0 * math.pi
 LEAST_PEAK = 0.02
 """Peaks below this share of the largest amplitude of the response are not listed [1]."""
 MOST_SHAPES = 5
+SHARED_LABEL = 0.06
+"""Distance of two planes along the rotor below which they share a label, over its length [1]."""
 
 
 def unbalance_page(machine: Machine, response: MachineResponse) -> ReportContent:
@@ -276,12 +278,30 @@ def shape_figure(
                 hovertemplate="%{x:.0f} mm: %{y:.4g} µm<extra>" + label + "</extra>",
             )
         )
-    for name, node in response.places:
-        position = 1e3 * response.node_positions[node - 1]
-        figure.add_vline(x=position, line={"color": MUTED, "width": 1, "dash": "dot"})
-        figure.add_annotation(
-            x=position, y=1.0, yref="paper", text=plain(name), showarrow=False, yanchor="bottom"
-        )
+    _mark_places(figure, response)
     figure.update_xaxes(title_text=axis_title("position from node 1", "mm"))
     figure.update_yaxes(title_text=axis_title("deflection, 0 to peak", "µm"), rangemode="tozero")
     return fit_legend(figure)
+
+
+def _mark_places(figure: go.Figure, response: MachineResponse) -> None:
+    """Draw an upright line at every plane; planes beside each other share a label, which stays inside."""
+    length = 1e3 * float(response.node_positions[-1])
+    groups: list[tuple[float, list[str]]] = []
+    at = {name: 1e3 * float(response.node_positions[node - 1]) for name, node in response.places}
+    for name, position in sorted(at.items(), key=lambda pair: pair[1]):
+        figure.add_vline(x=position, line={"color": MUTED, "width": 1, "dash": "dot"})
+        if groups and position - groups[-1][0] < SHARED_LABEL * length:
+            groups[-1][1].append(name)
+        else:
+            groups.append((position, [name]))
+    for position, names in groups:
+        figure.add_annotation(
+            x=position,
+            y=1.0,
+            yref="paper",
+            text=plain(", ".join(names)),
+            showarrow=False,
+            xanchor="left" if position < 0.5 * length else "right",
+            yanchor="bottom",
+        )

@@ -36,6 +36,18 @@ def test_a_mode_further_off_or_against_the_spin_is_none():
     assert said(548.4, "backward") == []
 
 
+def test_the_verdict_stands_first_and_says_that_nothing_is_too_near():
+    crossing = SimpleNamespace(speed=2.0 * math.pi * 455.0, direction="forward", damping_ratio=0.025)
+    machine = SimpleNamespace(speed=SimpleNamespace(nominal=2.0 * math.pi * 550.0))
+    found, diagrams = SimpleNamespace(at_lines=AT_LINES), {"AMBs": SimpleNamespace(crossings=(crossing,))}
+    first, *others = _verdict(machine, found, diagrams)
+    assert first.level == "good" and "No critical speed of the held rotor is nearer" in first.text
+    assert {one.level for one in others} == {"notice"}
+    near = SimpleNamespace(speed=2.0 * math.pi * 548.0, direction="forward", damping_ratio=0.025)
+    levels = [one.level for one in _verdict(machine, found, {"AMBs": SimpleNamespace(crossings=(near,))})]
+    assert levels[0] == "bad" and "good" not in levels
+
+
 def test_the_stability_map_is_drawn_told_and_in_the_json():
     found = StabilityMap(
         suspension="AMBs",
