@@ -163,6 +163,11 @@ def test_sampling_interval_by_profile(write, machine):
     assert any("counts from the first sample" in note for note in plain.notes)
 
 
+def test_a_header_without_readings_is_told_as_that(write, machine):
+    with pytest.raises(RecordError, match=r"line 1\) reads 'Time \[s\];S_NDE_A \[um\]': a header without"):
+        read_record(write("Time [s];S_NDE_A [um]\n"), machine)
+
+
 def test_wrong_column_count_names_line_and_counts(write, machine):
     lines = recorder()[0].split("\n")
     lines[9] = lines[9].rsplit(";", 1)[0]

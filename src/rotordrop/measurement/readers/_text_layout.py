@@ -122,6 +122,10 @@ def fields_of(line: str, separator: str) -> list[str]:
     return [part.strip().strip('"').strip() for part in parts]
 
 
+_A_NUMBER = re.compile(r"(^|[\s;,\"])[-+]?[.,]?\d")
+"""Where a number begins, at the start of a field."""
+
+
 def find_layout(lines: list[str], path: Path, rules: TextLayout) -> Layout:
     """Find separator, decimal sign, what each column holds and the first data line from the lines themselves.
 
@@ -141,6 +145,11 @@ def find_layout(lines: list[str], path: Path, rules: TextLayout) -> Layout:
     ]
     best = max(tried, key=lambda found: found[0], default=None)
     if best is None or best[0][0] < 0.5 * len(sample):
+        if re.search(r"[;,\t]", lines[-1]) and not any(_A_NUMBER.search(line) for line in lines):
+            raise RecordError(
+                f"{path}: no line holds a number, the last one (line {len(lines)}) reads "
+                f"{lines[-1][:60]!r}: a header without readings? Export the readings too"
+            )
         raise RecordError(
             f"{path}: found no columns of numbers with semicolon, tab, comma or blank between them (line "
             f"{len(lines)} reads {lines[-1][:60]!r}); export it as a table of numbers, or name "
