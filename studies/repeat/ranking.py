@@ -31,7 +31,8 @@ Row = tuple[DropSeverity, float]
 def of_calibrated(folder: Path) -> Iterator[tuple[str, str, Row]]:
     """Machine, quantity, and estimate with truth."""
     for file in sorted(folder.glob("*_none.json")):
-        for k, drop in enumerate(json.loads(file.read_text())["drops"]):
+        drops = [one for one in json.loads(file.read_text())["drops"] if "bearings" in one]  # else refused
+        for k, drop in enumerate(drops):
             for bearing, entry in drop["bearings"].items():
                 for field, known in entry.items():
                     if isinstance(known, dict) and known.get("interval_90"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -138,10 +139,17 @@ def rank_drops(
     )
 
 
+@lru_cache(maxsize=1)
+def _quadrature() -> tuple[Array, Array]:
+    """Nodes and weights of Gauss and Legendre; finding them takes longer than all that they are used for."""
+    nodes, weights = np.polynomial.legendre.leggauss(400)
+    return nodes, weights
+
+
 def worst_probability(value: Array, error: Array) -> Array:
     """Probability of each of several independent normal quantities to be the largest [1], shape as given."""
     sigma = np.maximum(error, 1e-9 * max(float(np.ptp(value)), float(np.abs(value).max()), 1e-300))
-    nodes, weights = np.polynomial.legendre.leggauss(400)
+    nodes, weights = _quadrature()
     z, dz = 8.0 * nodes, 8.0 * weights
     result = np.empty(value.size)
     for k in range(value.size):
