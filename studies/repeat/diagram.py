@@ -61,8 +61,10 @@ class Panel:
         dash = ' stroke-dasharray="4 4"' if dashed else ""
         self.parts.append(f'<path d="M{points}" fill="none" stroke="{colour}" stroke-width="1.6"{dash}/>')
 
-    def word(self, line: int, text: str, colour: str) -> None:
-        x, y = self.left + 12, TOP + 18 + 16 * line
+    def word(self, line: int, text: str, colour: str, *, below: bool = False) -> None:
+        x, y = (
+            (self.left + 66, TOP + SIZE - 34 + 16 * line) if below else (self.left + 12, TOP + 18 + 16 * line)
+        )
         self.parts.append(f'<text x="{x}" y="{y}" fill="{colour}">{text}</text>')
 
 
@@ -76,7 +78,7 @@ def ranking() -> Panel:
         zip(("usual impulses", "likeliest impulses"), COLOURS, strict=False)
     ):
         told = found[name]["worse_than_another"]
-        panel.word(line, f"{name}: {found[name]['drops']} drops, {told['pairs']} pairs", colour)
+        panel.word(line, f"{name}: {found[name]['drops']} drops, {told['pairs']} pairs", colour, below=True)
         rows = told["diagram"]
         panel.curve([one["said"] for one in rows], [one["true"] for one in rows], colour)
         for one in rows:
