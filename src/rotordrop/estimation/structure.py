@@ -91,13 +91,10 @@ class Extension:
     values : callable
         Values that the description of a machine then names, neutral ones to begin with; none where it names
         them already.
-    of_sensors : bool
-        Whether it belongs to the sensors: it may then be there although the usual model fits.
     """
 
     name: str
     values: Callable[[Machine], Values]
-    of_sensors: bool = False
 
     def added_to(self, machine: Machine) -> Machine:
         """The machine with this extension."""
@@ -108,12 +105,10 @@ EXTENSIONS: tuple[Extension, ...] = (
     Extension(name="turned support axes", values=_of_bearings(coupling=0.0)),
     Extension(name="cubic support", values=_of_bearings(cubic=0.0)),
     Extension(name="foundation mode", values=_foundation),
-    Extension(name="sensor lag", values=_of_sensors("time_constant", 1e-5), of_sensors=True),
-    Extension(name="cross-axis sensitivity", values=_of_sensors("cross_axis", 0.0), of_sensors=True),
-    Extension(
-        name="brackets that follow the housing", values=_of_sensors("follows_housing", 0.0), of_sensors=True
-    ),
-    Extension(name="sensor planes elsewhere", values=_of_sensors("plane_offset", 0.0), of_sensors=True),
+    Extension(name="sensor lag", values=_of_sensors("time_constant", 1e-5)),
+    Extension(name="cross-axis sensitivity", values=_of_sensors("cross_axis", 0.0)),
+    Extension(name="brackets that follow the housing", values=_of_sensors("follows_housing", 0.0)),
+    Extension(name="sensor planes elsewhere", values=_of_sensors("plane_offset", 0.0)),
     Extension(name="long remanence", values=_remanence),
     Extension(name="unbalance beyond its grade", values=_unbalance),
     Extension(name="rotor stiffness", values=_modulus),

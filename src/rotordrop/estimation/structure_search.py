@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import reduce
 from typing import Protocol
 
 import numpy as np
@@ -217,10 +216,11 @@ def _winner(entrants: Sequence[_Entrant], search: Search) -> Candidate | None:
     return min(found, key=lambda one: one.rank, default=None)
 
 
-def found_sensors(usual: Candidate, search: Search) -> Candidate:
-    """The usual model that fits, with the extension of its sensors that pays all the same, if one does.
+def found_beside_the_usual(usual: Candidate, search: Search) -> Candidate:
+    """The usual model that fits, with the extension that pays all the same, if one does.
 
-    What sensors do may not show in the size of the innovations, and bias the air gap.
+    A mild departure may not show in the size of the innovations, which nobody knows to a tenth, and yet move
+    peaks and gaps: a rotor 3 % softer moved a peak by 4.6 %, cross-axis sensitivity a gap by 30 µm.
 
     Parameters
     ----------
@@ -229,19 +229,17 @@ def found_sensors(usual: Candidate, search: Search) -> Candidate:
     search : Search
         Fits machines to the record.
     """
-    judge, look = search.judge, search.look
-    plain = judge(usual.fit, usual.machine)
-    of_sensors = [one for one in EXTENSIONS if one.of_sensors and one.values(usual.machine)]
-    together = reduce(lambda machine, one: one.added_to(machine), of_sensors, usual.machine)
-    if plain - judge(usual.fit, together) < 0.5 * PENALTY:  # one pass in place of one for each
+    plain = search.judge(usual.fit, usual.machine)
+    if not math.isfinite(plain):
         return usual
-    extended = [(one, one.added_to(usual.machine)) for one in of_sensors]
-    gains = [plain - judge(usual.fit, machine) for _, machine in extended]
-    if max(gains, default=0.0) < PENALTY:
+    extended = [(one, one.added_to(usual.machine)) for one in EXTENSIONS if one.values(usual.machine)]
+    with ThreadPoolExecutor(max_workers=THREADS) as pool:
+        gains = list(pool.map(lambda one: plain - search.judge(usual.fit, one[1]), extended))
+    if max(gains, default=0.0) < 0.5 * PENALTY:
         return usual
     extension, machine = extended[gains.index(max(gains))]
-    found = Candidate(machine=machine, fit=look(usual.fit, machine, BACK_PASSES))
-    again = replace(usual, fit=look(usual.fit, usual.machine, BACK_PASSES))
+    found = Candidate(machine=machine, fit=search.look(usual.fit, machine, BACK_PASSES))
+    again = replace(usual, fit=search.look(usual.fit, usual.machine, BACK_PASSES))
     gain = gain_of(found, again)
     kept = (Kept(extension=extension, gain=gain),)
     return replace(found, kept=kept) if gain >= PENALTY else usual

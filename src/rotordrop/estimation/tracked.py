@@ -17,7 +17,7 @@ from rotordrop.estimation.structure_search import (
     Candidate,
     Kept,
     Place,
-    found_sensors,
+    found_beside_the_usual,
     found_structure,
     rank_of,
 )
@@ -207,11 +207,11 @@ def track_drops(
     else:
         usual = Candidate(machine=machine, fit=search.first_fit(machine))
         if not usual.beside:
-            usual = found_sensors(usual, search)
+            usual = found_beside_the_usual(usual, search)
         # First: the coarse basis alone may end beside a record that the finer one fits.
         found = search.refined(usual)
     # Where a beam stands for a rotor, its form is what does not fit: no extension stands for that.
-    if not found.kept and not is_beam(machine.rotor) and not _fits(found):
+    if not is_beam(machine.rotor) and not _fits(found):
         if progress is not None:
             progress("trying extensions of the usual model", 0.0)
         extended = found_structure(usual, search)

@@ -23,7 +23,7 @@ from rotordrop.estimation.structure_search import (
     Candidate,
     Kept,
     Place,
-    found_sensors,
+    found_beside_the_usual,
     found_structure,
     rank_of,
 )
@@ -178,15 +178,20 @@ def test_an_extension_that_loses_the_record_is_no_candidate(lp400):
     assert names(found) == [] and found.machine == lp400
 
 
-def test_what_sensors_do_is_looked_for_beside_a_model_that_fits(lp400):
+def test_what_pays_beside_a_model_that_fits_is_kept(lp400):
     usual = fit_of(1000.0, 0.92)
-    cross = frozenset({"cross-axis sensitivity"})
-    every = cross | {"sensor lag", "brackets that follow the housing", "sensor planes elsewhere"}
-    table = {cross: fit_of(880.0, 0.9), every: fit_of(890.0, 0.9), AXES: fit_of(500.0, 0.8)}
-    found = found_sensors(Candidate(machine=lp400, fit=usual), Record(table, usual))
-    assert names(found) == ["cross-axis sensitivity"] and found.kept[0].gain == pytest.approx(120.0)
-    record = Record({AXES: fit_of(500.0, 0.8)}, usual)
-    assert found_sensors(Candidate(machine=lp400, fit=usual), record).kept == ()
+    cross, softer = frozenset({"cross-axis sensitivity"}), frozenset({"rotor stiffness"})
+    record = Record({cross: fit_of(930.0, 0.9), softer: fit_of(880.0, 0.9)}, usual)
+    found = found_beside_the_usual(Candidate(machine=lp400, fit=usual), record)
+    assert names(found) == ["rotor stiffness"] and found.kept[0].gain == pytest.approx(120.0)
+
+
+@pytest.mark.parametrize("plain", [1000.0, math.inf])
+def test_what_pays_less_beside_a_model_that_fits_is_not_kept(lp400, plain):
+    """Nor is anything where the usual model itself loses the record in one pass."""
+    usual = fit_of(plain, 0.92)
+    record = Record({AXES: fit_of(1000.0 - 0.9 * PENALTY, 0.8)}, usual)
+    assert found_beside_the_usual(Candidate(machine=lp400, fit=usual), record).kept == ()
 
 
 # sentences
