@@ -140,7 +140,7 @@ def found_structure(usual: Candidate, search: Search) -> Candidate:
         best = _given_back(better, better, search)
         if not best.beside:
             break
-    return _other_starts(best, search) if best.beside else best
+    return found_start(best, search)
 
 
 def _best_extension(base: Candidate, search: Search) -> Candidate | None:
@@ -167,8 +167,13 @@ def _given_back(base: Candidate, better: Candidate, search: Search) -> Candidate
     return min(base, back, key=lambda one: one.rank)
 
 
-def _other_starts(best: Candidate, search: Search) -> Candidate:
-    """The same machine from other places in its prior, where the objective has several minima."""
+def found_start(best: Candidate, search: Search) -> Candidate:
+    """The same machine from other places in its prior, where it ended beside the record.
+
+    The objective has several minima.
+    """
+    if not best.beside:
+        return best
     starts = range(FIRST_OTHER_START, FIRST_OTHER_START + OTHER_STARTS)
     entrants = [_Entrant(machine=best.machine, attempt=start, kept=best.kept) for start in starts]
     found = _winner(entrants, search)

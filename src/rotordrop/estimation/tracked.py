@@ -18,6 +18,7 @@ from rotordrop.estimation.structure_search import (
     Kept,
     Place,
     found_beside_the_usual,
+    found_start,
     found_structure,
     rank_of,
 )
@@ -209,14 +210,23 @@ def track_drops(
         if not usual.beside:
             usual = found_beside_the_usual(usual, search)
         # First: the coarse basis alone may end beside a record that the finer one fits.
-        found = search.refined(usual)
-    # Where a beam stands for a rotor, its form is what does not fit: no extension stands for that.
-    if not is_beam(machine.rotor) and not _fits(found):
+        try:
+            found = search.refined(usual)
+        except IdentificationError:  # the finer basis lost what the coarse one followed badly
+            if not usual.beside:
+                raise
+            found = usual
+    if not _fits(found):
         if progress is not None:
-            progress("trying extensions of the usual model", 0.0)
-        extended = found_structure(usual, search)
-        if extended.fit is not usual.fit:
-            found = min(found, search.refined(extended), key=lambda one: one.rank)
+            progress("trying extensions of the usual model, and other starts", 0.0)
+        # Where a beam stands for a rotor, its form is what does not fit: no extension stands for that.
+        beam = is_beam(machine.rotor)
+        other = found_start(usual, search) if beam else found_structure(usual, search)
+        if other.fit is not usual.fit:
+            again = search.refined(other)
+            found = again if found.fit is usual.fit else min(found, again, key=lambda one: one.rank)
+        elif found.fit is usual.fit:
+            found = search.refined(usual)  # says where it was lost
     return search.not_lost(found)
 
 
@@ -262,12 +272,19 @@ class _Search:
 
     def first_fit(self, machine: Machine) -> TrackedDrops:
         """Fit of a machine from its guesses by the coarse basis; beside the record, again in short steps."""
-        problems = self.coarse(machine)
-        found = track(problems, self.shifted(machine, BLIND_SCHEDULE), progress=self.progress)
-        if not beside_the_record(found):
-            return found
-        again = track(problems, self.shifted(machine, DAMPED_SCHEDULE), progress=self.progress)
-        return min(found, self.settled(_place_of(again)), key=rank_of)
+        problems, fits = self.coarse(machine), []
+        lost: IdentificationError | None = None
+        for schedule, settle in ((BLIND_SCHEDULE, False), (DAMPED_SCHEDULE, True)):
+            try:
+                fit = track(problems, self.shifted(machine, schedule), progress=self.progress)
+                fits.append(self.settled(_place_of(fit)) if settle else fit)
+            except IdentificationError as error:
+                lost = error
+            if fits and not beside_the_record(fits[-1]):
+                break
+        if not fits:
+            raise lost or AssertionError
+        return min(fits, key=rank_of)
 
     @property
     def windows(self) -> int:
