@@ -37,8 +37,8 @@ BACK_PASSES = 3
 FIRST_CHOICE = 2
 """Window after which the half that follows the record worse stays behind, and after each one from then on.
 
-Before, the windows hold little more than the first contact. After it the right one of ten extensions was
-among the best two wherever it was found at all (see ``studies/structure``).
+Before, the windows hold little more than the first contact. After it the right one of ten extensions was in
+the better half, and first from the next window on (three structures, both ways: ``studies/structure``).
 """
 FEWEST = 2
 
