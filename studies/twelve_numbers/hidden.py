@@ -138,7 +138,7 @@ def drawn(known: Machine, true: Machine) -> Machine:
             one.changed(node=other.node)
             for one, other in zip(getattr(known, name), getattr(true, name), strict=True)
         )
-        for name in ("touchdown_bearings", "sensors", "ambs")
+        for name in ("touchdown_bearings", "sensors", "ambs", "unbalances")
     }
     return known.changed(rotor=true.rotor, **moved)
 

@@ -136,9 +136,12 @@ class Placed(Description):
             )
 
     def changed(self, **values: Any) -> Self:
-        """Give a copy with other values, at the same node."""
+        """Give a copy with other values, at the same node where no other place is given."""
+        if "node" in values:
+            values = {"position": None, **values}  # a place by position would take it back
         copy = super().changed(**values)
-        copy.__dict__["node"] = self.node
+        if "node" not in values and "position" not in values:
+            copy.__dict__["node"] = self.node
         return copy
 
 

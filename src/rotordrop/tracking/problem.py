@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.errors import IdentificationError
 from rotordrop.model import layout as L
 from rotordrop.model.parameters import DropModel
 from rotordrop.model.static_sag import race_sag, static_sag
@@ -231,7 +232,13 @@ def build_problem(
         End of the window [s].
     unknowns : tuple of Unknown, optional
         The parameters to estimate; all by default.
+
+    Raises
+    ------
+    IdentificationError
+        If the rotor does not rest on every touchdown bearing.
     """
+    _refuse_unloaded(model)
     unknowns = all_unknowns(model) if unknowns is None else unknowns
     inside = (drop.time >= 0.0) & (drop.time <= until)
     readings = drop.readings[inside]
@@ -258,6 +265,21 @@ def build_problem(
         apply_tail(problem, drop.tail_level, problem.start, problem.covariance.copy())
         apply_tail(problem, drop.tail_level, problem.mean, problem.covariance)
     return problem
+
+
+def _refuse_unloaded(model: DropModel) -> None:
+    """Refuse a rotor that would lift off at one end, of which the filter knows nothing."""
+    machine = model.machine
+    z = machine.rotor.node_positions
+    for bearing, share in zip(machine.touchdown_bearings, model.load_shares, strict=True):
+        if share <= 0.0:
+            places = ", ".join(f"{z[one.node - 1]:.3f}" for one in machine.touchdown_bearings)
+            raise IdentificationError(
+                f"the rotor does not rest on the touchdown bearing {bearing.name} ({share:.0f} N of its "
+                f"weight of {machine.rotor.mass * float(machine.gravity):.0f} N): its centre of gravity at "
+                f"{machine.rotor.centre_of_gravity:.3f} m lies beside the bearings at {places} m; expected "
+                "it between them. Check nodes or positions of the bearings and the sections of the rotor"
+            )
 
 
 def _prepared(model: DropModel, omega: float) -> DropModel:

@@ -4,10 +4,12 @@ import math
 import time
 
 import pytest
+from tests.scaled_machines import TWELVE_NUMBERS
 
 from rotordrop.errors import UsageError
 from rotordrop.estimated import Estimated
 from rotordrop.machine import example_machine, loads_machine
+from rotordrop.machine.simple import SimpleMachine, simple_machine
 
 
 @pytest.fixture(scope="module")
@@ -147,3 +149,14 @@ def test_it_is_fast_enough_to_disappear_behind_a_simulation(machine):
     for _ in range(50):
         machine.with_values(values)
     assert (time.perf_counter() - start) / 50 < 2e-3
+
+
+@pytest.mark.parametrize(
+    "described", [example_machine("lp400"), simple_machine(SimpleMachine(**TWELVE_NUMBERS))]
+)
+def test_another_node_is_another_place_whether_node_or_position_was_given(described) -> None:
+    """It was taken back without a word, and a rotor exchanged under its bearings stood on other nodes."""
+    first, last = described.touchdown_bearings
+    moved = described.changed(touchdown_bearings=(first.changed(node=last.node - 2), last))
+    assert [bearing.node for bearing in moved.touchdown_bearings] == [last.node - 2, last.node]
+    assert first.changed(air_gap="300 um").node == first.node

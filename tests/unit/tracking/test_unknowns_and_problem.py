@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotordrop.errors import RecordError
+from rotordrop.errors import IdentificationError, RecordError
 from rotordrop.estimated import NINETY, Estimated
 from rotordrop.estimation.tracked import COARSE_BASIS, drop_problem, recorded_drop
 from rotordrop.identification.evidence import Missing, read_evidence
-from rotordrop.machine import Machine
+from rotordrop.machine import Machine, example_machine
 from rotordrop.measurement.record import read_record
 from rotordrop.model.parameter_table import parameter
 from rotordrop.model.parameters import build_drop_model
@@ -23,7 +23,9 @@ from rotordrop.physics.ball_bearing import bearing_constants, preload_of_offset
 from rotordrop.tracking.problem import (
     NOISE_FLOOR,
     TAIL_VERTICAL_SIGMA,
+    RecordedDrop,
     apply_tail,
+    build_problem,
     settled_displacement,
 )
 from rotordrop.tracking.transfer import transferred
@@ -358,3 +360,23 @@ def test_an_exponent_calibrated_at_its_bound_is_not_taken_for_exact(lp400: Machi
     )
     sigma = next(u.sigma for u in unknowns if u.path == "NDE.contact.exponent")
     assert sigma == parameter("contact.exponent").least_sigma
+
+
+def test_a_rotor_that_does_not_rest_on_a_bearing_is_refused_with_its_numbers() -> None:
+    """It was lost "after 0 samples": a negative load has no contact frequency, and NaN went through."""
+    machine = example_machine("lp400")
+    bearings = machine.touchdown_bearings
+    beside = machine.changed(touchdown_bearings=(bearings[0], bearings[1].changed(node=12)))
+    time = np.arange(400) / 20e3
+    drop = RecordedDrop(
+        time=time,
+        readings=np.zeros((len(time), len(beside.sensors))),
+        noise=np.full(len(beside.sensors), 1e-6),
+        initial_speed=600.0,
+        initial_speed_error=0.1,
+        speed=np.full(len(time), 600.0),
+        tail_level=None,
+    )
+    expected = r"does not rest on the touchdown bearing NDE \(-\d+ N of .* 584 N\).* expected it between them"
+    with pytest.raises(IdentificationError, match=expected):
+        build_problem(build_drop_model(beside, COARSE_BASIS), drop)
