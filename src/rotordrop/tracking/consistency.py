@@ -25,6 +25,8 @@ NOISE_FACTOR_LIMIT = 8.0
 BEAM_GAIN_SIGMA = 0.03
 """Relative standard deviation of what a beam in place of the rotor gets wrong between bearing and sensor [1]:
 gains take it up. Such a gain went 5 % off on a rotor whose forces came out within 4 %."""
+LONGEST_REMANENCE = 0.2
+"""Time constant [s] from which on a remanent force is none: eddy currents fade within milliseconds."""
 LEAST_SECOND_DIRECTION = 0.05
 """Smallest singular value of the directions of a plane's sensors that still counts as two directions [1]."""
 
@@ -61,6 +63,7 @@ def consistency_checks(problem: DropProblem, smoothed: Smoothed, noise_factor: f
         _direction_check(problem, smoothed),
         _parameter_check(problem, smoothed),
         _nuisance_check(problem, smoothed, white),
+        _remanence_check(problem, smoothed),
         Check(
             name="process noise",
             passed=noise_factor < NOISE_FACTOR_LIMIT,
@@ -181,6 +184,29 @@ def _nuisance_check(problem: DropProblem, smoothed: Smoothed, white: bool) -> Ch
     message = _departs(path, departure)
     note = "" if usual or not white else f"{message}; the readings are followed all the same"
     return Check(name="unknowns of the drop", passed=usual or white, message=message, note=note)
+
+
+def _remanence_check(problem: DropProblem, smoothed: Smoothed) -> Check:
+    """Whether the remanent force fades.
+
+    One that stays is how a gain error that all sensors share looks: the rotor falls and flies with another
+    gravity, every reading is followed, and every force and gap has the error.
+    """
+    theta = smoothed.means[parameter_sample(smoothed)][problem.parameter_slice]
+    lasting = [
+        unknown.value_of(float(t))
+        for t, unknown in zip(theta, problem.unknowns, strict=True)
+        if unknown.path == "remanence.time_constant"
+    ]
+    longest = max(lasting, default=0.0)
+    return Check(
+        name="remanent force",
+        passed=longest < LONGEST_REMANENCE,
+        message=(
+            f"the remanent force of the magnets fades in {longest:.3g} s (limit {LONGEST_REMANENCE:g} s); "
+            "one that stays looks like a gain error of all sensors, which forces and gaps would share"
+        ),
+    )
 
 
 def _farthest(problem: DropProblem, smoothed: Smoothed, scope: str) -> tuple[str, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -36,6 +37,7 @@ def test_a_right_model_passes_every_check(impacts, impacts_smoothed):
         "directions",
         "parameters",
         "unknowns of the drop",
+        "remanent force",
         "process noise",
         "filter",
     }
@@ -103,6 +105,17 @@ def test_a_parameter_far_from_its_prior_is_named(impacts, impacts_smoothed):
     check = next(c for c in checks if c.name == "parameters")
     assert not check.passed
     assert "NDE.support.mass departs by" in check.message
+
+
+def test_a_remanent_force_that_stays_is_a_gain_error_of_all_sensors(impacts, impacts_smoothed):
+    """Readings times 1.2 were followed with a time constant of 1.3 s, and forces 20 % too high passed."""
+    place = [u.path for u in impacts.unknowns].index("remanence.time_constant")
+    means = impacts_smoothed.means.copy()
+    means[:, impacts.n_dynamic + place] = math.log(1.28)
+    checks = consistency_checks(impacts, replace(impacts_smoothed, means=means), 1.0)
+    check = next(c for c in checks if c.name == "remanent force")
+    assert not check.passed
+    assert "fades in 1.28 s (limit 0.2 s)" in check.message
 
 
 def test_unusual_process_noise_is_seen(impacts, impacts_smoothed):
