@@ -88,7 +88,7 @@ class IdentifiedValue:
     interval_90 : tuple of float, optional
         Interval that holds the true value with 90 % probability.
     allowance_90 : float, optional
-        Half width that the interval has by what the model leaves out alone; with what the record leaves
+        Half width, in the unit of the value, by what the model leaves out alone; with what the record leaves
         open, as independent errors, it makes up the interval.
     lower, upper : float, optional
         Limits the record itself sets, for example the lower and upper air gap.

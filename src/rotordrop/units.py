@@ -280,6 +280,11 @@ def format_moment(time: float, decimals: int = 3) -> str:
     return f"{text.removeprefix('-') if float(text) == 0.0 else text} s"
 
 
+def format_minute(moment: str) -> str:
+    """Write a moment of ISO 8601 to the minute, ``"2026-03-01 12:30"``; anything else as it is."""
+    return re.sub(r"^(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d).*$", r"\1 \2", moment)
+
+
 def format_chance(probability: float) -> str:
     """Write a probability [1] in per cent, ``"93%"``; nothing is certain: the ends are "> 99%" and "< 1%"."""
     if probability >= 0.995:

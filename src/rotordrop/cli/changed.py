@@ -5,7 +5,6 @@ Reads two estimates that were made with one machine file.
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -46,6 +45,7 @@ def _finite(content: dict[str, object]) -> dict[str, object]:
 def _summary(out: Console, found: Changes) -> None:
     from rich.table import Table
 
+    from rotordrop.estimation.changed import asked_for
     from rotordrop.model.parameter_table import row_of
     from rotordrop.report.quantity import Quantity
     from rotordrop.units import format_chance
@@ -62,12 +62,10 @@ def _summary(out: Console, found: Changes) -> None:
             text = f"{1e6 * one.change:+.3g} µm ({1e6 * low:+.3g} to {1e6 * high:+.3g})"
         before, after = (Quantity(value=value, kind=kind).text for value in (one.before, one.after))
         share = format_chance(one.probability) if one.determined else "–"
-        shows = "–" if math.isinf(one.smallest) else one.smallest_text
-        table.add_row(one.path, before, after, text, share, shows)
+        table.add_row(one.path, before, after, text, share, one.found_from)
     out.print(table)
     out.print(found.sentence())
     out.print(
-        "Asked for: 10 µm of a gap, 10 % of a stiffness and of damping, 20 % of friction, a factor of two of "
-        'the drag; "found from" is the change that these records show in 19 of 20 cases. A record that a '
-        "model does not follow can show changes that are none."
+        f'{asked_for()}; "found from" is the change that these records show in 19 of 20 cases. '
+        "A record that a model does not follow can show changes that are none."
     )

@@ -142,7 +142,9 @@ def _document(what: str | None) -> dict[str, Any]:
 
 def _day(drop: LoggedDrop) -> str:
     """When it was, to the minute."""
-    shown = (drop.recorded or drop.added)[:16].replace("T", " ")
+    from rotordrop.units import format_minute
+
+    shown = format_minute(drop.recorded or drop.added)
     return shown if drop.recorded else f"logged {shown}"
 
 

@@ -90,11 +90,26 @@ class Change:
         return not self.named and (not self.determined or self.smallest > asked)
 
     @property
+    def found_from(self) -> str:
+        """The same for a table; a dash where no size would have been found."""
+        return "–" if math.isinf(self.smallest) else self.smallest_text
+
+    @property
     def smallest_text(self) -> str:
         """Smallest change that would have been found, in words."""
         if math.isinf(self.smallest):
             return "of any size"
         return f"× {self.smallest:.3g}" if self.factor else f"{1e6 * self.smallest:.2g} µm"
+
+
+def asked_for() -> str:
+    """The sizes of `WATCHED` in words."""
+    percent = {path: f"{100.0 * (math.exp(size) - 1.0):.0f} %" for path, size in WATCHED.items()}
+    return (
+        f"Asked for: {1e6 * WATCHED['air_gap']:g} µm of a gap, {percent['support.stiffness']} of a stiffness "
+        f"and {percent['support.damping']} of damping, {percent['friction.dynamic']} of friction, "
+        f"a factor of {math.exp(WATCHED['race.drag_coefficient']):g} of the drag"
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

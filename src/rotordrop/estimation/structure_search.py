@@ -76,7 +76,17 @@ class Candidate:
 
 @dataclass(frozen=True, kw_only=True)
 class Place:
-    """Where a fit from guesses is after some windows: less than the fit, of which many are on their way."""
+    """Where a fit from guesses is after some windows: less than the fit, of which many are on their way.
+
+    Attributes
+    ----------
+    problems : tuple of DropProblem
+        The drops.
+    trajectories : tuple of ndarray
+        Smoothed means of each drop, shape (M, n).
+    rank : tuple
+        How the fit follows the record.
+    """
 
     problems: tuple[DropProblem, ...]
     trajectories: tuple[Array, ...]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -201,32 +202,29 @@ def track_drops(
     machine = search.with_rotor(machine)
     if is_calibrated(machine) and not calibrate_only:
         schedule = search.shifted(machine, QUICK_SCHEDULE if quick else CALIBRATED_SCHEDULE)
-        found = Candidate(machine=machine, fit=track(search.problems(machine), schedule, progress=progress))
-        if quick or not found.beside:
-            return search.not_lost(found)
+        calibrated = Candidate(
+            machine=machine, fit=track(search.problems(machine), schedule, progress=progress)
+        )
+        if quick or not calibrated.beside:
+            return search.not_lost(calibrated)
+        found: Candidate | None = calibrated
         usual = Candidate(machine=machine, fit=search.first_fit(machine))
     else:
         usual = Candidate(machine=machine, fit=search.first_fit(machine))
         if not usual.beside:
             usual = found_beside_the_usual(usual, search)
-        # First: the coarse basis alone may end beside a record that the finer one fits.
-        try:
-            found = search.refined(usual)
-        except IdentificationError:  # the finer basis lost what the coarse one followed badly
-            if not usual.beside:
-                raise
-            found = usual
-    if not _fits(found):
+        # First: the coarse basis alone may end beside a record that the finer one fits, or lose it there.
+        found = search.refined_if_followed(usual)
+    if found is None or not _fits(found):
         if progress is not None:
             progress("trying extensions of the usual model, and other starts", 0.0)
         # Where a beam stands for a rotor, its form is what does not fit: no extension stands for that.
-        beam = is_beam(machine.rotor)
-        other = found_start(usual, search) if beam else found_structure(usual, search)
-        if other.fit is not usual.fit:
-            again = search.refined(other)
-            found = again if found.fit is usual.fit else min(found, again, key=lambda one: one.rank)
-        elif found.fit is usual.fit:
-            found = search.refined(usual)  # says where it was lost
+        other = found_start(usual, search) if is_beam(machine.rotor) else found_structure(usual, search)
+        again = None if other.fit is usual.fit else search.refined_if_followed(other)
+        followed = [one for one in (found, again) if one is not None]
+        if not followed:
+            return search.not_lost(search.refined(other))  # says where it was lost
+        found = min(followed, key=lambda one: one.rank)
     return search.not_lost(found)
 
 
@@ -272,19 +270,19 @@ class _Search:
 
     def first_fit(self, machine: Machine) -> TrackedDrops:
         """Fit of a machine from its guesses by the coarse basis; beside the record, again in short steps."""
-        problems, fits = self.coarse(machine), []
-        lost: IdentificationError | None = None
-        for schedule, settle in ((BLIND_SCHEDULE, False), (DAMPED_SCHEDULE, True)):
-            try:
-                fit = track(problems, self.shifted(machine, schedule), progress=self.progress)
-                fits.append(self.settled(_place_of(fit)) if settle else fit)
-            except IdentificationError as error:
-                lost = error
-            if fits and not beside_the_record(fits[-1]):
-                break
-        if not fits:
-            raise lost or AssertionError
-        return min(fits, key=rank_of)
+        problems, found = self.coarse(machine), None
+        with suppress(IdentificationError):
+            found = track(problems, self.shifted(machine, BLIND_SCHEDULE), progress=self.progress)
+            if not beside_the_record(found):
+                return found
+        try:
+            again = track(problems, self.shifted(machine, DAMPED_SCHEDULE), progress=self.progress)
+            again = self.settled(_place_of(again))
+        except IdentificationError:
+            if found is None:
+                raise
+            return found
+        return again if found is None else min(found, again, key=rank_of)
 
     @property
     def windows(self) -> int:
@@ -332,6 +330,15 @@ class _Search:
             references = converged(fine, schedule[0], references).trajectories
         fit = track(fine, schedule, references=references, progress=self.progress)
         return replace(first, fit=fit)
+
+    def refined_if_followed(self, first: Candidate) -> Candidate | None:
+        """The same; None where the finer basis loses a record beside which the coarse one ended."""
+        try:
+            return self.refined(first)
+        except IdentificationError:
+            if not first.beside:
+                raise
+            return None
 
     def not_lost(self, found: Candidate) -> Candidate:
         """What was found, if the filter followed all drops to the end."""

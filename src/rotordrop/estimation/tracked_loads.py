@@ -203,19 +203,19 @@ def holding(value: IdentifiedValue, ratio: float, accuracy: float) -> Identified
 
 
 def is_beside(peak: float, check: InputEstimate, b: int) -> bool:
-    """Whether a peak is so far from the cross-check that the twin cannot have followed the drop."""
-    found = float(check.peak[b])
-    if not (math.isfinite(found) and found > 0.0 and peak > 0.0):
-        return False  # no impact, or no cross-check: nothing to give way to
-    return not 1.0 / FACTOR_APART <= found / peak <= FACTOR_APART
+    """Whether a peak [N] is so far from the cross-check that the twin cannot have followed the drop."""
+    return not 1.0 / FACTOR_APART <= _over_check(peak, check, b) <= FACTOR_APART
 
 
 def is_apart(peak: float, check: InputEstimate, b: int) -> bool:
-    """Whether a peak lies outside the known accuracy of the cross-check."""
+    """Whether a peak [N] lies outside the known accuracy of the cross-check."""
+    return abs(_over_check(peak, check, b) - 1.0) > float(check.peak_error[b])
+
+
+def _over_check(peak: float, check: InputEstimate, b: int) -> float:
+    """A peak over that of the cross-check [1]; 1 where there is no impact or nothing to compare it with."""
     found = float(check.peak[b])
-    if not (math.isfinite(found) and found > 0.0 and peak > 0.0):
-        return False
-    return abs(peak / found - 1.0) > float(check.peak_error[b])
+    return peak / found if math.isfinite(found) and found > 0.0 and peak > 0.0 else 1.0
 
 
 def holding_cross_check(loads: Loads, forces: ForceHistory, check: InputEstimate, b: int) -> Loads:

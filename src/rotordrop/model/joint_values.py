@@ -93,7 +93,11 @@ def correlate(model: DropModel, unknowns: Sequence[Unknown], block: Array) -> No
     half = solve(through, spread.matrix[np.ix_(order, order)])
     fitted = signs[:, None] * solve(through, half.T) * signs
     own = np.sqrt(np.diag(fitted))
-    for i, k in enumerate(listed):
-        for j, m in enumerate(listed):
-            if i != j and chosen[i].calibrated and chosen[j].calibrated and own[i] * own[j] > 0.0:
-                block[k, m] = fitted[i, j] / (own[i] * own[j]) * math.sqrt(block[k, k] * block[m, m])
+    known = [i for i, one in enumerate(chosen) if one.calibrated and own[i] > 0.0]
+    places = [listed[i] for i in known]
+    variance = np.diag(block)[places]
+    correlated = fitted[np.ix_(known, known)] * np.outer(
+        np.sqrt(variance) / own[known], np.sqrt(variance) / own[known]
+    )
+    np.fill_diagonal(correlated, variance)
+    block[np.ix_(places, places)] = correlated

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
 from rotordrop.errors import UsageError
-from rotordrop.estimation.changed import Change, changes
+from rotordrop.estimation.changed import Change, asked_for, changes
 from rotordrop.estimation.document import estimate_document
 from rotordrop.estimation.estimate import Estimate
 from rotordrop.model.parameter_table import row_of
@@ -18,8 +17,8 @@ from rotordrop.units import format_chance
 HEADING = "Since the last drop"
 NOTHING_GIVEN = "No earlier estimate of this machine was given to compare with."
 NOTE = (
-    "Asked for: 10 µm of a gap, 10 % of a stiffness and of damping, 20 % of friction, a factor of two of the "
-    "drag, with the probability of at least that; the last column is the change that shows in 19 of 20 cases."
+    f"{asked_for()}, with the probability of at least that; "
+    "the last column is the change that shows in 19 of 20 cases."
 )
 
 
@@ -60,13 +59,12 @@ def spoken_path(path: str) -> str:
 def _row(one: Change) -> tuple[Cell, ...]:
     kind = row_of(one.path).display_kind
     before, after = (Quantity(value=value, kind=kind) for value in (one.before, one.after))
-    shows = "–" if math.isinf(one.smallest) else one.smallest_text
     if not one.determined:
-        return (spoken_path(one.path), before, after, "the records do not say", "–", shows)
+        return (spoken_path(one.path), before, after, "the records do not say", "–", one.found_from)
     low, high = one.interval_90
     if one.factor:
         text = f"× {one.change:.3g} ({low:.3g} to {high:.3g})"
     else:
         ends = (written(1e6 * end, 1) for end in (one.change, low, high))
         text = "{} µm ({} to {} µm)".format(*ends)
-    return (spoken_path(one.path), before, after, text, format_chance(one.probability), shows)
+    return (spoken_path(one.path), before, after, text, format_chance(one.probability), one.found_from)

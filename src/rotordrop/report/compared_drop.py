@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,6 +10,7 @@ from typing import Any
 from rotordrop.errors import UsageError
 from rotordrop.report.quantity import Quantity
 from rotordrop.severity.numbers import SEVERITY
+from rotordrop.units import format_minute
 
 NUMBERS = (
     ("peak_force_N", "peak bearing force", "force"),
@@ -75,7 +75,7 @@ class ComparedDrop:
     @property
     def minute(self) -> str:
         """When the recorder says the drop was, without seconds."""
-        return re.sub(r"^(\d{4}-\d\d-\d\d)T(\d\d:\d\d).*$", r"\1 \2", self.recorded)
+        return format_minute(self.recorded)
 
     @classmethod
     def of_document(cls, name: str, document: Mapping[str, Any], *, simulated: bool = False) -> ComparedDrop:

@@ -68,7 +68,7 @@ class Quantity:
     interval_90 : tuple of float, optional
         Interval that holds the true value with 90 % probability.
     allowance_90 : float, optional
-        Half width of the interval by what the model leaves out alone.
+        Half width of the interval by what the model leaves out alone, in the SI unit of the kind.
     standard_error : float, optional
         Standard error.
     lower, upper : float, optional

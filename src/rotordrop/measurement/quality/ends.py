@@ -19,7 +19,7 @@ from rotordrop.measurement.axes import Plane
 from rotordrop.measurement.events import CoarseDrop, find_fall
 from rotordrop.measurement.levitated import LevitatedModel
 from rotordrop.measurement.quality.finding import Finding
-from rotordrop.measurement.quality.sensing import TURNED, read_otherwise
+from rotordrop.measurement.quality.sensing import TURNED, WRONG_GAIN, read_otherwise
 from rotordrop.model.rotor_form import is_beam
 
 if TYPE_CHECKING:
@@ -48,7 +48,6 @@ _AS_FALLING = 1.0
 explain it [1]: the fall is too short to tell, or the rotor touched before."""
 
 _ANY_GAIN = (0.2, 1.8)
-_WRONG_GAIN = 0.08
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,7 +147,7 @@ def _decide(mine: float, cases: list[_Case], falls: list[Fall | None]) -> Findin
     if case.kind == "wrong gain":
         errors = fall.gain_errors
         index = int(np.argmax(np.abs(errors)))
-        if abs(errors[index]) < _WRONG_GAIN:
+        if abs(errors[index]) < WRONG_GAIN:
             return _undecided(
                 f"as described, the fall deviates from the rotor model by {mine**0.5:.1f} × the noise"
             )

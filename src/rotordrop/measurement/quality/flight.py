@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotordrop.estimated import NINETY
 from rotordrop.measurement.axes import Plane, planar_of, sensor_directions
 from rotordrop.measurement.levitated import LevitatedModel
 from rotordrop.measurement.quality.finding import Finding
-from rotordrop.measurement.quality.motion import GRAVITY
-from rotordrop.measurement.quality.sensing import TURNED
+from rotordrop.measurement.quality.sensing import TURNED, WRONG_GAIN
 from rotordrop.measurement.recording import Array
 from rotordrop.series import runs_of
 
@@ -70,9 +70,6 @@ _SEPARABLE = 1e-9
 SURE = 5.0
 """Standard deviations from which on a gain is named [1]."""
 
-LEAST = 0.08
-"""Error of a gain from which on it is named [1]; calibrated sensors have 0.05 at most by API 670."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Weighed:
@@ -107,7 +104,7 @@ def weighed(
     total: Array = np.zeros(count)
     flights = 0
     for window in _flights(record, planes, levitated, drop):
-        found = _weighed_in(record, planes, rotor, levitated, window)
+        found = _weighed_in(record, planes, rotor, levitated, window, float(machine.gravity))
         if found is None:
             continue
         share, covariance = found
@@ -144,14 +141,14 @@ def check_flights(seen: Weighed, record: Record, planes: tuple[Plane, ...]) -> l
         tried.append((size**2 * float(shape @ precision @ shape), size, kind, channels))
     gained, size, kind, channels = max(tried, key=lambda one: one[0])
     left = float(off @ precision @ off) - gained
-    if gained < SURE**2 or abs(size) < LEAST or left > _ONE_FAULT * (len(off) - 1):
+    if gained < SURE**2 or abs(size) < WRONG_GAIN or left > _ONE_FAULT * (len(off) - 1):
         return []
     names = ", ".join(channels)
     error = abs(size) / gained**0.5
     seen_as = (
         f"{names} turned by about {np.degrees(np.arctan(size)):+.0f}°"
         if kind == TURNED
-        else f"{names} reading {1.0 + size:.3g} ± {1.65 * error:.2g} (90 %) of what it should"
+        else f"{names} reading {1.0 + size:.3g} ± {NINETY * error:.2g} (90 %) of what it should"
     )
     return [
         Finding(
@@ -212,13 +209,14 @@ def _weighed_in(
     rotor: FreeRotor,
     levitated: LevitatedModel,
     window: tuple[int, int],
+    gravity: float,
 ) -> tuple[Array, Array] | None:
     """Share of gravity by every sensor in one flight, cut until the free rotor explains it."""
     first, count = window
     thin = max(round(record.sampling_rate / _ENOUGH_RATE), 1)
     while count >= SHORTEST * record.sampling_rate:
         inside = slice(first, first + count, thin)
-        share, covariance, residual = _fitted(record, planes, rotor, levitated, inside)
+        share, covariance, residual = _fitted(record, planes, rotor, levitated, inside, gravity)
         if float(np.mean(residual**2)) < _AT_NOISE:
             return share, covariance
         half, cut = len(residual) // 2, max(int(_SHORTENED * count), thin)
@@ -228,7 +226,12 @@ def _weighed_in(
 
 
 def _fitted(
-    record: Record, planes: tuple[Plane, ...], rotor: FreeRotor, levitated: LevitatedModel, inside: slice
+    record: Record,
+    planes: tuple[Plane, ...],
+    rotor: FreeRotor,
+    levitated: LevitatedModel,
+    inside: slice,
+    gravity: float,
 ) -> tuple[Array, Array, Array]:
     """Fit a flight by the motion left in the rotor, its unbalance and gravity.
 
@@ -255,7 +258,7 @@ def _fitted(
     left = response_at(response_to_start(rotor, speed, float(since[-1])), since)[:, of_plane] * toward
     turning = np.exp(1j * speed * since)[:, None, None] * np.eye(len(planes))[of_plane] * toward
     parts = [column for seen in (left, turning) for column in (seen.real, -seen.imag)]
-    falls = -0.5 * GRAVITY * since[:, None, None] ** 2 * np.diag(unit[:, 1])
+    falls = -0.5 * gravity * since[:, None, None] ** 2 * np.diag(unit[:, 1])
     columns = np.concatenate([*parts, falls], axis=-1) / noise[None, :, None]
     readings = record.signals[inside] * gains / noise
     flat = columns.reshape(-1, columns.shape[-1])

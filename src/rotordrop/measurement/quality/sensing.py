@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 TURNED = "turned sensors"
 """Kind of the finding that the rotor falls aside before it touches anything."""
 
+WRONG_GAIN = 0.08
+"""Error of a gain from which on it is named [1]; calibrated sensors have 0.05 at most by API 670."""
+
 SUSPECT = 14.0
 """Chi square of one fault from which on it is named: one good fall in 500 has as much by chance [1]."""
 
