@@ -1,12 +1,13 @@
 """Is the covariance of the linearised fit that of the posterior? Checked by importance sampling on one drop.
 
-Usage: python studies/tracked/sampler.py [--seed 4001] [--draws 2000] [--window 0.025]
+Usage: python studies/tracked/sampler.py [--seed 4001] [--draws 2000] [--window 0.025] [--structure NAME]
 
 The parameters that matter for the force (gap, support, contact stiffness, friction of both bearings) are
 drawn from a Student distribution about the linearised fit. The weight of a draw is its prior times the
 likelihood of all readings by a filter that has these parameters fixed, takes all else as unknown and
 linearises at its own estimate: nothing of the fit is used but its place and width. The parameters do not
-drift here, so that both sides mean the same thing.
+drift here, so that both sides mean the same thing. With ``--structure`` the machine has one that the usual
+model does not have, and its unknowns are fitted and sampled with the others.
 """
 
 from __future__ import annotations
@@ -26,11 +27,13 @@ for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.estimation.structure import EXTENSIONS
 from rotordrop.estimation.tracked import COARSE_BASIS, _first_contact, drop_problem
 from rotordrop.identification.evidence import read_evidence
 from rotordrop.machine import example_machine
 from rotordrop.model.parameters import build_drop_model
 from rotordrop.synthesis import hidden_machine, synthesize_drop
+from rotordrop.synthesis.violations import Violations
 from rotordrop.tracking.calibration import BLIND_SCHEDULE, Stage, shifted, stage_settings, track
 from rotordrop.tracking.problem import DropProblem
 from rotordrop.tracking.smoother import PassSettings, forward
@@ -45,6 +48,14 @@ SAMPLED = (
     "contact.stiffness",
     "friction.dynamic",
 )
+STRUCTURES: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
+    "turned support axes": (
+        {"support": {"stiffness_ratio": 0.65, "axes_angle": "30 deg"}},
+        ("support.coupling",),
+    ),
+    "cross-axis sensitivity": ({"sensors": {"cross_axis": 0.03}}, ("cross_axis",)),
+}
+"""What is true of the machine of a structure, and the unknowns that the extension of that name has."""
 FREEDOM = 7.0
 """Degrees of freedom of the Student distribution of the proposals."""
 
@@ -78,10 +89,14 @@ def log_posterior(
     return -0.5 * float(prior) - result.negative_log_likelihood
 
 
-def study(seed: int, draws: int, window: float, threads: int = 2) -> dict[str, Any]:
+def study(seed: int, draws: int, window: float, structure: str = "", threads: int = 2) -> dict[str, Any]:
     """Standard deviations of the linearised fit beside those of the weighted draws."""
-    drop = synthesize_drop(hidden_machine(example_machine("lp400"), seed), 2.0 * math.pi * 60.0, seed)
     machine = example_machine("lp400")
+    departure, more = STRUCTURES.get(structure, ({}, ()))
+    hidden = hidden_machine(machine, seed, Violations.model_validate(departure))
+    drop = synthesize_drop(hidden, 2.0 * math.pi * 60.0, seed)
+    for extension in EXTENSIONS:
+        machine = extension.added_to(machine) if extension.name == structure else machine
     evidence = read_evidence(build_drop_model(machine), drop.record, drop.tail)
     problem = steady(drop_problem(build_drop_model(machine, COARSE_BASIS), evidence, window + 0.01))
     schedule = shifted(BLIND_SCHEDULE, _first_contact(evidence), problem.fall_time)
@@ -90,7 +105,7 @@ def study(seed: int, draws: int, window: float, threads: int = 2) -> dict[str, A
     settings = stage_settings(problem, last)
     samples = len(fitted.means)
     places = np.array(
-        [problem.n_dynamic + k for k, u in enumerate(problem.unknowns) if u.path.endswith(SAMPLED)]
+        [problem.n_dynamic + k for k, u in enumerate(problem.unknowns) if u.path.endswith((*SAMPLED, *more))]
     )
     paths = [problem.unknowns[i - problem.n_dynamic].path for i in places]
     centre = fitted.means[-1][places]
@@ -114,6 +129,7 @@ def study(seed: int, draws: int, window: float, threads: int = 2) -> dict[str, A
     truth = {b["name"] if "name" in b else str(i): b for i, b in enumerate(drop.truth["support"])}
     return {
         "seed": seed,
+        "structure": structure,
         "draws": draws,
         "window_s": window,
         "effective_draws": float(1.0 / np.sum(weight**2)),
@@ -139,9 +155,10 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=4001)
     parser.add_argument("--draws", type=int, default=2000)
     parser.add_argument("--window", type=float, default=0.025)
+    parser.add_argument("--structure", choices=tuple(STRUCTURES), default="")
     parser.add_argument("--out", type=Path, default=HERE / "results" / "sampler.json")
     arguments = parser.parse_args()
-    result = study(arguments.seed, arguments.draws, arguments.window)
+    result = study(arguments.seed, arguments.draws, arguments.window, arguments.structure)
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
     arguments.out.write_text(json.dumps(result, indent=1))
     print(f"{result['effective_draws']:.0f} effective of {arguments.draws} draws")

@@ -123,8 +123,7 @@ def find_drop_instant(record: Record, machine: Machine) -> DropInstant:
         When the rotor does not fall in the record, or the record does not begin before the fall.
     """
     whole, planes = with_whole_planes(record)
-    coarse = coarse_drop(whole, machine, planes)
-    levitated = fit_levitated(record, coarse.instant - _UNSURE, speed=coarse.speed)
+    coarse, levitated = drop_and_levitated(record, machine, whole, planes)
     fall = find_fall(whole, machine, planes, levitated.of_channels(_columns(whole, record)), coarse)
     return _instant(fall, levitated, record)
 
@@ -236,6 +235,58 @@ def until_fallen(record: Record, planes: tuple[Plane, ...], gaps: Array, first: 
             end = begin + int(np.argmax(fallen)) + round(AFTER_FALL * record.sampling_rate)
             return record if end >= len(record.time) else record.window(-np.inf, float(record.time[end]))
     return record
+
+
+def drop_and_levitated(
+    record: Record, machine: Machine, whole: Record, planes: tuple[Plane, ...]
+) -> tuple[CoarseDrop, LevitatedModel]:
+    """First guess of the drop, and what all sensors read before it.
+
+    Where one end touches and is thrown up again before the other has sunk, both are low long after the
+    release; what the rotor did before shows as soon as the levitated motion is known.
+
+    Parameters
+    ----------
+    record : Record
+        The record.
+    machine : Machine
+        The machine, for its gaps.
+    whole : Record
+        The record with those planes only whose sensors give x and y.
+    planes : tuple of Plane
+        Those planes.
+
+    Raises
+    ------
+    RecordError
+        When the rotor does not fall in the record, or the record does not begin before the fall.
+    """
+    coarse = coarse_drop(whole, machine, planes)
+    levitated = fit_levitated(record, coarse.instant - _UNSURE, speed=coarse.speed)
+    if levitated.end > coarse.instant - _UNSURE - 2.0 / record.sampling_rate:
+        return coarse, levitated
+    coarse = _sooner(whole, machine, planes, levitated.of_channels(_columns(whole, record)), coarse)
+    return coarse, fit_levitated(record, coarse.instant - _UNSURE, speed=coarse.speed)
+
+
+def _sooner(
+    record: Record, machine: Machine, planes: tuple[Plane, ...], levitated: LevitatedModel, coarse: CoarseDrop
+) -> CoarseDrop:
+    """The first guess of a drop by the way from the levitated motion, whatever its direction."""
+    gaps, gravity = np.array([gap_of(machine, plane) for plane in planes]), float(machine.gravity)
+    near = record.window(-np.inf, coarse.contact)
+    away = planar_of(along_sensors(near.signals - levitated.readings(near.time), record.sensors), planes)
+    way = np.hypot(away[:, :, 0], away[:, :, 1])
+    gone = (way > FALLEN_SHARE * gaps).any(axis=1) & (near.time > levitated.end)
+    if not gone.any():
+        return coarse
+    sunk = int(np.argmax(gone))
+    # the unbalance throws a widely circling plane further than it falls, but not before it was let go
+    fallen = float(near.time[sunk]) - float(np.sqrt(2.0 * np.max(way[sunk]) / gravity))
+    instant = max(fallen, levitated.end)
+    shape = planar_of(along_sensors(near.signals, record.sensors), planes)
+    contact = first_sudden(near, shape, gravity, instant, max(sunk, _first(way > NEAREST_CONTACT * gaps)))
+    return replace(coarse, instant=instant, sunk=float(near.time[sunk]), contact=contact)
 
 
 def _coarse_drop(

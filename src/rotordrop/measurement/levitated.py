@@ -5,6 +5,7 @@ The one fit of the levitated part of a record: power-off, fall, filter and repla
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -35,6 +36,12 @@ _APART = 1.5
 _FEWEST_TURNS = 2.0
 
 _FEWEST_SAMPLES = 50
+
+_STRETCH = 1e-3
+"""Length of the stretches by which the end of the levitated part is looked at [s]."""
+
+_LEFT = 3.0
+"""A last stretch that scatters this many times as much as most has left the levitated motion [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,6 +123,8 @@ class LevitatedModel:
 def fit_levitated(record: Record, end: float, *, speed: float, start: float | None = None) -> LevitatedModel:
     """Fit the readings before the drop by a constant, 1X, 2X and hum.
 
+    A window that reaches into the fall ends before it.
+
     Parameters
     ----------
     record : Record
@@ -146,8 +155,19 @@ def fit_levitated(record: Record, end: float, *, speed: float, start: float | No
             begins_late=True,
         )
     hum = _choose_hum(time, signals, nominal, span)
-    frequency = _refined(time, signals, nominal, hum, span)
-    return _fit(time, signals, frequency, hum)
+    found = _fit(time, signals, _refined(time, signals, nominal, hum, span), hum)
+    stays = _stays_until(time, signals, found)
+    return found if stays >= found.end else fit_levitated(record, stays, speed=speed, start=start)
+
+
+def _stays_until(time: Array, signals: Array, model: LevitatedModel) -> float:
+    """Until when the last readings belong to the levitated motion [s]."""
+    count = round(float(time[-1] - time[0]) / _STRETCH)
+    rest = np.square((signals - model.readings(time)) / model.noise)
+    edges = np.linspace(0, len(time), max(count, 1) + 1).astype(int)
+    scatter = np.sqrt([np.nanmean(rest[a:b]) for a, b in itertools.pairwise(edges)])
+    stay = np.flatnonzero(scatter <= _LEFT * np.median(scatter))
+    return float(time[edges[stay[-1] + 1] - 1])
 
 
 def _choose_hum(time: Array, signals: Array, frequency: float, span: float) -> float | None:

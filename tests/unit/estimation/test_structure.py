@@ -19,6 +19,7 @@ from rotordrop.estimation.estimate import Verdict
 from rotordrop.estimation.structure import EXTENSIONS
 from rotordrop.estimation.structure_search import (
     FIRST_OTHER_START,
+    PAYS_BESIDE,
     PENALTY,
     Candidate,
     Kept,
@@ -190,7 +191,7 @@ def test_what_pays_beside_a_model_that_fits_is_kept(lp400):
 def test_what_pays_less_beside_a_model_that_fits_is_not_kept(lp400, plain):
     """Nor is anything where the usual model itself loses the record in one pass."""
     usual = fit_of(plain, 0.92)
-    record = Record({AXES: fit_of(1000.0 - 0.9 * PENALTY, 0.8)}, usual)
+    record = Record({AXES: fit_of(1000.0 - 0.9 * PAYS_BESIDE, 0.8)}, usual)
     assert found_beside_the_usual(Candidate(machine=lp400, fit=usual), record).kept == ()
 
 

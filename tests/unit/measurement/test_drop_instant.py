@@ -42,6 +42,17 @@ def test_power_off_at_150_hz_within_half_a_sample(found_fast):
     assert 0.8 < found_fast.fall.misfit < 1.2
 
 
+def test_power_off_where_one_end_bounces_before_the_other_has_sunk():
+    """Both ends are low 7 ms after the release first; with the levitated part until then, noise was 7 µm."""
+    lp400 = example_machine("lp400")
+    hidden = hidden_machine(lp400, 20009)
+    made = synthesize_drop(hidden, 2.0 * np.pi * 120.0, 20009, duration=0.1)
+    found = find_drop_instant(made.record, lp400)
+    assert found.value == pytest.approx(made.truth["t_off_in_record_s"], abs=0.5 * SAMPLE)
+    assert found.levitated.end < found.value
+    np.testing.assert_allclose(found.levitated.noise, made.truth["noise_rms_m"], rtol=0.05)
+
+
 def test_the_standard_error_of_the_power_off_is_its_scatter(drop, machine):
     """Twelve times other noise of 1.5 µm on the same fall; the bound holds 98 of 100 such dozens."""
     short = drop.window(-0.25, 0.03)

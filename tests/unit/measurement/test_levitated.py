@@ -39,6 +39,17 @@ def test_constant_tones_hum_and_noise_are_found(drop):
     np.testing.assert_allclose(np.abs(model.amplitudes[2]), 0.4e-6, atol=5 * error)
 
 
+def test_a_window_that_reaches_into_the_fall_ends_before_it(drop):
+    """Four milliseconds of a free fall, which are 78 µm, in a window of 250 ms."""
+    record = levitated(drop)
+    since = np.maximum(record.time + 4e-3, 0.0)
+    fallen = replace(record, signals=record.signals - 4.9 * since[:, None] ** 2)
+    model = fit_levitated(fallen, 0.0, speed=150.03 * HZ)
+    assert -5e-3 <= model.end < -3e-3
+    np.testing.assert_allclose(model.noise, 0.45e-6, rtol=0.05)
+    assert fit_levitated(record, 0.0, speed=150.03 * HZ).end == record.time[-1]
+
+
 @pytest.mark.parametrize("mains", [50.0, 60.0, 400.0, 50.0 / 3.0])
 def test_the_mains_frequency_is_found(drop, mains):
     model = fit_levitated(levitated(drop, mains=mains, hum=1.5e-6), 0.0, speed=150.0 * HZ)

@@ -14,7 +14,7 @@ import numpy as np
 
 from rotordrop.errors import NoDropError, RecordError
 from rotordrop.measurement.axes import sensor_planes
-from rotordrop.measurement.events import coarse_drop, with_whole_planes
+from rotordrop.measurement.events import drop_and_levitated, with_whole_planes
 from rotordrop.measurement.levitated import LevitatedModel, fit_levitated
 from rotordrop.measurement.quality.arrangement import LEANING, check_planes, fall_of
 from rotordrop.measurement.quality.channels import check_channels
@@ -39,9 +39,6 @@ from rotordrop.measurement.quality.tail import check_tail
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
     from rotordrop.measurement.record import Record
-
-_MARGIN = 3e-3
-"""Time kept clear before the first guess of the drop [s]."""
 
 _NEAR = 0.5
 """Time after the drop that the comparison with a free fall is given [s]."""
@@ -112,8 +109,7 @@ def _check_motion(record: Record, machine: Machine, tail: Record | None) -> list
     if stops(findings):
         return findings
     try:
-        coarse = coarse_drop(record, machine, planes)
-        levitated = fit_levitated(record, coarse.instant - _MARGIN, speed=coarse.speed)
+        coarse, levitated = drop_and_levitated(record, machine, record, planes)
     except NoDropError as error:
         return [no_drop(error)]
     # a high-pass bends a rest into what looks like a rail; what a filter explains is none
