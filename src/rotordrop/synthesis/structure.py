@@ -73,7 +73,11 @@ def _of_bearing(bearing: TouchdownBearing, v: BearingViolations, typical: float)
             float(support.stiffness_horizontal),
             float(v.support.stiffness_ratio),
         ),
-        "support.damping_horizontal": (float(support.damping_horizontal), float(v.support.damping_ratio)),
+        "support.damping": (float(support.damping), float(v.support.damping)),
+        "support.damping_horizontal": (
+            float(support.damping_horizontal),
+            float(v.support.damping) * float(v.support.damping_ratio),
+        ),
     }
     values |= {path: value * factor for path, (value, factor) in factors.items() if factor != 1.0}
     if stiffness != float(contact.stiffness):

@@ -18,6 +18,7 @@ KINDS: dict[str, tuple[str, ...]] = {
         "support.stiffness_ratio",
         "support.damping_ratio",
     ),
+    "support damping": ("support.damping",),
     "cubic support": ("support.hardening",),
     "hysteretic support": ("support.slip_force",),
     "foundation mode": ("foundation.mass",),

@@ -77,6 +77,8 @@ class SupportViolation(Violation):
         Angle from horizontal to the first principal axis of stiffness and damping [rad], from x towards y.
     stiffness_ratio, damping_ratio : Estimated
         Factors on stiffness and damping along the first axis, which at angle zero is horizontal [1].
+    damping : Estimated
+        Factor on the damping along both axes [1].
     hardening : Estimated
         How much the spring force exceeds that of the linear spring, at the force below [1].
     hardening_force : Estimated
@@ -92,6 +94,7 @@ class SupportViolation(Violation):
     axes_angle: Angle = default(0.0, "axes horizontal and vertical")
     stiffness_ratio: Positive = default(1.0, NO_CHANGE)
     damping_ratio: Positive = default(1.0, NO_CHANGE)
+    damping: NonNegativeNumber = default(1.0, NO_CHANGE)
     hardening: NonNegativeNumber = default(0.0, "a linear spring")
     hardening_force: PositiveForce = default(1.0, "of no effect without hardening")
     hardening_radial: bool = False

@@ -212,6 +212,17 @@ def test_remanence_unbalance_and_friction_leave_their_ranges(known):
         assert float(mine.friction.static) == pytest.approx(0.28 * ratio)
 
 
+def test_friction_can_take_the_place_of_the_damper_of_a_support(known):
+    drop = _recorded(known, support={"damping": 0.0, "slip_force": "100 N", "slip_travel": "2 um"})
+    assert drop.truth["violated"] == ["support damping", "hysteretic support"]
+    assert set(drop.truth["support_damping"].values()) == {0.0}
+    half = hidden_machine(known, 3, violations(support={"damping": 0.5, "damping_ratio": 0.6}), drawn=False)
+    for mine, described in zip(half.machine.touchdown_bearings, known.touchdown_bearings, strict=True):
+        assert float(mine.support.damping) == pytest.approx(0.5 * float(described.support.damping))
+        across = float(described.support.damping_horizontal)
+        assert float(mine.support.damping_horizontal) == pytest.approx(0.3 * across)
+
+
 def test_the_truth_holds_what_structures_are(known):
     drop = _recorded(
         known,
