@@ -114,6 +114,18 @@ def _of_bearing(bearing: TouchdownBearing, v: BearingViolations) -> dict[str, fl
     return values
 
 
+def without_powers(hidden: HiddenMachine, values: dict[str, Any]) -> dict[str, Any]:
+    """Truth without stiffness and exponent of a contact whose law is no power: it has neither."""
+    bent = [hidden.violations.of_bearing(b.name).contact.law for b in hidden.machine.touchdown_bearings]
+    names = [b.name for b in hidden.machine.touchdown_bearings]
+    stiffness = {name: values["contact_K"][name] for name, law in zip(names, bent, strict=True) if not law}
+    contact = [
+        {key: value for key, value in row.items() if not (law and key in ("K", "n"))}
+        for row, law in zip(values["contact"], bent, strict=True)
+    ]
+    return values | {"contact_K": stiffness, "contact": contact}
+
+
 def turned_supports(hidden: HiddenMachine) -> dict[str, Any]:
     """Fields of the truth that turned axes change: the stiffness and damping that act in y, the ratio."""
     found: dict[str, dict[str, float]] = {

@@ -18,7 +18,12 @@ from rotordrop.simulation.result import DropResult
 from rotordrop.synthesis.event import DropConditions, HiddenMachine
 from rotordrop.synthesis.motion import true_motion
 from rotordrop.synthesis.sensor_chain import SensorChain, SensorErrors
-from rotordrop.synthesis.true_structure import true_structure, turned_supports, violated_kinds
+from rotordrop.synthesis.true_structure import (
+    true_structure,
+    turned_supports,
+    violated_kinds,
+    without_powers,
+)
 
 Array = NDArray[np.float64]
 
@@ -48,7 +53,7 @@ def true_values(
     }
     values |= _loads(result)
     values |= _motion(hidden, result, rest)
-    values |= machine_truth(hidden.machine) | turned_supports(hidden)
+    values |= without_powers(hidden, machine_truth(hidden.machine)) | turned_supports(hidden)
     values["structure"] = true_structure(hidden, conditions, errors)
     values["violated"] = list(violated_kinds(hidden.violations))
     values |= _conditions(conditions, hidden)

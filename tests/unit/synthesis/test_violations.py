@@ -13,6 +13,7 @@ from rotordrop.synthesis import Violations, hidden_machine, load_violations, sco
 from rotordrop.synthesis.event import drop_conditions
 from rotordrop.synthesis.sensor_chain import PERFECT, lagging
 from rotordrop.synthesis.true_structure import KINDS, violated_kinds
+from rotordrop.synthesis.truth import truth_of
 from rotordrop.synthesis.violations import violations_schema
 
 SPEED = 2.0 * np.pi * 60.0
@@ -221,6 +222,17 @@ def test_friction_can_take_the_place_of_the_damper_of_a_support(known):
         assert float(mine.support.damping) == pytest.approx(0.5 * float(described.support.damping))
         across = float(described.support.damping_horizontal)
         assert float(mine.support.damping_horizontal) == pytest.approx(0.3 * across)
+
+
+def test_a_contact_law_that_is_no_power_has_no_exponent_to_be_scored_against(known):
+    law = [{"depth": "1 um", "force": "90 N"}, {"depth": "4 um", "force": "1.6 kN"}]
+    truth = _recorded(known, bearing={"DE": {"contact": {"law": law}}}).truth
+    assert list(truth["contact_K"]) == ["NDE"]
+    assert "n" in truth["contact"][0] and not {"K", "n"} & set(truth["contact"][1])
+    true = truth_of(truth)
+    assert "contact.exponent" in true.of_bearing("NDE")
+    assert not {"contact.exponent", "contact.stiffness_N_per_m_n"} & set(true.of_bearing("DE"))
+    assert true.of_bearing("DE")["contact.damping_s_per_m"] > 0.0
 
 
 def test_the_truth_holds_what_structures_are(known):
