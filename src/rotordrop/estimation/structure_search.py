@@ -251,12 +251,13 @@ def found_beside_the_usual(usual: Candidate, search: Search) -> Candidate:
     search : Search
         Fits machines to the record.
     """
-    plain = search.judge(usual.fit, usual.machine)
+    extended = [(one, one.added_to(usual.machine)) for one in EXTENSIONS if one.values(usual.machine)]
+    machines = [usual.machine, *(machine for _, machine in extended)]
+    with ThreadPoolExecutor(max_workers=THREADS) as pool:
+        plain, *others = pool.map(lambda machine: search.judge(usual.fit, machine), machines)
     if not math.isfinite(plain):
         return usual
-    extended = [(one, one.added_to(usual.machine)) for one in EXTENSIONS if one.values(usual.machine)]
-    with ThreadPoolExecutor(max_workers=THREADS) as pool:
-        gains = list(pool.map(lambda one: plain - search.judge(usual.fit, one[1]), extended))
+    gains = [plain - other for other in others]
     if max(gains, default=0.0) < PAYS_BESIDE:
         return usual
     extension, machine = extended[gains.index(max(gains))]

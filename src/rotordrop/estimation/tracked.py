@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -23,7 +24,7 @@ from rotordrop.estimation.structure_search import (
     found_structure,
     rank_of,
 )
-from rotordrop.estimation.tracked_loads import of_a_beam
+from rotordrop.estimation.tracked_loads import check_without_contact_law, checks_begun, of_a_beam
 from rotordrop.estimation.tracked_parameters import UNSURE_GAP
 from rotordrop.identification.evidence import Evidence, Missing
 from rotordrop.machine import Machine
@@ -48,6 +49,7 @@ from rotordrop.tracking.calibration import (
 )
 from rotordrop.tracking.consistency import DIRECTIONS, Check, consistency_checks, judged_by
 from rotordrop.tracking.forces import ForceHistory, force_history
+from rotordrop.tracking.input_state import InputEstimate
 from rotordrop.tracking.prior import fall_time
 from rotordrop.tracking.problem import DropProblem, Fall, RecordedDrop, build_problem
 from rotordrop.tracking.smoother import Forward, Smoothed, forward
@@ -93,8 +95,7 @@ class TrackedDrop:
     evidence : Evidence
         What the record says beside the contacts.
     problem, smoothed : DropProblem, Smoothed
-        The estimation problem and its smoothed estimate with the likeliest unknown impulses; hundreds of
-        megabytes.
+        The estimation problem and its smoothed estimate with the likeliest unknown impulses.
     judged : Forward
         The pass by whose innovations the model is judged.
     forces : ForceHistory
@@ -107,6 +108,8 @@ class TrackedDrop:
         Number of drops that were fitted together.
     kept : tuple of Kept
         Extensions of the usual model that the readings paid for.
+    unaided : Future of InputEstimate, optional
+        The estimate without contact law, where it was begun beside the passes.
     """
 
     evidence: Evidence
@@ -118,6 +121,11 @@ class TrackedDrop:
     noise_factor: float
     drops: int = 1
     kept: tuple[Kept, ...] = ()
+    unaided: Future[InputEstimate] | None = None
+
+    def without_contact_law(self) -> InputEstimate:
+        """The estimate without contact law: as it was begun, or made now."""
+        return check_without_contact_law(self.problem) if self.unaided is None else self.unaided.result()
 
     @property
     def consistent(self) -> bool:
@@ -442,6 +450,7 @@ def tracked_drop(
     noise_factor: float,
     drops: int = 1,
     kept: tuple[Kept, ...] = (),
+    unaided: Future[InputEstimate] | None = None,
 ) -> TrackedDrop:
     """Forces and checks of one smoothed drop."""
     forces = force_history(problem, smoothed)
@@ -456,6 +465,7 @@ def tracked_drop(
         noise_factor=noise_factor,
         drops=drops,
         kept=kept,
+        unaided=unaided,
     )
 
 
@@ -473,10 +483,15 @@ def followed_drops(
     found = track_drops(machine, evidence, quick=quick, progress=progress)
     fit, factor, count, kept = found.fit, max(found.fit.noise_factors), len(evidence), found.kept
     usual = [drop.filtered for drop in fit.smoothed]
+    unaided: list[Future[InputEstimate] | None] = [None] * count
     if not quick:
-        factor = likeliest_noise(fit, FINE_SCHEDULE[-1])
-        fit = with_noise(fit, FINE_SCHEDULE[-1], factor)
-    waiting = list(zip(evidence, fit.problems, fit.smoothed, usual, strict=True))
-    del fit, found, usual
+        # The estimate without contact law takes nothing from these passes, which leave a core to it.
+        with ThreadPoolExecutor(max_workers=1) as beside:
+            unaided = checks_begun(beside, fit)
+            factor = likeliest_noise(fit, FINE_SCHEDULE[-1])
+            fit = with_noise(fit, FINE_SCHEDULE[-1], factor)
+    waiting = list(zip(evidence, fit.problems, fit.smoothed, usual, unaided, strict=True))
+    del fit, found, usual, unaided
     while waiting:
-        yield tracked_drop(*waiting.pop(0), factor, count, kept)
+        item, problem, smoothed, judged, check = waiting.pop(0)
+        yield tracked_drop(item, problem, smoothed, judged, factor, count, kept, check)

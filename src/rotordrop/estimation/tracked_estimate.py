@@ -31,7 +31,6 @@ from rotordrop.estimation.tracked_loads import (
     INCONSISTENT_WIDENING,
     Loads,
     bearing_drop,
-    check_of_a_beam,
     check_of_the_rotor,
     cross_checks,
     holding_cross_check,
@@ -54,13 +53,7 @@ from rotordrop.estimation.unbalance import PlaneUnbalance, unbalance_notes
 from rotordrop.model.bearing_numbers import numbers_of
 from rotordrop.model.rotor_form import is_beam
 from rotordrop.tracking.consistency import NIS_RANGE, Check
-from rotordrop.tracking.input_state import (
-    InputEstimate,
-    at_bearings,
-    input_state_estimate,
-    lent_by_record,
-)
-from rotordrop.tracking.problem import DropProblem
+from rotordrop.tracking.input_state import InputEstimate, at_bearings
 
 Array = NDArray[np.float64]
 
@@ -209,7 +202,7 @@ def _cross_checked(drop: TrackedDrop, method: Tracked) -> tuple[TrackedDrop, Inp
     if not drop.sees_all_directions or (drop.consistent and method.quick and not with_play):
         return drop, None
     if drop.consistent:
-        check = _without_contact_law(problem)
+        check = drop.without_contact_law()
         apart = [
             f"the peak force at {name} is {peak:.0f} N, without a contact law {check.peak[b]:.0f} N"
             for b, name in enumerate(problem.model.bearing_names)
@@ -219,13 +212,7 @@ def _cross_checked(drop: TrackedDrop, method: Tracked) -> tuple[TrackedDrop, Inp
             return drop, check
         failed = Check(name="cross-check", passed=False, message="; ".join(apart))
         return replace(drop, checks=(*drop.checks, failed)), check
-    return drop, _without_contact_law(problem)
-
-
-def _without_contact_law(problem: DropProblem) -> InputEstimate:
-    """The cross-check, with the error of a beam where one stands for the rotor."""
-    check = input_state_estimate(problem, lent_by_record(problem))
-    return check_of_a_beam(check) if is_beam(problem.model.machine.rotor) else check
+    return drop, drop.without_contact_law()
 
 
 def _judge(drop: TrackedDrop, check: InputEstimate | None) -> _Judgement:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -24,9 +25,17 @@ from rotordrop.estimation.bearing_drop import (
     mean_late,
 )
 from rotordrop.estimation.estimate import CrossCheck
+from rotordrop.model.rotor_form import is_beam
 from rotordrop.simulation.certificate import refined_peak
+from rotordrop.tracking.calibration import TrackedDrops
+from rotordrop.tracking.consistency import direction_check
 from rotordrop.tracking.forces import ForceHistory
-from rotordrop.tracking.input_state import MEAN_ERROR, InputEstimate
+from rotordrop.tracking.input_state import (
+    MEAN_ERROR,
+    InputEstimate,
+    input_state_estimate,
+    lent_by_record,
+)
 from rotordrop.tracking.problem import DropProblem
 
 Array = NDArray[np.float64]
@@ -93,6 +102,20 @@ def of_the_rotor(forces: ForceHistory) -> ForceHistory:
         magnitude_sigma=_without(forces.magnitude_sigma, BEAM_FORCE_SIGMA * forces.magnitude),
         stress_sigma=_without(forces.stress_sigma, BEAM_FORCE_SIGMA / 3.0 * forces.stress),
     )
+
+
+def check_without_contact_law(problem: DropProblem) -> InputEstimate:
+    """The cross-check, with the error of a beam where one stands for the rotor; the twin lends nothing."""
+    check = input_state_estimate(problem, lent_by_record(problem))
+    return check_of_a_beam(check) if is_beam(problem.model.machine.rotor) else check
+
+
+def checks_begun(pool: Executor, fit: TrackedDrops) -> list[Future[InputEstimate] | None]:
+    """The cross-check of every drop of a fit that is seen in all directions, begun in a pool."""
+    return [
+        pool.submit(check_without_contact_law, problem) if direction_check(problem, drop).passed else None
+        for problem, drop in zip(fit.problems, fit.smoothed, strict=True)
+    ]
 
 
 def check_of_a_beam(check: InputEstimate) -> InputEstimate:

@@ -84,13 +84,13 @@ def synchronous_motion(
     ]
     if len(per_turn) < FEWEST_TURNS:
         return None
-    from scipy.stats import t
+    from scipy.special import stdtrit
 
     vectors = np.array(per_turn)
     mean, n = complex(np.mean(vectors)), len(vectors)
     # along and across the mean vector: the one is the error of the amplitude, the other that of the phase
     turned = vectors * np.conj(mean) / max(abs(mean), 1e-300)
-    wide = float(t.ppf(CONFIDENCE, n - 1)) / math.sqrt(n)
+    wide = float(stdtrit(n - 1, CONFIDENCE)) / math.sqrt(n)
     along, across = wide * float(np.std(turned.real, ddof=1)), wide * float(np.std(turned.imag, ddof=1))
     phase = math.remainder(math.atan2(mean.imag, mean.real) - 0.5 * math.pi, 2.0 * math.pi)
     spread = math.asin(across / abs(mean)) if across < abs(mean) else math.pi

@@ -216,8 +216,9 @@ def soften_friction(P: Array, least: Array, p: KernelParameters) -> None:
 
 @kernel
 def forward_pass(
+    first: int,
     mean_0: Array,
-    P_0: Array,
+    P: Array,
     times: Array,
     readings: Array,
     speed: Array,
@@ -241,8 +242,10 @@ def forward_pass(
 
     Parameters
     ----------
-    mean_0, P_0 : ndarray, shapes (n,), (n, n)
-        Estimate before the first sample.
+    first : int
+        First sample to be done: 0, or 1 to go on from the filtered estimate of sample 0.
+    mean_0, P : ndarray, shapes (n,), (n, n)
+        Estimate to begin with; ``P`` is overwritten by that of the last sample.
     times, readings, speed : ndarray, shapes (N,), (N, C), (N,)
         Time from power-off [s], readings with polarity removed [m] (NaN is left out), rotor speed [rad/s]
         (NaN too).
@@ -273,7 +276,6 @@ def forward_pass(
     n_p = n - s - 4 * n_c
     i_w, i_a = p.rotor_at[L.ROTOR_SPEED], p.rotor_at[L.ROTOR_ANGLE]
     mean = mean_0.copy()
-    P = P_0.copy()
     y = np.zeros(p.rotor_at[L.N_STATES])
     F = np.zeros((s, s + n_p))
     impulses = np.zeros(p.bearing.shape[0])
@@ -283,7 +285,9 @@ def forward_pass(
     moved = np.empty(s + n_p)
     keep = transitions.shape[0] > 0
     smoothing = p.bearing[:, L.SMOOTHING_SPEED].copy()
-    for i in range(times.shape[0]):
+    if first > 0 and covariances.shape[1] > 0:
+        pack(P, covariances[0])
+    for i in range(first, times.shape[0]):
         if i > 0:
             at = mean
             with_reference = i - 1 < reference.shape[0]
@@ -373,6 +377,7 @@ def is_plausible(mean: Array, p: KernelParameters) -> bool:
 
 @kernel
 def backward_pass(
+    first: int,
     means: Array,
     covariances: Compact,
     transitions: Compact,
@@ -384,6 +389,7 @@ def backward_pass(
     kept: IntArray,
     smoothed: Array,
     blocks: Array,
+    filtered: Array,
     information: Array,
     final_score: Array,
     final_information: Array,
@@ -392,6 +398,8 @@ def backward_pass(
 
     Parameters
     ----------
+    first : int
+        Where to stop: 0, or 1 where `forward_pass` went on from sample 0.
     watched : ndarray, shape (G, n)
         Linear functions of the estimate whose smoothed covariance is wanted at every sample.
     kept : ndarray, shape (K,)
@@ -400,12 +408,11 @@ def backward_pass(
         Filled with the smoothed estimate.
     blocks : ndarray, shape (N, G, G)
         Filled with the smoothed covariance of the watched functions.
-    information : ndarray, shape (K, n, n)
-        Filled with Λ of the kept samples: the smoothed covariance is ``P − P Λ P`` with the filtered ``P``.
+    filtered, information : ndarray, shape (K, n, n)
+        Filled with P and Λ of the kept samples: the smoothed covariance is ``P − P Λ P``.
     final_score, final_information : ndarray, shapes (n,), (n, n)
-        λ and Λ that later records put on the last sample (zero for a single record); overwritten by their
-        values
-        *before* the first measurement, to be handed to an earlier record.
+        λ and Λ that later samples or records put on the last one (zero behind the end); overwritten by their
+        values *before* the first measurement done, to be handed to an earlier one.
     """
     n_t, n = means.shape
     s = transitions.shape[1]
@@ -417,12 +424,13 @@ def backward_pass(
     P = np.empty((n, n))
     seen = np.empty(n, dtype=np.int64)
     left = kept.shape[0] - 1
-    for i in range(n_t - 1, -1, -1):
+    for i in range(n_t - 1, first - 1, -1):
         unpack(covariances[i], P)
         smoothed[i] = means[i] - np.dot(P, lam)
         spread = np.dot(watched, P)
         blocks[i] = np.dot(spread, watched.T) - np.dot(np.dot(spread, Lam), spread.T)
         if left >= 0 and kept[left] == i:
+            filtered[left] = P
             information[left] = Lam
             left -= 1
         for c in range(rows.shape[1] - 1, -1, -1):

@@ -182,7 +182,6 @@ def track(
         for _ in range(stage.passes):
             if progress is not None:
                 progress(f"fitting the first {1e3 * stage.until:.0f} ms", done / total)
-            smoothed = []  # the next pass writes over what the one before left in its storage
             smoothed = one_pass(
                 [_eased(*one, stage) for one in zip(problems, trajectories, strict=True)],
                 settings,
@@ -264,8 +263,9 @@ def one_pass(
 ) -> list[Smoothed]:
     """One forward pass through the chain of drops and one backward pass through it.
 
-    ``storages``, one for each drop if given, hold what the passes leave.
+    ``storages``, one for each drop if given, is memory that passes before have used.
     """
+    storages = storages or [Storage() for _ in problems]
     shared = problems[0].machine_indices
     filtered: list[Forward] = []
     mean = problems[0].start if from_guesses else problems[0].mean
@@ -274,8 +274,7 @@ def one_pass(
         if d > 0:
             mean, covariance = handed_on(filtered[-1], problem)
         samples = int(np.searchsorted(problem.time, until, side="right"))
-        storage = storages[d] if storages else Storage()
-        result = _followed(problem, settings, mean, covariance, references[d], samples, storage)
+        result = _followed(problem, settings, mean, covariance, references[d], samples, storages[d])
         if result.done < min(samples, 10):
             raise IdentificationError(
                 f"the filter lost the drop after {result.done} of {samples} samples; the machine's guesses "
@@ -285,7 +284,7 @@ def one_pass(
     smoothed: list[Smoothed] = []
     score, information = None, None
     for d in range(len(problems) - 1, -1, -1):
-        back = smooth(filtered[d], score, information, watched=problems[d].watched)
+        back = smooth(filtered[d], score, information, watched=problems[d].watched, storage=storages[d])
         smoothed.append(back)
         if d > 0:
             n = len(problems[d].mean)
@@ -331,5 +330,5 @@ def handed_on(before: Forward, problem: DropProblem) -> tuple[Array, Array]:
     mean[shared] = before.means[last][shared]
     covariance[shared, :] = 0.0
     covariance[:, shared] = 0.0
-    covariance[np.ix_(shared, shared)] = before.covariance(last)[np.ix_(shared, shared)]
+    covariance[np.ix_(shared, shared)] = before.last[np.ix_(shared, shared)]
     return mean, covariance

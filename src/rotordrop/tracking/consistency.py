@@ -60,7 +60,7 @@ def consistency_checks(problem: DropProblem, smoothed: Smoothed, noise_factor: f
     return (
         *innovations,
         _sensor_check(problem, smoothed),
-        _direction_check(problem, smoothed),
+        direction_check(problem, smoothed),
         _parameter_check(problem, smoothed),
         _nuisance_check(problem, smoothed, white),
         _remanence_check(problem, smoothed),
@@ -152,7 +152,7 @@ def _sensor_check(problem: DropProblem, smoothed: Smoothed) -> Check:
     )
 
 
-def _direction_check(problem: DropProblem, smoothed: Smoothed) -> Check:
+def direction_check(problem: DropProblem, smoothed: Smoothed) -> Check:
     """Whether both directions are seen at every node with sensors; the rest follows from the model alone."""
     heard = np.flatnonzero(np.isfinite(normalised_innovations(smoothed)).any(axis=0))
     sensors = [problem.model.machine.sensors[c] for c in heard]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
@@ -18,7 +19,7 @@ from rotordrop.tracking.problem import DropProblem, Fall, private_copy
 
 Array = NDArray[np.float64]
 Compact = NDArray[np.float32]
-"""What a pass stores for the smoother: hundreds of megabytes, of which seven digits are plenty."""
+"""What a pass stores of covariances and transitions for the smoother: seven digits of them are plenty."""
 
 Number = TypeVar("Number", np.float32, np.float64)
 
@@ -30,6 +31,12 @@ SPIN = 0.07
 """Unknown friction on races and rotor as a coefficient of friction under the weight [1]."""
 LEARNING = 7.0
 """Time at which a race turns with the rotor, over the time of a free fall [1]; see `PassSettings`."""
+STRETCH = 32_000_000
+"""Memory [B] for what a pass keeps of its samples for the smoother; what does not fit is filtered again.
+
+The smoother takes it twice. Of a whole drop all but an eighth is filtered again, of a first fit of the coarse
+basis less than half of the last windows.
+"""
 LARGEST_PHASE = 1.0
 """Largest phase [rad] by which the fastest mode may turn in one integration step of the filter."""
 
@@ -114,22 +121,29 @@ def pass_settings(problem: DropProblem, *, force: float, share: float, substeps:
     )
 
 
-class Storage:
-    """Memory of the passes over one drop: each writes where the one before it did.
+@dataclass(frozen=True, kw_only=True)
+class Stretch:
+    """What the smoother needs of some samples of a pass beside its means; K samples, n estimated.
 
-    Hundreds of megabytes asked of the system anew are as slow to fill for the first time as the filter.
+    It begins with the sample ``first`` of the pass, or goes on from it. Covariances are stored packed.
+    """
+
+    first: int
+    covariances: Compact
+    transitions: Compact
+    rows: Array
+    gains: Array
+
+
+class Storage:
+    """Memory for one stretch of a pass: what a pass writes to it is overwritten by the next.
+
+    Memory asked of the system anew is as slow to fill for the first time as the filter.
     """
 
     def __init__(self) -> None:
         self._blocks: dict[str, NDArray[Any]] = {}
-
-    @classmethod
-    def of(cls, past: Forward) -> Storage:
-        """The memory that a pass wrote to."""
-        storage = cls()
-        for name in ("covariances", "transitions", "rows", "gains"):
-            storage._blocks[name] = getattr(past, name).reshape(-1)
-        return storage
+        self._held: tuple[Array, Stretch] | None = None
 
     def array(self, name: str, shape: tuple[int, ...], kind: type[Number]) -> NDArray[Number]:
         """An array of any content; those of the same name share their memory."""
@@ -139,34 +153,120 @@ class Storage:
             self._blocks[name] = block = np.empty(size, dtype=kind)
         return block[:size].reshape(shape)
 
+    @property
+    def size(self) -> int:
+        """Memory taken [B]."""
+        return sum(block.nbytes for block in self._blocks.values())
+
+    def hold(self, means: Array, stretch: Stretch) -> None:
+        """Remember which pass, told by its means, and which stretch of it the memory holds."""
+        self._held = means, stretch
+
+    def held(self, means: Array, first: int) -> Stretch | None:
+        """The stretch of a pass that begins at a sample, if nothing was written over it."""
+        if self._held is None or self._held[0] is not means or self._held[1].first != first:
+            return None
+        return self._held[1]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Course:
+    """What every stretch of a pass starts from: the problem, where it begins, where it is linearised."""
+
+    problem: DropProblem
+    settings: P.FilterSettings
+    mean: Array
+    reference: Array
+    length: int
+    smoothing: bool
+
+    def stretch(self, first: int, count: int, storage: Storage) -> Stretch:
+        """Room for the samples of a stretch."""
+        n, s, updates = len(self.mean), self.problem.n_dynamic, self.problem.n_channels + 1
+        kept = count if self.smoothing else 0
+        columns = s + len(self.problem.unknowns)
+        packed = n * (n + 1) // 2 if self.smoothing else 0
+        return Stretch(
+            first=first,
+            covariances=storage.array("covariances", (count, packed), np.float32),
+            transitions=storage.array("transitions", (kept, s, columns), np.float32),
+            rows=storage.array("rows", (kept, updates, n), np.float64),
+            gains=storage.array("gains", (kept, updates, n), np.float64),
+        )
+
+    def followed(
+        self, first: int, covariance: Array, filled: tuple[Array, Array, Array], storage: Storage
+    ) -> tuple[int, Stretch]:
+        """Filter a stretch; gives the sample reached, and ``covariance`` becomes that of the last one.
+
+        ``filled`` are means, innovations and their variances of the whole pass.
+        """
+        problem, means = self.problem, filled[0]
+        chosen = slice(first, min(first + self.length, len(means) - 1) + 1)
+        stretch = self.stretch(first, chosen.stop - first, storage)
+        done = F.forward_pass(
+            min(first, 1),
+            means[first].copy() if first else self.mean,
+            covariance,
+            problem.time[chosen],
+            np.ascontiguousarray(problem.readings[chosen]),
+            problem.speed[chosen],
+            problem.reading_rows,
+            problem.variances,
+            problem.speed_variance,
+            problem.targets,
+            private_copy(problem.model.parameters),
+            self.settings,
+            problem.sensor_form,
+            self.reference[chosen],
+            means[chosen],
+            stretch.covariances,
+            stretch.transitions,
+            stretch.rows,
+            stretch.gains,
+            filled[1][chosen],
+            filled[2][chosen],
+        )
+        storage.hold(means, stretch)
+        return first + int(done), stretch
+
 
 @dataclass(frozen=True, kw_only=True)
 class Forward:
-    """What a forward pass leaves: filtered estimates and what the smoother needs; N samples, n estimated.
+    """What a forward pass leaves; N samples, n estimated.
 
     ``done`` is the number of samples reached; ``innovations`` and ``innovation_variances`` have one column
     per channel and one for the speed, NaN where nothing was measured; ``impulse`` is the size of the
-    unknown impulses of the pass [N s]; ``parameter_sample`` is where parameters are read. The covariances
-    are stored packed; `covariance` gives one.
+    unknown impulses of the pass [N s]; ``parameter_sample`` is where parameters are read; ``last`` is the
+    covariance (n, n) of the last sample reached, in single precision. What the smoother needs besides is
+    filtered again from ``starts``, the covariances at the beginning of every stretch: kept for all samples it
+    would be hundreds of megabytes.
     """
 
     done: int
     impulse: float
     means: Array
-    covariances: Compact
-    transitions: Compact
-    rows: Array
-    gains: Array
     innovations: Array
     innovation_variances: Array
     parameter_sample: int
+    last: Array
+    course: _Course
+    starts: tuple[Array, ...]
+
+    def stretch(self, number: int, storage: Storage) -> Stretch:
+        """What the smoother needs of a stretch: as it is held, or filtered again with the same bits."""
+        first = number * self.course.length
+        held = storage.held(self.means, first)
+        if held is not None:
+            return held
+        filled = (self.means, self.innovations, self.innovation_variances)
+        return self.course.followed(first, self.starts[number].copy(), filled, storage)[1]
 
     def covariance(self, sample: int) -> Array:
         """Filtered covariance at a sample, shape (n, n); single precision."""
-        n = self.means.shape[1]
-        P = np.empty((n, n))
-        unpack(self.covariances[sample], P)
-        return P
+        number = min(sample // self.course.length, len(self.starts) - 1)
+        stretch = self.stretch(number, Storage())
+        return _unpacked(stretch, sample, self.means.shape[1])
 
     @property
     def nis(self) -> float:
@@ -220,47 +320,49 @@ def forward(
     """
     count = len(problem.time) if samples is None else min(samples, len(problem.time))
     mean = problem.mean if mean is None else mean
-    covariance = problem.covariance if covariance is None else covariance
-    n, s, n_c = len(mean), problem.n_dynamic, problem.n_channels
-    kept = count if smoothing else 0
-    columns = s + len(problem.unknowns)
+    P = np.array(problem.covariance if covariance is None else covariance)
+    n, updates = len(mean), problem.n_channels + 1
     dt = float(problem.time[1] - problem.time[0])
-    array = (storage or Storage()).array
-    result = Forward(
-        done=0,
+    course = _Course(
+        problem=problem,
+        settings=settings.for_sampling(dt, fastest_frequency(problem), problem.fall),
+        mean=np.ascontiguousarray(mean),
+        reference=np.zeros((0, n)) if reference is None else np.ascontiguousarray(reference[:count]),
+        length=_stretch_length(problem) if smoothing else count,
+        smoothing=smoothing,
+    )
+    filled = np.empty((count, n)), np.empty((count, updates)), np.empty((count, updates))
+    storage, starts = storage or Storage(), []
+    for first in range(0, max(count - 1, 1), course.length):
+        starts.append(P.copy())
+        done, stretch = course.followed(first, P, filled, storage)
+        if done <= min(first + course.length, count - 1):
+            break
+    return Forward(
+        done=done,
         impulse=settings.impulse,
-        means=np.empty((count, n)),
-        covariances=array("covariances", (count, n * (n + 1) // 2 if smoothing else 0), np.float32),
-        transitions=array("transitions", (kept, s, columns), np.float32),
-        rows=array("rows", (kept, n_c + 1, n), np.float64),
-        gains=array("gains", (kept, n_c + 1, n), np.float64),
-        innovations=np.empty((count, n_c + 1)),
-        innovation_variances=np.empty((count, n_c + 1)),
+        means=filled[0],
+        innovations=filled[1],
+        innovation_variances=filled[2],
         parameter_sample=problem.parameter_sample,
+        last=_unpacked(stretch, max(done - 1, 0), n) if smoothing else P,
+        course=course,
+        starts=tuple(starts),
     )
-    done = F.forward_pass(
-        np.ascontiguousarray(mean),
-        np.ascontiguousarray(covariance),
-        problem.time[:count],
-        np.ascontiguousarray(problem.readings[:count]),
-        problem.speed[:count],
-        problem.reading_rows,
-        problem.variances,
-        problem.speed_variance,
-        problem.targets,
-        private_copy(problem.model.parameters),
-        settings.for_sampling(dt, fastest_frequency(problem), problem.fall),
-        problem.sensor_form,
-        np.zeros((0, n)) if reference is None else np.ascontiguousarray(reference[:count]),
-        result.means,
-        result.covariances,
-        result.transitions,
-        result.rows,
-        result.gains,
-        result.innovations,
-        result.innovation_variances,
-    )
-    return replace(result, done=int(done))
+
+
+def _stretch_length(problem: DropProblem) -> int:
+    """Samples of which what the smoother needs fits into `STRETCH`."""
+    n, s, updates = len(problem.mean), problem.n_dynamic, problem.n_channels + 1
+    packed, transition = n * (n + 1) // 2, s * (s + len(problem.unknowns))
+    return max(2, STRETCH // (4 * (packed + transition) + 8 * 2 * updates * n))
+
+
+def _unpacked(stretch: Stretch, sample: int, n: int) -> Array:
+    """Filtered covariance (n, n) at a sample of a stretch."""
+    P = np.empty((n, n))
+    unpack(stretch.covariances[sample - stretch.first], P)
+    return P
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -275,8 +377,8 @@ class Smoothed:
         Smoothed covariance of the watched linear functions at each sample.
     kept : ndarray, shape (K,)
         Samples whose whole covariance can be asked for.
-    information : ndarray, shape (K, n, n)
-        Λ of these samples: the smoothed covariance is ``P − P Λ P`` with the filtered P.
+    spread, information : ndarray, shape (K, n, n)
+        Filtered P and Λ of these samples: the smoothed covariance is ``P − P Λ P``.
     score_0, information_0 : ndarray, shapes (n,), (n, n)
         λ and Λ before the first measurement.
     """
@@ -285,6 +387,7 @@ class Smoothed:
     means: Array
     watched: Array
     kept: NDArray[np.int64]
+    spread: Array
     information: Array
     score_0: Array
     information_0: Array
@@ -294,7 +397,7 @@ class Smoothed:
         found = np.flatnonzero(self.kept == sample)
         if len(found) == 0:
             raise IndexError(f"the covariance of sample {sample} was not kept; kept are {self.kept.tolist()}")
-        P = self.filtered.covariance(sample)
+        P = self.spread[found[0]]
         return np.asarray(P - P @ self.information[found[0]] @ P)
 
 
@@ -310,6 +413,7 @@ def smooth(
     *,
     watched: Array | None = None,
     kept: Sequence[int] | None = None,
+    storage: Storage | None = None,
 ) -> Smoothed:
     """Run the backward pass.
 
@@ -322,38 +426,62 @@ def smooth(
     kept : sequence of int, optional
         Samples whose whole covariance is wanted; by default the first, the one that parameters are read at
         and the last.
+    storage : Storage, optional
+        That of the forward pass, whose last stretch is at hand there.
     """
     done, n = filtered.done, filtered.means.shape[1]
-    samples = (0, min(filtered.parameter_sample, done - 1), done - 1) if kept is None else kept
-    chosen = np.unique(np.asarray(samples, dtype=np.int64))
+    wanted = (0, min(filtered.parameter_sample, done - 1), done - 1) if kept is None else kept
+    chosen = np.unique(np.asarray(wanted, dtype=np.int64))
     rows = np.zeros((0, n)) if watched is None else np.ascontiguousarray(watched)
     means = np.empty((done, n))
     blocks = np.empty((done, len(rows), len(rows)))
-    stored = np.empty((len(chosen), n, n))
+    spread, stored = np.empty((len(chosen), n, n)), np.empty((len(chosen), n, n))
     lam = np.zeros(n) if score is None else score.copy()
     Lam = np.zeros((n, n)) if information is None else information.copy()
-    F.backward_pass(
-        filtered.means[:done],
-        filtered.covariances[:done],
-        filtered.transitions[:done],
-        filtered.rows[:done],
-        filtered.gains[:done],
-        filtered.innovations[:done],
-        filtered.innovation_variances[:done],
-        rows,
-        chosen,
-        means,
-        blocks,
-        stored,
-        lam,
-        Lam,
-    )
+    for stretch in _from_the_last(filtered, storage or Storage()):
+        first = stretch.first
+        samples = slice(first, min(first + filtered.course.length + 1, done))
+        held, own = slice(0, samples.stop - first), min(first, 1)
+        inside = slice(*np.searchsorted(chosen, (first + own, samples.stop)))
+        F.backward_pass(
+            own,
+            filtered.means[samples],
+            stretch.covariances[held],
+            stretch.transitions[held],
+            stretch.rows[held],
+            stretch.gains[held],
+            filtered.innovations[samples],
+            filtered.innovation_variances[samples],
+            rows,
+            chosen[inside] - first,
+            means[samples],
+            blocks[samples],
+            spread[inside],
+            stored[inside],
+            lam,
+            Lam,
+        )
     return Smoothed(
         filtered=filtered,
         means=means,
         watched=blocks,
         kept=chosen,
+        spread=spread,
         information=stored,
         score_0=lam,
         information_0=Lam,
     )
+
+
+def _from_the_last(filtered: Forward, storage: Storage) -> Iterator[Stretch]:
+    """The stretches of a pass, backwards; while one is used, the one before it is filtered again."""
+    here, there = storage, Storage()
+    with ThreadPoolExecutor(max_workers=1) as ahead:
+        number = len(filtered.starts) - 1
+        coming = ahead.submit(filtered.stretch, number, here)
+        while number > 0:
+            stretch, number = coming.result(), number - 1
+            here, there = there, here
+            coming = ahead.submit(filtered.stretch, number, here)
+            yield stretch
+        yield coming.result()

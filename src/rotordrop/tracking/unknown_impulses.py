@@ -20,7 +20,7 @@ from rotordrop.tracking.calibration import (
     one_pass,
     stage_settings,
 )
-from rotordrop.tracking.smoother import Forward, Storage, forward
+from rotordrop.tracking.smoother import Forward, forward
 
 SMALLEST, LARGEST = 0.125, 64.0
 """Limits of the size, over the usual one [1]. Below the smaller one the sensors' noise and the machine's
@@ -76,17 +76,13 @@ def forward_passes(fit: TrackedDrops, stage: Stage, factor: float) -> list[Forwa
 
 
 def with_noise(fit: TrackedDrops, stage: Stage, factor: float) -> TrackedDrops:
-    """The drops smoothed with unknown impulses of that size [1], linearised at a fit.
-
-    The pass writes where that of the fit did: what the fit says of covariances is gone.
-    """
+    """The drops smoothed with unknown impulses of that size [1], linearised at a fit."""
     drops = zip(fit.problems, fit.smoothed, strict=True)
     again = one_pass(
         fit.problems,
         stage_settings(fit.problems[0], stage, factor),
         fit.trajectories,
         max(float(problem.time[len(drop.means) - 1]) for problem, drop in drops),
-        storages=[Storage.of(drop.filtered) for drop in fit.smoothed],
     )
     return replace(
         fit,

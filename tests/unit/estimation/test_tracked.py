@@ -38,6 +38,7 @@ from rotordrop.estimation.tracked_loads import (
     INCONSISTENT_WIDENING,
     MODEL_FORCE_SIGMA,
     OF_CROSS_CHECK,
+    check_without_contact_law,
     holding_cross_check,
     is_beside,
     loads_of_cross_check,
@@ -479,9 +480,17 @@ def test_a_drop_that_nothing_can_check_is_refused(
 
 
 def test_an_estimate_keeps_no_array_of_the_filter(workshop: TrackedDrop, tracked: Estimate) -> None:
-    """What is kept of a drop is a few megabytes; the workshop has hundreds."""
+    """What is kept of a drop is a few megabytes; the covariances of its filter are hundreds."""
     kept = len(pickle.dumps(replace(tracked, record=None, machine=None, drop_instant=None)))  # type: ignore[arg-type]
-    assert kept < 10e6 < 0.1 * workshop.smoothed.filtered.covariances.nbytes
+    samples, estimated = workshop.smoothed.means.shape
+    assert kept < 10e6 < 0.1 * samples * estimated**2 * 4
+
+
+def test_the_cross_check_made_beside_the_passes_is_that_made_alone(workshop: TrackedDrop) -> None:
+    assert workshop.unaided is not None
+    beside, alone = workshop.without_contact_law(), check_without_contact_law(workshop.problem)
+    np.testing.assert_array_equal(beside.force, alone.force)
+    np.testing.assert_array_equal(beside.stress, alone.stress)
 
 
 def test_nothing_gives_way_to_a_cross_check_that_found_nothing(workshop: TrackedDrop) -> None:

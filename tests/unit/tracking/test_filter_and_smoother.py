@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from rotordrop.tracking import _propagation as P
+from rotordrop.tracking import smoother
 from rotordrop.tracking._covariance import is_covariance, pack, unpack
 from rotordrop.tracking.calibration import one_pass
 from rotordrop.tracking.problem import DropProblem, private_copy
-from rotordrop.tracking.smoother import PassSettings, Storage, fastest_frequency, forward, smooth
+from rotordrop.tracking.smoother import (
+    PassSettings,
+    Smoothed,
+    Storage,
+    fastest_frequency,
+    forward,
+    smooth,
+)
 
 SETTINGS = PassSettings(impulse=1e-3, share=0.01)
 
@@ -168,27 +177,88 @@ def test_a_packed_covariance_comes_back_whole(random):
     np.testing.assert_array_equal(back, whole)
 
 
+def all_of(smoothed: Smoothed) -> list[np.ndarray]:
+    """Everything that a backward pass gives."""
+    covariances = [smoothed.covariance(sample) for sample in smoothed.kept]
+    return [
+        smoothed.means,
+        smoothed.watched,
+        smoothed.information,
+        smoothed.score_0,
+        smoothed.information_0,
+        *covariances,
+    ]
+
+
+@pytest.mark.parametrize("length", [2, 7, 29, 58, 59, 60])
+def test_a_pass_in_stretches_has_the_bits_of_a_whole_one(flight, filtered, length, monkeypatch):
+    """Also where a stretch ends at the last sample, or one before it."""
+    kept = (0, length, 2 * length - 1, 59)
+    kept = tuple(sample for sample in kept if sample < 60)
+    whole = smooth(filtered, watched=flight.watched, kept=kept)
+    monkeypatch.setattr(smoother, "_stretch_length", lambda _: length)
+    storage = Storage()
+    parts = forward(flight, SETTINGS, storage=storage)
+    assert len(parts.starts) == math.ceil(59 / length)
+    for one, other in (
+        (parts.means, filtered.means),
+        (parts.innovations, filtered.innovations),
+        (parts.last, filtered.last),
+        (parts.covariance(length - 1), filtered.covariance(length - 1)),
+    ):
+        np.testing.assert_array_equal(one, other)
+    for again in (storage, None, storage):  # at hand, filtered again, and where another stretch is at hand
+        found = smooth(parts, watched=flight.watched, kept=kept, storage=again)
+        for one, other in zip(all_of(found), all_of(whole), strict=True):
+            np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("length", [10, 12, 24, 25])
+def test_a_pass_that_loses_the_drop_is_smoothed_to_where_it_got(flight, length, monkeypatch):
+    """Also where it is lost with the first sample of a stretch."""
+    readings = flight.readings.copy()
+    readings[25] = 1e3
+    far = replace(flight, readings=readings)
+    whole = forward(far, SETTINGS)
+    assert whole.done == 25
+    monkeypatch.setattr(smoother, "_stretch_length", lambda _: length)
+    parts = forward(far, SETTINGS)
+    assert parts.done == 25
+    np.testing.assert_array_equal(parts.last, whole.last)
+    for one, other in zip(all_of(smooth(parts)), all_of(smooth(whole)), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_memory_for_the_smoother_does_not_grow_with_the_drop(flight, monkeypatch):
+    monkeypatch.setattr(smoother, "STRETCH", 600_000)
+    used = {}
+    for samples in (20, 60):
+        storage = Storage()
+        parts = forward(flight, SETTINGS, samples=samples, storage=storage)
+        smooth(parts, storage=storage)
+        used[samples] = storage.size
+        assert len(parts.starts) > 1
+    assert used[20] == used[60] <= 1.2 * 600_000, "a stretch begins with a sample of the one before"
+
+
 def test_a_pass_in_the_memory_of_another_is_the_same(flight, filtered):
     """Shorter, then whole: nothing of the pass before is left in what the next one gives."""
     storage = Storage()
     first = forward(flight, SETTINGS, samples=25, storage=storage)
     again = forward(flight, SETTINGS, storage=storage)
     shorter = forward(flight, SETTINGS, samples=25, storage=storage)
-    assert np.shares_memory(again.covariances, shorter.covariances)
-    assert not np.shares_memory(first.covariances, again.covariances)  # it had no room for the longer one
     for one, count in ((first, 25), (shorter, 25)):
         np.testing.assert_array_equal(one.covariance(24), filtered.covariance(24))
         np.testing.assert_array_equal(
-            smooth(one).means, smooth(forward(flight, SETTINGS, samples=count)).means
+            smooth(one, storage=storage).means, smooth(forward(flight, SETTINGS, samples=count)).means
         )
-    whole = smooth(forward(flight, SETTINGS, storage=storage))
-    np.testing.assert_array_equal(whole.means, smooth(filtered).means)
+    np.testing.assert_array_equal(smooth(again, storage=storage).means, smooth(filtered).means)
 
 
 def test_the_last_sample_has_nothing_to_be_smoothed(filtered):
     smoothed = smooth(filtered)
     np.testing.assert_array_equal(smoothed.means[-1], filtered.means[-1])
-    np.testing.assert_array_equal(smoothed.covariance(filtered.done - 1), filtered.covariance(-1))
+    np.testing.assert_array_equal(smoothed.covariance(filtered.done - 1), filtered.last)
 
 
 def test_a_later_sample_only_narrows(flight, filtered):
@@ -241,7 +311,7 @@ def test_missing_readings_are_left_out(flight):
     place = flight.n_dynamic + len(flight.unknowns) + 2
     others = [place - 2, place - 1, place + 1]
     prior = deviations_of(flight.covariance) ** 2
-    shrunk = np.diag(found.covariance(-1)) / prior
+    shrunk = np.diag(found.last) / prior
     assert shrunk[place] > 0.999 * np.max(shrunk[others])
     plain = PlainFilter(partial).run()
     assert in_deviations(found.means[-1] - plain.means[-1], plain.covariances[-1]) < 1e-6
@@ -308,6 +378,7 @@ NOISELESS = PassSettings(impulse=0.0, share=0.0, spin_noise=0.0, speed_noise=0.0
 def linear_readings(problem: DropProblem, reference: np.ndarray):
     """All readings as a linear function of the estimate at the first sample: matrix, values, deviations."""
     found = forward(problem, NOISELESS, reference=reference)
+    kept = found.stretch(0, Storage())
     n, s = len(problem.mean), problem.n_dynamic
     columns = s + len(problem.unknowns)
     deviation = np.eye(n)  # of the estimate at sample i from its reference, by that at sample 0
@@ -316,13 +387,13 @@ def linear_readings(problem: DropProblem, reference: np.ndarray):
     for i in range(found.done):
         if i > 0:
             F = np.eye(n)
-            F[:s, :columns] = found.transitions[i]
+            F[:s, :columns] = kept.transitions[i]
             ahead = propagated(problem, reference[i - 1], i)
             deviation, shift = F @ deviation, F @ shift
             shift[:s] += ahead - reference[i, :s]
             shift[s:] += reference[i - 1, s:] - reference[i, s:]
         for c in range(problem.n_channels + 1):
-            row = found.rows[i, c]
+            row = kept.rows[i, c]
             if not row.any():
                 continue
             value, expected, variance = expected_reading(problem, reference[i], i, c)
@@ -404,7 +475,7 @@ def test_what_belongs_to_one_drop_does_not_reach_the_other(flight):
     assert lift not in first.machine_indices
     assert offset in first.machine_indices
     assert start[lift] == pytest.approx(prior[lift], rel=1e-6)
-    assert chained[0].filtered.covariance(-1)[lift, lift] < 0.9 * prior[lift]
+    assert chained[0].filtered.last[lift, lift] < 0.9 * prior[lift]
     assert start[offset] < 0.98 * alone[offset]
 
 

@@ -70,7 +70,6 @@ def test_the_last_pass_goes_to_the_end_of_the_longest_drop(monkeypatch: pytest.M
 
     monkeypatch.setattr(unknown_impulses, "one_pass", one_pass)
     monkeypatch.setattr(unknown_impulses, "stage_settings", lambda *_: None)
-    monkeypatch.setattr(unknown_impulses.Storage, "of", lambda _: None)
     drops = [SimpleNamespace(means=np.zeros((count, 1)), filtered=None) for count in (50, 200)]
     problems = [SimpleNamespace(time=1e-3 * np.arange(count)) for count in (50, 400)]
     fit: Any = TrackedDrops(problems=tuple(problems), smoothed=tuple(drops), nis=())  # type: ignore[arg-type]
