@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 STANDARD_OUTPUT = Path("-")
 _PLAIN_WIDTH = 110
 
+_LARGEST_MACHINE = 16 * 2**20
+"""Characters that are read to see which files a machine file names."""
+
 Progress = Callable[[str, float], None]
 
 _inputs: list[Path] = []
@@ -81,7 +84,8 @@ def _read_beside(file: Path) -> list[Path]:
     import tomllib
 
     try:
-        rotor = tomllib.loads(file.read_text(encoding="utf-8-sig")).get("rotor")
+        with file.open(encoding="utf-8-sig") as stream:
+            rotor = tomllib.loads(stream.read(_LARGEST_MACHINE)).get("rotor")
         return [file.parent / str(rotor["shaft_table"])] if isinstance(rotor, dict) else []
     except (OSError, ValueError, RecursionError, KeyError):
         return []  # whoever reads the file says what is wrong with it

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rotordrop.cli._interruption import interruptible
 from rotordrop.cli._options import JsonOption, MachineArgument, quantity
 from rotordrop.cli._output import console, deliver, progress_bar, require_places
 from rotordrop.cli.simulate import Integrator, Reduction
@@ -86,10 +87,12 @@ def coast_down(
     from rotordrop.machine import load_machine
     from rotordrop.model.parameters import build_drop_model
     from rotordrop.report.coast_down_page import coast_down_page
-    from rotordrop.report.terminal import print_summary
+    from rotordrop.report.terminal import print_summary, summary_console
+    from rotordrop.simulation._coast_run import MOST_STEPS_PER_WINDOW
     from rotordrop.simulation.case import CentredStart, LevitatedStart
     from rotordrop.simulation.coast_down import simulate_coast_down
     from rotordrop.simulation.coast_down_case import CoastDownCase
+    from rotordrop.simulation.expected_steps import long_run
 
     require_places(output, report, json_file)
     if resume and output is None:
@@ -108,8 +111,13 @@ def coast_down(
         integrator=integrator.value,
     )
     model = build_drop_model(described, case.reduction)
+    warning = long_run(described, 1.0, MOST_STEPS_PER_WINDOW)
+    if warning is not None:
+        summary_console(sys.stderr).print(f"each second: {warning}", soft_wrap=True)
     with _resumable(output), progress_bar("coast-down") as progress:
-        result = simulate_coast_down(model, case, output=output, resume=resume, progress=progress)
+        result = interruptible(
+            lambda: simulate_coast_down(model, case, output=output, resume=resume, progress=progress)
+        )
     assert result is not None
     certificate = _certificate(model, case, result) if certify else None
     numbers: dict[str, Any] = result.as_json()

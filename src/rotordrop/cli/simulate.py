@@ -122,7 +122,7 @@ def simulate(
     from rotordrop.report.terminal import print_summary, summary_console
     from rotordrop.simulation.case import DropCase
     from rotordrop.simulation.drop import simulate_drop
-    from rotordrop.simulation.expected_steps import MANY_STEPS, expected_steps
+    from rotordrop.simulation.expected_steps import long_run
 
     require_places(output, report, json_file)
     described = load_machine(machine)
@@ -142,9 +142,9 @@ def simulate(
         spin=spin.value,
         integrator=integrator.value,
     )
-    expected = expected_steps(described, duration)
-    if expected.steps > MANY_STEPS:
-        summary_console(sys.stderr).print(f"this will take long: {expected}; Ctrl-C stops it", soft_wrap=True)
+    warning = long_run(described, duration, case.most_steps)
+    if warning is not None:
+        summary_console(sys.stderr).print(warning, soft_wrap=True)
     result = interruptible(lambda: simulate_drop(described, case, certify=certify))
     page = simulate_page(result, described)
     if output is not None:

@@ -41,9 +41,10 @@ from rotordrop.simulation.checkpoint import (
     remove_work_folder,
     run_digest,
     save_checkpoint,
+    work_folder,
 )
 from rotordrop.simulation.coast_down_case import CoastDownCase
-from rotordrop.simulation.coast_down_file import Frame, write_coast_down, write_part
+from rotordrop.simulation.coast_down_file import Frame, ended_run, write_coast_down, write_part
 from rotordrop.simulation.coast_down_result import QUANTITIES, CoastDownResult, WindowStatistics
 
 Array = NDArray[np.float64]
@@ -71,7 +72,8 @@ def simulate_coast_down(
     output : Path, optional
         HDF5 file for the samples; without it only the statistics are kept.
     resume : bool
-        Go on with a run to the same output that was killed; the result is the same to the last bit.
+        Go on with a run to the same output that was killed; the result is the same to the last bit. A run
+        that had ended is read from its output.
     progress : callable, optional
         Called with a few words and the fraction done.
     windows_at_most : int, optional
@@ -98,6 +100,9 @@ def simulate_coast_down(
     model = machine if isinstance(machine, DropModel) else build_drop_model(machine, case.reduction)
     setup = prepare(model, case)
     digest = run_digest(model, f"{case!r} {N_RUN_COLUMNS}")
+    if output is not None and resume and (ended := ended_run(output, digest)) is not None:
+        remove_work_folder(work_folder(output))
+        return ended
     folder = None if output is None else _folder(output, resume=resume)
     stored = None if folder is None or not resume else load_checkpoint(folder, digest)
     run = begin(setup) if stored is None else Run.of(stored)
@@ -115,7 +120,7 @@ def simulate_coast_down(
     if folder is not None and output is not None:
         gaps = model.parameters.bearing[:, L.AIR_GAP]
         frame = Frame(sensor_nodes=setup.sensor_nodes, air_gap=gaps)
-        write_coast_down(result, frame, folder, int(run.status[PARTS]), output)
+        write_coast_down(result, frame, digest, folder, int(run.status[PARTS]), output)
         remove_work_folder(folder)
     return result
 

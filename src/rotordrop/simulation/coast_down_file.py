@@ -72,10 +72,13 @@ def write_part(path: Path, samples: Mapping[str, NDArray[Any]], contact_log: Arr
         file.create_dataset(CONTACT_LOG, data=contact_log)
 
 
-def write_coast_down(result: CoastDownResult, frame: Frame, folder: Path, parts: int, output: Path) -> None:
+def write_coast_down(
+    result: CoastDownResult, frame: Frame, digest: str, folder: Path, parts: int, output: Path
+) -> None:
     """Join the parts of a run to one file with its statistics; the file appears complete or not at all."""
     with new_hdf5(output) as file:
         file.attrs["format"] = FORMAT
+        file.attrs["run"] = digest
         file.attrs["fingerprint"] = fingerprint()
         _write_head(file, result, frame)
         _join(file, [part_path(folder, number) for number in range(parts)])
@@ -150,6 +153,17 @@ def is_coast_down(path: str | Path) -> bool:
         return False
     with h5py.File(path, "r") as file:
         return bool(file.attrs.get("format") == FORMAT)
+
+
+def ended_run(path: Path, digest: str) -> CoastDownResult | None:
+    """What a file holds if it is the whole of just this run, as a run killed behind its end left it."""
+    import h5py
+
+    if not is_coast_down(path):
+        return None
+    with h5py.File(path, "r") as file:
+        mine = file.attrs.get("run") == digest
+    return load_coast_down(path) if mine else None
 
 
 def _check_format(file: Any, path: Path) -> None:

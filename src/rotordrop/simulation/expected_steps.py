@@ -66,6 +66,27 @@ def expected_steps(machine: Machine, duration: float) -> ExpectedSteps:
     return ExpectedSteps(steps=duration * rate / STABLE, rate=rate, cause=cause)
 
 
+def long_run(machine: Machine, duration: float, most_steps: int) -> str | None:
+    """Sentence on a simulation that takes millions of steps, None on any other.
+
+    Parameters
+    ----------
+    machine : Machine
+        The machine.
+    duration : float
+        Time that is simulated [s].
+    most_steps : int
+        Steps after which the simulation ends unfinished [1].
+    """
+    expected = expected_steps(machine, duration)
+    if expected.steps <= MANY_STEPS:
+        return None
+    # the steps taken were half of those expected at least
+    hopeless = expected.steps > 2.0 * most_steps
+    unfinished = f"; it will end unfinished after {most_steps / 1e6:.3g} million" if hopeless else ""
+    return f"this will take long: {expected}{unfinished}; Ctrl-C stops it"
+
+
 def _rates(bearing: TouchdownBearing, rest: BearingSummary) -> Iterator[tuple[float, str]]:
     """Rates [1/s] of what a bearing is made of, at rest; under impacts they are somewhat higher."""
     stiffness, name = rest.tangent_stiffness, bearing.name

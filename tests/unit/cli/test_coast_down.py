@@ -356,18 +356,37 @@ def test_a_run_is_resumed_with_its_own_machine_only(machine, tmp_path, capsys):
     assert "add --resume to go on with it" in capsys.readouterr().err
     assert run(["coast-down", str(other), *again, "--resume"]) == 5
     assert "belongs to another run" in capsys.readouterr().err
-    assert run(["coast-down", machine, *again, "--resume"]) == 0
+    json_file = tmp_path / "c.json"
+    assert run(["coast-down", machine, *again, "--resume", "--json", str(json_file)]) == 0
     assert output.exists()
     assert not work_folder(output).exists()
-    assert run(["coast-down", machine, *again, "--resume"]) == 6
+    assert run(["coast-down", str(other), *again, "--resume"]) == 6
     assert "nothing to resume" in capsys.readouterr().err
+    # killed between its samples and its JSON, or while the parts were removed: what had ended is read again
+    told, samples = json_file.read_text(), output.read_bytes()
+    json_file.unlink()
+    work_folder(output).mkdir()
+    assert run(["coast-down", machine, *again, "--resume", "--json", str(json_file)]) == 0
+    assert (json_file.read_text(), output.read_bytes()) == (told, samples)
+    assert not work_folder(output).exists()
+
+
+def test_a_coast_down_of_millions_of_steps_says_so_first(machine, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("rotordrop.simulation.coast_down.simulate_coast_down", _stopped)
+    slow = tmp_path / "slow.toml"
+    save_machine(load_machine(machine).with_values({"NDE.support.mass": 1e-9}), slow)
+    assert run(["coast-down", str(slow), "--speed", "60 Hz"]) == 130
+    said = " ".join(capsys.readouterr().err.split())
+    assert "each second: this will take long: at least" in said
+    assert "it will end unfinished after 5 million; Ctrl-C stops it" in said
+
+
+def _stopped(*arguments, **options):
+    raise KeyboardInterrupt
 
 
 def test_ctrl_c_says_how_to_go_on(machine, tmp_path, monkeypatch, capsys):
-    def stopped(*arguments, **options):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("rotordrop.simulation.coast_down.simulate_coast_down", stopped)
+    monkeypatch.setattr("rotordrop.simulation.coast_down.simulate_coast_down", _stopped)
     output = tmp_path / "c.h5"
     assert run(["coast-down", machine, "--speed", "60 Hz", "--output", str(output)]) == 130
     assert "go on with --resume" in " ".join(capsys.readouterr().err.split())

@@ -3,6 +3,7 @@
 import gzip
 import io
 import struct
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -196,6 +197,30 @@ def test_an_array_that_claims_more_than_the_file_holds(tmp_path):
         read_recording(tmp_path / "bomb.npy", BY_PROFILE)
 
 
+@pytest.mark.parametrize("suffix", ["csv", "csv.gz", "h5", "mat", "tdms", "uff", "wav", "npy", "npz", "cfg"])
+def test_a_file_too_large_for_memory_is_refused_before_it_is_read(tmp_path, suffix):
+    path = tmp_path / f"drop.{suffix}"
+    with path.open("wb") as stream:
+        stream.truncate(20 * 2**30)
+    with pytest.raises(RecordError, match=rf"drop\.{suffix} has 21\.5 GB, at most 1\.07 GB are read; export"):
+        read_recording(path, Profile())
+
+
+def test_what_is_no_text_is_refused_by_its_beginning(tmp_path):
+    path = tmp_path / "drop.csv"
+    with path.open("wb") as stream:
+        stream.write(b"time,a\n")
+        stream.truncate(2**30)
+    tracemalloc.start()
+    with pytest.raises(RecordError, match=r"drop\.csv is not a text file: character 8 is a zero byte"):
+        read_recording(path, Profile())
+    path.write_bytes(b"1" * 20_000_000)
+    with pytest.raises(RecordError, match=r"line 1 has more than 1000000 characters; no row"):
+        read_recording(path, Profile())
+    assert tracemalloc.get_traced_memory()[1] < 30e6
+    tracemalloc.stop()
+
+
 def test_gzip_of_any(machine, tmp_path):
     path = tmp_path / "drop.csv.gz"
     path.write_bytes(gzip.compress(WAYS["status column"].encode()))
@@ -203,8 +228,8 @@ def test_gzip_of_any(machine, tmp_path):
     path.write_bytes(path.read_bytes()[:-9])
     with pytest.raises(RecordError, match=r"drop\.csv\.gz cannot be unpacked: .*copy it again"):
         read_record(path, machine)
-    path.write_bytes(gzip.compress(bytes(300 * 2**20)))
-    with pytest.raises(RecordError, match=r"drop\.csv\.gz claims \d+ samples .*exhaust memory"):
+    path.write_bytes(gzip.compress(bytes(40 * 2**20)))
+    with pytest.raises(RecordError, match=r"drop\.csv\.gz claims \d+ samples .*exhaust.*at most 34 MB"):
         read_record(path, machine)
 
 

@@ -21,6 +21,9 @@ Reader = Callable[[Path, Profile], Recording]
 
 GROUP = "rotordrop.readers"
 
+LARGEST = 2**30
+"""Largest file that is read [byte]: it is held in memory, as text several times over."""
+
 _DELIMITED = "rotordrop.measurement.readers.delimited:read_delimited"
 _HDF5 = "rotordrop.measurement.readers.hdf5:read_hdf5"
 _COMTRADE = "rotordrop.measurement.readers.comtrade:read_comtrade"
@@ -65,10 +68,21 @@ def read_recording(path: Path, profile: Profile) -> Recording:
     if not there:
         what = "is a folder" if path.is_dir() else "is no file" if path.exists() else "does not exist"
         raise RecordError(f"the recording {path} {what}; check the path")
+    refuse_large(path)
     name = profile.format if profile.format and path.suffix != ".gz" else path.suffix.lstrip(".").lower()
     if name == "dat" and any(path.with_suffix(suffix).is_file() for suffix in (".cfg", ".CFG")):
         name = "comtrade"
     return find_reader(name, path)(path, profile)
+
+
+def refuse_large(path: Path) -> None:
+    """Refuse a file that is too large to be held in memory."""
+    size = path.stat().st_size
+    if size > LARGEST:
+        raise RecordError(
+            f"the recording {path} has {size / 1e9:.3g} GB, at most {LARGEST / 1e9:.3g} GB are read; export "
+            "the seconds around the drop, or fewer channels"
+        )
 
 
 def find_reader(name: str, path: Path) -> Reader:
@@ -90,4 +104,4 @@ def known_formats() -> tuple[str, ...]:
     return tuple(sorted({*_SUPPLIED, *(entry.name for entry in entry_points(group=GROUP))}))
 
 
-__all__ = ["GROUP", "Reader", "find_reader", "known_formats", "read_recording"]
+__all__ = ["GROUP", "Reader", "find_reader", "known_formats", "read_recording", "refuse_large"]

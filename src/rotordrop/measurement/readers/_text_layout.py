@@ -32,6 +32,9 @@ _STAMP = re.compile(
     r"(?:(?P<hour>[0-9]{1,2}):(?P<minute>[0-9]{2})(?::(?P<whole>[0-9]{2})(?:[.,](?P<part>[0-9]{1,12}))?)?"
     r"(?:Z|[+-][0-9]{2}:?[0-9]{2})?)?(?<=[0-9Z])"
 )
+_WIDE = (b"\xff\xfe", b"\xfe\xff")
+"""Marks at the begin of a text of two bytes per character."""
+
 _LONGEST_LINE = 1_000_000
 
 ColumnKind = Literal["number", "time", "text"]
@@ -74,7 +77,11 @@ def read_lines(path: Path, rules: TextLayout) -> tuple[list[str], bool, str]:
     encoding : str
         The encoding used.
     """
-    content = path.read_bytes()
+    with path.open("rb") as stream:
+        content = stream.read(_LONGEST_LINE + 1)
+        if not content.startswith(_WIDE) and not rules.encoding:
+            _refuse_no_text(content, path)
+        content += stream.read()
     if not content:
         raise RecordError(f"{path} is empty (0 bytes); export the recording again")
     encoding = rules.encoding or _encoding(content)
@@ -100,10 +107,25 @@ def read_lines(path: Path, rules: TextLayout) -> tuple[list[str], bool, str]:
     return lines, complete, encoding
 
 
+def _refuse_no_text(begin: bytes, path: Path) -> None:
+    """Refuse what its beginning shows to be no text before all of it is read."""
+    if b"\x00" in begin:
+        raise RecordError(
+            f"{path} is not a text file: character {begin.index(0) + 1} is a zero byte; set 'format' in the "
+            "profile"
+        )
+    if len(begin) > _LONGEST_LINE and not any(end in begin for end in (b"\n", b"\r")):
+        raise RecordError(
+            f"{path}, line 1 has more than {_LONGEST_LINE} characters; no row of a recording is so long: "
+            "export it again, one row per sample"
+        )
+
+
 def _encoding(content: bytes) -> str:
-    for mark, name in ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16")):
-        if content.startswith(mark):
-            return name
+    if content.startswith(b"\xef\xbb\xbf"):
+        return "utf-8-sig"
+    if content.startswith(_WIDE):
+        return "utf-16"
     try:
         content.decode("utf-8")
     except UnicodeDecodeError:

@@ -11,6 +11,7 @@ import numpy as np
 
 from rotordrop.errors import RecordError
 from rotordrop.measurement.profile import Profile
+from rotordrop.measurement.readers import refuse_large
 from rotordrop.measurement.recording import Array, Channel, Recording, known_unit, split_unit
 
 _FORMATS = {"BINARY": ("<i2", -(2**15)), "BINARY32": ("<i4", -(2**31)), "FLOAT32": ("<f4", None)}
@@ -81,8 +82,9 @@ def _disagreement(time: Array, stamps: Array, told: _Configuration) -> tuple[str
 
 def _beside(path: Path, suffix: str) -> Path:
     for name in (suffix, suffix.upper(), suffix.capitalize()):
-        if path.with_suffix(f".{name}").is_file():
-            return path.with_suffix(f".{name}")
+        if (found := path.with_suffix(f".{name}")).is_file():
+            refuse_large(found)
+            return found
     raise RecordError(f"{path} needs {path.with_suffix('.' + suffix).name} beside it; copy both files")
 
 

@@ -14,6 +14,13 @@ from rotordrop.measurement.unpacking import refuse_bomb
 
 _BLOCK = 2**20
 
+_UNPACKED = 32 * 2**20
+"""Bytes that any packed file may hold, and …"""
+
+_UNPACKED_PER_BYTE = 16
+"""… this many times its own: noisy readings pack three to six times, and a text takes eight times its bytes
+to be read."""
+
 
 def read_gzip(path: Path, profile: Profile) -> Recording:
     """Read ``drop.csv.gz`` and the like.
@@ -40,7 +47,7 @@ def _unpack(path: Path, inside: Path) -> None:
         with gzip.open(path, "rb") as packed, inside.open("wb") as stream:
             while block := packed.read(_BLOCK):
                 written += len(block)
-                refuse_bomb(written // 8, size, path)
+                refuse_bomb(written // 8, size, path, most=_UNPACKED, most_per_byte=_UNPACKED_PER_BYTE)
                 stream.write(block)
     except (EOFError, gzip.BadGzipFile, zlib.error) as error:
         raise RecordError(f"{path} cannot be unpacked: {error}; copy it again") from error

@@ -159,9 +159,23 @@ def _content(answer: bytes, path: Path) -> Content:
     return Content(items=tuple(items), attributes=told["attributes"])
 
 
-def refuse_bomb(samples: int, size: int, what: object) -> None:
-    """Refuse a file whose samples would fill far more memory than a recording of its size."""
-    limit = max(UNPACKED, UNPACKED_PER_BYTE * size)
+def refuse_bomb(
+    samples: int, size: int, what: object, *, most: int = UNPACKED, most_per_byte: int = UNPACKED_PER_BYTE
+) -> None:
+    """Refuse a file whose samples would fill far more memory than a recording of its size.
+
+    Parameters
+    ----------
+    samples : int
+        Samples that the file claims [1].
+    size : int
+        Size of the file [byte].
+    what : object
+        What to call it.
+    most, most_per_byte : int
+        What any file may hold [byte], and what it may hold per byte when that is more [1].
+    """
+    limit = max(most, most_per_byte * size)
     if 8 * samples > limit:
         raise RecordError(
             f"{what} claims {samples} samples in {size} bytes; it is damaged or made to exhaust memory "
