@@ -163,7 +163,7 @@ def calibrate_machine(
     covariance = smoothed.covariance(at)
     mean = smoothed.means[at]
     widening = 1.0 if consistent else INCONSISTENT_WIDENING
-    values = _values(problem, mean, covariance, widening, len(stems))
+    values = _values(problem, mean, covariance, widening)
     bearings = [bearing.name for bearing in machine.touchdown_bearings]
     identifiability = _identifiability(problem, covariance, values)
     known = _as_known(at_fitted_exponents(machine, values), identifiability)
@@ -257,7 +257,7 @@ def _possible(machine: Machine, fitted: dict[str, Estimated], drops: Sequence[st
 
 
 def _values(
-    problem: DropProblem, mean: Array, covariance: Array, widening: float, drops: int
+    problem: DropProblem, mean: Array, covariance: Array, widening: float
 ) -> dict[str, IdentifiedValue]:
     sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     values: dict[str, IdentifiedValue] = {}
@@ -265,7 +265,7 @@ def _values(
         if unknown.scope != "machine":
             continue
         i = problem.n_dynamic + k
-        error = model_error(unknown, float(sigma[i]), drops)
+        error = model_error(unknown, float(sigma[i]))
         wide = parameter_widening(unknown, error, widening)
         values[unknown.path] = identified(unknown, float(mean[i]), error, wide)
     first = problem.n_dynamic + len(problem.unknowns)

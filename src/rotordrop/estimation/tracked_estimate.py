@@ -222,7 +222,7 @@ def _judge(drop: TrackedDrop, check: InputEstimate | None) -> _Judgement:
         _refuse_unchecked(drop)
     fits = drop.consistent or check is None
     widening = 1.0 if drop.consistent else INCONSISTENT_WIDENING
-    found = parameters(problem, smoothed, fits=fits, widening=widening, drops=drop.drops)
+    found = parameters(problem, smoothed, fits=fits, widening=widening)
     given_way = [False] * len(problem.model.bearing_names)
     if not fits and check is not None:
         given_way = [_gives_way(drop, found, check, b) for b in range(len(given_way))]

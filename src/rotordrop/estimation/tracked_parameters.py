@@ -23,11 +23,11 @@ from rotordrop.tracking.smoother import Smoothed, parameter_sample
 
 Array = NDArray[np.float64]
 
-MODEL_GAP_SIGMA = 0.01
-"""Standard deviation of a gap, over it, by what confounds it with gains and offsets beyond the fit [1]."""
-LONE_GAP_SIGMA = 0.016
-"""The same for a gap that was only guessed before a lone drop [1]: one drop seldom touches all round, and
-near the bottom gap and sensor offset are hard to tell apart."""
+MODEL_GAP_SIGMA = 0.008
+"""Standard deviation of a gap, over it, by what confounds it with gains and offsets beyond the fit [1].
+
+Sensors that read 1 % of the motion across, as mounted 0.6° aside, moved gaps of lone drops by up to 2 %.
+"""
 UNSURE_GAP = 0.05
 """Relative prior standard deviation from which an air gap counts as guessed [1]."""
 PARAMETER_WIDENING = 1.5
@@ -69,17 +69,14 @@ def within_bounds(row: Parameter, interval: tuple[float, float]) -> tuple[float,
     return (max(low, 0.0), max(high, 0.0)) if row is parameter("air_gap") else interval
 
 
-def left_out(unknown: Unknown, drops: int) -> float:
-    """Standard error of a parameter by what the fit to a number of drops leaves out of it."""
-    if unknown.parameter is not parameter("air_gap"):
-        return 0.0
-    lone = drops == 1 and unknown.sigma > UNSURE_GAP * unknown.begin
-    return (LONE_GAP_SIGMA if lone else MODEL_GAP_SIGMA) * unknown.begin
+def left_out(unknown: Unknown) -> float:
+    """Standard error of a parameter by what the fit leaves out of it."""
+    return MODEL_GAP_SIGMA * unknown.begin if unknown.parameter is parameter("air_gap") else 0.0
 
 
-def model_error(unknown: Unknown, sigma: float, drops: int) -> float:
-    """Standard error of a parameter with what the fit to a number of drops leaves out of it."""
-    return math.hypot(sigma, left_out(unknown, drops))
+def model_error(unknown: Unknown, sigma: float) -> float:
+    """Standard error of a parameter with what the fit leaves out of it."""
+    return math.hypot(sigma, left_out(unknown))
 
 
 def parameter_widening(unknown: Unknown, sigma: float, widening: float = 1.0) -> float:
@@ -88,7 +85,7 @@ def parameter_widening(unknown: Unknown, sigma: float, widening: float = 1.0) ->
 
 
 def parameters(
-    problem: DropProblem, smoothed: Smoothed, *, fits: bool, widening: float, drops: int
+    problem: DropProblem, smoothed: Smoothed, *, fits: bool, widening: float
 ) -> tuple[FittedParameter, ...]:
     """Every unknown as it was shortly after the first contacts, beside what was known before.
 
@@ -99,13 +96,13 @@ def parameters(
     sigma = np.sqrt(np.maximum(np.diag(smoothed.covariance(at))[problem.parameter_slice], 0.0))
     found = []
     for unknown, t, s in zip(problem.unknowns, theta, sigma, strict=True):
-        error = model_error(unknown, float(s), drops)
+        error = model_error(unknown, float(s))
         prior = identified(unknown, unknown.mean, unknown.sigma)
         wider = parameter_widening(unknown, error, widening)
         value = identified(unknown, float(t), error, wider)
         if not fits:
             value = replace(value, status=INCONSISTENT, interval_90=_hull(value, prior))
-        elif (allowed := left_out(unknown, drops)) > 0.0:
+        elif (allowed := left_out(unknown)) > 0.0:
             value = replace(value, allowance_90=NINETY * wider * allowed)
         found.append(FittedParameter(row=unknown.parameter, owner=unknown.owner, prior=prior, estimate=value))
     return tuple(found)

@@ -128,7 +128,7 @@ def test_a_calibrated_gain_undoes_the_error_of_the_sensor() -> None:
     errors, offsets = np.array([0.1, -0.2]), np.array([3e-6, -4e-6])
     sigma = np.array([1.0, 1.0, 1.0, 0.02, 0.01, 1e-6, 2e-6])
     mean = np.concatenate([np.zeros(3), errors, offsets])
-    found = _values(only, mean, np.diag(sigma**2), 1.5, 2)
+    found = _values(only, mean, np.diag(sigma**2), 1.5)
     for c, name in enumerate(names):
         gain, offset = found[f"sensors.{name}.gain"], found[f"sensors.{name}.offset"]
         assert gain.value * (1.0 + errors[c]) == pytest.approx(1.0)
@@ -262,7 +262,7 @@ def test_a_twin_that_fits_stands_whether_it_was_cross_checked_or_not(
 ) -> None:
     seen: list[tuple[bool, float]] = []
 
-    def parameters(*_: Any, fits: bool, widening: float, drops: int) -> tuple[Any, ...]:
+    def parameters(*_: Any, fits: bool, widening: float) -> tuple[Any, ...]:
         seen.append((fits, widening))
         return ()
 

@@ -11,6 +11,7 @@ import pytest
 from rotordrop.cli.app import run
 from rotordrop.errors import UsageError
 from rotordrop.machine import load_machine
+from rotordrop.measurement.record import sha256_of
 from rotordrop.synthesis import Violations, read_truth
 from rotordrop.synthesis.bench import DROPS, VERSION, make_bench, score_bench
 from rotordrop.synthesis.bench.departures import departures
@@ -142,6 +143,21 @@ def test_true_estimates_have_no_error(folder, estimates):
     assert row.worst == pytest.approx(0.0, abs=1e-12)
     assert row.half_width == pytest.approx(0.02)
     assert (scores.departures, scores.named_rightly, scores.named_wrongly) == (1, 1, 1)
+
+
+def test_an_estimate_counts_for_the_recording_it_was_made_of(folder, estimates):
+    """The document of ``rotordrop estimate`` names its recording, and all of the bench are ``record.csv``."""
+    _estimates(estimates)
+    for name in MADE:
+        file = estimates / f"{name}.json"
+        recorded = {
+            "record": "record.csv",
+            "record_sha256": sha256_of(folder / "drops" / MADE[0] / "record.csv"),
+        }
+        file.write_text(json.dumps(json.loads(file.read_text()) | recorded))
+    scores = score_bench(folder, estimates)
+    assert set(scores.unscored) == {MADE[1]}
+    assert "belongs to record.csv" in scores.unscored[MADE[1]]
 
 
 def test_a_wrong_and_a_missing_estimate_are_lost(folder, estimates):
