@@ -251,18 +251,24 @@ def found_beside_the_usual(usual: Candidate, search: Search) -> Candidate:
     search : Search
         Fits machines to the record.
     """
-    extended = [(one, one.added_to(usual.machine)) for one in EXTENSIONS if one.values(usual.machine)]
-    machines = [usual.machine, *(machine for _, machine in extended)]
+    able = [one for one in EXTENSIONS if one.shows_beside and one.values(usual.machine)]
     with ThreadPoolExecutor(max_workers=THREADS) as pool:
-        plain, *others = pool.map(lambda machine: search.judge(usual.fit, machine), machines)
-    if not math.isfinite(plain):
+        described = pool.submit(search.judge, usual.fit, usual.machine)
+
+        def rise(one: Extension) -> float:
+            with_it = search.judge(usual.fit, one.added_to(usual.machine))
+            if not one.usual(usual.machine):
+                return described.result() - with_it
+            return search.judge(usual.fit, one.saying_the_usual(usual.machine)) - with_it
+
+        rises = list(pool.map(rise, able))
+    if not math.isfinite(described.result()):
         return usual
-    gains = [plain - other for other in others]
-    if max(gains, default=0.0) < PAYS_BESIDE:
-        return usual
-    extension, machine = extended[gains.index(max(gains))]
-    found = Candidate(machine=machine, fit=search.look(usual.fit, machine, BACK_PASSES))
-    again = replace(usual, fit=search.look(usual.fit, usual.machine, BACK_PASSES))
-    gain = gain_of(found, again)
-    kept = (Kept(extension=extension, gain=gain),)
-    return replace(found, kept=kept) if gain >= PAYS_BESIDE else usual
+    promising = [pair for pair in zip(rises, able, strict=True) if pair[0] >= PAYS_BESIDE]
+    for _, extension in sorted(promising, key=lambda pair: -pair[0]):
+        machine, plain = extension.added_to(usual.machine), extension.saying_the_usual(usual.machine)
+        found = Candidate(machine=machine, fit=search.look(usual.fit, machine, BACK_PASSES))
+        again = replace(usual, fit=search.look(usual.fit, plain, BACK_PASSES))
+        if (gain := gain_of(found, again)) >= PAYS_BESIDE:
+            return replace(found, kept=(Kept(extension=extension, gain=gain),))
+    return usual
