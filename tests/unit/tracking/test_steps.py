@@ -78,13 +78,12 @@ def test_a_filter_that_lost_the_drop_is_judged_by_what_it_followed() -> None:
         done=60,
         impulse=1e-3,
         means=nothing,
-        covariances=nothing,  # type: ignore[arg-type]
-        transitions=nothing,  # type: ignore[arg-type]
-        rows=nothing,
-        gains=nothing,
         innovations=innovations,
         innovation_variances=variances,
         parameter_sample=0,
+        last=nothing,
+        course=nothing,  # type: ignore[arg-type]
+        starts=(),
     )
     terms = [
         (e**2 / s, np.log(s))
