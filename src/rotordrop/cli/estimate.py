@@ -146,11 +146,12 @@ def _write(
     since: Mapping[str, Any] | None,
 ) -> None:
     from rotordrop.estimation.document import combined, estimate_document
-    from rotordrop.report.estimate_page import estimate_page
+    from rotordrop.report.estimate_page import estimate_page, estimate_summary
     from rotordrop.report.page import write_page
     from rotordrop.report.terminal import print_summary
 
-    pages = [estimate_page(estimate, origin, since) for estimate in estimates]
+    whole = bool(reports) or since is not None
+    pages = [estimate_page(e, origin, since) if whole else estimate_summary(e, origin) for e in estimates]
     for page, place in zip(pages, reports, strict=False):
         write_page(page, place)
 

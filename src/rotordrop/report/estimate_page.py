@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -61,6 +62,11 @@ def estimate_page(
     since : mapping, optional
         Document of an earlier estimate of the machine, with which this one is compared.
     """
+    return replace(estimate_summary(estimate, origin), sections=_sections(estimate, since))
+
+
+def estimate_summary(estimate: Estimate, origin: Origin | None = None) -> ReportContent:
+    """The same without its sections: what a terminal shows, for which no figure need be drawn."""
     speed = Quantity(value=estimate.speed, kind="speed", digits=4)
     replayed = isinstance(estimate.method, Replay)
     fixed = estimate.replay.fixed if estimate.replay else ""
@@ -72,7 +78,6 @@ def estimate_page(
         cards=tuple(headline_card(b, certain=estimate.consistent) for b in estimate.bearings),
         summary=(identified_table(estimate.bearings, taken_over=fixed, certain=estimate.consistent),),
         facts=(*_facts(estimate), *(origin or Origin()).facts(estimate.record.sha256)),
-        sections=_sections(estimate, since),
     )
 
 
