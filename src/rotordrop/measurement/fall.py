@@ -114,7 +114,7 @@ class _Problem:
         since = time - release
         fixed = self.responses.fixed
         step, forward, backward = (self._seen(response_at(table, since)) for table in fixed)
-        left = self._seen(response_at(self.responses.fading(decay), since)) * self.rotor.lift
+        left = self._seen(self.responses.fading(decay, since)) * self.rotor.lift
         fall = (-1j * step * self.rotor.lift).sum(axis=-1).real
         parts = [column for unit in (left, forward, backward) for column in (unit.real, -unit.imag)]
         expected = fall + parts[1].sum(axis=-1) * REMANENT_SHARE[0]

@@ -217,22 +217,24 @@ class FallResponses:
             inputs=np.vstack([np.zeros_like(rotor.force_rows.T), rotor.force_rows.T]),
         )
 
-    def fading(self, decay: float) -> ComplexArray:
-        """Response (K, P, A) to unit forces that fade with a time constant [s].
+    def fading(self, decay: float, since: Array) -> ComplexArray:
+        """Response (T, P, A) to forces that fade with a time constant [s], at times from the release [s].
 
-        With x' = A x + B exp(−t/τ) and x(0) = 0, x = (exp(A t) − exp(−t/τ)) (A + 1/τ)⁻¹ B.
+        With x' = A x + B exp(−t/τ) and x(0) = 0, x = (exp(A t) − exp(−t/τ)) (A + 1/τ)⁻¹ B. Only the rows that
+        are asked for are multiplied: the whole table is ten times as long, and a product of that size is
+        handed to several threads, which on a busy computer cost ten times the work.
         """
         rate = 1.0 / decay
         share = np.linalg.solve(self.system + rate * np.eye(len(self.system)), self.inputs)
-        count, planes, _ = self.free.shape
-        fades = np.exp(-rate * GRID * np.arange(count))[:, None, None]
-        released = self.free.reshape(count * planes, -1) @ share
-        return np.asarray(released.reshape(count, planes, -1) - fades * (self.free[0] @ share))
+        fades = np.exp(-rate * GRID * np.arange(len(self.free)))[:, None, None]
+        free = response_at(self.free, since)
+        released = (free.reshape(-1, free.shape[-1]) @ share).reshape(*free.shape[:2], -1)
+        return np.asarray(released - response_at(fades, since) * (self.free[0] @ share))
 
 
-def response_at(table: ComplexArray, since: Array) -> ComplexArray:
+def response_at(table: ComplexArray | Array, since: Array) -> ComplexArray:
     """Look up a tabulated response at times since the release [s], shape (T,): zero before it."""
     place = np.clip(since / GRID, 0.0, len(table) - 1.001)
     low = place.astype(np.int64)
     share = (place - low)[:, None, None]
-    return table[low] * (1.0 - share) + table[low + 1] * share
+    return np.asarray(table[low] * (1.0 - share) + table[low + 1] * share)

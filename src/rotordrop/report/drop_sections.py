@@ -226,12 +226,14 @@ def _first_contact(bearings: Sequence[BearingDrop], tables: tuple[Table, ...]) -
     return Section(heading="First contact", figures=(figure,), tables=tables)
 
 
-def orbit_section(bearings: Sequence[BearingMotions | BearingDrop]) -> Section:
-    """Orbits in the clearance circle and the radial displacement."""
+def orbit_section(
+    bearings: Sequence[BearingMotions | BearingDrop], early: Sequence[BearingMotions] = (), until: str = ""
+) -> Section:
+    """Orbits in the clearance circle, of an early part alone where one is given, and radial displacement."""
     orbit = Figure(
-        chart=orbit_figure(bearings),
-        caption="Path of the rotor centre against the clearance circle; x to the right, y up, seen from the "
-        "last bearing (Neisi 2020, Fig. 12).",
+        chart=orbit_figure(early or bearings),
+        caption=f"Path of the rotor centre against the clearance circle{until}; x to the right, y up, seen "
+        "from the last bearing (Neisi 2020, Fig. 12).",
         name="orbit",
     )
     limits = any(bearing.at_gap_limits for bearing in bearings)

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import degrees
 from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from rotordrop._version import __version__
 from rotordrop.estimation.bearing_drop import AirGap, BearingMotions, Motion
@@ -27,6 +31,10 @@ if TYPE_CHECKING:
 
 MOST_LISTED = 40
 """Impacts listed on the page; the JSON has all."""
+
+
+ORBIT_BEFORE, ORBIT_UNTIL = 0.05, 0.5
+"""Part of the record that the orbits are drawn of, from the release [s]: those of a minute are one blot."""
 
 
 def look_page(seen: Look, *, drawn: bool = True) -> ReportContent:
@@ -159,7 +167,16 @@ def _figures(seen: Look) -> tuple[Section, ...]:
         for path in seen.motion.paths
     ]
     note = "Displacement in the planes of the sensors; time counts from the release."
-    return motion_section(bearings, "measured", note), orbit_section(bearings)
+    first = (time >= -ORBIT_BEFORE) & (time <= ORBIT_UNTIL)
+    begin = [
+        replace(bearing, motions=tuple(_part(m, first) for m in bearing.motions)) for bearing in bearings
+    ]
+    until = f" until {ORBIT_UNTIL:g} s after the release" if time[-1] > ORBIT_UNTIL else ""
+    return motion_section(bearings, "measured", note), orbit_section(bearings, begin, until)
+
+
+def _part(motion: Motion, kept: NDArray[np.bool_]) -> Motion:
+    return replace(motion, time=motion.time[kept], displacement=motion.displacement[kept])
 
 
 def _impacts(seen: Look) -> Section:

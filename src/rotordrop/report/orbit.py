@@ -25,6 +25,8 @@ from rotordrop.report.style import (
 
 CIRCLE = np.linspace(0.0, 2.0 * np.pi, 181)
 ORBIT_BLOCKS = 450
+ORBIT_POINTS = 4000
+"""Samples at even steps that an orbit is drawn with: 40 a turn at 200 Hz in half a second."""
 
 
 def orbit_figure(bearings: Sequence[BearingMotions | BearingDrop]) -> go.Figure:
@@ -57,7 +59,9 @@ def orbit_figure(bearings: Sequence[BearingMotions | BearingDrop]) -> go.Figure:
 def _add_orbit(figure: go.Figure, motion: Motion, column: int, line: dict[str, Any] | None) -> None:
     x, y = motion.displacement[:, 0], motion.displacement[:, 1]
     radius = np.hypot(x, y)
-    chosen = peak_indices(x, y, radius, blocks=ORBIT_BLOCKS)
+    # extremes alone would join points of different turns by chords that the rotor never went
+    even = np.arange(0, len(x), -(-len(x) // ORBIT_POINTS))
+    chosen = np.union1d(peak_indices(x, y, radius, blocks=ORBIT_BLOCKS), even)
     label = plain(motion.label)
     figure.add_trace(
         go.Scatter(

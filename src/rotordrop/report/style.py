@@ -134,6 +134,22 @@ def label_time(figure: go.Figure, row: int | None = None) -> None:
     figure.update_xaxes(rangemode="tozero")
 
 
+def in_seconds(figure: go.Figure) -> None:
+    """Turn the time axes of a figure, and what is drawn along them, from milliseconds to seconds."""
+    for trace in figure.data:
+        trace.x = single(np.asarray(trace.x, dtype=np.float64) / MILLI)
+        if trace.hovertemplate:
+            trace.hovertemplate = trace.hovertemplate.replace("%{x:.2f} ms", "%{x:.4f} s")
+    for mark in figure.layout.annotations:
+        if mark.xref and "domain" not in mark.xref and mark.xref != "paper":
+            mark.x /= MILLI
+    figure.for_each_xaxis(
+        lambda axis: (
+            axis.title.update(text=axis_title("time from power-off", "s")) if axis.title.text else None
+        )
+    )
+
+
 def line_style(role: Role, index: int | None = None) -> dict[str, Any]:
     """Colour and width of a history; an index takes the colour of a series instead of the role's."""
     colour = COLOURS[role] if index is None else SERIES[index % len(SERIES)]

@@ -21,10 +21,14 @@ from rotordrop.report.style import (
     axis_title,
     compared_style,
     fit_legend,
+    in_seconds,
     label_time,
     line_style,
     panels,
 )
+
+LONG = 3.0
+"""Time [s] from which on an axis counts seconds."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,6 +123,9 @@ def time_panels(
         for j, panel in enumerate(row, start=1):
             _draw(figure, panel, scale, unit, i, j, legend)
     label_time(figure, row=len(rows))
+    drawn = [history.time for row in rows for panel in row for history in panel.histories]
+    if any(float(np.ptp(time)) > LONG for time in drawn if len(time)):
+        in_seconds(figure)
     if not from_power_off:
         figure.update_xaxes(rangemode="normal", matches=None, showticklabels=True)
     figure.update_yaxes(rangemode="tozero" if from_zero else "normal")

@@ -9,9 +9,13 @@ import pytest
 from rotordrop.errors import RecordError
 from rotordrop.estimated import Estimated
 from rotordrop.measurement import check_record, refuse_unusable
+from rotordrop.measurement.axes import sensor_planes
+from rotordrop.measurement.events import drop_and_levitated
+from rotordrop.measurement.levitated import fit_levitated
 from rotordrop.measurement.quality import Finding, _not_both, sensing
-from rotordrop.measurement.quality.arrangement import LEANING
+from rotordrop.measurement.quality.arrangement import LEANING, check_planes
 from rotordrop.measurement.quality.clock import check_clock
+from rotordrop.measurement.quality.ends import fell_as_described
 from rotordrop.measurement.quality.motion import check_rotation_line, first_motion
 from rotordrop.synthesis import hidden_machine, synthesize_drop
 
@@ -401,7 +405,39 @@ class TestArrangement:
         made = synthesize_drop(hidden, 200.0 * HZ, 1, duration=0.1, name="rough")
         found = check_record(made.record, machine, made.tail)
         assert "stop" not in {one.severity for one in found}
-        assert any("leans" in one.message and one.severity == "warning" for one in found)
+        assert any("leans" in one.message and one.severity == "note" for one in found)
+
+    def test_a_lean_that_an_exchange_explains_is_none_after_a_fall_as_described(self, drop):
+        """Friction of 0.12 drove the DE up the side of a rotor of 400 kg: refused as swapped axes."""
+        planes = sensor_planes(drop.sensors)
+        aside = np.array([-20.0, -20.0, -32.5, 12.7]) * 1e-6
+        forward = 5e-6 * np.exp(-1j * np.array([float(sensor.angle) for sensor in drop.sensors]))
+        (wired,) = check_planes(planes, aside, forward)
+        assert (wired.kind, wired.severity) == ("swapped axes", "stop")
+        (driven,) = check_planes(planes, aside, forward, fell_straight=True)
+        assert (driven.kind, driven.severity) == ("leaning fall", "warning")
+        assert "leans 66° from straight down, but before the first contact the rotor falls" in driven.message
+        # an orbit against the spin is no matter of the fall
+        backward = check_planes(planes, aside, forward.conj(), fell_straight=True)
+        assert {one.severity for one in backward} == {"stop"}
+
+    @pytest.mark.parametrize(
+        ("signs", "order", "told"),
+        [
+            ((1, 1, 1, 1), (0, 1, 2, 3), True),
+            ((1, 1, -1, 1), (0, 1, 3, 2), False),
+            ((1, 1, -1, 1), (0, 1, 2, 3), False),
+            ((1, 1, -1, -1), (0, 1, 2, 3), False),
+        ],
+    )
+    def test_the_fall_before_the_first_contact_shows_where_the_sensors_look(
+        self, signs, order, told, drop, machine
+    ):
+        planes = sensor_planes(drop.sensors)
+        coarse, _ = drop_and_levitated(drop, machine, drop, planes)
+        record = replace(drop, signals=drop.signals[:, list(order)] * np.array(signs))
+        levitated = fit_levitated(record, coarse.instant - 3e-3, speed=coarse.speed)
+        assert fell_as_described(record, machine, planes, levitated, coarse) is told
 
     def test_ends_swapped(self, drop, fast_drop, machine, edited):
         for record in (drop, fast_drop):

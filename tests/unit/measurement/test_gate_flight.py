@@ -10,7 +10,7 @@ from rotordrop.measurement.axes import sensor_planes
 from rotordrop.measurement.events import coarse_drop
 from rotordrop.measurement.levitated import fit_levitated
 from rotordrop.measurement.quality.flight import check_flights, weighed
-from rotordrop.measurement.release import FallResponses, free_rotor, tabulate_response
+from rotordrop.measurement.release import GRID, FallResponses, free_rotor, tabulate_response
 from rotordrop.synthesis import hidden_machine, synthesize_drop
 
 
@@ -54,8 +54,12 @@ def test_the_gain_of_one_channel_is_weighed(channel, hopping, machine):
     scale = np.ones(4)
     scale[channel] = 1.35
     record = replace(hopping[0], signals=hopping[0].signals * scale)
-    (found,) = in_flight(record, machine)[1]
+    seen, (found,) = in_flight(record, machine)
     assert (found.kind, found.channel) == ("wrong gain", record.channel_names[channel])
+    # a touch that was not seen looks like this in a single flight
+    assert (seen.flights, found.severity) == (1, "note")
+    (twice,) = check_flights(replace(seen, flights=2), record, sensor_planes(record.sensors))
+    assert twice.severity == "warning"
 
 
 def test_the_gate_tells_a_common_gain_that_the_first_fall_hides(hopping, machine):
@@ -72,5 +76,7 @@ def test_a_fading_force_is_answered_as_by_stepping(hopping, machine):
     rotor = free_rotor(machine, sensor_planes(hopping[0].sensors))
     for decay in (1e-4, 5e-3, 3e-2):
         stepped = tabulate_response(rotor, 600.0, 1.0 / decay, 0.02)
-        closed = FallResponses.of(rotor, 600.0, 0.02).fading(decay)
+        stepped = stepped[:-1]  # what lies beyond the table is held at its end
+        since = np.arange(len(stepped)) * GRID
+        closed = FallResponses.of(rotor, 600.0, 0.02).fading(decay, since)
         np.testing.assert_allclose(closed, stepped, rtol=0.0, atol=1e-9 * np.max(np.abs(stepped)))

@@ -14,6 +14,7 @@ from rotordrop.estimation.bearing_drop import (
     AirGap,
     Band,
     BearingDrop,
+    BearingMotions,
     FirstContact,
     History,
     Motion,
@@ -159,6 +160,28 @@ def test_the_pair_has_horizontal_left_and_vertical_right_of_every_bearing() -> N
 def test_radial_displacement_is_the_distance_from_the_centre() -> None:
     item = trace(charts()["Distance of"], "simulated", 2)
     assert_allclose(item.y, 275.0, rtol=1e-6)
+
+
+def test_a_long_record_counts_seconds() -> None:
+    time = np.linspace(-0.25, 57.0, 20_001)
+    long = History(label="measured", time=time, values=np.sin(time), role="measured")
+    peak = Peak(known=IdentifiedValue(value=1.0), time=12.5, origin=Origin.TWIN)
+    drawn = time_panels([[Panel(title="NDE", axis="force", histories=(long,), peak=peak)]], 1.0, "N")
+    assert drawn.layout.xaxis.title.text == "time from power-off [s]"
+    assert_allclose(drawn.data[0].x[[0, -1]], (-0.25, 57.0), rtol=SINGLE)
+    assert "%{x:.4f} s" in drawn.data[0].hovertemplate
+    assert 12.5 in [mark.x for mark in drawn.layout.annotations]
+
+
+def test_a_long_orbit_is_no_polygon_of_far_points() -> None:
+    """The extremes of blocks alone cut forty turns into chords up to a diameter long."""
+    angle = np.linspace(0.0, 2.0 * np.pi * 40.0, 20_000)
+    time = np.linspace(0.0, 0.5, len(angle))
+    path = 250e-6 * np.column_stack([np.cos(angle), np.sin(angle)])
+    turned = Motion(label="measured", time=time, displacement=path, role="measured")
+    (orbit, *_) = orbit_figure([BearingMotions(name="NDE", motions=(turned,))]).data
+    chords = np.hypot(np.diff(orbit.x), np.diff(orbit.y))
+    assert float(np.max(chords)) < 250.0 * 2.0 * np.pi / 90.0
 
 
 def test_the_orbit_lies_in_circles_of_both_gap_limits_at_equal_scales() -> None:

@@ -19,7 +19,7 @@ from rotordrop.measurement.levitated import LevitatedModel, fit_levitated
 from rotordrop.measurement.quality.arrangement import LEANING, check_planes, fall_of
 from rotordrop.measurement.quality.channels import check_channels
 from rotordrop.measurement.quality.clock import check_blocks, check_clock
-from rotordrop.measurement.quality.ends import check_ends
+from rotordrop.measurement.quality.ends import check_ends, fell_as_described
 from rotordrop.measurement.quality.finding import Finding, Severity, ranked, refuse_unusable, stops
 from rotordrop.measurement.quality.flight import weighed, with_flights
 from rotordrop.measurement.quality.motion import (
@@ -35,6 +35,7 @@ from rotordrop.measurement.quality.rail import check_rail
 from rotordrop.measurement.quality.recorder import check_again, check_filters, check_speed_signal
 from rotordrop.measurement.quality.sensing import TURNED
 from rotordrop.measurement.quality.tail import check_tail
+from rotordrop.measurement.recording import Array
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
@@ -105,7 +106,7 @@ def _check_motion(record: Record, machine: Machine, tail: Record | None) -> list
     if levitated is not None:
         level = levitated.mean
     if levitated is not None and not stops(findings):
-        findings += check_planes(planes, fall_of(record, level, sunk_at), levitated.amplitudes[0])
+        findings += _arrangement(record, machine, fall_of(record, level, sunk_at), levitated)
     if stops(findings):
         return findings
     try:
@@ -129,14 +130,32 @@ def _check_motion(record: Record, machine: Machine, tail: Record | None) -> list
     return findings
 
 
+def _arrangement(record: Record, machine: Machine, sunk: Array, levitated: LevitatedModel) -> list[Finding]:
+    """Check the planes; none is refused for a lean that friction gave the rotor after a fall as described."""
+    planes = sensor_planes(record.sensors)
+    found = check_planes(planes, sunk, levitated.amplitudes[0])
+    if not stops(found):
+        return found
+    try:
+        coarse, levitated = drop_and_levitated(record, machine, record, planes)
+    except RecordError:
+        return found
+    near = record.window(-np.inf, coarse.instant + _NEAR)
+    straight = fell_as_described(near, machine, planes, levitated, coarse)
+    return check_planes(planes, sunk, levitated.amplitudes[0], fell_straight=straight)
+
+
 def _not_both(findings: list[Finding], of_ends: list[Finding]) -> list[Finding]:
     """A fall that leans stops only when the sensors look in other directions before the first contact too.
 
     That it deviates there from a free rotor is not enough: two of eight drops of small rotors at 500 Hz did,
-    and leant because of friction.
+    and leant because of friction. Where the fall before the first contact is that of the rotor as described,
+    gravity has shown which way every sensor looks, and what leans later is the rotor: that is worth a note.
     """
-    if any(found.kind == TURNED for found in of_ends):
-        findings = [replace(f, severity="stop") if f.kind == LEANING else f for f in findings]
+    turned = any(found.kind == TURNED for found in of_ends)
+    severity: Severity | None = "stop" if turned else None if of_ends else "note"
+    if severity is not None:
+        findings = [replace(f, severity=severity) if f.kind == LEANING else f for f in findings]
     return findings + of_ends
 
 

@@ -65,6 +65,8 @@ def check_planes(
     planes: tuple[Plane, ...],
     sunk: Array,
     levitated_1x: Tone,
+    *,
+    fell_straight: bool = False,
 ) -> list[Finding]:
     """Check polarity and order of the sensors in every plane.
 
@@ -76,6 +78,9 @@ def check_planes(
         Change of the readings by the fall [m].
     levitated_1x : array, shape (S,), complex
         1X tone of the levitated readings [m].
+    fell_straight : bool
+        Whether the free rotor with the sensors as described explains the fall before the first contact. Then
+        what leans later is the rotor, whatever exchange would make it point down.
     """
     verdicts = [_verdict(plane, sunk, levitated_1x) for plane in planes]
     if all(verdict == "backward" for verdict in verdicts):
@@ -95,7 +100,7 @@ def check_planes(
     for plane, verdict in zip(planes, verdicts, strict=True):
         if verdict == "fits":
             continue
-        findings.append(_plane_finding(plane, verdict, sunk, levitated_1x))
+        findings.append(_plane_finding(plane, verdict, sunk, levitated_1x, fell_straight))
     return findings
 
 
@@ -139,6 +144,7 @@ def _plane_finding(
     verdict: str,
     sunk: Array,
     tone: Tone,
+    fell_straight: bool,
 ) -> Finding:
     names = ", ".join(plane.names)
     if verdict == "undecided":
@@ -164,7 +170,9 @@ def _plane_finding(
     if verdict == "backward":
         seen = f"the fall changes {own}, but the levitated orbit at node {plane.node} runs against the spin"
     if not fitting:
-        return _unexplained(seen, names)
+        return _leaning(f"{seen}; no exchange or inversion explains it", names)
+    if fell_straight and _sense(plane, tone, _changes(len(plane.columns))[0]) >= 0:
+        return _leaning(f"{seen}, but before the first contact the rotor falls as described", names)
     simplest = [change for change in fitting if _effort(change) == min(map(_effort, fitting))]
     causes = " or ".join(change.words(plane.names) for change in simplest)
     swapped = all(change.order != tuple(sorted(change.order)) for change in simplest)
@@ -177,7 +185,7 @@ def _plane_finding(
     )
 
 
-def _unexplained(seen: str, names: str) -> Finding:
+def _leaning(message: str, names: str) -> Finding:
     """A fall that leans for no reason of wiring: strong friction drives a rotor up the side of its bearing.
 
     Just the most dangerous drops look so; they must not be refused. Sensors turned to other angles show in
@@ -185,7 +193,7 @@ def _unexplained(seen: str, names: str) -> Finding:
     """
     return Finding(
         kind=LEANING,
-        message=f"{seen}; no exchange or inversion explains it",
+        message=message,
         remedy="strong friction drives a rotor sideways like this; make sure that the angles in the machine "
         "file are right",
         severity="warning",

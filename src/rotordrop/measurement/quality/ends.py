@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotordrop.estimated import Estimated
+from rotordrop.estimated import NINETY, Estimated
 from rotordrop.measurement.axes import Plane
 from rotordrop.measurement.events import CoarseDrop, find_fall
 from rotordrop.measurement.levitated import LevitatedModel
 from rotordrop.measurement.quality.finding import Finding
 from rotordrop.measurement.quality.sensing import TURNED, WRONG_GAIN, read_otherwise
+from rotordrop.measurement.recording import Array
 from rotordrop.model.rotor_form import is_beam
 
 if TYPE_CHECKING:
@@ -73,7 +74,9 @@ def check_ends(
         return [_undecided("it takes two AMB planes in the machine file and two sensor planes")]
     own = find_fall(record, machine, planes, levitated, coarse)
     if own.misfit <= GOOD_FIT and own.end >= coarse.contact - _NEAR_CONTACT:
-        return read_otherwise(record, planes, levitated, own) or _implausible_lift(own, machine)
+        return read_otherwise(record, planes, levitated, own) or _implausible_lift(
+            record, planes, levitated, own, machine
+        )
     cases = _other_cases(record, planes, levitated)
     if not is_beam(machine.rotor):
         cases.append(_any_gain(record, levitated))
@@ -81,7 +84,9 @@ def check_ends(
     until = max([own.end, *(fall.end for fall in grown if fall.misfit <= GOOD_FIT)])
     mine = find_fall(record, machine, planes, levitated, coarse, until=until).misfit
     if mine <= GOOD_FIT:
-        return read_otherwise(record, planes, levitated, own) or _implausible_lift(own, machine)
+        return read_otherwise(record, planes, levitated, own) or _implausible_lift(
+            record, planes, levitated, own, machine
+        )
     finals = [
         find_fall(case.record, machine, planes, case.levitated, coarse, until=until)
         if case.kind == "wrong gain" or fall.end >= until - _NEAR_CONTACT
@@ -98,12 +103,14 @@ def check_ends(
     return [replace(found, severity="stop") if stop else found for found in named] or [decided]
 
 
-def _implausible_lift(fall: Fall, machine: Machine) -> list[Finding]:
+def _implausible_lift(
+    record: Record, planes: tuple[Plane, ...], levitated: LevitatedModel, fall: Fall, machine: Machine
+) -> list[Finding]:
     """A fall that fits only with an impossible remanent lift is too fast or too slow: a gain is wrong."""
     share = fall.remanent_force[:, 1] / fall.rotor.lift
     worst = int(np.argmax(np.abs(share - np.mean(_POSSIBLE_LIFT))))
     if _POSSIBLE_LIFT[0] <= share[worst] <= _POSSIBLE_LIFT[1]:
-        return _implausible_sideways(fall, machine)
+        return _implausible_sideways(record, planes, levitated, fall, machine)
     return [
         Finding(
             kind="wrong gain",
@@ -116,11 +123,56 @@ def _implausible_lift(fall: Fall, machine: Machine) -> list[Finding]:
     ]
 
 
-def _implausible_sideways(fall: Fall, machine: Machine) -> list[Finding]:
-    """A fall that leads aside before anything is touched: the sensors look in other directions."""
+def fell_as_described(
+    record: Record,
+    machine: Machine,
+    planes: tuple[Plane, ...],
+    levitated: LevitatedModel,
+    coarse: CoarseDrop,
+) -> bool:
+    """Whether gravity has shown, before the first contact, that the sensors look where they are said to.
+
+    Sensors that are exchanged or inverted see gravity pull aside or upwards: the free rotor then explains the
+    fall only with a force there as large as the lift that was lost. It need not be explained up to the first
+    sudden acceleration, which may be the second contact: what counts is how well the force is known.
+    """
+    if len({amb.node for amb in machine.ambs}) < 2 or len(planes) < 2:
+        return False
+    fall = find_fall(record, machine, planes, levitated, coarse)
+    if fall.misfit > GOOD_FIT:
+        return False
+    upwards = fall.remanent_force[:, 1] / fall.rotor.lift
+    if np.any(upwards < _POSSIBLE_LIFT[0]) or np.any(upwards > _POSSIBLE_LIFT[1]):
+        return False
+    aside, error = _sideways(record, planes, levitated, fall)
+    return bool(np.all(np.abs(aside) + NINETY * error < 0.5 * _AS_FALLING))
+
+
+def _sideways(
+    record: Record, planes: tuple[Plane, ...], levitated: LevitatedModel, fall: Fall
+) -> tuple[Array, Array]:
+    """Horizontal force at the release over static lift, per magnetic bearing, and its standard error [1]."""
+    from rotordrop.measurement.fall import linearised
+
     share = fall.remanent_force[:, 0] / fall.rotor.lift
+    jacobian = linearised(record, planes, levitated, fall)[1]
+    variance = np.diag(np.linalg.inv(jacobian.T @ jacobian))[: len(share)] * max(fall.misfit, 1.0)
+    return share, np.sqrt(variance)
+
+
+def _implausible_sideways(
+    record: Record, planes: tuple[Plane, ...], levitated: LevitatedModel, fall: Fall, machine: Machine
+) -> list[Finding]:
+    """A fall that leads aside before anything is touched: the sensors look in other directions.
+
+    In a short fall a force aside and the turning force of the unbalance look alike: what counts is by how
+    much the force is larger than a magnet's at least.
+    """
+    share, error = _sideways(record, planes, levitated, fall)
     worst = int(np.argmax(np.abs(share)))
     if not _POSSIBLE_SIDEWAYS < abs(share[worst]) < _AS_FALLING:
+        return []
+    if abs(share[worst]) - NINETY * error[worst] < _POSSIBLE_SIDEWAYS:
         return []
     return [
         Finding(

@@ -95,12 +95,13 @@ def read_otherwise(
     trusted = _trust(levitated, fall)
     if trusted * gained < max(SUSPECT, _EXPLAINED * trusted * beyond):
         return []
-    if best.kind == "wrong gain" and abs(size) < _WITHIN_TOLERANCE:
-        return []
+    alike = [one for one in found if one[0] > gained - 0.5 * SUSPECT]
+    if any(other.kind == "wrong gain" and abs(value) < _WITHIN_TOLERANCE for _, value, other in alike):
+        return []  # a gain that calibrated sensors may have explains as much
     near = [
         other.words(value)
-        for more, value, other in found[1:]
-        if more > gained - 0.5 * SUSPECT and (other.kind, other.channels) != (best.kind, best.channels)
+        for _, value, other in alike[1:]
+        if (other.kind, other.channels) != (best.kind, best.channels)
     ]
     also = f"; or {', or '.join(near)}" if near else ""
     return [

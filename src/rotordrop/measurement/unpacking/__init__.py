@@ -31,12 +31,12 @@ CPU_S_PER_BYTE = 5e-7
 PATIENCE = 5.0
 """Wall time over processor time that a busy computer may need."""
 
-MEMORY = 512 * 2**20
-"""Memory that any file may take [byte]."""
+MEMORY = 320 * 2**20
+"""Memory that any file may take [byte]: with the program that waits for it less than 500 MB."""
 
 MEMORY_PER_BYTE = 16
 
-UNPACKED = 256 * 2**20
+UNPACKED = 64 * 2**20
 """Samples of a file may fill this much [byte] whatever the size of the file, and …"""
 
 UNPACKED_PER_BYTE = 200
