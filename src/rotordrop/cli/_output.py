@@ -21,9 +21,6 @@ if TYPE_CHECKING:
 STANDARD_OUTPUT = Path("-")
 _PLAIN_WIDTH = 110
 
-_LARGEST_MACHINE = 16 * 2**20
-"""Characters that are read to see which files a machine file names."""
-
 Progress = Callable[[str, float], None]
 
 _inputs: list[Path] = []
@@ -83,9 +80,11 @@ def _read_beside(file: Path) -> list[Path]:
         return []
     import tomllib
 
+    from rotordrop.machine.description import LARGEST_FILE
+
     try:
         with file.open(encoding="utf-8-sig") as stream:
-            rotor = tomllib.loads(stream.read(_LARGEST_MACHINE)).get("rotor")
+            rotor = tomllib.loads(stream.read(LARGEST_FILE)).get("rotor")
         return [file.parent / str(rotor["shaft_table"])] if isinstance(rotor, dict) else []
     except (OSError, ValueError, RecursionError, KeyError):
         return []  # whoever reads the file says what is wrong with it

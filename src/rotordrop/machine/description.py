@@ -12,6 +12,9 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, Strict, mode
 from rotordrop.estimated import Estimated
 from rotordrop.machine.values import Length, Physical
 
+LARGEST_FILE = 16 * 2**20
+"""Bytes that a machine file or a table of it can need."""
+
 
 def _node(raw: Any) -> Any:
     if isinstance(raw, bool) or not isinstance(raw, int):

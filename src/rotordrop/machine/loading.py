@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from rotordrop.errors import MachineFileError, UsageError
-from rotordrop.machine.description import Description, Misfit, UnknownKey
+from rotordrop.machine.description import LARGEST_FILE, Description, Misfit, UnknownKey
 from rotordrop.machine.machine import Machine
 from rotordrop.machine.provenance import kind_of
 from rotordrop.machine.shaft_table import SECTION_LINE, read_shaft_table
@@ -30,7 +30,6 @@ _EXPECTED = {
     "too_short": "at least one entry is needed",
     "missing_argument": "expected two entries",
 }
-_LARGEST_FILE = 16 * 2**20
 _DEEPEST = 40
 """Brackets or parts of a key inside one another that a machine file can need."""
 
@@ -67,11 +66,11 @@ def load_description(kind: type[D], file: Path) -> D:
 def _text_of(file: Path, what: str) -> str:
     try:
         with file.open("rb") as stream:
-            content = stream.read(_LARGEST_FILE + 1)
+            content = stream.read(LARGEST_FILE + 1)
     except OSError as error:
         raise MachineFileError(f"cannot read the {what}: {error.strerror}", file=file) from error
-    if len(content) > _LARGEST_FILE:
-        raise MachineFileError(f"more than {_LARGEST_FILE} bytes are no {what}", file=file)
+    if len(content) > LARGEST_FILE:
+        raise MachineFileError(f"more than {LARGEST_FILE} bytes are no {what}", file=file)
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -9,11 +9,8 @@ from typing import Any, NoReturn
 
 from rotordrop.errors import MachineFileError, UsageError
 from rotordrop.estimated import Estimated
-from rotordrop.machine.description import unknown_key
+from rotordrop.machine.description import LARGEST_FILE, unknown_key
 from rotordrop.units import parse_quantity
-
-_LARGEST_TABLE = 16 * 2**20
-"""Bytes that a table of sections can need."""
 
 _COLUMNS = {
     "position": "length",
@@ -188,8 +185,8 @@ def _text(path: Path) -> str:
     try:
         if path.exists() and not path.is_file():
             raise MachineFileError("the shaft table is no plain file; name a CSV file", file=path)
-        if path.stat().st_size > _LARGEST_TABLE:
-            raise MachineFileError(f"more than {_LARGEST_TABLE} bytes are no shaft table", file=path)
+        if path.stat().st_size > LARGEST_FILE:
+            raise MachineFileError(f"more than {LARGEST_FILE} bytes are no shaft table", file=path)
         return path.read_text(encoding="utf-8-sig")
     except (OSError, ValueError) as error:
         if isinstance(error, UnicodeDecodeError):

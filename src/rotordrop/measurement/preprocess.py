@@ -6,13 +6,14 @@ import numpy as np
 
 from rotordrop.errors import RecordError
 from rotordrop.measurement.recording import Array
-from rotordrop.series import local_polynomials
 
 
 def acceleration(values: Array, rate: float, *, width: float = 1e-3) -> Array:
     """Acceleration [m/s²] by a Savitzky–Golay filter of order 3 along the first axis, shape of `values`."""
+    from scipy.signal import savgol_filter
+
     samples = max(round(width * rate) // 2 * 2 + 1, 5)
-    return local_polynomials(values, samples, 3, derivative=2, spacing=1.0 / rate)
+    return np.asarray(savgol_filter(values, samples, 3, deriv=2, delta=1.0 / rate, axis=0))
 
 
 def local_polynomial(

@@ -9,7 +9,6 @@ import numpy as np
 
 from rotordrop.errors import RecordError
 from rotordrop.measurement.recording import Array
-from rotordrop.series import local_polynomials
 
 if TYPE_CHECKING:
     from rotordrop.measurement.record import Record
@@ -224,13 +223,15 @@ def _slope_after(when: Array, change: Array) -> float:
 
 def smooth_speed(record: Record, *, span: float = 0.1) -> Array:
     """Speed over the record [rad/s], shape (N,), outliers replaced and smoothed by local straight lines."""
+    from scipy.signal import savgol_filter
+
     time, readings = require_speed(record)
     if len(readings) < 5:
         return np.interp(record.time, time, readings)
     clean = _without_outliers(readings)
     width = int(span / float(np.median(np.diff(time)))) // 2 * 2 + 1
     width = min(max(width, 5), len(clean) - 1 + len(clean) % 2)
-    return np.asarray(np.interp(record.time, time, local_polynomials(clean, width, 1)))
+    return np.asarray(np.interp(record.time, time, savgol_filter(clean, width, 1)))
 
 
 def require_speed(record: Record) -> tuple[Array, Array]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rotordrop.series import local_polynomials, noise_by_differences, runs_of
+from rotordrop.series import noise_by_differences, runs_of
 
 
 def test_runs_are_found_with_starts_and_lengths_at_the_ends_too() -> None:
@@ -32,22 +32,3 @@ def test_missing_samples_are_left_out_of_the_noise() -> None:
     values = np.random.default_rng(4).normal(0.0, 0.4e-6, 20_000)
     values[100:4000:7] = np.nan
     assert noise_by_differences(values, 3) == pytest.approx(0.4e-6, rel=0.05)
-
-
-@pytest.mark.parametrize(("samples", "order", "derivative"), [(21, 3, 2), (5, 3, 2), (51, 1, 0), (31, 3, 1)])
-def test_local_polynomials_are_those_of_scipy(samples: int, order: int, derivative: int) -> None:
-    from scipy.signal import savgol_filter
-
-    rng = np.random.default_rng(3)
-    for values in (rng.normal(size=(200, 4)).cumsum(axis=0), rng.normal(size=200)):
-        expected = savgol_filter(values, samples, order, deriv=derivative, delta=0.1, axis=0)
-        found = local_polynomials(values, samples, order, derivative=derivative, spacing=0.1)
-        assert found == pytest.approx(expected, rel=1e-9, abs=1e-9 * np.max(np.abs(expected)))
-
-
-def test_local_polynomials_follow_a_parabola_to_its_ends() -> None:
-    time = 0.01 * np.arange(60)
-    values = 3.0 * time**2 - time
-    assert local_polynomials(values, 11, 2, spacing=0.01) == pytest.approx(values, abs=1e-12)
-    slope = local_polynomials(values, 11, 2, derivative=1, spacing=0.01)
-    assert slope == pytest.approx(6.0 * time - 1.0, abs=1e-10)
