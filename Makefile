@@ -24,8 +24,8 @@ demo: $(READY) ## estimate force and stress from a bundled (simulated) recording
 test: $(READY) ## run the tests
 	@$(BIN)/python -m pytest
 
-NUMERIC := tests/unit/physics tests/unit/model tests/unit/simulation tests/validation
-FITTED := tests/unit/identification tests/unit/tracking
+NUMERIC := tests/unit/physics tests/unit/rotor tests/unit/simulate tests/validation
+FITTED := tests/unit/identification tests/unit/track
 
 arithmetic: $(READY) ## run the numeric tests with the arithmetic of other processors
 	@OPENBLAS_CORETYPE=Prescott $(BIN)/python -m pytest -q -m "not slow" $(NUMERIC) $(FITTED)

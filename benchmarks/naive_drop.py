@@ -13,11 +13,11 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from rotordrop.machine.touchdown_bearing import TouchdownBearing
-from rotordrop.model import layout as L
-from rotordrop.model.parameters import DropModel
 from rotordrop.physics.ball_bearing import bearing_constants
-from rotordrop.simulation.case import DropCase
-from rotordrop.simulation.levitation import start_of_drop
+from rotordrop.rotor import layout as L
+from rotordrop.rotor.parameters import DropModel
+from rotordrop.simulate.case import DropCase
+from rotordrop.simulate.levitation import start_of_drop
 
 MAX_STEP = 5e-6
 TOLERANCE = 1e-5

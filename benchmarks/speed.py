@@ -32,10 +32,10 @@ from naive_drop import NaiveDrop
 from tuned_drop import TunedDrop
 
 from rotordrop.machine import example_machine
-from rotordrop.model.parameters import DropModel, build_drop_model
-from rotordrop.simulation.batch import simulate_drops
-from rotordrop.simulation.case import DropCase, PlacedStart
-from rotordrop.simulation.drop import simulate_drop
+from rotordrop.rotor.parameters import DropModel, build_drop_model
+from rotordrop.simulate.batch import simulate_drops
+from rotordrop.simulate.case import DropCase, PlacedStart
+from rotordrop.simulate.drop import simulate_drop
 
 START = PlacedStart(displacement=np.array([[0.0, 2e-6], [0.0, -5e-6]]), velocity=np.zeros((2, 2)))
 CASE = DropCase(speed=2.0 * np.pi * 60.0, duration=0.2, tolerance=1e-6, start=START)
@@ -46,9 +46,9 @@ FRESH = """
 import hashlib, time
 began = time.perf_counter()
 from rotordrop.machine import example_machine
-from rotordrop.model.parameters import build_drop_model
-from rotordrop.simulation.case import DropCase
-from rotordrop.simulation.drop import simulate_drop
+from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.simulate.case import DropCase
+from rotordrop.simulate.drop import simulate_drop
 model = build_drop_model(example_machine("paper"), "quick")
 result = simulate_drop(model, DropCase(speed=376.99, duration=0.2))
 print(time.perf_counter() - began, time.process_time(), hashlib.sha256(result.state.tobytes()).hexdigest())

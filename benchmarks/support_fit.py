@@ -25,7 +25,7 @@ from rotordrop.identification.evidence import Evidence, read_evidence
 from rotordrop.identification.replica import build_replica
 from rotordrop.identification.support import SupportFit, fit_support, impact_problem
 from rotordrop.machine import example_machine
-from rotordrop.model.parameters import build_drop_model
+from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.synthesis import hidden_machine, synthesize_drop
 
 STARTS = 8

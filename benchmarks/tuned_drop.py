@@ -10,10 +10,10 @@ import math
 import numpy as np
 from naive_drop import NaiveDrop
 
-from rotordrop.model import layout as L
-from rotordrop.model.parameters import DropModel
-from rotordrop.simulation.case import DropCase
-from rotordrop.simulation.levitation import start_of_drop
+from rotordrop.rotor import layout as L
+from rotordrop.rotor.parameters import DropModel
+from rotordrop.simulate.case import DropCase
+from rotordrop.simulate.levitation import start_of_drop
 
 
 class Bearing:

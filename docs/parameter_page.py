@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from rotordrop.model.parameter import Parameter
-from rotordrop.model.parameter_table import LOADS, rows
-from rotordrop.model.structure_table import STRUCTURE
+from rotordrop.rotor.parameter import Parameter
+from rotordrop.rotor.parameter_table import LOADS, rows
+from rotordrop.rotor.structure_table import STRUCTURE
 
 INTRODUCTION = """\
 # Parameters
 
 Every unknown of a drop, as the estimators know it before they read a record. This page is written from the
-table `rotordrop.model.parameter_table`, which priors, schema, report and score read too.
+table `rotordrop.rotor.parameter_table`, which priors, schema, report and score read too.
 
 **What the machine file says of a value.** A `range` of a guess, and an `interval` of a value, is the
 interval that holds the value with 90 % probability: one in twenty lies below it and one in twenty above.

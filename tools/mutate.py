@@ -46,7 +46,7 @@ PACKAGE = ROOT / "src" / "rotordrop"
 KEPT = ROOT / "tests" / "mutation" / "mutants.json"
 WORK = ROOT / "build" / "mutation"
 SEED = 2026
-WANTED = dict.fromkeys(("measurement", "identification", "tracking", "estimation", "spectrum"), 26)
+WANTED = dict.fromkeys(("measurement", "identification", "track", "estimation", "spectrum"), 26)
 OTHERS = 20
 LIMIT = 60.0
 """Processor time for a fault [s]."""
@@ -54,8 +54,8 @@ LIMIT = 60.0
 COMPILING = 100.0
 """What is added where kernels are compiled anew [s]."""
 
-WITH_KERNELS = ("physics", "model", "simulation", "tracking")
-INTERPRETED = ("physics", "model", "simulation")
+WITH_KERNELS = ("physics", "rotor", "simulate", "track")
+INTERPRETED = ("physics", "rotor", "simulate")
 """Folders of tests that are also followed with the kernels as plain Python."""
 
 LONGEST_INTERPRETED = 5.0
@@ -506,9 +506,7 @@ def attempt_with(files: list[str], fault: Mutation, copies: Copies, limit: float
 def warm(copies: Copies, compiled: Tests) -> None:
     """Fill the cache of machine code, and see that the tests pass where there is no fault."""
     kept = [
-        name
-        for name in compiled.ran
-        if name.startswith(("tests/unit/tracking/", "tests/unit/identification/"))
+        name for name in compiled.ran if name.startswith(("tests/unit/track/", "tests/unit/identification/"))
     ]
     pass_without_fault(kept, copies, compiled)
 

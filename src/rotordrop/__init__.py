@@ -30,14 +30,14 @@ if TYPE_CHECKING:
     from rotordrop.measurement import example_record_path as example_record_path
     from rotordrop.measurement import read_record as read_record
     from rotordrop.measurement.look import look as look
-    from rotordrop.model.parameters import DropModel as DropModel
-    from rotordrop.model.parameters import build_drop_model as build_drop_model
-    from rotordrop.simulation.case import DropCase as DropCase
-    from rotordrop.simulation.case import LevitatedStart as LevitatedStart
-    from rotordrop.simulation.case import PlacedStart as PlacedStart
-    from rotordrop.simulation.drop import simulate_drop as simulate_drop
-    from rotordrop.simulation.result import DropResult as DropResult
-    from rotordrop.simulation.result import load_result as load_result
+    from rotordrop.rotor.parameters import DropModel as DropModel
+    from rotordrop.rotor.parameters import build_drop_model as build_drop_model
+    from rotordrop.simulate.case import DropCase as DropCase
+    from rotordrop.simulate.case import LevitatedStart as LevitatedStart
+    from rotordrop.simulate.case import PlacedStart as PlacedStart
+    from rotordrop.simulate.drop import simulate_drop as simulate_drop
+    from rotordrop.simulate.result import DropResult as DropResult
+    from rotordrop.simulate.result import load_result as load_result
     from rotordrop.study import load_study as load_study
     from rotordrop.study import run_study as run_study
     from rotordrop.study import sweep as sweep
@@ -47,19 +47,19 @@ if TYPE_CHECKING:
     from rotordrop.units import parse_quantity as parse_quantity
 
 _PUBLIC = {
-    "DropCase": "rotordrop.simulation.case",
-    "DropModel": "rotordrop.model.parameters",
-    "DropResult": "rotordrop.simulation.result",
+    "DropCase": "rotordrop.simulate.case",
+    "DropModel": "rotordrop.rotor.parameters",
+    "DropResult": "rotordrop.simulate.result",
     "Estimated": "rotordrop.estimated",
     "IdentifiedValue": "rotordrop.estimated",
-    "LevitatedStart": "rotordrop.simulation.case",
+    "LevitatedStart": "rotordrop.simulate.case",
     "Machine": "rotordrop.machine",
-    "PlacedStart": "rotordrop.simulation.case",
+    "PlacedStart": "rotordrop.simulate.case",
     "Record": "rotordrop.measurement",
     "RotordropError": "rotordrop.errors",
     "Replay": "rotordrop.estimation",
     "Tracked": "rotordrop.estimation",
-    "build_drop_model": "rotordrop.model.parameters",
+    "build_drop_model": "rotordrop.rotor.parameters",
     "calibrate_machine": "rotordrop.estimation.calibrated",
     "check_record": "rotordrop.measurement",
     "estimate_drop": "rotordrop.estimation",
@@ -69,7 +69,7 @@ _PUBLIC = {
     "example_record_path": "rotordrop.measurement",
     "format_quantity": "rotordrop.units",
     "load_machine": "rotordrop.machine",
-    "load_result": "rotordrop.simulation.result",
+    "load_result": "rotordrop.simulate.result",
     "load_study": "rotordrop.study",
     "look": "rotordrop.measurement.look",
     "machine_schema": "rotordrop.machine",
@@ -78,7 +78,7 @@ _PUBLIC = {
     "run_study": "rotordrop.study",
     "save_machine": "rotordrop.machine",
     "score_estimate": "rotordrop.synthesis",
-    "simulate_drop": "rotordrop.simulation.drop",
+    "simulate_drop": "rotordrop.simulate.drop",
     "sweep": "rotordrop.study",
     "synthesize_drop": "rotordrop.synthesis",
 }

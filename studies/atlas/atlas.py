@@ -18,9 +18,9 @@ from pathlib import Path
 from typing import Any
 
 from rotordrop import example_machine
-from rotordrop.model.parameters import build_drop_model
 from rotordrop.report.page import write_page
 from rotordrop.report.study_page import study_numbers, study_page
+from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.study.folder import StudyFolder, open_folder, publish
 from rotordrop.study.plan import Study, read_study
 from rotordrop.study.run import compute_shard

@@ -27,7 +27,7 @@ from rotordrop.estimation import Tracked, estimate_drop
 from rotordrop.estimation.changed import changes
 from rotordrop.machine import example_machine
 from rotordrop.machine.parameter_paths import value_of_path
-from rotordrop.model.parameters import build_drop_model
+from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.synthesis.event import FINER, HiddenMachine, hidden_machine
 from rotordrop.synthesis.recording import synthesize_drop
 

@@ -10,10 +10,10 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 from common import arguments, keep, machine_with_drag
 
-from rotordrop.model.parameters import build_drop_model
-from rotordrop.simulation.coast_down import simulate_coast_down
-from rotordrop.simulation.coast_down_case import CoastDownCase
-from rotordrop.simulation.coast_down_certificate import compare_coast_downs
+from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.simulate.coast_down import simulate_coast_down
+from rotordrop.simulate.coast_down_case import CoastDownCase
+from rotordrop.simulate.coast_down_certificate import compare_coast_downs
 
 SECONDS = 10.0
 

@@ -20,9 +20,9 @@ from rotordrop.estimation.recorded_coast_down import recorded_coast_down, with_r
 from rotordrop.estimation.simulated_coast_down import simulated_coast_down
 from rotordrop.machine import load_machine
 from rotordrop.measurement.record import read_record
-from rotordrop.simulation.case import LevitatedStart
-from rotordrop.simulation.coast_down import simulate_coast_down
-from rotordrop.simulation.coast_down_case import CoastDownCase
+from rotordrop.simulate.case import LevitatedStart
+from rotordrop.simulate.coast_down import simulate_coast_down
+from rotordrop.simulate.coast_down_case import CoastDownCase
 from rotordrop.spectrum.coast_down import WaterfallChoice, analyse_coast_down
 from rotordrop.spectrum.machine_candidates import machine_candidates, swing_ranges
 

@@ -12,9 +12,9 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 from common import arguments, keep, machine_with_drag
 
-from rotordrop.model.parameters import build_drop_model
-from rotordrop.simulation.coast_down import simulate_coast_down
-from rotordrop.simulation.coast_down_case import CoastDownCase
+from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.simulate.coast_down import simulate_coast_down
+from rotordrop.simulate.coast_down_case import CoastDownCase
 
 SPEED = 2.0 * math.pi * 60.0
 

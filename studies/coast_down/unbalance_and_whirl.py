@@ -10,8 +10,8 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 from common import arguments, keep, machine_with_drag
 
-from rotordrop.simulation.coast_down import simulate_coast_down
-from rotordrop.simulation.coast_down_case import CoastDownCase
+from rotordrop.simulate.coast_down import simulate_coast_down
+from rotordrop.simulate.coast_down_case import CoastDownCase
 
 SECONDS = 5.0
 CASES = [(speed, factor, mu) for speed in (60.0, 210.0) for factor in (1.0, 8.0) for mu in (None, 0.35)]

@@ -3,7 +3,7 @@
 Usage: python studies/cross_check/accuracy.py [CASE ...] [--seeds SEED ...]
 
 The cross-check is given settled tail (or none) and machine file with guesses, nothing of the twin. Seeds 41
-and 42 set the error model of `rotordrop.tracking.input_state`; those from 61 on are scored and used nowhere
+and 42 set the error model of `rotordrop.track.input_state`; those from 61 on are scored and used nowhere
 else. One JSON file per case and seed in ``results``; ``results/summary.md`` is written at the end, also
 without cases.
 """
@@ -25,9 +25,9 @@ from tests.scaled_machines import scaled_machine
 from rotordrop.estimation.tracked import twin_problem
 from rotordrop.identification.evidence import read_evidence
 from rotordrop.machine import Machine, example_machine, load_machine
-from rotordrop.model.parameters import build_drop_model
+from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.synthesis import SensorChain, hidden_machine, synthesize_drop
-from rotordrop.tracking.input_state import input_state_estimate, lent_by_record
+from rotordrop.track.input_state import input_state_estimate, lent_by_record
 
 HERE = Path(__file__).parent
 RESULTS = HERE / "results"

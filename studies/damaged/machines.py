@@ -21,7 +21,7 @@ from pathlib import Path
 from rotordrop.errors import RotordropError
 from rotordrop.machine import example_path, loads_machine
 from rotordrop.machine.template import template_text
-from rotordrop.model.machine_summary import summarise_machine
+from rotordrop.rotor.machine_summary import summarise_machine
 
 BLOCK = 250
 RESULTS = Path(__file__).parent / "results" / "machines.jsonl"

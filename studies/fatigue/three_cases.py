@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from rotordrop import DropCase, example_machine, simulate_drop
-from rotordrop.model.bearing_numbers import numbers_of
+from rotordrop.rotor.bearing_numbers import numbers_of
 from rotordrop.severity.numbers import fatigue_shares
-from rotordrop.simulation.case import LevitatedStart
+from rotordrop.simulate.case import LevitatedStart
 
 HZ = 2.0 * math.pi
 

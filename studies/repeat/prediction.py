@@ -21,8 +21,8 @@ import numpy as np
 
 from rotordrop.estimation.calibrated import calibrate_machine
 from rotordrop.machine import Machine, example_machine, load_machine, save_machine
-from rotordrop.simulation.case import DropCase
-from rotordrop.simulation.drop import simulate_drop
+from rotordrop.simulate.case import DropCase
+from rotordrop.simulate.drop import simulate_drop
 from rotordrop.study.repeat import Recorded, place_among, repeat_study
 from rotordrop.study.run import run_study
 from rotordrop.synthesis.event import HiddenMachine, drop_conditions, hidden_machine

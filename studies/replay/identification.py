@@ -42,7 +42,7 @@ from rotordrop.identification.support import (
     impact_problem,
     refit_with_friction,
 )
-from rotordrop.model.parameters import build_drop_model
+from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.synthesis import hidden_machine, synthesize_drop
 
 Array = NDArray[np.float64]

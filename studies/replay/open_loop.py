@@ -34,10 +34,10 @@ from rotordrop.identification.sensing import build_sensing
 from rotordrop.identification.support import impact_problem
 from rotordrop.machine import Machine
 from rotordrop.measurement.record import Record
-from rotordrop.model.parameters import DropModel, build_drop_model
-from rotordrop.simulation.case import DropCase, StateStart
-from rotordrop.simulation.drop import simulate_drop
-from rotordrop.simulation.result import DropResult
+from rotordrop.rotor.parameters import DropModel, build_drop_model
+from rotordrop.simulate.case import DropCase, StateStart
+from rotordrop.simulate.drop import simulate_drop
+from rotordrop.simulate.result import DropResult
 from rotordrop.synthesis import HiddenMachine, hidden_machine, synthesize_drop
 from rotordrop.synthesis.event import drop_conditions
 

@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 
 from rotordrop.machine.ross_files import ImportedRotor, read_ross
-from rotordrop.model.assembly import PointMass, RotorFE, assemble
-from rotordrop.model.supports import spring
-from rotordrop.model.whirl import whirl_modes
 from rotordrop.physics import timoshenko
+from rotordrop.rotor.assembly import PointMass, RotorFE, assemble
+from rotordrop.rotor.supports import spring
+from rotordrop.rotor.whirl import whirl_modes
 
 HERE = Path(__file__).parent
 PARTS = (1, 2, 4)

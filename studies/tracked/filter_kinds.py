@@ -29,14 +29,14 @@ from numpy.typing import NDArray
 from rotordrop.estimation.tracked import FINE_BASIS, drop_problem
 from rotordrop.identification.evidence import read_evidence
 from rotordrop.machine import example_machine
-from rotordrop.model.parameters import build_drop_model
+from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.synthesis import hidden_machine, synthesize_drop
 from rotordrop.synthesis.recording import SyntheticDrop
-from rotordrop.tracking import _filter as F
-from rotordrop.tracking import _propagation as P
-from rotordrop.tracking import forces
-from rotordrop.tracking.problem import DropProblem, private_copy
-from rotordrop.tracking.smoother import PassSettings, fastest_frequency, forward, smooth
+from rotordrop.track import _filter as F
+from rotordrop.track import _propagation as P
+from rotordrop.track import forces
+from rotordrop.track.problem import DropProblem, private_copy
+from rotordrop.track.smoother import PassSettings, fastest_frequency, forward, smooth
 
 Array = NDArray[np.float64]
 HERE = Path(__file__).parent

@@ -31,12 +31,12 @@ from rotordrop.estimation.structure import EXTENSIONS
 from rotordrop.estimation.tracked import COARSE_BASIS, _first_contact, drop_problem
 from rotordrop.identification.evidence import read_evidence
 from rotordrop.machine import example_machine
-from rotordrop.model.parameters import build_drop_model
+from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.synthesis import hidden_machine, synthesize_drop
 from rotordrop.synthesis.violations import Violations
-from rotordrop.tracking.calibration import BLIND_SCHEDULE, Stage, shifted, stage_settings, track
-from rotordrop.tracking.problem import DropProblem
-from rotordrop.tracking.smoother import PassSettings, forward
+from rotordrop.track.calibration import BLIND_SCHEDULE, Stage, shifted, stage_settings, track
+from rotordrop.track.problem import DropProblem
+from rotordrop.track.smoother import PassSettings, forward
 
 Array = NDArray[np.float64]
 HERE = Path(__file__).parent

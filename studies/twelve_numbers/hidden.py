@@ -37,16 +37,16 @@ from rotordrop.machine import Machine
 from rotordrop.machine.rotor import Rotor
 from rotordrop.machine.simple import SimpleMachine, simple_machine
 from rotordrop.measurement.record import read_record
-from rotordrop.model.assembly import rotor_fe
-from rotordrop.model.modes import free_free_modes
-from rotordrop.model.parameters import build_drop_model
-from rotordrop.model.rotor_form import is_beam
-from rotordrop.model.unknowns import Unknown, all_unknowns
+from rotordrop.rotor.assembly import rotor_fe
+from rotordrop.rotor.modes import free_free_modes
+from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.rotor.rotor_form import is_beam
+from rotordrop.rotor.unknowns import Unknown, all_unknowns
 from rotordrop.synthesis import SensorChain, hidden_machine, synthesize_drop, write_synthetic
 from rotordrop.synthesis.bench.drops import SPEEDS
 from rotordrop.synthesis.bench.rotors import ROTORS
-from rotordrop.tracking.input_state import input_state_estimate, lent_by_record
-from rotordrop.tracking.prior import fall_time
+from rotordrop.track.input_state import input_state_estimate, lent_by_record
+from rotordrop.track.prior import fall_time
 
 RESULTS = Path(__file__).parent / "results"
 MEASURED = 0.01

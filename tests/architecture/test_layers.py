@@ -45,12 +45,12 @@ def test_every_package_has_its_place_in_the_layers():
 @pytest.mark.parametrize(
     ("where", "imports"),
     [
-        ("physics", "simulation"),
+        ("physics", "simulate"),
         ("machine", "physics"),
         ("measurement", "spectrum"),
         ("estimation", "report"),
         ("errors", "units"),
-        ("simulation", "cli"),
+        ("simulate", "cli"),
     ],
 )
 def test_an_import_upward_or_sideways_is_found(tmp_path, where, imports):
@@ -86,10 +86,10 @@ def test_a_page_that_asks_for_balls_is_found(tmp_path):
 
 def test_numba_in_a_second_file_is_found(tmp_path):
     _skeleton(tmp_path)
-    (tmp_path / "src" / "rotordrop" / "simulation" / "__init__.py").write_text("import numba\n")
+    (tmp_path / "src" / "rotordrop" / "simulate" / "__init__.py").write_text("import numba\n")
     done = check(tmp_path)
     assert done.returncode != 0
-    assert "rotordrop.simulation -> numba" in " ".join(done.stdout.split())
+    assert "rotordrop.simulate -> numba" in " ".join(done.stdout.split())
 
 
 def _contract() -> dict[str, list[str]]:

@@ -9,9 +9,9 @@ from cases import load_case
 from test_rotor_cases import CASES as ROTOR_CASES
 
 from rotordrop.machine import example_machine
-from rotordrop.model.critical_speeds import critical_speed_map
-from rotordrop.model.statics import bearing_load_shares
 from rotordrop.physics.hertz import contact_parameters
+from rotordrop.rotor.critical_speeds import critical_speed_map
+from rotordrop.rotor.statics import bearing_load_shares
 
 
 @dataclass(frozen=True, kw_only=True)

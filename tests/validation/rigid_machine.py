@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from rotordrop.machine import loads_machine
-from rotordrop.model import layout as L
-from rotordrop.model.parameters import DropModel, build_drop_model
-from rotordrop.model.reduction import Reduction
+from rotordrop.rotor import layout as L
+from rotordrop.rotor.parameters import DropModel, build_drop_model
+from rotordrop.rotor.reduction import Reduction
 
 LINK = 1e13
 """Stiffness [N/m] of the balls between race and support, which share the mass of the support of a case."""

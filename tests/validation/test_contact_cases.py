@@ -22,8 +22,8 @@ from rotordrop.physics import whirl
 from rotordrop.physics.contact import contact_force, contact_law
 from rotordrop.physics.friction import stribeck_coefficient
 from rotordrop.physics.spin import surface_speed
-from rotordrop.simulation.case import DropCase, PlacedStart
-from rotordrop.simulation.drop import simulate_drop
+from rotordrop.simulate.case import DropCase, PlacedStart
+from rotordrop.simulate.drop import simulate_drop
 
 pytestmark = pytest.mark.acceptance
 Inputs = Mapping[str, Any]

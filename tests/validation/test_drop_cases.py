@@ -12,10 +12,10 @@ import pytest
 from cases import Compute, check, fails_with, load_case
 
 from rotordrop.machine import Machine, example_machine
-from rotordrop.model import layout as L
-from rotordrop.model.parameters import DropModel, build_drop_model
-from rotordrop.simulation.case import DropCase, PlacedStart
-from rotordrop.simulation.drop import simulate_drop
+from rotordrop.rotor import layout as L
+from rotordrop.rotor.parameters import DropModel, build_drop_model
+from rotordrop.simulate.case import DropCase, PlacedStart
+from rotordrop.simulate.drop import simulate_drop
 
 pytestmark = pytest.mark.acceptance
 Inputs = Mapping[str, Any]

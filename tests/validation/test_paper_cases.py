@@ -9,7 +9,7 @@ import pytest
 from cases import Compute, check, load_case
 
 from rotordrop.machine import example_machine
-from rotordrop.model.statics import bearing_load_shares
+from rotordrop.rotor.statics import bearing_load_shares
 
 pytestmark = pytest.mark.acceptance
 Inputs = Mapping[str, Any]

@@ -11,13 +11,13 @@ import pytest
 from cases import Compute, check, fails_with, load_case
 from scipy.optimize import minimize_scalar
 
-from rotordrop.model.assembly import PointMass, RotorFE, assemble
-from rotordrop.model.critical_speeds import critical_speeds
-from rotordrop.model.modes import modes_on_springs
-from rotordrop.model.reduction import Reduction, RotorBasis, reduce_rotor
-from rotordrop.model.supports import Support, spring
-from rotordrop.model.whirl import WhirlModes, unbalance_response, whirl_modes
 from rotordrop.physics.timoshenko import Section, rectangle_shear_coefficient, round_section
+from rotordrop.rotor.assembly import PointMass, RotorFE, assemble
+from rotordrop.rotor.critical_speeds import critical_speeds
+from rotordrop.rotor.modes import modes_on_springs
+from rotordrop.rotor.reduction import Reduction, RotorBasis, reduce_rotor
+from rotordrop.rotor.supports import Support, spring
+from rotordrop.rotor.whirl import WhirlModes, unbalance_response, whirl_modes
 
 pytestmark = pytest.mark.acceptance
 Inputs = Mapping[str, Any]

@@ -13,11 +13,11 @@ import pytest
 from cases import Compute, check, fails_with, load_case
 from test_rotor_cases import disc_rotor, rigid_rotor, rpm
 
-from rotordrop.model.campbell import Crossing
-from rotordrop.model.separation import response_peaks, separations
-from rotordrop.model.supports import Link, Support, spring
-from rotordrop.model.unbalanced import orbit_axis
-from rotordrop.model.whirl import unbalance_response
+from rotordrop.rotor.campbell import Crossing
+from rotordrop.rotor.separation import response_peaks, separations
+from rotordrop.rotor.supports import Link, Support, spring
+from rotordrop.rotor.unbalanced import orbit_axis
+from rotordrop.rotor.whirl import unbalance_response
 
 Inputs = Mapping[str, Any]
 

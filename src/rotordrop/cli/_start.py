@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rotordrop.machine import Machine
-    from rotordrop.simulation.case import LevitatedStart, PlacedStart
+    from rotordrop.simulate.case import LevitatedStart, PlacedStart
 
 _EXAMPLES = {"length": "10 um, -20 um", "velocity": "0 mm/s, -5 mm/s", "force": "0 N, 40 N"}
 
@@ -55,7 +55,7 @@ def named_pairs(texts: Sequence[str], kind: str, names: Sequence[str]) -> NDArra
 
 def placed_start(machine: Machine, displacements: Sequence[str], velocities: Sequence[str]) -> PlacedStart:
     """Start from given displacements and velocities at the touchdown bearings; zero where not given."""
-    from rotordrop.simulation.case import PlacedStart
+    from rotordrop.simulate.case import PlacedStart
 
     names = [bearing.name for bearing in machine.touchdown_bearings]
     return PlacedStart(
@@ -68,7 +68,7 @@ def levitated_start(
     machine: Machine, rotor_angle: float, delay: float, remanent_force: Sequence[str], decay: float
 ) -> LevitatedStart:
     """Start on the synchronous orbit in the AMBs, with what the magnets still do after power-off."""
-    from rotordrop.simulation.case import LevitatedStart
+    from rotordrop.simulate.case import LevitatedStart
 
     names = [amb.name for amb in machine.ambs]
     return LevitatedStart(

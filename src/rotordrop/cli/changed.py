@@ -46,8 +46,8 @@ def _summary(out: Console, found: Changes) -> None:
     from rich.table import Table
 
     from rotordrop.estimation.changed import asked_for
-    from rotordrop.model.parameter_table import row_of
     from rotordrop.report.quantity import Quantity
+    from rotordrop.rotor.parameter_table import row_of
     from rotordrop.units import format_chance
 
     columns = ("parameter", "before", "after", "change (90 %)", "changed that much", "found from")

@@ -40,10 +40,10 @@ def check(
     """Check a machine file and show what it amounts to: mass, load shares, frequencies, sag, assumptions."""
     from rotordrop.cli._rotor_text import rotor_lines
     from rotordrop.machine import load_machine
-    from rotordrop.model.machine_summary import summarise_machine
-    from rotordrop.model.machine_warnings import machine_warnings
     from rotordrop.report.machine_content import machine_content, machine_json
     from rotordrop.report.terminal import print_summary
+    from rotordrop.rotor.machine_summary import summarise_machine
+    from rotordrop.rotor.machine_warnings import machine_warnings
 
     require_places(report, json_file)
     described = load_machine(machine)

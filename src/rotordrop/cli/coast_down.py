@@ -22,9 +22,9 @@ from rotordrop.errors import UsageError
 if TYPE_CHECKING:
     from rotordrop.cli._output import Progress
     from rotordrop.machine import Machine
-    from rotordrop.simulation.coast_down_case import CoastDownCase
-    from rotordrop.simulation.coast_down_certificate import CoastDownCertificate
-    from rotordrop.simulation.coast_down_result import CoastDownResult
+    from rotordrop.simulate.coast_down_case import CoastDownCase
+    from rotordrop.simulate.coast_down_certificate import CoastDownCertificate
+    from rotordrop.simulate.coast_down_result import CoastDownResult
     from rotordrop.spectrum.coast_down import CoastDownAnalysis
 
 STANDSTILL = "standstill"
@@ -85,14 +85,14 @@ def coast_down(
     on with --resume and the same values, to the same last bit.
     """
     from rotordrop.machine import load_machine
-    from rotordrop.model.parameters import build_drop_model
     from rotordrop.report.coast_down_page import coast_down_page
     from rotordrop.report.terminal import print_summary, summary_console
-    from rotordrop.simulation._coast_run import MOST_STEPS_PER_WINDOW
-    from rotordrop.simulation.case import CentredStart, LevitatedStart
-    from rotordrop.simulation.coast_down import simulate_coast_down
-    from rotordrop.simulation.coast_down_case import CoastDownCase
-    from rotordrop.simulation.expected_steps import long_run
+    from rotordrop.rotor.parameters import build_drop_model
+    from rotordrop.simulate._coast_run import MOST_STEPS_PER_WINDOW
+    from rotordrop.simulate.case import CentredStart, LevitatedStart
+    from rotordrop.simulate.coast_down import simulate_coast_down
+    from rotordrop.simulate.coast_down_case import CoastDownCase
+    from rotordrop.simulate.expected_steps import long_run
 
     require_places(output, report, json_file)
     if resume and output is None:
@@ -156,7 +156,7 @@ def _with_recorded_drag(machine: Machine, path: Path) -> Machine:
 
 
 def _certificate(model: Any, case: CoastDownCase, result: CoastDownResult) -> CoastDownCertificate:
-    from rotordrop.simulation.coast_down_certificate import certify_coast_down
+    from rotordrop.simulate.coast_down_certificate import certify_coast_down
 
     with progress_bar("at a tighter tolerance") as progress:
         return certify_coast_down(model, case, result, progress=progress)

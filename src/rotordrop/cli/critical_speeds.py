@@ -49,12 +49,12 @@ def critical_speeds(
     import numpy as np
 
     from rotordrop.machine import load_machine
-    from rotordrop.model.campbell import campbell_diagram
-    from rotordrop.model.critical_speeds import WHIRLS, critical_speed_map
-    from rotordrop.model.stability import stability_map
     from rotordrop.report.critical_speeds_page import critical_speeds_json, critical_speeds_page
     from rotordrop.report.page import write_page
     from rotordrop.report.terminal import print_summary
+    from rotordrop.rotor.campbell import campbell_diagram
+    from rotordrop.rotor.critical_speeds import WHIRLS, critical_speed_map
+    from rotordrop.rotor.stability import stability_map
 
     require_places(report, json_file)
     described = load_machine(machine)

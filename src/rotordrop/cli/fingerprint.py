@@ -12,7 +12,7 @@ from rotordrop.cli._output import deliver
 
 def fingerprint(json_file: JsonOption = None) -> None:
     """Print a hash that tells whether drops have the same bits on two computers."""
-    from rotordrop.simulation.fingerprint import fingerprint as of_this_computer
+    from rotordrop.simulate.fingerprint import fingerprint as of_this_computer
 
     found = of_this_computer()
     deliver({"fingerprint": found}, json_file, lambda out: out.print(found, no_wrap=True, crop=True))

@@ -19,7 +19,7 @@ from rotordrop.cli._start import levitated_start, placed_start
 from rotordrop.errors import UsageError
 
 if TYPE_CHECKING:
-    from rotordrop.simulation.case import Start
+    from rotordrop.simulate.case import Start
 
 
 class Reduction(StrEnum):
@@ -120,9 +120,9 @@ def simulate(
     from rotordrop.report.simulate_page import simulate_page
     from rotordrop.report.simulation_numbers import simulation_numbers
     from rotordrop.report.terminal import print_summary, summary_console
-    from rotordrop.simulation.case import DropCase
-    from rotordrop.simulation.drop import simulate_drop
-    from rotordrop.simulation.expected_steps import long_run
+    from rotordrop.simulate.case import DropCase
+    from rotordrop.simulate.drop import simulate_drop
+    from rotordrop.simulate.expected_steps import long_run
 
     require_places(output, report, json_file)
     described = load_machine(machine)

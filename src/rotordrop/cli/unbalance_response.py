@@ -35,11 +35,11 @@ def unbalance_response(
 ) -> None:
     """Show amplitude and phase under unbalance over the speed, with amplification factors and margins."""
     from rotordrop.machine import load_machine
-    from rotordrop.model.unbalanced import resolved_response
     from rotordrop.report.csv_files import write_data
     from rotordrop.report.page import write_page
     from rotordrop.report.terminal import print_summary
     from rotordrop.report.unbalance_page import unbalance_json, unbalance_page
+    from rotordrop.rotor.unbalanced import resolved_response
 
     require_places(report, json_file)
     described = load_machine(machine)

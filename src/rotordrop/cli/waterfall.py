@@ -140,7 +140,7 @@ def _signal(machine: Machine, path: Path, profile: Path | None) -> tuple[CoastDo
     from rotordrop.measurement.record import read_record
     from rotordrop.measurement.simulated import is_simulated
     from rotordrop.report.content import SIMULATED_RECORD
-    from rotordrop.simulation.coast_down_file import is_coast_down
+    from rotordrop.simulate.coast_down_file import is_coast_down
 
     if is_coast_down(path):
         text = "Everything on this page is computed from the machine description; nothing was measured."

@@ -118,7 +118,7 @@ def estimate_drops(
     from rotordrop.estimation.tracked import followed_drops
     from rotordrop.estimation.tracked_estimate import estimate_of
     from rotordrop.identification.evidence import read_evidence
-    from rotordrop.model.parameters import build_drop_model
+    from rotordrop.rotor.parameters import build_drop_model
 
     model = build_drop_model(machine)
     evidence = [read_evidence(model, r, t, name=n) for r, t, n in zip(records, tails, stems, strict=True)]

@@ -9,10 +9,10 @@ import numpy as np
 
 from rotordrop.estimated import NINETY
 from rotordrop.identification.evidence import Evidence, Missing, strongest_slowing
-from rotordrop.model.contact_band import contact_frequency
-from rotordrop.model.parameter_table import parameter
-from rotordrop.model.unknowns import sensor_prior, smallest_gap
-from rotordrop.tracking.problem import DropProblem, rough_noise
+from rotordrop.rotor.contact_band import contact_frequency
+from rotordrop.rotor.parameter_table import parameter
+from rotordrop.rotor.unknowns import sensor_prior, smallest_gap
+from rotordrop.track.problem import DropProblem, rough_noise
 from rotordrop.units import format_quantity
 
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from rotordrop.estimated import IdentifiedValue
 from rotordrop.severity.statistics import StressStatistics, stress_statistics
-from rotordrop.simulation.certificate import refined_peak
-from rotordrop.simulation.result import DropResult
+from rotordrop.simulate.certificate import refined_peak
+from rotordrop.simulate.result import DropResult
 
 Array = NDArray[np.float64]
 Role: TypeAlias = Literal["measured", "simulated", "simulated, lower gap", "estimated", "cross-check"]

@@ -26,15 +26,15 @@ from rotordrop.estimation.tracked_parameters import (
 from rotordrop.identification.evidence import read_evidence
 from rotordrop.machine import CalibrationDrop, CalibrationOrigin, Machine, RecordedLift
 from rotordrop.measurement.record import Record
-from rotordrop.model.parameter import Parameter
-from rotordrop.model.parameter_table import parameter, row_of, rows, separating_measurement
-from rotordrop.model.parameters import build_drop_model
-from rotordrop.model.statics import bearing_load_shares
-from rotordrop.model.unknowns import typical_depth, weight_per_magnet
-from rotordrop.tracking.consistency import Check, consistency_checks, judged_by
-from rotordrop.tracking.problem import DropProblem
-from rotordrop.tracking.smoother import Smoothed, parameter_sample
-from rotordrop.tracking.unknown_impulses import likeliest_noise, with_noise
+from rotordrop.rotor.parameter import Parameter
+from rotordrop.rotor.parameter_table import parameter, row_of, rows, separating_measurement
+from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.rotor.statics import bearing_load_shares
+from rotordrop.rotor.unknowns import typical_depth, weight_per_magnet
+from rotordrop.track.consistency import Check, consistency_checks, judged_by
+from rotordrop.track.problem import DropProblem
+from rotordrop.track.smoother import Smoothed, parameter_sample
+from rotordrop.track.unknown_impulses import likeliest_noise, with_noise
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]

@@ -13,9 +13,9 @@ from scipy.special import ndtr, ndtri
 
 from rotordrop.errors import UsageError
 from rotordrop.estimated import NINETY
-from rotordrop.model.parameter import Parameter
-from rotordrop.model.parameter_table import fitted_row, row_of
 from rotordrop.physics.linear_algebra import solve, symmetric_eigen
+from rotordrop.rotor.parameter import Parameter
+from rotordrop.rotor.parameter_table import fitted_row, row_of
 from rotordrop.units import format_chance
 
 Array = NDArray[np.float64]

@@ -19,7 +19,7 @@ from rotordrop.estimation.methods import Replay
 from rotordrop.estimation.severity_numbers import severity_values
 from rotordrop.identification.first_contact import TimedContact
 from rotordrop.measurement.event_date import event_date
-from rotordrop.simulation.fingerprint import fingerprint
+from rotordrop.simulate.fingerprint import fingerprint
 
 FORMAT = "rotordrop estimate 2"
 

@@ -34,8 +34,8 @@ from rotordrop.measurement.events import DropInstant
 from rotordrop.measurement.power_off import PowerOff
 from rotordrop.measurement.quality.finding import Finding
 from rotordrop.measurement.record import Record
-from rotordrop.model.parameter import Parameter
-from rotordrop.tracking.consistency import Check
+from rotordrop.rotor.parameter import Parameter
+from rotordrop.track.consistency import Check
 from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import Any
 from rotordrop.errors import UsageError
 from rotordrop.estimated import Correlation, Estimated
 from rotordrop.machine import Machine
-from rotordrop.model.parameter_table import rows
+from rotordrop.rotor.parameter_table import rows
 
 Document = Mapping[str, Any]
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rotordrop.atomic_file import atomic_path, new_hdf5
 from rotordrop.errors import OutputError, UsageError
 from rotordrop.estimation.bearing_drop import BearingDrop
-from rotordrop.model.bearing_numbers import numbers_of
+from rotordrop.rotor.bearing_numbers import numbers_of
 
 if TYPE_CHECKING:
     import pandas

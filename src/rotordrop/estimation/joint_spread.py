@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from rotordrop.estimated import NINETY, IdentifiedValue
 from rotordrop.machine import JointSpread
-from rotordrop.model.joint_values import (
+from rotordrop.rotor.joint_values import (
     file_of_fitted,
     file_path,
     is_logarithmic,
     is_of_a_bearing,
     slope_signs,
 )
-from rotordrop.tracking.problem import DropProblem
+from rotordrop.track.problem import DropProblem
 
 Array = NDArray[np.float64]
 

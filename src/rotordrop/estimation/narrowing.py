@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from rotordrop.estimated import NINETY
 from rotordrop.estimation.advice import WORTH_SAYING, Advice
 from rotordrop.estimation.tracked_loads import BEAM_FORCE_SIGMA, MODEL_FORCE_SIGMA
-from rotordrop.model.rotor_form import is_beam
-from rotordrop.tracking.forces import ForceHistory, force_gradient
-from rotordrop.tracking.problem import DropProblem
-from rotordrop.tracking.smoother import Smoothed, smooth
+from rotordrop.rotor.rotor_form import is_beam
+from rotordrop.track.forces import ForceHistory, force_gradient
+from rotordrop.track.problem import DropProblem
+from rotordrop.track.smoother import Smoothed, smooth
 
 Array = NDArray[np.float64]
 

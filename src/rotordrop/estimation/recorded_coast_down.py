@@ -16,10 +16,10 @@ from rotordrop.machine import Machine
 from rotordrop.machine.sensor import Sensor
 from rotordrop.measurement.axes import along_sensors
 from rotordrop.measurement.record import Record
-from rotordrop.model.assembly import build_rotor_fe
-from rotordrop.model.bearing_numbers import numbers_of
-from rotordrop.model.parameters import build_drop_model
-from rotordrop.model.statics import bearing_load_shares
+from rotordrop.rotor.assembly import build_rotor_fe
+from rotordrop.rotor.bearing_numbers import numbers_of
+from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.rotor.statics import bearing_load_shares
 from rotordrop.spectrum.coast_down import RACES_SPUN_UP, SHORTEST_LAW, CoastDownSignal
 from rotordrop.spectrum.coast_down_law import fit_drag
 from rotordrop.spectrum.speed_profile import SpeedProfile, fit_speed_profile

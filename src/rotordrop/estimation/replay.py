@@ -55,8 +55,8 @@ from rotordrop.identification.support import (
 )
 from rotordrop.machine import Machine
 from rotordrop.measurement.record import Record
-from rotordrop.model.parameter import Step
-from rotordrop.model.parameters import build_drop_model
+from rotordrop.rotor.parameter import Step
+from rotordrop.rotor.parameters import build_drop_model
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]

@@ -30,10 +30,10 @@ from rotordrop.identification.friction import FrictionSweep
 from rotordrop.identification.modal_expansion import expand_initial_state
 from rotordrop.identification.support import SupportFit
 from rotordrop.machine import Machine, TouchdownBearing
-from rotordrop.model.bearing_numbers import numbers_of
-from rotordrop.model.parameter import Step
-from rotordrop.model.parameter_table import parameter, rows
-from rotordrop.simulation.result import DropResult
+from rotordrop.rotor.bearing_numbers import numbers_of
+from rotordrop.rotor.parameter import Step
+from rotordrop.rotor.parameter_table import parameter, rows
+from rotordrop.simulate.result import DropResult
 
 Array = NDArray[np.float64]
 NO_INTERVAL: Verdict = "the record does not determine it"

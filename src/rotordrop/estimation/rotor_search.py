@@ -19,14 +19,14 @@ from rotordrop.errors import RotordropError
 from rotordrop.estimated import NINETY, Estimated
 from rotordrop.identification.evidence import Evidence
 from rotordrop.machine import Machine
-from rotordrop.model.parameter import Parameter
-from rotordrop.model.parameter_table import parameter
-from rotordrop.model.parameters import build_drop_model
-from rotordrop.model.reduction import Reduction
-from rotordrop.model.rotor_form import FORM, is_beam
-from rotordrop.model.unknowns import prior
-from rotordrop.tracking.problem import RecordedDrop, build_problem
-from rotordrop.tracking.rotor_likelihood import Readings, improbability_of, readings_of
+from rotordrop.rotor.parameter import Parameter
+from rotordrop.rotor.parameter_table import parameter
+from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.rotor.reduction import Reduction
+from rotordrop.rotor.rotor_form import FORM, is_beam
+from rotordrop.rotor.unknowns import prior
+from rotordrop.track.problem import RecordedDrop, build_problem
+from rotordrop.track.rotor_likelihood import Readings, improbability_of, readings_of
 
 Array = NDArray[np.float64]
 

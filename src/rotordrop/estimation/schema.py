@@ -19,7 +19,7 @@ from rotordrop.json_schema import (
     closed,
     numbers,
 )
-from rotordrop.model.parameter_table import LOADS, published
+from rotordrop.rotor.parameter_table import LOADS, published
 from rotordrop.severity.numbers import SEVERITY
 from rotordrop.units import si_unit
 

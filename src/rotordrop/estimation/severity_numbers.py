@@ -11,7 +11,7 @@ from rotordrop.estimated import IdentifiedValue
 from rotordrop.estimation.bearing_drop import BearingDrop
 from rotordrop.estimation.estimate import Estimate
 from rotordrop.measurement.look import INDEX_WINDOW
-from rotordrop.model.bearing_numbers import Ratings, numbers_of
+from rotordrop.rotor.bearing_numbers import Ratings, numbers_of
 from rotordrop.severity.numbers import fatigue_shares, static_safety_of_load, static_safety_of_stress
 
 Array = NDArray[np.float64]

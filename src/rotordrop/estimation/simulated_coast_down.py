@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from rotordrop.machine import Machine
-from rotordrop.simulation.coast_down_file import load_coast_down, open_samples
+from rotordrop.simulate.coast_down_file import load_coast_down, open_samples
 from rotordrop.spectrum.coast_down import CoastDownSignal
 from rotordrop.spectrum.speed_profile import exact_speed_profile
 from rotordrop.spectrum.waterfall import PlanarSignal

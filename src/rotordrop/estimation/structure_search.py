@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from rotordrop.errors import IdentificationError
 from rotordrop.estimation.structure import EXTENSIONS, Extension
 from rotordrop.machine import Machine
-from rotordrop.tracking.calibration import THREADS, TrackedDrops, beside_the_record
-from rotordrop.tracking.problem import DropProblem
+from rotordrop.track.calibration import THREADS, TrackedDrops, beside_the_record
+from rotordrop.track.problem import DropProblem
 
 Array = NDArray[np.float64]
 

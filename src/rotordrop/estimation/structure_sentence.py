@@ -10,8 +10,8 @@ from rotordrop.estimation.estimate import Structure
 from rotordrop.estimation.structure_search import Kept
 from rotordrop.machine import Machine
 from rotordrop.machine.amb import REMANENCE_TIME
-from rotordrop.model.statics import bearing_load_shares
-from rotordrop.model.unknowns import PEAK_LOADS
+from rotordrop.rotor.statics import bearing_load_shares
+from rotordrop.rotor.unknowns import PEAK_LOADS
 
 Values = Mapping[str, IdentifiedValue]
 """Values found, by path."""

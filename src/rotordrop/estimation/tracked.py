@@ -29,11 +29,11 @@ from rotordrop.estimation.tracked_parameters import UNSURE_GAP
 from rotordrop.identification.evidence import Evidence, Missing
 from rotordrop.machine import Machine
 from rotordrop.measurement.axes import sees_both_directions
-from rotordrop.model.contact_band import reduction_for_contact
-from rotordrop.model.parameters import DropModel, build_drop_model
-from rotordrop.model.reduction import Reduction
-from rotordrop.model.rotor_form import is_beam
-from rotordrop.tracking.calibration import (
+from rotordrop.rotor.contact_band import reduction_for_contact
+from rotordrop.rotor.parameters import DropModel, build_drop_model
+from rotordrop.rotor.reduction import Reduction
+from rotordrop.rotor.rotor_form import is_beam
+from rotordrop.track.calibration import (
     BLIND_SCHEDULE,
     CALIBRATED_SCHEDULE,
     DAMPED_SCHEDULE,
@@ -47,14 +47,14 @@ from rotordrop.tracking.calibration import (
     stage_settings,
     track,
 )
-from rotordrop.tracking.consistency import DIRECTIONS, Check, consistency_checks, judged_by
-from rotordrop.tracking.forces import ForceHistory, force_history
-from rotordrop.tracking.input_state import InputEstimate
-from rotordrop.tracking.prior import fall_time
-from rotordrop.tracking.problem import DropProblem, Fall, RecordedDrop, build_problem
-from rotordrop.tracking.smoother import Forward, Smoothed, forward
-from rotordrop.tracking.transfer import transferred
-from rotordrop.tracking.unknown_impulses import likeliest_noise, with_noise
+from rotordrop.track.consistency import DIRECTIONS, Check, consistency_checks, judged_by
+from rotordrop.track.forces import ForceHistory, force_history
+from rotordrop.track.input_state import InputEstimate
+from rotordrop.track.prior import fall_time
+from rotordrop.track.problem import DropProblem, Fall, RecordedDrop, build_problem
+from rotordrop.track.smoother import Forward, Smoothed, forward
+from rotordrop.track.transfer import transferred
+from rotordrop.track.unknown_impulses import likeliest_noise, with_noise
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]

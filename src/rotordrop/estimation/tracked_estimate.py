@@ -50,10 +50,10 @@ from rotordrop.estimation.tracked_parameters import (
 )
 from rotordrop.estimation.tracked_unbalance import plane_unbalances
 from rotordrop.estimation.unbalance import PlaneUnbalance, unbalance_notes
-from rotordrop.model.bearing_numbers import numbers_of
-from rotordrop.model.rotor_form import is_beam
-from rotordrop.tracking.consistency import NIS_RANGE, Check
-from rotordrop.tracking.input_state import InputEstimate, at_bearings
+from rotordrop.rotor.bearing_numbers import numbers_of
+from rotordrop.rotor.rotor_form import is_beam
+from rotordrop.track.consistency import NIS_RANGE, Check
+from rotordrop.track.input_state import InputEstimate, at_bearings
 
 Array = NDArray[np.float64]
 

@@ -25,18 +25,18 @@ from rotordrop.estimation.bearing_drop import (
     mean_late,
 )
 from rotordrop.estimation.estimate import CrossCheck
-from rotordrop.model.rotor_form import is_beam
-from rotordrop.simulation.certificate import refined_peak
-from rotordrop.tracking.calibration import TrackedDrops
-from rotordrop.tracking.consistency import direction_check
-from rotordrop.tracking.forces import ForceHistory
-from rotordrop.tracking.input_state import (
+from rotordrop.rotor.rotor_form import is_beam
+from rotordrop.simulate.certificate import refined_peak
+from rotordrop.track.calibration import TrackedDrops
+from rotordrop.track.consistency import direction_check
+from rotordrop.track.forces import ForceHistory
+from rotordrop.track.input_state import (
     MEAN_ERROR,
     InputEstimate,
     input_state_estimate,
     lent_by_record,
 )
-from rotordrop.tracking.problem import DropProblem
+from rotordrop.track.problem import DropProblem
 
 Array = NDArray[np.float64]
 

@@ -13,13 +13,13 @@ from rotordrop.estimated import NINETY, IdentifiedValue, Verdict
 from rotordrop.estimation.estimate import FittedParameter, JointEstimate, SensorErrors
 from rotordrop.estimation.tracked_loads import INCONSISTENT, OF_CROSS_CHECK, with_interval
 from rotordrop.machine import Machine
-from rotordrop.model.bearing_numbers import numbers_of
-from rotordrop.model.parameter import Parameter
-from rotordrop.model.parameter_table import parameter, published
-from rotordrop.model.unknowns import Unknown, sensor_prior, smallest_gap
-from rotordrop.tracking.consistency import PARAMETER_LIMIT
-from rotordrop.tracking.problem import DropProblem
-from rotordrop.tracking.smoother import Smoothed, parameter_sample
+from rotordrop.rotor.bearing_numbers import numbers_of
+from rotordrop.rotor.parameter import Parameter
+from rotordrop.rotor.parameter_table import parameter, published
+from rotordrop.rotor.unknowns import Unknown, sensor_prior, smallest_gap
+from rotordrop.track.consistency import PARAMETER_LIMIT
+from rotordrop.track.problem import DropProblem
+from rotordrop.track.smoother import Smoothed, parameter_sample
 
 Array = NDArray[np.float64]
 

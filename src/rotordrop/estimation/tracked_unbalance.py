@@ -12,8 +12,8 @@ from rotordrop.estimation.tracked_loads import INCONSISTENT
 from rotordrop.estimation.tracked_parameters import determination, parameter_widening
 from rotordrop.estimation.unbalance import PlaneUnbalance
 from rotordrop.measurement.synchronous import MarkAngle, angle_since_mark
-from rotordrop.tracking.problem import DropProblem
-from rotordrop.tracking.smoother import Smoothed, parameter_sample
+from rotordrop.track.problem import DropProblem
+from rotordrop.track.smoother import Smoothed, parameter_sample
 
 Array = NDArray[np.float64]
 

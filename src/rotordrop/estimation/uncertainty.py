@@ -21,11 +21,11 @@ from rotordrop.identification.initial_state import covariance_root
 from rotordrop.identification.parameter_vector import with_bearing
 from rotordrop.identification.replica import drop_parameters
 from rotordrop.identification.support import WIDENING, ImpactFit
-from rotordrop.model.parameters import DropModel
-from rotordrop.simulation.case import DropCase, StateStart
-from rotordrop.simulation.certificate import refined_peak
-from rotordrop.simulation.drop import simulate_drop
-from rotordrop.simulation.result import DropResult
+from rotordrop.rotor.parameters import DropModel
+from rotordrop.simulate.case import DropCase, StateStart
+from rotordrop.simulate.certificate import refined_peak
+from rotordrop.simulate.drop import simulate_drop
+from rotordrop.simulate.result import DropResult
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from rotordrop.errors import IdentificationError
 from rotordrop.identification.sensing import Sensing, displacements_along
 from rotordrop.measurement.record import Record
-from rotordrop.model.parameters import DropModel
-from rotordrop.model.static_sag import StaticSag, sag_of_model
+from rotordrop.rotor.parameters import DropModel
+from rotordrop.rotor.static_sag import StaticSag, sag_of_model
 
 Array = NDArray[np.float64]
 

@@ -27,7 +27,7 @@ from rotordrop.measurement.power_off import PowerOff, find_power_off
 from rotordrop.measurement.record import Record
 from rotordrop.measurement.settled import resting_record
 from rotordrop.measurement.speed import RotorAngle, rotor_angle
-from rotordrop.model.parameters import DropModel
+from rotordrop.rotor.parameters import DropModel
 
 Array = NDArray[np.float64]
 Fact = TypeVar("Fact")

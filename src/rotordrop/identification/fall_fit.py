@@ -12,8 +12,8 @@ from rotordrop.identification.free_fall import FreeFall, sagging_amplitudes
 from rotordrop.identification.sensing import Sensing
 from rotordrop.machine import Machine
 from rotordrop.measurement.fall import REMANENT_SHARE, REMANENT_TIME
-from rotordrop.model.parameters import DropModel
-from rotordrop.model.unknowns import smallest_gap
+from rotordrop.rotor.parameters import DropModel
+from rotordrop.rotor.unknowns import smallest_gap
 
 Array = NDArray[np.float64]
 

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.model import layout as L
-from rotordrop.model.parameters import DropModel
-from rotordrop.model.statics import levitated_sag
+from rotordrop.rotor import layout as L
+from rotordrop.rotor.parameters import DropModel
+from rotordrop.rotor.statics import levitated_sag
 
 Array = NDArray[np.float64]
 

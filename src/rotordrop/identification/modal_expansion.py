@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rotordrop.errors import IdentificationError
 from rotordrop.identification.sensing import Sensing
 from rotordrop.measurement.preprocess import local_polynomial
-from rotordrop.model.parameters import DropModel
+from rotordrop.rotor.parameters import DropModel
 
 Array = NDArray[np.float64]
 

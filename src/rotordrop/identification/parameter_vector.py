@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.model import layout as L
-from rotordrop.model.layout import KernelParameters
-from rotordrop.model.parameter import Role, Step
-from rotordrop.model.parameters import DropModel
-from rotordrop.model.unknowns import Unknown, bearing_unknowns
+from rotordrop.rotor import layout as L
+from rotordrop.rotor.layout import KernelParameters
+from rotordrop.rotor.parameter import Role, Step
+from rotordrop.rotor.parameters import DropModel
+from rotordrop.rotor.unknowns import Unknown, bearing_unknowns
 
 Array = NDArray[np.float64]
 

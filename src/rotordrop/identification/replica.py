@@ -13,14 +13,14 @@ from rotordrop.identification.free_fall import MAGNET_FORCES, FreeFall, build_fr
 from rotordrop.identification.initial_state import InitialState
 from rotordrop.identification.parameter_vector import ParameterVector, with_bearing
 from rotordrop.identification.sensing import Sensing, build_sensing
-from rotordrop.model import layout as L
-from rotordrop.model.layout import KernelParameters
-from rotordrop.model.parameters import DropModel
-from rotordrop.model.static_sag import sag_of_model, static_sag
 from rotordrop.physics import aerodynamics
-from rotordrop.simulation import _loop
-from rotordrop.simulation._tableau import tsit5
-from rotordrop.simulation.drop import FIRST_STEP, error_scale
+from rotordrop.rotor import layout as L
+from rotordrop.rotor.layout import KernelParameters
+from rotordrop.rotor.parameters import DropModel
+from rotordrop.rotor.static_sag import sag_of_model, static_sag
+from rotordrop.simulate import _loop
+from rotordrop.simulate._tableau import tsit5
+from rotordrop.simulate.drop import FIRST_STEP, error_scale
 
 Array = NDArray[np.float64]
 

@@ -11,10 +11,10 @@ from rotordrop.errors import IdentificationError
 from rotordrop.machine.sensor import Sensor
 from rotordrop.measurement.axes import along_sensors, sensor_directions
 from rotordrop.measurement.record import Record
-from rotordrop.model.parameter_table import parameter
-from rotordrop.model.parameters import DropModel
-from rotordrop.model.statics import settled_sag
-from rotordrop.model.unknowns import sensor_prior, smallest_gap
+from rotordrop.rotor.parameter_table import parameter
+from rotordrop.rotor.parameters import DropModel
+from rotordrop.rotor.statics import settled_sag
+from rotordrop.rotor.unknowns import sensor_prior, smallest_gap
 
 Array = NDArray[np.float64]
 

@@ -28,7 +28,7 @@ from rotordrop.identification.parameter_vector import (
 )
 from rotordrop.identification.replica import Replica
 from rotordrop.identification.search import Progress, Schedule, Search, search, sobol_starts
-from rotordrop.model.parameter import Role
+from rotordrop.rotor.parameter import Role
 
 Array = NDArray[np.float64]
 

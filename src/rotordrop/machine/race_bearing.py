@@ -14,7 +14,7 @@ Oddity = tuple[str, float, float, str]
 class RaceBearing(Description):
     """The bearing that carries the race of a touchdown bearing, of whatever kind.
 
-    The numbers that follow from it are in `rotordrop.model.bearing_numbers`.
+    The numbers that follow from it are in `rotordrop.rotor.bearing_numbers`.
     """
 
     @abstractmethod

@@ -19,8 +19,8 @@ from rotordrop.measurement.release import (
     FreeRotor,
     response_at,
 )
-from rotordrop.model.parameter_table import parameter
-from rotordrop.model.unknowns import sensor_prior
+from rotordrop.rotor.parameter_table import parameter
+from rotordrop.rotor.unknowns import sensor_prior
 
 if TYPE_CHECKING:
     from rotordrop.machine.sensor import Sensor

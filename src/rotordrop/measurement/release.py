@@ -16,9 +16,9 @@ import numpy as np
 from rotordrop.machine import Machine
 from rotordrop.measurement.axes import Plane
 from rotordrop.measurement.recording import Array
-from rotordrop.model.assembly import build_rotor_fe
-from rotordrop.model.reduction import Reduction, RotorBasis, reduce_rotor
-from rotordrop.model.statics import rest_on
+from rotordrop.rotor.assembly import build_rotor_fe
+from rotordrop.rotor.reduction import Reduction, RotorBasis, reduce_rotor
+from rotordrop.rotor.statics import rest_on
 
 ComplexArray = np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
 

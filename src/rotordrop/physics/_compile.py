@@ -22,12 +22,12 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _MARK = "rotordrop.physics._compile import"
-_CONSTANTS = (_PACKAGE / "model" / "layout.py", _PACKAGE / "physics" / "elementary_tables.py")
+_CONSTANTS = (_PACKAGE / "rotor" / "layout.py", _PACKAGE / "physics" / "elementary_tables.py")
 """Compiled into the kernels as numbers though they have no kernel themselves."""
 
 
 def _kernel_sources() -> list[Path]:
-    folders = ("physics", "model", "simulation", "synthesis", "tracking")
+    folders = ("physics", "rotor", "simulate", "synthesis", "track")
     files = (file for folder in folders for file in sorted((_PACKAGE / folder).glob("*.py")))
     return [file for file in files if file in _CONSTANTS or _MARK in file.read_text(encoding="utf-8")]
 

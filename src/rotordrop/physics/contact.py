@@ -1,7 +1,7 @@
 """Contact of rotor and inner race: the one place that knows its law (Neisi 2020, eqs. 8–10).
 
 A law is a short array of numbers that only this module reads: `contact_law` makes it, the columns of
-`rotordrop.model.layout` hold it, and whoever needs force, derivative, energy, depth or tangent hands it back.
+`rotordrop.rotor.layout` hold it, and whoever needs force, derivative, energy, depth or tangent hands it back.
 """
 
 from __future__ import annotations

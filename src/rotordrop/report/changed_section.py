@@ -9,9 +9,9 @@ from rotordrop.errors import UsageError
 from rotordrop.estimation.changed import Change, asked_for, changes
 from rotordrop.estimation.document import estimate_document
 from rotordrop.estimation.estimate import Estimate
-from rotordrop.model.parameter_table import row_of
 from rotordrop.report.content import Cell, Section, Statement, Table
 from rotordrop.report.quantity import Quantity, written
+from rotordrop.rotor.parameter_table import row_of
 from rotordrop.units import format_chance
 
 HEADING = "Since the last drop"

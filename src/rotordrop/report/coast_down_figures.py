@@ -23,7 +23,7 @@ from rotordrop.report.style import (
     plain,
     single,
 )
-from rotordrop.simulation.coast_down_result import QUANTILES, CoastDownResult
+from rotordrop.simulate.coast_down_result import QUANTILES, CoastDownResult
 from rotordrop.spectrum.coast_down import SpeedLaw
 from rotordrop.spectrum.indentation import DisplacementHistory
 

@@ -12,11 +12,11 @@ from rotordrop.report.content import Card, Figure, KeyFigure, ReportContent, Sec
 from rotordrop.report.machine_sections import machine_sections
 from rotordrop.report.quantity import Quantity, written
 from rotordrop.report.waterfall_page import frequency_sections
-from rotordrop.simulation.coast_down_result import QUANTITIES, CoastDownResult
+from rotordrop.simulate.coast_down_result import QUANTITIES, CoastDownResult
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
-    from rotordrop.simulation.coast_down_certificate import CoastDownCertificate
+    from rotordrop.simulate.coast_down_certificate import CoastDownCertificate
     from rotordrop.spectrum.coast_down import CoastDownAnalysis
 
 

@@ -9,9 +9,6 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from rotordrop.model.campbell import CampbellDiagram
-from rotordrop.model.critical_speeds import CriticalSpeedMap
-from rotordrop.model.stability import StabilityMap
 from rotordrop.report.style import (
     INK,
     LIMIT,
@@ -24,6 +21,9 @@ from rotordrop.report.style import (
     plain,
     single,
 )
+from rotordrop.rotor.campbell import CampbellDiagram
+from rotordrop.rotor.critical_speeds import CriticalSpeedMap
+from rotordrop.rotor.stability import StabilityMap
 
 Array = NDArray[np.float64]
 TURN = 2.0 * math.pi

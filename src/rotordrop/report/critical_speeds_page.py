@@ -9,10 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotordrop._version import __version__
-from rotordrop.model.campbell import CampbellDiagram
-from rotordrop.model.critical_speeds import CriticalSpeedMap
-from rotordrop.model.separation import Separation, amplification_factor, separations
-from rotordrop.model.stability import StabilityMap
 from rotordrop.report.content import Card, Figure, KeyFigure, ReportContent, Section, Statement, Table
 from rotordrop.report.critical_speeds_figure import (
     campbell_figure,
@@ -22,6 +18,10 @@ from rotordrop.report.critical_speeds_figure import (
 )
 from rotordrop.report.machine_sections import defaults_section
 from rotordrop.report.quantity import Quantity
+from rotordrop.rotor.campbell import CampbellDiagram
+from rotordrop.rotor.critical_speeds import CriticalSpeedMap
+from rotordrop.rotor.separation import Separation, amplification_factor, separations
+from rotordrop.rotor.stability import StabilityMap
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine

@@ -14,7 +14,7 @@ from rotordrop.report.content import Cell, Figure, ReportContent, Section, State
 from rotordrop.report.origin import study_facts
 from rotordrop.report.quantity import display_unit
 from rotordrop.report.style import SERIES, axis_title, fit_legend, panels, plain
-from rotordrop.simulation.fingerprint import fingerprint
+from rotordrop.simulate.fingerprint import fingerprint
 from rotordrop.study.design import Aim, Candidate, DesignPlan, DesignResult
 from rotordrop.study.quantities import columns_of
 from rotordrop.study.summary import Known

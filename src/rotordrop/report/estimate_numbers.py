@@ -7,10 +7,10 @@ from pathlib import Path
 
 from rotordrop.estimated import IdentifiedValue
 from rotordrop.estimation.bearing_drop import BearingDrop
-from rotordrop.model.parameter import Role
-from rotordrop.model.parameter_table import LOADS, published
 from rotordrop.report.content import Card, Cell, KeyFigure, Table
 from rotordrop.report.quantity import Quantity
+from rotordrop.rotor.parameter import Role
+from rotordrop.rotor.parameter_table import LOADS, published
 
 MEANS = (
     "A mean force is the mean of the magnitude; the magnitude of the mean force would be smaller where its "

@@ -13,9 +13,9 @@ from rotordrop.report.quantity import Quantity
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
-    from rotordrop.model.bearing_numbers import BearingFigure
-    from rotordrop.model.machine_summary import BearingSummary, MachineSummary
-    from rotordrop.model.machine_warnings import MachineWarning
+    from rotordrop.rotor.bearing_numbers import BearingFigure
+    from rotordrop.rotor.machine_summary import BearingSummary, MachineSummary
+    from rotordrop.rotor.machine_warnings import MachineWarning
 
 
 def machine_content(

@@ -79,7 +79,7 @@ def weight_shares(machine: Machine | None) -> dict[str, float]:
     """Share of the weight [N] by name of the bearing; empty without a machine."""
     if machine is None:
         return {}
-    from rotordrop.model.statics import bearing_load_shares
+    from rotordrop.rotor.statics import bearing_load_shares
 
     shares = bearing_load_shares(machine)
     return {

@@ -78,7 +78,7 @@ def origin_here(arguments: Sequence[str], files: Sequence[tuple[str, Path]], ope
     operator : str
         Who made it.
     """
-    from rotordrop.simulation.fingerprint import fingerprint
+    from rotordrop.simulate.fingerprint import fingerprint
 
     return Origin(
         command=command_line(arguments),

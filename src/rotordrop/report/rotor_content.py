@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from rotordrop.machine.ross_files import ImportedRotor
-from rotordrop.model.assembly import rotor_fe
-from rotordrop.model.modes import N_RIGID, free_free_modes, modes_on_springs
 from rotordrop.report.content import Cell, ReportContent, Statement, Table
 from rotordrop.report.quantity import Quantity
+from rotordrop.rotor.assembly import rotor_fe
+from rotordrop.rotor.modes import N_RIGID, free_free_modes, modes_on_springs
 
 SHOWN = 6
 

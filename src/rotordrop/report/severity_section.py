@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from rotordrop.estimation.estimate import Estimate
 from rotordrop.estimation.severity_numbers import severity_values
-from rotordrop.model.bearing_numbers import numbers_of
 from rotordrop.report.content import Cell, Section, Table
 from rotordrop.report.quantity import Quantity
+from rotordrop.rotor.bearing_numbers import numbers_of
 from rotordrop.severity.numbers import SEVERITY
 
 NOTE = (

@@ -14,7 +14,7 @@ from rotordrop.report.drop_sections import drop_sections, speed_figure, static_l
 from rotordrop.report.estimate_numbers import headline_card
 from rotordrop.report.machine_sections import machine_sections, weight_shares
 from rotordrop.report.quantity import Quantity
-from rotordrop.simulation.result import DropResult
+from rotordrop.simulate.result import DropResult
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine

@@ -7,7 +7,7 @@ from typing import Any
 
 from rotordrop.estimation.bearing_drop import simulated_bearings
 from rotordrop.estimation.document import bearing_entry
-from rotordrop.simulation.result import DropResult
+from rotordrop.simulate.result import DropResult
 
 
 def simulation_numbers(result: DropResult) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from rotordrop.machine.parameter_paths import kind_of_path
 from rotordrop.report.content import Cell, Figure, ReportContent, Section, Statement, Table
 from rotordrop.report.quantity import display_unit
 from rotordrop.report.style import SERIES, axis_title, fit_legend, panels, plain
-from rotordrop.simulation.fingerprint import fingerprint
+from rotordrop.simulate.fingerprint import fingerprint
 from rotordrop.study.plan import case_kind
 from rotordrop.study.quantities import Quantity
 from rotordrop.study.sensitivity import Share, influences

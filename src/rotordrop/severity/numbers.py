@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.machine.ball_bearing import STATIC_STRESS
-from rotordrop.model.bearing_numbers import Ratings
+from rotordrop.rotor.bearing_numbers import Ratings
 from rotordrop.severity.fatigue import (
     ball_row,
     joined,

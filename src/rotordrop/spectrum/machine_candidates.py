@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotordrop.machine import Machine, TouchdownBearing
-from rotordrop.model.assembly import build_rotor_fe
-from rotordrop.model.bearing_numbers import numbers_of
-from rotordrop.model.parameters import contact_law_of
-from rotordrop.model.reduction import Reduction, reduce_rotor
-from rotordrop.model.suspension import EquivalentStiffness, equivalent_stiffness, touchdown_supports
-from rotordrop.model.whirl import matrices_of, whirl_modes
 from rotordrop.physics.contact import depth_at
 from rotordrop.physics.pendulum import effective_length, period_ratio, small_frequency, spin_participation
+from rotordrop.rotor.assembly import build_rotor_fe
+from rotordrop.rotor.bearing_numbers import numbers_of
+from rotordrop.rotor.parameters import contact_law_of
+from rotordrop.rotor.reduction import Reduction, reduce_rotor
+from rotordrop.rotor.suspension import EquivalentStiffness, equivalent_stiffness, touchdown_supports
+from rotordrop.rotor.whirl import matrices_of, whirl_modes
 from rotordrop.spectrum.candidates import (
     Candidate,
     bearing_defect_candidates,

@@ -21,8 +21,8 @@ from rotordrop.machine.amb import REMANENCE_TIME
 from rotordrop.machine.description import unknown_key
 from rotordrop.machine.parameter_paths import kind_of_path, value_of_path
 from rotordrop.machine.saving import machine_text
-from rotordrop.model.parameter_table import fitted_row, parameter
-from rotordrop.simulation.case import DropCase, LevitatedStart
+from rotordrop.rotor.parameter_table import fitted_row, parameter
+from rotordrop.simulate.case import DropCase, LevitatedStart
 from rotordrop.study import sampling
 from rotordrop.study.chosen_bearings import bearings_of, is_bearing, read_bearings, with_chosen
 from rotordrop.study.distributions import Distribution, read_distribution

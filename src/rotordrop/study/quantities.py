@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.machine import Machine
-from rotordrop.model.parameters import DropModel
 from rotordrop.physics.whirl_spells import WhirlSpell, whirl_spells
-from rotordrop.simulation.losses import losses
-from rotordrop.simulation.result import DropResult
+from rotordrop.rotor.parameters import DropModel
+from rotordrop.simulate.losses import losses
+from rotordrop.simulate.result import DropResult
 from rotordrop.units import si_unit
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ from scipy.stats import t as student
 
 from rotordrop.errors import UsageError
 from rotordrop.machine.description import unknown_key
-from rotordrop.model.parameters import build_drop_model
+from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.study.plan import Study
 from rotordrop.study.quantities import columns_of
 from rotordrop.study.run import one_drop

@@ -21,8 +21,8 @@ from rotordrop.errors import UsageError
 from rotordrop.estimated import NINETY
 from rotordrop.machine import Machine
 from rotordrop.machine.amb import REMANENCE_TIME
-from rotordrop.model.parameter_table import parameter
-from rotordrop.model.unknowns import smallest_gap
+from rotordrop.rotor.parameter_table import parameter
+from rotordrop.rotor.unknowns import smallest_gap
 from rotordrop.study.between_drops import next_draw
 from rotordrop.study.distributions import Distribution
 from rotordrop.study.plan import Study

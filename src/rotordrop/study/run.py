@@ -15,8 +15,8 @@ from typing import Any, Literal
 import numpy as np
 
 from rotordrop.errors import RotordropError, UsageError
-from rotordrop.model.parameters import DropModel, build_drop_model
-from rotordrop.simulation.drop import simulate_drop
+from rotordrop.rotor.parameters import DropModel, build_drop_model
+from rotordrop.simulate.drop import simulate_drop
 from rotordrop.study.folder import (
     Claim,
     Shard,

@@ -7,11 +7,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.model import layout as L
-from rotordrop.model.layout import KernelParameters
 from rotordrop.physics._compile import kernel
 from rotordrop.physics.elementary import exp, ln, power
-from rotordrop.simulation._loop import (
+from rotordrop.rotor import layout as L
+from rotordrop.rotor.layout import KernelParameters
+from rotordrop.simulate._loop import (
     ALPHA,
     BETA,
     FINISHED,
@@ -26,7 +26,7 @@ from rotordrop.simulation._loop import (
     dense_output,
     scaled_error,
 )
-from rotordrop.simulation._tableau import Tableau
+from rotordrop.simulate._tableau import Tableau
 from rotordrop.synthesis._hidden_rhs import hidden_derivative
 
 Array = NDArray[np.float64]

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from rotordrop.errors import UsageError
 from rotordrop.estimated import Estimated
 from rotordrop.machine import Machine, TouchdownBearing
-from rotordrop.model.bearing_numbers import Spread, numbers_of
-from rotordrop.model.parameters import DropModel, build_drop_model
-from rotordrop.model.reduction import Reduction
-from rotordrop.model.structure_table import structure_rows as structure_rows_of
-from rotordrop.simulation.case import LevitatedStart
+from rotordrop.rotor.bearing_numbers import Spread, numbers_of
+from rotordrop.rotor.parameters import DropModel, build_drop_model
+from rotordrop.rotor.reduction import Reduction
+from rotordrop.rotor.structure_table import structure_rows as structure_rows_of
+from rotordrop.simulate.case import LevitatedStart
 from rotordrop.synthesis.random_streams import stream
 from rotordrop.synthesis.structure import structure_rows, violated, without_structure
 from rotordrop.synthesis.violations import Violations, named_violations

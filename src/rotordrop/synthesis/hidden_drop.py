@@ -8,16 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import SimulationError
-from rotordrop.model.layout import KernelParameters
-from rotordrop.model.parameters import DropModel
-from rotordrop.model.rotor_on_race import rotor_on_race
-from rotordrop.simulation import _histories
-from rotordrop.simulation._loop import FINISHED
-from rotordrop.simulation.case import DropCase
-from rotordrop.simulation.certificate import Certificate, peaks_of, refined_peak
-from rotordrop.simulation.drop import FIRST_STEP, error_scale, simulate_drop, tableau_of
-from rotordrop.simulation.levitation import start_of_drop
-from rotordrop.simulation.result import ContactLog, DropResult
+from rotordrop.rotor.layout import KernelParameters
+from rotordrop.rotor.parameters import DropModel
+from rotordrop.rotor.rotor_on_race import rotor_on_race
+from rotordrop.simulate import _histories
+from rotordrop.simulate._loop import FINISHED
+from rotordrop.simulate.case import DropCase
+from rotordrop.simulate.certificate import Certificate, peaks_of, refined_peak
+from rotordrop.simulate.drop import FIRST_STEP, error_scale, simulate_drop, tableau_of
+from rotordrop.simulate.levitation import start_of_drop
+from rotordrop.simulate.result import ContactLog, DropResult
 from rotordrop.synthesis import _hidden_rhs as H
 from rotordrop.synthesis._hidden_loop import integrate_hidden
 from rotordrop.synthesis.violation_parts import UnbalanceJump

@@ -7,11 +7,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.model import layout as L
-from rotordrop.model.layout import KernelParameters
-from rotordrop.model.parameters import DropModel
 from rotordrop.physics.ball_set import ball_set_energy
 from rotordrop.physics.contact import contact_energy
+from rotordrop.rotor import layout as L
+from rotordrop.rotor.layout import KernelParameters
+from rotordrop.rotor.parameters import DropModel
 from rotordrop.synthesis import _hidden_rhs as H
 from rotordrop.synthesis.settled import coordinate_masses, lowest_energy, settled_coordinates, without_magnets
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.simulation.levitation import levitated_orbit, levitated_static
-from rotordrop.simulation.result import DropResult
+from rotordrop.simulate.levitation import levitated_orbit, levitated_static
+from rotordrop.simulate.result import DropResult
 from rotordrop.synthesis.event import DropConditions, HiddenMachine
 
 Array = NDArray[np.float64]

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from rotordrop._version import __version__
 from rotordrop.measurement.record import Record
-from rotordrop.simulation.case import DropCase
-from rotordrop.simulation.result import DropResult
+from rotordrop.simulate.case import DropCase
+from rotordrop.simulate.result import DropResult
 from rotordrop.synthesis.event import LARGEST_JITTER, DropConditions, HiddenMachine, drop_conditions
 from rotordrop.synthesis.hidden_drop import true_drop
 from rotordrop.synthesis.hidden_rest import hidden_rest

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
-from rotordrop.model.reduction import RotorBasis
+from rotordrop.rotor.reduction import RotorBasis
 
 Array = NDArray[np.float64]
 

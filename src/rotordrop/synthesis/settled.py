@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import SimulationError
-from rotordrop.model import layout as L
-from rotordrop.model.bearing_numbers import numbers_of
-from rotordrop.model.layout import KernelParameters
-from rotordrop.model.parameters import DropModel
-from rotordrop.model.static_sag import sag_of_model
 from rotordrop.physics.pendulum import small_frequency
-from rotordrop.simulation._histories import stored_energy
-from rotordrop.simulation._rhs import drop_derivative
-from rotordrop.simulation._sensitivity import drop_jacobian
-from rotordrop.simulation.levitation import rigid_amplitudes
+from rotordrop.rotor import layout as L
+from rotordrop.rotor.bearing_numbers import numbers_of
+from rotordrop.rotor.layout import KernelParameters
+from rotordrop.rotor.parameters import DropModel
+from rotordrop.rotor.static_sag import sag_of_model
+from rotordrop.simulate._histories import stored_energy
+from rotordrop.simulate._rhs import drop_derivative
+from rotordrop.simulate._sensitivity import drop_jacobian
+from rotordrop.simulate.levitation import rigid_amplitudes
 
 Array = NDArray[np.float64]
 

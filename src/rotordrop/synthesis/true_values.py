@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.machine import Machine, TouchdownBearing
-from rotordrop.model.bearing_numbers import numbers_of
-from rotordrop.model.parameter import Step
-from rotordrop.model.parameter_table import rows
-from rotordrop.model.statics import bearing_load_shares
-from rotordrop.simulation.certificate import refined_peak
-from rotordrop.simulation.result import DropResult
+from rotordrop.rotor.bearing_numbers import numbers_of
+from rotordrop.rotor.parameter import Step
+from rotordrop.rotor.parameter_table import rows
+from rotordrop.rotor.statics import bearing_load_shares
+from rotordrop.simulate.certificate import refined_peak
+from rotordrop.simulate.result import DropResult
 from rotordrop.synthesis.event import DropConditions, HiddenMachine
 from rotordrop.synthesis.motion import true_motion
 from rotordrop.synthesis.sensor_chain import SensorChain, SensorErrors

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import UsageError
-from rotordrop.model.parameter_table import LOADS, published
+from rotordrop.rotor.parameter_table import LOADS, published
 
 Array = NDArray[np.float64]
 

@@ -223,7 +223,7 @@ def _falls(found: CoastDownAnalysis, job: Job, made: Path, options: Mapping[str,
 
 
 def _origin(job: Job, options: Mapping[str, Any], verb: str = "estimate") -> Origin:
-    from rotordrop.simulation.fingerprint import fingerprint
+    from rotordrop.simulate.fingerprint import fingerprint
 
     told = job.read()["files"]
     named = {"machine": "machine file"}

@@ -22,8 +22,8 @@ from rotordrop.estimation.tracked import is_calibrated
 from rotordrop.machine import CalibrationDrop, CalibrationOrigin, Machine, example_path, load_machine
 from rotordrop.measurement.examples import example_record_path
 from rotordrop.measurement.record import read_record
-from rotordrop.tracking.calibration import BLIND_SCHEDULE, Stage
-from rotordrop.tracking.consistency import Check
+from rotordrop.track.calibration import BLIND_SCHEDULE, Stage
+from rotordrop.track.consistency import Check
 
 LP400 = str(example_path("lp400"))
 RECORD = str(example_record_path("lp400_drop_060"))

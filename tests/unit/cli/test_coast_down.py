@@ -19,13 +19,13 @@ from rotordrop.estimation.recorded_coast_down import recorded_coast_down, with_r
 from rotordrop.estimation.simulated_coast_down import simulated_coast_down
 from rotordrop.machine import example_machine, example_path, load_machine, save_machine
 from rotordrop.measurement.record import read_record
-from rotordrop.model.parameters import build_drop_model
 from rotordrop.report.waterfall_page import waterfall_page
-from rotordrop.simulation.case import CentredStart
-from rotordrop.simulation.checkpoint import work_folder
-from rotordrop.simulation.coast_down import simulate_coast_down
-from rotordrop.simulation.coast_down_case import CoastDownCase
-from rotordrop.simulation.coast_down_file import load_coast_down, open_samples
+from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.simulate.case import CentredStart
+from rotordrop.simulate.checkpoint import work_folder
+from rotordrop.simulate.coast_down import simulate_coast_down
+from rotordrop.simulate.coast_down_case import CoastDownCase
+from rotordrop.simulate.coast_down_file import load_coast_down, open_samples
 from rotordrop.spectrum.coast_down import analyse_coast_down
 from rotordrop.spectrum.frequency_path import FrequencyPath
 
@@ -372,7 +372,7 @@ def test_a_run_is_resumed_with_its_own_machine_only(machine, tmp_path, capsys):
 
 
 def test_a_coast_down_of_millions_of_steps_says_so_first(machine, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("rotordrop.simulation.coast_down.simulate_coast_down", _stopped)
+    monkeypatch.setattr("rotordrop.simulate.coast_down.simulate_coast_down", _stopped)
     slow = tmp_path / "slow.toml"
     save_machine(load_machine(machine).with_values({"NDE.support.mass": 1e-9}), slow)
     assert run(["coast-down", str(slow), "--speed", "60 Hz"]) == 130
@@ -386,7 +386,7 @@ def _stopped(*arguments, **options):
 
 
 def test_ctrl_c_says_how_to_go_on(machine, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("rotordrop.simulation.coast_down.simulate_coast_down", _stopped)
+    monkeypatch.setattr("rotordrop.simulate.coast_down.simulate_coast_down", _stopped)
     output = tmp_path / "c.h5"
     assert run(["coast-down", machine, "--speed", "60 Hz", "--output", str(output)]) == 130
     assert "go on with --resume" in " ".join(capsys.readouterr().err.split())

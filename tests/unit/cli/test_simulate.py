@@ -15,7 +15,7 @@ from rotordrop.cli._start import named_pairs
 from rotordrop.cli.app import run
 from rotordrop.errors import UsageError
 from rotordrop.machine import example_machine, example_path, save_machine
-from rotordrop.simulation.result import load_result
+from rotordrop.simulate.result import load_result
 
 PAPER = str(example_path("paper"))
 SHORT = ["simulate", PAPER, "--speed", "60 Hz", "--duration", "12 ms", "--reduction", "quick"]

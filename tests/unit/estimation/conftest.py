@@ -16,7 +16,7 @@ from rotordrop.estimation.tracked import TrackedDrop, followed_drops
 from rotordrop.estimation.tracked_estimate import estimate_of
 from rotordrop.identification.evidence import read_evidence
 from rotordrop.machine import Machine, example_machine
-from rotordrop.model.parameters import build_drop_model
+from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.synthesis import HiddenMachine, SyntheticDrop, hidden_machine, synthesize_drop
 
 SPEED = 2.0 * math.pi * 60.0

@@ -16,7 +16,7 @@ from rotordrop.identification.evidence import Evidence, Missing, read_evidence
 from rotordrop.machine import Machine, example_machine, load_machine
 from rotordrop.measurement.examples import example_record_path
 from rotordrop.measurement.record import read_record
-from rotordrop.model.parameters import build_drop_model
+from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.synthesis import hidden_machine, synthesize_drop
 
 UNTIL = 3e-3

@@ -11,8 +11,8 @@ from rotordrop.estimation.calibrated import Calibration, calibrate_machine, cali
 from rotordrop.estimation.tracked import is_calibrated
 from rotordrop.estimation.tracked_parameters import NOT_DETERMINED
 from rotordrop.machine import Machine, load_machine, save_machine
-from rotordrop.model.parameter_table import parameter, row_of
-from rotordrop.model.unknowns import prior
+from rotordrop.rotor.parameter_table import parameter, row_of
+from rotordrop.rotor.unknowns import prior
 from rotordrop.synthesis import HiddenMachine, SyntheticDrop, synthesize_drop
 
 BEARINGS = ("NDE", "DE")

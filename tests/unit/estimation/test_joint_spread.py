@@ -14,9 +14,9 @@ from rotordrop.estimation.joint_spread import joint_spread
 from rotordrop.estimation.tracked_parameters import identified
 from rotordrop.machine import example_machine
 from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin
-from rotordrop.model.joint_values import correlate
-from rotordrop.model.parameters import build_drop_model
-from rotordrop.model.unknowns import bearing_unknowns
+from rotordrop.rotor.joint_values import correlate
+from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.rotor.unknowns import bearing_unknowns
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +90,7 @@ def test_the_horizontal_support_follows_the_vertical_one(problem, covariance):
 
 def test_contact_stiffness_is_that_of_the_fitted_exponent(problem, covariance):
     """The force at the typical indentation varies as fitted, whatever exponent is drawn."""
-    from rotordrop.model.unknowns import typical_depth
+    from rotordrop.rotor.unknowns import typical_depth
 
     spread = joint_spread(problem, middle(problem), covariance, stated(problem, covariance, 1.0))
     machine = problem.model.machine

@@ -27,10 +27,10 @@ from rotordrop.estimation.tracked_parameters import (
     within_bounds,
 )
 from rotordrop.machine import example_machine
-from rotordrop.model.bearing_numbers import numbers_of
-from rotordrop.model.parameter_table import parameter
-from rotordrop.model.parameters import build_drop_model
-from rotordrop.model.unknowns import all_unknowns
+from rotordrop.rotor.bearing_numbers import numbers_of
+from rotordrop.rotor.parameter_table import parameter
+from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.rotor.unknowns import all_unknowns
 
 NINETY = 1.6448536269514722
 SENSORS = 4

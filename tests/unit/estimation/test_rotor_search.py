@@ -26,12 +26,12 @@ from rotordrop.identification.evidence import read_evidence
 from rotordrop.machine import example_machine
 from rotordrop.machine.simple import SimpleMachine, simple_machine
 from rotordrop.measurement.record import read_record
-from rotordrop.model.assembly import rotor_fe
-from rotordrop.model.modes import free_free_modes
-from rotordrop.model.parameters import build_drop_model
-from rotordrop.model.rotor_form import FORM
-from rotordrop.tracking.forces import ForceHistory
-from rotordrop.tracking.input_state import InputEstimate
+from rotordrop.rotor.assembly import rotor_fe
+from rotordrop.rotor.modes import free_free_modes
+from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.rotor.rotor_form import FORM
+from rotordrop.track.forces import ForceHistory
+from rotordrop.track.input_state import InputEstimate
 
 RECORDS = Path(rotordrop.__file__).parent / "examples" / "lp400"
 

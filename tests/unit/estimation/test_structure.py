@@ -30,8 +30,8 @@ from rotordrop.estimation.structure_search import (
 )
 from rotordrop.estimation.structure_sentence import derived, soft_axis, soft_over_stiff, structure_of
 from rotordrop.machine import Machine, example_machine, load_machine, save_machine
-from rotordrop.model.parameters import build_drop_model
-from rotordrop.model.unknowns import all_unknowns
+from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.rotor.unknowns import all_unknowns
 
 
 @pytest.fixture(scope="module")

@@ -50,16 +50,16 @@ from rotordrop.machine import Machine, example_machine, load_machine
 from rotordrop.measurement.examples import example_record_path
 from rotordrop.measurement.power_off import PowerOff
 from rotordrop.measurement.record import Record, read_record
-from rotordrop.model.parameters import build_drop_model
+from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.synthesis import SyntheticDrop, hidden_machine, synthesize_drop
 from rotordrop.synthesis.score import score_estimate
-from rotordrop.tracking.calibration import TrackedDrops, beside_the_record
-from rotordrop.tracking.consistency import Check
-from rotordrop.tracking.input_state import (
+from rotordrop.track.calibration import TrackedDrops, beside_the_record
+from rotordrop.track.consistency import Check
+from rotordrop.track.input_state import (
     input_state_estimate,
     lent_by_record,
 )
-from rotordrop.tracking.smoother import parameter_sample
+from rotordrop.track.smoother import parameter_sample
 
 BEARINGS = ("NDE", "DE")
 SPEED = 2.0 * math.pi * 60.0

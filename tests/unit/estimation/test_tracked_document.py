@@ -14,10 +14,10 @@ from rotordrop.estimation.document import estimate_document
 from rotordrop.estimation.estimate import Estimate
 from rotordrop.estimation.later_motion import RESOLVED
 from rotordrop.estimation.tracked import TrackedDrop
-from rotordrop.model.parameter_table import published, rows
 from rotordrop.report.estimate_page import estimate_page
 from rotordrop.report.page import render_page
 from rotordrop.report.quantity import Quantity
+from rotordrop.rotor.parameter_table import published, rows
 from rotordrop.synthesis import SyntheticDrop
 
 BEARINGS = ("NDE", "DE")

@@ -11,11 +11,11 @@ import pytest
 from rotordrop.estimation.tracked import COARSE_BASIS, recorded_drop
 from rotordrop.identification.evidence import read_evidence
 from rotordrop.machine import Machine
-from rotordrop.model.parameters import build_drop_model
+from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.synthesis import SyntheticDrop
-from rotordrop.tracking.forces import ForceHistory, force_history
-from rotordrop.tracking.problem import build_problem
-from rotordrop.tracking.smoother import PassSettings, forward, smooth
+from rotordrop.track.forces import ForceHistory, force_history
+from rotordrop.track.problem import build_problem
+from rotordrop.track.smoother import PassSettings, forward, smooth
 
 UNTIL = 0.025
 

@@ -16,8 +16,8 @@ from rotordrop.identification.replica import Replica, build_replica
 from rotordrop.identification.sensing import Sensing, build_sensing
 from rotordrop.identification.support import ImpactFit, impact_problem
 from rotordrop.machine import Machine, example_machine
-from rotordrop.model.parameters import DropModel, build_drop_model
-from rotordrop.model.reduction import Reduction
+from rotordrop.rotor.parameters import DropModel, build_drop_model
+from rotordrop.rotor.reduction import Reduction
 from rotordrop.synthesis import SyntheticDrop, hidden_machine, synthesize_drop
 from rotordrop.synthesis.sensor_chain import PERFECT
 

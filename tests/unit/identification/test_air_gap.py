@@ -14,8 +14,8 @@ from rotordrop.machine import Machine
 from rotordrop.measurement.axes import sensor_directions
 from rotordrop.measurement.record import Record
 from rotordrop.measurement.settled import resting_record
-from rotordrop.model.parameters import DropModel
-from rotordrop.model.static_sag import sag_of_model
+from rotordrop.rotor.parameters import DropModel
+from rotordrop.rotor.static_sag import sag_of_model
 from rotordrop.synthesis import SyntheticDrop
 
 

@@ -10,7 +10,7 @@ import pytest
 from rotordrop.identification.fall_fit import FallFit, FallReadings
 from rotordrop.identification.initial_state import InitialState
 from rotordrop.identification.sensing import Sensing
-from rotordrop.model.parameters import DropModel
+from rotordrop.rotor.parameters import DropModel
 
 OFFSET = 8e-6
 

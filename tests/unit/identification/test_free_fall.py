@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from rotordrop.identification.free_fall import build_free_fall, kernel_state, sagging_amplitudes
-from rotordrop.model.parameters import DropModel
-from rotordrop.model.statics import bending_part, levitated_sag
-from rotordrop.simulation.case import DropCase, LevitatedStart, StateStart
-from rotordrop.simulation.drop import simulate_drop
-from rotordrop.simulation.levitation import levitated_orbit, start_of_drop
+from rotordrop.rotor.parameters import DropModel
+from rotordrop.rotor.statics import bending_part, levitated_sag
+from rotordrop.simulate.case import DropCase, LevitatedStart, StateStart
+from rotordrop.simulate.drop import simulate_drop
+from rotordrop.simulate.levitation import levitated_orbit, start_of_drop
 
 SPEED = 2.0 * np.pi * 150.0
 

@@ -14,7 +14,7 @@ from rotordrop.identification.initial_state import InitialState, end_of_fall, fi
 from rotordrop.identification.modal_expansion import expand_initial_state
 from rotordrop.identification.replica import transferred
 from rotordrop.identification.sensing import Sensing, displacements_along
-from rotordrop.model.parameters import DropModel, build_drop_model
+from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.synthesis import SyntheticDrop
 
 

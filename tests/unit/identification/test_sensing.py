@@ -12,7 +12,7 @@ from rotordrop.estimated import Estimated
 from rotordrop.identification.modal_expansion import expansion_matrix
 from rotordrop.identification.sensing import Sensing, build_sensing
 from rotordrop.machine import Machine, Sensor
-from rotordrop.model.parameters import DropModel
+from rotordrop.rotor.parameters import DropModel
 
 
 def straight_rotor(model: DropModel, sensors: tuple[Sensor, ...]) -> tuple[np.ndarray, np.ndarray]:

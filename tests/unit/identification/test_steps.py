@@ -15,8 +15,8 @@ from rotordrop.identification.friction import TENFOLD, orbit_disagreement
 from rotordrop.identification.search import Schedule, _Searching
 from rotordrop.identification.support import identified_values
 from rotordrop.machine import example_machine
-from rotordrop.model.parameters import build_drop_model
-from rotordrop.model.unknowns import all_unknowns
+from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.rotor.unknowns import all_unknowns
 
 NINETY = 1.6448536269514722
 

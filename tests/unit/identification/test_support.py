@@ -21,8 +21,8 @@ from rotordrop.identification.support import (
     refit_with_friction,
     widened_covariance,
 )
-from rotordrop.model import layout as L
-from rotordrop.model.parameters import DropModel
+from rotordrop.rotor import layout as L
+from rotordrop.rotor.parameters import DropModel
 
 
 def moved_from_truth(problem: ImpactFit) -> np.ndarray:

@@ -11,9 +11,9 @@ from rotordrop.errors import UsageError
 from rotordrop.machine import load_machine, loads_machine, machine_text
 from rotordrop.machine.other_programs import read_rotor
 from rotordrop.machine.simple import SimpleMachine, simple_machine
-from rotordrop.model.assembly import rotor_fe
-from rotordrop.model.machine_summary import summarise_machine
-from rotordrop.model.modes import free_free_modes
+from rotordrop.rotor.assembly import rotor_fe
+from rotordrop.rotor.machine_summary import summarise_machine
+from rotordrop.rotor.modes import free_free_modes
 from rotordrop.synthesis.bench.rotors import ROTORS
 
 

@@ -7,8 +7,8 @@ import pytest
 import scipy.linalg
 
 from rotordrop.machine import example_machine
-from rotordrop.model.assembly import build_rotor_fe
 from rotordrop.physics import linear_algebra as own
+from rotordrop.rotor.assembly import build_rotor_fe
 
 SIZES = (1, 2, 3, 12, 60)
 

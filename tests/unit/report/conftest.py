@@ -15,11 +15,11 @@ from rotordrop.estimation.tracked_estimate import estimate_of
 from rotordrop.identification.evidence import read_evidence
 from rotordrop.machine import example_machine
 from rotordrop.measurement.record import read_record
-from rotordrop.model.parameters import build_drop_model
 from rotordrop.physics.hertz import LineContact
-from rotordrop.simulation.certificate import Certificate
-from rotordrop.simulation.result import ContactLog, DropResult
-from rotordrop.tracking.calibration import CALIBRATED_SCHEDULE, track
+from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.simulate.certificate import Certificate
+from rotordrop.simulate.result import ContactLog, DropResult
+from rotordrop.track.calibration import CALIBRATED_SCHEDULE, track
 
 GAPS = (275e-6, 285e-6)
 TIME = np.linspace(0.0, 0.2, 4001)

@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rotordrop.model.stability import StabilityMap
 from rotordrop.report.critical_speeds_page import _stability_section, _verdict, critical_speeds_json
+from rotordrop.rotor.stability import StabilityMap
 
 AT_LINES = {"tangent": np.array([100.0]), "with support mass": np.array([90.0])}
 

@@ -12,9 +12,9 @@ import pytest
 
 from rotordrop.cli.app import run
 from rotordrop.machine import example_machine
-from rotordrop.model.campbell import campbell_diagram
-from rotordrop.model.critical_speeds import critical_speed_map
 from rotordrop.report.critical_speeds_page import critical_speeds_json
+from rotordrop.rotor.campbell import campbell_diagram
+from rotordrop.rotor.critical_speeds import critical_speed_map
 from rotordrop.severity.ranking import DropSeverity, rank_drops
 
 TURN = 2.0 * math.pi

@@ -20,7 +20,7 @@ from rotordrop.report.origin import Origin, UsedFile, command_line
 from rotordrop.report.page import css_text, render_page
 from rotordrop.report.style import LOG_LABELS, faded
 from rotordrop.report.time_panels import Panel, time_panels
-from rotordrop.simulation.result import DropResult
+from rotordrop.simulate.result import DropResult
 
 
 def test_the_origin_names_who_when_how_and_from_what(tmp_path: Path) -> None:

@@ -18,7 +18,6 @@ from rotordrop.estimation.methods import Replay
 from rotordrop.identification.first_contact import TimedContact
 from rotordrop.identification.friction import FrictionSweep
 from rotordrop.machine import example_machine
-from rotordrop.model.parameter_table import parameter
 from rotordrop.report.content import Section
 from rotordrop.report.estimate_numbers import identified_table
 from rotordrop.report.estimate_page import estimate_page
@@ -31,7 +30,8 @@ from rotordrop.report.replay_tables import (
     friction_sweep_figure,
     window_table,
 )
-from rotordrop.simulation.result import DropResult
+from rotordrop.rotor.parameter_table import parameter
+from rotordrop.simulate.result import DropResult
 
 GAPS = np.array([275e-6, 285e-6])
 CONTACT = TimedContact(

@@ -13,7 +13,7 @@ from rotordrop.report.content import ReportContent
 from rotordrop.report.machine_sections import defaults_section, friction_section, spoken_key, weight_shares
 from rotordrop.report.page import render_page
 from rotordrop.report.simulate_page import simulate_page
-from rotordrop.simulation.result import DropResult
+from rotordrop.simulate.result import DropResult
 
 
 def headline(content: ReportContent, bearing: int, label: str) -> float:

@@ -22,7 +22,7 @@ from rotordrop.report.record_quality import record_quality_section
 from rotordrop.report.stress_box import StressBox, stress_box, stress_box_figure, stress_table, thinned
 from rotordrop.report.waterfall_page import _law_rows
 from rotordrop.severity.statistics import stress_statistics
-from rotordrop.simulation.result import DropResult
+from rotordrop.simulate.result import DropResult
 
 
 def texts(row: tuple[object, ...]) -> list[str]:

@@ -22,7 +22,7 @@ from rotordrop.report.drop_sections import drop_sections
 from rotordrop.report.estimate_page import cross_check_statements, estimate_page, spoken
 from rotordrop.report.page import render_page
 from rotordrop.report.quantity import Quantity
-from rotordrop.tracking.consistency import Check
+from rotordrop.track.consistency import Check
 
 
 def table(estimate: Estimate, heading: str, number: int = 0) -> Table:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rotordrop.machine import example_machine
-from rotordrop.model.bearing_numbers import numbers_of
+from rotordrop.rotor.bearing_numbers import numbers_of
 from rotordrop.severity.numbers import (
     SEVERITY,
     fatigue_shares,

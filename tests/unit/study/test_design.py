@@ -12,7 +12,7 @@ from rotordrop import example_machine, save_machine
 from rotordrop.cli.app import run
 from rotordrop.errors import UsageError
 from rotordrop.machine.catalog import find_bearing
-from rotordrop.model.parameters import build_drop_model
+from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.study.design import Aim, best_designs, front_of, read_design
 from rotordrop.study.folder import study_of
 from rotordrop.study.run import one_drop

@@ -16,7 +16,7 @@ import pytest
 
 from rotordrop import DropCase, example_machine, simulate_drop
 from rotordrop.errors import OutputError, UsageError
-from rotordrop.model.parameters import build_drop_model
+from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.study.folder import StudyFolder, claimed, open_folder, read_shard, study_of
 from rotordrop.study.plan import Study, load_study, read_study
 from rotordrop.study.quantities import columns_of

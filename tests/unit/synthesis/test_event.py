@@ -7,7 +7,7 @@ import pytest
 
 from rotordrop.errors import UsageError
 from rotordrop.machine import example_machine
-from rotordrop.model.parameter_table import rows
+from rotordrop.rotor.parameter_table import rows
 from rotordrop.synthesis import VIOLATIONS, Violations, hidden_machine
 from rotordrop.synthesis.event import LARGEST_JITTER, LARGEST_ORBIT, drop_conditions
 from rotordrop.synthesis.random_streams import stream

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from tests.scaled_machines import scaled_machine
 
-from rotordrop.model import layout as L
-from rotordrop.model.parameters import build_drop_model
-from rotordrop.simulation._rhs import drop_derivative
+from rotordrop.rotor import layout as L
+from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.simulate._rhs import drop_derivative
 from rotordrop.synthesis import hidden_machine, synthesize_drop
 from rotordrop.synthesis.settled import settled_coordinates
 

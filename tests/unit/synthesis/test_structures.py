@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import SimulationError
-from rotordrop.model import layout as L
-from rotordrop.model.modes import free_free_modes
-from rotordrop.model.parameters import DropModel, build_drop_model
-from rotordrop.simulation.case import CentredStart, DropCase, LevitatedStart, PlacedStart
-from rotordrop.simulation.drop import simulate_drop
+from rotordrop.rotor import layout as L
+from rotordrop.rotor.modes import free_free_modes
+from rotordrop.rotor.parameters import DropModel, build_drop_model
+from rotordrop.simulate.case import CentredStart, DropCase, LevitatedStart, PlacedStart
+from rotordrop.simulate.drop import simulate_drop
 from rotordrop.synthesis import Violations, hidden_machine
 from rotordrop.synthesis import _hidden_rhs as H
 from rotordrop.synthesis.hidden_drop import _integrated, simulate_hidden

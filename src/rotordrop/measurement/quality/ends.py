@@ -21,7 +21,7 @@ from rotordrop.measurement.levitated import LevitatedModel
 from rotordrop.measurement.quality.finding import Finding
 from rotordrop.measurement.quality.sensing import TURNED, WRONG_GAIN, read_otherwise
 from rotordrop.measurement.recording import Array
-from rotordrop.model.rotor_form import is_beam
+from rotordrop.rotor.rotor_form import is_beam
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from rotordrop.machine import Machine
-from rotordrop.model.statics import bearing_load_shares
 from rotordrop.physics.contact import contact_law, contact_tangent, depth_at
+from rotordrop.rotor.statics import bearing_load_shares
 
 Parts = dict[str, dict[str, Any]]
 

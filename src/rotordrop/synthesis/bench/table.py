@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from rotordrop.errors import UsageError
-from rotordrop.model.parameter_table import LOADS, published
+from rotordrop.rotor.parameter_table import LOADS, published
 from rotordrop.synthesis.bench.drops import VERSION
 from rotordrop.synthesis.bench.make import chosen_drops, truth_path
 from rotordrop.synthesis.score import score_estimate

@@ -1,0 +1,268 @@
+"""What a ball bearing states of itself."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property, lru_cache, partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.estimated import Estimated
+from rotordrop.machine.ball_bearing import STATIC_STRESS
+from rotordrop.machine.catalog.inference import dynamic_rating, static_rating
+from rotordrop.physics.ball_bearing import (
+    BearingConstants,
+    ball_centrifugal_force,
+    bearing_constants,
+    preload_of_offset,
+)
+from rotordrop.physics.ball_bearing_response import bearing_response, simple_radial_stiffness
+from rotordrop.physics.ball_loads import ball_loads, displacement_under
+from rotordrop.physics.ball_set import ball_set_entries, balls_of, loose_race_seat, static_deflection
+from rotordrop.physics.hertz import compliance
+from rotordrop.rotor.bearing_numbers import (
+    BearingFigure,
+    BearingNumbers,
+    Excess,
+    Measure,
+    Ratings,
+    RollingElements,
+    Spread,
+)
+from rotordrop.rotor.inferred_balls import inferred_stress_sigma
+from rotordrop.units import format_quantity
+
+if TYPE_CHECKING:
+    from rotordrop.machine import BallBearing
+
+Array = NDArray[np.float64]
+
+CENTRIFUGAL_SHARE = 0.25
+"""Ball centrifugal force over preload ball load from which it counts."""
+
+_STEEL = (208e9, 0.3)
+
+
+@lru_cache(maxsize=64)
+def _constants(balls: BallBearing) -> BearingConstants:
+    """Found once for equal bearings: a study asks for them six times a drop, and they cost milliseconds."""
+    return bearing_constants(balls)
+
+
+@dataclass(frozen=True, eq=False)
+class BallNumbers(BearingNumbers):
+    """The numbers of a ball bearing, from its description."""
+
+    balls: BallBearing
+
+    @cached_property
+    def constants(self) -> BearingConstants:
+        """What does not change during a drop."""
+        return _constants(self.balls)
+
+    @property
+    def held(self) -> bool:
+        """Whether the balls are preloaded."""
+        return self.constants.preloaded
+
+    @property
+    def play(self) -> float:
+        """Radial play [m], half the clearance of deep grooves."""
+        return self.constants.radial_play
+
+    def element_loads(self, moved: Array) -> Array:
+        """Load of every ball [N]."""
+        return ball_loads(self.constants, moved)
+
+    def element_loads_under(self, force: Array) -> Array:
+        """Load of every ball [N] where they push the race with a force."""
+        return ball_loads(self.constants, displacement_under(self.constants, force))
+
+    def load_of_stress(self, stress: Array) -> Array:
+        """Load [N] of the ball with a stress at the inner race."""
+        return np.asarray((stress / self.constants.stress_coefficient_inner) ** 3)
+
+    def ratings(self) -> Ratings:
+        """Load ratings as given, else by ISO 76 and ISO 281 from the balls."""
+        b = self.balls
+        angle, rows = float(b.contact_angle), 1 if b.arrangement == "single" else 2
+        row = (b.ball_count, float(b.ball_diameter), float(b.pitch_diameter), angle)
+        given = [b.static_load_rating, b.dynamic_load_rating]
+        static, dynamic = (
+            rule(*row) if one is None else float(one)
+            for one, rule in zip(given, (static_rating, dynamic_rating), strict=True)
+        )
+        both = all(one is not None for one in given)
+        return Ratings(
+            static=rows * static,
+            dynamic=dynamic,
+            rows=rows,
+            balls=b.ball_count,
+            gamma=float(b.ball_diameter) * math.cos(angle) / float(b.pitch_diameter),
+            cosine=math.cos(angle),
+            conformity_inner=float(b.conformity_inner),
+            conformity_outer=float(b.conformity_outer),
+            source="as given" if both else "from the balls by ISO 76 and ISO 281",
+        )
+
+    @property
+    def drag_diameter(self) -> float:
+        """Pitch diameter [m]."""
+        return float(self.balls.pitch_diameter)
+
+    @property
+    def ring_material(self) -> tuple[float, float]:
+        """Young's modulus [Pa] and Poisson's ratio [1] of the rings."""
+        return float(self.balls.ring_youngs_modulus), float(self.balls.ring_poisson_ratio)
+
+    def entries(self) -> Array:
+        """Stiffness of a ball, groove distance and offsets, stress coefficient."""
+        return ball_set_entries(self.constants)
+
+    def places(self, least: int = 0) -> Array:
+        """Direction of every ball and how many stand there."""
+        return balls_of(self.constants, least)
+
+    def deflection(self, load: float) -> tuple[float, float]:
+        """Way of the race under a load [N] and tangent stiffness there [N/m]."""
+        return static_deflection(self.constants, load)
+
+    def seat(self, load: float) -> tuple[float, float]:
+        """Straight below the middle with preload; else in the gap of the lowest balls [m]."""
+        if self.held:
+            return 0.0, -self.deflection(load)[0]
+        return loose_race_seat(self.constants, load)
+
+    def simple_stiffness(self, load: float) -> float:
+        """Stiffness [N/m] by Palmgren's formula, which knows no preload."""
+        balls = (float(self.balls.ball_youngs_modulus), float(self.balls.ball_poisson_ratio))
+        return simple_radial_stiffness(
+            float(self.balls.ball_diameter),
+            self.constants.row_count * self.constants.ball_count,
+            self.constants.radial_contact_angle,
+            load,
+            compliance(*self.ring_material, *balls) / compliance(*_STEEL, *_STEEL),
+        )
+
+    @property
+    def _preload_stress(self) -> float:
+        """Hertz stress of a ball on the inner race from the preload alone [Pa]."""
+        return self.constants.stress_coefficient_inner * math.cbrt(self.constants.preload_ball_load)
+
+    def ball_loads(self, load: float) -> Array:
+        """Load of every ball [N] with the race at rest under a load [N]."""
+        return bearing_response(self.constants, [*self.seat(load), 0.0, 0.0, 0.0]).ball_loads
+
+    def figures(self, load: float) -> tuple[BearingFigure, ...]:
+        """The preload and its stress; or else the play, its angle and how the balls lie."""
+        constants, balls = self.constants, self.balls
+        if self.held:
+            return (
+                _figure("preload_N", "preload of a row", "force", float(balls.preload), balls.preload),
+                _figure("preload_stress_Pa", "stress by preload", "pressure", self._preload_stress),
+            )
+        loads, clearance = self.ball_loads(load), 2.0 * self.play
+        axial = _figure("axial_play_m", "axial play", "length", constants.axial_play)
+        return (
+            _figure("clearance_m", "radial clearance", "length", clearance, balls.clearance),
+            *((axial,) if constants.row_count == 1 else ()),
+            _figure("contact_angle_rad", "free contact angle", "angle", constants.contact_angle),
+            BearingFigure(
+                field="ball_load_N",
+                label="largest ball load at rest",
+                kind="force",
+                value=float(np.max(loads)),
+                note=f"on {np.count_nonzero(loads)} balls",
+            ),
+        )
+
+    def excesses(self, omega: float, load: float) -> Iterator[Excess]:
+        """Speed beyond what the maker allows, centrifugal force of the balls, stress by preload."""
+        speed, limit = format_quantity(omega, "speed"), self.balls.limiting_speed
+        if limit is not None and omega > float(limit):
+            allowed = format_quantity(float(limit), "speed")
+            text = f"a race that reaches the rotor's {speed} turns faster than the {allowed} its maker allows"
+            yield Excess(kind="limiting speed", value=omega, limit=float(limit), text=text)
+        force = float(ball_centrifugal_force(self.balls, omega))
+        carried = self.constants.preload_ball_load if self.held else float(np.max(self.ball_loads(load)))
+        if force > CENTRIFUGAL_SHARE * carried:
+            thrown, against = format_quantity(force, "force"), format_quantity(carried, "force")
+            text = (
+                f"at {speed} of the race each ball is thrown outwards with {thrown}, not small against "
+                f"{'its preload of' if self.held else 'the load of the lowest ball at rest,'} {against}; the "
+                "drop model leaves this out"
+            )
+            yield Excess(kind="ball centrifugal force", value=force, limit=carried, text=text)
+        stress = self._preload_stress
+        if stress > STATIC_STRESS:
+            pressed, rated = (format_quantity(value, "pressure") for value in (stress, STATIC_STRESS))
+            text = (
+                f"the preload alone presses the balls with {pressed}, and ISO 76 rates bearings up to {rated}"
+            )
+            yield Excess(kind="preload", value=stress, limit=STATIC_STRESS, text=text, doubtful=True)
+
+    def room_to_grow(self) -> tuple[float, str]:
+        """Elastic approach of a preloaded ball, or the play that closes [m]."""
+        if not self.held:
+            return self.play, "its radial play of {room}, which closes"
+        approach = (self.constants.preload_ball_load / self.constants.ball_stiffness) ** (2.0 / 3.0)
+        return approach, "the {room} a preloaded ball is pressed in, so that the preload rises"
+
+    @property
+    def stress_sigma(self) -> float:
+        """How far the stress is uncertain by balls inferred from a designation [1]."""
+        return inferred_stress_sigma(self.balls)
+
+    def rolling_elements(self) -> RollingElements:
+        """The balls."""
+        return RollingElements(
+            ball_count=self.balls.ball_count,
+            ball_diameter=float(self.balls.ball_diameter),
+            pitch_diameter=float(self.balls.pitch_diameter),
+            contact_angle=float(self.balls.contact_angle),
+        )
+
+    def measure(self, path: str) -> Measure | None:
+        """The preload by the axial offset of the rows, which is what the ball forces depend on."""
+        if path != "preload":
+            return None
+
+        def offset(preload: float) -> float:
+            return bearing_constants(self.balls.changed(preload=Estimated(value=preload))).axial_offset
+
+        published = partial(preload_of_offset, self.constants)
+        return Measure(start=self.constants.axial_offset, of_value=offset, value_of=published)
+
+    def spreads(self) -> Iterator[Spread]:
+        """Preload and angle of the first ball."""
+        yield Spread(path="preload", low=0.8, high=1.25, described=self.balls.preload)
+        yield Spread(path="bearing.first_ball_angle", low=0.0, high=2.0 * math.pi / self.balls.ball_count)
+
+    def truth(self) -> dict[str, float]:
+        """Geometry, materials, preload and where the balls stand."""
+        balls = self.balls
+        return {
+            "Dw": float(balls.ball_diameter),
+            "Z": balls.ball_count,
+            "Dpw": float(balls.pitch_diameter),
+            "alpha_deg": math.degrees(float(balls.contact_angle)),
+            "fi": float(balls.conformity_inner),
+            "fo": float(balls.conformity_outer),
+            "E_ring": float(balls.ring_youngs_modulus),
+            "nu_ring": float(balls.ring_poisson_ratio),
+            "E_ball": float(balls.ball_youngs_modulus),
+            "nu_ball": float(balls.ball_poisson_ratio),
+            "preload_N": float(balls.preload),
+            "beta0_deg": math.degrees(float(balls.first_ball_angle)),
+            "row2_offset_pitch": float(balls.second_row_offset),
+        }
+
+
+def _figure(
+    field: str, label: str, kind: str, value: float, described: Estimated | None = None
+) -> BearingFigure:
+    return BearingFigure(field=field, label=label, kind=kind, value=value, described=described)

@@ -1,0 +1,194 @@
+"""Campbell diagram: damped whirling frequencies of a machine against its speed, line by line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rotordrop.errors import UsageError
+from rotordrop.machine import Machine
+from rotordrop.rotor.assembly import build_rotor_fe
+from rotordrop.rotor.reduction import Reduction, RotorBasis, reduce_rotor
+from rotordrop.rotor.supports import Support
+from rotordrop.rotor.suspension import suspension_of
+from rotordrop.rotor.whirl import WhirlModes, direction_name, matrices_of, whirl_modes
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+REDUCTION = Reduction(modes=16, attachment=True)
+_SPARE_MODES = 4
+_STANDSTILL = 1e-3  # of the first speed: forward and backward are told apart at this speed
+
+
+@dataclass(frozen=True, kw_only=True)
+class Crossing:
+    """A critical speed: where a line of the diagram meets the rotor's own speed.
+
+    Attributes
+    ----------
+    speed : float
+        Speed of the rotor [rad/s].
+    line : int
+        Index of the line.
+    direction : str
+        ``"forward"``, ``"backward"`` or ``"mixed"``.
+    damping_ratio : float
+        Damping ratio there [1].
+    """
+
+    speed: float
+    line: int
+    direction: str
+    damping_ratio: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CampbellDiagram:
+    """Damped modes of a rotor against its speed; a line keeps its shape from one speed to the next.
+
+    Attributes
+    ----------
+    suspension : str
+        What holds the rotor: ``"free-free"``, ``"AMBs"``, ``"touchdown bearings"`` or a description.
+    speed : ndarray, shape (S,)
+        Speeds [rad/s], increasing.
+    frequency : ndarray, shape (S, K)
+        Damped frequencies [Hz]; NaN where a line has left the lowest modes or is overdamped.
+    damping_ratio : ndarray, shape (S, K)
+        Damping ratios [1].
+    whirl : ndarray, shape (S, K)
+        +1 circular forward, −1 circular backward, 0 on a line.
+    shapes : ndarray, shape (S, K, N, 2), complex
+        Displacement (x, y) at the nodes, largest displacement 1.
+    node_positions : ndarray, shape (N,)
+        Positions along z [m].
+    crossings : tuple of Crossing
+        Critical speeds between the first and the last speed.
+    """
+
+    suspension: str
+    speed: Array
+    frequency: Array
+    damping_ratio: Array
+    whirl: Array
+    shapes: ComplexArray
+    node_positions: Array
+    crossings: tuple[Crossing, ...]
+
+    def direction(self, line: int) -> str:
+        """Direction of a line, by the mean over its speeds."""
+        return direction_name(float(np.nanmean(self.whirl[:, line])))
+
+
+def campbell_diagram(
+    machine: Machine, speeds: ArrayLike, suspension: str = "touchdown bearings", *, count: int = 10
+) -> CampbellDiagram:
+    """Campbell diagram of a machine.
+
+    Parameters
+    ----------
+    machine : Machine
+        The machine.
+    speeds : array_like, shape (S,)
+        Speeds [rad/s], increasing, not negative.
+    suspension : str
+        ``"free-free"``, ``"AMBs"`` or ``"touchdown bearings"`` (settled in them).
+    count : int
+        Number of lines K.
+    """
+    supports = suspension_of(machine, suspension)
+    fe = build_rotor_fe(machine)
+    nodes = [support.node for support in supports]
+    basis = reduce_rotor(fe, REDUCTION, nodes)
+    return campbell_lines(basis, fe.node_positions, speeds, supports, suspension=suspension, count=count)
+
+
+def campbell_lines(
+    rotor: RotorBasis,
+    node_positions: Array,
+    speeds: ArrayLike,
+    supports: Sequence[Support],
+    *,
+    suspension: str = "given supports",
+    count: int = 10,
+) -> CampbellDiagram:
+    """Campbell diagram of a reduced rotor on any supports; arguments as in `campbell_diagram`."""
+    grid = np.atleast_1d(np.asarray(speeds, dtype=np.float64))
+    if grid.ndim != 1 or np.any(np.diff(grid) <= 0.0) or grid[0] < 0.0:
+        raise UsageError("the speeds of a Campbell diagram must increase and not be negative")
+    if grid[-1] == 0.0:
+        raise UsageError("a Campbell diagram needs a speed above standstill")
+    mass = matrices_of(rotor, supports).mass
+    slowest = _STANDSTILL * grid[grid > 0.0][0]
+    followed: list[WhirlModes] = []
+    for speed in grid:
+        modes = whirl_modes(rotor, max(float(speed), slowest), supports, count + _SPARE_MODES)
+        followed.append(_in_order(followed[-1], modes, mass) if followed else modes)
+    frequency = _stack([modes.frequency for modes in followed], count)
+    damping_ratio = _stack([modes.damping_ratio for modes in followed], count)
+    whirl = _stack([modes.whirl for modes in followed], count)
+    shapes = np.full((len(grid), count, *followed[0].shapes.shape[1:]), np.nan, dtype=np.complex128)
+    for s, modes in enumerate(followed):
+        shown = min(count, len(modes.shapes))
+        shapes[s, :shown] = modes.shapes[:shown]
+    return CampbellDiagram(
+        suspension=suspension,
+        speed=grid,
+        frequency=frequency,
+        damping_ratio=damping_ratio,
+        whirl=whirl,
+        shapes=shapes,
+        node_positions=node_positions,
+        crossings=_crossings(grid, frequency, damping_ratio, whirl),
+    )
+
+
+def _in_order(before: WhirlModes, now: WhirlModes, mass: Array) -> WhirlModes:
+    """Modes of this speed in the order of the last one: nearest eigenvalue among the most alike shapes."""
+    from scipy.optimize import linear_sum_assignment
+
+    likeness = np.abs(before.vectors.conj().T @ mass @ now.vectors) ** 2
+    change = np.abs(before.eigenvalue[:, None] - now.eigenvalue)
+    cost = (1.0 - np.minimum(likeness, 1.0)) + change / np.maximum(np.abs(before.eigenvalue[:, None]), 1.0)
+    rows, columns = linear_sum_assignment(cost)
+    order = np.full(len(before.eigenvalue), -1)
+    order[rows] = columns
+    kept = np.concatenate([order[order >= 0], np.setdiff1d(np.arange(len(now.eigenvalue)), columns)])
+    return WhirlModes(
+        speed=now.speed,
+        eigenvalue=now.eigenvalue[kept],
+        whirl=now.whirl[kept],
+        shapes=now.shapes[kept],
+        vectors=now.vectors[:, kept],
+    )
+
+
+def _stack(rows: list[Array], count: int) -> Array:
+    table = np.full((len(rows), count), np.nan)
+    for s, row in enumerate(rows):
+        shown = min(count, len(row))
+        table[s, :shown] = row[:shown]
+    return table
+
+
+def _crossings(speed: Array, frequency: Array, damping_ratio: Array, whirl: Array) -> tuple[Crossing, ...]:
+    found = []
+    above = frequency * 2.0 * np.pi - speed[:, None]
+    for line in range(frequency.shape[1]):
+        gap = above[:, line]
+        for s in np.flatnonzero(gap[:-1] * gap[1:] < 0.0):
+            part = gap[s] / (gap[s] - gap[s + 1])
+            at = [float((1.0 - part) * a[s, line] + part * a[s + 1, line]) for a in (damping_ratio, whirl)]
+            found.append(
+                Crossing(
+                    speed=float((1.0 - part) * speed[s] + part * speed[s + 1]),
+                    line=line,
+                    direction=direction_name(at[1]),
+                    damping_ratio=at[0],
+                )
+            )
+    return tuple(sorted(found, key=lambda crossing: crossing.speed))

@@ -1,0 +1,191 @@
+"""Critical speed map: natural frequencies and critical speeds against the stiffness of the supports."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rotordrop.errors import UsageError
+from rotordrop.machine import Machine
+from rotordrop.rotor.assembly import RotorFE, build_rotor_fe
+from rotordrop.rotor.reduction import RotorBasis
+from rotordrop.rotor.supports import Support, link, planar_matrices, spring
+from rotordrop.rotor.suspension import FORMULAS, EquivalentStiffness, equivalent_stiffness
+
+Array = NDArray[np.float64]
+
+WHIRLS = {"standstill": 0, "forward": 1, "backward": -1}
+DEFAULT_STIFFNESS = (1e5, 1e10)
+_SUPPORT_RIGID = 0.999
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CriticalSpeedMap:
+    """Undamped map of a machine on its touchdown bearings (Neisi 2020, Fig. 19).
+
+    Attributes
+    ----------
+    machine_name : str
+        The machine.
+    whirl : str
+        ``"standstill"``: natural frequencies without spin, as in the paper; ``"forward"`` or ``"backward"``:
+        critical speeds, at which the whirl keeps step with the spin.
+    stiffness : ndarray, shape (S,)
+        Equivalent stiffness of bearing and support, the same at all bearings [N/m].
+    massless : ndarray, shape (S, K)
+        Frequencies with supports that have no mass, as in the paper [Hz].
+    with_support_mass : ndarray, shape (S, K)
+        Frequencies with the masses of the supports, and the bearings' tangent stiffness fixed [Hz]; NaN
+        where the stiffness exceeds what a bearing on a rigid support would have.
+    lines : tuple of EquivalentStiffness
+        The machine's own stiffness per bearing: the vertical lines of the map.
+    at_lines : mapping
+        Frequencies [Hz], shape (K,), with every bearing at its own equivalent stiffness: ``"tangent"``,
+        ``"simple"``, ``"with contact"`` (massless) and ``"with support mass"``.
+    """
+
+    machine_name: str
+    whirl: str
+    stiffness: Array
+    massless: Array
+    with_support_mass: Array
+    lines: tuple[EquivalentStiffness, ...]
+    at_lines: Mapping[str, Array]
+
+
+def critical_speed_map(
+    machine: Machine,
+    stiffness: ArrayLike | None = None,
+    *,
+    whirl: str = "standstill",
+    count: int = 6,
+    loads: Sequence[float] | None = None,
+) -> CriticalSpeedMap:
+    """Critical speed map of a machine on its touchdown bearings.
+
+    Parameters
+    ----------
+    machine : Machine
+        The machine; its supports may be identified ones.
+    stiffness : array_like, shape (S,), optional
+        Equivalent stiffnesses [N/m]; 121 from 1e5 to 1e10 by default.
+    whirl : str
+        ``"standstill"`` (default), ``"forward"`` or ``"backward"``.
+    count : int
+        Number of lines K.
+    loads : sequence of float, optional
+        Static loads of the bearings [N]; the load shares of the weight by default.
+    """
+    grid = (
+        np.geomspace(*DEFAULT_STIFFNESS, 121)
+        if stiffness is None
+        else np.asarray(stiffness, dtype=np.float64)
+    )
+    if grid.ndim != 1 or not np.all(grid > 0.0):
+        raise UsageError(
+            f"the stiffnesses of a critical speed map must be positive, got {np.min(grid):.3g} N/m"
+        )
+    fe = build_rotor_fe(machine)
+    parts = equivalent_stiffness(machine, loads)
+    masses = [float(bearing.support.mass) for bearing in machine.touchdown_bearings]
+    massless = [_on(fe, [spring(p.node, k) for p in parts], whirl, count) for k in grid]
+    massive = [_on(fe, _with_mass(parts, masses, k), whirl, count) for k in grid]
+    return CriticalSpeedMap(
+        machine_name=machine.name,
+        whirl=whirl,
+        stiffness=grid,
+        massless=np.array(massless),
+        with_support_mass=np.array(massive),
+        lines=parts,
+        at_lines=_at_lines(fe, parts, masses, whirl, count),
+    )
+
+
+def critical_speeds(
+    rotor: RotorFE | RotorBasis,
+    supports: Sequence[Support],
+    *,
+    whirl: str = "forward",
+    count: int | None = None,
+) -> Array:
+    """Undamped critical speeds of a rotor on supports, lowest first, shape (K,) [Hz].
+
+    Parameters
+    ----------
+    rotor : RotorFE or RotorBasis
+        The rotor; point masses on a shaft without mass are allowed.
+    supports : sequence of Support
+        What holds it, firmly enough that it cannot drift; its vertical stiffness counts in both directions.
+    whirl : str
+        ``"forward"`` or ``"backward"``: the whirl keeps step with the spin. ``"standstill"``: natural
+        frequencies without spin.
+    count : int, optional
+        Number of critical speeds; all by default.
+    """
+    if whirl not in WHIRLS:
+        raise UsageError(f"unknown whirl {whirl!r}; choose one of {', '.join(map(repr, WHIRLS))}")
+    rows = [rotor.node_row(support.node) for support in supports]
+    zero = np.zeros_like(rotor.mass)
+    system = planar_matrices(rotor.mass, rotor.stiffness, zero, rotor.polar, rows, supports)
+    n = system.plane_size
+    inertia = system.mass[n:, n:] - WHIRLS[whirl] * system.gyroscopic[:n, n:]
+    return _frequencies(system.stiffness[n:, n:], inertia)[:count]
+
+
+def _frequencies(stiffness: Array, inertia: Array) -> Array:
+    """Finite real frequencies of ``K q = ω² J q`` [Hz]; J may be singular or indefinite."""
+    from scipy.linalg import LinAlgError, eigh
+
+    try:
+        inverse = eigh(inertia, stiffness, eigvals_only=True)[::-1]
+    except LinAlgError:
+        raise UsageError(
+            "the supports do not hold the rotor: it can drift or turn without force. Critical speeds need "
+            "springs at two nodes at least."
+        ) from None
+    inverse = inverse[inverse > 1e-12 * inverse[0]]
+    return np.asarray(1.0 / (2.0 * np.pi * np.sqrt(inverse)))
+
+
+def _on(fe: RotorFE, supports: list[Support] | None, whirl: str, count: int) -> Array:
+    found = np.full(count, np.nan)
+    if supports is not None:
+        frequencies = critical_speeds(fe, supports, whirl=whirl, count=count)
+        found[: len(frequencies)] = frequencies
+    return found
+
+
+def _with_mass(
+    parts: Sequence[EquivalentStiffness], masses: list[float], equivalent: float
+) -> list[Support] | None:
+    """Bearings on supports with mass, all of one equivalent stiffness [N/m]; None where none is so rigid."""
+    if equivalent >= _SUPPORT_RIGID * min(p.tangent for p in parts):
+        return None
+    return [
+        Support(
+            node=p.node,
+            links=(link(p.tangent), link(equivalent * p.tangent / (p.tangent - equivalent))),
+            masses=(mass,),
+        )
+        for p, mass in zip(parts, masses, strict=True)
+    ]
+
+
+def _at_lines(
+    fe: RotorFE, parts: Sequence[EquivalentStiffness], masses: list[float], whirl: str, count: int
+) -> dict[str, Array]:
+    found = {
+        formula: _on(fe, [spring(p.node, p.equivalent(formula)) for p in parts], whirl, count)
+        for formula in FORMULAS
+    }
+    held = [spring(p.node, p.equivalent(contact=True)) for p in parts]
+    found["with contact"] = _on(fe, held, whirl, count)
+    massive = [
+        Support(node=p.node, links=(link(p.tangent), link(p.support)), masses=(mass,))
+        for p, mass in zip(parts, masses, strict=True)
+    ]
+    found["with support mass"] = _on(fe, massive, whirl, count)
+    return found

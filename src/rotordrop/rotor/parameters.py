@@ -1,0 +1,235 @@
+"""From the description of a machine to the flat arrays the compiled drop model works on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.machine.touchdown_bearing import Contact
+from rotordrop.physics import aerodynamics
+from rotordrop.physics.contact import contact_law
+from rotordrop.physics.elementary import sine_cosine
+from rotordrop.physics.linear_algebra import product
+from rotordrop.physics.support import PRESENT
+from rotordrop.rotor import layout as L
+from rotordrop.rotor.assembly import RotorFE, build_rotor_fe
+from rotordrop.rotor.bearing_numbers import numbers_of, places_of
+from rotordrop.rotor.layout import KernelParameters
+from rotordrop.rotor.reduction import Reduction, RotorBasis, reduce_rotor
+from rotordrop.rotor.statics import bearing_load_shares
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class DropModel:
+    """A machine made ready for the time loop: finite elements, reduced basis, kernel arrays, state layout."""
+
+    machine: Machine
+    fe: RotorFE
+    basis: RotorBasis
+    parameters: KernelParameters
+    layout: L.StateLayout
+    load_shares: Array
+
+    def with_values(self, values: Mapping[str, float]) -> DropModel:
+        """The same model with other parameter values, by path such as ``"NDE.support.stiffness"`` (SI).
+
+        Only what changes is computed again; the rotor and its basis are kept.
+        """
+        return self.with_machine(self.machine.with_values(values))
+
+    def with_machine(self, machine: Machine) -> DropModel:
+        """The same model of a machine with the same rotor and other bearings or values."""
+        return replace(self, machine=machine, parameters=_with_machine(self, machine))
+
+    def at_rest(self) -> Array:
+        """State, shape (n,), of a centred rotor with all at rest; loose races lie where they fall."""
+        state = self.layout.zeros()
+        p = self.parameters.bearing
+        for b, bearing in enumerate(self.machine.touchdown_bearings):
+            weight = p[b, L.RACE_WEIGHT]
+            if weight > 0.0:
+                seat = numbers_of(bearing).seat(weight)
+                sag = weight / p[b, L.SUPPORT_STIFFNESS_Y]
+                state[self.layout.race][2 * b : 2 * b + 2] = seat[0], seat[1] - sag
+                state[self.layout.support][2 * b + 1] = -sag
+        return state
+
+    @property
+    def bearing_names(self) -> tuple[str, ...]:
+        """Names of the touchdown bearings, in the order of every bearing axis."""
+        return tuple(bearing.name for bearing in self.machine.touchdown_bearings)
+
+
+def build_drop_model(machine: Machine, reduction: str | Reduction = "accurate") -> DropModel:
+    """Assemble, reduce and flatten a machine for the time loop.
+
+    Parameters
+    ----------
+    machine : Machine
+        What the machine is.
+    reduction : str or Reduction
+        ``"accurate"`` (14 modes + attachment), ``"quick"`` (6 + attachment), ``"full"`` or an own choice.
+    """
+    fe = build_rotor_fe(machine)
+    nodes = tuple(bearing.node for bearing in machine.touchdown_bearings)
+    basis = reduce_rotor(fe, reduction, nodes)
+    shares = np.asarray(bearing_load_shares(machine), dtype=np.float64)
+    layout = L.StateLayout(
+        n_modes=basis.shapes.shape[1],
+        n_bearings=len(nodes),
+        bearing_own=_foundation_states(machine),
+        sensor_own=sum(sensor.time_constant is not None for sensor in machine.sensors),
+    )
+    return DropModel(
+        machine=machine,
+        fe=fe,
+        basis=basis,
+        parameters=_kernel_parameters(machine, fe, basis, shares, layout),
+        layout=layout,
+        load_shares=shares,
+    )
+
+
+def _foundation_states(machine: Machine) -> tuple[int, ...]:
+    gives_way = [b.support.foundation_share is not None for b in machine.touchdown_bearings]
+    return tuple(L.FOUNDATION_STATES * int(one) for one in gives_way) if any(gives_way) else ()
+
+
+def _rows(basis: RotorBasis, nodes: list[int]) -> Array:
+    if not nodes:
+        return np.zeros((0, basis.shapes.shape[1]))
+    return np.ascontiguousarray([basis.node_row(node) for node in nodes], dtype=np.float64)
+
+
+def _kernel_parameters(
+    machine: Machine, fe: RotorFE, basis: RotorBasis, shares: Array, layout: L.StateLayout
+) -> KernelParameters:
+    m = basis.shapes.shape[1]
+    bearings = machine.touchdown_bearings
+    magnet = np.zeros((len(machine.ambs), L.N_MAGNET_COLUMNS))
+    for a, amb in enumerate(machine.ambs):
+        magnet[a, L.AMB_STIFFNESS] = float(amb.stiffness)
+        magnet[a, L.AMB_DAMPING] = float(amb.damping)
+    lift = np.zeros(fe.mass.shape[0])
+    lift[0::2] = 1.0
+    unbalance_cos, unbalance_sin = _unbalance(machine, basis)
+    return KernelParameters(
+        eigenvalue=np.ascontiguousarray(basis.eigenvalues, dtype=np.float64),
+        damping=np.ascontiguousarray(np.diag(basis.damping), dtype=np.float64),
+        polar=np.ascontiguousarray(basis.polar, dtype=np.float64).reshape(m, m),
+        gravity=-float(machine.gravity) * (product(basis.shapes.T, product(fe.mass, lift))),
+        unbalance_cos=unbalance_cos,
+        unbalance_sin=unbalance_sin,
+        bearing_shape=_rows(basis, [b.node for b in bearings]),
+        bearing=_bearing_rows(machine, shares),
+        balls=places_of([numbers_of(b) for b in bearings]),
+        magnet_shape=_rows(basis, [amb.node for amb in machine.ambs]),
+        magnet=magnet,
+        spin=_spin(machine, fe),
+        flags=np.array([aerodynamics.OFF, 0], dtype=np.int64),
+        rotor_at=layout.rotor_at(),
+        bearing_at=layout.bearing_at(),
+        magnet_at=layout.magnet_at(len(machine.ambs)),
+    )
+
+
+def _with_machine(model: DropModel, machine: Machine) -> KernelParameters:
+    bearings = machine.touchdown_bearings
+    unbalance_cos, unbalance_sin = _unbalance(machine, model.basis)
+    spin = _spin(machine, model.fe)
+    return model.parameters._replace(
+        bearing=_bearing_rows(machine, model.load_shares),
+        balls=places_of([numbers_of(b) for b in bearings]),
+        unbalance_cos=unbalance_cos,
+        unbalance_sin=unbalance_sin,
+        spin=spin,
+    )
+
+
+def _spin(machine: Machine, fe: RotorFE) -> Array:
+    spin = np.zeros(L.N_SPIN_ENTRIES)
+    spin[L.POLAR_INERTIA] = fe.polar_inertia
+    speed = machine.speed
+    spin[L.AERO_TIME_CONSTANT] = (
+        np.inf if speed.aero_time_constant is None else float(speed.aero_time_constant)
+    )
+    # The machine file gives torques, the kernel wants them per polar inertia.
+    spin[L.AERO_LINEAR] = float(speed.aero_linear or 0.0) / fe.polar_inertia
+    spin[L.AERO_QUADRATIC] = float(speed.aero_quadratic or 0.0) / fe.polar_inertia
+    return spin
+
+
+def _unbalance(machine: Machine, basis: RotorBasis) -> tuple[Array, Array]:
+    """Modal unbalance vectors; the phase is measured from +y, so 90° is added to get it from +x."""
+    cosine = np.zeros(basis.shapes.shape[1])
+    sine = np.zeros_like(cosine)
+    for unbalance in machine.unbalances:
+        angle = float(unbalance.phase) + 0.5 * math.pi
+        row = basis.node_row(unbalance.node)
+        s, c = sine_cosine(angle)
+        cosine += float(unbalance.amount) * c * row
+        sine += float(unbalance.amount) * s * row
+    return cosine, sine
+
+
+def contact_law_of(contact: Contact) -> Array:
+    """Law of a contact as its machine file describes it, for the functions of `physics.contact`."""
+    return contact_law(float(contact.stiffness), float(contact.exponent), float(contact.damping))
+
+
+def _bearing_rows(machine: Machine, shares: Array) -> Array:
+    rows = np.array([bearing_row(b, w) for b, w in zip(machine.touchdown_bearings, shares, strict=True)])
+    for row, bearing in zip(rows, machine.touchdown_bearings, strict=True):
+        # A held race gives way to its own weight by nanometres; a loose one falls.
+        if not numbers_of(bearing).held:
+            row[L.RACE_WEIGHT] = row[L.RACE_MASS] * float(machine.gravity)
+    return rows
+
+
+def bearing_row(bearing: TouchdownBearing, static_load: float) -> Array:
+    """One row of `KernelParameters.bearing` [SI], with the bearing damping from the tangent stiffness at a
+    load [N].
+    """
+    numbers = numbers_of(bearing)
+    row = np.zeros(L.N_BEARING_COLUMNS)
+    gap = float(bearing.air_gap)
+    row[L.AIR_GAP] = gap
+    row[L.BORE_RADIUS] = float(bearing.bore_radius)
+    row[L.ROTOR_RADIUS] = float(bearing.bore_radius) - gap
+    row[L.CONTACT : L.CONTACT_END] = contact_law_of(bearing.contact)
+    row[L.BALL_SET : L.BALL_SET_END] = numbers.entries()
+    row[L.FRICTION_STATIC] = float(bearing.friction.static)
+    row[L.FRICTION_DYNAMIC] = float(bearing.friction.dynamic)
+    row[L.STRIBECK_SPEED] = float(bearing.friction.stribeck_speed)
+    row[L.SMOOTHING_SPEED] = float(bearing.friction.smoothing_speed)
+    row[L.RACE_MASS] = float(bearing.race.mass)
+    row[L.RACE_INERTIA] = float(bearing.race.inertia)
+    row[L.DRAG_COEFFICIENT] = float(bearing.race.drag_coefficient)
+    row[L.DRAG_SPEED] = float(bearing.race.drag_speed)
+    row[L.PITCH_DIAMETER] = numbers.drag_diameter
+    row[L.BEARING_DAMPING] = float(bearing.damping_time) * numbers.tangent_stiffness(static_load)
+    support = bearing.support
+    row[L.SUPPORT_MASS_X] = float(support.mass_horizontal)
+    row[L.SUPPORT_MASS_Y] = float(support.mass)
+    row[L.SUPPORT_STIFFNESS_X] = float(support.stiffness_horizontal)
+    row[L.SUPPORT_STIFFNESS_Y] = float(support.stiffness)
+    row[L.SUPPORT_DAMPING_X] = float(support.damping_horizontal)
+    row[L.SUPPORT_DAMPING_Y] = float(support.damping)
+    form = {
+        L.SUPPORT_COUPLING: support.coupling,
+        L.SUPPORT_CUBIC: support.cubic,
+        L.FOUNDATION_SHARE: support.foundation_share,
+        L.FOUNDATION_SPEED: support.foundation_frequency,
+        L.FOUNDATION_DAMPING: support.foundation_damping_ratio,
+    }
+    for column, value in form.items():
+        row[column] = 0.0 if value is None else float(value)
+    row[L.SUPPORT_FORM + PRESENT] = float(any(value is not None for value in form.values()))
+    return row

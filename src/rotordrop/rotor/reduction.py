@@ -1,0 +1,229 @@
+"""Fewer coordinates for the rotor: free-free modes, and attachment modes for its static flexibility.
+
+The contact force of a drop acts at the touchdown bearings. What the truncated modes would still give way
+there under a static force, the residual flexibility, is one extra shape per bearing node; with it a
+handful of modes does what four times as many plain ones do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.errors import SimulationError, UsageError
+from rotordrop.physics.linear_algebra import orthonormal, product, symmetric_eigen
+from rotordrop.rotor.assembly import RotorFE
+from rotordrop.rotor.modes import N_RIGID, PlanarModes, free_free_modes, with_positive_peak
+
+Array = NDArray[np.float64]
+
+_DEPENDENT = 1e-8
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reduction:
+    """How many shapes describe the rotor in each plane.
+
+    Attributes
+    ----------
+    modes : int or None
+        Free-free modes, the two rigid ones included; None for all finite-element coordinates.
+    attachment : bool
+        Whether residual-flexibility modes at the touchdown bearings are added.
+    """
+
+    modes: int | None = 14
+    attachment: bool = True
+
+
+PRESETS = {
+    "accurate": Reduction(modes=14, attachment=True),
+    "quick": Reduction(modes=6, attachment=True),
+    "full": Reduction(modes=None, attachment=False),
+}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RotorBasis:
+    """Shapes of the reduced rotor, the same in both planes, with unit modal mass and diagonal stiffness.
+
+    Attributes
+    ----------
+    shapes : ndarray, shape (2N, m)
+        Displacement [1/sqrt(kg)] and slope per node; amplitudes have the unit sqrt(kg) m.
+    eigenvalues : ndarray, shape (m,)
+        Modal stiffness [rad²/s²]; exactly 0 for the rigid modes, which come first.
+    polar : ndarray, shape (m, m)
+        Polar inertia matrix [1].
+    damping : ndarray, shape (m, m)
+        Modal damping of the free-free flexible modes, projected [1/s].
+    reduction : Reduction
+        The choice that made it.
+    attachment_nodes : tuple of int
+        Nodes with an attachment mode, counted from 1.
+    n_rigid : int
+        Number of rigid modes.
+    """
+
+    shapes: Array
+    eigenvalues: Array
+    polar: Array
+    damping: Array
+    reduction: Reduction
+    attachment_nodes: tuple[int, ...] = ()
+    n_rigid: int = N_RIGID
+
+    @property
+    def size(self) -> int:
+        """Coordinates per plane."""
+        return int(self.shapes.shape[1])
+
+    @property
+    def mass(self) -> Array:
+        """Mass matrix of the coordinates: unity, shape (m, m)."""
+        return np.eye(self.size)
+
+    @property
+    def stiffness(self) -> Array:
+        """Stiffness matrix of the coordinates [rad²/s²], diagonal, shape (m, m)."""
+        return np.diag(self.eigenvalues)
+
+    @property
+    def description(self) -> str:
+        """The reduction in words."""
+        if self.reduction.modes is None:
+            return f"all {self.size} finite-element coordinates per plane"
+        extra = self.size - self.reduction.modes
+        text = f"{self.reduction.modes} free-free modes"
+        return f"{text} and {extra} attachment modes per plane" if extra else f"{text} per plane"
+
+    def node_row(self, node: int) -> Array:
+        """Displacement at a node (counted from 1) per unit amplitude, shape (m,)."""
+        return np.asarray(self.shapes[self._index(node)])
+
+    def slope_row(self, node: int) -> Array:
+        """Slope at a node (counted from 1) per unit amplitude, shape (m,)."""
+        return np.asarray(self.shapes[self._index(node) + 1])
+
+    def _index(self, node: int) -> int:
+        count = len(self.shapes) // 2
+        if not 1 <= node <= count:
+            raise UsageError(f"node {node} is not on the rotor, which has nodes 1 to {count}")
+        return 2 * (node - 1)
+
+
+def reduction_of(choice: str | Reduction) -> Reduction:
+    """The reduction of a preset name, or the reduction itself."""
+    if isinstance(choice, Reduction):
+        return choice
+    if choice not in PRESETS:
+        raise UsageError(
+            f"unknown reduction {choice!r}; choose one of {', '.join(map(repr, PRESETS))} or give "
+            "Reduction(modes=…, attachment=…)"
+        )
+    return PRESETS[choice]
+
+
+def reduce_rotor(
+    fe: RotorFE, reduction: str | Reduction = "accurate", attachment_nodes: Sequence[int] = ()
+) -> RotorBasis:
+    """Reduce a rotor to free-free modes and attachment modes, Ritz-orthonormalised.
+
+    Parameters
+    ----------
+    fe : RotorFE
+        The rotor.
+    reduction : str or Reduction
+        ``"accurate"`` (14 + attachment), ``"quick"`` (6 + attachment), ``"full"`` or an own choice.
+    attachment_nodes : sequence of int
+        Nodes of the touchdown bearings, counted from 1.
+
+    Returns
+    -------
+    RotorBasis
+        Shapes with ``shapesᵀ M shapes = 1`` and ``shapesᵀ K shapes = diag(eigenvalues)``.
+    """
+    choice = reduction_of(reduction)
+    nodes = tuple(dict.fromkeys(attachment_nodes)) if choice.attachment else ()
+    if choice.modes is None or not nodes:
+        modes = free_free_modes(fe, choice.modes)
+        rate = 2.0 * fe.modal_damping * modes.omega
+        return _basis(fe, modes.shapes, modes.omega**2, np.diag(rate), choice, ())
+    if choice.modes < N_RIGID:
+        raise SimulationError(
+            f"{choice.modes} modes per plane are too few: the {N_RIGID} rigid modes are always needed"
+        )
+    everything = free_free_modes(fe)
+    kept = min(choice.modes, fe.size)
+    inner, eigenvalues, damping = _attachment_coordinates(fe, everything, kept, nodes)
+    extra = with_positive_peak(product(everything.shapes[:, kept:], inner))
+    signs = np.sign(np.sum(extra * product(fe.mass, product(everything.shapes[:, kept:], inner)), axis=0))
+    shapes = np.column_stack([everything.shapes[:, :kept], extra])
+    projected = np.zeros((shapes.shape[1], shapes.shape[1]))
+    projected[:kept, :kept] = np.diag(2.0 * fe.modal_damping * everything.omega[:kept])
+    projected[kept:, kept:] = signs[:, None] * damping * signs
+    values = np.concatenate([everything.omega[:kept] ** 2, eigenvalues])
+    return _basis(fe, shapes, values, projected, choice, nodes)
+
+
+def _attachment_coordinates(
+    fe: RotorFE, modes: PlanarModes, kept: int, nodes: tuple[int, ...]
+) -> tuple[Array, Array, Array]:
+    """Attachment modes from truncated ones: coefficients (t, a), eigenvalues (a,), damping (a, a)."""
+    rows = np.array([fe.node_row(node) for node in nodes])
+    omega = modes.omega[kept:]
+    residual = product(modes.shapes[:, kept:].T, rows.T) / omega[:, None] ** 2
+    basis = orthonormal(residual, _DEPENDENT)
+    eigenvalues, rotation = symmetric_eigen(product(basis.T, omega[:, None] ** 2 * basis))
+    inner = product(basis, rotation)
+    damping = product(inner.T, 2.0 * fe.modal_damping * omega[:, None] * inner)
+    return inner, eigenvalues, damping
+
+
+def _basis(
+    fe: RotorFE,
+    shapes: Array,
+    eigenvalues: Array,
+    damping: Array,
+    reduction: Reduction,
+    nodes: tuple[int, ...],
+) -> RotorBasis:
+    polar = product(product(shapes.T, fe.polar), shapes)
+    return RotorBasis(
+        shapes=shapes,
+        eigenvalues=eigenvalues,
+        polar=np.asarray(0.5 * (polar + polar.T)),
+        damping=damping,
+        reduction=reduction,
+        attachment_nodes=nodes,
+    )
+
+
+def elastic_flexibility(fe: RotorFE, nodes: Sequence[int], omega: float = 0.0) -> Array:
+    """Displacement at each node per unit force there by bending alone, shape (P,) [m/N].
+
+    The rotor is free and its rigid motion is left out; ``omega`` is the frequency of the force [rad/s].
+    """
+    modes = free_free_modes(fe)
+    return _modal_flexibility(
+        modes.shapes, modes.omega**2, np.array([fe.node_index(n) for n in nodes]), omega
+    )
+
+
+def residual_flexibility(fe: RotorFE, basis: RotorBasis, nodes: Sequence[int], omega: float = 0.0) -> Array:
+    """What a reduced rotor gives way too little per unit force at each node, shape (P,) [m/N].
+
+    Times the contact stiffness it estimates the relative truncation error of a contact force whose time
+    scale is 1/omega [rad/s]; zero at standstill for nodes with an attachment mode.
+    """
+    index = np.array([fe.node_index(n) for n in nodes])
+    reduced = _modal_flexibility(basis.shapes, basis.eigenvalues, index, omega)
+    return elastic_flexibility(fe, nodes, omega) - reduced
+
+
+def _modal_flexibility(shapes: Array, eigenvalues: Array, index: NDArray[np.intp], omega: float) -> Array:
+    rows = shapes[index, N_RIGID:]
+    return np.asarray(np.sum(rows**2 / (eigenvalues[N_RIGID:] - omega**2), axis=1))

@@ -1,0 +1,124 @@
+"""The rotor at rest under its weight: load shares of the touchdown bearings, sag levitated and settled."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.errors import SimulationError
+from rotordrop.physics.linear_algebra import product, solve
+from rotordrop.rotor.assembly import RotorFE, build_rotor_fe
+from rotordrop.rotor.modes import N_RIGID, free_free_modes, rigid_modes
+
+if TYPE_CHECKING:
+    from rotordrop.machine import Machine
+
+Array = NDArray[np.float64]
+
+
+def weight_vector(fe: RotorFE, gravity: float) -> Array:
+    """Nodal forces of gravity in y [N, N m], shape (2N,); gravity [m/s²] acts towards −y."""
+    return -gravity * product(fe.mass, fe.rigid_shapes[:, 0])
+
+
+def rest_on(
+    fe: RotorFE, nodes: Sequence[int], gravity: float, compliance: Sequence[float] | None = None
+) -> tuple[Array, Array]:
+    """Static shape of the rotor under its weight, held at nodes.
+
+    Parameters
+    ----------
+    fe : RotorFE
+        The rotor.
+    nodes : sequence of int, length P
+        Where it is held, counted from 1; at least two different ones.
+    gravity : float
+        Gravity [m/s²].
+    compliance : sequence of float, length P, optional
+        How much each support gives way [m/N]; 0 (rigid) by default.
+
+    Returns
+    -------
+    tuple of ndarray
+        Vertical displacement and slope per node, shape (2N,) [m, rad], and the upward reactions, shape
+        (P,) [N].
+    """
+    held = len(set(nodes))
+    if held < 2 or held < len(nodes):
+        listed = ", ".join(map(str, nodes)) or "none"
+        raise SimulationError(
+            f"a rotor at rest must be held at two or more different nodes; it is held at: {listed}"
+        )
+    rows = np.array([fe.node_row(node) for node in nodes])
+    give = np.diag(np.zeros(held) if compliance is None else np.asarray(compliance, dtype=np.float64))
+    # reactions scaled to the stiffness of the shaft, so that the system is well conditioned
+    scale = float(np.max(np.diag(fe.stiffness)))
+    system = np.block([[fe.stiffness, -scale * rows.T], [-scale * rows, -(scale**2) * give]])
+    right = np.concatenate([weight_vector(fe, gravity), np.zeros(held)])
+    try:
+        solution = solve(system, right)
+    except np.linalg.LinAlgError as error:
+        raise SimulationError(
+            "the shaft cannot hold its own weight: some of it is too thin or soft beside the rest for the "
+            "numbers of a computer; check the diameters of the sections and the moduli of the materials"
+        ) from error
+    return solution[: fe.size], scale * solution[fe.size :]
+
+
+def bearing_load_shares(machine: Machine, fe: RotorFE | None = None) -> Array:
+    """Weight each touchdown bearing carries when the rotor rests on them [N], shape (B,).
+
+    With two bearings it follows from the centre of gravity; with more, the bearings count as level and rigid.
+    """
+    fe = build_rotor_fe(machine) if fe is None else fe
+    nodes = [bearing.node for bearing in machine.touchdown_bearings]
+    gravity = float(machine.gravity)
+    if len(nodes) == 1:
+        return np.array([fe.total_mass * gravity])
+    return rest_on(fe, nodes, gravity)[1]
+
+
+def levitated_sag(fe: RotorFE, machine: Machine) -> Array:
+    """Static shape of the levitated rotor in y, shape (2N,) [m, rad].
+
+    AMBs with integral action hold their nodes exactly; the others give way like springs of their stiffness.
+    """
+    nodes = [amb.node for amb in machine.ambs]
+    if len(set(nodes)) < 2:
+        raise SimulationError(
+            f"the machine has {len(nodes)} AMB planes; the sag of the levitated rotor needs two. "
+            "Give the AMB nodes in the machine file, or start the drop from given displacements."
+        )
+    compliance = [0.0 if amb.integral_action else 1.0 / float(amb.stiffness) for amb in machine.ambs]
+    return rest_on(fe, nodes, float(machine.gravity), compliance)[0]
+
+
+def bending_part(fe: RotorFE, shape: Array) -> Array:
+    """What is left of a shape (2N,) without its rigid modes [m, rad]: how far it is from a straight rotor."""
+    rigid = rigid_modes(fe)
+    return shape - product(rigid, product(rigid.T, product(fe.mass, shape)))
+
+
+def settled_sag(fe: RotorFE, machine: Machine) -> Array:
+    """Static shape in y of the rotor that rests on its touchdown bearings, shape (2N,) [m, rad].
+
+    Measured from the straight line through the rotor's centre at the bearings (with one bearing: from the
+    level through it, for a rotor that stays horizontal).
+    """
+    nodes = [bearing.node for bearing in machine.touchdown_bearings]
+    gravity = float(machine.gravity)
+    if len(nodes) == 1:
+        return _inertia_relief(fe, nodes[0], gravity)
+    return rest_on(fe, nodes, gravity)[0]
+
+
+def _inertia_relief(fe: RotorFE, node: int, gravity: float) -> Array:
+    modes = free_free_modes(fe)
+    bending, eigenvalues = modes.shapes[:, N_RIGID:], modes.omega[N_RIGID:] ** 2
+    force = weight_vector(fe, gravity) + fe.total_mass * gravity * fe.node_row(node)
+    shape = product(bending, product(bending.T, force) / eigenvalues)
+    lift = fe.rigid_shapes[:, 0] * shape[fe.node_index(node)]
+    return np.asarray(shape - lift)

@@ -1,0 +1,144 @@
+"""Response of a machine to its unbalance: amplitude and phase at its sensors and bearings over the speed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rotordrop.errors import UsageError
+from rotordrop.machine import Machine
+from rotordrop.rotor.assembly import build_rotor_fe
+from rotordrop.rotor.reduction import Reduction, reduce_rotor
+from rotordrop.rotor.separation import response_peaks
+from rotordrop.rotor.suspension import suspension_of
+from rotordrop.rotor.whirl import unbalance_response
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+REDUCTION = Reduction(modes=16, attachment=True)
+
+SPEEDS, PEAK_SPEEDS, CLOSEST = 2001, 81, 200
+"""Speeds of the even grid and across a sharp peak, and how many times closer two may lie than on the grid."""
+
+SHARP = 20.0
+"""Steps of the even grid in the half-power width of a peak below which it is sharp [1]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MachineResponse:
+    """Synchronous response of a rotor to its unbalance.
+
+    Attributes
+    ----------
+    suspension : str
+        What holds the rotor.
+    speed : ndarray, shape (S,)
+        Speeds [rad/s].
+    displacement : ndarray, shape (S, N, 2), complex
+        Displacement (x, y) at the nodes [m], ``Re(value · e^(jωt))``.
+    node_positions : ndarray, shape (N,)
+        Positions along z [m].
+    places : tuple of (str, int)
+        Planes of interest with their nodes, counted from 1.
+    unbalance : tuple of (int, float, float)
+        Node, amount [kg m] and phase from +y [rad] of every unbalance.
+    """
+
+    suspension: str
+    speed: Array
+    displacement: ComplexArray
+    node_positions: Array
+    places: tuple[tuple[str, int], ...]
+    unbalance: tuple[tuple[int, float, float], ...]
+
+    def at(self, node: int) -> ComplexArray:
+        """Displacement (x, y) at a node [m], shape (S, 2)."""
+        return np.asarray(self.displacement[:, node - 1])
+
+    def major_axis(self, node: int) -> Array:
+        """Half the major axis of the orbit at a node [m], shape (S,)."""
+        return orbit_axis(self.at(node))
+
+
+def orbit_axis(displacement: ComplexArray) -> Array:
+    """Half the major axis [m] of orbits given by their displacements (x, y), last axis 2.
+
+    Source: an ellipse is a forward and a backward circle; the axis is the sum of their radii.
+    """
+    x, y = displacement[..., 0], displacement[..., 1]
+    forward, backward = 0.5 * np.abs(x + 1j * y), 0.5 * np.abs(np.conj(x) + 1j * np.conj(y))
+    return np.asarray(forward + backward)
+
+
+def machine_response(machine: Machine, speeds: ArrayLike, suspension: str) -> MachineResponse:
+    """Response of a machine to the unbalance of its file, in the AMBs or settled in its touchdown bearings.
+
+    Parameters
+    ----------
+    machine : Machine
+        The machine; it needs unbalances, or a balance grade, which says nothing of their phases.
+    speeds : array_like, shape (S,)
+        Speeds [rad/s].
+    suspension : str
+        ``"AMBs"`` or ``"touchdown bearings"``.
+
+    Raises
+    ------
+    UsageError
+        If the machine has no unbalance.
+    """
+    if not machine.unbalances:
+        raise UsageError(
+            f"machine {machine.name!r} has no unbalance; add [balance_grade] or [[unbalances]] to its file"
+        )
+    supports = suspension_of(machine, suspension)
+    fe = build_rotor_fe(machine)
+    known = tuple((one.node, float(one.amount), float(one.phase)) for one in machine.unbalances)
+    forces: dict[int, complex] = {}
+    for node, amount, phase in known:
+        forces[node] = forces.get(node, 0.0) + amount * complex(np.exp(1j * (0.5 * math.pi + phase)))
+    nodes = [*(support.node for support in supports), *forces]
+    basis = reduce_rotor(fe, REDUCTION, list(dict.fromkeys(nodes)))
+    grid = np.atleast_1d(np.asarray(speeds, dtype=np.float64))
+    return MachineResponse(
+        suspension=suspension,
+        speed=grid,
+        displacement=unbalance_response(basis, grid, forces, supports),
+        node_positions=fe.node_positions,
+        places=_places(machine),
+        unbalance=known,
+    )
+
+
+def resolved_response(machine: Machine, top: float, suspension: str) -> MachineResponse:
+    """Response up to a speed [rad/s], with more speeds wherever a peak is too sharp for an even grid.
+
+    Arguments as of `machine_response`. On an even grid alone a peak of lightly damped modes is too low and,
+    by its half-power width, too broad.
+    """
+    step = top / SPEEDS
+    grid = step * np.arange(1, SPEEDS + 1)
+    first = machine_response(machine, grid, suspension)
+    wanted = [grid]
+    for _, node in first.places:
+        for peak in response_peaks(first.speed, first.major_axis(node)):
+            width = peak.speed / peak.factor
+            if width < SHARP * step:
+                reach = max(width, 2.0 * step)
+                wanted.append(np.linspace(peak.speed - reach, peak.speed + reach, PEAK_SPEEDS))
+    finest = step / CLOSEST  # speeds nearer to each other would differ by rounding only
+    speeds = finest * np.unique(np.round(np.concatenate(wanted) / finest))
+    return machine_response(machine, speeds[(speeds > 0.0) & (speeds <= top)], suspension)
+
+
+def _places(machine: Machine) -> tuple[tuple[str, int], ...]:
+    """Sensor planes and touchdown bearings; a plane of several sensors once."""
+    planes: dict[int, str] = {}
+    for sensor in machine.sensors:
+        planes.setdefault(sensor.node, f"sensors {sensor.bearing}")
+    bearings = [(f"touchdown bearing {bearing.name}", bearing.node) for bearing in machine.touchdown_bearings]
+    return (*((name, node) for node, name in planes.items()), *bearings)

@@ -1,0 +1,437 @@
+"""The unknowns of a machine and a drop: rows of the parameter table bound to their owner, with priors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from rotordrop.estimated import NINETY, Estimated
+from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.machine.amb import REMANENCE_TIME
+from rotordrop.machine.sensor import Sensor
+from rotordrop.physics.contact import depth_at
+from rotordrop.rotor import layout as L
+from rotordrop.rotor.bearing_numbers import Measure, numbers_of
+from rotordrop.rotor.parameter import Entry, Parameter, Rule
+from rotordrop.rotor.parameter_table import parameter, rows
+from rotordrop.rotor.parameters import DropModel, contact_law_of
+from rotordrop.rotor.structure_table import structure_rows
+
+Scope = Literal["machine", "drop"]
+
+TYPICAL_LOADS = 5.0
+"""Contact force at whose indentation the stiffness keeps its meaning when the exponent differs, over the mean
+static load of a bearing [1]: impacts that say something of the contact have it and more."""
+
+TURNED_ANISOTROPY = 0.4
+"""Prior standard deviation of the logarithm of horizontal over vertical stiffness of turned axes."""
+
+PEAK_LOADS = 10.0
+"""Force of a hard impact over the mean static load of a bearing [1]: where a cubic term counts."""
+
+CENTRED = 1e-6
+"""Distance of value and middle of its range, in standard deviations, below which they are one [1]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Target:
+    """A kernel entry that an unknown sets: which, in which row, and the factor on the value."""
+
+    entry: Entry
+    row: int
+    factor: float = 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unknown:
+    """One unknown parameter of a machine or a drop with its prior.
+
+    Attributes
+    ----------
+    parameter : Parameter
+        Its row in the parameter table.
+    owner : str
+        Name of the bearing or magnet, number of the unbalance, or nothing for a drop.
+    mean, sigma : float
+        Prior mean and standard deviation, of the logarithm where the parameter is logarithmic.
+    targets : tuple of Target
+        Kernel entries it sets.
+    start : float, optional
+        Where a search begins, in the measure of the mean: the value of the machine file.
+    calibrated : bool
+        Whether its prior is an estimate made before, not a guess.
+    published : callable, optional
+        The published value [SI] of the number that is estimated, where they differ: preload for the axial
+        offset of the ball rows, anisotropy for its ratio to the one described.
+    common_variance : float
+        Prior covariance with the same unknown of the other sensors of its group.
+    limits : tuple of float, optional
+        Bounds that depend on the machine, in the measure of the mean; those of the row when left out.
+    """
+
+    parameter: Parameter
+    owner: str = ""
+    mean: float
+    sigma: float
+    targets: tuple[Target, ...]
+    start: float | None = None
+    calibrated: bool = False
+    published: Callable[[float], float] | None = None
+    common_variance: float = 0.0
+    limits: tuple[float, float] | None = None
+
+    @property
+    def path(self) -> str:
+        """Path in the machine, such as ``"NDE.support.stiffness"``."""
+        return self.parameter.path_of(self.owner)
+
+    @property
+    def logarithmic(self) -> bool:
+        """Whether it is estimated by its logarithm."""
+        return self.parameter.logarithmic
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the published value."""
+        return self.parameter.unit
+
+    @property
+    def scope(self) -> Scope:
+        """Whether all drops of a machine share it."""
+        return "machine" if self.parameter.owner in ("bearing", "sensor", "rotor") else "drop"
+
+    @property
+    def drift(self) -> float:
+        """Random walk per square root of a second, in the measure it is estimated in."""
+        row = self.parameter
+        return row.drift if row.logarithmic else row.drift * abs(self.begin)
+
+    @property
+    def begin(self) -> float:
+        """Where a search begins, in the measure it is estimated in."""
+        return self.mean if self.start is None else self.start
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Between what the model follows it, in the measure it is estimated in."""
+        row = self.parameter
+        if self.limits is not None:
+            return self.limits
+        if row.reach is not None:
+            return self.mean - math.log(row.reach), self.mean + math.log(row.reach)
+        low, high = (
+            end if limit is None else math.log(limit) if row.logarithmic else limit
+            for limit, end in ((row.lower, -math.inf), (row.upper, math.inf))
+        )
+        return low, high
+
+    def kernel_value(self, theta: float) -> float:
+        """What is written into the kernel for an estimated number: within the limits of its row."""
+        return self.parameter.within(math.exp(theta) if self.logarithmic else theta)
+
+    def value_of(self, theta: float) -> float:
+        """Published SI value of an estimated number."""
+        return self.kernel_value(theta) if self.published is None else self.published(theta)
+
+    def standard_error(self, theta: float, sigma: float) -> float:
+        """Standard error of the published value for that of an estimated number."""
+        if self.published is not None:
+            half = NINETY * sigma
+            return (self.published(theta + half) - self.published(theta - half)) / (2.0 * NINETY)
+        return sigma * self.kernel_value(theta) if self.logarithmic else sigma
+
+
+@dataclass(frozen=True, kw_only=True)
+class Prior:
+    """What is known of a parameter before a record is read, in the measure it is estimated in.
+
+    Attributes
+    ----------
+    mean, sigma : float
+        Normal distribution, of the logarithm where the parameter is logarithmic.
+    start : float
+        The value of the machine file, where a search begins.
+    """
+
+    mean: float
+    sigma: float
+    start: float
+
+
+def prior(
+    row: Parameter, quantity: Estimated, scale: float = 1.0, *, logarithmic: bool | None = None
+) -> Prior:
+    """Prior of a parameter from what the machine file says of it.
+
+    A range, or the interval of an estimate, is the 90 % interval of the prior: its centre is the middle of
+    the range (of its logarithms), wherever in it the guess lies. Without either, the value is the centre.
+
+    Parameters
+    ----------
+    row : Parameter
+        Row of the parameter.
+    quantity : Estimated
+        The value with what is known about it.
+    scale : float
+        What the standard deviations of the row are shares of, where it is not logarithmic.
+    logarithmic : bool, optional
+        Measure of the distribution; that of the row by default.
+    """
+    log = row.logarithmic if logarithmic is None else logarithmic
+    value = float(quantity)
+    start = math.log(value) if log else value
+    known = quantity.interval_90 or quantity.range
+    if known is not None and (known[0] > 0.0 or not log):
+        low, high = (math.log(end) if log else end for end in known)
+        sigma = max((high - low) / (2.0 * NINETY), row.least_sigma)
+        middle = 0.5 * (low + high)
+        centred = abs(middle - start) < CENTRED * sigma
+        return Prior(mean=start if centred else middle, sigma=sigma, start=start)
+    if known is not None and known[1] > value:
+        # From zero on a logarithm has no lower limit; the upper one is left above by one in twenty.
+        return Prior(mean=start, sigma=(math.log(known[1]) - start) / NINETY, start=start)
+    if quantity.standard_error is not None:
+        error = quantity.standard_error / value if log else quantity.standard_error
+        return Prior(mean=start, sigma=max(error, row.least_sigma), start=start)
+    usual = row.given_sigma if quantity.status == "given" else row.guess_sigma
+    return Prior(mean=start, sigma=usual * (1.0 if log else scale), start=start)
+
+
+def bearing_unknowns(model: DropModel, index: int) -> Iterator[Unknown]:
+    """Unknown parameters of one touchdown bearing of a model.
+
+    What the machine does not have, such as the preload of a bearing with clearance, is no unknown.
+    """
+    bearing = model.machine.touchdown_bearings[index]
+    for row in rows("bearing"):
+        if not row.entries or float(row.described(bearing)) == 0.0:
+            continue  # for a loose bearing, the air gap takes up an error of the play
+        measure = numbers_of(bearing).measure(row.path)
+        if measure is not None:
+            yield _measured_otherwise(row, bearing, index, measure)
+        elif row.path == "support.anisotropy":
+            yield _anisotropy(row, bearing, index)
+        else:
+            yield _unknown(model, row, index)
+
+
+def _unknown(model: DropModel, row: Parameter, index: int) -> Unknown:
+    bearing = model.machine.touchdown_bearings[index]
+    quantity = row.described(bearing)
+    known = prior(row, quantity, scale=float(quantity))
+    return Unknown(
+        parameter=row,
+        owner=bearing.name,
+        mean=known.mean,
+        sigma=known.sigma,
+        start=known.start,
+        targets=tuple(
+            Target(entry=entry, row=index, factor=_factor(model, entry, index, float(quantity)))
+            for entry in row.entries
+        ),
+        calibrated=quantity.status == "estimated",
+    )
+
+
+def _factor(model: DropModel, entry: Entry, index: int, value: float) -> float:
+    if entry.rule is Rule.RATIO:
+        return float(model.parameters.bearing[index, entry.column]) / value
+    if entry.rule is Rule.AT_TYPICAL_DEPTH:
+        return typical_depth(model.machine.touchdown_bearings[index], float(np.mean(model.load_shares)))
+    return 1.0
+
+
+def typical_depth(bearing: TouchdownBearing, load: float) -> float:
+    """Indentation [m] by which the contact stiffness keeps its meaning when the exponent differs.
+
+    Parameters
+    ----------
+    bearing : TouchdownBearing
+        Gives the contact law.
+    load : float
+        Share of the weight of one bearing, in the mean [N].
+    """
+    return depth_at(contact_law_of(bearing.contact), TYPICAL_LOADS * load)
+
+
+def _anisotropy(row: Parameter, bearing: TouchdownBearing, index: int) -> Unknown:
+    """Horizontal over vertical stiffness, estimated by its ratio to the one described."""
+    described = row.described(bearing)
+    turned = bearing.support.coupling is not None and bearing.support.coupling.status != "estimated"
+
+    def ratio(theta: float) -> float:
+        return float(described) * math.exp(theta)
+
+    return Unknown(
+        parameter=row,
+        owner=bearing.name,
+        mean=0.0,
+        sigma=TURNED_ANISOTROPY if turned else prior(row, described).sigma,
+        targets=tuple(Target(entry=entry, row=index) for entry in row.entries),
+        published=ratio,
+    )
+
+
+def _measured_otherwise(row: Parameter, bearing: TouchdownBearing, index: int, measure: Measure) -> Unknown:
+    """A parameter estimated by another number, on which the forces depend: a preload by an axial offset.
+
+    The ends of the 90 % interval are those of the parameter; between them the prior is normal in the number.
+    """
+    quantity = row.described(bearing)
+    known = prior(row, quantity, logarithmic=True)
+    low, high = (
+        measure.of_value(math.exp(end))
+        for end in (known.mean - NINETY * known.sigma, known.mean + NINETY * known.sigma)
+    )
+    stated = quantity.interval_90 or quantity.range
+    return Unknown(
+        parameter=row,
+        owner=bearing.name,
+        mean=measure.start if stated is None else 0.5 * (low + high),
+        sigma=(high - low) / (2.0 * NINETY),
+        start=measure.start,
+        targets=tuple(Target(entry=entry, row=index) for entry in row.entries),
+        calibrated=quantity.status == "estimated",
+        published=measure.value_of,
+    )
+
+
+def sensor_prior(row: Parameter, quantity: Estimated, smallest_gap: float) -> Prior:
+    """Prior of gain or offset of a sensor.
+
+    Parameters
+    ----------
+    row : Parameter
+        Row of the gain or the offset.
+    quantity : Estimated
+        The value with what is known about it; the range of a default says what is thinkable, not usual.
+    smallest_gap : float
+        Smallest air gap of the machine [m], of which an unknown offset is a share.
+    """
+    if quantity.status == "default":
+        quantity = replace(quantity, range=None)
+    return prior(row, quantity, scale=smallest_gap if row.kind == "length" else 1.0)
+
+
+def smallest_gap(machine: Machine) -> float:
+    """Smallest air gap of a machine as described [m]."""
+    return min(float(bearing.air_gap) for bearing in machine.touchdown_bearings)
+
+
+def weight_per_magnet(machine: Machine) -> float:
+    """Weight of the rotor over the number of its magnet planes [N], by which remanent forces are measured."""
+    return machine.rotor.mass * float(machine.gravity) / max(len(machine.ambs), 1)
+
+
+def drop_unknowns(model: DropModel) -> Iterator[Unknown]:
+    """Unknowns of one drop: unbalance against an unknown mark, remanent forces, aerodynamic constant."""
+    machine = model.machine
+    for plane, unbalance in enumerate(machine.unbalances):
+        for row in rows("unbalance"):
+            yield _of_drop(row, str(plane), 0.0, max(float(unbalance.amount), 1e-9), plane)
+    share = weight_per_magnet(machine)
+    for a, amb in enumerate(machine.ambs):
+        for row in rows("magnet"):
+            yield _of_drop(row, amb.name, 0.0, row.guess_sigma * share, a)
+    if machine.ambs:
+        yield _remanence_time(machine)
+    yield _of_drop(parameter("speed.aero_time_constant", "drop"), "", math.log(aero_time_constant(machine)))
+
+
+def _remanence_time(machine: Machine) -> Unknown:
+    row, described = parameter("remanence.time_constant", "drop"), machine.remanence_time_constant
+    if described is None:
+        return _of_drop(row, "", math.log(REMANENCE_TIME))
+    known = prior(row, described)
+    return _of_drop(row, "", known.mean, known.sigma)
+
+
+def _of_drop(row: Parameter, owner: str, mean: float, sigma: float | None = None, index: int = 0) -> Unknown:
+    return Unknown(
+        parameter=row,
+        owner=owner,
+        mean=mean,
+        sigma=row.guess_sigma if sigma is None else sigma,
+        targets=tuple(Target(entry=entry, row=index) for entry in row.entries),
+    )
+
+
+def aero_time_constant(machine: Machine) -> float:
+    """Time constant [s] of the aerodynamic deceleration to start from; 10 s when the machine does not say."""
+    constant = machine.speed.aero_time_constant
+    return 10.0 if constant is None else float(constant)
+
+
+def structure_unknowns(model: DropModel) -> Iterator[Unknown]:
+    """Unknowns beyond the usual model: those that the machine description names."""
+    machine = model.machine
+    for index, bearing in enumerate(machine.touchdown_bearings):
+        for row in structure_rows("bearing"):
+            if (quantity := row.stated(bearing)) is not None:
+                yield _of_structure(row, bearing.name, quantity, index, *_cubic_scale(model, row, index))
+    for index, sensor in enumerate(machine.sensors):
+        for row in structure_rows("sensor"):
+            if (quantity := row.stated(sensor)) is not None:
+                known = _of_structure(row, sensor.name, quantity, index)
+                yield known if known.calibrated else _in_common(known, machine, sensor)
+    for row in structure_rows("rotor"):
+        if (quantity := row.stated(machine.rotor)) is not None:
+            yield _of_structure(row, "", quantity, 0)
+
+
+def _of_structure(
+    row: Parameter,
+    owner: str,
+    quantity: Estimated,
+    index: int,
+    scale: float = 1.0,
+    limits: tuple[float, float] | None = None,
+) -> Unknown:
+    known = prior(row, quantity, scale=scale)
+    return Unknown(
+        parameter=row,
+        owner=owner,
+        mean=known.mean,
+        sigma=known.sigma,
+        start=known.start,
+        targets=tuple(
+            Target(entry=e, row=index, factor=1.0 / float(quantity) if e.rule is Rule.RATIO else 1.0)
+            for e in row.entries
+        ),
+        calibrated=quantity.status == "estimated",
+        limits=limits,
+    )
+
+
+def _cubic_scale(
+    model: DropModel, row: Parameter, index: int
+) -> tuple[float] | tuple[float, tuple[float, float]]:
+    """Scale of a cubic term, and its limits: hard impacts at most double the stiffness, or take a fifth."""
+    if row.path != "support.cubic":
+        return (1.0,)
+    load = PEAK_LOADS * float(np.mean(model.load_shares))
+    scale = (float(model.parameters.bearing[index, L.SUPPORT_STIFFNESS_Y]) / load) ** 2
+    return scale, (-0.2 * scale, 2.0 * scale)
+
+
+def _in_common(one: Unknown, machine: Machine, sensor: Sensor) -> Unknown:
+    """The unknown of a sensor with what is known of it and the sensors of its group together."""
+    row = one.parameter
+    group = [s for s in machine.sensors if row.group == "machine" or s.node == sensor.node]
+    own, count = one.sigma**2, len([s for s in group if row.stated(s) is not None])
+    common = row.common_sigma**2 - own / count
+    return replace(one, sigma=math.sqrt(own + common), common_variance=common)
+
+
+def all_unknowns(model: DropModel) -> tuple[Unknown, ...]:
+    """Every unknown, machine first, then those of the drop."""
+    of_bearings = (
+        unknown
+        for index in range(len(model.machine.touchdown_bearings))
+        for unknown in bearing_unknowns(model, index)
+    )
+    return (*of_bearings, *structure_unknowns(model), *drop_unknowns(model))

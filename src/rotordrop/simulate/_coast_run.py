@@ -1,0 +1,426 @@
+"""Where a coast-down stands, and how it is taken one window of time further."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.errors import SimulationError
+from rotordrop.physics import aerodynamics
+from rotordrop.physics.elementary import atan2, magnitude
+from rotordrop.rotor import layout as L
+from rotordrop.rotor.layout import KernelParameters
+from rotordrop.rotor.parameters import DropModel
+from rotordrop.rotor.suspension import equivalent_stiffness
+from rotordrop.simulate import _coast_loop as C
+from rotordrop.simulate import _histories as H
+from rotordrop.simulate import _loop
+from rotordrop.simulate import _settled_loop as S
+from rotordrop.simulate.coast_down_case import CoastDownCase
+from rotordrop.simulate.coast_down_result import QUANTILES
+from rotordrop.simulate.drop import FIRST_STEP, LOG_ROWS_PER_SECOND, error_scale, tableau_of
+from rotordrop.simulate.levitation import start_of_drop
+
+Array = NDArray[np.float64]
+Single = NDArray[np.float32]
+
+MOST_STEPS_PER_WINDOW = 5_000_000
+WINDOW_ROWS = (
+    "window_rows",
+    "window_peak",
+    "window_quantile",
+    "window_contacts",
+    "window_share",
+    "window_race",
+    "window_method",
+)
+"""Names of what is kept of every window."""
+SETTLED_STEP = 0.92
+CHECKED = 2e-3
+"""Part of every settled window [s] that is also done with the Runge–Kutta pair."""
+RUNNING, ENDED, BROKEN = 0.0, 1.0, 2.0
+# Entries of `Run.status`.
+PHASE, WINDOW, SAMPLE, STOPPED_AT, LAST_SAMPLE, PARTS, ENERGY_AT_START, WORST_BALANCE = range(8)
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What does not change during a run."""
+
+    model: DropModel
+    case: CoastDownCase
+    parameters: KernelParameters
+    scale: Array
+    sensor_rows: Array
+    sensor_nodes: tuple[int, ...]
+    settled_parts: int
+
+
+@dataclass(frozen=True)
+class Run:
+    """Where a run stands: arrays that change in place, and nothing else, so a checkpoint is just these."""
+
+    state: Array
+    progress: Array
+    running: Array
+    open_log: Array
+    peaks: Array
+    whirl: Array
+    totals: Array
+    status: Array
+    windows: dict[str, list[Array]]
+
+    def arrays(self) -> dict[str, Array]:
+        kept = {name: value for name, value in vars(self).items() if name != "windows"}
+        return kept | {name: np.array(rows) for name, rows in self.windows.items()}
+
+    @classmethod
+    def of(cls, arrays: dict[str, Array]) -> Run:
+        windows = {name: list(arrays.pop(name)) for name in WINDOW_ROWS}
+        return cls(**arrays, windows=windows)
+
+
+def prepare(model: DropModel, case: CoastDownCase) -> Setup:
+    _, parameters = start_of_drop(model, case.as_drop())
+    nodes = tuple(sorted({sensor.node for sensor in model.machine.sensors}))
+    rows = np.array([model.basis.node_row(node) for node in nodes]).reshape(len(nodes), model.layout.n_modes)
+    return Setup(
+        model=model,
+        case=case,
+        parameters=_with_drag(parameters, model, case),
+        scale=error_scale(model),
+        sensor_rows=rows,
+        sensor_nodes=nodes,
+        settled_parts=_settled_parts(model, case.output_step),
+    )
+
+
+def _settled_parts(model: DropModel, output_step: float) -> int:
+    """Steps per sample that keep the settled scheme stable: the races swing 0.92 rad in a step."""
+    fastest = 0.0
+    for bearing, parts in zip(
+        model.machine.touchdown_bearings, equivalent_stiffness(model.machine), strict=True
+    ):
+        fastest = max(fastest, math.sqrt((parts.contact + parts.tangent) / float(bearing.race.mass)))
+    return max(1, math.ceil(output_step * fastest / SETTLED_STEP))
+
+
+def _with_drag(parameters: KernelParameters, model: DropModel, case: CoastDownCase) -> KernelParameters:
+    """Aerodynamic drag as a function of speed, and race drag that stays dry down to the stop speed."""
+    speed = model.machine.speed
+    spin, bearing = parameters.spin.copy(), parameters.bearing.copy()
+    if speed.aero_linear is None and speed.aero_quadratic is None:
+        if speed.aero_time_constant is None:
+            raise SimulationError(
+                f"the machine {model.machine.name!r} has no aerodynamic drag: speed.aero_linear, "
+                "speed.aero_quadratic and speed.aero_time_constant are all missing. Give one of them under "
+                '[speed], such as aero_time_constant = "8 s", or take the drag from the speed of a recorded '
+                "coast-down: --drag-from RECORD, in Python with_recorded_drag."
+            )
+        spin[L.AERO_LINEAR] = 1.0 / float(speed.aero_time_constant)
+    bearing[:, L.DRAG_SPEED] = np.minimum(bearing[:, L.DRAG_SPEED], case.stop_speed)
+    return parameters._replace(spin=spin, bearing=bearing)
+
+
+def begin(setup: Setup) -> Run:
+    start, _ = start_of_drop(setup.model, setup.case.as_drop())
+    n_b = setup.model.layout.n_bearings
+    progress = np.zeros(C.N_PROGRESS)
+    progress[C.STEP] = FIRST_STEP
+    progress[C.PREVIOUS_ERROR] = 1.0
+    running = np.zeros((n_b, _loop.N_RUN_COLUMNS))
+    log = np.zeros((n_b, _loop.N_LOG_COLUMNS))
+    progress[C.LOGGED] = C.start_window(start, 0.0, setup.parameters, running, log)
+    whirl = np.zeros((n_b, C.N_WHIRL))
+    relative = relative_displacement(setup, start[None, :])[0]
+    for b in range(n_b):
+        C.start_whirl(0.0, relative[b, 0], relative[b, 1], whirl[b])
+    status = np.zeros(8)
+    status[STOPPED_AT] = np.nan
+    status[LAST_SAMPLE] = math.ceil(setup.case.last_time / setup.case.output_step - 1e-9)
+    status[ENERGY_AT_START] = stored_energy_of(setup, start) - start[setup.model.layout.work_in]
+    return Run(
+        state=start,
+        progress=progress,
+        running=running,
+        open_log=log,
+        peaks=np.zeros((n_b, C.N_PEAKS)),
+        whirl=whirl,
+        totals=np.zeros((n_b, 2)),
+        status=status,
+        windows={name: [] for name in WINDOW_ROWS},
+    )
+
+
+def stored_energy_of(setup: Setup, state: Array) -> float:
+    return float(H.stored_energy(state, setup.parameters, True))
+
+
+def relative_displacement(setup: Setup, states: Array) -> Array:
+    """Displacement of the rotor relative to the races, shape (T, B, 2) [m]."""
+    return displacement_at(setup, states, setup.parameters.bearing_shape) - states[
+        :, setup.model.layout.race
+    ].reshape(len(states), -1, 2)
+
+
+def displacement_at(setup: Setup, states: Array, rows: Array) -> Array:
+    return H.node_displacements(np.ascontiguousarray(states), np.ascontiguousarray(rows))
+
+
+def advance(setup: Setup, run: Run) -> tuple[dict[str, Single], Array]:
+    """Simulate to the end of the present window; returns its samples and the contacts that ended."""
+    case, status = setup.case, run.status
+    first, window_end = int(status[SAMPLE]), case.window_end(int(status[WINDOW]))
+    rows = window_end - first + 1
+    states = np.empty((rows, len(run.state)))
+    histories = np.empty((rows, len(run.running), H.N_HISTORIES))
+    states[0] = run.state
+    H.bearing_histories(states[:1], setup.parameters, histories[:1])
+    before = (float(run.progress[C.TIME]), float(run.state[setup.model.layout.dissipated]))
+    log, already_open = _log_of_window(run, rows * case.output_step), int(run.progress[C.LOGGED])
+    method, filled, try_settled = np.zeros(3), 1, case.settled_scheme and may_be_settled(run)
+    while status[PHASE] == RUNNING:
+        last = min(window_end, int(status[LAST_SAMPLE]))
+        wanted = slice(filled, last - first + 1)
+        if first + filled > last:
+            break
+        if try_settled:
+            got, method = settled_piece(setup, run, states[wanted], histories[wanted], log)
+            try_settled, outcome = False, _loop.FINISHED
+        else:
+            times = _grid(first + filled, last + 1, case.output_step)
+            outcome = integrate(setup, run, times, states[wanted], log)
+            got = int(run.progress[C.SAMPLES])
+            fresh = slice(filled, filled + got)
+            H.bearing_histories(states[fresh], setup.parameters, histories[fresh])
+        filled += got
+        _after(setup, run, outcome, first + filled - 1)
+    ended, began = _ended_contacts(run, log, already_open)
+    kept = filled if status[PHASE] != RUNNING else filled - 1
+    times = _grid(first, first + kept, case.output_step)
+    C.follow_whirl(times, relative_displacement(setup, states[:kept]), run.whirl)
+    keep_statistics(setup, run, before, histories[:kept], began)
+    run.windows["window_method"].append(method)
+    status[SAMPLE] = first + kept
+    status[WINDOW] += 1.0
+    return samples_of(setup, states[:kept], histories[:kept]), ended
+
+
+def _grid(first: int, last: int, step: float) -> Array:
+    return np.asarray(np.arange(first, last, dtype=np.float64) * step)
+
+
+def _log_of_window(run: Run, length: float) -> Array:
+    log = np.zeros((len(run.open_log) + 100 + int(LOG_ROWS_PER_SECOND * length), _loop.N_LOG_COLUMNS))
+    log[: len(run.open_log)] = run.open_log
+    return log
+
+
+def integrate(setup: Setup, run: Run, times: Array, states: Array, log: Array) -> int:
+    """One call of the compiled loop: until the last of the times, or until the rotor stands."""
+    spinning, parameters = present_drive(setup, run)
+    return int(
+        C.integrate_window(
+            run.state,
+            times,
+            parameters,
+            tableau_of(setup.case.as_drop()),
+            setup.scale,
+            setup.case.tolerance,
+            setup.case.largest_step,
+            MOST_STEPS_PER_WINDOW,
+            setup.case.stop_speed if spinning else -1.0,
+            states[: len(times)],
+            log,
+            run.running,
+            run.peaks,
+            run.progress,
+        )
+    )
+
+
+def present_drive(setup: Setup, run: Run) -> tuple[bool, KernelParameters]:
+    """Whether the rotor still turns, and the kernel parameters that go with it."""
+    spinning = math.isnan(run.status[STOPPED_AT])
+    return spinning, setup.parameters if spinning else held(setup.parameters)
+
+
+def held(parameters: KernelParameters) -> KernelParameters:
+    """The same machine with the rotor held at zero speed."""
+    flags, spin = parameters.flags.copy(), parameters.spin.copy()
+    flags[L.SPIN_MODE] = aerodynamics.PRESCRIBED_SPEED
+    spin[L.INITIAL_SPEED] = 0.0
+    spin[L.AERO_TIME_CONSTANT] = 1.0
+    return parameters._replace(flags=flags, spin=spin)
+
+
+def _after(setup: Setup, run: Run, outcome: int, sample: int) -> None:
+    """Decide how the run goes on after a call of the loop that ended at a sample."""
+    status, layout = run.status, setup.model.layout
+    if outcome == _loop.STANDSTILL:
+        status[STOPPED_AT] = run.progress[C.TIME]
+        turning = 0.5 * setup.parameters.spin[L.POLAR_INERTIA] * run.state[layout.rotor_speed] ** 2
+        run.state[layout.rotor_speed] = 0.0
+        run.state[layout.dissipated] += turning
+        if setup.case.duration is None:
+            end = run.progress[C.TIME] + setup.case.rest
+            status[LAST_SAMPLE] = math.ceil(end / setup.case.output_step - 1e-9)
+            if setup.case.rest == 0.0:
+                status[PHASE] = ENDED
+                return
+    elif outcome != _loop.FINISHED:
+        status[PHASE] = BROKEN
+    if sample >= status[LAST_SAMPLE]:
+        status[PHASE] = max(status[PHASE], ENDED)
+
+
+def _ended_contacts(run: Run, log: Array, already_open: int) -> tuple[Array, Array]:
+    """Contacts that ended in this window, with those still open at the end of the run; and how many began at
+    each bearing.
+    """
+    count = min(int(run.progress[C.LOGGED]), len(log))
+    entries = log[:count]
+    n_b = len(run.running)
+    began = np.bincount(entries[already_open:, _loop.LOG_BEARING].astype(int), minlength=n_b)
+    if not run.windows["window_rows"]:
+        began = np.bincount(entries[:, _loop.LOG_BEARING].astype(int), minlength=n_b)
+    ended = entries if run.status[PHASE] != RUNNING else entries[~np.isnan(entries[:, _loop.LOG_END])]
+    ended = ended.copy()
+    for b in range(n_b):
+        mine = ended[ended[:, _loop.LOG_BEARING] == b]
+        run.totals[b, 1] += float(np.sum(mine[:, _loop.LOG_DISSIPATED]))
+        run.totals[b, 0] += float(began[b])
+    kept = C.carry_open_contacts(log, count, run.running)
+    run.open_log[:] = 0.0
+    run.open_log[:kept] = log[:kept]
+    run.progress[C.LOGGED] = kept
+    return ended, began.astype(np.float64)
+
+
+def keep_statistics(
+    setup: Setup, run: Run, before: tuple[float, float], histories: Array, began: Array
+) -> None:
+    layout, windows = setup.model.layout, run.windows
+    force = magnitude(histories[..., H.H_BEARING_FORCE_X], histories[..., H.H_BEARING_FORCE_Y])
+    depth = histories[..., H.H_DELTA]
+    values = np.stack([depth, force, histories[..., H.H_STRESS]], axis=-1)
+    balance = stored_energy_of(setup, run.state) + run.state[layout.dissipated] - run.state[layout.work_in]
+    residual = balance - run.status[ENERGY_AT_START]
+    run.status[WORST_BALANCE] = max(run.status[WORST_BALANCE], abs(residual))
+    speed = float(run.state[layout.rotor_speed])
+    lost = float(run.state[layout.dissipated]) - before[1]
+    windows["window_rows"].append(np.array([before[0], run.progress[C.TIME], speed, lost, residual]))
+    windows["window_peak"].append(values.max(axis=0))
+    windows["window_quantile"].append(np.moveaxis(np.quantile(values, QUANTILES, axis=0), 0, -1))
+    windows["window_contacts"].append(began)
+    windows["window_share"].append(np.mean(depth > 0.0, axis=0))
+    windows["window_race"].append(run.state[layout.race_spin].copy())
+
+
+def samples_of(setup: Setup, states: Array, histories: Array) -> dict[str, NDArray[np.float32]]:
+    layout = setup.model.layout
+    columns = {
+        "displacement": displacement_at(setup, states, setup.parameters.bearing_shape),
+        "race_displacement": states[:, layout.race].reshape(len(states), -1, 2),
+        "sensor_displacement": displacement_at(setup, states, setup.sensor_rows),
+        "indentation": histories[..., H.H_DELTA],
+        "contact_force": histories[..., H.H_CONTACT_FORCE],
+        "bearing_force": magnitude(histories[..., H.H_BEARING_FORCE_X], histories[..., H.H_BEARING_FORCE_Y]),
+        "max_stress": histories[..., H.H_STRESS],
+        "race_speed": states[:, layout.race_spin],
+    }
+    samples = {name: values.astype(np.float32) for name, values in columns.items()}
+    samples["speed"] = states[:, layout.rotor_speed].copy()  # type: ignore[assignment]
+    return samples
+
+
+def may_be_settled(run: Run) -> bool:
+    """Whether every bearing was in contact all through the window before."""
+    shares = run.windows["window_share"]
+    return len(shares) > 1 and bool(np.all(shares[-1] == 1.0))
+
+
+def settled_piece(setup: Setup, run: Run, states: Array, histories: Array, log: Array) -> tuple[int, Array]:
+    """Try a stretch with the scheme for settled rotors; returns samples done, and share and errors.
+
+    The first 2 ms are done with the Runge–Kutta pair too, and the stretch is given up, nothing changed, if
+    the two differ by more than the case allows or if any bearing loses contact.
+    """
+    case = setup.case
+    spinning, parameters = present_drive(setup, run)
+    start, begun = run.state.copy(), float(run.progress[C.TIME])
+    reference = _reference(setup, run, begun, len(states))
+    got = S.integrate_settled(
+        run.state,
+        begun,
+        case.output_step,
+        setup.settled_parts,
+        parameters,
+        case.stop_speed if spinning else -1.0,
+        states,
+    )
+    H.bearing_histories(states[:got], setup.parameters, histories[:got])
+    done = histories[:got]
+    error = _difference(setup, states[:got], done, reference)
+    lost = not np.all(np.isfinite(states[:got])) or bool(np.any(done[..., H.H_DELTA] <= 0.0))
+    if got == 0 or lost or not error[0] <= case.settled_error:
+        run.state[:] = start
+        return 0, np.zeros(3)
+    run.progress[C.TIME] = (round(begun / case.output_step) + got) * case.output_step
+    _carry_contacts(run, done, begun, case.output_step, log)
+    return got, np.array([got / len(states), *error])
+
+
+def _reference(setup: Setup, run: Run, begun: float, available: int) -> Array:
+    """The first 2 ms from the same state with the Runge–Kutta pair, shape (K, n)."""
+    case = setup.case
+    count = min(max(1, round(CHECKED / case.output_step)), available)
+    sample = round(begun / case.output_step) + 1
+    times = _grid(sample, sample + count, case.output_step)
+    states = np.full((count, len(run.state)), np.nan)
+    copy = Run.of({name: array.copy() for name, array in run.arrays().items()})
+    integrate(setup, copy, times, states, np.zeros((100, _loop.N_LOG_COLUMNS)))
+    return states
+
+
+def _difference(setup: Setup, states: Array, histories: Array, reference: Array) -> tuple[float, float]:
+    """Largest difference of displacement at the bearings [m] and of ball force [N] over the checked time."""
+    count = min(len(reference), len(states))
+    if count == 0:
+        return math.inf, math.inf
+    rows = setup.parameters.bearing_shape
+    moved = displacement_at(setup, states[:count], rows) - displacement_at(setup, reference[:count], rows)
+    exact = np.empty((count, *histories.shape[1:]))
+    H.bearing_histories(np.ascontiguousarray(reference[:count]), setup.parameters, exact)
+    force = slice(H.H_BEARING_FORCE_X, H.H_BEARING_FORCE_Y + 1)
+    return float(np.max(np.abs(moved))), float(
+        np.max(np.abs(histories[:count, :, force] - exact[..., force]))
+    )
+
+
+def _carry_contacts(run: Run, histories: Array, begun: float, step: float, log: Array) -> None:
+    """Bring the open contacts and the peaks up to the end of a settled stretch."""
+    force = magnitude(histories[..., H.H_BEARING_FORCE_X], histories[..., H.H_BEARING_FORCE_Y])
+    values = (histories[..., H.H_DELTA], force, histories[..., H.H_STRESS])
+    for b in range(len(run.running)):
+        row = log[int(run.running[b, _loop.RUN_IN_CONTACT]) - 1]
+        normal, power = histories[:, b, H.H_CONTACT_FORCE], histories[:, b, H.H_CONTACT_POWER]
+        row[_loop.LOG_IMPULSE] += step * float(np.sum(normal))
+        row[_loop.LOG_DISSIPATED] += step * float(np.sum(power))
+        row[_loop.LOG_SLIDING] += step * float(np.sum(power))  # settled: the normal force loses nothing
+        best = int(np.argmax(normal))
+        if normal[best] > row[_loop.LOG_PEAK_FORCE]:
+            row[_loop.LOG_PEAK_FORCE] = normal[best]
+            row[_loop.LOG_PEAK_TIME] = begun + (best + 1) * step
+            row[_loop.LOG_AZIMUTH] = atan2(histories[best, b, H.H_NORMAL_Y], histories[best, b, H.H_NORMAL_X])
+        run.running[b, _loop.RUN_FORCE] = normal[-1]
+        run.running[b, _loop.RUN_POWER] = run.running[b, _loop.RUN_SLIDING] = power[-1]
+        run.running[b, _loop.RUN_DELTA] = histories[-1, b, H.H_DELTA]
+        for column, quantity in zip((C.PEAK_INDENTATION, C.PEAK_FORCE, C.PEAK_STRESS), values, strict=True):
+            best = int(np.argmax(quantity[:, b]))
+            if quantity[best, b] > run.peaks[b, column]:
+                run.peaks[b, column] = quantity[best, b]
+                run.peaks[b, column + 1] = begun + (best + 1) * step

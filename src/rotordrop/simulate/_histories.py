@@ -1,0 +1,132 @@
+"""Forces, loads and stress of every bearing from the states of a drop."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.physics import support
+from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
+from rotordrop.physics.ball_set import ball_set_energy, ball_set_force, ball_set_load
+from rotordrop.physics.contact import contact_energy
+from rotordrop.rotor import layout as L
+from rotordrop.rotor.layout import KernelParameters
+from rotordrop.simulate._loop import contact_at
+from rotordrop.simulate._rhs import (
+    modal_parts,
+    project,
+    race_deflection,
+    relative_motion,
+    support_deflection,
+)
+
+Array = NDArray[np.float64]
+
+# Last axis of the history array.
+H_DELTA = 0
+H_CONTACT_FORCE = 1
+H_FRICTION_FORCE = 2
+H_NORMAL_X = 3
+H_NORMAL_Y = 4
+H_CONTACT_POWER = 5
+H_BEARING_FORCE_X = 6
+H_BEARING_FORCE_Y = 7
+H_BALL_LOAD = 8
+H_STRESS = 9
+N_HISTORIES = 10
+
+
+@inner_kernel
+def fill_history(b: int, y: Array, p: KernelParameters, work: Array, out: Array) -> None:
+    """Fill ``out`` (10,) with what one bearing does in a state."""
+    contact_at(b, y, p, out)
+    entries, balls = p.bearing[b, L.BALL_SET : L.BALL_SET_END], p.balls[b]
+    dx, dy = race_deflection(b, y, p)
+    F_x, F_y = ball_set_force(entries, balls, dx, dy, work)
+    out[H_BEARING_FORCE_X] = -F_x
+    out[H_BEARING_FORCE_Y] = -F_y
+    out[H_BALL_LOAD], out[H_STRESS] = ball_set_load(entries, balls, dx, dy)
+
+
+@kernel
+def bearing_histories(states: Array, p: KernelParameters, out: Array) -> None:
+    """Fill ``out`` (T, B, 10) from ``states`` (T, n); SI units, columns ``H_*``; the ball force is that on
+    the race.
+    """
+    work = np.empty((2, p.balls.shape[2]))
+    for i in range(states.shape[0]):
+        for b in range(p.bearing.shape[0]):
+            fill_history(b, states[i], p, work, out[i, b])
+
+
+@kernel
+def node_displacements(states: Array, shapes: Array) -> Array:
+    """Displacement of nodes [m], shape (T, P, 2), from states (T, n) and their rows of mode shapes (P, m)."""
+    m = shapes.shape[1]
+    out = np.empty((states.shape[0], shapes.shape[0], 2))
+    for i in range(states.shape[0]):
+        for k in range(shapes.shape[0]):
+            out[i, k, 0] = project(shapes[k], states[i, :m])
+            out[i, k, 1] = project(shapes[k], states[i, m : 2 * m])
+    return out
+
+
+@lean_kernel
+def support_form_energy(b: int, y: Array, p: KernelParameters) -> float:
+    """Energy [J] that the form of a support adds to that of a plain one, its foundation included."""
+    h, own = p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.BEARING_OWN]
+    row = p.bearing[b]
+    form = row[L.SUPPORT_FORM : L.SUPPORT_FORM_END]
+    k_x, k_y = row[L.SUPPORT_STIFFNESS_X], row[L.SUPPORT_STIFFNESS_Y]
+    x, z, _vx, _vz = support_deflection(b, y, p)
+    energy: float = support.support_energy(form, k_x, k_y, x, z)
+    energy -= 0.5 * (k_x * y[h] ** 2 + k_y * y[h + 1] ** 2)
+    if own >= 0 and form[support.FOUNDATION_SHARE] > 0.0:
+        mass = row[L.SUPPORT_MASS_Y] / form[support.FOUNDATION_SHARE]
+        for axis in range(2):
+            u, v = y[own + axis], y[own + 2 + axis]
+            energy += 0.5 * mass * (v * v + form[support.FOUNDATION_SPEED] ** 2 * u * u)
+    return energy
+
+
+@lean_kernel
+def stored_energy(y: Array, p: KernelParameters, with_rotor_spin: bool) -> float:
+    """Energy [J] of a state: motion, bending, contacts, balls, supports, gravity and spin."""
+    n_q = p.rotor_at[L.N_COORDINATES]
+    qx, qy, sx, sy = modal_parts(y, p)
+    energy = 0.0
+    for k in range(p.eigenvalue.shape[0]):
+        energy += 0.5 * (sx[k] ** 2 + sy[k] ** 2)
+        energy += 0.5 * p.eigenvalue[k] * (qx[k] ** 2 + qy[k] ** 2) - p.gravity[k] * qy[k]
+    for b in range(p.bearing.shape[0]):
+        row = p.bearing[b]
+        r, h = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT]
+        ux, uy, _vx, _vy = relative_motion(b, y, p)
+        delta = math.sqrt(ux * ux + uy * uy) - row[L.AIR_GAP]
+        if delta > 0.0:
+            energy += contact_energy(row[L.CONTACT : L.CONTACT_END], delta)
+        dx, dy = race_deflection(b, y, p)
+        energy += ball_set_energy(row[L.BALL_SET : L.BALL_SET_END], p.balls[b], dx, dy)
+        energy += row[L.RACE_WEIGHT] * y[r + 1]
+        energy += 0.5 * row[L.RACE_MASS] * (y[n_q + r] ** 2 + y[n_q + r + 1] ** 2)
+        energy += (
+            0.5 * row[L.SUPPORT_MASS_X] * y[n_q + h] ** 2 + 0.5 * row[L.SUPPORT_MASS_Y] * y[n_q + h + 1] ** 2
+        )
+        energy += (
+            0.5 * row[L.SUPPORT_STIFFNESS_X] * y[h] ** 2 + 0.5 * row[L.SUPPORT_STIFFNESS_Y] * y[h + 1] ** 2
+        )
+        if row[L.SUPPORT_FORM + support.PRESENT] != 0.0:
+            energy += support_form_energy(b, y, p)
+        energy += 0.5 * row[L.RACE_INERTIA] * y[p.bearing_at[b, L.RACE_SPIN]] ** 2
+    if with_rotor_spin:
+        energy += 0.5 * p.spin[L.POLAR_INERTIA] * y[p.rotor_at[L.ROTOR_SPEED]] ** 2
+    return energy
+
+
+@kernel
+def stored_energies(states: Array, p: KernelParameters, with_rotor_spin: bool, out: Array) -> None:
+    """Fill ``out`` (T,) with the energy [J] of each of the ``states`` (T, n)."""
+    for i in range(states.shape[0]):
+        out[i] = stored_energy(states[i], p, with_rotor_spin)

@@ -1,0 +1,345 @@
+"""Right-hand side of a drop: rotor modes, contact, friction, races, balls, supports, spin.
+
+Numbers below, names above: everything arrives as the flat arrays of
+`rotordrop.rotor.parameters.KernelParameters`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.physics import aerodynamics, support
+from rotordrop.physics._compile import inner_kernel, lean_kernel
+from rotordrop.physics.aerodynamics import exponential_deceleration, speed_dependent_deceleration
+from rotordrop.physics.ball_set import ball_set_force
+from rotordrop.physics.contact import contact_force
+from rotordrop.physics.elementary import sine_cosine
+from rotordrop.physics.friction import stribeck_coefficient
+from rotordrop.physics.remanence import remanent_fraction
+from rotordrop.physics.spin import race_drag_torque, surface_speed
+from rotordrop.rotor import layout as L
+from rotordrop.rotor.layout import KernelParameters
+
+Array = NDArray[np.float64]
+PRESCRIBED = aerodynamics.PRESCRIBED_SPEED
+IN_TIME = aerodynamics.EXPONENTIAL_IN_TIME
+OF_SPEED = aerodynamics.FUNCTION_OF_SPEED
+
+
+@lean_kernel
+def project(shape: Array, amplitudes: Array) -> float:
+    """Physical displacement or velocity of a node from modal amplitudes: one row of mode shapes times
+    amplitudes.
+    """
+    total = 0.0
+    for k in range(shape.shape[0]):
+        total += shape[k] * amplitudes[k]
+    return total
+
+
+@inner_kernel
+def modal_parts(y: Array, p: KernelParameters) -> tuple[Array, Array, Array, Array]:
+    """Views of the modal amplitudes in x and in y and of their velocities in a state or its derivative."""
+    m = p.eigenvalue.shape[0]
+    x, z, n_q = p.rotor_at[L.MODES_X], p.rotor_at[L.MODES_Y], p.rotor_at[L.N_COORDINATES]
+    return y[x : x + m], y[z : z + m], y[n_q + x : n_q + x + m], y[n_q + z : n_q + z + m]
+
+
+@inner_kernel
+def relative_motion(b: int, y: Array, p: KernelParameters) -> tuple[float, float, float, float]:
+    """Displacement [m] and velocity [m/s] of the rotor relative to the race of one bearing, x and y."""
+    n_q, r = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.RACE]
+    shape = p.bearing_shape[b]
+    qx, qy, sx, sy = modal_parts(y, p)
+    ux = uy = vx = vy = 0.0
+    for k in range(shape.shape[0]):
+        ux += shape[k] * qx[k]
+        uy += shape[k] * qy[k]
+        vx += shape[k] * sx[k]
+        vy += shape[k] * sy[k]
+    return ux - y[r], uy - y[r + 1], vx - y[n_q + r], vy - y[n_q + r + 1]
+
+
+@inner_kernel
+def race_deflection(b: int, y: Array, p: KernelParameters) -> tuple[float, float]:
+    """Displacement [m] of the race of one bearing relative to its support, x and y."""
+    r, h = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT]
+    return y[r] - y[h], y[r + 1] - y[h + 1]
+
+
+@inner_kernel
+def support_deflection(b: int, y: Array, p: KernelParameters) -> tuple[float, float, float, float]:
+    """Deflection [m] and its rate [m/s] of a support, x and y, against the foundation if that gives way."""
+    n_q, h, own = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.BEARING_OWN]
+    x, z, vx, vz = y[h], y[h + 1], y[n_q + h], y[n_q + h + 1]
+    if own < 0:
+        return x, z, vx, vz
+    return x - y[own], z - y[own + 1], vx - y[own + 2], vz - y[own + 3]
+
+
+@inner_kernel
+def contact_state(
+    ux: float, uy: float, vx: float, vy: float, omega: float, omega_i: float, bearing: Array
+) -> tuple[float, float, float, float, float, float, float]:
+    """Contact of rotor and race from their relative displacement [m] and velocity [m/s].
+
+    Returns indentation [m], normal force [N], signed friction coefficient [1], normal (x, y) [1] from race to
+    rotor, relative surface speed [m/s] and the elastic part of the normal force [N]. The tangent is the
+    normal turned by 90° in the sense of positive spin.
+    """
+    e_r = math.sqrt(ux * ux + uy * uy)
+    delta = e_r - bearing[L.AIR_GAP]
+    if delta <= 0.0:
+        return delta, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    # Unit vectors instead of angles: no branch at an azimuth, no sign to set by hand.
+    nx = ux / e_r
+    ny = uy / e_r
+    delta_dot = vx * nx + vy * ny
+    F_r, elastic = contact_force(bearing[L.CONTACT : L.CONTACT_END], delta, delta_dot)
+    v_t = surface_speed(vy * nx - vx * ny, omega, bearing[L.ROTOR_RADIUS], omega_i, bearing[L.BORE_RADIUS])
+    mu = stribeck_coefficient(
+        v_t,
+        bearing[L.FRICTION_STATIC],
+        bearing[L.FRICTION_DYNAMIC],
+        bearing[L.STRIBECK_SPEED],
+        bearing[L.SMOOTHING_SPEED],
+    )
+    return delta, F_r, mu, nx, ny, v_t, elastic
+
+
+@inner_kernel
+def gyroscopic_forces(
+    polar: Array,
+    ux: Array,
+    uy: Array,
+    vx: Array,
+    vy: Array,
+    omega: float,
+    omega_dot: float,
+    gx: Array,
+    gy: Array,
+) -> None:
+    """Fill modal gyroscopic and spin-up forces ``gx, gy`` (m,) from the symmetric polar inertia (m, m)."""
+    for k in range(gx.shape[0]):
+        gx[k] = 0.0
+        gy[k] = 0.0
+    for j in range(polar.shape[0]):
+        row = polar[j]
+        along = omega * vy[j] + omega_dot * uy[j]
+        across = omega * vx[j] + omega_dot * ux[j]
+        for k in range(row.shape[0]):
+            gx[k] += row[k] * along
+            gy[k] += row[k] * across
+
+
+@inner_kernel
+def add_rotor_accelerations(
+    y: Array, omega: float, omega_dot: float, p: KernelParameters, dy: Array
+) -> tuple[float, float]:
+    """Add modal accelerations from stiffness, damping, gyroscopics, unbalance and gravity.
+
+    Returns the power dissipated by modal damping and the power put in by unbalance and spin-up [W].
+    """
+    s, c = sine_cosine(y[p.rotor_at[L.ROTOR_ANGLE]])
+    # The unbalance pulls outwards with ω² and, while the rotor slows down, backwards with its deceleration.
+    w2 = omega * omega
+    along = w2 * c + omega_dot * s
+    across = w2 * s - omega_dot * c
+    ux, uy, vx, vy = modal_parts(y, p)
+    # The rates of the modes are written last of all; until then their places hold the gyroscopic forces.
+    gx, gy, ax, ay = modal_parts(dy, p)
+    gyroscopic_forces(p.polar, ux, uy, vx, vy, omega, omega_dot, gx, gy)
+    dissipated = 0.0
+    put_in = 0.0
+    for k in range(p.eigenvalue.shape[0]):
+        fx = p.unbalance_cos[k] * along - p.unbalance_sin[k] * across
+        fy = p.unbalance_cos[k] * across + p.unbalance_sin[k] * along
+        ax[k] += fx - p.eigenvalue[k] * ux[k] - p.damping[k] * vx[k] - gx[k]
+        ay[k] += fy + p.gravity[k] - p.eigenvalue[k] * uy[k] - p.damping[k] * vy[k] + gy[k]
+        dissipated += p.damping[k] * (vx[k] * vx[k] + vy[k] * vy[k])
+        put_in += (fx - gx[k]) * vx[k] + (fy + gy[k]) * vy[k]
+    return dissipated, put_in
+
+
+@lean_kernel
+def add_magnet_forces(t: float, y: Array, p: KernelParameters, dy: Array) -> float:
+    """Add holding, spring, damper and remanent forces of the AMBs; returns the power they put in [W]."""
+    qx, qy, sx, sy = modal_parts(y, p)
+    _, _, ax, ay = modal_parts(dy, p)
+    holds = t < p.spin[L.POWER_OFF_DELAY]
+    left = remanent_fraction(t, p.spin[L.POWER_OFF_DELAY], p.spin[L.REMANENCE_TIME_CONSTANT])
+    put_in = 0.0
+    for a in range(p.magnet.shape[0]):
+        shape = p.magnet_shape[a]
+        vx = project(shape, sx)
+        vy = project(shape, sy)
+        fx = left * p.magnet[a, L.REMANENT_X]
+        fy = left * p.magnet[a, L.REMANENT_Y]
+        if holds:
+            ux = project(shape, qx) - p.magnet[a, L.AMB_REFERENCE_X]
+            uy = project(shape, qy) - p.magnet[a, L.AMB_REFERENCE_Y]
+            fx += (
+                p.magnet[a, L.HOLDING_X] - p.magnet[a, L.AMB_STIFFNESS] * ux - p.magnet[a, L.AMB_DAMPING] * vx
+            )
+            fy += (
+                p.magnet[a, L.HOLDING_Y] - p.magnet[a, L.AMB_STIFFNESS] * uy - p.magnet[a, L.AMB_DAMPING] * vy
+            )
+        for k in range(shape.shape[0]):
+            ax[k] += shape[k] * fx
+            ay[k] += shape[k] * fy
+        put_in += fx * vx + fy * vy
+    return put_in
+
+
+@lean_kernel
+def add_support_form(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
+    """Add what the form of a support changes: its force, and the motion of its foundation.
+
+    Returns what is dissipated beyond the dampers of the plain support [W].
+    """
+    n_q, h, own = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.BEARING_OWN]
+    row = p.bearing[b]
+    x, z, vx, vz = support_deflection(b, y, p)
+    k_x, k_y = row[L.SUPPORT_STIFFNESS_X], row[L.SUPPORT_STIFFNESS_Y]
+    c_x, c_y = row[L.SUPPORT_DAMPING_X], row[L.SUPPORT_DAMPING_Y]
+    form = row[L.SUPPORT_FORM : L.SUPPORT_FORM_END]
+    F_x, F_y = support.support_force(form, k_x, k_y, c_x, c_y, x, z, vx, vz)
+    sx, sy = y[n_q + h], y[n_q + h + 1]
+    dy[n_q + h] += (c_x * sx + k_x * y[h] - F_x) / row[L.SUPPORT_MASS_X]
+    dy[n_q + h + 1] += (c_y * sy + k_y * y[h + 1] - F_y) / row[L.SUPPORT_MASS_Y]
+    dissipated: float = c_x * (vx * vx - sx * sx) + c_y * (vz * vz - sy * sy)
+    if own < 0:
+        return dissipated
+    speed, share = form[support.FOUNDATION_SPEED], max(form[support.FOUNDATION_SHARE], 0.0)
+    damping, mobility = 2.0 * form[support.FOUNDATION_DAMPING] * speed, share / row[L.SUPPORT_MASS_Y]
+    for axis in range(2):
+        force = F_x if axis == 0 else F_y
+        u, v = y[own + axis], y[own + 2 + axis]
+        dy[own + axis] = v
+        dy[own + 2 + axis] = mobility * force - speed * speed * u - damping * v
+        if mobility > 0.0:
+            dissipated += damping * v * v / mobility
+    return dissipated
+
+
+@inner_kernel
+def bearing_accelerations(
+    b: int, y: Array, omega: float, p: KernelParameters, dy: Array, work: Array
+) -> tuple[float, float]:
+    """Forces at one touchdown bearing, added to rotor, race, support and spin.
+
+    Returns the friction torque on the rotor [N m] (positive drives it) and the power dissipated [W].
+    """
+    n_q = p.rotor_at[L.N_COORDINATES]
+    r, h, spin = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.RACE_SPIN]
+    row = p.bearing[b]
+    shape = p.bearing_shape[b]
+    ux, uy, vx, vy = relative_motion(b, y, p)
+    delta, F_r, mu, nx, ny, v_t, elastic = contact_state(ux, uy, vx, vy, omega, y[spin], row)
+    race_x, race_y = race_deflection(b, y, p)
+    F_x, F_y = ball_set_force(row[L.BALL_SET : L.BALL_SET_END], p.balls[b], race_x, race_y, work)
+    drag = race_drag_torque(
+        math.sqrt(F_x * F_x + F_y * F_y),
+        y[spin],
+        row[L.DRAG_COEFFICIENT],
+        row[L.PITCH_DIAMETER],
+        row[L.DRAG_SPEED],
+    )
+    wx = y[n_q + r] - y[n_q + h]
+    wy = y[n_q + r + 1] - y[n_q + h + 1]
+    C_b = row[L.BEARING_DAMPING]
+    F_x += C_b * wx
+    F_y += C_b * wy
+    sx = y[n_q + h]
+    sy = y[n_q + h + 1]
+    contact_x = 0.0
+    contact_y = 0.0
+    torque = 0.0
+    dissipated = C_b * (wx * wx + wy * wy) + drag * y[spin]
+    dissipated += row[L.SUPPORT_DAMPING_X] * sx * sx + row[L.SUPPORT_DAMPING_Y] * sy * sy
+    if delta > 0.0:
+        F_mu = mu * F_r
+        contact_x = F_r * nx - F_mu * ny
+        contact_y = F_r * ny + F_mu * nx
+        torque = F_mu
+        dissipated += F_mu * v_t + (F_r - elastic) * (vx * nx + vy * ny)
+        _, _, ax, ay = modal_parts(dy, p)
+        for k in range(shape.shape[0]):
+            ax[k] -= shape[k] * contact_x
+            ay[k] -= shape[k] * contact_y
+    dy[n_q + r] = (contact_x - F_x) / row[L.RACE_MASS]
+    dy[n_q + r + 1] = (contact_y - F_y - row[L.RACE_WEIGHT]) / row[L.RACE_MASS]
+    dy[n_q + h] = (F_x - row[L.SUPPORT_DAMPING_X] * sx - row[L.SUPPORT_STIFFNESS_X] * y[h]) / row[
+        L.SUPPORT_MASS_X
+    ]
+    dy[n_q + h + 1] = (F_y - row[L.SUPPORT_DAMPING_Y] * sy - row[L.SUPPORT_STIFFNESS_Y] * y[h + 1]) / row[
+        L.SUPPORT_MASS_Y
+    ]
+    if row[L.SUPPORT_FORM + support.PRESENT] != 0.0:
+        dissipated += add_support_form(b, y, p, dy)
+    dy[spin] = (torque * row[L.BORE_RADIUS] - drag) / row[L.RACE_INERTIA]
+    return -torque * row[L.ROTOR_RADIUS], dissipated
+
+
+@inner_kernel
+def aerodynamic_deceleration(t: float, omega: float, p: KernelParameters) -> float:
+    """Deceleration [rad/s²] by air alone, in the mode of the case; zero without a speed model."""
+    mode = p.flags[L.SPIN_MODE]
+    if mode == IN_TIME or mode == PRESCRIBED:  # noqa: SIM109  compiled
+        return exponential_deceleration(t, p.spin[L.INITIAL_SPEED], p.spin[L.AERO_TIME_CONSTANT])
+    if mode == OF_SPEED:
+        return speed_dependent_deceleration(omega, p.spin[L.AERO_LINEAR], p.spin[L.AERO_QUADRATIC])
+    return 0.0
+
+
+@inner_kernel
+def drop_derivative(t: float, y: Array, p: KernelParameters, dy: Array, work: Array) -> None:
+    """Time derivative of the state of a drop.
+
+    Bearings come first, then the rotor's spin, then its lateral motion, because the ω̇ terms of eq. (1) need
+    the angular acceleration that friction causes.
+    """
+    n_q, i_w = p.rotor_at[L.N_COORDINATES], p.rotor_at[L.ROTOR_SPEED]
+    omega = y[i_w]
+    accelerations = dy[n_q : 2 * n_q]
+    for i in range(n_q):
+        accelerations[i] = 0.0
+    contact_torque = 0.0
+    dissipated = 0.0
+    for b in range(p.bearing.shape[0]):
+        torque, lost = bearing_accelerations(b, y, omega, p, dy, work)
+        contact_torque += torque
+        dissipated += lost
+    add_rotor_rates(t, y, contact_torque, dissipated, p, dy)
+
+
+@inner_kernel
+def add_rotor_rates(
+    t: float, y: Array, contact_torque: float, dissipated: float, p: KernelParameters, dy: Array
+) -> None:
+    """Add what is the rotor's own to the forces of the bearings: its spin, its lateral motion, the books.
+
+    ``contact_torque`` [N m] is what the bearings drive it with, ``dissipated`` [W] what is lost there.
+    """
+    n_q, i_w = p.rotor_at[L.N_COORDINATES], p.rotor_at[L.ROTOR_SPEED]
+    omega = y[i_w]
+    rates, velocities = dy[:n_q], y[n_q : 2 * n_q]
+    air = aerodynamic_deceleration(t, omega, p)
+    omega_dot = air
+    put_in = p.spin[L.POLAR_INERTIA] * air * omega
+    if p.flags[L.SPIN_MODE] != PRESCRIBED:
+        omega_dot += contact_torque / p.spin[L.POLAR_INERTIA]
+    else:
+        put_in -= contact_torque * omega
+    lost, gained = add_rotor_accelerations(y, omega, omega_dot, p, dy)
+    if p.flags[L.MAGNETS_ACT] != 0:
+        gained += add_magnet_forces(t, y, p, dy)
+    for i in range(n_q):
+        rates[i] = velocities[i]
+    dy[i_w] = omega_dot
+    dy[p.rotor_at[L.ROTOR_ANGLE]] = omega
+    dy[p.rotor_at[L.DISSIPATED]] = dissipated + lost
+    dy[p.rotor_at[L.WORK_IN]] = put_in + gained

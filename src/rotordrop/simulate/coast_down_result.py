@@ -1,0 +1,234 @@
+"""What remains of a simulated coast-down: statistics per second, peaks with their time, whirl, energy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.simulate.coast_down_case import FIRST_WINDOW
+from rotordrop.units import format_quantity
+
+Array = NDArray[np.float64]
+
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95, 0.99)
+QUANTITIES: Mapping[str, tuple[str, str]] = {
+    "indentation": ("length", "m"),
+    "bearing force": ("force", "N"),
+    "Hertz stress": ("pressure", "Pa"),
+}
+"""Quantities whose peaks and quantiles are kept: kind for `format_quantity`, SI unit."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Maximum:
+    """The largest value of a quantity over a coast-down, and whether the first 0.2 s held it.
+
+    Attributes
+    ----------
+    quantity, bearing : str
+        What, and where.
+    value, time : float
+        Largest value [SI] and when [s].
+    later, later_time : float
+        Largest value after the first 0.2 s [SI] on the output grid, and the middle of the second in which it
+        came [s]; NaN when the simulation ends before.
+    """
+
+    quantity: str
+    bearing: str
+    value: float
+    time: float
+    later: float
+    later_time: float
+
+    @property
+    def in_first_window(self) -> bool:
+        """Whether the largest value came within the first 0.2 s."""
+        return self.time <= FIRST_WINDOW
+
+    def sentence(self) -> str:
+        """The finding in words."""
+        kind = QUANTITIES[self.quantity][0]
+        when = "within" if self.in_first_window else "after"
+        text = (
+            f"{self.bearing}: the largest {self.quantity} of {format_quantity(self.value, kind)} came at "
+            f"{format_quantity(self.time, 'time')}, {when} the first {format_quantity(FIRST_WINDOW, 'time')}"
+        )
+        if not np.isfinite(self.later):
+            return f"{text}; nothing later was simulated."
+        share = f"{100.0 * self.later / self.value:.0f} %" if self.value > 0.0 else "none"
+        return f"{text}; the largest one after that is {share} of it."
+
+    def as_json(self) -> dict[str, Any]:
+        """All fields, ready for JSON."""
+        finite = np.isfinite(self.later)
+        return {
+            "quantity": self.quantity,
+            "bearing": self.bearing,
+            "unit": QUANTITIES[self.quantity][1],
+            "value": self.value,
+            "time_s": self.time,
+            "within_first_0.2_s": self.in_first_window,
+            "largest_later": self.later if finite else None,
+            "largest_later_time_s": self.later_time if finite else None,
+            "statement": self.sentence(),
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class WindowStatistics:
+    """Statistics window by window: the first 0.2 s, the rest of the first second, then second by second.
+
+    Attributes
+    ----------
+    start, end : ndarray, shape (W,)
+        Limits of the windows [s].
+    speed : ndarray, shape (W,)
+        Rotor speed at the end of each [rad/s].
+    race_speed : ndarray, shape (W, B)
+        Race spin at the end of each [rad/s].
+    dissipated : ndarray, shape (W,)
+        Energy lost in contacts, bearings, supports and rotor damping within each [J]; air drag apart.
+    contacts : ndarray, shape (W, B)
+        Contacts that began within each [1].
+    contact_share : ndarray, shape (W, B)
+        Share of the time in contact [1].
+    peak : ndarray, shape (W, B, 3)
+        Largest value on the output grid, last axis in the order of `QUANTITIES` [m, N, Pa].
+    quantile : ndarray, shape (W, B, 3, Q)
+        Quantiles at the levels `QUANTILES` of the samples, indentation as −depth when in flight [m, N, Pa].
+    energy_residual : ndarray, shape (W,)
+        Stored, dissipated and supplied energy out of balance at the end of each, since the start [J].
+    settled : ndarray, shape (W, 3)
+        Share of the window done with the scheme for settled rotors [1], and how far it was from the
+        Runge–Kutta pair over the first 2 ms: displacement at the bearings [m], ball force [N].
+    """
+
+    start: Array
+    end: Array
+    speed: Array
+    race_speed: Array
+    dissipated: Array
+    contacts: Array
+    contact_share: Array
+    peak: Array
+    quantile: Array
+    energy_residual: Array
+    settled: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class CoastDownResult:
+    """One simulated coast-down, reduced to statistics; the samples are in the file at ``path``, if any.
+
+    Attributes
+    ----------
+    end_time : float
+        Time reached [s].
+    standstill_time : float or None
+        When the rotor stopped [s].
+    windows : WindowStatistics
+        Statistics second by second.
+    peak_value, peak_time : ndarray, shape (B, 3)
+        Largest values at the integrator's own steps [m, N, Pa] and their times [s].
+    whirl_time : ndarray, shape (B, 2)
+        Time of forward and backward whirl, whole turns round the race only [s].
+    contacts : ndarray, shape (B,)
+        Number of contacts.
+    contact_energy : ndarray, shape (B,)
+        Energy lost in contact and friction at each bearing [J].
+    dissipated, air_work : float
+        Energy lost in all of the machine, and work done by air drag and unbalance (mostly negative) [J].
+    energy_residual, energy_scale : float
+        Largest imbalance of energy, and the energy it is to be compared with [J].
+    path : Path or None
+        Where the samples are.
+    """
+
+    machine_name: str
+    bearing_names: tuple[str, ...]
+    initial_speed: float
+    tolerance: float
+    reduction: str
+    output_step: float
+    end_time: float
+    standstill_time: float | None
+    finished: bool
+    outcome: str
+    windows: WindowStatistics
+    peak_value: Array
+    peak_time: Array
+    whirl_time: Array
+    contacts: Array
+    contact_energy: Array
+    dissipated: float
+    air_work: float
+    energy_residual: float
+    energy_scale: float
+    steps: int
+    rejected_steps: int
+    path: Path | None = None
+
+    def maxima(self) -> tuple[Maximum, ...]:
+        """When the largest indentation, force and stress of every bearing came: does 0.2 s hold them?"""
+        windows = self.windows
+        later = windows.start >= FIRST_WINDOW - 1e-9
+        found = []
+        for b, bearing in enumerate(self.bearing_names):
+            for q, quantity in enumerate(QUANTITIES):
+                value, when = np.nan, np.nan
+                if np.any(later):
+                    best = int(np.argmax(np.where(later, windows.peak[:, b, q], -np.inf)))
+                    value = float(windows.peak[best, b, q])
+                    when = 0.5 * float(windows.start[best] + windows.end[best])
+                found.append(
+                    Maximum(
+                        quantity=quantity,
+                        bearing=bearing,
+                        value=float(self.peak_value[b, q]),
+                        time=float(self.peak_time[b, q]),
+                        later=value,
+                        later_time=when,
+                    )
+                )
+        return tuple(found)
+
+    def as_json(self) -> dict[str, Any]:
+        """Everything but the samples, ready for JSON, SI units."""
+        windows = {name: np.round(value, 12).tolist() for name, value in vars(self.windows).items()}
+        return {
+            "machine": self.machine_name,
+            "bearings": list(self.bearing_names),
+            "initial_speed_rad_s": self.initial_speed,
+            "tolerance": self.tolerance,
+            "reduction": self.reduction,
+            "output_step_s": self.output_step,
+            "end_time_s": self.end_time,
+            "standstill_time_s": self.standstill_time,
+            "finished": self.finished,
+            "outcome": self.outcome,
+            "maxima": [maximum.as_json() for maximum in self.maxima()],
+            "whirl_s": {
+                name: {"forward": float(f), "backward": float(b)}
+                for name, (f, b) in zip(self.bearing_names, self.whirl_time, strict=True)
+            },
+            "contacts": {n: int(c) for n, c in zip(self.bearing_names, self.contacts, strict=True)},
+            "contact_energy_J": {
+                n: float(e) for n, e in zip(self.bearing_names, self.contact_energy, strict=True)
+            },
+            "dissipated_J": self.dissipated,
+            "air_work_J": self.air_work,
+            "energy_residual_J": self.energy_residual,
+            "energy_scale_J": self.energy_scale,
+            "steps": self.steps,
+            "rejected_steps": self.rejected_steps,
+            "quantile_levels": list(QUANTILES),
+            "quantities": list(QUANTITIES),
+            "windows": windows,
+            "samples": None if self.path is None else str(self.path),
+        }

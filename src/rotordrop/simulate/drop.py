@@ -1,0 +1,241 @@
+"""Simulate one drop of a rotor onto its touchdown bearings (Neisi 2020, sections 2, 3.1 and 5)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.machine import Machine
+from rotordrop.physics.elementary import magnitude
+from rotordrop.rotor import layout as L
+from rotordrop.rotor.layout import KernelParameters
+from rotordrop.rotor.parameters import DropModel, build_drop_model
+from rotordrop.rotor.reduction import Reduction
+from rotordrop.rotor.rotor_on_race import rotor_on_race
+from rotordrop.simulate import _histories as H
+from rotordrop.simulate import _loop
+from rotordrop.simulate._tableau import Tableau, dp5, tsit5
+from rotordrop.simulate.case import DropCase
+from rotordrop.simulate.certificate import COMPARABLE_WINDOW, Certificate, peaks_of
+from rotordrop.simulate.levitation import start_of_drop
+from rotordrop.simulate.result import ContactLog, DropResult
+
+Array = NDArray[np.float64]
+
+TYPICAL = np.empty(L.AUDIT)
+"""Typical size of a state by its kind, in its unit; angle and audit follow without control."""
+TYPICAL[[L.POSITION, L.VELOCITY, L.SPIN, L.INTERNAL, L.ANGLE]] = 1e-4, 0.1, 10.0, 1.0, np.inf
+FIRST_STEP = 1e-6
+LOG_ROWS_PER_SECOND = 20_000
+
+
+def simulate_drop(machine: Machine | DropModel, case: DropCase, *, certify: bool = False) -> DropResult:
+    """Simulate a rotor that falls onto its touchdown bearings.
+
+    Parameters
+    ----------
+    machine : Machine or DropModel
+        The machine, or a model built before with `build_drop_model`.
+    case : DropCase
+        Speed [rad/s], start, duration [s], accuracy.
+    certify : bool
+        Also repeat the drop with a ten times tighter tolerance and with eight more modes per plane, and put
+        the changes of the peak force into the certificate (three times the cost).
+
+    Returns
+    -------
+    DropResult
+        Histories, contacts, outcome and certificate.
+
+    Raises
+    ------
+    SimulationError
+        If start and machine do not fit.
+    """
+    model = machine if isinstance(machine, DropModel) else build_drop_model(machine, case.reduction)
+    result = _simulate(model, case)
+    if certify:
+        result = replace(result, certificate=_certified(model, case, result))
+    return result
+
+
+def tableau_of(case: DropCase) -> Tableau:
+    """Coefficients of the pair a case asks for."""
+    return tsit5() if case.integrator == "tsit5" else dp5()
+
+
+def error_scale(model: DropModel) -> Array:
+    """Typical size of every state that the step control looks at, shape (s,), in the units of the states.
+
+    Modal amplitudes are scaled so that a mode counts by what it moves at the bearings.
+    """
+    layout = model.layout
+    reach = np.max(np.abs(model.parameters.bearing_shape), axis=0)
+    floor = 0.05 * np.max(reach)
+    modal = 1.0 / np.maximum(reach, floor)
+    scale = TYPICAL[layout.kinds[: layout.n_controlled]]
+    for part in (layout.modal_x, layout.modal_y):
+        scale[part] *= modal
+        scale[layout.velocity_of(part)] *= modal
+    return scale
+
+
+def _simulate(model: DropModel, case: DropCase) -> DropResult:
+    start, parameters = start_of_drop(model, case)
+    times = case.output_times
+    states = np.empty((len(times), model.layout.size))
+    log = np.zeros((100 + int(LOG_ROWS_PER_SECOND * case.duration), _loop.N_LOG_COLUMNS))
+    counters = np.zeros(5)
+    outcome = _loop.integrate_drop(
+        start,
+        times,
+        parameters,
+        tableau_of(case),
+        error_scale(model),
+        case.tolerance,
+        FIRST_STEP,
+        case.largest_step,
+        case.most_steps,
+        states,
+        log,
+        counters,
+    )
+    return _result(model, case, parameters, times, states, log[: int(counters[3])], counters, outcome)
+
+
+def _result(
+    model: DropModel,
+    case: DropCase,
+    parameters: KernelParameters,
+    times: Array,
+    states: Array,
+    log: Array,
+    counters: Array,
+    outcome: int,
+) -> DropResult:
+    layout, n_b = model.layout, model.layout.n_bearings
+    reached = int(np.sum(times <= counters[4]))
+    times, states = times[:reached], states[:reached]
+    histories = np.empty((reached, n_b, H.N_HISTORIES))
+    H.bearing_histories(states, parameters, histories)
+    displacement = H.node_displacements(states, parameters.bearing_shape)
+    force = histories[..., H.H_BEARING_FORCE_X : H.H_BEARING_FORCE_Y + 1]
+    return DropResult(
+        time=times,
+        displacement=displacement,
+        race_displacement=states[:, layout.race].reshape(reached, n_b, 2),
+        support_displacement=states[:, layout.support].reshape(reached, n_b, 2),
+        indentation=histories[..., H.H_DELTA],
+        contact_force=histories[..., H.H_CONTACT_FORCE],
+        friction_force=histories[..., H.H_FRICTION_FORCE],
+        bearing_force=force,
+        max_ball_load=histories[..., H.H_BALL_LOAD],
+        max_stress=histories[..., H.H_STRESS],
+        line_contacts=tuple(rotor_on_race(model.machine, b) for b in model.machine.touchdown_bearings),
+        speed=states[:, layout.rotor_speed],
+        race_speed=states[:, layout.race_spin],
+        state=states,
+        contacts=_contact_log(log),
+        bearing_names=model.bearing_names,
+        state_names=layout.names(model.bearing_names),
+        shapes=model.basis.shapes,
+        machine_name=model.machine.name,
+        initial_speed=case.speed,
+        tolerance=case.tolerance,
+        reduction=model.basis.description,
+        steps=int(counters[0]),
+        rejected_steps=int(counters[1]),
+        outcome=_sentence(outcome, case, counters, len(log), n_b),
+        finished=outcome == _loop.FINISHED,
+        certificate=_energy_certificate(model, parameters, times, states, force),
+    )
+
+
+def _contact_log(log: Array) -> ContactLog:
+    return ContactLog(
+        bearing=log[:, _loop.LOG_BEARING].astype(np.int64),
+        start=log[:, _loop.LOG_START].copy(),
+        end=log[:, _loop.LOG_END].copy(),
+        peak_force=log[:, _loop.LOG_PEAK_FORCE].copy(),
+        peak_time=log[:, _loop.LOG_PEAK_TIME].copy(),
+        azimuth=log[:, _loop.LOG_AZIMUTH].copy(),
+        impulse=log[:, _loop.LOG_IMPULSE].copy(),
+        dissipated_energy=log[:, _loop.LOG_DISSIPATED].copy(),
+        sliding_energy=log[:, _loop.LOG_SLIDING].copy(),
+    )
+
+
+def _sentence(outcome: int, case: DropCase, counters: Array, contacts: int, n_bearings: int) -> str:
+    reached = f"{counters[4]:.6g} s"
+    if outcome == _loop.FINISHED:
+        return f"The drop was simulated to {reached} in {int(counters[0])} steps with {contacts} contacts."
+    if outcome == _loop.STEP_TOO_SMALL:
+        return (
+            f"The simulation stopped at {reached}: the step fell below 1e-14 s. "
+            "Check for a friction law with a tiny smoothing speed or an extreme stiffness."
+        )
+    if outcome == _loop.TOO_MANY_STEPS:
+        return (
+            f"The simulation stopped at {reached}: {case.most_steps} steps were not enough. "
+            "Raise most_steps, loosen the tolerance or use a smaller reduction."
+        )
+    return (
+        f"The simulation stopped at {reached}: a value became infinite. "
+        "Check the start and the machine's parameters."
+    )
+
+
+def _energy_certificate(
+    model: DropModel, parameters: KernelParameters, times: Array, states: Array, force: Array
+) -> Certificate:
+    layout = model.layout
+    chosen = np.unique(np.linspace(0, len(states) - 1, 200).astype(int))
+    stored = np.empty(len(chosen))
+    H.stored_energies(states[chosen], parameters, True, stored)
+    balance = stored + states[chosen, layout.dissipated] - states[chosen, layout.work_in]
+    return Certificate(
+        energy_residual=float(np.max(np.abs(balance - balance[0]))),
+        energy_scale=float(np.max(np.abs(stored - stored[0]))),
+        peak_force=peaks_of(times, magnitude(force[..., 0], force[..., 1])),
+    )
+
+
+def _certified(model: DropModel, case: DropCase, result: DropResult) -> Certificate:
+    tighter = _simulate(model, replace(case, tolerance=0.1 * case.tolerance))
+    certificate = replace(
+        result.certificate,
+        peak_change_tolerance=_peak_change(result, tighter, COMPARABLE_WINDOW),
+        peak_change_tolerance_whole=_peak_change(result, tighter, np.inf),
+    )
+    richer = _richer(model)
+    if richer is None or not _transferable(case):
+        return certificate
+    finer = _simulate(richer, case)
+    return replace(
+        certificate,
+        peak_change_truncation=_peak_change(result, finer, COMPARABLE_WINDOW),
+        peak_change_truncation_whole=_peak_change(result, finer, np.inf),
+    )
+
+
+def _transferable(case: DropCase) -> bool:
+    from rotordrop.simulate.case import StateStart
+
+    return not isinstance(case.start, StateStart)
+
+
+def _richer(model: DropModel) -> DropModel | None:
+    reduction = model.basis.reduction
+    if reduction.modes is None:
+        return None
+    return build_drop_model(
+        model.machine, Reduction(modes=reduction.modes + 8, attachment=reduction.attachment)
+    )
+
+
+def _peak_change(one: DropResult, other: DropResult, until: float) -> Array:
+    first = peaks_of(one.time, one.bearing_force_magnitude, until)
+    second = peaks_of(other.time, other.bearing_force_magnitude, until)
+    return np.abs(first - second) / np.maximum(second, 1e-9)

@@ -1,0 +1,206 @@
+"""The rotor before the drop: floating in its AMBs, and other ways to set the start state."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.errors import SimulationError
+from rotordrop.physics import aerodynamics
+from rotordrop.physics.elementary import sine_cosine
+from rotordrop.physics.linear_algebra import least_squares, product, solve
+from rotordrop.rotor import layout as L
+from rotordrop.rotor.layout import KernelParameters
+from rotordrop.rotor.parameters import DropModel
+from rotordrop.simulate.case import CentredStart, DropCase, LevitatedStart, PlacedStart, StateStart
+
+Array = NDArray[np.float64]
+
+_SPIN_MODES = {
+    "dynamic": aerodynamics.EXPONENTIAL_IN_TIME,
+    "prescribed": aerodynamics.PRESCRIBED_SPEED,
+    "function of speed": aerodynamics.FUNCTION_OF_SPEED,
+    "coasting": aerodynamics.OFF,
+    "constant": aerodynamics.PRESCRIBED_SPEED,
+}
+
+
+def start_of_drop(model: DropModel, case: DropCase) -> tuple[Array, KernelParameters]:
+    """State at power-off, shape (n,), and the kernel parameters with what the case adds (speed mode,
+    magnets).
+    """
+    parameters = _with_spin(model.parameters, case)
+    start = case.start
+    if isinstance(start, StateStart):
+        return _given_state(model, start), parameters
+    state = model.at_rest()
+    state[model.layout.rotor_speed] = case.speed
+    if isinstance(start, CentredStart):
+        return state, parameters
+    if isinstance(start, PlacedStart):
+        return _placed(model, start, state), parameters
+    return _levitated(model, case.speed, start, state, parameters)
+
+
+def _with_spin(parameters: KernelParameters, case: DropCase) -> KernelParameters:
+    spin = parameters.spin.copy()
+    spin[L.INITIAL_SPEED] = case.speed
+    if case.spin == "constant":
+        spin[L.AERO_TIME_CONSTANT] = np.inf  # a prescribed profile that never falls
+    flags = parameters.flags.copy()
+    flags[L.SPIN_MODE] = _SPIN_MODES[case.spin]
+    return parameters._replace(spin=spin, flags=flags)
+
+
+def _given_state(model: DropModel, start: StateStart) -> Array:
+    state = np.array(start.state, dtype=np.float64)
+    if state.shape != (model.layout.size,):
+        raise SimulationError(
+            f"the start state has shape {state.shape}; this model expects ({model.layout.size},). "
+            "Use the layout of the same reduction."
+        )
+    return state
+
+
+def rigid_amplitudes(model: DropModel, positions: Array, values: Array) -> Array:
+    """Amplitudes (m, 2) of the two rigid modes of a straight rotor through values (P, 2) at positions z (P,)
+    [m].
+    """
+    line = np.column_stack([np.ones_like(positions), positions])
+    coefficients = least_squares(line, values)
+    z = np.asarray(model.fe.node_positions)
+    shape = np.zeros((2 * len(z), 2))
+    shape[0::2] = coefficients[0] + np.outer(z, coefficients[1])
+    shape[1::2] = coefficients[1]
+    return product(model.basis.shapes.T, product(model.fe.mass, shape))
+
+
+def _placed(model: DropModel, start: PlacedStart, state: Array) -> Array:
+    nodes = [bearing.node for bearing in model.machine.touchdown_bearings]
+    expected = (len(nodes), 2)
+    for name, value in (("displacement", start.displacement), ("velocity", start.velocity)):
+        if np.shape(value) != expected:
+            raise SimulationError(
+                f"the start {name} has shape {np.shape(value)}; expected {expected}: "
+                "x and y for each touchdown bearing."
+            )
+    positions = np.asarray(model.fe.node_positions)[np.array(nodes) - 1]
+    layout = model.layout
+    for values, x, y in (
+        (start.displacement, layout.modal_x, layout.modal_y),
+        (start.velocity, layout.velocity_of(layout.modal_x), layout.velocity_of(layout.modal_y)),
+    ):
+        amplitudes = rigid_amplitudes(model, positions, np.asarray(values, dtype=np.float64))
+        state[x], state[y] = amplitudes[:, 0], amplitudes[:, 1]
+    return state
+
+
+def levitated_orbit(
+    model: DropModel, speed: float, orbit: NDArray[np.complex128] | None = None
+) -> NDArray[np.complex128]:
+    """Complex synchronous response (m, 2), in x and y: amplitudes are ``Re(q e^(jθ))`` at rotor angle θ.
+
+    The response to the unbalance of the rotor in its AMBs (stiffness and damping in every direction alike);
+    with a given orbit at the AMBs (A,) [m] the magnets also apply the synchronous forces it takes.
+    """
+    p = model.parameters
+    m = p.eigenvalue.shape[0]
+    square = speed * speed
+    force = square * np.column_stack([p.unbalance_cos, p.unbalance_sin])
+    dynamic = np.diag(p.eigenvalue) - square * np.eye(m) + square * p.polar
+    damping = speed * np.diag(p.damping)
+    if orbit is None:
+        rows = p.magnet_shape.T
+        dynamic += product(rows * p.magnet[:, L.AMB_STIFFNESS], p.magnet_shape)
+        damping += speed * product(rows * p.magnet[:, L.AMB_DAMPING], p.magnet_shape)
+        forward = _complex_solution(dynamic, damping, force)
+    else:
+        n_a = p.magnet_shape.shape[0]
+        if np.shape(orbit) != (n_a,):
+            raise SimulationError(
+                f"the orbit has shape {np.shape(orbit)}; expected ({n_a},): "
+                "one complex amplitude for each AMB."
+            )
+        given = np.asarray(orbit, dtype=np.complex128)
+        held = np.block([[dynamic, -p.magnet_shape.T], [p.magnet_shape, np.zeros((n_a, n_a))]])
+        turning = np.zeros_like(held)
+        turning[:m, :m] = damping
+        right = np.vstack([force, np.column_stack([given.real, given.imag])])
+        forward = _complex_solution(held, turning, right)[:m]
+    whole = np.empty((m, 2), dtype=np.complex128)
+    whole.real, whole.imag = (
+        np.column_stack([forward[:, 0], forward[:, 1]]),
+        np.column_stack([forward[:, 1], -forward[:, 0]]),
+    )
+    return whole
+
+
+def _complex_solution(real: Array, imaginary: Array, right: Array) -> Array:
+    """Real and imaginary part (n, 2) of the solution of a complex system, given by its parts.
+
+    In real numbers, because a product of complex ones is rounded otherwise where the processor fuses it.
+    """
+    system = np.block([[real, -imaginary], [imaginary, real]])
+    return solve(system, np.concatenate([right[:, 0], right[:, 1]])).reshape(2, -1).T
+
+
+def levitated_static(model: DropModel, offset: Array | None) -> tuple[Array, Array]:
+    """Static amplitudes (m, 2) of the levitated rotor and the holding force of each AMB (A, 2) [N].
+
+    With integral action the controller holds the rotor at its reference in each AMB plane.
+    """
+    p = model.parameters
+    n_a, m = p.magnet_shape.shape
+    target = np.zeros((n_a, 2)) if offset is None else np.asarray(offset, dtype=np.float64)
+    load = np.column_stack([np.zeros(m), p.gravity])
+    border = p.magnet_shape.T
+    matrix = np.block([[np.diag(p.eigenvalue), -border], [p.magnet_shape, np.zeros((n_a, n_a))]])
+    # rows of stiff modes are divided by their stiffness: its range would pass for a loss of rank
+    size = np.concatenate([np.maximum(p.eigenvalue, 1.0), np.ones(n_a)])[:, None]
+    solution = least_squares(matrix / size, np.vstack([load, target]) / size)
+    return solution[:m], solution[m:]
+
+
+def _levitated(
+    model: DropModel, speed: float, start: LevitatedStart, state: Array, parameters: KernelParameters
+) -> tuple[Array, KernelParameters]:
+    n_a = parameters.magnet.shape[0]
+    if n_a < 2:
+        raise SimulationError(
+            "a levitated start needs at least two radial AMBs; "
+            f"the machine {model.machine.name!r} has {n_a}. "
+            "Add [[amb]] entries with node, stiffness and damping, or use another start."
+        )
+    static, holding = levitated_static(model, start.offset)
+    orbit = np.zeros(static.shape, dtype=np.complex128)
+    if speed != 0.0:
+        orbit = levitated_orbit(model, speed, start.orbit)
+    sine, cosine = sine_cosine(start.rotor_angle)
+    position = static + (orbit.real * cosine - orbit.imag * sine)
+    velocity = -speed * (orbit.real * sine + orbit.imag * cosine)
+    layout = model.layout
+    state[layout.modal_x], state[layout.modal_y] = position[:, 0], position[:, 1]
+    state[layout.velocity_of(layout.modal_x)] = velocity[:, 0]
+    state[layout.velocity_of(layout.modal_y)] = velocity[:, 1]
+    state[layout.rotor_angle] = start.rotor_angle
+    return state, _with_magnets(parameters, start, holding)
+
+
+def _with_magnets(parameters: KernelParameters, start: LevitatedStart, holding: Array) -> KernelParameters:
+    n_a = parameters.magnet.shape[0]
+    magnet, spin, flags = parameters.magnet.copy(), parameters.spin.copy(), parameters.flags.copy()
+    magnet[:, L.HOLDING_X : L.HOLDING_Y + 1] = holding
+    if start.offset is not None:
+        magnet[:, L.AMB_REFERENCE_X : L.AMB_REFERENCE_Y + 1] = start.offset
+    if start.remanent_force is not None:
+        force = np.asarray(start.remanent_force, dtype=np.float64)
+        if force.shape != (n_a, 2):
+            raise SimulationError(
+                f"the remanent force has shape {force.shape}; expected ({n_a}, 2): "
+                "x and y for each AMB, in newtons."
+            )
+        magnet[:, L.REMANENT_X : L.REMANENT_Y + 1] = force
+    spin[L.POWER_OFF_DELAY] = start.delay
+    spin[L.REMANENCE_TIME_CONSTANT] = start.remanence_time_constant
+    flags[L.MAGNETS_ACT] = 1 if start.delay > 0.0 or start.remanent_force is not None else 0
+    return parameters._replace(magnet=magnet, spin=spin, flags=flags)

@@ -1,0 +1,477 @@
+"""Forward filter and backward smoother of a drop: state, parameters and sensor errors in one.
+
+The vector estimated is ``[dynamic state (s), parameters (P), sensor gains (C), offsets (C), 1X runout
+cosine and sine (C, C)]``. The forward pass is an extended Kalman filter with analytic sensitivities of the
+drop model; given a reference trajectory (the smoothed one of an earlier pass) it linearises there, so that
+repeated passes are a Gauss–Newton solution of the whole problem. The backward pass is the modified
+Bryson–Frazier smoother: it needs no inverse of a covariance.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.physics._compile import kernel, lean_kernel
+from rotordrop.physics.elementary import exp, sine_cosine
+from rotordrop.rotor import layout as L
+from rotordrop.rotor.layout import KernelParameters
+from rotordrop.track._covariance import is_covariance, pack, symmetrise, unpack
+from rotordrop.track._propagation import (
+    FilterSettings,
+    ParameterTargets,
+    add_process_noise,
+    apply_parameters,
+    propagate,
+)
+
+Array = NDArray[np.float64]
+Compact = NDArray[np.float32]
+IntArray = NDArray[np.int64]
+
+
+LARGEST_DEFLECTION = 4.0
+"""Way of a race or a support from its place, over the air gap, from which a filter has diverged [1]."""
+SIGN_WIDTH = math.sqrt(0.5 * math.pi)
+
+
+class SensorForm(NamedTuple):
+    """What sensors do beyond gain, offset and runout; T terms, G sensors that lag behind, s dynamic.
+
+    A sensor sees ``(its row + Σ value of the unknown · row of the term) · state``: ``term`` (T, 2) holds
+    sensor and unknown, ``term_row`` (T, s) its row. ``lag`` (G, 2) holds for each sensor the state with what
+    it has got to and the unknown that is the logarithm of its time constant, between ``shortest`` and
+    ``longest`` (G,); ``lag_row`` (G, s) is what it sees. All are empty for plain sensors.
+    """
+
+    term: IntArray
+    term_row: Array
+    lag: IntArray
+    lag_row: Array
+    shortest: Array
+    longest: Array
+
+
+@lean_kernel
+def seen_by(c: int, at: Array, sensor_row: Array, form: SensorForm, s: int) -> float:
+    """Displacement [m] that sensor ``c`` sees of a state, with the terms of its form."""
+    seen = 0.0
+    for j in range(s):
+        seen += sensor_row[j] * at[j]
+    for t in range(form.term.shape[0]):
+        if form.term[t, 0] == c:
+            along = 0.0
+            for j in range(s):
+                along += form.term_row[t, j] * at[j]
+            seen += at[s + form.term[t, 1]] * along
+    return seen
+
+
+@kernel
+def lag_step(before: Array, after: Array, form: SensorForm, dt: float, F: Array) -> None:
+    """Advance what the sensors have got to by one sample, in ``after`` (s + P,) and ``F`` (s, s + P).
+
+    A first-order lag follows a straight line between two samples exactly, so that no time constant, however
+    short, asks for a shorter step. ``before`` (s + P,) is state and unknowns at the sample before.
+    """
+    s = F.shape[0]
+    for c in range(form.lag.shape[0]):
+        i, k = form.lag[c, 0], form.lag[c, 1]
+        q = dt / exp(min(max(before[s + k], form.shortest[c]), form.longest[c]))
+        a = exp(-q)
+        b = (1.0 - a) / q
+        first = seen_by(c, before, form.lag_row[c], form, s)
+        last = seen_by(c, after, form.lag_row[c], form, s)
+        F[i, :] = 0.0
+        _add_seen(c, i, before, form, b - a, F)
+        _add_seen_after(c, i, after, form, 1.0 - b, F)
+        F[i, i] += a
+        F[i, s + k] += a * q * before[i] + (b - a - a * q) * first - (b - a) * last
+        after[i] = a * before[i] + (b - a) * first + (1.0 - b) * last
+
+
+@lean_kernel
+def _add_seen(c: int, i: int, at: Array, form: SensorForm, weight: float, F: Array) -> None:
+    """Add to row ``i`` of ``F`` the derivative of what sensor ``c`` saw at the sample before."""
+    s = F.shape[0]
+    for j in range(s):
+        F[i, j] += weight * form.lag_row[c, j]
+    for t in range(form.term.shape[0]):
+        if form.term[t, 0] == c:
+            along = 0.0
+            for j in range(s):
+                F[i, j] += weight * at[s + form.term[t, 1]] * form.term_row[t, j]
+                along += form.term_row[t, j] * at[j]
+            F[i, s + form.term[t, 1]] += weight * along
+
+
+@kernel
+def _add_seen_after(c: int, i: int, at: Array, form: SensorForm, weight: float, F: Array) -> None:
+    """Add to row ``i`` of ``F`` the derivative of what sensor ``c`` sees now, by way of the state now."""
+    s, columns = F.shape
+    row = form.lag_row[c].copy()
+    for t in range(form.term.shape[0]):
+        if form.term[t, 0] == c:
+            along = 0.0
+            for j in range(s):
+                row[j] += at[s + form.term[t, 1]] * form.term_row[t, j]
+                along += form.term_row[t, j] * at[j]
+            F[i, s + form.term[t, 1]] += weight * along
+    for j in range(s):
+        if row[j] != 0.0:
+            for e in range(columns):
+                F[i, e] += weight * row[j] * F[j, e]
+
+
+@lean_kernel
+def scalar_update(
+    mean: Array, P: Array, row: Array, innovation: float, variance: float, gain: Array
+) -> float:
+    """Update mean and covariance in place with one scalar measurement; returns the innovation's variance.
+
+    The covariance takes the Joseph form, written out for a scalar, which stays symmetric and positive.
+    ``row`` (n,) is the measurement's derivative by the estimate, ``gain`` (n,) receives the Kalman gain.
+    """
+    # Readings have independent noise, so they are taken one at a time and no matrix is inverted: S, the
+    # variance of the innovation, is a number.
+    n = mean.shape[0]
+    for i in range(n):
+        gain[i] = 0.0
+    for j in range(n):
+        value = row[j]
+        if value != 0.0:
+            for i in range(n):
+                gain[i] += P[j, i] * value
+    S = variance
+    for j in range(n):
+        S += row[j] * gain[j]
+    # The short form P − K h P would do on paper; where a reading is much sharper than what is known, it takes
+    # the difference of two nearly equal numbers, and a variance may come out negative.
+    inverse = 1.0 / S
+    for i in range(n):
+        spread = gain[i]
+        weight = spread * inverse
+        for j in range(n):
+            k_j = gain[j] * inverse
+            P[i, j] -= weight * gain[j] + spread * k_j - S * weight * k_j
+    for i in range(n):
+        gain[i] /= S
+        mean[i] += gain[i] * innovation
+    return S
+
+
+@lean_kernel
+def measurement_row(
+    c: int, at: Array, angle: float, sensor_row: Array, first: int, n_c: int, form: SensorForm, row: Array
+) -> float:
+    """Reading of sensor ``c`` predicted at an estimate [m] and its derivative ``row`` (n,).
+
+    The reading is ``(1 + gain error) · (sensor row · state) + offset + runout at the rotor angle``. The gains
+    begin at ``first``, the offsets, cosines and sines follow, ``n_c`` of each. A sensor that lags behind
+    reads its own state, and its terms act on what it lags behind of.
+    """
+    row[:] = 0.0
+    k = first + c
+    sine, cosine = sine_cosine(angle)
+    seen = 0.0
+    for j in range(sensor_row.shape[0]):
+        seen += sensor_row[j] * at[j]
+    growth = 1.0 + at[k]
+    for j in range(sensor_row.shape[0]):
+        row[j] = growth * sensor_row[j]
+    if form.lag.shape[0] == 0:
+        s = sensor_row.shape[0]
+        for t in range(form.term.shape[0]):
+            if form.term[t, 0] == c:
+                along, unknown = 0.0, s + form.term[t, 1]
+                for j in range(s):
+                    along += form.term_row[t, j] * at[j]
+                    row[j] += growth * at[unknown] * form.term_row[t, j]
+                row[unknown] = growth * along
+                seen += at[unknown] * along
+    row[k] = seen
+    row[k + n_c] = 1.0
+    row[k + 2 * n_c] = cosine
+    row[k + 3 * n_c] = sine
+    predicted: float = growth * seen + at[k + n_c] + at[k + 2 * n_c] * cosine + at[k + 3 * n_c] * sine
+    return predicted
+
+
+@lean_kernel
+def soften_friction(P: Array, least: Array, p: KernelParameters) -> None:
+    """Smooth the sign of friction by how well each race spin is known, never less than ``least`` (B,) [m/s].
+
+    The spin of a race is not seen before it catches up with the rotor. A sign taken at the estimate has
+    no slope there, and the filter cannot learn when that happens; the mean of the sign over a normal
+    distribution of the slip is, to a few per cent, tanh(v / (1.25 σ)).
+    """
+    for b in range(least.shape[0]):
+        spin = p.bearing_at[b, L.RACE_SPIN]
+        spread = SIGN_WIDTH * p.bearing[b, L.BORE_RADIUS] * math.sqrt(max(P[spin, spin], 0.0))
+        p.bearing[b, L.SMOOTHING_SPEED] = math.sqrt(least[b] * least[b] + spread * spread)
+
+
+@kernel
+def forward_pass(
+    first: int,
+    mean_0: Array,
+    P: Array,
+    times: Array,
+    readings: Array,
+    speed: Array,
+    sensor_rows: Array,
+    variances: Array,
+    speed_variance: float,
+    targets: ParameterTargets,
+    p: KernelParameters,
+    settings: FilterSettings,
+    form: SensorForm,
+    reference: Array,
+    means: Array,
+    covariances: Compact,
+    transitions: Compact,
+    rows: Array,
+    gains: Array,
+    innovations: Array,
+    innovation_variances: Array,
+) -> int:
+    """Extended Kalman filter over the samples of one drop; N samples, n estimated, s dynamic, C channels.
+
+    Parameters
+    ----------
+    first : int
+        First sample to be done: 0, or 1 to go on from the filtered estimate of sample 0.
+    mean_0, P : ndarray, shapes (n,), (n, n)
+        Estimate to begin with; ``P`` is overwritten by that of the last sample.
+    times, readings, speed : ndarray, shapes (N,), (N, C), (N,)
+        Time from power-off [s], readings with polarity removed [m] (NaN is left out), rotor speed [rad/s]
+        (NaN too).
+    sensor_rows : ndarray, shape (C, s)
+        Displacement along each sensor's direction from the dynamic state.
+    variances, speed_variance : ndarray (C,), float
+        Noise variance of the readings [m²] and of the speed [rad²/s²].
+    form : SensorForm
+        What the sensors do beyond gain, offset and runout.
+    reference : ndarray, shape (M, n)
+        Trajectory to linearise at for the first M samples; the filter's own mean afterwards.
+    means, covariances : ndarray, shapes (N, n), (N, n (n + 1) / 2) or (N, 0)
+        Filled with the filtered estimate; covariances, as `pack` stores them, only when there is room.
+    transitions : ndarray, shape (N, s, s + P) or (0, ...)
+        Filled with the sensitivity from the sample before.
+    rows, gains : ndarray, shape (N, C + 1, n) or (0, ...)
+        Filled with measurement rows and gains, in the order used.
+    innovations, innovation_variances : ndarray, shape (N, C + 1)
+        Filled; NaN where a reading was left out.
+
+    Returns
+    -------
+    int
+        Number of samples done; fewer than N when a value became infinite.
+    """
+    n = mean_0.shape[0]
+    n_c, s = sensor_rows.shape
+    n_p = n - s - 4 * n_c
+    i_w, i_a = p.rotor_at[L.ROTOR_SPEED], p.rotor_at[L.ROTOR_ANGLE]
+    mean = mean_0.copy()
+    y = np.zeros(p.rotor_at[L.N_STATES])
+    F = np.zeros((s, s + n_p))
+    impulses = np.zeros(p.bearing.shape[0])
+    row = np.empty(n)
+    gain = np.empty(n)
+    theta = mean[s : s + n_p].copy()
+    moved = np.empty(s + n_p)
+    keep = transitions.shape[0] > 0
+    smoothing = p.bearing[:, L.SMOOTHING_SPEED].copy()
+    if first > 0 and covariances.shape[1] > 0:
+        pack(P, covariances[0])
+    for i in range(first, times.shape[0]):
+        if i > 0:
+            at = mean
+            with_reference = i - 1 < reference.shape[0]
+            if with_reference:
+                at = reference[i - 1]
+            theta[:] = at[s : s + n_p]
+            apply_parameters(theta, targets, p)
+            soften_friction(P, smoothing, p)
+            y[:] = 0.0
+            y[:s] = at[:s]
+            propagate(times[i - 1], y, theta, targets, p, settings, F, impulses)
+            if form.lag.shape[0] > 0:
+                moved[:s] = y[:s]
+                moved[s:] = theta
+                lag_step(at[: s + n_p], moved, form, settings.dt, F)
+                y[:s] = moved[:s]
+            # Around a reference the model is an affine map, the same for prediction and for smoothing, so the
+            # passes are Gauss-Newton steps of one least-squares problem. The mean itself, propagated, would
+            # be linearised elsewhere than the smoother's, and each pass would solve another problem.
+            if with_reference:
+                deviation = mean[: s + n_p] - at[: s + n_p]
+                mean[:s] = y[:s] + np.dot(F, deviation)
+            else:
+                mean[:s] = y[:s]
+            # Only the dynamic states move; parameters and sensor errors are constants (but for their drift),
+            # so of the whole covariance s rows and columns change.
+            head = np.dot(F, np.ascontiguousarray(P[: s + n_p]))
+            P[:s] = head
+            P[:s, :s] = np.dot(np.ascontiguousarray(head[:, : s + n_p]), F.T)
+            P[s:, :s] = head[:, s:].T
+            drift = targets.late_drift if times[i] > settings.learning_end else targets.drift
+            largest = settings.fall_impulse if times[i] < settings.fall_end else np.inf
+            add_process_noise(P, p, settings, impulses, drift, largest)
+            if keep:
+                transitions[i] = F
+        elif keep:
+            transitions[i] = 0.0
+        for c in range(n_c + 1):
+            value = speed[i] if c == n_c else readings[i, c]
+            innovations[i, c] = np.nan
+            innovation_variances[i, c] = np.nan
+            if not math.isfinite(value):
+                if keep:
+                    rows[i, c] = 0.0
+                    gains[i, c] = 0.0
+                continue
+            if c < n_c:
+                variance = variances[c]
+                if i < reference.shape[0]:
+                    at = reference[i]
+                    predicted = measurement_row(c, at, at[i_a], sensor_rows[c], s + n_p, n_c, form, row)
+                    for j in range(n):
+                        predicted += row[j] * (mean[j] - at[j])
+                else:
+                    predicted = measurement_row(c, mean, mean[i_a], sensor_rows[c], s + n_p, n_c, form, row)
+            else:
+                variance = speed_variance
+                row[:] = 0.0
+                row[i_w] = 1.0
+                predicted = mean[i_w]
+            innovations[i, c] = value - predicted
+            innovation_variances[i, c] = scalar_update(mean, P, row, value - predicted, variance, gain)
+            if keep:
+                rows[i, c] = row
+                gains[i, c] = gain
+        # Rounding leaves P lopsided by a little, and sample by sample the error would grow.
+        symmetrise(P)
+        means[i] = mean
+        if covariances.shape[1] > 0:
+            pack(P, covariances[i])
+        if not is_covariance(P) or not is_plausible(mean, p):
+            return i
+    return len(times)
+
+
+@kernel
+def is_plausible(mean: Array, p: KernelParameters) -> bool:
+    """Whether the estimate is finite and no race or support has left its place."""
+    good = math.isfinite(np.sum(mean))
+    for b in range(p.bearing.shape[0]):
+        limit = LARGEST_DEFLECTION * p.bearing[b, L.AIR_GAP]
+        for body in (L.RACE, L.SUPPORT):
+            i = p.bearing_at[b, body]
+            good = good and abs(mean[i]) < limit and abs(mean[i + 1]) < limit
+    return good
+
+
+@kernel
+def backward_pass(
+    first: int,
+    means: Array,
+    covariances: Compact,
+    transitions: Compact,
+    rows: Array,
+    gains: Array,
+    innovations: Array,
+    innovation_variances: Array,
+    watched: Array,
+    kept: IntArray,
+    smoothed: Array,
+    blocks: Array,
+    filtered: Array,
+    information: Array,
+    final_score: Array,
+    final_information: Array,
+) -> None:
+    """Modified Bryson–Frazier smoother; arrays as filled by `forward_pass`.
+
+    Parameters
+    ----------
+    first : int
+        Where to stop: 0, or 1 where `forward_pass` went on from sample 0.
+    watched : ndarray, shape (G, n)
+        Linear functions of the estimate whose smoothed covariance is wanted at every sample.
+    kept : ndarray, shape (K,)
+        Samples, rising, whose Λ is wanted.
+    smoothed : ndarray, shape (N, n)
+        Filled with the smoothed estimate.
+    blocks : ndarray, shape (N, G, G)
+        Filled with the smoothed covariance of the watched functions.
+    filtered, information : ndarray, shape (K, n, n)
+        Filled with P and Λ of the kept samples: the smoothed covariance is ``P − P Λ P``.
+    final_score, final_information : ndarray, shapes (n,), (n, n)
+        λ and Λ that later samples or records put on the last one (zero behind the end); overwritten by their
+        values *before* the first measurement done, to be handed to an earlier one.
+    """
+    n_t, n = means.shape
+    s = transitions.shape[1]
+    columns = transitions.shape[2]
+    # λ and Λ gather what all later innovations say of the present estimate, in the manner of a gradient and
+    # its curvature. That way no covariance is inverted, and a parameter known exactly does no harm.
+    lam = final_score
+    Lam = final_information
+    P = np.empty((n, n))
+    seen = np.empty(n, dtype=np.int64)
+    left = kept.shape[0] - 1
+    for i in range(n_t - 1, first - 1, -1):
+        unpack(covariances[i], P)
+        smoothed[i] = means[i] - np.dot(P, lam)
+        spread = np.dot(watched, P)
+        blocks[i] = np.dot(spread, watched.T) - np.dot(np.dot(spread, Lam), spread.T)
+        if left >= 0 and kept[left] == i:
+            filtered[left] = P
+            information[left] = Lam
+            left -= 1
+        for c in range(rows.shape[1] - 1, -1, -1):
+            S = innovation_variances[i, c]
+            if not math.isfinite(S):
+                continue
+            row = rows[i, c]
+            gain = gains[i, c]
+            # (I - K h)ᵀ Λ (I - K h) + hᵀ h / S
+            lk = np.dot(Lam, gain)
+            klk = np.dot(gain, lk)
+            score = np.dot(gain, lam)
+            weight = klk + 1.0 / S
+            count = 0
+            # A reading sees one plane and its own sensor errors: most of its row is zero.
+            for a in range(n):
+                if row[a] != 0.0:
+                    seen[count] = a
+                    count += 1
+            for a in range(n):
+                for e in range(count):
+                    Lam[a, seen[e]] -= lk[a] * row[seen[e]]
+            for e in range(count):
+                a = seen[e]
+                for b in range(n):
+                    Lam[a, b] += row[a] * (weight * row[b] - lk[b])
+            for a in range(n):
+                lam[a] -= row[a] * (score + innovations[i, c] / S)
+        if i > 0:
+            F = transitions[i].astype(np.float64)
+            top = np.ascontiguousarray(Lam[:s])
+            tail = np.dot(F.T, top)
+            body = np.dot(np.ascontiguousarray(tail[:, :s]), F)
+            old = lam.copy()
+            lam[:columns] = np.dot(F.T, old[:s])
+            lam[s:columns] += old[s:columns]
+            lower = Lam[s:, s:].copy()
+            cross = tail[:, s:].copy()
+            Lam[:, :] = 0.0
+            Lam[s:, s:] = lower
+            Lam[:columns, :columns] += body
+            Lam[:columns, s:] += cross
+            Lam[s:, :columns] += cross.T
+        symmetrise(Lam)

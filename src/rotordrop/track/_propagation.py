@@ -1,0 +1,431 @@
+"""One step of the drop model with its sensitivity to state and parameters, and the noise added to it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.physics._compile import kernel, lean_kernel
+from rotordrop.physics.aerodynamics import PRESCRIBED_SPEED
+from rotordrop.physics.elementary import exp, power
+from rotordrop.rotor import layout as L
+from rotordrop.rotor.layout import KernelParameters
+from rotordrop.simulate._loop import contact_at
+from rotordrop.simulate._rhs import (
+    add_rotor_rates,
+    bearing_accelerations,
+    drop_derivative,
+)
+from rotordrop.simulate._sensitivity import drop_jacobian_parts
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+# What a parameter acts on.
+ON_BEARING = 0
+ON_SPIN = 1
+ON_MAGNET = 2
+ON_UNBALANCE = 3
+SCALE_BEARING = 4
+AT_TYPICAL_DEPTH = 5
+SCALE_MODES = 6
+
+
+class ParameterTargets(NamedTuple):
+    """Which kernel entries the unknown parameters set; R targets, P parameters, U unbalance planes.
+
+    ``target`` (R, 4): parameter, kind, row, column; ``factor`` (R,) [1]; ``logarithmic`` (P,) flags;
+    ``step`` (P,) of the finite difference by which the right-hand side is differentiated; ``drift`` (P,)
+    standard deviation of the random walk of each parameter per square root of a second, ``late_drift`` the
+    same later in a drop; ``plane_shape`` (U, m) mode shapes of the planes. Beyond ``lower`` and ``upper``
+    (P,) the model takes the bound: what drifts without being seen must not make it unstable. ``mean`` (P,)
+    is the prior mean. ``eigenvalue`` (m,) are those of the rotor as described. ``acts`` (P, B + 1) flags
+    the bearings on whose forces a parameter acts, and in the last column whether it acts on the rotor's
+    own. ``together`` lists for each parameter, from ``starts`` (P + 1,) on, the targets that write where it
+    writes, in their order: what has to be written again when it alone changes.
+    """
+
+    target: IntArray
+    acts: Flags
+    together: IntArray
+    starts: IntArray
+    factor: Array
+    logarithmic: IntArray
+    step: Array
+    drift: Array
+    late_drift: Array
+    plane_shape: Array
+    lower: Array
+    upper: Array
+    mean: Array
+    eigenvalue: Array
+
+
+class FilterSettings(NamedTuple):
+    """Numbers of one pass: sample distance [s], steps per sample, impulse noise [N s] and its share.
+
+    ``impulse`` is the standard deviation of an unknown impulse per sample at each bearing and axis,
+    ``share`` the same as a fraction of the contact impulse, ``spin_noise`` that of the race spins per
+    sample [rad/s], ``speed_noise`` that of the rotor speed [rad/s]. After ``learning_end`` [s] the late
+    drift of the parameters holds. Before ``fall_end`` [s] no unknown impulse is larger than ``fall_impulse``.
+    """
+
+    dt: float
+    substeps: int
+    impulse: float
+    share: float
+    spin_noise: float
+    speed_noise: float
+    learning_end: float
+    fall_end: float
+    fall_impulse: float
+
+
+@kernel
+def apply_parameters(theta: Array, targets: ParameterTargets, p: KernelParameters) -> None:
+    """Write parameter values into the kernel arrays (which must be private copies)."""
+    values = np.empty(theta.shape[0])
+    for k in range(theta.shape[0]):
+        values[k] = bounded_value(k, theta[k], targets, 0.0)
+    powers = np.ones(targets.target.shape[0])
+    every = np.arange(targets.target.shape[0])
+    update_powers(every, values, targets, powers)
+    write_values(every, values, powers, targets, p)
+
+
+@lean_kernel
+def update_powers(which: IntArray, values: Array, targets: ParameterTargets, powers: Array) -> None:
+    """Factors on entries that follow a parameter as a power of a typical depth, for some of the targets."""
+    for i in which:
+        if targets.target[i, 1] == AT_TYPICAL_DEPTH:
+            k = targets.target[i, 0]
+            powers[i] = power(targets.factor[i], exp(targets.mean[k]) - values[k])
+
+
+@lean_kernel
+def bounded_value(k: int, theta: float, targets: ParameterTargets, step: float) -> float:
+    """Parameter ``k`` as the model takes it: within its bounds, then a step on, and no longer a logarithm."""
+    # The step comes after the bounds: at its bound a parameter keeps a slope and can be led back.
+    within = min(max(theta, targets.lower[k]), targets.upper[k]) + step
+    return exp(within) if targets.logarithmic[k] != 0 else within
+
+
+@lean_kernel
+def write_values(
+    which: IntArray, values: Array, powers: Array, targets: ParameterTargets, p: KernelParameters
+) -> None:
+    """Write some of the targets into the kernel arrays; logarithmic ones come as the values themselves."""
+    cleared = False
+    for i in which:
+        kind = targets.target[i, 1]
+        row = targets.target[i, 2]
+        column = targets.target[i, 3]
+        value = values[targets.target[i, 0]] * targets.factor[i]
+        if kind == ON_BEARING:
+            p.bearing[row, column] = value
+            if column == L.AIR_GAP:
+                p.bearing[row, L.ROTOR_RADIUS] = p.bearing[row, L.BORE_RADIUS] - value
+        elif kind == SCALE_BEARING:
+            p.bearing[row, column] *= value
+        elif kind == AT_TYPICAL_DEPTH:
+            p.bearing[row, column] *= powers[i]
+        elif kind == ON_SPIN:
+            p.spin[column] = value
+        elif kind == ON_MAGNET:
+            p.magnet[row, column] = value
+        elif kind == SCALE_MODES:
+            for j in range(p.eigenvalue.shape[0]):
+                p.eigenvalue[j] = value * targets.eigenvalue[j]
+        else:
+            if not cleared:
+                p.unbalance_cos[:] = 0.0
+                p.unbalance_sin[:] = 0.0
+                cleared = True
+            for j in range(p.unbalance_cos.shape[0]):
+                if column == 0:
+                    p.unbalance_cos[j] += value * targets.plane_shape[row, j]
+                else:
+                    p.unbalance_sin[j] += value * targets.plane_shape[row, j]
+
+
+@lean_kernel
+def rates_by_owner(
+    t: float, owner: int, y: Array, p: KernelParameters, torque: float, out: Array, work: Array
+) -> float:
+    """The part of the right-hand side that one bearing gives, or the rotor's own behind the last, in ``out``.
+
+    ``torque`` [N m] is what the bearings drive the rotor with. Returns the torque that this bearing gives.
+    """
+    for i in range(out.shape[0]):
+        out[i] = 0.0
+    if owner == p.bearing.shape[0]:
+        add_rotor_rates(t, y, torque, 0.0, p, out)
+        return 0.0
+    driven, _lost = bearing_accelerations(owner, y, y[p.rotor_at[L.ROTOR_SPEED]], p, out, work)
+    return driven
+
+
+@kernel
+def parameter_jacobian(
+    t: float,
+    y: Array,
+    theta: Array,
+    targets: ParameterTargets,
+    p: KernelParameters,
+    base: Array,
+    other: Array,
+    work: Array,
+    B: Array,
+) -> None:
+    """Derivative of the right-hand side by the parameters, shape (s, P), by one-sided differences.
+
+    A parameter of a bearing changes the forces at this bearing alone; the rest is not computed again. The
+    effect of its torque on the ω̇ terms of eq. (1) is left out, as in the derivative by the state. ``base``
+    (B + 1, n) and ``other`` (n,) are scratch.
+    """
+    s, n_b, i_w = B.shape[0], p.bearing.shape[0], p.rotor_at[L.ROTOR_SPEED]
+    free = p.flags[L.SPIN_MODE] != PRESCRIBED_SPEED
+    torques = np.empty(n_b)
+    torque = 0.0
+    for b in range(n_b):
+        torques[b] = rates_by_owner(t, b, y, p, 0.0, base[b], work)
+        torque += torques[b]
+    rates_by_owner(t, n_b, y, p, torque, base[n_b], work)
+    values = np.empty(theta.shape[0])
+    powers = np.ones(targets.target.shape[0])
+    for k in range(theta.shape[0]):
+        values[k] = bounded_value(k, theta[k], targets, 0.0)
+    update_powers(np.arange(targets.target.shape[0]), values, targets, powers)
+    B[:, :] = 0.0
+    for k in range(theta.shape[0]):
+        value, step = values[k], targets.step[k]
+        which = targets.together[targets.starts[k] : targets.starts[k + 1]]
+        values[k] = bounded_value(k, theta[k], targets, step)
+        update_powers(which, values, targets, powers)
+        write_values(which, values, powers, targets, p)
+        for owner in range(n_b + 1):
+            if not targets.acts[k, owner]:
+                continue
+            driven = rates_by_owner(t, owner, y, p, torque, other, work)
+            for i in range(s):
+                B[i, k] += (other[i] - base[owner, i]) / step
+            if free and owner < n_b:
+                B[i_w, k] += (driven - torques[owner]) / (step * p.spin[L.POLAR_INERTIA])
+        values[k] = value
+        update_powers(which, values, targets, powers)
+        write_values(which, values, powers, targets, p)
+
+
+@lean_kernel
+def gather_entries(J: Array, entries: Array, columns: IntArray, starts: IntArray) -> None:
+    """List the entries of a mostly empty square matrix row by row, for fast products."""
+    n = J.shape[0]
+    count = 0
+    for i in range(n):
+        starts[i] = count
+        for k in range(n):
+            if J[i, k] != 0.0:
+                entries[count] = J[i, k]
+                columns[count] = k
+                count += 1
+    starts[n] = count
+
+
+@lean_kernel
+def sparse_product(entries: Array, columns: IntArray, starts: IntArray, V: Array, out: Array) -> None:
+    """Product of a listed matrix (see `gather_entries`) with a full one; rows of ``V`` are contiguous."""
+    c = V.shape[1]
+    for i in range(starts.shape[0] - 1):
+        for j in range(c):
+            out[i, j] = 0.0
+        for e in range(starts[i], starts[i + 1]):
+            value = entries[e]
+            k = columns[e]
+            for j in range(c):
+                out[i, j] += value * V[k, j]
+
+
+@lean_kernel
+def add_contact_product(b: int, g: Array, p: KernelParameters, V: Array, moved: Array, out: Array) -> None:
+    """Add to ``out`` the product of one contact's part of the Jacobian with ``V``, both (s, c).
+
+    A contact couples all modes, but only through the six motions it sees and the three forces it gives:
+    in two steps it takes a fraction of the operations of the full rows. ``moved`` (7, c) is scratch.
+    """
+    n_q, i_w = p.rotor_at[L.N_COORDINATES], p.rotor_at[L.ROTOR_SPEED]
+    r, spin = p.bearing_at[b, L.RACE], p.bearing_at[b, L.RACE_SPIN]
+    shape = p.bearing_shape[b]
+    row = p.bearing[b]
+    c = V.shape[1]
+    for part in range(4):
+        base = (part // 2) * n_q
+        axis = part % 2
+        modes = base + p.rotor_at[L.MODES_X + axis]
+        for j in range(c):
+            moved[part, j] = -V[base + r + axis, j]
+        for k in range(shape.shape[0]):
+            weight = shape[k]
+            source = modes + k
+            for j in range(c):
+                moved[part, j] += weight * V[source, j]
+    for force in range(3):
+        for j in range(c):
+            moved[4 + force, j] = g[force, 4] * V[i_w, j] + g[force, 5] * V[spin, j]
+        for part in range(4):
+            weight = g[force, part]
+            for j in range(c):
+                moved[4 + force, j] += weight * moved[part, j]
+    for axis in range(2):
+        add_row(1.0 / row[L.RACE_MASS], moved[4 + axis], out[n_q + r + axis])
+        modes = n_q + p.rotor_at[L.MODES_X + axis]
+        for k in range(shape.shape[0]):
+            add_row(-shape[k], moved[4 + axis], out[modes + k])
+    add_row(row[L.BORE_RADIUS] / row[L.RACE_INERTIA], moved[6], out[spin])
+    if p.flags[L.SPIN_MODE] != PRESCRIBED_SPEED:
+        add_row(-row[L.ROTOR_RADIUS] / p.spin[L.POLAR_INERTIA], moved[6], out[i_w])
+
+
+@lean_kernel
+def add_row(weight: float, source: Array, target: Array) -> None:
+    """Add a weighted row to another."""
+    for j in range(source.shape[0]):
+        target[j] += weight * source[j]
+
+
+@lean_kernel
+def jacobian_product(
+    entries: Array,
+    columns: IntArray,
+    starts: IntArray,
+    touching: IntArray,
+    g: Array,
+    p: KernelParameters,
+    V: Array,
+    moved: Array,
+    out: Array,
+) -> None:
+    """Product of the whole Jacobian, listed part and contacts, with a full matrix."""
+    sparse_product(entries, columns, starts, V, out)
+    for b in range(touching.shape[0]):
+        if touching[b] != 0:
+            add_contact_product(b, g[b], p, V, moved, out)
+
+
+@lean_kernel
+def rk4_step(t: float, h: float, y: Array, p: KernelParameters, k: Array, trial: Array, work: Array) -> None:
+    """One classical Runge–Kutta step in place; ``k`` (5, n) and ``trial`` (n,) are scratch."""
+    n = y.shape[0]
+    drop_derivative(t, y, p, k[0], work)
+    for i in range(n):
+        trial[i] = y[i] + 0.5 * h * k[0, i]
+    drop_derivative(t + 0.5 * h, trial, p, k[1], work)
+    for i in range(n):
+        k[4, i] = y[i] + 0.5 * h * k[1, i]
+    drop_derivative(t + 0.5 * h, k[4], p, k[2], work)
+    for i in range(n):
+        trial[i] = y[i] + h * k[2, i]
+    drop_derivative(t + h, trial, p, k[3], work)
+    for i in range(n):
+        y[i] += h / 6.0 * (k[0, i] + 2.0 * k[1, i] + 2.0 * k[2, i] + k[3, i])
+
+
+@kernel
+def propagate(
+    t: float,
+    y: Array,
+    theta: Array,
+    targets: ParameterTargets,
+    p: KernelParameters,
+    settings: FilterSettings,
+    F: Array,
+    impulses: Array,
+) -> None:
+    """Advance a state by one sample in place and fill its sensitivity ``F`` (s, s + P).
+
+    ``impulses`` (B,) receives the contact impulse of each bearing over the sample [N s].
+    """
+    n = y.shape[0]
+    s, columns = F.shape
+    J = np.empty((s, s))
+    B = np.empty((s, columns - s))
+    first = np.empty((s, columns))
+    second = np.empty((s, columns))
+    third = np.empty((s, columns))
+    entries = np.empty(s * s)
+    places = np.empty(s * s, dtype=np.int64)
+    starts = np.empty(s + 1, dtype=np.int64)
+    k = np.zeros((5, n))  # what a sensor has got to stays: `lag_step` moves it
+    trial = np.empty(n)
+    work = np.empty((2, p.balls.shape[2]))
+    base, other = np.zeros((p.bearing.shape[0] + 1, n)), np.zeros(n)
+    contact = np.empty(6)
+    g = np.zeros((p.bearing.shape[0], 3, 6))
+    touching = np.zeros(p.bearing.shape[0], dtype=np.int64)
+    moved = np.empty((7, columns))
+    h = settings.dt / settings.substeps
+    F[:, :] = 0.0
+    for i in range(s):
+        F[i, i] = 1.0
+    impulses[:] = 0.0
+    for step in range(settings.substeps):
+        now = t + step * h
+        rk4_step(now, h, y, p, k, trial, work)
+        # The Jacobian of the middle serves the whole substep to second order, though it changes within it.
+        middle = k[4].copy()
+        drop_jacobian_parts(now + 0.5 * h, middle, p, J, g, touching)
+        gather_entries(J, entries, places, starts)
+        # at every substep: position and gap must see the same contact, or the gap looks too well known
+        if columns > s:
+            parameter_jacobian(now + 0.5 * h, middle, theta, targets, p, base, other, work, B)
+        # What the contact law gets wrong is a share of what it gives; process noise is scaled by the impulse.
+        for b in range(p.bearing.shape[0]):
+            contact_at(b, middle, p, contact)
+            impulses[b] += h * contact[1]
+        # F <- exp(hJ) F + what the parameters add, to third order: at second order light modes would grow
+        jacobian_product(entries, places, starts, touching, g, p, F, moved, first)
+        for i in range(s):
+            for j in range(columns - s):
+                first[i, s + j] += B[i, j]
+        jacobian_product(entries, places, starts, touching, g, p, first, moved, second)
+        jacobian_product(entries, places, starts, touching, g, p, second, moved, third)
+        for i in range(s):
+            for j in range(columns):
+                F[i, j] += h * (first[i, j] + h * (0.5 * second[i, j] + h / 6.0 * third[i, j]))
+
+
+@kernel
+def add_process_noise(
+    P: Array, p: KernelParameters, settings: FilterSettings, impulses: Array, drift: Array, largest: float
+) -> None:
+    """Add unknown impulses at the bearings, noise of the spins and drift of the parameters to ``P``.
+
+    ``largest`` is the largest standard deviation of an unknown impulse [N s].
+    """
+    m, n_q, i_w = p.eigenvalue.shape[0], p.rotor_at[L.N_COORDINATES], p.rotor_at[L.ROTOR_SPEED]
+    # Process noise enters where the model errs: as an impulse between rotor and race, equal and opposite.
+    # White noise on every state would let the filter explain a record by motions that nothing can cause.
+    # ``g`` is the velocity that a unit impulse gives; modes have unit mass.
+    g = np.empty(m + 1)
+    place = np.empty(m + 1, dtype=np.int64)
+    for b in range(p.bearing.shape[0]):
+        sigma = min(settings.impulse + settings.share * impulses[b], largest)
+        for axis in range(2):
+            for k in range(m):
+                g[k] = -p.bearing_shape[b, k]
+                place[k] = n_q + p.rotor_at[L.MODES_X + axis] + k
+            g[m] = 1.0 / p.bearing[b, L.RACE_MASS]
+            place[m] = n_q + p.bearing_at[b, L.RACE] + axis
+            for i in range(m + 1):
+                for j in range(m + 1):
+                    P[place[i], place[j]] += sigma * sigma * g[i] * g[j]
+        # Of an unknown impulse friction passes on about a tenth to the spin of the race.
+        spin = settings.spin_noise + sigma * p.bearing[b, L.BORE_RADIUS] / p.bearing[b, L.RACE_INERTIA] * 0.1
+        P[p.bearing_at[b, L.RACE_SPIN], p.bearing_at[b, L.RACE_SPIN]] += spin * spin
+    P[i_w, i_w] += settings.speed_noise * settings.speed_noise
+    s = p.rotor_at[L.N_DYNAMIC]
+    # a random walk: its variance grows with time
+    for k in range(drift.shape[0]):
+        P[s + k, s + k] += drift[k] * drift[k] * settings.dt

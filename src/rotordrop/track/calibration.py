@@ -1,0 +1,334 @@
+"""One fit of a drop model to several recorded drops of a machine, by repeated filter and smoother passes.
+
+Each pass linearises at the smoothed trajectory of the pass before: a Gauss–Newton step of the whole
+problem. The window grows, because a long chaotic window has no use for a start that is wrong. The drops are
+chained: what belongs to the machine is carried from the end of one drop to the beginning of the next, what
+belongs to a drop is not.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.errors import IdentificationError
+from rotordrop.track.problem import DropProblem
+from rotordrop.track.smoother import (
+    Forward,
+    PassSettings,
+    Smoothed,
+    Storage,
+    forward,
+    pass_settings,
+    smooth,
+)
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stage:
+    """One stage: window after power-off [s], unknown forces, their share, passes, steps per 50 µs.
+
+    ``force`` is the unknown force at each bearing and axis as a part of the weight on a bearing, ``share`` as
+    a part of the force of the contact [1]; both are new every `STEP` of a free fall through the gap.
+
+    ``damping`` holds the parameters to where the pass before had them, that many times as strongly [1] as the
+    prior holds them to the guesses (Levenberg–Marquardt): the first impacts alone leave some of them so free
+    that an undamped step lands in another minimum.
+    """
+
+    until: float
+    force: float
+    share: float
+    passes: int
+    substeps: int = 4
+    damping: float = 0.0
+
+
+BLIND_SCHEDULE: tuple[Stage, ...] = (
+    Stage(until=0.012, force=0.7, share=0.05, passes=1),
+    Stage(until=0.012, force=0.35, share=0.03, passes=2),
+    Stage(until=0.016, force=0.2, share=0.03, passes=2),
+    Stage(until=0.020, force=0.2, share=0.02, passes=2),
+    Stage(until=0.030, force=0.14, share=0.02, passes=2),
+    Stage(until=0.045, force=0.14, share=0.02, passes=2),
+    Stage(until=0.060, force=0.14, share=0.02, passes=2),
+)
+"""From nominal guesses: windows for a first contact at 7.5 ms, for a gap of 0.25 mm; see `shifted`."""
+
+DAMPED_SCHEDULE: tuple[Stage, ...] = (
+    *(replace(stage, damping=3.0 if stage.until < 0.02 else 1.0) for stage in BLIND_SCHEDULE[:-1]),
+    BLIND_SCHEDULE[-1],
+)
+"""The same windows in short steps: another way to the record."""
+
+CALIBRATED_SCHEDULE: tuple[Stage, ...] = (
+    Stage(until=0.02, force=0.07, share=0.01, passes=1),
+    Stage(until=0.2, force=0.07, share=0.01, passes=1),
+)
+"""With a calibrated machine: what is left is the state, the sensors and the drop's own unknowns."""
+
+QUICK_SCHEDULE: tuple[Stage, ...] = (Stage(until=0.2, force=0.07, share=0.01, passes=1, substeps=3),)
+"""With a calibrated machine: one pass, linearised at the filter's own estimate."""
+
+REFERENCE_CONTACT = 0.0075
+REFERENCE_FALL = math.sqrt(2.0 * 0.25e-3 / 9.81)
+"""First contact and time of a free fall that the windows of the schedules are written for [s]."""
+WHOLE_DROP = 0.1
+"""Windows from here on are parts of the drop, not of its first contacts [s]."""
+FITTING_NIS = 1.25
+"""Mean normalised innovation squared up to which a model fits its record [1]."""
+LOOSER = (1.0, 8.0, 32.0)
+"""Factors on the unknown impulses with which a pass is repeated that lost the drop [1]."""
+MOST_REPEATS, SMALL_RISE = 6, 5.0
+"""Repeats of a window, and the rise of the log likelihood that ends them [1]."""
+THREADS = 2
+"""Passes over the same drops that run side by side [1]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrackedDrops:
+    """Smoothed estimates of all drops of a fit.
+
+    Attributes
+    ----------
+    problems : tuple of DropProblem
+        The drops, in the order of the chain.
+    smoothed : tuple of Smoothed
+        Their smoothed estimates.
+    nis : tuple of float
+        Mean normalised innovation squared of each drop [1].
+    diverged : tuple of bool
+        Drops in which the filter had to give up.
+    noise_factors : tuple of float
+        Factor on the usual unknown impulses that the last pass needed to follow each drop [1].
+    """
+
+    problems: tuple[DropProblem, ...]
+    smoothed: tuple[Smoothed, ...]
+    nis: tuple[float, ...]
+    diverged: tuple[bool, ...] = field(default=())
+    noise_factors: tuple[float, ...] = field(default=())
+
+    @property
+    def improbability(self) -> float:
+        """Negative logarithm of the marginal likelihood of all drops, up to a constant [1]."""
+        return sum(one.filtered.negative_log_likelihood for one in self.smoothed)
+
+    @property
+    def trajectories(self) -> list[Array]:
+        """Smoothed means of each drop, shape (M, n)."""
+        return [one.means for one in self.smoothed]
+
+
+def shifted(schedule: Sequence[Stage], first_contact: float, fall: float) -> tuple[Stage, ...]:
+    """The schedule with its short windows where the first contacts of a drop are.
+
+    Parameters
+    ----------
+    schedule : sequence of Stage
+        Windows for a first contact at 7.5 ms and a free fall of 7.1 ms.
+    first_contact : float
+        Time of the first contact [s].
+    fall : float
+        Time of a free fall through the air gap [s]: rebounds last longer with it.
+    """
+    return tuple(
+        replace(stage, until=first_contact + (stage.until - REFERENCE_CONTACT) * fall / REFERENCE_FALL)
+        if stage.until < WHOLE_DROP
+        else stage
+        for stage in schedule
+    )
+
+
+def track(
+    problems: Sequence[DropProblem],
+    schedule: Sequence[Stage],
+    *,
+    references: Sequence[Array] | None = None,
+    noise_factor: float = 1.0,
+    progress: Progress | None = None,
+) -> TrackedDrops:
+    """Fit the drop model to recorded drops of one machine.
+
+    Parameters
+    ----------
+    problems : sequence of DropProblem
+        The drops; the prior of the first one holds for the machine.
+    schedule : sequence of Stage
+        Windows and noise, in order.
+    references : sequence of ndarray, optional
+        Trajectory of each drop to linearise at first, shape (M, n).
+    noise_factor : float
+        Factor on the unknown impulses of every stage [1].
+    progress : callable, optional
+        Called with a sentence and the fraction done.
+    """
+    trajectories: list[Array | None] = list(references) if references is not None else [None] * len(problems)
+    # A pass from the guesses gives a place to linearise at, no estimate yet: it needs a second one.
+    from_guesses = references is None and sum(stage.passes for stage in schedule) > 1
+    total = sum(stage.until * stage.passes for stage in schedule)
+    done = 0.0
+    smoothed: list[Smoothed] = []
+    storages = [Storage() for _ in problems]
+    for stage in schedule:
+        settings = stage_settings(problems[0], stage, noise_factor)
+        for _ in range(stage.passes):
+            if progress is not None:
+                progress(f"fitting the first {1e3 * stage.until:.0f} ms", done / total)
+            smoothed = one_pass(
+                [_eased(*one, stage) for one in zip(problems, trajectories, strict=True)],
+                settings,
+                trajectories,
+                stage.until,
+                from_guesses=from_guesses,
+                storages=storages,
+            )
+            from_guesses = False
+            trajectories = [s.means for s in smoothed]
+            done += stage.until
+    return TrackedDrops(
+        problems=tuple(problems),
+        smoothed=tuple(smoothed),
+        nis=tuple(s.filtered.nis for s in smoothed),
+        diverged=tuple(s.filtered.done < len(s.filtered.means) for s in smoothed),
+        noise_factors=tuple(s.filtered.impulse / settings.impulse for s in smoothed),
+    )
+
+
+def converged(problems: Sequence[DropProblem], stage: Stage, references: Sequence[Array]) -> TrackedDrops:
+    """A fit after as many passes over a window as still raise the likelihood.
+
+    Parameters
+    ----------
+    problems : sequence of DropProblem
+        The drops.
+    stage : Stage
+        The window; one pass of it is made at a time.
+    references : sequence of ndarray
+        Trajectory of each drop to begin with, shape (M, n).
+    """
+    once = (replace(stage, passes=1),)
+    fit = track(problems, once, references=references)
+    for _ in range(MOST_REPEATS - 1):
+        before, fit = fit.improbability, track(problems, once, references=fit.trajectories)
+        if fit.improbability > before - SMALL_RISE:
+            break
+    return fit
+
+
+def stage_settings(problem: DropProblem, stage: Stage, factor: float = 1.0) -> PassSettings:
+    """Settings of the passes of a stage, with the unknown forces larger by a factor [1]."""
+    return pass_settings(
+        problem, force=factor * stage.force, share=factor * stage.share, substeps=stage.substeps
+    )
+
+
+def _eased(problem: DropProblem, reference: Array | None, stage: Stage) -> DropProblem:
+    """The problem with its parameters held to a reference (M, n), as strongly as a stage says."""
+    if stage.damping == 0.0:
+        return problem
+    chosen, held = problem.parameter_slice, 1.0 + stage.damping
+    known = np.atleast_2d(problem.start if reference is None else reference)
+    before = known[min(problem.parameter_sample, len(known) - 1)]
+    mean, start = problem.mean.copy(), problem.start.copy()
+    mean[chosen] = (mean[chosen] + stage.damping * before[chosen]) / held
+    start[chosen] = (start[chosen] + stage.damping * before[chosen]) / held
+    narrower = np.ones(len(mean))
+    narrower[chosen] = 1.0 / math.sqrt(held)
+    return replace(
+        problem, mean=mean, start=start, covariance=problem.covariance * np.outer(narrower, narrower)
+    )
+
+
+def beside_the_record(tracked: TrackedDrops) -> bool:
+    """Whether innovations or unknown impulses of a drop are larger than a fitting model leaves."""
+    return any(tracked.diverged) or max(tracked.noise_factors) > 1.0 or max(tracked.nis) > FITTING_NIS
+
+
+def one_pass(
+    problems: Sequence[DropProblem],
+    settings: PassSettings,
+    references: Sequence[Array | None],
+    until: float,
+    *,
+    from_guesses: bool = False,
+    storages: Sequence[Storage] = (),
+) -> list[Smoothed]:
+    """One forward pass through the chain of drops and one backward pass through it.
+
+    ``storages``, one for each drop if given, is memory that passes before have used.
+    """
+    storages = storages or [Storage() for _ in problems]
+    shared = problems[0].machine_indices
+    filtered: list[Forward] = []
+    mean = problems[0].start if from_guesses else problems[0].mean
+    covariance = problems[0].covariance
+    for d, problem in enumerate(problems):
+        if d > 0:
+            mean, covariance = handed_on(filtered[-1], problem)
+        samples = int(np.searchsorted(problem.time, until, side="right"))
+        result = _followed(problem, settings, mean, covariance, references[d], samples, storages[d])
+        if result.done < min(samples, 10):
+            raise IdentificationError(
+                f"the filter lost the drop after {result.done} of {samples} samples; the machine's guesses "
+                "are too far from it. Check air gap, bearing nodes, sensor angles and support guesses."
+            )
+        filtered.append(result)
+    smoothed: list[Smoothed] = []
+    score, information = None, None
+    for d in range(len(problems) - 1, -1, -1):
+        back = smooth(filtered[d], score, information, watched=problems[d].watched, storage=storages[d])
+        smoothed.append(back)
+        if d > 0:
+            n = len(problems[d].mean)
+            score, information = np.zeros(n), np.zeros((n, n))
+            score[shared] = back.score_0[shared]
+            information[np.ix_(shared, shared)] = back.information_0[np.ix_(shared, shared)]
+    return smoothed[::-1]
+
+
+def _followed(
+    problem: DropProblem,
+    settings: PassSettings,
+    mean: Array,
+    covariance: Array,
+    reference: Array | None,
+    samples: int,
+    storage: Storage,
+) -> Forward:
+    """A pass along the reference; one that loses the drop is repeated without it, then more loosely."""
+    result = forward(
+        problem,
+        settings,
+        mean=mean,
+        covariance=covariance,
+        reference=reference,
+        samples=samples,
+        storage=storage,
+    )
+    for factor in LOOSER if reference is not None else LOOSER[1:]:
+        if result.done == samples:
+            break
+        looser = replace(settings, impulse=factor * settings.impulse, share=factor * settings.share)
+        again = forward(problem, looser, mean=mean, covariance=covariance, samples=samples)
+        result = max(result, again, key=lambda one: one.done)
+    return result
+
+
+def handed_on(before: Forward, problem: DropProblem) -> tuple[Array, Array]:
+    """Prior of the next drop: its own state, and the machine as known after the drop before."""
+    shared = problem.machine_indices
+    last = before.done - 1
+    mean, covariance = problem.mean.copy(), problem.covariance.copy()
+    mean[shared] = before.means[last][shared]
+    covariance[shared, :] = 0.0
+    covariance[:, shared] = 0.0
+    covariance[np.ix_(shared, shared)] = before.last[np.ix_(shared, shared)]
+    return mean, covariance

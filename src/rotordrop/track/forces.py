@@ -1,0 +1,219 @@
+"""Touchdown-bearing force and stress from a smoothed drop, with their standard deviations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.errors import IdentificationError
+from rotordrop.physics._compile import kernel
+from rotordrop.physics.ball_set import ball_set_force, ball_set_load
+from rotordrop.rotor import layout as L
+from rotordrop.rotor.layout import KernelParameters
+from rotordrop.simulate._loop import contact_at
+from rotordrop.simulate._rhs import race_deflection
+from rotordrop.track import _propagation as P
+from rotordrop.track._filter import LARGEST_DEFLECTION
+from rotordrop.track.problem import DropProblem, private_copy
+from rotordrop.track.smoother import Smoothed
+
+Array = NDArray[np.float64]
+
+FORCE_X, FORCE_Y, FORCE, STRESS = range(4)
+N_VALUES = 4
+
+
+@kernel
+def bearing_values(
+    dx: float, dy: float, axial: float, b: int, p: KernelParameters, work: Array, out: Array
+) -> None:
+    """Ball force on the race in x and y and its magnitude [N] and the stress [Pa] at a deflection [m].
+
+    The axial offset of the balls is set to ``axial`` [m] and stays so.
+    """
+    p.bearing[b, L.AXIAL_OFFSET] = axial
+    entries, balls = p.bearing[b, L.BALL_SET : L.BALL_SET_END], p.balls[b]
+    F_x, F_y = ball_set_force(entries, balls, dx, dy, work)
+    _load, stress = ball_set_load(entries, balls, dx, dy)
+    out[FORCE_X] = -F_x
+    out[FORCE_Y] = -F_y
+    out[FORCE] = np.sqrt(F_x * F_x + F_y * F_y)
+    out[STRESS] = stress
+
+
+@kernel
+def force_values(
+    means: Array,
+    s: int,
+    targets: P.ParameterTargets,
+    p: KernelParameters,
+    n_parameters: int,
+    values: Array,
+    gradients: Array,
+    contacts: Array,
+) -> None:
+    """Fill values (N, B, 4), their gradients (N, B, 4, 3) and contacts (N, B, 6).
+
+    Gradients are by race deflection x, y and axial offset. Values are ball force on the race x, y, its
+    magnitude [N] and inner-race stress [Pa]; contacts as in `contact_at`.
+    """
+    work = np.empty((2, p.balls.shape[2]))
+    above = np.empty(N_VALUES)
+    below = np.empty(N_VALUES)
+    y = np.zeros(p.rotor_at[L.N_STATES])
+    step_d = 1e-9
+    for i in range(means.shape[0]):
+        P.apply_parameters(means[i, s : s + n_parameters].copy(), targets, p)
+        y[:s] = means[i, :s]
+        for b in range(p.bearing.shape[0]):
+            dx, dy = race_deflection(b, y, p)
+            axial = p.bearing[b, L.AXIAL_OFFSET]
+            contact_at(b, y, p, contacts[i, b])
+            bearing_values(dx, dy, axial, b, p, work, values[i, b])
+            for c in range(3):
+                ex = step_d if c == 0 else 0.0
+                ey = step_d if c == 1 else 0.0
+                es = step_d if c == 2 else 0.0
+                bearing_values(dx + ex, dy + ey, axial + es, b, p, work, above)
+                bearing_values(dx - ex, dy - ey, axial - es, b, p, work, below)
+                for v in range(N_VALUES):
+                    gradients[i, b, v, c] = (above[v] - below[v]) / (2.0 * step_d)
+            p.bearing[b, L.AXIAL_OFFSET] = axial
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForceHistory:
+    """Forces of a smoothed drop; N samples, B bearings.
+
+    Attributes
+    ----------
+    time : ndarray, shape (N,)
+        Time from power-off [s].
+    force : ndarray, shape (N, B, 2)
+        Elastic ball force on the race [N].
+    magnitude, magnitude_sigma : ndarray, shape (N, B)
+        Its magnitude and standard deviation [N].
+    stress, stress_sigma : ndarray, shape (N, B)
+        Largest Hertz stress at the inner race and standard deviation [Pa].
+    indentation, contact_force, friction_force, contact_power : ndarray, shape (N, B)
+        Indentation [m], normal and friction force [N], power lost in the contact [W].
+    azimuth : ndarray, shape (N, B)
+        Direction of the contact normal from race to rotor [rad ccw from +x]; NaN in flight.
+    displacement, displacement_sigma : ndarray, shape (N, B, 2)
+        Rotor at the bearing nodes and standard deviation [m].
+    """
+
+    time: Array
+    force: Array
+    magnitude: Array
+    magnitude_sigma: Array
+    stress: Array
+    stress_sigma: Array
+    indentation: Array
+    contact_force: Array
+    friction_force: Array
+    contact_power: Array
+    azimuth: Array
+    displacement: Array
+    displacement_sigma: Array
+
+
+def force_history(problem: DropProblem, smoothed: Smoothed) -> ForceHistory:
+    """Force and stress histories of a smoothed drop with standard deviations from the smoothed covariance."""
+    means, s = smoothed.means, problem.n_dynamic
+    n_b = problem.model.layout.n_bearings
+    count = len(means)
+    values = np.empty((count, n_b, N_VALUES))
+    gradients = np.empty((count, n_b, N_VALUES, 3))
+    contacts = np.empty((count, n_b, 6))
+    force_values(
+        means,
+        s,
+        problem.targets,
+        private_copy(problem.model.parameters),
+        len(problem.unknowns),
+        values,
+        gradients,
+        contacts,
+    )
+    sigma = _standard_deviations(smoothed, gradients)
+    displacement, displacement_sigma = _displacements(problem, smoothed)
+    touching = contacts[..., 0] > 0.0
+    return ForceHistory(
+        time=problem.time[:count],
+        force=values[..., FORCE_X : FORCE_Y + 1],
+        magnitude=values[..., FORCE],
+        magnitude_sigma=sigma[..., FORCE],
+        stress=values[..., STRESS],
+        stress_sigma=sigma[..., STRESS],
+        indentation=contacts[..., 0],
+        contact_force=contacts[..., 1],
+        friction_force=contacts[..., 2],
+        contact_power=contacts[..., 5],
+        azimuth=np.where(touching, np.arctan2(contacts[..., 4], contacts[..., 3]), np.nan),
+        displacement=displacement,
+        displacement_sigma=displacement_sigma,
+    )
+
+
+def force_gradient(problem: DropProblem, mean: Array, b: int) -> Array:
+    """Derivative of the force [N] of bearing ``b`` by the whole estimate ``mean`` (n,), shape (n,)."""
+    n_b, count = problem.model.layout.n_bearings, len(problem.unknowns)
+    gradients = np.empty((1, n_b, N_VALUES, 3))
+    values, contacts = np.empty((1, n_b, N_VALUES)), np.empty((1, n_b, 6))
+    p = private_copy(problem.model.parameters)
+    force_values(mean[None].copy(), problem.n_dynamic, problem.targets, p, count, values, gradients, contacts)
+    rows = problem.watched_rows(problem.model.bearing_names[b])[:3]
+    return np.asarray(gradients[0, b, FORCE] @ rows)
+
+
+def stress_at_force(problem: DropProblem, theta: Array, b: int, force: Array) -> float:
+    """Largest Hertz stress [Pa] at the inner race of bearing ``b`` under a static force (2,) [N].
+
+    The preload is that of the parameters ``theta`` (P,); the deflection is along the force.
+    """
+    from scipy.optimize import brentq
+
+    p = private_copy(problem.model.parameters)
+    P.apply_parameters(np.asarray(theta, dtype=np.float64).copy(), problem.targets, p)
+    size = float(np.hypot(force[0], force[1]))
+    along = np.asarray(force) / max(size, 1e-300)
+    work, out = np.empty((2, p.balls.shape[2])), np.empty(N_VALUES)
+
+    def lacking(deflection: float) -> float:
+        bearing_values(
+            deflection * along[0], deflection * along[1], p.bearing[b, L.AXIAL_OFFSET], b, p, work, out
+        )
+        return float(out[FORCE]) - size
+
+    if lacking(0.0) >= 0.0:  # no force beyond the rounding of the preload's balance
+        return float(out[STRESS])
+    largest = LARGEST_DEFLECTION * p.bearing[b, L.AIR_GAP]
+    if lacking(largest) < 0.0:
+        raise IdentificationError(
+            f"{problem.model.bearing_names[b]}: a bearing force of {size:.0f} N was found, which deflects "
+            f"its race by more than {1e3 * largest:.1f} mm; expected less. The record and the "
+            "machine do not belong together, or a sensor is wrong; check units, sensors and bearing data."
+        )
+    lacking(brentq(lacking, 0.0, largest, xtol=1e-12))  # leaves the stress at the root in `out`
+    return float(out[STRESS])
+
+
+def _standard_deviations(smoothed: Smoothed, gradients: Array) -> Array:
+    sigma = np.empty(gradients.shape[:3])
+    for b in range(gradients.shape[1]):
+        block = smoothed.watched[:, 5 * b : 5 * b + 3, 5 * b : 5 * b + 3]
+        g = gradients[:, b]
+        sigma[:, b] = np.sqrt(np.maximum(np.einsum("nvi,nij,nvj->nv", g, block, g), 0.0))
+    return sigma
+
+
+def _displacements(problem: DropProblem, smoothed: Smoothed) -> tuple[Array, Array]:
+    values, sigma = [], []
+    for b, name in enumerate(problem.model.bearing_names):
+        values.append(smoothed.means @ problem.watched_rows(name)[3:].T)
+        variance = np.diagonal(smoothed.watched, axis1=1, axis2=2)[:, 5 * b + 3 : 5 * b + 5]
+        sigma.append(np.sqrt(np.maximum(variance, 0.0)))
+    return np.stack(values, axis=1), np.stack(sigma, axis=1)

@@ -1,0 +1,471 @@
+"""Cross-check without any contact law: forces at the bearing nodes from the rotor's own motion.
+
+The rotor model alone (modes, gyroscopics, gravity) is driven by unknown forces at the touchdown-bearing
+nodes; their rates are random walks whose size follows the local force and the duration of the contacts, which
+the likelihood of the readings gives, and they are held at zero while the rotor is clearly inside the air gap.
+Smoothing takes from the peaks; twicing puts most of it back. It gives no waveform.
+
+Source: twicing, Tukey 1977, Exploratory Data Analysis, chapter 16.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.rotor.bearing_numbers import numbers_of
+from rotordrop.rotor.parameters import DropModel
+from rotordrop.track.forces import stress_at_force
+from rotordrop.track.problem import DropProblem
+
+Array = NDArray[np.float64]
+
+GATE_MARGIN = 0.12
+"""Part of the air gap by which a rotor is clear of a race, at least, where its force is held at zero [1].
+
+The straight line through the sensors does not know how far the rotor bends beside it. A gate that closes
+during a contact takes force away and leaves the likelihood no contact to judge: with 0.04 one of four drops
+of a calibrated 60 kg machine read 6.5 in place of 2.7 kN; 0.08, 0.12 and 0.16 give peaks within 3 %."""
+HELD = 0.01
+"""Force that may be left while it is held at zero, as a part of the weight on a bearing [1]."""
+TURNED = 2.0 / math.sqrt(math.pi)
+"""Root of the density of the random walk of a rate, over ``F ω^1.5`` [1]: a half sine of amplitude F and
+angular frequency ω turns its rate from ``F ω`` to ``-F ω`` within π/ω; the walk spreads by ``s √(π/ω)``."""
+USUAL_PEAK = 10.0
+"""Usual ratio of the largest force of a drop to the weight on a bearing [1], where nothing is known yet."""
+LOCAL = 0.25
+"""Part of the duration of a contact, π/ω, from which the local force is taken on either side [1]: on five
+drops of 13 and 60 kg a quarter made the readings likelier than a half, and a half than the whole."""
+LOOKS = 3
+"""Passes, each with the local forces of the one before: with the third, peaks move by 1 % and less [1]."""
+SEARCHED = 8.0
+"""Part of a drop on which the duration of the contacts is judged, over the time of its fall [1]."""
+FASTEST_TURN = 0.5
+"""Largest turn of a contact between two samples [rad] that is tried."""
+STRESS_POINTS = 41
+"""Forces at which the stress of a bearing is computed; between them by straight lines."""
+LEAST_PEAK_ERROR, PUT_BACK_ERROR = 0.11, 3.8
+"""Relative error of a largest peak [1], at least and over the part of it that twicing has put back, through
+which sampling rate, noise, weight and contact time act: it held 11 of the 12 peaks that set it (13, 60 kg;
+0.45, 2 µm noise) and 95 of 96 at 10 to 100 kHz (studies/cross_check).
+
+Not validated: other rotors."""
+LEAST_STRESS_ERROR, STRESS_PER_PEAK = 0.015, 0.4
+"""Relative error of a largest stress [1], at least (preload) and over that of the peak (third root of it)."""
+MEAN_ERROR = 0.05
+"""Relative error of the late mean force [1]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class InputEstimate:
+    """Forces at the bearing nodes found without a contact law; N samples, B bearings.
+
+    Attributes
+    ----------
+    time : ndarray, shape (N,)
+        Time from power-off [s].
+    turn : float
+        Angular frequency of the contacts that makes the readings likeliest [rad/s].
+    force, sigma : ndarray, shape (N, B, 2)
+        Force of the rotor on the race and its standard error by the noise of the readings alone [N].
+    magnitude : ndarray, shape (N, B)
+        Its magnitude [N].
+    peak, put_back, peak_error : ndarray, shape (B,)
+        Largest magnitude [N], the part of it that twicing has put back [1], and the relative error that nine
+        of ten such peaks stay within [1].
+    stress : ndarray, shape (N, B)
+        Largest Hertz stress that this force gives in the bearing at rest [Pa].
+    peak_stress, stress_error : ndarray, shape (B,)
+        Its largest value [Pa] and the relative error that nine of ten stay within [1].
+    mean_late : ndarray, shape (B,)
+        Magnitude of the mean force vector between 0.15 and 0.2 s [N]; NaN when the record is shorter.
+    mean_magnitude_late : ndarray, shape (B,)
+        Mean magnitude of the force in the same time [N]; NaN when the record is shorter.
+    """
+
+    time: Array
+    turn: float
+    force: Array
+    sigma: Array
+    magnitude: Array
+    peak: Array
+    put_back: Array
+    peak_error: Array
+    stress: Array
+    peak_stress: Array
+    stress_error: Array
+    mean_late: Array
+    mean_magnitude_late: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lent:
+    """What the cross-check has to be told; N samples, B bearings, C channels.
+
+    Attributes
+    ----------
+    gain_errors, offsets : ndarray, shape (C,)
+        Errors of the readings [1], [m].
+    radius : ndarray, shape (N, B)
+        Distance of rotor and race [m]; NaN where it is not known.
+    reach : ndarray, shape (B,)
+        Distance below which rotor and race cannot touch [m].
+    theta : ndarray, shape (P,)
+        Parameters of the drop model, of which the stress takes the preload.
+    """
+
+    gain_errors: Array
+    offsets: Array
+    radius: Array
+    reach: Array
+    theta: Array
+
+
+def lent_by_record(problem: DropProblem) -> Lent:
+    """What settled tail and machine file say alone: the cross-check takes nothing from the twin.
+
+    The rotor counts as clear of a race only where it is so by twice the error of gap and sensors and by
+    `GATE_MARGIN` of the gap, which it may bend beside the line through its sensors: a gate that closes during
+    a contact would take force away, one that opens too early only lets a little noise in.
+    """
+    gain_errors, offsets = problem.sensor_errors(problem.mean)
+    entries = problem.gap_entries
+    variance = np.diag(problem.covariance)
+    first = problem.n_dynamic + len(problem.unknowns) + problem.n_channels
+    zero = float(np.max(variance[first : first + problem.n_channels]))
+    margin = GATE_MARGIN * problem.mean[entries] + 2.0 * np.sqrt(variance[entries] + zero)
+    motion = at_bearings(problem, (problem.readings - offsets) / (1.0 + gain_errors))
+    return Lent(
+        gain_errors=gain_errors,
+        offsets=offsets,
+        radius=np.hypot(motion[..., 0], motion[..., 1]),
+        reach=problem.mean[entries] - margin - _play(problem),
+        theta=problem.mean[problem.parameter_slice],
+    )
+
+
+def _play(problem: DropProblem) -> Array:
+    """Way that a loose race may lie off its centre [m], shape (B,)."""
+    bearings = problem.model.machine.touchdown_bearings
+    return np.array([numbers_of(bearing).play for bearing in bearings])
+
+
+def at_bearings(problem: DropProblem, along: Array) -> Array:
+    """Rotor at the bearings [m], shape (N, B, 2), on the straight line through its sensors.
+
+    Parameters
+    ----------
+    problem : DropProblem
+        Knows where sensors and bearings are.
+    along : ndarray, shape (N, C)
+        Displacement along every sensor [m], its gain and offset taken out; a sample that lacks a channel
+        gives NaN, a channel that is never there is left out.
+    """
+    layout, rigid = problem.model.layout, slice(0, problem.model.basis.n_rigid)
+    rows = problem.sensor_rows
+    design = np.hstack([rows[:, layout.modal_x][:, rigid], rows[:, layout.modal_y][:, rigid]])
+    heard = np.isfinite(along).any(axis=0)
+    amplitudes = along[:, heard] @ np.linalg.pinv(design[heard]).T
+    shapes = problem.model.parameters.bearing_shape[:, rigid]
+    half = shapes.shape[1]
+    return np.stack([amplitudes[:, :half] @ shapes.T, amplitudes[:, half:] @ shapes.T], axis=-1)
+
+
+def input_state_estimate(problem: DropProblem, lent: Lent) -> InputEstimate:
+    """Joint estimate of motion and bearing forces from the readings, by a linear filter and smoother.
+
+    No contact, friction or support enters. Both directions must be seen in two planes: with less, the rotor
+    model alone does not bound the forces.
+
+    Parameters
+    ----------
+    problem : DropProblem
+        Readings and rotor.
+    lent : Lent
+        Sensor errors, air gaps and preload, from the twin or from the record alone.
+    """
+    count = len(lent.radius)
+    closed = np.repeat(lent.radius < lent.reach, 2, axis=1)
+    readings = ((problem.readings - lent.offsets) / (1.0 + lent.gain_errors))[:count]
+    rotor = rotor_of(problem)
+    early = slice(0, int(np.searchsorted(problem.time[:count], SEARCHED * problem.fall_time)))
+    turn = (
+        USUAL_PEAK / problem.fall_time
+    )  # falling and rebounding as fast: twice its momentum under a half sine
+    local = np.broadcast_to(USUAL_PEAK * rotor.weight, closed.shape)
+    for look in range(LOOKS):
+        if look == 1:
+            turn = _likeliest_turn(rotor, readings[early], closed[early], local[early], turn)
+        passed = forward_pass(rotor, readings, closed, local, turn)
+        shown, variance = _backward(rotor, passed, variances=look == LOOKS - 1)
+        force, fitted = shown[:, : closed.shape[1]], shown[:, closed.shape[1] :]
+        local = _local_force(force, max(1, round(LOCAL * math.pi / (turn * rotor.dt))))
+    # What smoothing took from the peaks is in what is left of the readings: found there in the same way, it
+    # is put back ("twicing").
+    smoothed_peak = _size(force).max(axis=0)
+    force = force + _again(rotor, passed, readings - fitted)[:, : closed.shape[1]]
+    peak = _size(force).max(axis=0)
+    put_back = np.minimum(np.abs(peak - smoothed_peak) / np.maximum(peak, 1e-300), 1.0)
+    peak_error = np.hypot(LEAST_PEAK_ERROR, PUT_BACK_ERROR * put_back)
+    force, variance = force.reshape(count, -1, 2), np.maximum(variance, 0.0).reshape(count, -1, 2)
+    time = problem.time[:count]
+    magnitude = np.hypot(force[..., 0], force[..., 1])
+    level = np.sqrt(np.maximum(magnitude**2 - variance.sum(axis=2), 0.0))  # noise lengthens a vector
+    late = time >= 0.15
+    unknown = np.full(force.shape[1], np.nan)
+    whole = time[-1] > 0.199
+    stress = np.column_stack([_stress(problem, lent.theta, b, force[:, b]) for b in range(force.shape[1])])
+    return InputEstimate(
+        time=time,
+        turn=turn,
+        force=force,
+        sigma=np.sqrt(variance),
+        magnitude=magnitude,
+        peak=peak,
+        put_back=put_back,
+        peak_error=peak_error,
+        stress=stress,
+        peak_stress=stress.max(axis=0),
+        stress_error=np.hypot(LEAST_STRESS_ERROR, STRESS_PER_PEAK * peak_error),
+        mean_late=np.hypot(*force[late].mean(axis=0).T) if whole else unknown,
+        mean_magnitude_late=level[late].mean(axis=0) if whole else unknown,
+    )
+
+
+def _stress(problem: DropProblem, theta: Array, b: int, force: Array) -> Array:
+    """Stress of a bearing [Pa], shape (N,), under forces (N, 2) [N], by their size, in the worst direction.
+
+    The direction changes the stress by a few per mille only (one ball more or less below the force).
+    """
+    size = np.hypot(force[:, 0], force[:, 1])
+    worst = int(np.argmax(size))
+    sizes = size[worst] * np.linspace(0.0, 1.0, STRESS_POINTS) ** 2
+    along = force[worst] / max(size[worst], 1e-300)
+    return np.interp(size, sizes, [stress_at_force(problem, theta, b, one * along) for one in sizes])
+
+
+def _size(force: Array) -> Array:
+    """Magnitudes (N, B) of force components (N, K)."""
+    return np.asarray(np.hypot(force[:, 0::2], force[:, 1::2]))
+
+
+def _local_force(force: Array, half: int) -> Array:
+    """Largest force of a bearing within some samples on either side, for both axes, shape (N, K)."""
+    padded = np.pad(_size(force), ((half, half), (0, 0)), mode="edge")
+    largest = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1, axis=0).max(axis=-1)
+    return np.repeat(largest, 2, axis=1)
+
+
+def _transition(model: DropModel, speed: float, dt: float) -> tuple[Array, Array, int]:
+    """Discrete transition of ``[motion, forces, rates]`` and the gravity step, by the matrix exponential."""
+    from scipy.linalg import expm
+
+    p = model.parameters
+    m, n_b = len(p.eigenvalue), len(p.bearing_shape)
+    n, k = 4 * m, 2 * n_b
+    size = n + 2 * k + 1
+    A = np.zeros((size, size))
+    A[: 2 * m, 2 * m : n] = np.eye(2 * m)
+    for axis, sign in ((0, -1.0), (1, 1.0)):
+        rows = slice(2 * m + axis * m, 2 * m + (axis + 1) * m)
+        A[rows, axis * m : (axis + 1) * m] = -np.diag(p.eigenvalue)
+        A[rows, rows] = -np.diag(p.damping)
+        other = slice(2 * m + (1 - axis) * m, 2 * m + (2 - axis) * m)
+        A[rows, other] = sign * speed * p.polar
+        for b in range(n_b):
+            A[rows, n + 2 * b + axis] = -p.bearing_shape[b]
+    A[3 * m : n, -1] = p.gravity
+    A[n : n + k, n + k : n + 2 * k] = np.eye(k)
+    E = expm(A * dt)
+    return E[:-1, :-1], E[:-1, -1], n
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Rotor:
+    """The rotor under unknown forces, in samples: N readings, C channels, K force components, n states.
+
+    ``forces`` are the places of the force components among the states; their rates follow them.
+    """
+
+    dt: float
+    A: Array
+    gravity: Array
+    forces: slice
+    C: Array
+    start: Array
+    start_covariance: Array
+    variances: Array
+    weight: Array
+
+    @property
+    def watched(self) -> Array:
+        """Rows of forces and readings (K + C, n)."""
+        return np.concatenate([np.eye(len(self.A))[self.forces], self.C])
+
+
+def rotor_of(problem: DropProblem) -> _Rotor:
+    """The rotor of a problem under unknown forces at its bearings."""
+    model = problem.model
+    dt = float(problem.time[1] - problem.time[0])
+    A, gravity, n = _transition(model, float(problem.mean[model.layout.rotor_speed]), dt)
+    m, k = model.layout.n_modes, 2 * len(model.parameters.bearing_shape)
+    C = np.zeros((problem.n_channels, len(A)))
+    C[:, : 2 * m] = problem.sensor_rows[:, : 2 * m]
+    start, variance = np.zeros(len(A)), np.zeros(len(A))
+    known = np.diag(problem.covariance)
+    start[: 2 * m] = problem.mean[: 2 * m]
+    variance[: 2 * m] = known[: 2 * m]
+    variance[2 * m : n] = known[model.layout.velocity_of(slice(0, 2 * m))]
+    return _Rotor(
+        dt=dt,
+        A=A,
+        gravity=gravity,
+        forces=slice(n, n + k),
+        C=C,
+        start=start,
+        start_covariance=np.diag(variance),
+        variances=problem.variances,
+        weight=np.repeat(model.load_shares, 2),
+    )
+
+
+def _likeliest_turn(
+    rotor: _Rotor, readings: Array, closed: NDArray[np.bool_], local: Array, turn: float
+) -> float:
+    """Angular frequency of the contacts [rad/s] that makes the readings likeliest, by a parabola."""
+
+    def improbability(octave: int) -> float:
+        if octave not in tried:
+            tried[octave] = forward_pass(rotor, readings, closed, local, turn * 2.0**octave).improbability
+        return tried[octave]
+
+    tried: dict[int, float] = {}
+    best = 0
+    while (
+        improbability(best + 1) < improbability(best) and turn * 2.0 ** (best + 1) * rotor.dt < FASTEST_TURN
+    ):
+        best += 1
+    while best <= 0 and improbability(best - 1) < improbability(best):
+        best -= 1
+    below, least, above = (improbability(best + step) for step in (-1, 0, 1))
+    curvature = below - 2.0 * least + above
+    shift = 0.5 * (below - above) / curvature if curvature > 0.0 else 0.0
+    return float(turn * 2.0 ** (best + min(max(shift, -0.5), 0.5)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Update:
+    """Gain, rows, whitened innovation, inverse of its covariance; ``channels`` is None for the gate."""
+
+    K: Array
+    H: Array
+    whitened: Array
+    inverse: Array
+    channels: NDArray[np.int64] | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Passed:
+    """A forward pass: what the smoother needs, and how improbable the readings are.
+
+    One entry per sample: updates by gate and readings, what is watched, and its rows of the covariance.
+    """
+
+    updates: list[list[_Update]]
+    shown: Array
+    rows: Array
+    improbability: float
+
+
+def forward_pass(
+    rotor: _Rotor, readings: Array, closed: NDArray[np.bool_], local: Array, turn: float
+) -> _Passed:
+    """Kalman filter over the readings (N, C) with unknown forces of local size (N, K) [N]."""
+    dt, f = rotor.dt, rotor.forces
+    k = f.stop - f.start
+    at, rate = np.arange(f.start, f.stop), np.arange(f.stop, f.stop + k)
+    count, size = len(readings), len(rotor.A)
+    strength = TURNED * turn**1.5 * np.maximum(local, rotor.weight)
+    # A rate that is a random walk of density s² moves rate and force together over a sample.
+    of_force, of_both, of_rate = (strength**2 * x for x in (dt**3 / 3.0, dt**2 / 2.0, dt))
+    held = (HELD * rotor.weight) ** 2 / (turn * dt)
+    identity = np.eye(size)
+    x, P = rotor.start, rotor.start_covariance
+    watched = rotor.watched
+    updates, improbability = [], 0.0
+    shown, rows = np.empty((count, len(watched))), np.empty((count, len(watched), size))
+    for i in range(count):
+        if i > 0:
+            x = rotor.A @ x + rotor.gravity
+            P = rotor.A @ P @ rotor.A.T
+            P[at, at] += of_force[i]
+            P[at, rate] += of_both[i]
+            P[rate, at] += of_both[i]
+            P[rate, rate] += of_rate[i]
+        heard, shut = np.flatnonzero(np.isfinite(readings[i])), np.flatnonzero(closed[i])
+        done = []
+        for H, z, R, channels in (
+            (identity[at[shut]], np.zeros(len(shut)), held[shut], None),
+            (rotor.C[heard], readings[i, heard], rotor.variances[heard], heard),
+        ):
+            if len(z) == 0:
+                continue
+            PH = P @ H.T
+            S = H @ PH
+            S[np.diag_indices(len(z))] += R
+            inverse: Array = np.asarray(np.linalg.inv(S), dtype=np.float64)
+            K, e = PH @ inverse, z - H @ x
+            x = x + K @ e
+            left = identity - K @ H
+            P = left @ P @ left.T + (K * R) @ K.T  # Joseph form: stays positive with a channel missing
+            done.append(_Update(K=K, H=H, whitened=inverse @ e, inverse=inverse, channels=channels))
+        if len(heard):
+            improbability += 0.5 * float(e @ done[-1].whitened - np.linalg.slogdet(inverse)[1])
+        updates.append(done)
+        shown[i], rows[i] = watched @ x, watched @ P
+    return _Passed(updates=updates, shown=shown, rows=rows, improbability=improbability)
+
+
+def _backward(rotor: _Rotor, passed: _Passed, *, variances: bool = True) -> tuple[Array, Array]:
+    """Smoothed forces and readings (N, K + C), variances of the forces (N, K): modified Bryson–Frazier."""
+    size, f = len(rotor.A), rotor.forces
+    k = f.stop - f.start
+    shown, variance = passed.shown.copy(), np.empty((len(passed.shown), k))
+    score, information = np.zeros(size), np.zeros((size, size))
+    for i in range(len(shown) - 1, -1, -1):
+        shown[i] -= passed.rows[i] @ score
+        if variances:
+            rows = passed.rows[i, :k]
+            variance[i] = np.diag(rows[:, f]) - np.sum((rows @ information) * rows, axis=1)
+        for update in reversed(passed.updates[i]):
+            K, H = update.K, update.H
+            score = score - H.T @ (K.T @ score + update.whitened)
+            if variances:
+                information = information - H.T @ (K.T @ information)
+                information = information - (information @ K) @ H + H.T @ update.inverse @ H
+        score = rotor.A.T @ score
+        if variances:
+            information = rotor.A.T @ information @ rotor.A
+    return shown, variance
+
+
+def _again(rotor: _Rotor, passed: _Passed, left: Array) -> Array:
+    """Forces (N, K) that the same filter and smoother find in other readings (N, C), from rest.
+
+    Gains do not depend on readings, so that this is a fraction of the work of a pass.
+    """
+    x, shown, updates = np.zeros(len(rotor.A)), np.empty_like(passed.shown), []
+    for i, before in enumerate(passed.updates):
+        x = rotor.A @ x
+        done = []
+        for update in before:
+            z = 0.0 if update.channels is None else left[i, update.channels]
+            e = z - update.H @ x
+            x = x + update.K @ e
+            done.append(replace(update, whitened=update.inverse @ e))
+        shown[i] = rotor.watched @ x
+        updates.append(done)
+    return _backward(rotor, replace(passed, updates=updates, shown=shown), variances=False)[0]

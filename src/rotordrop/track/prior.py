@@ -1,0 +1,126 @@
+"""What is known of a drop before its readings: rotor by its first readings, machine by its description."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.machine import Machine
+from rotordrop.rotor.joint_values import correlate
+from rotordrop.rotor.parameter_table import parameter
+from rotordrop.rotor.parameters import DropModel
+from rotordrop.rotor.statics import levitated_sag
+from rotordrop.rotor.unknowns import Unknown, sensor_prior, smallest_gap
+from rotordrop.track.sensor_form import begin_caught_up, share_in_groups
+
+Array = NDArray[np.float64]
+
+RUNOUT_SIGMA = 0.5e-6
+START_POSITION_SIGMA, BENDING_POSITION_SIGMA, RACE_POSITION_SIGMA = 0.12, 6e-3, 4e-4
+"""How far the rotor, its first bending and a race may be from where they were seen, over the air gap [1]."""
+START_VELOCITY_SIGMA, BENDING_VELOCITY_SIGMA, RACE_VELOCITY_SIGMA = 0.28, 0.021, 1.4e-3
+"""Their velocities at power-off over that of a free fall through the air gap [1]."""
+START_ORBIT_SIGMA = 0.03
+"""Radius of the orbit of the levitated rotor over the air gap [1]."""
+RACE_SPIN_SIGMA = 0.3
+"""Spin of a race at power-off [rad/s]."""
+SPEED_SIGMA = 0.5
+"""Rotor speed at power-off beside its standard error [rad/s]."""
+OWN_SIGMA = (0.3e-6, 0.3e-6, 1e-4, 1e-4)
+"""How far a foundation may be from rest at power-off, displacement [m] and velocity [m/s], x and y."""
+
+
+def fall_time(machine: Machine, gap: float | None = None) -> float:
+    """Time [s] of a free fall through a gap [m], the narrowest of a machine by default."""
+    return math.sqrt(2.0 * (smallest_gap(machine) if gap is None else gap) / float(machine.gravity))
+
+
+def prior_at_power_off(
+    model: DropModel, unknowns: tuple[Unknown, ...], rows: Array, level: Array, speed: tuple[float, float]
+) -> tuple[Array, Array]:
+    """Prior mean (n,) and covariance (n, n) of the whole estimate at power-off.
+
+    Parameters
+    ----------
+    model : DropModel
+        Drop model of the machine.
+    unknowns : tuple of Unknown
+        The parameters to estimate.
+    rows : ndarray, shape (C, s)
+        Displacement along each sensor's direction from the dynamic state.
+    level : ndarray, shape (C,)
+        First readings of every channel [m]; NaN where there is none.
+    speed : tuple of float
+        Rotor speed at power-off and its standard error [rad/s].
+    """
+    layout = model.layout
+    s, n_p, n_c = layout.n_dynamic, len(unknowns), rows.shape[0]
+    mean = np.zeros(s + n_p + 4 * n_c)
+    sigma = np.zeros_like(mean)
+    mean[:s] = model.at_rest()[:s]
+    gap, fall = smallest_gap(model.machine), fall_time(model.machine)
+    _rotor_prior(model, rows, level, speed[0], mean, sigma)
+    for part in (layout.race, layout.support):
+        sigma[part] = RACE_POSITION_SIGMA * gap
+        sigma[layout.velocity_of(part)] = RACE_VELOCITY_SIGMA * float(model.machine.gravity) * fall
+    sigma[layout.race_spin] = RACE_SPIN_SIGMA
+    mean[layout.rotor_speed] = speed[0]
+    sigma[layout.rotor_speed] = math.hypot(SPEED_SIGMA, speed[1])
+    for i, unknown in enumerate(unknowns):
+        mean[s + i], sigma[s + i] = unknown.mean, unknown.sigma
+    for c, sensor in enumerate(model.machine.sensors):
+        gain, offset = s + n_p + c, s + n_p + n_c + c
+        known = sensor_prior(parameter("gain", "sensor"), sensor.gain, gap)
+        mean[gain], sigma[gain] = 1.0 / known.mean - 1.0, known.sigma
+        known = sensor_prior(parameter("offset", "sensor"), sensor.offset, gap)
+        mean[offset], sigma[offset] = known.mean, known.sigma
+    sigma[s + n_p + 2 * n_c :] = RUNOUT_SIGMA
+    sigma[layout.own] = np.resize(OWN_SIGMA, layout.own.stop - layout.own.start)
+    covariance = np.diag(sigma**2)
+    share_in_groups(model, unknowns, covariance[s : s + n_p, s : s + n_p])
+    correlate(model, unknowns, covariance[s : s + n_p, s : s + n_p])
+    if layout.sensor_own:
+        begin_caught_up(layout, rows, mean, covariance)
+    return mean, covariance
+
+
+def start_of(mean: Array, model: DropModel, unknowns: tuple[Unknown, ...]) -> Array:
+    """The prior mean with the unknowns at the guesses of the machine file, which need not be the centre."""
+    start = mean.copy()
+    first = model.layout.n_dynamic
+    start[first : first + len(unknowns)] = [unknown.begin for unknown in unknowns]
+    return start
+
+
+def _rotor_prior(
+    model: DropModel, rows: Array, level: Array, omega: float, mean: Array, sigma: Array
+) -> None:
+    layout, basis = model.layout, model.basis
+    gap = smallest_gap(model.machine)
+    falling = float(model.machine.gravity) * fall_time(model.machine)
+    weight = np.sqrt(model.fe.total_mass)
+    frequency = np.sqrt(np.maximum(basis.eigenvalues, 0.0))
+    softer = np.where(frequency > 0.0, frequency[2] / np.maximum(frequency, 1.0), 1.0)
+    sag = np.zeros(basis.shapes.shape[0])
+    if len(model.machine.ambs) >= 2:
+        sag = np.asarray(levitated_sag(model.fe, model.machine), dtype=np.float64)
+    amplitude = basis.shapes.T @ (model.fe.mass @ sag)
+    amplitude[: basis.n_rigid] = 0.0
+    mean[layout.modal_y] = amplitude
+    rigid = slice(0, basis.n_rigid)
+    observed = level - rows[:, : mean.size][:, layout.modal_y] @ amplitude
+    design = np.hstack([rows[:, layout.modal_x][:, rigid], rows[:, layout.modal_y][:, rigid]])
+    seen = np.isfinite(observed)
+    fitted, *_ = np.linalg.lstsq(design[seen], observed[seen], rcond=None)
+    mean[layout.modal_x][rigid] = fitted[: basis.n_rigid]
+    mean[layout.modal_y][rigid] += fitted[basis.n_rigid :]
+    for part in (layout.modal_x, layout.modal_y):
+        position = BENDING_POSITION_SIGMA * gap * weight * softer**2 + 0.2 * np.abs(amplitude)
+        velocity = BENDING_VELOCITY_SIGMA * falling * weight * softer
+        position[rigid] = START_POSITION_SIGMA * gap * weight
+        circling = START_ORBIT_SIGMA * gap * omega
+        velocity[rigid] = math.hypot(START_VELOCITY_SIGMA * falling, circling) * weight
+        sigma[part] = position
+        sigma[layout.velocity_of(part)] = velocity

@@ -1,0 +1,431 @@
+"""A recorded drop put as an estimation problem: readings, sensor rows, unknowns, prior."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.errors import IdentificationError
+from rotordrop.physics import aerodynamics
+from rotordrop.rotor import layout as L
+from rotordrop.rotor.parameters import DropModel
+from rotordrop.rotor.static_sag import race_sag, static_sag
+from rotordrop.rotor.statics import settled_sag
+from rotordrop.rotor.unknowns import Unknown, all_unknowns, smallest_gap
+from rotordrop.series import noise_by_differences
+from rotordrop.track import _filter as F
+from rotordrop.track import _propagation as P
+from rotordrop.track.prior import fall_time, prior_at_power_off, start_of
+from rotordrop.track.sensor_form import rest_terms, sensor_form
+from rotordrop.track.unknowns import parameter_targets
+
+Array = NDArray[np.float64]
+
+FIRST_READINGS = 0.07
+"""Time after power-off whose mean reading says where the rotor is, over the time of a free fall [1]."""
+SPEED_READING_SIGMA = 1.0
+SPEED_SPACING = 2.5e-3
+"""Time between speed readings that count as independent [s]."""
+AFTER_FALL = 1.4
+"""Time at which parameters are read over the time of a free fall through the widest air gap [1]."""
+FEWEST_DIFFERENCES = 50
+"""Differences from which their median is a noise [1]."""
+NOISE_FLOOR = 0.1e-6
+USUAL_NOISE = 1e-6
+TAIL_VERTICAL_SIGMA, TAIL_HORIZONTAL_SIGMA = 2.8e-3, 0.1
+"""How far the resting rotor may be from where gap and sag put it, over the air gap [1]."""
+SMOOTHED_FRICTION_SPEED = 0.15
+"""Sliding speed [m/s] below which the filter smooths friction: the spin of a race is not known better, so the
+mean of the friction law over what is possible is what a linearisation may use."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordedDrop:
+    """What a record says of a drop, as the filter takes it; N samples, C channels.
+
+    Attributes
+    ----------
+    time : ndarray, shape (N,)
+        Time from power-off [s], evenly spaced.
+    readings : ndarray, shape (N, C)
+        Readings in the positive direction of each sensor [m], hum and 2X runout taken off; NaN where missing.
+    noise : ndarray, shape (C,)
+        Standard deviation of the noise [m]; NaN where the record does not say.
+    initial_speed, initial_speed_error : float
+        Rotor speed at power-off and its standard error [rad/s].
+    speed : ndarray, shape (N,)
+        Measured rotor speed [rad/s], NaN where nobody measured it.
+    tail_level : ndarray, shape (C,), or None
+        Mean readings of the settled tail in the positive direction of each sensor [m].
+    """
+
+    time: Array
+    readings: Array
+    noise: Array
+    initial_speed: float
+    initial_speed_error: float
+    speed: Array
+    tail_level: Array | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fall:
+    """The fall before the first contact: its end [s] and the largest unknown impulse per 50 µs in it [N s].
+
+    Nothing acts on a falling rotor but its weight and what is left of the magnets. Larger impulses would
+    explain a lift that lasts longer than usual.
+    """
+
+    end: float
+    impulse: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class DropProblem:
+    """One recorded drop with all the filter needs; N samples, C channels, n estimated, s dynamic.
+
+    Attributes
+    ----------
+    time : ndarray, shape (N,)
+        Time from power-off [s].
+    readings : ndarray, shape (N, C)
+        Readings in the positive direction of each sensor [m], hum and 2X runout removed.
+    speed : ndarray, shape (N,)
+        Rotor speed [rad/s], NaN where it is not used.
+    sensor_rows : ndarray, shape (C, s)
+        Displacement along each sensor's direction from the dynamic state.
+    variances : ndarray, shape (C,)
+        Noise variance of each channel [m²].
+    mean, covariance : ndarray, shapes (n,), (n, n)
+        Prior at the first sample.
+    start : ndarray, shape (n,)
+        Where the first pass begins: the prior mean with the guesses of the machine file.
+    sensor_form : SensorForm
+        What the sensors do beyond gain, offset and runout.
+    fall : Fall, optional
+        The fall, where the lift of the magnets may last longer than usual.
+    """
+
+    model: DropModel
+    unknowns: tuple[Unknown, ...]
+    targets: P.ParameterTargets
+    time: Array
+    readings: Array
+    speed: Array
+    sensor_rows: Array
+    variances: Array
+    speed_variance: float
+    mean: Array
+    start: Array
+    covariance: Array
+    sensor_form: F.SensorForm
+    fall: Fall | None = None
+
+    @property
+    def reading_rows(self) -> Array:
+        """What the readings show of the dynamic state, shape (C, s): what a sensor that lags has got to."""
+        lagging = self.sensor_form.lag
+        if len(lagging) == 0:
+            return self.sensor_rows
+        rows = np.zeros_like(self.sensor_rows)
+        rows[np.arange(len(lagging)), lagging[:, 0]] = 1.0
+        return rows
+
+    @property
+    def n_dynamic(self) -> int:
+        """Number of dynamic states s."""
+        return self.model.layout.n_dynamic
+
+    @property
+    def parameter_time(self) -> float:
+        """Time from power-off [s] at which parameters are read: shortly after the first contacts.
+
+        Later in a drop friction and race drift with what their laws get wrong.
+        """
+        gap = max(float(bearing.air_gap) for bearing in self.model.machine.touchdown_bearings)
+        return AFTER_FALL * fall_time(self.model.machine, gap)
+
+    @property
+    def parameter_sample(self) -> int:
+        """First sample at that time, or behind the last where the window ends before."""
+        return int(np.searchsorted(self.time, self.parameter_time))
+
+    @property
+    def fall_time(self) -> float:
+        """Time of a free fall through the narrowest air gap [s]."""
+        return fall_time(self.model.machine)
+
+    @property
+    def n_channels(self) -> int:
+        """Number of sensor channels C."""
+        return len(self.variances)
+
+    @property
+    def parameter_slice(self) -> slice:
+        """Where the unknown parameters are in the estimate."""
+        return slice(self.n_dynamic, self.n_dynamic + len(self.unknowns))
+
+    @property
+    def machine_indices(self) -> NDArray[np.int64]:
+        """Entries of the estimate that all drops share: parameters of the machine, gains, offsets."""
+        start = self.n_dynamic
+        shared = [start + i for i, unknown in enumerate(self.unknowns) if unknown.scope == "machine"]
+        first = start + len(self.unknowns)
+        sensors = range(first, first + 2 * self.n_channels)
+        return np.array([*shared, *sensors], dtype=np.int64)
+
+    @property
+    def gap_entries(self) -> NDArray[np.int64]:
+        """Entries of the estimate that hold the air gaps, bearing by bearing."""
+        paths = [unknown.path for unknown in self.unknowns]
+        gaps = [paths.index(f"{name}.air_gap") for name in self.model.bearing_names]
+        return np.array([self.n_dynamic + gap for gap in gaps], dtype=np.int64)
+
+    def sensor_errors(self, estimate: Array) -> tuple[Array, Array]:
+        """Gain errors [1] and offsets [m] of the readings in an estimate (n,) or deviation, shape (C,)."""
+        first, n_c = self.n_dynamic + len(self.unknowns), self.n_channels
+        return estimate[first : first + n_c], estimate[first + n_c : first + 2 * n_c]
+
+    def watched_rows(self, name: str) -> Array:
+        """Linear functions of the estimate that forces and orbit at a bearing depend on, shape (5, n).
+
+        Deflection of race against support in x and y [m], axial offset of the ball rows [m], displacement of
+        the rotor in x and y [m].
+        """
+        layout = self.model.layout
+        b = self.model.bearing_names.index(name)
+        rows = np.zeros((5, len(self.mean)))
+        for axis in range(2):
+            rows[axis, layout.race.start + 2 * b + axis] = 1.0
+            rows[axis, layout.support.start + 2 * b + axis] = -1.0
+        for k, unknown in enumerate(self.unknowns):
+            if unknown.path == f"{name}.preload":
+                rows[2, self.n_dynamic + k] = 1.0
+        rows[3, layout.modal_x] = self.model.parameters.bearing_shape[b]
+        rows[4, layout.modal_y] = self.model.parameters.bearing_shape[b]
+        return rows
+
+    @property
+    def watched(self) -> Array:
+        """The watched functions of all bearings, shape (5 B, n)."""
+        return np.concatenate([self.watched_rows(name) for name in self.model.bearing_names])
+
+
+def build_problem(
+    model: DropModel,
+    drop: RecordedDrop,
+    *,
+    until: float = 0.2,
+    unknowns: tuple[Unknown, ...] | None = None,
+) -> DropProblem:
+    """Put a recorded drop as an estimation problem.
+
+    Parameters
+    ----------
+    model : DropModel
+        Drop model of the machine; its sensors define the channels.
+    drop : RecordedDrop
+        What the record says.
+    until : float
+        End of the window [s].
+    unknowns : tuple of Unknown, optional
+        The parameters to estimate; all by default.
+
+    Raises
+    ------
+    IdentificationError
+        If the rotor does not rest on every touchdown bearing.
+    """
+    _refuse_unloaded(model)
+    unknowns = all_unknowns(model) if unknowns is None else unknowns
+    inside = (drop.time >= 0.0) & (drop.time <= until)
+    readings = drop.readings[inside]
+    rows = sensor_rows(model)
+    level = _first_level(drop.time[drop.time >= 0.0], readings, FIRST_READINGS * fall_time(model.machine))
+    speed = drop.initial_speed, drop.initial_speed_error
+    mean, covariance = prior_at_power_off(model, unknowns, rows, level, speed)
+    problem = DropProblem(
+        model=_prepared(model, drop.initial_speed),
+        unknowns=unknowns,
+        targets=parameter_targets(model, unknowns),
+        time=drop.time[inside],
+        readings=readings,
+        speed=_thinned(drop.time[inside], drop.speed[inside]),
+        sensor_rows=rows,
+        variances=_variances(drop.noise, readings),
+        speed_variance=SPEED_READING_SIGMA**2,
+        mean=mean,
+        start=start_of(mean, model, unknowns),
+        covariance=covariance,
+        sensor_form=sensor_form(model, unknowns, rows),
+    )
+    if drop.tail_level is not None:
+        apply_tail(problem, drop.tail_level, problem.start, problem.covariance.copy())
+        apply_tail(problem, drop.tail_level, problem.mean, problem.covariance)
+    return problem
+
+
+def _refuse_unloaded(model: DropModel) -> None:
+    """Refuse a rotor that would lift off at one end, of which the filter knows nothing."""
+    machine = model.machine
+    z = machine.rotor.node_positions
+    for bearing, share in zip(machine.touchdown_bearings, model.load_shares, strict=True):
+        if share <= 0.0:
+            places = ", ".join(f"{z[one.node - 1]:.3f}" for one in machine.touchdown_bearings)
+            raise IdentificationError(
+                f"the rotor does not rest on the touchdown bearing {bearing.name} ({share:.0f} N of its "
+                f"weight of {machine.rotor.mass * float(machine.gravity):.0f} N): its centre of gravity at "
+                f"{machine.rotor.centre_of_gravity:.3f} m lies beside the bearings at {places} m; expected "
+                "it between them. Check nodes or positions of the bearings and the sections of the rotor"
+            )
+
+
+def _prepared(model: DropModel, omega: float) -> DropModel:
+    p = model.parameters
+    spin, flags = p.spin.copy(), p.flags.copy()
+    spin[L.INITIAL_SPEED] = omega
+    spin[L.POWER_OFF_DELAY] = 0.0
+    flags[L.SPIN_MODE] = aerodynamics.EXPONENTIAL_IN_TIME
+    flags[L.MAGNETS_ACT] = 1
+    bearing = p.bearing.copy()
+    bearing[:, L.SMOOTHING_SPEED] = np.maximum(bearing[:, L.SMOOTHING_SPEED], SMOOTHED_FRICTION_SPEED)
+    return replace(model, parameters=p._replace(spin=spin, flags=flags, bearing=bearing))
+
+
+def _thinned(time: Array, speed: Array) -> Array:
+    """Speed as a measurement now and then: its error is not white, so not every sample counts."""
+    thin = np.full_like(speed, np.nan)
+    every = max(1, round(SPEED_SPACING / float(time[1] - time[0])))
+    thin[::every] = speed[::every]
+    return thin
+
+
+def _variances(noise: Array, readings: Array) -> Array:
+    """Noise variance of each channel [m²]: from the levitated part, else from their roughness."""
+    noise = np.where(np.isfinite(noise), noise, rough_noise(readings))
+    noise[~np.isfinite(noise)] = USUAL_NOISE
+    return np.asarray(noise**2 + NOISE_FLOOR**2)
+
+
+def rough_noise(readings: Array) -> Array:
+    """Standard deviation of white noise on smooth motion, shape (C,) [m]; NaN where too little is read.
+
+    Third differences take the motion away; their median leaves the few at contacts aside.
+    """
+    found = np.full(readings.shape[1], np.nan)
+    for c in range(readings.shape[1]):
+        if np.count_nonzero(np.isfinite(np.diff(readings[:, c], 3))) > FEWEST_DIFFERENCES:
+            found[c] = noise_by_differences(readings[:, c], 3)
+    return found
+
+
+def sensor_rows(model: DropModel) -> Array:
+    """Displacement along each sensor's direction from the dynamic state, shape (C, s) [m per state]."""
+    layout = model.layout
+    rows = np.zeros((len(model.machine.sensors), layout.n_dynamic))
+    for c, sensor in enumerate(model.machine.sensors):
+        shape = model.basis.node_row(sensor.node)
+        angle = float(sensor.angle)
+        rows[c, layout.modal_x] = np.cos(angle) * shape
+        rows[c, layout.modal_y] = np.sin(angle) * shape
+    return rows
+
+
+def _first_level(time: Array, readings: Array, until: float) -> Array:
+    """Mean of the first readings of every channel [m]; NaN where there is none."""
+    first = readings[time[: len(readings)] < time[0] + until]
+    known = np.isfinite(first)
+    if known.all():
+        return np.asarray(first.mean(axis=0))
+    count = known.sum(axis=0)
+    total = np.where(known, first, 0.0).sum(axis=0)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def settled_displacement(problem: DropProblem, theta: Array) -> Array:
+    """Vertical displacement [m] of the resting rotor at each sensor, shape (C,), for parameter values.
+
+    Gap, indentation, race and support sag under the static load shares, the line between the bearings, and
+    the bending of the rotor on its touchdown bearings.
+    """
+    model = problem.model
+    p = _with_theta(problem, theta)
+    loads = np.asarray(model.load_shares)
+    sag = static_sag(p.bearing, race_sag(model.machine.touchdown_bearings, loads), loads)
+    level = -sag.depth(p.bearing[:, L.AIR_GAP])
+    nodes = np.array([bearing.node for bearing in model.machine.touchdown_bearings]) - 1
+    z = np.asarray(model.fe.node_positions)
+    line = np.polynomial.Polynomial.fit(z[nodes], level, min(1, len(nodes) - 1)).convert()
+    bend = np.asarray(settled_sag(model.fe, model.machine))[0::2]
+    sensors = np.array([sensor.node for sensor in model.machine.sensors]) - 1
+    return np.asarray(line(z[sensors]) + bend[sensors])
+
+
+def _with_theta(problem: DropProblem, theta: Array) -> L.KernelParameters:
+    p = private_copy(problem.model.parameters)
+    P.apply_parameters(np.asarray(theta, dtype=np.float64).copy(), problem.targets, p)
+    return p
+
+
+def private_copy(p: L.KernelParameters) -> L.KernelParameters:
+    """Kernel arrays that may be written to."""
+    copies = {name: getattr(p, name).copy() for name in p._fields}
+    return L.KernelParameters(**copies)
+
+
+def apply_tail(problem: DropProblem, tail_level: Array, mean: Array, covariance: Array) -> None:
+    """Tie gap, gains and offsets to the settled tail: update mean (n,) and covariance (n, n) in place.
+
+    Vertically the rotor rests where gap and sag put it; horizontally it may be held aside by friction.
+    """
+    start, n_p, n_c = problem.n_dynamic, len(problem.unknowns), problem.n_channels
+    theta = mean[problem.parameter_slice].copy()
+    height = settled_displacement(problem, theta)
+    slopes = np.zeros((n_c, n_p))
+    for k in range(n_p):
+        if not np.any((problem.targets.target[:, 0] == k) & (problem.targets.target[:, 1] == P.ON_BEARING)):
+            continue
+        trial = theta.copy()
+        trial[k] += problem.targets.step[k]
+        slopes[:, k] = (settled_displacement(problem, trial) - height) / problem.targets.step[k]
+    model = problem.model
+    gap = smallest_gap(model.machine)
+    angles = np.array([float(sensor.angle) for sensor in model.machine.sensors])
+    nodes = np.array([sensor.node for sensor in model.machine.sensors])
+    gain_scratch = np.empty(len(mean))
+    for node in np.unique(nodes):
+        chosen = np.flatnonzero((nodes == node) & np.isfinite(tail_level))
+        if len(chosen) == 0:
+            continue
+        for weights, sigma in _tail_combinations(angles[chosen]):
+            row = np.zeros(len(mean))
+            predicted, observed = 0.0, 0.0
+            for weight, c in zip(weights, chosen, strict=True):
+                along = np.sin(angles[c]) * height[c]
+                for k, per_unit in rest_terms(model, problem.unknowns, int(c), float(height[c])):
+                    along += theta[k] * per_unit
+                    row[start + k] += weight * (1.0 + mean[start + n_p + c]) * per_unit
+                growth = 1.0 + mean[start + n_p + c]
+                predicted += weight * (growth * along + mean[start + n_p + n_c + c])
+                observed += weight * tail_level[c]
+                row[start + n_p + c] += weight * along
+                row[start + n_p + n_c + c] += weight
+                row[problem.parameter_slice] += weight * growth * np.sin(angles[c]) * slopes[c]
+            F.scalar_update(mean, covariance, row, observed - predicted, (sigma * gap) ** 2, gain_scratch)
+
+
+def _tail_combinations(angles: Array) -> list[tuple[Array, float]]:
+    """Weights of the readings of one plane and how far the resting rotor may be from what they predict.
+
+    Distances are over the air gap [1]. Two directions give the height and what friction may hold the rotor
+    aside; a single one sees a mixture.
+    """
+    directions = np.column_stack([np.cos(angles), np.sin(angles)])
+    if np.linalg.matrix_rank(directions, tol=0.05) == 2:
+        sideways, height = np.linalg.pinv(directions)
+        return [(height, TAIL_VERTICAL_SIGMA), (sideways, TAIL_HORIZONTAL_SIGMA)]
+    spread = np.hypot(directions[:, 0] * TAIL_HORIZONTAL_SIGMA, directions[:, 1] * TAIL_VERTICAL_SIGMA)
+    aligned = np.sign(directions @ directions[0])
+    return [(aligned / len(angles), float(np.mean(spread)))]

@@ -1,0 +1,113 @@
+"""What sensors do beyond gain, offset and runout: lag, cross-axis sensitivity, moving bracket, plane."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.errors import UsageError
+from rotordrop.rotor import layout as L
+from rotordrop.rotor.parameters import DropModel
+from rotordrop.rotor.static_sag import support_sag
+from rotordrop.rotor.unknowns import Unknown
+from rotordrop.track._filter import SensorForm
+
+Array = NDArray[np.float64]
+
+CATCHING_UP_SIGMA = 1e-6
+"""How far [m] a sensor may lag behind at power-off."""
+
+
+def sensor_form(model: DropModel, unknowns: tuple[Unknown, ...], rows: Array) -> SensorForm:
+    """What the sensors of a machine do beyond gain, offset and runout, as the filter takes it."""
+    names = [sensor.name for sensor in model.machine.sensors]
+    own = {(u.parameter.path, u.owner): k for k, u in enumerate(unknowns) if u.parameter.owner == "sensor"}
+    terms = [(path, names.index(name), k) for (path, name), k in own.items() if path != "time_constant"]
+    lagging = [own["time_constant", name] for name in names if ("time_constant", name) in own]
+    first = model.layout.sensors.start
+    s = rows.shape[1]
+    return SensorForm(
+        term=np.array([(c, k) for _, c, k in terms], dtype=np.int64).reshape(-1, 2),
+        term_row=np.array([_term_row(model, path, c) for path, c, _ in terms]).reshape(-1, s),
+        lag=np.array([(first + c, k) for c, k in enumerate(lagging)], dtype=np.int64).reshape(-1, 2),
+        lag_row=rows[: len(lagging)],
+        shortest=np.array([unknowns[k].bounds[0] for k in lagging]),
+        longest=np.array([unknowns[k].bounds[1] for k in lagging]),
+    )
+
+
+def _term_row(model: DropModel, path: str, c: int) -> Array:
+    """What a sensor sees per unit of one of its unknowns, shape (s,) [m per state]."""
+    layout, sensor = model.layout, model.machine.sensors[c]
+    row = np.zeros(layout.n_dynamic)
+    sine, cosine = math.sin(float(sensor.angle)), math.cos(float(sensor.angle))
+    if path == "follows_housing":
+        support = layout.support.start + 2 * model.bearing_names.index(sensor.bearing)
+        row[support : support + 2] = -cosine, -sine
+        return row
+    if path == "cross_axis":
+        shape = model.basis.node_row(sensor.node)
+        cosine, sine = -sine, cosine
+    else:
+        shape = _slope(model, sensor.node)
+    row[layout.modal_x], row[layout.modal_y] = cosine * shape, sine * shape
+    return row
+
+
+def _slope(model: DropModel, node: int) -> Array:
+    """Change of the mode shapes along the rotor at a node, shape (m,) [1/m per amplitude]."""
+    z = model.fe.node_positions
+    left, right = max(node - 1, 1), min(node + 1, len(z))
+    rise = model.basis.node_row(right) - model.basis.node_row(left)
+    return np.asarray(rise / (z[right - 1] - z[left - 1]))
+
+
+def share_in_groups(model: DropModel, unknowns: tuple[Unknown, ...], block: Array) -> None:
+    """Add to the prior covariance of the unknowns (P, P) what sensors of a group have in common."""
+    node = {sensor.name: sensor.node for sensor in model.machine.sensors}
+    for i, one in enumerate(unknowns):
+        for k, other in enumerate(unknowns):
+            same = i != k and one.parameter is other.parameter and one.common_variance != 0.0
+            if same and (one.parameter.group == "machine" or node[one.owner] == node[other.owner]):
+                block[i, k] = one.common_variance
+
+
+def begin_caught_up(layout: L.StateLayout, rows: Array, mean: Array, covariance: Array) -> None:
+    """Let the sensors begin at what they see: a levitated rotor moves little within a time constant.
+
+    Raises
+    ------
+    UsageError
+        If some sensors have a time constant and others none.
+    """
+    s = layout.n_dynamic
+    if layout.sensor_own < len(rows):
+        raise UsageError(
+            f"{layout.sensor_own} of {len(rows)} sensors have a 'time_constant'; give it for all of them or "
+            "for none"
+        )
+    spread = np.eye(s)
+    spread[layout.sensors] = rows
+    mean[:s] = spread @ mean[:s]
+    covariance[:s, :s] = spread @ covariance[:s, :s] @ spread.T
+    lagging = np.arange(layout.sensors.start, layout.sensors.stop)
+    covariance[lagging, lagging] += CATCHING_UP_SIGMA**2
+
+
+def rest_terms(
+    model: DropModel, unknowns: tuple[Unknown, ...], c: int, height: float
+) -> Iterator[tuple[int, float]]:
+    """Unknowns of sensor ``c`` and what it sees per unit of each of the rotor at rest [m]; it lies level."""
+    sensor = model.machine.sensors[c]
+    for k, unknown in enumerate(unknowns):
+        if unknown.parameter.owner != "sensor" or unknown.owner != sensor.name:
+            continue
+        if unknown.parameter.path == "cross_axis":
+            yield k, math.cos(float(sensor.angle)) * height
+        elif unknown.parameter.path == "follows_housing":
+            b = model.bearing_names.index(sensor.bearing)
+            sag = support_sag(model.parameters.bearing[b], float(model.load_shares[b]))
+            yield k, math.sin(float(sensor.angle)) * sag

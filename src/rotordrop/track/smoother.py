@@ -1,0 +1,487 @@
+"""Filter and smoother over one recorded drop, and over several drops of one machine."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.rotor import layout as L
+from rotordrop.track import _filter as F
+from rotordrop.track import _propagation as P
+from rotordrop.track._covariance import unpack
+from rotordrop.track.problem import DropProblem, Fall, private_copy
+
+Array = NDArray[np.float64]
+Compact = NDArray[np.float32]
+"""What a pass stores of covariances and transitions for the smoother: seven digits of them are plenty."""
+
+Number = TypeVar("Number", np.float32, np.float64)
+
+REFERENCE_STEP = 50e-6
+"""Time for which the numbers of `PassSettings` hold [s]."""
+STEP = 0.007
+"""Time over which unknown forces are alike, over the time of a free fall through the air gap [1]."""
+SPIN = 0.07
+"""Unknown friction on races and rotor as a coefficient of friction under the weight [1]."""
+LEARNING = 7.0
+"""Time at which a race turns with the rotor, over the time of a free fall [1]; see `PassSettings`."""
+STRETCH = 32_000_000
+"""Memory [B] for what a pass keeps of its samples for the smoother; what does not fit is filtered again.
+
+The smoother takes it twice. Of a whole drop all but an eighth is filtered again, of a first fit of the coarse
+basis less than half of the last windows.
+"""
+LARGEST_PHASE = 1.0
+"""Largest phase [rad] by which the fastest mode may turn in one integration step of the filter."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PassSettings:
+    """Numbers of one pass.
+
+    Attributes
+    ----------
+    substeps : int
+        Integration steps per sample.
+    impulse : float
+        Standard deviation of an unknown impulse per 50 µs at each bearing and axis [N s].
+    share : float
+        The same as a fraction of the contact impulse of 50 µs [1].
+    spin_noise : float
+        Standard deviation of the race spin per 50 µs [rad/s].
+    speed_noise : float
+        Standard deviation of the rotor speed per 50 µs [rad/s].
+    learning_end : float
+        Time [s] after which friction and race may drift faster: once a race turns with the rotor, the
+        friction law near zero speed decides, which no record of positions shows, and must not rewrite what
+        the first impacts said.
+    """
+
+    substeps: int = 4
+    impulse: float = 2e-4
+    share: float = 0.01
+    spin_noise: float = 0.1
+    speed_noise: float = 1e-3
+    learning_end: float = 0.05
+
+    def for_sampling(self, dt: float, fastest: float = 0.0, fall: Fall | None = None) -> P.FilterSettings:
+        """Settings of the kernel for a sample distance [s]; noise grows with the square root of time.
+
+        ``fastest`` is the highest natural frequency of the model [rad/s]; it sets a least number of steps.
+        ``fall`` limits the unknown impulses before the first contact.
+        """
+        growth = math.sqrt(dt / REFERENCE_STEP)
+        return P.FilterSettings(
+            dt=dt,
+            substeps=max(
+                1, round(self.substeps * dt / REFERENCE_STEP), math.ceil(fastest * dt / LARGEST_PHASE)
+            ),
+            impulse=self.impulse * growth,
+            share=self.share / growth,
+            spin_noise=self.spin_noise * growth,
+            speed_noise=self.speed_noise * growth,
+            learning_end=self.learning_end,
+            fall_end=-math.inf if fall is None else fall.end,
+            fall_impulse=math.inf if fall is None else fall.impulse * growth,
+        )
+
+
+def pass_settings(problem: DropProblem, *, force: float, share: float, substeps: int = 4) -> PassSettings:
+    """Settings of a pass by the size of the machine: weight on a bearing, air gap, friction of a race.
+
+    Parameters
+    ----------
+    problem : DropProblem
+        Gives the machine.
+    force, share : float
+        Unknown force as a part of the mean weight on a bearing and of the force of the contact [1]; a new one
+        every `STEP` of a free fall.
+    substeps : int
+        Integration steps per 50 µs.
+    """
+    model = problem.model
+    weight, bearings = float(np.mean(model.load_shares)), model.machine.touchdown_bearings
+    growth = math.sqrt(STEP * problem.fall_time / REFERENCE_STEP)
+    impulse = weight * REFERENCE_STEP * growth
+    race = max(float(bearing.bore_radius) / float(bearing.race.inertia) for bearing in bearings)
+    rotor = sum(float(bearing.bore_radius) for bearing in bearings) / model.fe.polar_inertia
+    return PassSettings(
+        substeps=substeps,
+        impulse=force * impulse,
+        share=share * growth,
+        spin_noise=SPIN * impulse * race,
+        speed_noise=SPIN * impulse * rotor,
+        learning_end=LEARNING * problem.fall_time,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stretch:
+    """What the smoother needs of some samples of a pass beside its means; K samples, n estimated.
+
+    It begins with the sample ``first`` of the pass, or goes on from it. Covariances are stored packed.
+    """
+
+    first: int
+    covariances: Compact
+    transitions: Compact
+    rows: Array
+    gains: Array
+
+
+class Storage:
+    """Memory for one stretch of a pass: what a pass writes to it is overwritten by the next.
+
+    Memory asked of the system anew is as slow to fill for the first time as the filter.
+    """
+
+    def __init__(self) -> None:
+        self._blocks: dict[str, NDArray[Any]] = {}
+        self._held: tuple[Array, Stretch] | None = None
+
+    def array(self, name: str, shape: tuple[int, ...], kind: type[Number]) -> NDArray[Number]:
+        """An array of any content; those of the same name share their memory."""
+        size = math.prod(shape)
+        block = self._blocks.get(name)
+        if block is None or block.size < size or block.dtype != kind:
+            self._blocks[name] = block = np.empty(size, dtype=kind)
+        return block[:size].reshape(shape)
+
+    @property
+    def size(self) -> int:
+        """Memory taken [B]."""
+        return sum(block.nbytes for block in self._blocks.values())
+
+    def hold(self, means: Array, stretch: Stretch) -> None:
+        """Remember which pass, told by its means, and which stretch of it the memory holds."""
+        self._held = means, stretch
+
+    def held(self, means: Array, first: int) -> Stretch | None:
+        """The stretch of a pass that begins at a sample, if nothing was written over it."""
+        if self._held is None or self._held[0] is not means or self._held[1].first != first:
+            return None
+        return self._held[1]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Course:
+    """What every stretch of a pass starts from: the problem, where it begins, where it is linearised."""
+
+    problem: DropProblem
+    settings: P.FilterSettings
+    mean: Array
+    reference: Array
+    length: int
+    smoothing: bool
+
+    def stretch(self, first: int, count: int, storage: Storage) -> Stretch:
+        """Room for the samples of a stretch."""
+        n, s, updates = len(self.mean), self.problem.n_dynamic, self.problem.n_channels + 1
+        kept = count if self.smoothing else 0
+        columns = s + len(self.problem.unknowns)
+        packed = n * (n + 1) // 2 if self.smoothing else 0
+        return Stretch(
+            first=first,
+            covariances=storage.array("covariances", (count, packed), np.float32),
+            transitions=storage.array("transitions", (kept, s, columns), np.float32),
+            rows=storage.array("rows", (kept, updates, n), np.float64),
+            gains=storage.array("gains", (kept, updates, n), np.float64),
+        )
+
+    def followed(
+        self, first: int, covariance: Array, filled: tuple[Array, Array, Array], storage: Storage
+    ) -> tuple[int, Stretch]:
+        """Filter a stretch; gives the sample reached, and ``covariance`` becomes that of the last one.
+
+        ``filled`` are means, innovations and their variances of the whole pass.
+        """
+        problem, means = self.problem, filled[0]
+        chosen = slice(first, min(first + self.length, len(means) - 1) + 1)
+        stretch = self.stretch(first, chosen.stop - first, storage)
+        done = F.forward_pass(
+            min(first, 1),
+            means[first].copy() if first else self.mean,
+            covariance,
+            problem.time[chosen],
+            np.ascontiguousarray(problem.readings[chosen]),
+            problem.speed[chosen],
+            problem.reading_rows,
+            problem.variances,
+            problem.speed_variance,
+            problem.targets,
+            private_copy(problem.model.parameters),
+            self.settings,
+            problem.sensor_form,
+            self.reference[chosen],
+            means[chosen],
+            stretch.covariances,
+            stretch.transitions,
+            stretch.rows,
+            stretch.gains,
+            filled[1][chosen],
+            filled[2][chosen],
+        )
+        storage.hold(means, stretch)
+        return first + int(done), stretch
+
+
+@dataclass(frozen=True, kw_only=True)
+class Forward:
+    """What a forward pass leaves; N samples, n estimated.
+
+    ``done`` is the number of samples reached; ``innovations`` and ``innovation_variances`` have one column
+    per channel and one for the speed, NaN where nothing was measured; ``impulse`` is the size of the
+    unknown impulses of the pass [N s]; ``parameter_sample`` is where parameters are read; ``last`` is the
+    covariance (n, n) of the last sample reached, in single precision. What the smoother needs besides is
+    filtered again from ``starts``, the covariances at the beginning of every stretch: kept for all samples it
+    would be hundreds of megabytes.
+    """
+
+    done: int
+    impulse: float
+    means: Array
+    innovations: Array
+    innovation_variances: Array
+    parameter_sample: int
+    last: Array
+    course: _Course
+    starts: tuple[Array, ...]
+
+    def stretch(self, number: int, storage: Storage) -> Stretch:
+        """What the smoother needs of a stretch: as it is held, or filtered again with the same bits."""
+        first = number * self.course.length
+        held = storage.held(self.means, first)
+        if held is not None:
+            return held
+        filled = (self.means, self.innovations, self.innovation_variances)
+        return self.course.followed(first, self.starts[number].copy(), filled, storage)[1]
+
+    def covariance(self, sample: int) -> Array:
+        """Filtered covariance at a sample, shape (n, n); single precision."""
+        number = min(sample // self.course.length, len(self.starts) - 1)
+        stretch = self.stretch(number, Storage())
+        return _unpacked(stretch, sample, self.means.shape[1])
+
+    @property
+    def nis(self) -> float:
+        """Mean normalised innovation squared [1]; about one when model and noise are right."""
+        values = self.innovations[: self.done] ** 2 / self.innovation_variances[: self.done]
+        return float(np.nanmean(values))
+
+    @property
+    def negative_log_likelihood(self) -> float:
+        """Negative logarithm of the likelihood of the readings, up to a constant [1]."""
+        S = self.innovation_variances[: self.done]
+        values = self.innovations[: self.done] ** 2 / S + np.log(S)
+        return 0.5 * float(np.nansum(values))
+
+
+def fastest_frequency(problem: DropProblem) -> float:
+    """Highest natural frequency [rad/s] of the model: of the rotor's basis or of a race on its balls."""
+    p = problem.model.parameters
+    races = p.bearing[:, L.BEARING_DAMPING] / np.array(
+        [float(b.damping_time) for b in problem.model.machine.touchdown_bearings]
+    )
+    race = np.sqrt(np.max(races / p.bearing[:, L.RACE_MASS]))
+    return float(max(np.sqrt(np.max(p.eigenvalue)), race))
+
+
+def forward(
+    problem: DropProblem,
+    settings: PassSettings,
+    *,
+    mean: Array | None = None,
+    covariance: Array | None = None,
+    reference: Array | None = None,
+    samples: int | None = None,
+    smoothing: bool = True,
+    storage: Storage | None = None,
+) -> Forward:
+    """Run the filter over the first samples of a problem.
+
+    Parameters
+    ----------
+    mean, covariance : ndarray, optional
+        Start estimate, shapes (n,), (n, n); the problem's prior by default.
+    reference : ndarray, shape (M, n), optional
+        Trajectory to linearise at for the first M samples; the filter's own mean afterwards.
+    samples : int, optional
+        Number of samples; all by default.
+    smoothing : bool
+        Keep what the smoother needs.
+    storage : Storage, optional
+        Where to keep it: what an earlier pass left there is overwritten.
+    """
+    count = len(problem.time) if samples is None else min(samples, len(problem.time))
+    mean = problem.mean if mean is None else mean
+    P = np.array(problem.covariance if covariance is None else covariance)
+    n, updates = len(mean), problem.n_channels + 1
+    dt = float(problem.time[1] - problem.time[0])
+    course = _Course(
+        problem=problem,
+        settings=settings.for_sampling(dt, fastest_frequency(problem), problem.fall),
+        mean=np.ascontiguousarray(mean),
+        reference=np.zeros((0, n)) if reference is None else np.ascontiguousarray(reference[:count]),
+        length=_stretch_length(problem) if smoothing else count,
+        smoothing=smoothing,
+    )
+    filled = np.empty((count, n)), np.empty((count, updates)), np.empty((count, updates))
+    storage, starts = storage or Storage(), []
+    for first in range(0, max(count - 1, 1), course.length):
+        starts.append(P.copy())
+        done, stretch = course.followed(first, P, filled, storage)
+        if done <= min(first + course.length, count - 1):
+            break
+    return Forward(
+        done=done,
+        impulse=settings.impulse,
+        means=filled[0],
+        innovations=filled[1],
+        innovation_variances=filled[2],
+        parameter_sample=problem.parameter_sample,
+        last=_unpacked(stretch, max(done - 1, 0), n) if smoothing else P,
+        course=course,
+        starts=tuple(starts),
+    )
+
+
+def _stretch_length(problem: DropProblem) -> int:
+    """Samples of which what the smoother needs fits into `STRETCH`."""
+    n, s, updates = len(problem.mean), problem.n_dynamic, problem.n_channels + 1
+    packed, transition = n * (n + 1) // 2, s * (s + len(problem.unknowns))
+    return max(2, STRETCH // (4 * (packed + transition) + 8 * 2 * updates * n))
+
+
+def _unpacked(stretch: Stretch, sample: int, n: int) -> Array:
+    """Filtered covariance (n, n) at a sample of a stretch."""
+    P = np.empty((n, n))
+    unpack(stretch.covariances[sample - stretch.first], P)
+    return P
+
+
+@dataclass(frozen=True, kw_only=True)
+class Smoothed:
+    """Smoothed estimate of one drop.
+
+    Attributes
+    ----------
+    means : ndarray, shape (N, n)
+        Smoothed estimate at each sample.
+    watched : ndarray, shape (N, G, G)
+        Smoothed covariance of the watched linear functions at each sample.
+    kept : ndarray, shape (K,)
+        Samples whose whole covariance can be asked for.
+    spread, information : ndarray, shape (K, n, n)
+        Filtered P and Λ of these samples: the smoothed covariance is ``P − P Λ P``.
+    score_0, information_0 : ndarray, shapes (n,), (n, n)
+        λ and Λ before the first measurement.
+    """
+
+    filtered: Forward
+    means: Array
+    watched: Array
+    kept: NDArray[np.int64]
+    spread: Array
+    information: Array
+    score_0: Array
+    information_0: Array
+
+    def covariance(self, sample: int) -> Array:
+        """Smoothed covariance at a kept sample, shape (n, n)."""
+        found = np.flatnonzero(self.kept == sample)
+        if len(found) == 0:
+            raise IndexError(f"the covariance of sample {sample} was not kept; kept are {self.kept.tolist()}")
+        P = self.spread[found[0]]
+        return np.asarray(P - P @ self.information[found[0]] @ P)
+
+
+def parameter_sample(smoothed: Smoothed) -> int:
+    """Sample at which parameters are read: shortly after the first contacts."""
+    return min(smoothed.filtered.parameter_sample, len(smoothed.means) - 1)
+
+
+def smooth(
+    filtered: Forward,
+    score: Array | None = None,
+    information: Array | None = None,
+    *,
+    watched: Array | None = None,
+    kept: Sequence[int] | None = None,
+    storage: Storage | None = None,
+) -> Smoothed:
+    """Run the backward pass.
+
+    Parameters
+    ----------
+    score, information : ndarray, shapes (n,), (n, n), optional
+        What later drops say about the last sample.
+    watched : ndarray, shape (G, n), optional
+        Linear functions of the estimate whose covariance is wanted at every sample.
+    kept : sequence of int, optional
+        Samples whose whole covariance is wanted; by default the first, the one that parameters are read at
+        and the last.
+    storage : Storage, optional
+        That of the forward pass, whose last stretch is at hand there.
+    """
+    done, n = filtered.done, filtered.means.shape[1]
+    wanted = (0, min(filtered.parameter_sample, done - 1), done - 1) if kept is None else kept
+    chosen = np.unique(np.asarray(wanted, dtype=np.int64))
+    rows = np.zeros((0, n)) if watched is None else np.ascontiguousarray(watched)
+    means = np.empty((done, n))
+    blocks = np.empty((done, len(rows), len(rows)))
+    spread, stored = np.empty((len(chosen), n, n)), np.empty((len(chosen), n, n))
+    lam = np.zeros(n) if score is None else score.copy()
+    Lam = np.zeros((n, n)) if information is None else information.copy()
+    for stretch in _from_the_last(filtered, storage or Storage()):
+        first = stretch.first
+        samples = slice(first, min(first + filtered.course.length + 1, done))
+        held, own = slice(0, samples.stop - first), min(first, 1)
+        inside = slice(*np.searchsorted(chosen, (first + own, samples.stop)))
+        F.backward_pass(
+            own,
+            filtered.means[samples],
+            stretch.covariances[held],
+            stretch.transitions[held],
+            stretch.rows[held],
+            stretch.gains[held],
+            filtered.innovations[samples],
+            filtered.innovation_variances[samples],
+            rows,
+            chosen[inside] - first,
+            means[samples],
+            blocks[samples],
+            spread[inside],
+            stored[inside],
+            lam,
+            Lam,
+        )
+    return Smoothed(
+        filtered=filtered,
+        means=means,
+        watched=blocks,
+        kept=chosen,
+        spread=spread,
+        information=stored,
+        score_0=lam,
+        information_0=Lam,
+    )
+
+
+def _from_the_last(filtered: Forward, storage: Storage) -> Iterator[Stretch]:
+    """The stretches of a pass, backwards; while one is used, the one before it is filtered again."""
+    here, there = storage, Storage()
+    with ThreadPoolExecutor(max_workers=1) as ahead:
+        number = len(filtered.starts) - 1
+        coming = ahead.submit(filtered.stretch, number, here)
+        while number > 0:
+            stretch, number = coming.result(), number - 1
+            here, there = there, here
+            coming = ahead.submit(filtered.stretch, number, here)
+            yield stretch
+        yield coming.result()

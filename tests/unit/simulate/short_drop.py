@@ -1,0 +1,20 @@
+"""A drop of 2 ms with a contact at both bearings, short enough for the interpreter."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rotordrop.machine import example_machine
+from rotordrop.rotor.parameters import DropModel, build_drop_model
+from rotordrop.simulate.case import DropCase, PlacedStart
+
+START = PlacedStart(
+    displacement=np.array([[20e-6, -270e-6], [-30e-6, -278e-6]]),
+    velocity=np.array([[0.01, -0.07], [0.0, -0.06]]),
+)
+CASE = DropCase(speed=2.0 * np.pi * 60.0, duration=0.002, output_step=1e-4, start=START)
+
+
+def model() -> DropModel:
+    """The reference machine with 6 + 2 modes per plane."""
+    return build_drop_model(example_machine("paper"), "quick")

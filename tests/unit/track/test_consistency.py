@@ -1,0 +1,158 @@
+"""Checks that decide whether intervals hold: what they see, and that they do not see what is not there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rotordrop.estimation.tracked import COARSE_BASIS, drop_problem
+from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.track.consistency import (
+    CORRELATION_LIMIT,
+    NOISE_FACTOR_LIMIT,
+    SENSOR_LIMIT,
+    consistency_checks,
+    judged_by,
+    normalised_innovations,
+)
+from rotordrop.track.smoother import PassSettings, forward, smooth
+
+SETTINGS = PassSettings(impulse=3e-3, share=0.03)
+
+
+def checked(problem, noise_factor: float = 1.0):
+    return {c.name: c for c in consistency_checks(problem, smooth(forward(problem, SETTINGS)), noise_factor)}
+
+
+def test_a_right_model_passes_every_check(impacts, impacts_smoothed):
+    checks = consistency_checks(impacts, impacts_smoothed, 1.0)
+    assert [c.message for c in checks if not c.passed] == []
+    assert {c.name for c in checks} == {
+        "innovation size",
+        "innovation whiteness",
+        "sensor errors",
+        "directions",
+        "parameters",
+        "unknowns of the drop",
+        "remanent force",
+        "process noise",
+        "filter",
+    }
+
+
+def test_innovations_of_a_right_model_are_white_and_of_unit_size(impacts_smoothed):
+    e = normalised_innovations(impacts_smoothed)
+    assert e.shape == (500, 4)
+    assert np.mean(e**2) == pytest.approx(1.0, abs=0.15)
+
+
+def test_sensors_in_the_wrong_plane_are_seen(lp400, prepared):
+    """Sensors said to sit in the bearing planes, 30 mm outboard of where they are."""
+    moved = tuple(sensor.model_copy(update={"node": {5: 4, 25: 26}[sensor.node]}) for sensor in lp400.sensors)
+    wrong = lp400.model_copy(update={"sensors": moved})
+    further = wrong.model_copy(
+        update={"sensors": tuple(s.model_copy(update={"node": {4: 2, 26: 28}[s.node]}) for s in moved)}
+    )
+    problem = drop_problem(build_drop_model(further, COARSE_BASIS), prepared, until=0.025)
+    failed = {name for name, check in checked(problem).items() if not check.passed}
+    assert failed & {"innovation size", "innovation whiteness", "sensor errors", "parameters"}
+
+
+def test_red_noise_is_seen(impacts, random):
+    """Noise of the same size whose neighbours are alike, as a low-pass before the sampling makes it."""
+    white = random.standard_normal(impacts.readings.shape)
+    red = np.zeros_like(white)
+    for i in range(1, len(white)):
+        red[i] = 0.8 * red[i - 1] + 0.6 * white[i]
+    noisy = replace(
+        impacts, readings=impacts.readings + 1.5e-6 * red, variances=impacts.variances + 1.5e-6**2
+    )
+    whiteness = checked(noisy)["innovation whiteness"]
+    assert not whiteness.passed
+    assert f"(limit {CORRELATION_LIMIT:g})" in whiteness.message
+    usual = replace(
+        impacts, readings=impacts.readings + 1.5e-6 * white, variances=impacts.variances + 1.5e-6**2
+    )
+    assert checked(usual)["innovation whiteness"].passed
+
+
+def test_noise_of_another_size_than_stated_is_seen_and_named(impacts, random):
+    louder = impacts.readings.copy()
+    louder[:, 1] += 1.5e-6 * random.standard_normal(len(louder))
+    check = checked(replace(impacts, readings=louder))["innovation size"]
+    assert not check.passed
+    assert "S_NDE_B" in check.message and "usual 0.6 to 1.25" in check.message
+    quieter = replace(impacts, variances=4.0 * impacts.variances)
+    assert not checked(quieter)["innovation size"].passed
+
+
+def test_a_sensor_offset_beyond_its_prior_is_named(impacts):
+    shifted = impacts.readings.copy()
+    shifted[:, 3] += 120e-6
+    check = checked(replace(impacts, readings=shifted))["sensor errors"]
+    assert not check.passed
+    assert f"(limit {SENSOR_LIMIT:g})" in check.message and "channel S_DE_" in check.message
+
+
+def test_a_parameter_far_from_its_prior_is_named(impacts, impacts_smoothed):
+    place = [u.path for u in impacts.unknowns].index("NDE.support.mass")
+    means = impacts_smoothed.means.copy()
+    means[:, impacts.n_dynamic + place] += 4.5 * impacts.unknowns[place].sigma
+    checks = consistency_checks(impacts, replace(impacts_smoothed, means=means), 1.0)
+    check = next(c for c in checks if c.name == "parameters")
+    assert not check.passed
+    assert "NDE.support.mass departs by" in check.message
+
+
+def test_a_remanent_force_that_stays_is_a_gain_error_of_all_sensors(impacts, impacts_smoothed):
+    """Readings times 1.2 were followed with a time constant of 1.3 s, and forces 20 % too high passed."""
+    place = [u.path for u in impacts.unknowns].index("remanence.time_constant")
+    means = impacts_smoothed.means.copy()
+    means[:, impacts.n_dynamic + place] = math.log(1.28)
+    checks = consistency_checks(impacts, replace(impacts_smoothed, means=means), 1.0)
+    check = next(c for c in checks if c.name == "remanent force")
+    assert not check.passed
+    assert "fades in 1.28 s (limit 0.2 s)" in check.message
+
+
+def test_unusual_process_noise_is_seen(impacts, impacts_smoothed):
+    for factor, passes in ((0.5, True), (4.0, True), (NOISE_FACTOR_LIMIT, False)):
+        checks = consistency_checks(impacts, impacts_smoothed, factor)
+        assert next(c for c in checks if c.name == "process noise").passed is passes
+
+
+def test_a_filter_that_gave_up_is_not_consistent(impacts, impacts_smoothed):
+    lost = replace(impacts_smoothed, filtered=replace(impacts_smoothed.filtered, done=300))
+    check = next(c for c in consistency_checks(impacts, lost, 1.0) if c.name == "filter")
+    assert not check.passed
+    assert check.message == "the filter followed 300 of 500 samples"
+
+
+def test_a_lost_channel_is_not_judged(impacts):
+    readings = impacts.readings.copy()
+    readings[:, 1] = np.nan
+    checks = checked(replace(impacts, readings=readings))
+    for name in ("innovation size", "innovation whiteness"):
+        assert "nan" not in checks[name].message
+        assert "S_NDE_B" not in checks[name].message
+
+
+def test_a_beam_is_judged_with_its_own_error(impacts, impacts_smoothed):
+    """Innovations with the likeliest impulses, gains within what a beam bends otherwise; and it is said."""
+    machine = impacts.model.machine
+    beam = machine.changed(rotor=machine.rotor.changed(mass_to_ends=0.0))
+    of_beam = replace(impacts, model=replace(impacts.model, machine=beam))
+    usual, likeliest = impacts_smoothed.filtered, replace(impacts_smoothed.filtered, done=499)
+    assert judged_by(impacts, likeliest, usual) is usual
+    assert judged_by(of_beam, likeliest, usual) is likeliest
+    means = impacts_smoothed.means.copy()
+    means[:, impacts.n_dynamic + len(impacts.unknowns)] += 0.05  # the gain of the first channel
+    passed = {}
+    for problem in (impacts, of_beam):
+        checks = {c.name: c for c in consistency_checks(problem, replace(impacts_smoothed, means=means), 4.1)}
+        passed[problem is of_beam] = checks["sensor errors"].passed
+        assert ("4.1 × their usual size" in checks["process noise"].note) is (problem is of_beam)
+    assert passed == {False: False, True: True}

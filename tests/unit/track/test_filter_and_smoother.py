@@ -1,0 +1,513 @@
+"""Filter and smoother against plain textbook ones, and what must hold through impacts."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rotordrop.track import _propagation as P
+from rotordrop.track import smoother
+from rotordrop.track._covariance import is_covariance, pack, unpack
+from rotordrop.track.calibration import one_pass
+from rotordrop.track.problem import DropProblem, private_copy
+from rotordrop.track.smoother import (
+    PassSettings,
+    Smoothed,
+    Storage,
+    fastest_frequency,
+    forward,
+    smooth,
+)
+
+SETTINGS = PassSettings(impulse=1e-3, share=0.01)
+
+
+class PlainFilter:
+    """Kalman filter as in textbooks: full matrices, readings one by one, Joseph form, nothing clever."""
+
+    def __init__(self, problem: DropProblem, settings: PassSettings = SETTINGS) -> None:
+        self.problem = problem
+        dt = float(problem.time[1] - problem.time[0])
+        self.numbers = settings.for_sampling(dt, fastest_frequency(problem))
+        self.means, self.covariances, self.predicted, self.matrices = [], [], [], []
+        self.innovations = []
+
+    def run(self):
+        mean, covariance = self.problem.mean.copy(), self.problem.covariance.copy()
+        for i in range(len(self.problem.time)):
+            if i > 0:
+                mean, covariance = self._predicted(i, mean, covariance)
+            else:
+                self.matrices.append(np.eye(len(mean)))
+            self.predicted.append((mean.copy(), covariance.copy()))
+            for value, row, expected, variance in self._readings(i):
+                mean, covariance = self._updated(mean, covariance, value, row, expected, variance)
+            self.means.append(mean)
+            self.covariances.append(covariance)
+        return self
+
+    def _predicted(self, i, mean, covariance):
+        problem, n = self.problem, len(mean)
+        s, n_p = problem.n_dynamic, len(problem.unknowns)
+        y = np.zeros(problem.model.layout.size)
+        y[:s] = mean[:s]
+        theta, F = mean[problem.parameter_slice].copy(), np.zeros((s, s + n_p))
+        impulses, p = np.zeros(problem.model.layout.n_bearings), private_copy(problem.model.parameters)
+        P.apply_parameters(theta, problem.targets, p)
+        P.propagate(problem.time[i - 1], y, theta, problem.targets, p, self.numbers, F, impulses)
+        whole = np.eye(n)
+        whole[:s, : s + n_p] = F
+        noise = np.zeros((n, n))
+        P.add_process_noise(noise, p, self.numbers, impulses, problem.targets.drift, np.inf)
+        self.matrices.append(whole)
+        return np.concatenate([y[:s], mean[s:]]), whole @ covariance @ whole.T + noise
+
+    def _readings(self, i):
+        """Readings of a sample with the linearised measurement; taken at the mean at hand."""
+        problem = self.problem
+        s, n_p, n_c = problem.n_dynamic, len(problem.unknowns), problem.n_channels
+        for c in range(n_c):
+            if np.isfinite(problem.readings[i, c]):
+
+                def at(mean, c=c):
+                    first = s + n_p
+                    gain, offset = 1.0 + mean[first + c], mean[first + n_c + c]
+                    turn = np.array([np.cos(mean[s - 1]), np.sin(mean[s - 1])])
+                    seen = problem.sensor_rows[c] @ mean[:s]
+                    runout = mean[[first + 2 * n_c + c, first + 3 * n_c + c]] @ turn
+                    row = np.zeros(len(mean))
+                    row[:s] = gain * problem.sensor_rows[c]
+                    row[first + c], row[first + n_c + c] = seen, 1.0
+                    row[[first + 2 * n_c + c, first + 3 * n_c + c]] = turn
+                    return row, gain * seen + offset + runout
+
+                yield problem.readings[i, c], at, None, problem.variances[c]
+        if np.isfinite(problem.speed[i]):
+            place = problem.model.layout.rotor_speed
+
+            def tacho(mean):
+                return np.eye(len(mean))[place], mean[place]
+
+            yield problem.speed[i], tacho, None, problem.speed_variance
+
+    def _updated(self, mean, covariance, value, at, _, variance):
+        row, expected = at(mean)
+        size = row @ covariance @ row + variance
+        gain = covariance @ row / size
+        keep = np.eye(len(mean)) - np.outer(gain, row)
+        self.innovations.append((value - expected, size))
+        return mean + gain * (value - expected), keep @ covariance @ keep.T + variance * np.outer(gain, gain)
+
+    def smoothed(self):
+        """Rauch–Tung–Striebel, with the inverse taken in units of the predicted standard deviations."""
+        mean, covariance = self.means[-1], self.covariances[-1]
+        means, covariances = [mean], [covariance]
+        for i in range(len(self.means) - 2, -1, -1):
+            ahead, spread = self.predicted[i + 1]
+            unit = np.sqrt(np.diag(spread))
+            cross = (self.covariances[i] @ self.matrices[i + 1].T) / unit
+            gain = np.linalg.solve(spread / np.outer(unit, unit), cross.T).T / unit
+            mean = self.means[i] + gain @ (mean - ahead)
+            covariance = self.covariances[i] + gain @ (covariance - spread) @ gain.T
+            means.append(mean)
+            covariances.append(covariance)
+        return np.array(means[::-1]), np.array(covariances[::-1])
+
+
+@pytest.fixture(scope="module")
+def plain(flight: DropProblem) -> PlainFilter:
+    return PlainFilter(flight).run()
+
+
+@pytest.fixture(scope="module")
+def filtered(flight: DropProblem):
+    return forward(flight, SETTINGS)
+
+
+def deviations_of(covariance: np.ndarray) -> np.ndarray:
+    """Standard deviations; one for what is known exactly (the rotor angle at the beginning)."""
+    variance = np.diag(covariance)
+    return np.sqrt(np.where(variance > 0.0, variance, 1.0))
+
+
+def in_deviations(difference: np.ndarray, covariance: np.ndarray) -> float:
+    """Largest difference in standard deviations of the estimate."""
+    return float(np.max(np.abs(difference) / deviations_of(covariance)))
+
+
+def test_the_forward_filter_is_the_plain_one(flight, plain, filtered):
+    assert filtered.done == len(flight.time) == 60
+    for i in range(filtered.done):
+        assert in_deviations(filtered.means[i] - plain.means[i], plain.covariances[i]) < 1e-6
+        unit = deviations_of(plain.covariances[i])
+        difference = (filtered.covariance(i) - plain.covariances[i]) / np.outer(unit, unit)
+        assert np.abs(difference).max() < 1e-6
+    innovations, sizes = np.array(plain.innovations).T
+    used = np.isfinite(filtered.innovations)
+    np.testing.assert_allclose(filtered.innovations[used], innovations, rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(filtered.innovation_variances[used], sizes, rtol=1e-6)
+
+
+def test_likelihood_and_size_are_those_of_the_innovations(plain, filtered):
+    innovations, sizes = np.array(plain.innovations).T
+    expected = 0.5 * np.sum(innovations**2 / sizes + np.log(sizes))
+    assert filtered.negative_log_likelihood == pytest.approx(expected, rel=1e-9)
+    assert filtered.nis == pytest.approx(np.mean(innovations**2 / sizes), rel=1e-6)
+
+
+def test_the_backward_pass_is_the_plain_smoother(flight, plain, filtered):
+    smoothed = smooth(filtered, kept=range(filtered.done))
+    means, covariances = plain.smoothed()
+    for i in range(0, len(means), 5):
+        assert in_deviations(smoothed.means[i] - means[i], covariances[i]) < 1e-3
+        unit = deviations_of(covariances[i])
+        difference = (smoothed.covariance(i) - covariances[i]) / np.outer(unit, unit)
+        assert np.abs(difference).max() < 1e-3
+
+
+def test_a_packed_covariance_comes_back_whole(random):
+    half = random.normal(size=(7, 7)).astype(np.float32)
+    whole = np.asarray(half + half.T, dtype=np.float64)
+    packed, back = np.full(28, np.nan, dtype=np.float32), np.full((7, 7), np.nan)
+    pack(whole, packed)
+    unpack(packed, back)
+    np.testing.assert_array_equal(back, whole)
+
+
+def all_of(smoothed: Smoothed) -> list[np.ndarray]:
+    """Everything that a backward pass gives."""
+    covariances = [smoothed.covariance(sample) for sample in smoothed.kept]
+    return [
+        smoothed.means,
+        smoothed.watched,
+        smoothed.information,
+        smoothed.score_0,
+        smoothed.information_0,
+        *covariances,
+    ]
+
+
+@pytest.mark.parametrize("length", [2, 7, 29, 58, 59, 60])
+def test_a_pass_in_stretches_has_the_bits_of_a_whole_one(flight, filtered, length, monkeypatch):
+    """Also where a stretch ends at the last sample, or one before it."""
+    kept = (0, length, 2 * length - 1, 59)
+    kept = tuple(sample for sample in kept if sample < 60)
+    whole = smooth(filtered, watched=flight.watched, kept=kept)
+    monkeypatch.setattr(smoother, "_stretch_length", lambda _: length)
+    storage = Storage()
+    parts = forward(flight, SETTINGS, storage=storage)
+    assert len(parts.starts) == math.ceil(59 / length)
+    for one, other in (
+        (parts.means, filtered.means),
+        (parts.innovations, filtered.innovations),
+        (parts.last, filtered.last),
+        (parts.covariance(length - 1), filtered.covariance(length - 1)),
+    ):
+        np.testing.assert_array_equal(one, other)
+    for again in (storage, None, storage):  # at hand, filtered again, and where another stretch is at hand
+        found = smooth(parts, watched=flight.watched, kept=kept, storage=again)
+        for one, other in zip(all_of(found), all_of(whole), strict=True):
+            np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("length", [10, 12, 24, 25])
+def test_a_pass_that_loses_the_drop_is_smoothed_to_where_it_got(flight, length, monkeypatch):
+    """Also where it is lost with the first sample of a stretch."""
+    readings = flight.readings.copy()
+    readings[25] = 1e3
+    far = replace(flight, readings=readings)
+    whole = forward(far, SETTINGS)
+    assert whole.done == 25
+    monkeypatch.setattr(smoother, "_stretch_length", lambda _: length)
+    parts = forward(far, SETTINGS)
+    assert parts.done == 25
+    np.testing.assert_array_equal(parts.last, whole.last)
+    for one, other in zip(all_of(smooth(parts)), all_of(smooth(whole)), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_memory_for_the_smoother_does_not_grow_with_the_drop(flight, monkeypatch):
+    monkeypatch.setattr(smoother, "STRETCH", 600_000)
+    used = {}
+    for samples in (20, 60):
+        storage = Storage()
+        parts = forward(flight, SETTINGS, samples=samples, storage=storage)
+        smooth(parts, storage=storage)
+        used[samples] = storage.size
+        assert len(parts.starts) > 1
+    assert used[20] == used[60] <= 1.2 * 600_000, "a stretch begins with a sample of the one before"
+
+
+def test_a_pass_in_the_memory_of_another_is_the_same(flight, filtered):
+    """Shorter, then whole: nothing of the pass before is left in what the next one gives."""
+    storage = Storage()
+    first = forward(flight, SETTINGS, samples=25, storage=storage)
+    again = forward(flight, SETTINGS, storage=storage)
+    shorter = forward(flight, SETTINGS, samples=25, storage=storage)
+    for one, count in ((first, 25), (shorter, 25)):
+        np.testing.assert_array_equal(one.covariance(24), filtered.covariance(24))
+        np.testing.assert_array_equal(
+            smooth(one, storage=storage).means, smooth(forward(flight, SETTINGS, samples=count)).means
+        )
+    np.testing.assert_array_equal(smooth(again, storage=storage).means, smooth(filtered).means)
+
+
+def test_the_last_sample_has_nothing_to_be_smoothed(filtered):
+    smoothed = smooth(filtered)
+    np.testing.assert_array_equal(smoothed.means[-1], filtered.means[-1])
+    np.testing.assert_array_equal(smoothed.covariance(filtered.done - 1), filtered.last)
+
+
+def test_a_later_sample_only_narrows(flight, filtered):
+    smoothed = smooth(filtered, kept=(0, 20, 40))
+    for i in (0, 20, 40):
+        before, after = np.diag(filtered.covariance(i)), np.diag(smoothed.covariance(i))
+        assert np.all(after <= before * (1.0 + 1e-6))
+        assert np.all(after >= 0.0)
+        assert np.all(after[before > 0.0] > 0.0)
+
+
+def test_watched_functions_have_the_covariance_of_the_whole(flight, filtered, random):
+    gradients = random.standard_normal((3, len(flight.mean)))
+    smoothed = smooth(filtered, watched=gradients, kept=(30,))
+    np.testing.assert_allclose(
+        smoothed.watched[30], gradients @ smoothed.covariance(30) @ gradients.T, rtol=1e-8
+    )
+
+
+def test_a_covariance_that_was_not_kept_is_refused(filtered):
+    with pytest.raises(IndexError, match=r"sample 7 was not kept; kept are \[0, 59\]"):
+        smooth(filtered).covariance(7)
+
+
+def test_the_watched_rows_are_deflection_offset_and_displacement(flight):
+    name = flight.model.bearing_names[1]
+    rows, layout = flight.watched_rows(name), flight.model.layout
+    estimate = np.zeros(len(flight.mean))
+    estimate[layout.race.start + 2], estimate[layout.support.start + 2] = 5e-6, 2e-6
+    estimate[layout.race.start + 3], estimate[layout.support.start + 3] = -4e-6, 1e-6
+    estimate[layout.modal_y] = 1e-5
+    shape = flight.model.parameters.bearing_shape[1]
+    np.testing.assert_allclose(rows @ estimate, [3e-6, -5e-6, 0.0, 0.0, 1e-5 * shape.sum()], atol=1e-18)
+    offset = [u.path for u in flight.unknowns].index(f"{name}.preload")
+    assert rows[2, flight.n_dynamic + offset] == 1.0
+    np.testing.assert_array_equal(flight.watched[5:], rows)
+
+
+def test_missing_readings_are_left_out(flight):
+    """Without any reading of a channel its gain and offset stay as they were before."""
+    readings = flight.readings.copy()
+    readings[:, 2] = np.nan
+    readings[10:20] = np.nan
+    partial = replace(flight, readings=readings, speed=np.full_like(flight.speed, np.nan))
+    found = forward(partial, SETTINGS)
+    assert found.done == len(flight.time)
+    assert not np.isfinite(found.innovations[:, 2]).any()
+    assert not np.isfinite(found.innovations[10:20]).any()
+    assert np.isfinite(found.innovations[20:, [0, 1, 3]]).all()
+    place = flight.n_dynamic + len(flight.unknowns) + 2
+    others = [place - 2, place - 1, place + 1]
+    prior = deviations_of(flight.covariance) ** 2
+    shrunk = np.diag(found.last) / prior
+    assert shrunk[place] > 0.999 * np.max(shrunk[others])
+    plain = PlainFilter(partial).run()
+    assert in_deviations(found.means[-1] - plain.means[-1], plain.covariances[-1]) < 1e-6
+
+
+def test_smoothing_over_a_gap_is_the_plain_one_too(flight):
+    readings = flight.readings.copy()
+    readings[15:30] = np.nan
+    partial = replace(flight, readings=readings)
+    smoothed, plain = smooth(forward(partial, SETTINGS)), PlainFilter(partial).run()
+    means, covariances = plain.smoothed()
+    assert in_deviations(smoothed.means[22] - means[22], covariances[22]) < 1e-3
+
+
+def test_the_covariance_stays_positive_definite_through_impacts(impacts, impacts_filtered):
+    assert impacts_filtered.done == len(impacts.time)
+    contacts = np.abs(np.diff(impacts_filtered.means[:, impacts.model.layout.race], axis=0)).max(axis=0)
+    assert np.all(contacts > 0.2e-6)  # both races were hit
+    smoothed = smooth(impacts_filtered, kept=range(0, impacts_filtered.done, 15))
+    for i in range(0, impacts_filtered.done, 15):
+        for covariance in (impacts_filtered.covariance(i), smoothed.covariance(i)):
+            unit = deviations_of(covariance)
+            assert np.all(np.isfinite(unit)) and np.all(np.diag(covariance) >= 0.0)
+            lowest = np.linalg.eigvalsh(covariance / np.outer(unit, unit))[0]
+            assert lowest > -2e-6  # stored with seven digits
+        filtered = impacts_filtered.covariance(i)
+        np.testing.assert_array_equal(filtered, filtered.T)
+
+
+def test_the_window_can_end_before_the_record(flight):
+    short, whole = forward(flight, SETTINGS, samples=25), forward(flight, SETTINGS)
+    assert len(short.means) == 25
+    np.testing.assert_array_equal(short.means, whole.means[:25])
+
+
+def test_with_a_reference_the_estimate_is_linear_in_the_readings(flight, filtered, random):
+    """A pass along a given trajectory is one Gauss–Newton step, so half the change gives half the answer."""
+    change = 2e-6 * random.standard_normal(flight.readings.shape)
+    means = [
+        smooth(
+            forward(
+                replace(flight, readings=flight.readings + factor * change),
+                SETTINGS,
+                reference=filtered.means,
+            )
+        ).means
+        for factor in (0.0, 0.5, 1.0)
+    ]
+    for i in (0, 30, 59):
+        whole, half = means[2][i] - means[0][i], means[1][i] - means[0][i]
+        assert in_deviations(whole, filtered.covariance(i)) > 0.1
+        assert in_deviations(whole - 2.0 * half, filtered.covariance(i)) < 1e-5
+
+
+def quiet(problem: DropProblem) -> DropProblem:
+    """The problem without any drift: what the drops share is a constant."""
+    still = np.zeros_like(problem.targets.drift)
+    return replace(problem, targets=problem.targets._replace(drift=still, late_drift=still))
+
+
+NOISELESS = PassSettings(impulse=0.0, share=0.0, spin_noise=0.0, speed_noise=0.0)
+
+
+def linear_readings(problem: DropProblem, reference: np.ndarray):
+    """All readings as a linear function of the estimate at the first sample: matrix, values, deviations."""
+    found = forward(problem, NOISELESS, reference=reference)
+    kept = found.stretch(0, Storage())
+    n, s = len(problem.mean), problem.n_dynamic
+    columns = s + len(problem.unknowns)
+    deviation = np.eye(n)  # of the estimate at sample i from its reference, by that at sample 0
+    shift = np.zeros(n)
+    rows, left, sigma = [], [], []
+    for i in range(found.done):
+        if i > 0:
+            F = np.eye(n)
+            F[:s, :columns] = kept.transitions[i]
+            ahead = propagated(problem, reference[i - 1], i)
+            deviation, shift = F @ deviation, F @ shift
+            shift[:s] += ahead - reference[i, :s]
+            shift[s:] += reference[i - 1, s:] - reference[i, s:]
+        for c in range(problem.n_channels + 1):
+            row = kept.rows[i, c]
+            if not row.any():
+                continue
+            value, expected, variance = expected_reading(problem, reference[i], i, c)
+            rows.append(row @ deviation)
+            left.append(value - expected - row @ shift)
+            sigma.append(np.sqrt(variance))
+    return np.array(rows), np.array(left), np.array(sigma)
+
+
+def propagated(problem: DropProblem, at: np.ndarray, i: int) -> np.ndarray:
+    step = PlainFilter(problem, NOISELESS)
+    return step._predicted(i, at, np.zeros((len(at), len(at))))[0][: problem.n_dynamic]
+
+
+def expected_reading(problem: DropProblem, at: np.ndarray, i: int, c: int):
+    values = {}
+    for number, (value, function, _, variance) in enumerate(PlainFilter(problem)._readings(i)):
+        values[number] = (value, function(at)[1], variance)
+    return values[c]
+
+
+def test_two_chained_drops_are_one_joint_least_squares_fit(flight):
+    """Shared parameters and sensors, a start of its own for every drop, nothing random in the motion."""
+    first = quiet(flight)
+    shared = first.machine_indices
+    own = np.setdiff1d(np.arange(len(first.mean)), shared)
+    shifted = first.mean.copy()
+    shifted[first.model.layout.modal_x.start] += 2e-5
+    second = replace(first, mean=shifted, readings=first.readings + 1.5e-6 * np.cos(np.arange(60.0))[:, None])
+    references = [np.array(forward(p, NOISELESS).means) for p in (first, second)]
+    chained = one_pass([first, second], NOISELESS, references, 0.003)
+
+    n = len(first.mean)
+    places = [np.arange(n), np.zeros(n, dtype=int)]
+    places[1][shared], places[1][own] = shared, n + np.arange(len(own))
+    total = n + len(own)
+    prior = np.zeros(total)
+    unit = np.ones(total)
+    information, score = np.zeros((total, total)), np.zeros(total)
+    for d, problem in enumerate((first, second)):
+        prior[places[d]] = problem.mean
+        unit[places[d]] = deviations_of(problem.covariance)
+    own_blocks = [(np.arange(n), first.covariance), (places[1][own], second.covariance[np.ix_(own, own)])]
+    for where, block in own_blocks:
+        scaled = block / np.outer(unit[where], unit[where])
+        known = np.diag(block) == 0.0
+        scaled[known, known] = 1e-16
+        information[np.ix_(where, where)] += np.linalg.inv(scaled)
+    for d, problem in enumerate((first, second)):
+        rows, left, sigma = linear_readings(problem, references[d])
+        weighted = rows * unit[places[d]] / sigma[:, None]
+        start = (prior[places[d]] - references[d][0]) / unit[places[d]]
+        information[np.ix_(places[d], places[d])] += weighted.T @ weighted
+        score[places[d]] += weighted.T @ (left / sigma - weighted @ start)
+    joint = prior + unit * np.linalg.solve(information, score)
+    spread = np.linalg.inv(information) * np.outer(unit, unit)
+    for d, smoothed in enumerate(chained):
+        deviations = np.sqrt(np.diag(spread)[places[d]])
+        assert np.max(np.abs(smoothed.means[0] - joint[places[d]]) / deviations) < 2e-3
+        found = np.sqrt(np.diag(smoothed.covariance(0)))
+        open_ = np.diag(first.covariance) > 0.0
+        assert np.count_nonzero(~open_) == 1  # the rotor angle
+        np.testing.assert_allclose(found[open_], deviations[open_], rtol=2e-3)
+    alone = one_pass([first], NOISELESS, references[:1], 0.003)[0]
+    gap = first.n_dynamic + len(first.unknowns) + first.n_channels  # an offset, which both drops see
+    assert chained[0].covariance(0)[gap, gap] < alone.covariance(0)[gap, gap]
+    assert chained[0].means[-1][shared] == pytest.approx(chained[1].means[0][shared], rel=1e-4, abs=1e-12)
+
+
+def test_what_belongs_to_one_drop_does_not_reach_the_other(flight):
+    """A second drop knows the offsets from the first, but nothing of its remanent force or its start."""
+    first = quiet(flight)
+    chained = one_pass([first, first], NOISELESS, [None, None], 0.003)
+    paths = [unknown.path for unknown in first.unknowns]
+    lift = first.n_dynamic + paths.index("NDE.remanent_force.y")
+    offset = first.n_dynamic + len(first.unknowns) + first.n_channels
+    start, prior = (np.diag(c) for c in (chained[1].filtered.covariance(0), first.covariance))
+    alone = np.diag(chained[0].filtered.covariance(0))
+    assert lift not in first.machine_indices
+    assert offset in first.machine_indices
+    assert start[lift] == pytest.approx(prior[lift], rel=1e-6)
+    assert chained[0].filtered.last[lift, lift] < 0.9 * prior[lift]
+    assert start[offset] < 0.98 * alone[offset]
+
+
+def test_a_machine_too_far_from_the_record_is_refused(flight):
+    from rotordrop.errors import IdentificationError
+
+    broken = replace(flight, mean=np.full_like(flight.mean, np.inf))
+    with pytest.raises(IdentificationError, match=r"lost the drop after 0 of 60 samples.*Check air gap"):
+        one_pass([broken], SETTINGS, [None], 0.003)
+
+
+def test_a_race_that_leaves_its_place_ends_the_pass(flight):
+    """The filter stops where its estimate is no longer a bearing, instead of going on with any number."""
+    far = flight.mean.copy()
+    far[flight.model.layout.race.start] = 5e-3
+    assert forward(flight, SETTINGS, mean=far).done == 0
+    assert not is_covariance(-np.eye(3))
+    assert not is_covariance(np.diag([1.0, np.nan, 1.0]))
+    assert is_covariance(np.eye(3))
+
+
+def test_a_pass_that_loses_the_drop_is_repeated_more_loosely(flight, monkeypatch):
+    """First without the reference, then with larger unknown impulses; the size that followed is kept."""
+    asked = []
+
+    def giving_up(problem, settings, *, mean, covariance, reference=None, samples=None, storage=None):
+        result = forward(problem, settings, mean=mean, covariance=covariance, samples=samples)
+        asked.append((settings.impulse, reference is not None))
+        return result if settings.impulse > 2.0 * SETTINGS.impulse else replace(result, done=3)
+
+    monkeypatch.setattr("rotordrop.track.calibration.forward", giving_up)
+    smoothed = one_pass([flight], SETTINGS, [np.tile(flight.mean, (20, 1))], 0.002)[0]
+    impulse = SETTINGS.impulse
+    assert asked == [(impulse, True), (impulse, False), (8.0 * impulse, False)]
+    assert smoothed.filtered.impulse == 8.0 * impulse

@@ -1,0 +1,250 @@
+"""Forces from the rotor's own motion, for a rotor pushed by known pulses without any contact law."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rotordrop.errors import IdentificationError
+from rotordrop.estimated import Estimated
+from rotordrop.rotor import layout as L
+from rotordrop.rotor.parameters import DropModel
+from rotordrop.track import _propagation as P
+from rotordrop.track.forces import bearing_values, stress_at_force
+from rotordrop.track.input_state import Lent, at_bearings, input_state_estimate, lent_by_record
+from rotordrop.track.problem import DropProblem, private_copy
+
+DT = 5e-5
+COUNT = 800
+PULSES = (  # bearing, direction (x, y), middle [s], duration [s], peak [N]
+    (0, (0.0, -1.0), 8.0e-3, 2.0e-3, 4000.0),
+    (1, (0.6, -0.8), 15.0e-3, 1.5e-3, 2500.0),
+    (0, (-0.6, -0.8), 24.0e-3, 2.5e-3, 3000.0),
+)
+
+
+def true_force(t: float, n_b: int) -> np.ndarray:
+    """Force of the rotor on the races [N], shape (B, 2): half sines squared."""
+    force = np.zeros((n_b, 2))
+    for b, direction, middle, duration, peak in PULSES:
+        if abs(t - middle) < 0.5 * duration:
+            force[b] += peak * np.cos(np.pi * (t - middle) / duration) ** 2 * np.array(direction)
+    return force
+
+
+def pushed_rotor(model: DropModel, speed: float, start: np.ndarray) -> np.ndarray:
+    """Modal amplitudes and velocities, shape (N, 4m), of the rotor under the pulses."""
+    p = model.parameters
+    m, shapes = len(p.eigenvalue), p.bearing_shape
+
+    def derivative(t, y):
+        x, v = y[: 2 * m].reshape(2, m), y[2 * m :].reshape(2, m)
+        push = -true_force(t, len(shapes)).T @ shapes
+        push[1] += p.gravity
+        turn = speed * np.stack([-p.polar @ v[1], p.polar @ v[0]])
+        return np.concatenate([v.ravel(), (push + turn - p.eigenvalue * x - p.damping * v).ravel()])
+
+    states, y, fine = [start], start.copy(), 8
+    h = DT / fine
+    for i in range((COUNT - 1) * fine):
+        t = i * h
+        k1 = derivative(t, y)
+        k2 = derivative(t + 0.5 * h, y + 0.5 * h * k1)
+        k3 = derivative(t + 0.5 * h, y + 0.5 * h * k2)
+        k4 = derivative(t + h, y + h * k3)
+        y = y + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+        if (i + 1) % fine == 0:
+            states.append(y)
+    return np.array(states)
+
+
+@pytest.fixture(scope="module")
+def pushed(flight: DropProblem) -> tuple[DropProblem, Lent, np.ndarray]:
+    """Readings of the pushed rotor with noise, a gate that opens at the pulses, true force."""
+    return recorded_pushes(flight, every=1)
+
+
+def recorded_pushes(flight: DropProblem, every: int) -> tuple[DropProblem, Lent, np.ndarray]:
+    """The pushed rotor with every so manieth reading, the noise density of the readings the same."""
+    model, layout = flight.model, flight.model.layout
+    m, n_b = layout.n_modes, layout.n_bearings
+    start = np.zeros(4 * m)
+    start[: 2 * m] = flight.mean[: 2 * m]
+    states = pushed_rotor(model, float(flight.mean[layout.rotor_speed]), start)[::every]
+    time = DT * np.arange(COUNT)[::every]
+    variances = flight.variances / every
+    noise = np.sqrt(variances) * np.random.default_rng(3).standard_normal((len(time), flight.n_channels))
+    clean = states[:, : 2 * m] @ flight.sensor_rows[:, : 2 * m].T
+    gain, offset = np.array([1.01, 0.99, 1.0, 1.005]), np.array([3e-6, -2e-6, 0.0, 1e-6])
+    force = np.array([true_force(t, n_b) for t in time])
+    problem = replace(
+        flight,
+        time=time,
+        readings=gain * (clean + noise) + offset,
+        variances=variances,
+        speed=np.full(len(time), np.nan),
+    )
+    lent = Lent(
+        gain_errors=gain - 1.0,
+        offsets=offset,
+        radius=np.where(np.abs(force).max(axis=2) > 0.0, 1.0, 0.0),
+        reach=np.full(n_b, 0.5),
+        theta=flight.mean[flight.parameter_slice],
+    )
+    return problem, lent, force
+
+
+def peaks_of(force: np.ndarray, dt: float = DT) -> list[np.ndarray]:
+    """Largest force vector within every pulse."""
+    found = []
+    for b, _, middle, duration, _ in PULSES:
+        near = slice(round((middle - 0.5 * duration) / dt), round((middle + 0.5 * duration) / dt) + 1)
+        size = np.hypot(*force[near, b].T)
+        found.append(force[near, b][np.argmax(size)])
+    return found
+
+
+def test_the_peaks_of_known_pulses_are_found_back(pushed):
+    problem, lent, force = pushed
+    found = input_state_estimate(problem, lent)
+    for estimate, pulse in zip(peaks_of(found.force), PULSES, strict=True):
+        true = pulse[4] * np.array(pulse[1])
+        assert np.hypot(*(estimate - true)) < 0.2 * pulse[4]
+    np.testing.assert_allclose(found.peak, np.hypot(*force.transpose(2, 0, 1)).max(axis=0), rtol=0.12)
+    np.testing.assert_array_equal(found.magnitude.max(axis=0), found.peak)
+    assert np.all(np.isnan(found.mean_late))  # the record ends before
+
+
+def test_the_peak_stress_is_that_of_the_bearing_under_the_peak_force(pushed):
+    """The twin's own force at a deflection leads back to the twin's own stress there."""
+    problem, lent, _ = pushed
+    theta = lent.theta
+    p = private_copy(problem.model.parameters)
+    P.apply_parameters(theta.copy(), problem.targets, p)
+    out = np.empty(4)
+    for b, deflection in ((0, 12e-6), (1, 25e-6)):
+        work = np.empty((2, p.balls.shape[2]))
+        bearing_values(0.0, -deflection, p.bearing[b, L.AXIAL_OFFSET], b, p, work, out)
+        found = stress_at_force(problem, theta, b, np.array([0.0, -out[2]]))
+        assert found == pytest.approx(out[3], rel=1e-6)
+    estimate = input_state_estimate(problem, lent)
+    for b in range(2):
+        worst = estimate.force[estimate.magnitude[:, b].argmax(), b]
+        assert estimate.peak_stress[b] == pytest.approx(stress_at_force(problem, theta, b, worst), rel=1e-9)
+        for i in range(0, COUNT, 50):
+            there = stress_at_force(problem, theta, b, estimate.force[i, b])
+            assert estimate.stress[i, b] == pytest.approx(there, rel=0.01)
+
+
+def test_without_the_twin_the_record_itself_opens_the_gate(pushed):
+    """Nothing of the twin enters: gains within 1 per cent, gaps within their prior, and the same peaks."""
+    problem, _, force = pushed
+    own = lent_by_record(problem)
+    motion = at_bearings(problem, (problem.readings - own.offsets) / (1.0 + own.gain_errors))
+    np.testing.assert_array_equal(own.radius, np.hypot(motion[..., 0], motion[..., 1]))
+    assert np.all((own.reach > 100e-6) & (own.reach < 0.96 * problem.mean[problem.gap_entries]))
+    opened = replace(own, reach=np.zeros(2))  # this rotor is pushed where no race is
+    found = input_state_estimate(problem, opened)
+    np.testing.assert_allclose(found.peak, np.hypot(*force.transpose(2, 0, 1)).max(axis=0), rtol=0.15)
+
+
+def test_the_gate_leaves_room_for_a_rotor_that_bends_beside_the_line_through_its_sensors(flight):
+    """However well the gap is known: pushed by some kN this rotor stands off that line by over 10 µm."""
+    model, layout = flight.model, flight.model.layout
+    m = layout.n_modes
+    start = np.zeros(4 * m)
+    start[: 2 * m] = flight.mean[: 2 * m]
+    states = pushed_rotor(model, float(flight.mean[layout.rotor_speed]), start)
+    line = at_bearings(flight, states[:, : 2 * m] @ flight.sensor_rows[:, : 2 * m].T)
+    shapes = model.parameters.bearing_shape.T
+    path = np.stack([states[:, :m] @ shapes, states[:, m : 2 * m] @ shapes], axis=-1)
+    bent = np.quantile(np.linalg.norm(line - path, axis=2), 0.9, axis=0)
+    known = replace(flight, covariance=np.zeros_like(flight.covariance))
+    room = flight.mean[flight.gap_entries] - lent_by_record(known).reach
+    assert np.all(bent > 5e-6), bent
+    assert np.all(room > bent), (room, bent)
+
+
+@pytest.mark.parametrize("every", [2, 4])
+def test_fewer_readings_of_the_same_information_give_the_same_forces(flight, pushed, every):
+    """Process noise grows with time, not with samples: 5 and 10 kHz find what 20 kHz finds."""
+    problem, lent, force = pushed
+    whole = input_state_estimate(problem, lent)
+    thin, thin_lent, thin_force = recorded_pushes(flight, every)
+    found = input_state_estimate(thin, thin_lent)
+    assert found.turn == pytest.approx(whole.turn, rel=0.35)
+    for one, other, pulse in zip(
+        peaks_of(found.force, every * DT), peaks_of(whole.force), PULSES, strict=True
+    ):
+        assert np.hypot(*(one - other)) < 0.15 * pulse[4]
+    assert np.sqrt(np.mean((found.force - thin_force) ** 2)) < 2.0 * np.sqrt(
+        np.mean((whole.force - force) ** 2)
+    )
+
+
+def test_the_stated_error_holds_the_peak_and_grows_with_noise(flight):
+    problem, lent, force = recorded_pushes(flight, 1)
+    true = np.hypot(*force.transpose(2, 0, 1)).max(axis=0)
+    found = input_state_estimate(problem, lent)
+    assert np.all(np.abs(found.peak - true) < found.peak_error * true)
+    noise = np.random.default_rng(4).standard_normal(problem.readings.shape)
+    worse = replace(
+        problem, readings=problem.readings + 4e-6 * noise, variances=problem.variances + (4e-6) ** 2
+    )
+    poor = input_state_estimate(worse, lent)
+    assert np.all(np.abs(poor.peak - true) < poor.peak_error * true)
+    assert np.all(poor.put_back > 1.5 * found.put_back)
+    assert np.all(poor.peak_error > found.peak_error)
+    np.testing.assert_allclose(poor.stress_error, np.hypot(0.015, 0.4 * poor.peak_error), rtol=0.2)
+
+
+def test_a_loose_race_opens_the_gate_by_its_play(flight):
+    """The race lies on its balls: above it, rotor and race touch nearer to the centre."""
+    tight = lent_by_record(flight)
+    machine = flight.model.machine
+    bearing = machine.touchdown_bearings[0]
+    ball = bearing.bearing.model_copy(
+        update={"clearance": Estimated(value=40e-6), "preload": Estimated(value=0.0)}
+    )
+    loose = bearing.model_copy(update={"bearing": ball})
+    changed = machine.model_copy(update={"touchdown_bearings": (loose, *machine.touchdown_bearings[1:])})
+    reach = lent_by_record(replace(flight, model=replace(flight.model, machine=changed))).reach
+    assert tight.reach[0] - reach[0] == pytest.approx(20e-6, rel=0.05)
+    assert reach[1] == tight.reach[1]
+
+
+def test_a_force_that_no_bearing_carries_is_refused(pushed):
+    problem, lent, _ = pushed
+    theta = lent.theta
+    with pytest.raises(IdentificationError, match=r"NDE: a bearing force of 1000000000000 N was found"):
+        stress_at_force(problem, theta, 0, np.array([0.0, -1e12]))
+
+
+def test_impulses_are_those_of_the_pulses(pushed):
+    problem, lent, force = pushed
+    found = input_state_estimate(problem, lent)
+    np.testing.assert_allclose(
+        DT * found.force.sum(axis=0), DT * force.sum(axis=0), atol=0.05 * DT * np.abs(force).sum(axis=0).max()
+    )
+
+
+def test_in_flight_the_force_is_held_at_zero(pushed):
+    problem, lent, force = pushed
+    found = input_state_estimate(problem, lent)
+    flying = np.abs(force).max(axis=2) == 0.0
+    assert np.count_nonzero(flying) > 1000
+    assert found.magnitude[flying].max() < 0.05 * found.peak.max()
+
+
+def test_missing_readings_are_bridged(pushed):
+    problem, lent, _ = pushed
+    readings = problem.readings.copy()
+    readings[400:405] = np.nan
+    readings[100:130, 2] = np.nan
+    worse = replace(problem, readings=readings)
+    found = input_state_estimate(worse, lent)
+    assert np.all(np.isfinite(found.force))
+    whole = input_state_estimate(problem, lent)
+    np.testing.assert_allclose(found.peak, whole.peak, rtol=0.05)

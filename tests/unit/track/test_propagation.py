@@ -1,0 +1,374 @@
+"""One sample of the drop model with its sensitivity, against finite differences; away from switches."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.special import erf
+
+from rotordrop.rotor import layout as L
+from rotordrop.rotor.parameters import DropModel
+from rotordrop.simulate._rhs import drop_derivative
+from rotordrop.track import _propagation as P
+from rotordrop.track._filter import soften_friction
+from rotordrop.track.problem import DropProblem, private_copy
+from rotordrop.track.smoother import PassSettings
+
+DT = 50e-6
+ANGLES = np.array([-1.3, -1.8])
+"""Direction of the contact at both bearings [rad]."""
+
+
+def settings(substeps: int) -> P.FilterSettings:
+    return PassSettings().for_sampling(DT)._replace(substeps=substeps)
+
+
+def theta_of(problem: DropProblem) -> np.ndarray:
+    theta = np.array([unknown.begin for unknown in problem.unknowns])
+    for i, unknown in enumerate(problem.unknowns):
+        if unknown.begin == 0.0:  # otherwise nothing of it would act
+            theta[i] = 0.4 * unknown.sigma
+    return theta
+
+
+def start_of(model: DropModel, indentation: float) -> np.ndarray:
+    """A state without symmetry: the rotor this far inside the race [m] at both bearings, sliding."""
+    layout, shapes = model.layout, model.parameters.bearing_shape
+    y = np.zeros(layout.size)
+    gaps = model.parameters.bearing[:, L.AIR_GAP]
+    normal = np.column_stack([np.cos(ANGLES), np.sin(ANGLES)])
+    race = max(indentation, 0.0) * normal  # about where the balls hold the race against the contact
+    rigid = np.linalg.inv(shapes[:, :2])
+    for axis, part in enumerate((layout.modal_x, layout.modal_y)):
+        y[part][:2] = rigid @ (race + (gaps + indentation)[:, None] * normal)[:, axis]
+        y[layout.velocity_of(part)][:2] = rigid @ np.array([[0.05, -0.03], [-0.04, -0.06]])[axis]
+    y[layout.race] = race.ravel()
+    y[layout.support] = [0.5e-6, -1e-6, 0.2e-6, -0.5e-6]
+    y[layout.velocity_of(layout.race)] = [0.01, -0.02, 0.0, 0.01]
+    y[layout.race_spin] = [20.0, 35.0]
+    y[layout.rotor_speed] = 380.0
+    y[layout.rotor_angle] = 0.7
+    return y
+
+
+def advanced(problem: DropProblem, y: np.ndarray, theta: np.ndarray, substeps: int):
+    """State after one sample, with sensitivity and contact impulses."""
+    s, n_p = problem.n_dynamic, len(problem.unknowns)
+    after, F = y.copy(), np.zeros((s, s + n_p))
+    impulses = np.zeros(problem.model.layout.n_bearings)
+    p = private_copy(problem.model.parameters)
+    P.apply_parameters(theta.copy(), problem.targets, p)
+    P.propagate(2e-4, after, theta.copy(), problem.targets, p, settings(substeps), F, impulses)
+    return after, F, impulses
+
+
+def scales(problem: DropProblem) -> np.ndarray:
+    """A change of every state and parameter that matters about as much as the others."""
+    layout = problem.model.layout
+    scale = np.ones(problem.n_dynamic)
+    for part, size in (
+        (layout.modal_x, 1e-5),
+        (layout.modal_y, 1e-5),
+        (layout.race, 1e-6),
+        (layout.support, 1e-6),
+    ):
+        scale[part] = size
+        scale[layout.velocity_of(part)] = 3e3 * size
+    scale[layout.own] = np.resize([1e-6, 1e-6, 3e-3, 3e-3], layout.own.stop - layout.own.start)
+    return np.concatenate([scale, [unknown.sigma for unknown in problem.unknowns]])
+
+
+def finite_differences(problem: DropProblem, y: np.ndarray, theta: np.ndarray, substeps: int) -> np.ndarray:
+    s, scale = problem.n_dynamic, scales(problem)
+    columns = []
+    for j, size in enumerate(scale):
+        step = 1e-4 * size
+        ends = []
+        for sign in (1.0, -1.0):
+            moved, changed = y.copy(), theta.copy()
+            if j < s:
+                moved[j] += sign * step
+            else:
+                changed[j - s] += sign * step
+            ends.append(advanced(problem, moved, changed, substeps)[0][:s])
+        columns.append((ends[0] - ends[1]) / (2.0 * step))
+    return np.column_stack(columns)
+
+
+def relative_errors(problem: DropProblem, F: np.ndarray, expected: np.ndarray) -> np.ndarray:
+    """Largest error of every column in units in which states matter equally, over the column's size."""
+    scale = scales(problem)
+    rows = scale[: problem.n_dynamic, None]
+    error = np.abs(F - expected) * scale / rows
+    return error.max(axis=0) / np.maximum((np.abs(expected) * scale / rows).max(axis=0), 1e-3)
+
+
+@pytest.mark.parametrize(("indentation", "touches"), [(-60e-6, False), (4e-6, True)])
+def test_the_sensitivity_is_that_of_finite_differences(flight, indentation, touches):
+    y, theta = start_of(flight.model, indentation), theta_of(flight)
+    _, F, impulses = advanced(flight, y, theta, 64)
+    assert np.all(impulses > 0.01) if touches else np.all(impulses == 0.0)
+    errors = relative_errors(flight, F, finite_differences(flight, y, theta, 64))
+    assert errors[: flight.n_dynamic].max() < 3e-4
+    assert errors.max() < 5e-3
+
+
+@pytest.mark.parametrize("indentation", [-60e-6, 4e-6])
+def test_a_parameter_moves_its_owners_part_and_leaves_the_others_as_they_were(flight, indentation):
+    """The derivative taken owner by owner is that of the whole right-hand side, written anew each time."""
+    y, theta = start_of(flight.model, indentation), theta_of(flight)
+    targets, p = flight.targets, private_copy(flight.model.parameters)
+    work, n_p = np.empty((2, p.balls.shape[2])), len(theta)
+    P.apply_parameters(theta, targets, p)
+    before = private_copy(p)
+    base, other = np.zeros((len(p.bearing) + 1, len(y))), np.zeros(len(y))
+    B = np.full((flight.n_dynamic, n_p), np.nan)
+    P.parameter_jacobian(2e-4, y, theta, targets, p, base, other, work, B)
+    for name in p._fields:
+        np.testing.assert_array_equal(getattr(p, name), getattr(before, name), err_msg=name)
+    rates = np.zeros((2, len(y)))
+    for k in range(n_p):
+        for side, sign in enumerate((-1.0, 1.0)):
+            moved = theta.copy()
+            moved[k] += sign * targets.step[k]
+            P.apply_parameters(moved, targets, p)
+            drop_derivative(2e-4, y, p, rates[side], work)
+        expected = (rates[1] - rates[0])[: flight.n_dynamic] / (2.0 * targets.step[k])
+        size = max(np.abs(expected).max(), 1.0)
+        np.testing.assert_allclose(
+            B[:, k] / size, expected / size, atol=2e-3, err_msg=flight.unknowns[k].path
+        )
+
+
+def test_with_the_steps_of_the_filter_it_is_good_to_some_percent_and_converges(flight):
+    """A race swings at 7 kHz, a turn of half a radian in a step of 12.5 µs; the order is at least two."""
+    y, theta = start_of(flight.model, 4e-6), theta_of(flight)
+    fine = finite_differences(flight, y, theta, 64)
+    every = [relative_errors(flight, advanced(flight, y, theta, n)[1], fine) for n in (4, 8, 16)]
+    states = [errors[: flight.n_dynamic].max() for errors in every]
+    assert states[0] < 0.06
+    for coarse, halved in itertools.pairwise(states):
+        assert halved < 0.25 * coarse
+    for coarse, halved in itertools.pairwise(every):
+        assert halved.max() < 0.35 * coarse.max()
+
+
+def test_a_parameter_of_one_bearing_moves_that_bearing_only_at_first(flight):
+    """In contact, the contact stiffness of a bearing pushes its own race and not the other one."""
+    layout, names = flight.model.layout, flight.model.bearing_names
+    F = advanced(flight, start_of(flight.model, 4e-6), theta_of(flight), 8)[1]
+    paths = [unknown.path for unknown in flight.unknowns]
+    for b, name in enumerate(names):
+        column = F[
+            layout.velocity_of(layout.race), flight.n_dynamic + paths.index(f"{name}.contact.stiffness")
+        ]
+        mine, others = (
+            np.abs(column[2 * b : 2 * b + 2]).max(),
+            np.abs(np.delete(column, [2 * b, 2 * b + 1])).max(),
+        )
+        assert mine > 20.0 * others > 0.0
+
+
+def test_impulses_are_the_time_integral_of_the_contact_force(flight):
+    """Momentum of the whole rotor: gravity, remanent lift and unbalance apart, contacts stop it."""
+    model, layout = flight.model, flight.model.layout
+    y, theta = start_of(flight.model, 4e-6), theta_of(flight)
+    paths = [unknown.path for unknown in flight.unknowns]
+    still = [i for i, path in enumerate(paths) if path.startswith("unbalance") or "remanent" in path]
+    frictionless = [i for i, path in enumerate(paths) if path.endswith("friction.dynamic")]
+    theta[still] = 0.0
+    theta[frictionless] = -40.0
+    boundless = np.full(len(theta), -np.inf)
+    flight = replace(flight, targets=flight.targets._replace(lower=boundless))
+    after, _, impulses = advanced(flight, y, theta, 64)
+    uniform = model.basis.shapes.T @ (model.fe.mass @ np.tile([1.0, 0.0], model.fe.mass.shape[0] // 2))
+    gained = np.array(
+        [uniform @ (after - y)[layout.velocity_of(part)] for part in (layout.modal_x, layout.modal_y)]
+    )
+    gained[1] += DT * model.fe.total_mass * 9.81
+    pushed = -impulses @ np.column_stack([np.cos(ANGLES), np.sin(ANGLES)])
+    np.testing.assert_allclose(gained, pushed, atol=0.02 * np.linalg.norm(pushed))
+
+
+def test_process_noise_is_an_impulse_between_rotor_and_race(flight):
+    layout, p = flight.model.layout, flight.model.parameters
+    n = len(flight.mean)
+    covariance, impulses = np.zeros((n, n)), np.array([0.5, 0.0])
+    numbers = PassSettings(impulse=2e-3, share=0.1, spin_noise=0.2, speed_noise=0.03).for_sampling(DT)
+    drift = np.arange(len(flight.unknowns), dtype=float)
+    P.add_process_noise(covariance, p, numbers, impulses, drift, np.inf)
+    expected = np.zeros((n, n))
+    for b, sigma in enumerate((2e-3 + 0.1 * 0.5, 2e-3)):
+        for axis, part in enumerate((layout.modal_x, layout.modal_y)):
+            push = np.zeros(n)
+            push[layout.velocity_of(part)] = -p.bearing_shape[b]
+            push[layout.velocity_of(layout.race).start + 2 * b + axis] = 1.0 / p.bearing[b, L.RACE_MASS]
+            expected += sigma**2 * np.outer(push, push)
+        spin = 0.2 + 0.1 * sigma * p.bearing[b, L.BORE_RADIUS] / p.bearing[b, L.RACE_INERTIA]
+        expected[layout.race_spin.start + b, layout.race_spin.start + b] = spin**2
+    expected[layout.rotor_speed, layout.rotor_speed] = 0.03**2
+    here = np.arange(flight.parameter_slice.start, flight.parameter_slice.stop)
+    expected[here, here] = drift**2 * DT
+    np.testing.assert_allclose(covariance, expected, rtol=1e-12, atol=1e-30)
+
+
+def single(flight: DropProblem, unknown):
+    """Kernel arrays before and after only this unknown is moved, and the value it was moved to."""
+    from rotordrop.track.unknowns import parameter_targets
+
+    targets = parameter_targets(flight.model, (unknown,))
+    moved = unknown.mean + (0.1 if unknown.logarithmic else 0.5 * unknown.sigma)
+    before, after = private_copy(flight.model.parameters), private_copy(flight.model.parameters)
+    P.apply_parameters(np.array([unknown.mean]), targets, before)
+    P.apply_parameters(np.array([moved]), targets, after)
+    return before, after, unknown.kernel_value(moved)
+
+
+COLUMNS = {
+    "air_gap": {L.AIR_GAP, L.ROTOR_RADIUS},
+    "support.stiffness": {L.SUPPORT_STIFFNESS_X, L.SUPPORT_STIFFNESS_Y},
+    "support.anisotropy": {L.SUPPORT_STIFFNESS_X},
+    "support.mass": {L.SUPPORT_MASS_X, L.SUPPORT_MASS_Y},
+    "support.damping": {L.SUPPORT_DAMPING_X, L.SUPPORT_DAMPING_Y},
+    "contact.stiffness": {L.CONTACT_STIFFNESS},
+    "contact.exponent": {L.CONTACT_EXPONENT, L.CONTACT_STIFFNESS},
+    "contact.damping": {L.CONTACT_DAMPING},
+    "friction.dynamic": {L.FRICTION_DYNAMIC, L.FRICTION_STATIC},
+    "friction.stribeck_speed": {L.STRIBECK_SPEED},
+    "race.inertia": {L.RACE_INERTIA},
+    "race.drag_coefficient": {L.DRAG_COEFFICIENT},
+    "damping_time": {L.BEARING_DAMPING},
+    "preload": {L.AXIAL_OFFSET},
+}
+
+
+DROP_ENTRIES = {
+    "remanent_force": "magnet",
+    "cosine": "unbalance_cos",
+    "sine": "unbalance_sin",
+    "time_constant": "spin",
+}
+
+
+def test_every_parameter_of_a_bearing_sets_its_own_entries_and_no_others(flight):
+    names = flight.model.bearing_names
+    seen = set()
+    for unknown in flight.unknowns:
+        name, path = unknown.owner, unknown.parameter.path
+        if unknown.scope != "machine":
+            continue
+        before, after, value = single(flight, unknown)
+        row = names.index(name)
+        changed = set(zip(*np.nonzero(before.bearing != after.bearing), strict=True))
+        assert changed == {(row, column) for column in COLUMNS[path]}, unknown.path
+        for part in set(before._fields) - {"bearing"}:
+            np.testing.assert_array_equal(getattr(before, part), getattr(after, part))
+        seen.add(path)
+        first = min(COLUMNS[path]) if path != "support.anisotropy" else None
+        if path in ("air_gap", "contact.stiffness", "race.inertia", "preload"):
+            assert after.bearing[row, first] == pytest.approx(value)
+    assert seen == set(COLUMNS)
+
+
+def test_another_exponent_keeps_the_force_at_a_typical_indentation(flight):
+    """Whatever stiffness is estimated beside it; below that indentation a higher exponent is softer."""
+    from rotordrop.rotor.unknowns import TYPICAL_LOADS, typical_depth
+    from rotordrop.track.unknowns import parameter_targets
+
+    by_path = {unknown.path: unknown for unknown in flight.unknowns}
+    chosen = (by_path["DE.contact.exponent"], by_path["DE.contact.stiffness"])
+    targets = parameter_targets(flight.model, chosen)
+    p = private_copy(flight.model.parameters)
+    load = float(np.mean(flight.model.load_shares))
+    depth = typical_depth(flight.model.machine.bearing("DE"), load)
+    for exponent in (1.0, 10.0 / 9.0, 1.5):
+        stiffness = 1.2 * float(flight.model.machine.bearing("DE").contact.stiffness)
+        P.apply_parameters(np.log([exponent, stiffness]), targets, p)
+        row = p.bearing[1]
+        assert row[L.CONTACT_EXPONENT] == pytest.approx(exponent)
+        assert row[L.CONTACT_STIFFNESS] * depth**exponent == pytest.approx(1.2 * TYPICAL_LOADS * load)
+
+
+def test_the_rotor_shrinks_when_the_gap_grows(flight):
+    gap = next(u for u in flight.unknowns if u.path == "DE.air_gap")
+    _, after, _ = single(flight, gap)
+    row = after.bearing[1]
+    assert row[L.ROTOR_RADIUS] + row[L.AIR_GAP] == pytest.approx(row[L.BORE_RADIUS], rel=1e-15)
+
+
+def test_anisotropy_multiplies_what_the_stiffness_sets(flight):
+    """Stiffness comes first whatever the order of the unknowns, and twice applied is not twice scaled."""
+    from rotordrop.track.unknowns import parameter_targets
+
+    by_path = {unknown.path: unknown for unknown in flight.unknowns}
+    chosen = (by_path["NDE.support.anisotropy"], by_path["NDE.support.stiffness"])
+    targets = parameter_targets(flight.model, chosen)
+    p = private_copy(flight.model.parameters)
+    for _ in range(2):
+        P.apply_parameters(np.array([np.log(0.6), np.log(2e8)]), targets, p)
+    assert p.bearing[0, L.SUPPORT_STIFFNESS_Y] == pytest.approx(2e8)
+    assert p.bearing[0, L.SUPPORT_STIFFNESS_X] == pytest.approx(1.2e8)
+
+
+def test_what_belongs_to_a_drop_sets_magnets_unbalance_and_air(flight):
+    model = flight.model
+    count = 0
+    for unknown in flight.unknowns:
+        if unknown.scope != "drop":
+            continue
+        before, after, value = single(flight, unknown)
+        kind = next(part for key, part in DROP_ENTRIES.items() if key in unknown.path)
+        changed = {
+            part for part in before._fields if not np.array_equal(getattr(before, part), getattr(after, part))
+        }
+        assert changed == {kind}
+        if kind == "magnet":
+            a = [amb.name for amb in model.machine.ambs].index(unknown.path.split(".")[0])
+            column = L.REMANENT_X if unknown.path.endswith("x") else L.REMANENT_Y
+            assert after.magnet[a, column] == pytest.approx(value)
+        if kind.startswith("unbalance"):
+            plane = int(unknown.path.split(".")[1])
+            shape = model.basis.node_row(model.machine.unbalances[plane].node)
+            np.testing.assert_allclose(getattr(after, kind), value * shape)
+        count += 1
+    assert count == 4 + 4 + 2
+
+
+def test_the_model_follows_a_drifting_parameter_only_so_far(flight):
+    """Beyond its bounds a parameter acts as at them, with the slope it has there."""
+    paths = [unknown.path for unknown in flight.unknowns]
+    k = paths.index("NDE.race.drag_coefficient")
+    mean = theta_of(flight)[k]
+
+    def taken(theta: float, step: float = 0.0) -> float:
+        return P.bounded_value(k, theta, flight.targets, step) / np.exp(mean)
+
+    bound = mean + np.log(6.0)
+    for theta in (bound, bound + 1.0, bound + 100.0):
+        assert taken(theta) == pytest.approx(6.0, rel=1e-12)
+    assert taken(mean - 50.0) == pytest.approx(1.0 / 6.0, rel=1e-12)
+    assert taken(mean + 0.5) == pytest.approx(np.exp(0.5), rel=1e-12)
+    assert taken(bound + 9.0, 1e-6) - taken(bound) == pytest.approx(6e-6, rel=1e-5)
+    free = paths.index("NDE.support.stiffness")
+    assert not np.isfinite(flight.targets.upper[free])
+
+
+def test_friction_changes_its_sign_as_softly_as_the_spin_is_uncertain(flight):
+    """Against the mean of the sign over a normal distribution of the slip."""
+    p = private_copy(flight.model.parameters)
+    least = p.bearing[:, L.SMOOTHING_SPEED].copy()
+    n_q = 2 * flight.model.layout.n_modes + 4 * len(least)
+    covariance = np.zeros((len(flight.mean), len(flight.mean)))
+    soften_friction(covariance, least, p)
+    np.testing.assert_array_equal(p.bearing[:, L.SMOOTHING_SPEED], least)
+    spin_sigma = 50.0
+    covariance[2 * n_q, 2 * n_q] = spin_sigma**2
+    soften_friction(covariance, least, p)
+    sigma = spin_sigma * p.bearing[0, L.BORE_RADIUS]
+    slip = np.linspace(-4.0, 4.0, 41) * sigma
+    mean_sign = erf(slip / sigma / np.sqrt(2.0))
+    assert np.abs(np.tanh(slip / p.bearing[0, L.SMOOTHING_SPEED]) - mean_sign).max() < 0.05
+    assert p.bearing[1, L.SMOOTHING_SPEED] == least[1]

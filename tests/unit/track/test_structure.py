@@ -1,0 +1,271 @@
+"""What a machine may have beyond the usual model: laws of its equations and what the filter makes of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.unit.track.test_propagation import (
+    advanced,
+    finite_differences,
+    relative_errors,
+    start_of,
+    theta_of,
+)
+
+from rotordrop.errors import UsageError
+from rotordrop.estimated import Estimated
+from rotordrop.estimation.structure import EXTENSIONS
+from rotordrop.estimation.tracked import COARSE_BASIS, drop_problem
+from rotordrop.identification.evidence import Evidence
+from rotordrop.machine import Machine, loads_machine
+from rotordrop.machine.saving import machine_text
+from rotordrop.physics import support
+from rotordrop.rotor import layout as L
+from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.rotor.unknowns import all_unknowns
+from rotordrop.simulate.case import DropCase
+from rotordrop.simulate.drop import simulate_drop
+from rotordrop.track._filter import lag_step
+from rotordrop.track.problem import DropProblem
+
+STRUCTURE = {
+    "support.coupling": 0.2,
+    "support.cubic": 5e7,
+    "support.foundation_share": 0.1,
+    "support.foundation_frequency": 600.0,
+    "support.foundation_damping_ratio": 0.03,
+}
+
+
+def structured(machine: Machine, status: str = "guess") -> Machine:
+    """The machine on turned, cubic supports whose foundations give way, with a stiffer rotor."""
+    values = {
+        f"{bearing.name}.{path}": Estimated(value=value, status=status)
+        for bearing in machine.touchdown_bearings
+        for path, value in STRUCTURE.items()
+    }
+    return machine.with_values(values | {"rotor.stiffness_factor": Estimated(value=1.02, status=status)})
+
+
+def sensing(machine: Machine) -> Machine:
+    """The machine whose sensors lag, see across, move with the housing and stand beside their nodes."""
+    values = {"time_constant": 8e-5, "cross_axis": 0.02, "follows_housing": 0.3, "plane_offset": 4e-3}
+    return machine.with_values(
+        {
+            f"sensors.{sensor.name}.{path}": Estimated(value=value, status="guess")
+            for sensor in machine.sensors
+            for path, value in values.items()
+        }
+    )
+
+
+# the support
+
+
+def form_of(**entries: float) -> np.ndarray:
+    form = np.zeros(support.N_ENTRIES)
+    for name, value in entries.items():
+        form[getattr(support, name)] = value
+    return form
+
+
+def test_a_support_turned_by_an_angle_is_stiff_along_its_own_axes():
+    k_1, k_2, turn = 1.3e8, 0.8e8, math.radians(30.0)
+    c, s = math.cos(turn), math.sin(turn)
+    k_x, k_y = k_1 * c * c + k_2 * s * s, k_1 * s * s + k_2 * c * c
+    form = form_of(COUPLING=(k_1 - k_2) * s * c / math.sqrt(k_x * k_y))
+    for stiffness, (x, y) in ((k_1, (c, s)), (k_2, (-s, c))):
+        force = support.support_force(form, k_x, k_y, 0.0, 0.0, 1e-5 * x, 1e-5 * y, 0.0, 0.0)
+        assert force == pytest.approx((1e-5 * stiffness * x, 1e-5 * stiffness * y), rel=1e-12)
+
+
+@pytest.mark.parametrize("entries", [{"COUPLING": 0.4}, {"CUBIC": 4e8}, {"CUBIC": -1e8, "COUPLING": -0.3}])
+def test_force_is_the_slope_of_the_energy_and_tangent_that_of_the_force(entries):
+    form, k_x, k_y, at = form_of(**entries), 0.7e8, 1e8, np.array([21e-6, -33e-6])
+    force = support.support_force(form, k_x, k_y, 0.0, 0.0, at[0], at[1], 0.0, 0.0)
+    k_xx, k_xy, k_yy = support.support_tangent(form, k_x, k_y, at[0], at[1])
+    step = 1e-9
+    for axis, slope in enumerate(((k_xx, k_xy), (k_xy, k_yy))):
+        ends = [at + sign * step * np.eye(2)[axis] for sign in (1.0, -1.0)]
+        energy = [support.support_energy(form, k_x, k_y, *end) for end in ends]
+        assert (energy[0] - energy[1]) / (2 * step) == pytest.approx(force[axis], rel=1e-6)
+        forces = [support.support_force(form, k_x, k_y, 0.0, 0.0, *end, 0.0, 0.0) for end in ends]
+        found = (np.array(forces[0]) - np.array(forces[1])) / (2 * step)
+        assert found == pytest.approx(slope, rel=1e-6)
+
+
+def test_a_softening_spring_never_pulls():
+    form = form_of(CUBIC=-1e9)
+    for x in (1e-6, 1e-5, 1e-4, 5e-4):
+        assert support.support_force(form, 1e8, 1e8, 0.0, 0.0, x, 0.0, 0.0, 0.0)[0] > 0.0
+
+
+def test_a_drop_on_such_supports_keeps_its_books(lp400):
+    """What is stored and what is lost, in spring, foundation and dampers, add up."""
+    result = simulate_drop(structured(lp400), DropCase(speed=2.0 * math.pi * 60.0, duration=0.05))
+    plain = simulate_drop(lp400, DropCase(speed=2.0 * math.pi * 60.0, duration=0.05))
+    assert result.certificate is not None
+    assert result.certificate.energy_residual < 1e-6 * result.certificate.energy_scale
+    apart = np.abs(result.bearing_force - plain.bearing_force).max()
+    assert apart > 0.05 * np.abs(plain.bearing_force).max()
+
+
+def test_a_support_without_form_is_the_plain_one_bit_by_bit(lp400):
+    """Neutral entries change nothing but rounding; without any no term of them is computed."""
+    model = build_drop_model(lp400, "quick")
+    assert not model.parameters.bearing[:, L.SUPPORT_FORM : L.SUPPORT_FORM_END].any()
+    assert model.layout.bearing_own == () and model.layout.sensor_own == 0
+    neutral = lp400.with_values({f"{n}.support.coupling": 0.0 for n in model.bearing_names})
+    case = DropCase(speed=2.0 * math.pi * 60.0, duration=0.02)
+    one, two = (simulate_drop(machine, case).bearing_force for machine in (lp400, neutral))
+    assert np.abs(one - two).max() < 1e-5 * np.abs(one).max()
+
+
+# the unknowns
+
+
+@pytest.mark.parametrize("extension", EXTENSIONS, ids=lambda extension: extension.name)
+def test_an_extension_adds_unknowns_and_a_machine_file_holds_them(lp400, extension):
+    extended = extension.added_to(lp400)
+    assert loads_machine(machine_text(extended)) == extended
+    assert extension.values(lp400) and not extension.values(extended)  # what is named is not named anew
+    usual = {u.path: u.sigma for u in all_unknowns(build_drop_model(lp400, COARSE_BASIS))}
+    found = {u.path: u for u in all_unknowns(build_drop_model(extended, COARSE_BASIS))}
+    assert set(usual) <= set(found)
+    wider = [path for path, sigma in usual.items() if found[path].sigma > 1.5 * sigma]
+    assert set(found) - set(usual) or wider
+    for path in set(found) - set(usual):
+        low, high = found[path].bounds
+        assert low <= found[path].mean < high and found[path].scope == "machine", path
+
+
+def test_a_foundation_is_given_whole(lp400):
+    with pytest.raises(UsageError, match=r"'foundation_share' but no 'foundation_frequency'"):
+        lp400.with_values({"NDE.support.foundation_share": 0.1})
+
+
+def test_what_both_sensors_of_a_plane_see_across_is_a_turn_and_has_a_prior_of_its_own(lp400, prepared):
+    machine = next(e for e in EXTENSIONS if e.name == "cross-axis sensitivity").added_to(lp400)
+    problem = drop_problem(build_drop_model(machine, COARSE_BASIS), prepared, until=0.003)
+    names = [sensor.name for sensor in machine.sensors if sensor.node == machine.sensors[0].node]
+    at = [problem.n_dynamic + k for k, u in enumerate(problem.unknowns) if u.owner in names]
+    block = problem.covariance[np.ix_(at, at)]
+    together, apart = np.array([0.5, 0.5]), np.array([0.5, -0.5])
+    assert math.sqrt(together @ block @ together) == pytest.approx(0.003, rel=0.05)
+    assert math.sqrt(apart @ block @ apart) == pytest.approx(0.03 / math.sqrt(2.0), rel=0.05)
+
+
+# the filter
+
+
+@pytest.fixture(scope="module")
+def extended_flight(lp400: Machine, prepared: Evidence) -> DropProblem:
+    return drop_problem(build_drop_model(structured(lp400), COARSE_BASIS), prepared, until=0.003)
+
+
+@pytest.mark.parametrize("indentation", [-60e-6, 4e-6])
+def test_the_sensitivity_of_such_a_machine_is_that_of_finite_differences(extended_flight, indentation):
+    problem = extended_flight
+    y, theta = start_of(problem.model, indentation), theta_of(problem)
+    y[problem.model.layout.own] = np.resize([2e-6, -3e-6, 1e-3, -2e-3], 8)
+    _, F, _ = advanced(problem, y, theta, 64)
+    errors = relative_errors(problem, F, finite_differences(problem, y, theta, 64))
+    assert errors[: problem.n_dynamic].max() < 3e-4
+    assert errors.max() < 5e-3
+
+
+@pytest.fixture(scope="module")
+def lagging(lp400: Machine, prepared: Evidence) -> DropProblem:
+    return drop_problem(build_drop_model(sensing(lp400), COARSE_BASIS), prepared, until=0.003)
+
+
+def test_a_lag_follows_a_straight_line_exactly(lagging):
+    """Of a ramp, a first-order lag stays behind by slope times time constant, whatever the sampling."""
+    problem, dt, slope = lagging, 5e-5, 0.07
+    layout, s = problem.model.layout, problem.n_dynamic
+    estimate = problem.mean[: s + len(problem.unknowns)].copy()
+    estimate[:s] = 0.0
+    form = problem.sensor_form._replace(term=np.zeros((0, 2), dtype=np.int64), term_row=np.zeros((0, s)))
+    seen = form.lag_row[0]
+    for step in range(60):
+        after = estimate.copy()
+        after[layout.modal_x], after[layout.modal_y] = (
+            slope * (step + 1) * dt * seen[part] / (seen @ seen) for part in (layout.modal_x, layout.modal_y)
+        )
+        lag_step(estimate, after, form, dt, np.zeros((s, len(estimate))))
+        estimate = after
+    behind = slope * 60 * dt - estimate[layout.sensors.start]
+    assert behind == pytest.approx(slope * 8e-5 * (1.0 - math.exp(-60 * dt / 8e-5)), rel=1e-9)
+
+
+def test_the_sensitivity_of_a_lag_is_that_of_finite_differences(lagging, random):
+    problem = lagging
+    s, n = problem.n_dynamic, problem.n_dynamic + len(problem.unknowns)
+    before = problem.mean[:n].copy()
+    before[:s] += 1e-5 * random.standard_normal(s)
+
+    def stepped(start: np.ndarray) -> np.ndarray:
+        after = start.copy()
+        after[:s] = motion @ start[:s]
+        lag_step(start, after, problem.sensor_form, 5e-5, np.zeros((s, n)))
+        return after[:s]
+
+    motion = np.eye(s) + 0.05 * random.standard_normal((s, s))
+    F = np.zeros((s, n))
+    F[:, :s] = motion
+    after = before.copy()
+    after[:s] = motion @ before[:s]
+    lag_step(before, after, problem.sensor_form, 5e-5, F)
+    rows = problem.model.layout.sensors
+    for j in range(n):
+        step = 1e-7 if j < s else 1e-5
+        ends = [stepped(before + sign * step * np.eye(n)[j])[rows] for sign in (1.0, -1.0)]
+        assert (ends[0] - ends[1]) / (2 * step) == pytest.approx(F[rows, j], rel=1e-4, abs=1e-8)
+
+
+def test_sensors_read_as_their_form_says(lp400, prepared):
+    """The reading predicted is that of the machine by hand: across, with the housing, beside the node."""
+    machine = sensing(lp400)
+    machine = machine.model_copy(
+        update={"sensors": tuple(s.model_copy(update={"time_constant": None}) for s in machine.sensors)}
+    )
+    problem = drop_problem(build_drop_model(machine, COARSE_BASIS), prepared, until=0.003)
+    layout, basis = problem.model.layout, problem.model.basis
+    state = np.random.default_rng(2).standard_normal(problem.n_dynamic) * 1e-5
+    sensor = machine.sensors[0]
+    z = np.asarray(problem.model.fe.node_positions)
+    slope = (basis.node_row(sensor.node + 1) - basis.node_row(sensor.node - 1)) / (
+        z[sensor.node] - z[sensor.node - 2]
+    )
+    rows = basis.node_row(sensor.node) + 4e-3 * slope, basis.node_row(sensor.node)
+    (x, y), (plain_x, plain_y) = ((row @ state[layout.modal_x], row @ state[layout.modal_y]) for row in rows)
+    b = problem.model.bearing_names.index(sensor.bearing)
+    hx, hy = state[layout.support][2 * b : 2 * b + 2]
+    c, s = math.cos(float(sensor.angle)), math.sin(float(sensor.angle))
+    expected = c * (x - 0.3 * hx) + s * (y - 0.3 * hy) + 0.02 * (-s * plain_x + c * plain_y)
+    estimate = np.concatenate([state, [u.begin for u in problem.unknowns]])
+    from rotordrop.track._filter import seen_by
+
+    seen = seen_by(0, estimate, problem.sensor_rows[0], problem.sensor_form, problem.n_dynamic)
+    assert seen == pytest.approx(expected, rel=1e-9)
+
+
+def test_some_sensors_with_a_time_constant_and_some_without_are_refused(lp400, prepared):
+    machine = lp400.with_values({f"sensors.{lp400.sensors[0].name}.time_constant": 5e-5})
+    with pytest.raises(UsageError, match="1 of 4 sensors have a 'time_constant'"):
+        drop_problem(build_drop_model(machine, COARSE_BASIS), prepared, until=0.003)
+
+
+def test_before_the_first_contact_unknown_impulses_are_small_where_a_lift_may_last(lp400, prepared):
+    machine = next(e for e in EXTENSIONS if e.name == "long remanence").added_to(lp400)
+    model = build_drop_model(machine, COARSE_BASIS)
+    problem = drop_problem(model, prepared, until=0.003)
+    assert problem.fall is not None
+    assert problem.fall.end == pytest.approx(prepared.power_off.contact - prepared.power_off.value, abs=1e-3)
+    assert problem.fall.impulse < 2e-4
+    usual = drop_problem(build_drop_model(lp400, COARSE_BASIS), prepared, until=0.003)
+    assert usual.fall is None
+    assert replace(usual, fall=None) is not None

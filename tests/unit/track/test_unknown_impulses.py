@@ -1,0 +1,103 @@
+"""The size of the unknown impulses is the likeliest one, and the estimate is made with it."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rotordrop.track import unknown_impulses
+from rotordrop.track.calibration import Stage, TrackedDrops, track
+from rotordrop.track.unknown_impulses import LARGEST, SMALLEST, likeliest_noise, with_noise
+
+STAGE = Stage(until=0.012, force=0.07, share=0.01, passes=1)
+
+
+def fit_that_needs(*factors: float) -> Any:
+    """A fit of two drops whose last passes needed so much larger impulses."""
+    drop = SimpleNamespace(means=np.zeros((10, 1)))
+    return SimpleNamespace(noise_factors=factors, smoothed=[drop] * len(factors))
+
+
+@pytest.mark.parametrize(
+    ("likeliest", "needed"),
+    [(0.125, 1.0), (0.3, 1.0), (0.9, 1.0), (1.1, 1.0), (2.9, 1.0), (30.0, 1.0), (17.0, 8.0)],
+)
+def test_the_size_is_that_of_the_least_improbability(
+    likeliest: float, needed: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A parabola in the logarithm is found exactly, wherever its lowest point lies."""
+
+    def passes(_fit: Any, _stage: Stage, factor: float) -> list[Any]:
+        value = 30.0 * math.log(factor / likeliest) ** 2
+        return [SimpleNamespace(done=10, negative_log_likelihood=share * value) for share in (0.3, 0.7)]
+
+    monkeypatch.setattr(unknown_impulses, "forward_passes", passes)
+    assert likeliest_noise(fit_that_needs(1.0, needed), STAGE) == pytest.approx(likeliest)
+
+
+@pytest.mark.parametrize(("likeliest", "limit"), [(1e-4, SMALLEST), (1e4, LARGEST)])
+def test_the_size_stays_within_its_limits(
+    likeliest: float, limit: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def passes(_fit: Any, _stage: Stage, factor: float) -> list[Any]:
+        return [SimpleNamespace(done=10, negative_log_likelihood=math.log(factor / likeliest) ** 2)]
+
+    monkeypatch.setattr(unknown_impulses, "forward_passes", passes)
+    assert likeliest_noise(fit_that_needs(1.0), STAGE) == limit
+
+
+def test_no_size_is_smaller_than_the_one_that_followed_the_drop(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else a drop that the usual impulses lose would be called one that the model follows."""
+
+    def passes(_fit: Any, _stage: Stage, factor: float) -> list[Any]:
+        return [SimpleNamespace(done=10, negative_log_likelihood=math.log(factor / 2.0) ** 2)]
+
+    monkeypatch.setattr(unknown_impulses, "forward_passes", passes)
+    assert likeliest_noise(fit_that_needs(8.0), STAGE) == 8.0
+
+
+def test_the_last_pass_goes_to_the_end_of_the_longest_drop(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where the record of the first one ends before."""
+    ends: list[float] = []
+
+    def one_pass(_problems: Any, _settings: Any, _references: Any, until: float, **_: Any) -> list[Any]:
+        ends.append(until)
+        return []
+
+    monkeypatch.setattr(unknown_impulses, "one_pass", one_pass)
+    monkeypatch.setattr(unknown_impulses, "stage_settings", lambda *_: None)
+    drops = [SimpleNamespace(means=np.zeros((count, 1)), filtered=None) for count in (50, 200)]
+    problems = [SimpleNamespace(time=1e-3 * np.arange(count)) for count in (50, 400)]
+    fit: Any = TrackedDrops(problems=tuple(problems), smoothed=tuple(drops), nis=())  # type: ignore[arg-type]
+    with_noise(fit, STAGE, 1.0)
+    assert ends == [pytest.approx(0.199)]
+
+
+def test_a_size_that_loses_a_drop_is_not_the_likeliest(monkeypatch: pytest.MonkeyPatch) -> None:
+    def passes(_fit: Any, _stage: Stage, factor: float) -> list[Any]:
+        return [SimpleNamespace(done=10 if factor >= 1.0 else 9, negative_log_likelihood=factor)]
+
+    monkeypatch.setattr(unknown_impulses, "forward_passes", passes)
+    assert likeliest_noise(fit_that_needs(1.0), STAGE) == 1.0
+
+
+def test_larger_impulses_make_the_readings_say_less(impacts: Any) -> None:
+    fit = track([impacts], (STAGE,))
+    found = likeliest_noise(fit, STAGE)
+    best, other = (
+        sum(one.negative_log_likelihood for one in unknown_impulses.forward_passes(fit, STAGE, factor))
+        for factor in (found, 4.0 * found)
+    )
+    assert best < other + 1.0, "the parabola is no exact one"
+    means = fit.smoothed[0].means.copy()
+    spread = {}
+    for factor in (found, 16.0 * found):
+        again = with_noise(fit, STAGE, factor)
+        spread[factor] = again.smoothed[0].watched[:, 0, 0].copy()
+        assert again.smoothed[0].means.shape == means.shape
+        assert not any(again.diverged)
+    assert np.all(spread[16.0 * found][5:] > spread[found][5:])

@@ -1,0 +1,382 @@
+"""Priors of the unknowns, what the settled tail says about them, and the readings of the levitated phase."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rotordrop.errors import IdentificationError, RecordError
+from rotordrop.estimated import NINETY, Estimated
+from rotordrop.estimation.tracked import COARSE_BASIS, drop_problem, recorded_drop
+from rotordrop.identification.evidence import Missing, read_evidence
+from rotordrop.machine import Machine, example_machine
+from rotordrop.measurement.record import read_record
+from rotordrop.physics.ball_bearing import bearing_constants, preload_of_offset
+from rotordrop.rotor.parameter_table import parameter
+from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.rotor.reduction import Reduction
+from rotordrop.rotor.unknowns import aero_time_constant, all_unknowns, prior
+from rotordrop.track.problem import (
+    NOISE_FLOOR,
+    TAIL_VERTICAL_SIGMA,
+    RecordedDrop,
+    apply_tail,
+    build_problem,
+    settled_displacement,
+)
+from rotordrop.track.transfer import transferred
+
+NO_TAIL = Missing(reason="none was given")
+
+
+def unknown_of(machine: Machine, path: str):
+    return next(u for u in all_unknowns(build_drop_model(machine, COARSE_BASIS)) if u.path == path)
+
+
+# priors
+
+
+@pytest.mark.parametrize(
+    ("quantity", "expected"),
+    [
+        (Estimated(value=1e8, status="guess", range=(0.5e8, 2e8)), math.log(4.0) / (2 * NINETY)),
+        (
+            Estimated(value=1e8, status="estimated", interval_90=(0.9e8, 1.1e8)),
+            math.log(11 / 9) / (2 * NINETY),
+        ),
+        (
+            Estimated(value=1e8, status="estimated", interval_90=(0.99e8, 1.01e8), range=(0.5e8, 2e8)),
+            math.log(101 / 99) / (2 * NINETY),
+        ),
+        (Estimated(value=1e8, status="estimated", standard_error=2e6), 0.02),
+        (Estimated(value=1e8, status="guess"), 0.5),
+        (Estimated(value=1e8, status="default"), 0.5),
+        (Estimated(value=1e8, status="given"), 0.05),
+        (Estimated(value=1e8, status="estimated", interval_90=(1e8, 1e8)), 1e-4),
+    ],
+)
+def test_the_prior_comes_from_interval_range_error_or_status(quantity, expected):
+    assert prior(parameter("support.stiffness"), quantity).sigma == pytest.approx(expected)
+
+
+def test_the_machine_file_sets_the_priors(lp400):
+    stiffness = unknown_of(lp400, "NDE.support.stiffness")
+    assert stiffness.value_of(stiffness.mean) == pytest.approx(1e8)
+    assert stiffness.sigma == pytest.approx(math.log(4.0) / (2 * NINETY))
+    gap = unknown_of(lp400, "DE.air_gap")
+    assert (gap.mean, gap.begin, gap.logarithmic) == (pytest.approx(275e-6), 250e-6, False)
+    assert gap.sigma == pytest.approx(150e-6 / (2 * NINETY))
+    damping = unknown_of(lp400, "NDE.contact.damping")  # a plain value
+    assert damping.sigma == parameter("contact.damping").given_sigma
+
+
+def test_a_gap_that_is_only_given_may_still_be_wrong(lp400):
+    given = unknown_of(lp400.with_values({"NDE.air_gap": 260e-6}), "NDE.air_gap")
+    assert given.sigma == pytest.approx(parameter("air_gap").given_sigma * 260e-6)
+
+
+def test_the_preload_is_estimated_by_the_axial_offset_it_belongs_to(lp400):
+    unknown = unknown_of(lp400, "NDE.preload")
+    bearing = lp400.bearing("NDE").bearing
+    constants = bearing_constants(bearing)
+    assert preload_of_offset(constants, unknown.begin) == pytest.approx(float(bearing.preload), rel=1e-6)
+    assert unknown.value_of(unknown.begin) == pytest.approx(float(bearing.preload), rel=1e-6)
+    ends = [unknown.value_of(unknown.mean + s * NINETY * unknown.sigma) for s in (-1.0, 1.0)]
+    assert ends == pytest.approx([370.0, 760.0], rel=1e-6)
+
+
+def test_what_a_drop_owns_is_not_shared(flight):
+    scopes = {u.path: u.scope for u in flight.unknowns}
+    assert scopes["unbalance.0.cosine"] == scopes["NDE.remanent_force.y"] == "drop"
+    assert scopes["speed.aero_time_constant"] == scopes["remanence.time_constant"] == "drop"
+    assert scopes["NDE.air_gap"] == scopes["DE.friction.dynamic"] == "machine"
+    shared = set(flight.machine_indices.tolist())
+    start, n_p, n_c = flight.n_dynamic, len(flight.unknowns), flight.n_channels
+    for k, unknown in enumerate(flight.unknowns):
+        assert (start + k in shared) == (unknown.scope == "machine")
+    assert {start + n_p + i for i in range(2 * n_c)} <= shared
+    assert not shared & {start + n_p + i for i in range(2 * n_c, 4 * n_c)}  # runout turns with the drop
+
+
+def test_a_machine_without_magnets_has_no_remanent_force(lp400):
+    bare = lp400.model_copy(update={"ambs": ()})
+    paths = {u.path for u in all_unknowns(build_drop_model(bare, COARSE_BASIS))}
+    assert not any("remanen" in path for path in paths)
+    assert "NDE.air_gap" in paths
+
+
+def test_friction_drifts_and_late_in_a_drop_faster(flight):
+    by_path = {u.path: (u, i) for i, u in enumerate(flight.unknowns)}
+    friction, i = by_path["NDE.friction.dynamic"]
+    stiffness, k = by_path["NDE.support.stiffness"]
+    factor = friction.parameter.late_drift_factor
+    assert flight.targets.drift[i] == friction.parameter.drift > 0.0 and factor > 1.0
+    assert flight.targets.late_drift[i] == factor * flight.targets.drift[i]
+    assert flight.targets.late_drift[k] == flight.targets.drift[k] == stiffness.parameter.drift > 0.0
+    g = by_path["NDE.air_gap"][1]
+    assert flight.targets.drift[g] == pytest.approx(0.032 * 250e-6)
+    assert by_path["NDE.preload"][0].parameter.drift == 0.0
+
+
+def test_the_aerodynamic_constant_has_a_start_even_when_nobody_knows_it(lp400):
+    assert lp400.speed.aero_time_constant is None
+    assert aero_time_constant(lp400) == 10.0
+    known = lp400.model_copy(
+        update={"speed": lp400.speed.model_copy(update={"aero_time_constant": Estimated(value=7.0)})}
+    )
+    assert aero_time_constant(known) == 7.0
+
+
+# the problem
+
+
+def test_sensors_start_from_what_the_machine_says(lp400, prepared):
+    known = lp400.with_values(
+        {
+            "sensors.S_NDE_A.gain": Estimated(value=1.02, status="estimated", interval_90=(1.019, 1.021)),
+            "sensors.S_NDE_A.offset": Estimated(value=4e-6, status="estimated", interval_90=(3e-6, 5e-6)),
+        }
+    )
+    problem = drop_problem(
+        build_drop_model(known, COARSE_BASIS), replace(prepared, settled_level=NO_TAIL), until=0.003
+    )
+    gain = problem.n_dynamic + len(problem.unknowns)
+    offset = gain + problem.n_channels
+    sigma = np.sqrt(np.diag(problem.covariance))
+    assert problem.mean[gain] == pytest.approx(1.0 / 1.02 - 1.0)
+    assert sigma[gain] == pytest.approx(0.001 / NINETY)
+    assert problem.mean[offset] == pytest.approx(4e-6)
+    assert sigma[offset] == pytest.approx(1e-6 / NINETY)
+    assert sigma[gain + 1] == pytest.approx(0.01)
+    assert sigma[offset + 1] == pytest.approx(0.04 * 250e-6)
+
+
+def test_the_rotor_starts_where_the_sensors_see_it_with_its_computed_sag(flight):
+    predicted = flight.sensor_rows @ flight.mean[: flight.n_dynamic]
+    first = flight.readings[:10].mean(axis=0)
+    np.testing.assert_allclose(predicted, first, atol=1e-6)
+    bending = flight.mean[flight.model.layout.modal_y][2:]
+    assert np.abs(bending).max() > 0.0
+    assert np.all(flight.mean[flight.model.layout.modal_x][2:] == 0.0)
+
+
+def test_a_record_without_speed_is_refused(model, prepared):
+    mute = replace(prepared.record, speed=None, speed_time=None, speed_readings=None)
+    with pytest.raises(RecordError, match=r"the record drop_060 has no rotor speed.*profile"):
+        read_evidence(model, mute, name="drop_060")
+
+
+def test_the_noise_of_the_levitated_part_is_that_of_the_channels(flight, prepared):
+    noise = prepared.noise(0.003)
+    np.testing.assert_allclose(flight.variances, noise**2 + NOISE_FLOOR**2)
+    assert np.all((noise > 0.2e-6) & (noise < 1e-6))
+
+
+# the settled tail
+
+
+@pytest.fixture(scope="module")
+def loose(model, prepared):
+    """The problem before the tail is used."""
+    return drop_problem(model, replace(prepared, settled_level=NO_TAIL), until=0.003)
+
+
+def height_at_sensors(problem, theta):
+    """Settled readings of perfect sensors: only the height is known, the rotor may be held aside."""
+    angles = np.array([float(sensor.angle) for sensor in problem.model.machine.sensors])
+    return np.sin(angles) * settled_displacement(problem, theta)
+
+
+def test_the_rotor_settles_below_the_gap_by_its_indentation(loose):
+    """Between the sensors and the bearings there are 30 mm of a rotor that bends by micrometres."""
+    theta = loose.mean[loose.parameter_slice]
+    level = settled_displacement(loose, theta)
+    assert np.all((level > -300e-6) & (level < -250e-6))
+    wider = theta.copy()
+    paths = [u.path for u in loose.unknowns]
+    wider[[paths.index("NDE.air_gap"), paths.index("DE.air_gap")]] += 10e-6
+    np.testing.assert_allclose(settled_displacement(loose, wider), level - 10e-6, atol=1e-12)
+    softer = theta.copy()
+    softer[paths.index("NDE.support.stiffness")] -= math.log(2.0)
+    assert settled_displacement(loose, softer)[0] < level[0]
+
+
+def test_the_tail_ties_gap_and_offset(loose):
+    """A tail 8 µm lower than expected is shared by gap and offsets; their sum is known, each is not."""
+    theta = loose.mean[loose.parameter_slice]
+    tail = height_at_sensors(loose, theta)
+    angles = np.array([float(sensor.angle) for sensor in loose.model.machine.sensors])
+    lower = tail - 8e-6 * np.sin(angles)
+    mean, covariance = loose.mean.copy(), loose.covariance.copy()
+    apply_tail(loose, lower, mean, covariance)
+    paths = [u.path for u in loose.unknowns]
+    gap = loose.n_dynamic + paths.index("NDE.air_gap")
+    offsets = loose.n_dynamic + len(paths) + loose.n_channels + np.arange(2)
+    assert mean[gap] - loose.mean[gap] > 2e-6
+    down = -np.sum(mean[offsets]) / (2.0 * math.sin(math.pi / 4))
+    gains = mean[offsets - loose.n_channels] @ (np.sin(angles[:2]) ** 2 * tail[:2] / np.sin(angles[:2]))
+    stiff = loose.n_dynamic + paths.index("NDE.support.stiffness")
+    assert abs(mean[stiff] - loose.mean[stiff]) < 0.05
+    explained = (mean[gap] - loose.mean[gap]) + down - gains
+    assert explained == pytest.approx(8e-6, abs=1.5e-6)
+    sigma = np.sqrt(np.diag(covariance))
+    assert sigma[gap] < 0.5 * math.sqrt(loose.covariance[gap, gap])
+    assert sigma[gap] > 3.0 * TAIL_VERTICAL_SIGMA * 250e-6  # not separable from the offset
+    row = np.zeros(len(mean))
+    row[gap], row[offsets] = -1.0, np.array([0.5, 0.5]) / math.sin(math.pi / 4)
+    row[offsets - loose.n_channels] = row[offsets] * tail[:2]
+    assert math.sqrt(row @ covariance @ row) < 1.5e-6
+    assert (
+        np.linalg.eigvalsh(covariance / np.outer(np.maximum(sigma, 1e-12), np.maximum(sigma, 1e-12)))[0]
+        > -1e-8
+    )
+
+
+def test_a_rotor_held_aside_by_friction_says_nothing_about_the_gap(loose):
+    theta = loose.mean[loose.parameter_slice]
+    tail = height_at_sensors(loose, theta)
+    angles = np.array([float(sensor.angle) for sensor in loose.model.machine.sensors])
+    mean, covariance = loose.mean.copy(), loose.covariance.copy()
+    apply_tail(loose, tail + 15e-6 * np.cos(angles), mean, covariance)
+    np.testing.assert_allclose(mean[loose.parameter_slice], theta, rtol=1e-3, atol=0.3e-6)
+
+
+def test_a_single_sensor_in_a_plane_cannot_tell_height_from_aside(lp400, prepared):
+    """With one of two sensors gone the tail must not tie the gap to the height it cannot see."""
+    three = lp400.model_copy(update={"sensors": lp400.sensors[:3]})
+    record = prepared.record
+    prepared = replace(
+        prepared,
+        record=replace(record, signals=record.signals[:, :3].copy(), sensors=three.sensors),
+        levitated=prepared.levitated.of_channels(range(3)),
+        settled_level=NO_TAIL,
+    )
+    problem = drop_problem(build_drop_model(three, COARSE_BASIS), prepared, until=0.003)
+    mean, covariance = problem.mean.copy(), problem.covariance.copy()
+    angles = np.array([float(sensor.angle) for sensor in three.sensors])
+    tail = height_at_sensors(problem, mean[problem.parameter_slice])
+    apply_tail(problem, tail + 20e-6 * np.cos(angles), mean, covariance)
+    paths = [u.path for u in problem.unknowns]
+    for name, limit in (("NDE", 1e-6), ("DE", 15e-6)):
+        gap = problem.n_dynamic + paths.index(f"{name}.air_gap")
+        change = abs(mean[gap] - problem.mean[gap])
+        sigma = math.sqrt(covariance[gap, gap])
+        assert change < limit
+        assert change < sigma
+    lost = problem.n_dynamic + paths.index("DE.air_gap")
+    seen = problem.n_dynamic + paths.index("NDE.air_gap")
+    assert covariance[lost, lost] > 3.0 * covariance[seen, seen]
+
+
+def test_the_settled_level_is_that_of_the_lowest_point_of_the_sway(lp400, prepared):
+    """A rotor that sways along its race by 40 µm lies higher in the mean than at the bottom."""
+    sensing, rest = prepared.sensing, prepared.rest
+    time = np.arange(3000) * 1e-3
+    angle = 0.14 * np.sin(2.0 * np.pi * 29.0 * time)
+    place = np.stack([np.outer(np.sin(angle), rest.radius), np.outer(-np.cos(angle), rest.radius)], axis=-1)
+    along = np.einsum("sbc,tbc->ts", sensing.from_bearings, place) + sensing.settled_bend
+    still = {"speed": None, "speed_time": None, "speed_readings": None}
+    tail = replace(prepared.record, time=time, signals=along, sampling_rate=1e3, **still)
+    found = read_evidence(build_drop_model(lp400), prepared.record, tail)
+    bottom = sensing.from_bearings[..., 1] @ -rest.radius + sensing.settled_bend
+    np.testing.assert_allclose(found.settled_level, bottom, atol=2e-8)
+    assert np.abs(along.mean(axis=0) - bottom).max() > 0.9e-6
+
+
+# what the record says
+
+
+@pytest.fixture(scope="module")
+def fast(lp400):
+    """A short drop at 150 Hz and what it says."""
+    path = Path(__file__).parents[1] / "measurement" / "recordings" / "drop_150_short.h5"
+    return read_evidence(build_drop_model(lp400), read_record(path, lp400), name="fast")
+
+
+def test_hum_at_60_hz_is_no_noise_of_the_twin(lp400, fast):
+    """1.5 µm of it once stayed in the readings and counted as 1.1 µm of noise."""
+    record = fast.record
+    hum = 1.5e-6 * np.cos(2.0 * np.pi * 60.0 * record.time[:, None] + np.arange(4))
+    noisy = replace(record, signals=record.signals + hum)
+    model = build_drop_model(lp400)
+    found, plain = (recorded_drop(read_evidence(model, one), 0.1) for one in (noisy, record))
+    np.testing.assert_allclose(found.noise, plain.noise, rtol=0.02)
+    assert np.abs(found.readings - plain.readings).max() < 0.25e-6
+
+
+def test_a_speed_given_by_hand_is_no_reading_after_power_off(lp400, fast):
+    nominal = replace(
+        fast.record,
+        speed=np.full(len(fast.record.time), 2.0 * np.pi * 150.2),
+        speed_time=fast.record.time[[0, -1]],
+        speed_readings=np.full(2, 2.0 * np.pi * 150.2),
+        speed_by_hand=True,
+    )
+    model = build_drop_model(lp400)
+    found, plain = (recorded_drop(read_evidence(model, one), 0.1) for one in (nominal, fast.record))
+    assert np.all(np.isnan(found.speed)) and np.any(np.isfinite(plain.speed))
+    assert found.initial_speed == pytest.approx(plain.initial_speed, abs=0.1)  # the orbit says it
+
+
+# from one basis to another
+
+
+def test_a_transferred_trajectory_keeps_the_motion_of_every_node(lp400, prepared, flight, random):
+    fine = drop_problem(build_drop_model(lp400, Reduction(modes=10, attachment=True)), prepared, until=0.003)
+    means = flight.mean + 1e-5 * random.standard_normal((7, len(flight.mean)))
+    moved = transferred(flight, fine, means)
+    assert moved.shape == (7, len(fine.mean))
+    for node in (1, 5, 17, 26, 33):
+        for part in ("modal_x", "modal_y"):
+            one, two = (getattr(p.model.layout, part) for p in (flight, fine))
+            for a, b in (
+                (one, two),
+                (flight.model.layout.velocity_of(one), fine.model.layout.velocity_of(two)),
+            ):
+                before = means[:, a] @ flight.model.basis.node_row(node)
+                after = moved[:, b] @ fine.model.basis.node_row(node)
+                np.testing.assert_allclose(after, before, rtol=0.02, atol=1e-7)
+    layouts = flight.model.layout, fine.model.layout
+    for part in ("race", "support", "race_spin"):
+        np.testing.assert_array_equal(
+            means[:, getattr(layouts[0], part)], moved[:, getattr(layouts[1], part)]
+        )
+    np.testing.assert_array_equal(means[:, flight.n_dynamic :], moved[:, fine.n_dynamic :])
+
+
+def test_a_trajectory_carried_to_the_same_basis_is_the_same(flight, random):
+    means = flight.mean + 1e-5 * random.standard_normal((3, len(flight.mean)))
+    np.testing.assert_allclose(transferred(flight, flight, means), means, rtol=1e-9, atol=1e-16)
+
+
+def test_an_exponent_calibrated_at_its_bound_is_not_taken_for_exact(lp400: Machine) -> None:
+    bound = Estimated(value=1.0, status="estimated", interval_90=(1.0, 1.0))
+    unknowns = all_unknowns(
+        build_drop_model(lp400.with_values({"NDE.contact.exponent": bound}), Reduction(modes=4))
+    )
+    sigma = next(u.sigma for u in unknowns if u.path == "NDE.contact.exponent")
+    assert sigma == parameter("contact.exponent").least_sigma
+
+
+def test_a_rotor_that_does_not_rest_on_a_bearing_is_refused_with_its_numbers() -> None:
+    """It was lost "after 0 samples": a negative load has no contact frequency, and NaN went through."""
+    machine = example_machine("lp400")
+    bearings = machine.touchdown_bearings
+    beside = machine.changed(touchdown_bearings=(bearings[0], bearings[1].changed(node=12)))
+    time = np.arange(400) / 20e3
+    drop = RecordedDrop(
+        time=time,
+        readings=np.zeros((len(time), len(beside.sensors))),
+        noise=np.full(len(beside.sensors), 1e-6),
+        initial_speed=600.0,
+        initial_speed_error=0.1,
+        speed=np.full(len(time), 600.0),
+        tail_level=None,
+    )
+    expected = r"does not rest on the touchdown bearing NDE \(-\d+ N of .* 584 N\).* expected it between them"
+    with pytest.raises(IdentificationError, match=expected):
+        build_problem(build_drop_model(beside, COARSE_BASIS), drop)
