@@ -21,7 +21,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from rotordrop.identification.evidence import Evidence, read_evidence
+from rotordrop.evidence.evidence import Evidence, read_evidence
 from rotordrop.identification.replica import build_replica
 from rotordrop.identification.support import SupportFit, fit_support, impact_problem
 from rotordrop.machine import example_machine

@@ -7,7 +7,7 @@ from typing import Any
 
 from rotordrop.machine import machine_schema
 from rotordrop.machine.schema import attribute_meanings
-from rotordrop.measurement.profile import Profile
+from rotordrop.record.profile import Profile
 
 MACHINE = """\
 # Machine file

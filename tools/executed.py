@@ -119,7 +119,7 @@ def commands(folder: Path) -> list[list[str]]:
     """Every way of `calibrate`, `estimate` and `waterfall`; what they read is written first."""
     from rotordrop.cli.app import run
     from rotordrop.machine import example_machine, example_path, save_machine
-    from rotordrop.measurement.examples import example_record_path
+    from rotordrop.record.examples import example_record_path
 
     owner, drop = str(example_path("lp400")), str(example_record_path("lp400_drop_060"))
     tail = str(example_record_path("lp400_drop_060_tail"))

@@ -19,17 +19,17 @@ if TYPE_CHECKING:
     from rotordrop.estimation import estimate_drop as estimate_drop
     from rotordrop.estimation import estimate_drops as estimate_drops
     from rotordrop.estimation.calibrated import calibrate_machine as calibrate_machine
+    from rotordrop.evidence import check_record as check_record
+    from rotordrop.evidence.look import look as look
     from rotordrop.machine import Machine as Machine
     from rotordrop.machine import example_machine as example_machine
     from rotordrop.machine import load_machine as load_machine
     from rotordrop.machine import machine_schema as machine_schema
     from rotordrop.machine import save_machine as save_machine
     from rotordrop.machine.catalog import find_bearing as find_bearing
-    from rotordrop.measurement import Record as Record
-    from rotordrop.measurement import check_record as check_record
-    from rotordrop.measurement import example_record_path as example_record_path
-    from rotordrop.measurement import read_record as read_record
-    from rotordrop.measurement.look import look as look
+    from rotordrop.record import Record as Record
+    from rotordrop.record import example_record_path as example_record_path
+    from rotordrop.record import read_record as read_record
     from rotordrop.rotor.parameters import DropModel as DropModel
     from rotordrop.rotor.parameters import build_drop_model as build_drop_model
     from rotordrop.simulate.case import DropCase as DropCase
@@ -55,26 +55,26 @@ _PUBLIC = {
     "LevitatedStart": "rotordrop.simulate.case",
     "Machine": "rotordrop.machine",
     "PlacedStart": "rotordrop.simulate.case",
-    "Record": "rotordrop.measurement",
+    "Record": "rotordrop.record",
     "RotordropError": "rotordrop.errors",
     "Replay": "rotordrop.estimation",
     "Tracked": "rotordrop.estimation",
     "build_drop_model": "rotordrop.rotor.parameters",
     "calibrate_machine": "rotordrop.estimation.calibrated",
-    "check_record": "rotordrop.measurement",
+    "check_record": "rotordrop.evidence",
     "estimate_drop": "rotordrop.estimation",
     "estimate_drops": "rotordrop.estimation",
     "find_bearing": "rotordrop.machine.catalog",
     "example_machine": "rotordrop.machine",
-    "example_record_path": "rotordrop.measurement",
+    "example_record_path": "rotordrop.record",
     "format_quantity": "rotordrop.units",
     "load_machine": "rotordrop.machine",
     "load_result": "rotordrop.simulate.result",
     "load_study": "rotordrop.study",
-    "look": "rotordrop.measurement.look",
+    "look": "rotordrop.evidence.look",
     "machine_schema": "rotordrop.machine",
     "parse_quantity": "rotordrop.units",
-    "read_record": "rotordrop.measurement",
+    "read_record": "rotordrop.record",
     "run_study": "rotordrop.study",
     "save_machine": "rotordrop.machine",
     "score_estimate": "rotordrop.synthesis",

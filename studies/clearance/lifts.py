@@ -22,9 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import RecordError
+from rotordrop.evidence.clearance import Clearance, measure_clearance, wear_between
 from rotordrop.machine import example_machine
-from rotordrop.measurement.clearance import Clearance, measure_clearance, wear_between
-from rotordrop.measurement.record import Record
+from rotordrop.record.record import Record
 
 Array = NDArray[np.float64]
 RESULTS = Path(__file__).parent / "results" / "lifts.json"

@@ -19,7 +19,7 @@ from common import keep
 from rotordrop.estimation.recorded_coast_down import recorded_coast_down, with_recorded_drag
 from rotordrop.estimation.simulated_coast_down import simulated_coast_down
 from rotordrop.machine import load_machine
-from rotordrop.measurement.record import read_record
+from rotordrop.record.record import read_record
 from rotordrop.simulate.case import LevitatedStart
 from rotordrop.simulate.coast_down import simulate_coast_down
 from rotordrop.simulate.coast_down_case import CoastDownCase

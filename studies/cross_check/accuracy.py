@@ -23,7 +23,7 @@ import numpy as np
 from tests.scaled_machines import scaled_machine
 
 from rotordrop.estimation.tracked import twin_problem
-from rotordrop.identification.evidence import read_evidence
+from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine import Machine, example_machine, load_machine
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.synthesis import SensorChain, hidden_machine, synthesize_drop

@@ -31,7 +31,7 @@ from typing import Any
 
 import h5py
 import numpy as np
-from tests.unit.measurement.every_format import NAMES, READINGS, SPEED, TIME, written
+from tests.unit.record.every_format import NAMES, READINGS, SPEED, TIME, written
 
 from rotordrop.machine import example_path
 

@@ -28,15 +28,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tests.unit.measurement import every_format
-from tests.unit.measurement.every_format import BY_HAND, BY_PROFILE, MACHINE, WRITERS, written
+from tests.unit.record import every_format
+from tests.unit.record.every_format import BY_HAND, BY_PROFILE, MACHINE, WRITERS, written
 
 from rotordrop.errors import RecordError
-from rotordrop.measurement import read_record
-from rotordrop.measurement.quality.channels import check_channels
-from rotordrop.measurement.quality.clock import check_blocks, check_clock
-from rotordrop.measurement.record import Record
-from rotordrop.measurement.unpacking import Content
+from rotordrop.evidence.quality.channels import check_channels
+from rotordrop.evidence.quality.clock import check_blocks, check_clock
+from rotordrop.record import read_record
+from rotordrop.record.record import Record
+from rotordrop.record.unpacking import Content
 
 BLOCK = 250
 CUT_ROWS = 60
@@ -73,7 +73,7 @@ def damaged(content: bytes, seed: int) -> tuple[str, bytes]:
 
 def _plain(path: Path, kind: str) -> Content:
     """Unpack in this process what the program unpacks in a child."""
-    content: Content = import_module(f"rotordrop.measurement.unpacking.{kind}").unpacked(path)
+    content: Content = import_module(f"rotordrop.record.unpacking.{kind}").unpacked(path)
     return content
 
 
@@ -108,7 +108,7 @@ def outcome(path: Path, whole: Record, name: str) -> tuple[str, float]:
 def _work(name: str, jobs: list[tuple[int, str, bytes]], folder: Path, answers: Any) -> None:
     """Read the damaged files of a block one after the other, telling before each."""
     for module in ("hdf5", "matlab", "tdms", "uff", "excel"):
-        reader = import_module(f"rotordrop.measurement.readers.{module}")
+        reader = import_module(f"rotordrop.record.readers.{module}")
         if hasattr(reader, "unpack"):
             reader.unpack = _plain  # type: ignore[attr-defined]
     path, whole = _seed(name, folder)

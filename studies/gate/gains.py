@@ -20,10 +20,11 @@ import numpy as np
 from rotordrop.errors import RotordropError
 from rotordrop.estimated import Estimated
 from rotordrop.estimation import estimate_drop
+from rotordrop.evidence import check_record
 from rotordrop.machine import example_machine
-from rotordrop.measurement import check_record, read_record
-from rotordrop.measurement.examples import example_record_path
-from rotordrop.measurement.record import Record
+from rotordrop.record import read_record
+from rotordrop.record.examples import example_record_path
+from rotordrop.record.record import Record
 
 RESULTS = Path(__file__).parent / "results" / "gains.jsonl"
 TRUE_PEAKS = {"NDE": 3333.1, "DE": 3618.5}

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from rotordrop.machine import Machine
-from rotordrop.measurement.record import Record
+from rotordrop.record.record import Record
 from rotordrop.synthesis import SensorChain, hidden_machine, synthesize_drop
 from rotordrop.synthesis.bench.rotors import bench_rotor
 

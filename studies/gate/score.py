@@ -25,8 +25,8 @@ from faults import FAULTS
 from records import kept, rotor_of
 
 from rotordrop.errors import RecordError
-from rotordrop.measurement import check_record
-from rotordrop.measurement.record import Record
+from rotordrop.evidence import check_record
+from rotordrop.record.record import Record
 
 RESULTS = Path(__file__).parent / "results"
 

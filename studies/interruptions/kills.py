@@ -28,7 +28,7 @@ import h5py
 
 from rotordrop.cli.app import run
 from rotordrop.machine import example_path
-from rotordrop.measurement import example_record_path
+from rotordrop.record import example_record_path
 
 RESULTS = Path(__file__).parent / "results" / "kills.jsonl"
 COMMANDS = {

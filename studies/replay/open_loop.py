@@ -25,15 +25,15 @@ from common import informed, known_machine, radians, size_of, speed_of, value_of
 from numpy.typing import NDArray
 
 from rotordrop.estimation.uncertainty import best_candidate, seen_at_bearings, whole_drop
-from rotordrop.identification.evidence import Evidence, read_evidence
-from rotordrop.identification.evidence import known as present
-from rotordrop.identification.initial_state import InitialState, fit_initial_state
+from rotordrop.evidence.evidence import Evidence, read_evidence
+from rotordrop.evidence.evidence import known as present
+from rotordrop.evidence.initial_state import InitialState, fit_initial_state
+from rotordrop.evidence.sensing import build_sensing
 from rotordrop.identification.modal_expansion import ExpandedState, expand_initial_state
 from rotordrop.identification.replica import build_replica
-from rotordrop.identification.sensing import build_sensing
 from rotordrop.identification.support import impact_problem
 from rotordrop.machine import Machine
-from rotordrop.measurement.record import Record
+from rotordrop.record.record import Record
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.simulate.case import DropCase, StateStart
 from rotordrop.simulate.drop import simulate_drop

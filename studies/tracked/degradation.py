@@ -27,7 +27,7 @@ from rotordrop.estimated import Estimated
 from rotordrop.estimation import estimate_drop
 from rotordrop.estimation.calibrated import calibrate_machine
 from rotordrop.machine import Machine, example_machine
-from rotordrop.measurement.record import Record
+from rotordrop.record.record import Record
 from rotordrop.synthesis import SensorChain, hidden_machine, synthesize_drop
 from rotordrop.synthesis.recording import SyntheticDrop
 

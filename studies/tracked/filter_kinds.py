@@ -27,7 +27,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rotordrop.estimation.tracked import FINE_BASIS, drop_problem
-from rotordrop.identification.evidence import read_evidence
+from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine import example_machine
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.synthesis import hidden_machine, synthesize_drop

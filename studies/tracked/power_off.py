@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
+from rotordrop.evidence.power_off import find_power_off
 from rotordrop.machine import example_machine
-from rotordrop.measurement.power_off import find_power_off
 from rotordrop.synthesis import hidden_machine, synthesize_drop
 
 HERE = Path(__file__).parent

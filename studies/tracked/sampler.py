@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from rotordrop.estimation.structure import EXTENSIONS
 from rotordrop.estimation.tracked import COARSE_BASIS, _first_contact, drop_problem
-from rotordrop.identification.evidence import read_evidence
+from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine import example_machine
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.synthesis import hidden_machine, synthesize_drop

@@ -32,11 +32,11 @@ from rotordrop.estimation.narrowing import DRAWING
 from rotordrop.estimation.rotor_search import with_found_rotor
 from rotordrop.estimation.tracked import COARSE_BASIS, ROTOR_SEEN, drop_problem, recorded_drop
 from rotordrop.estimation.tracked_loads import BEAM_FORCE_SIGMA
-from rotordrop.identification.evidence import read_evidence
+from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine import Machine
 from rotordrop.machine.rotor import Rotor
 from rotordrop.machine.simple import SimpleMachine, simple_machine
-from rotordrop.measurement.record import read_record
+from rotordrop.record.record import read_record
 from rotordrop.rotor.assembly import rotor_fe
 from rotordrop.rotor.modes import free_free_modes
 from rotordrop.rotor.parameters import build_drop_model

@@ -23,7 +23,7 @@ import numpy as np
 from rotordrop.errors import RotordropError
 from rotordrop.estimation import estimate_drop
 from rotordrop.machine import example_path, load_machine
-from rotordrop.measurement.tacho import passages
+from rotordrop.record.tacho import passages
 from rotordrop.synthesis import hidden_machine, synthesize_drop
 from rotordrop.synthesis.event import drop_conditions
 from rotordrop.synthesis.motion import true_motion

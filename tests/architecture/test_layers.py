@@ -47,7 +47,7 @@ def test_every_package_has_its_place_in_the_layers():
     [
         ("physics", "simulate"),
         ("machine", "physics"),
-        ("measurement", "spectrum"),
+        ("evidence", "spectrum"),
         ("estimation", "report"),
         ("errors", "units"),
         ("simulate", "cli"),

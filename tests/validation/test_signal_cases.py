@@ -11,8 +11,8 @@ import pytest
 from cases import Compute, check, load_case
 
 from rotordrop.machine.sensor import Sensor
-from rotordrop.measurement.axes import planar_of, sensor_planes
 from rotordrop.physics.aerodynamics import exponential_deceleration
+from rotordrop.record.axes import planar_of, sensor_planes
 from rotordrop.severity.statistics import stress_statistics
 from rotordrop.spectrum.coast_down_law import exponential_time_constant
 from rotordrop.spectrum.waterfall import WaterfallSettings, waterfall

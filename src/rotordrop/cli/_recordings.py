@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from rotordrop.errors import UsageError
 
 if TYPE_CHECKING:
-    from rotordrop.measurement.record import Record
+    from rotordrop.record.record import Record
 
 
 def require_own_names(records: Sequence[Path]) -> None:

@@ -51,10 +51,10 @@ def calibrate(
 ) -> None:
     """Calibrate a machine on recorded drops."""
     from rotordrop.estimation.calibrated import calibrate_machine, calibration_json
+    from rotordrop.evidence.quality import check_record
+    from rotordrop.evidence.quality.finding import refuse_unusable
     from rotordrop.machine import load_machine, save_machine
-    from rotordrop.measurement.quality import check_record
-    from rotordrop.measurement.quality.finding import refuse_unusable
-    from rotordrop.measurement.record import read_record
+    from rotordrop.record.record import read_record
 
     require_places(output, json)
     require_own_names(records)

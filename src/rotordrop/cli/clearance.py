@@ -17,8 +17,8 @@ from rotordrop.errors import UsageError
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from rotordrop.evidence.clearance import Clearance, Wear
     from rotordrop.machine import Machine
-    from rotordrop.measurement.clearance import Clearance, Wear
 
 
 def clearance(
@@ -40,7 +40,7 @@ def clearance(
     json: JsonOption = None,
 ) -> None:
     """Measure the air gap of every touchdown bearing by a lift check, and its wear by two."""
-    from rotordrop.measurement.clearance import measure_clearance, wear_between
+    from rotordrop.evidence.clearance import measure_clearance, wear_between
 
     described = _described(machine, output)
     checks = [

@@ -150,7 +150,7 @@ def _end(text: str) -> float | None:
 def _with_recorded_drag(machine: Machine, path: Path) -> Machine:
     """Drag as the recorded speed shows it: linear and quadratic from the air, dry from the races."""
     from rotordrop.estimation.recorded_coast_down import recorded_coast_down, with_recorded_drag
-    from rotordrop.measurement.record import read_record
+    from rotordrop.record.record import read_record
 
     return with_recorded_drag(machine, recorded_coast_down(machine, read_record(path, machine)))
 

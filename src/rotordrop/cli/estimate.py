@@ -81,7 +81,7 @@ def estimate(
     from rotordrop.estimation import Replay, Tracked, estimate_drops
     from rotordrop.estimation.histories import require_format
     from rotordrop.machine import load_machine
-    from rotordrop.measurement.record import read_record
+    from rotordrop.record.record import read_record
     from rotordrop.report.origin import origin_here
 
     if fixed is not None and method is not Method.replay:

@@ -33,7 +33,7 @@ def look(
     json: JsonOption = None,
 ) -> None:
     """Look at a recorded drop: what was read, its quality, what happened when, impacts, whirl, indices."""
-    from rotordrop.measurement.look import look as look_at
+    from rotordrop.evidence.look import look as look_at
     from rotordrop.report.look_page import look_page
     from rotordrop.report.terminal import print_summary
 

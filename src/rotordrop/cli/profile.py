@@ -14,7 +14,7 @@ from rotordrop.cli._output import console
 from rotordrop.errors import RecordError, UsageError
 
 if TYPE_CHECKING:
-    from rotordrop.measurement.profile import Profile
+    from rotordrop.record.profile import Profile
 
 
 def profile(
@@ -46,9 +46,9 @@ def profile(
     ] = None,
 ) -> None:
     """Make a profile of a recorder: what its files do not say themselves, said once."""
-    from rotordrop.measurement.profile import save_profile
-    from rotordrop.measurement.profile_guess import guess_profile
-    from rotordrop.measurement.readers import read_recording
+    from rotordrop.record.profile import save_profile
+    from rotordrop.record.profile_guess import guess_profile
+    from rotordrop.record.readers import read_recording
 
     given = _given(
         {
@@ -87,7 +87,7 @@ def profile(
 
 
 def _given(entries: dict[str, Any]) -> Profile:
-    from rotordrop.measurement.profile import profile_of
+    from rotordrop.record.profile import profile_of
 
     return profile_of(
         {name: _known(entry) for name, entry in entries.items() if entry is not None}, "the options"

@@ -49,7 +49,7 @@ def schema(
     elif document is Document.violations:
         from rotordrop.synthesis.violations import violations_schema as schema_of
     elif document is Document.look:
-        from rotordrop.measurement.look.schema import look_schema as schema_of
+        from rotordrop.evidence.look.schema import look_schema as schema_of
     else:
         from rotordrop.estimation.schema import estimate_schema as schema_of
 

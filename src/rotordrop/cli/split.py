@@ -27,9 +27,9 @@ def split(
 ) -> None:
     """Cut a recording with several drops into one record for each; no sample is changed."""
     from rotordrop.atomic_file import make_folder
+    from rotordrop.evidence.splitting import split_drops
     from rotordrop.machine import load_machine
-    from rotordrop.measurement.record import read_record, save_record
-    from rotordrop.measurement.splitting import split_drops
+    from rotordrop.record.record import read_record, save_record
 
     parts = split_drops(read_record(record, load_machine(machine), profile=profile))
     places = [folder / f"{part.name}.h5" for part in parts]

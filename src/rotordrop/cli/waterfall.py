@@ -137,8 +137,8 @@ def _signal(machine: Machine, path: Path, profile: Path | None) -> tuple[CoastDo
     """Open a recording or a simulated file, with the sentence that says it is simulated."""
     from rotordrop.estimation.recorded_coast_down import recorded_coast_down
     from rotordrop.estimation.simulated_coast_down import simulated_coast_down
-    from rotordrop.measurement.record import read_record
-    from rotordrop.measurement.simulated import is_simulated
+    from rotordrop.record.record import read_record
+    from rotordrop.record.simulated import is_simulated
     from rotordrop.report.content import SIMULATED_RECORD
     from rotordrop.simulate.coast_down_file import is_coast_down
 

@@ -12,7 +12,7 @@ from rotordrop.estimation.methods import Tracked as Tracked
 if TYPE_CHECKING:
     from rotordrop.estimation.estimate import Estimate, Estimates
     from rotordrop.machine import Machine
-    from rotordrop.measurement.record import Record
+    from rotordrop.record.record import Record
 
 Progress = Callable[[str, float], None]
 FOLLOWED = Tracked()
@@ -117,7 +117,7 @@ def estimate_drops(
         )
     from rotordrop.estimation.tracked import followed_drops
     from rotordrop.estimation.tracked_estimate import estimate_of
-    from rotordrop.identification.evidence import read_evidence
+    from rotordrop.evidence.evidence import read_evidence
     from rotordrop.rotor.parameters import build_drop_model
 
     model = build_drop_model(machine)

@@ -23,9 +23,9 @@ from rotordrop.estimation.tracked_parameters import (
     model_error,
     parameter_widening,
 )
-from rotordrop.identification.evidence import read_evidence
+from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine import CalibrationDrop, CalibrationOrigin, Machine, RecordedLift
-from rotordrop.measurement.record import Record
+from rotordrop.record.record import Record
 from rotordrop.rotor.parameter import Parameter
 from rotordrop.rotor.parameter_table import parameter, row_of, rows, separating_measurement
 from rotordrop.rotor.parameters import build_drop_model

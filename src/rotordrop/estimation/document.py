@@ -17,8 +17,8 @@ from rotordrop.estimation.bearing_drop import BearingDrop, Impact, Peak
 from rotordrop.estimation.estimate import Estimate, JointEstimate, ReplaySteps, Structure
 from rotordrop.estimation.methods import Replay
 from rotordrop.estimation.severity_numbers import severity_values
-from rotordrop.identification.first_contact import TimedContact
-from rotordrop.measurement.event_date import event_date
+from rotordrop.evidence.first_contact import TimedContact
+from rotordrop.record.event_date import event_date
 from rotordrop.simulate.fingerprint import fingerprint
 
 FORMAT = "rotordrop estimate 2"

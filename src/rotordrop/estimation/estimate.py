@@ -26,14 +26,14 @@ from rotordrop.estimation.bearing_drop import BearingDrop
 from rotordrop.estimation.later_motion import LaterMotion
 from rotordrop.estimation.methods import Method
 from rotordrop.estimation.unbalance import PlaneUnbalance
-from rotordrop.identification.first_contact import TimedContact as TimedContact
+from rotordrop.evidence.events import DropInstant
+from rotordrop.evidence.first_contact import TimedContact as TimedContact
+from rotordrop.evidence.power_off import PowerOff
+from rotordrop.evidence.quality.finding import Finding
+from rotordrop.evidence.speed import SpeedFit
 from rotordrop.identification.friction import FrictionSweep as FrictionSweep
-from rotordrop.identification.speed import SpeedFit
 from rotordrop.machine import Machine
-from rotordrop.measurement.events import DropInstant
-from rotordrop.measurement.power_off import PowerOff
-from rotordrop.measurement.quality.finding import Finding
-from rotordrop.measurement.record import Record
+from rotordrop.record.record import Record
 from rotordrop.rotor.parameter import Parameter
 from rotordrop.track.consistency import Check
 from rotordrop.units import format_quantity

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rotordrop.errors import RecordError
+from rotordrop.evidence.quality import Finding, check_record, refuse_unusable
+from rotordrop.evidence.settled import resting_record
 from rotordrop.machine import Machine
-from rotordrop.measurement.quality import Finding, check_record, refuse_unusable
-from rotordrop.measurement.record import Record
-from rotordrop.measurement.settled import resting_record
-from rotordrop.measurement.simulated import is_simulated
+from rotordrop.record.record import Record
+from rotordrop.record.simulated import is_simulated
 
 NO_TAIL = "no settled tail: the air gap rests on its prior and on the contacts; give one with --tail"
 COUNTED_TWICE = (

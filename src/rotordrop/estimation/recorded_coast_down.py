@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError, RecordError
 from rotordrop.estimated import NINETY, Estimated
-from rotordrop.identification.air_gap import AirGap, identify_air_gap, rest_at_end
-from rotordrop.identification.evidence import Evidence, Missing, known, read_evidence
-from rotordrop.identification.sensing import Sensing
+from rotordrop.evidence.air_gap import AirGap, identify_air_gap, rest_at_end
+from rotordrop.evidence.evidence import Evidence, Missing, known, read_evidence
+from rotordrop.evidence.sensing import Sensing
 from rotordrop.machine import Machine
 from rotordrop.machine.sensor import Sensor
-from rotordrop.measurement.axes import along_sensors
-from rotordrop.measurement.record import Record
+from rotordrop.record.axes import along_sensors
+from rotordrop.record.record import Record
 from rotordrop.rotor.assembly import build_rotor_fe
 from rotordrop.rotor.bearing_numbers import numbers_of
 from rotordrop.rotor.parameters import build_drop_model

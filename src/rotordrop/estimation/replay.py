@@ -39,10 +39,10 @@ from rotordrop.estimation.uncertainty import (
     seen_at_bearings,
     whole_drop,
 )
-from rotordrop.identification.air_gap import AirGap, identify_air_gap
-from rotordrop.identification.evidence import Evidence, known, read_evidence
+from rotordrop.evidence.air_gap import AirGap, identify_air_gap
+from rotordrop.evidence.evidence import Evidence, known, read_evidence
+from rotordrop.evidence.initial_state import InitialState
 from rotordrop.identification.friction import FrictionSweep, sweep_friction
-from rotordrop.identification.initial_state import InitialState
 from rotordrop.identification.replica import build_replica
 from rotordrop.identification.support import (
     LONGEST_WINDOW,
@@ -54,7 +54,7 @@ from rotordrop.identification.support import (
     refit_with_friction,
 )
 from rotordrop.machine import Machine
-from rotordrop.measurement.record import Record
+from rotordrop.record.record import Record
 from rotordrop.rotor.parameter import Step
 from rotordrop.rotor.parameters import build_drop_model
 

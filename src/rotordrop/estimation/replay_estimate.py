@@ -24,8 +24,8 @@ from rotordrop.estimation.estimate import FittedParameter
 from rotordrop.estimation.tracked_loads import MODEL_FORCE_SIGMA, MODEL_MEAN_FORCE_SIGMA, MODEL_STRESS_SIGMA
 from rotordrop.estimation.tracked_parameters import equivalent_stiffness, published_values, static_friction
 from rotordrop.estimation.uncertainty import FEWEST_DRAWS, Draws, interval
-from rotordrop.identification.air_gap import AirGap as IdentifiedGap
-from rotordrop.identification.evidence import Evidence, known
+from rotordrop.evidence.air_gap import AirGap as IdentifiedGap
+from rotordrop.evidence.evidence import Evidence, known
 from rotordrop.identification.friction import FrictionSweep
 from rotordrop.identification.modal_expansion import expand_initial_state
 from rotordrop.identification.support import SupportFit

@@ -17,7 +17,7 @@ from scipy.optimize import minimize
 
 from rotordrop.errors import RotordropError
 from rotordrop.estimated import NINETY, Estimated
-from rotordrop.identification.evidence import Evidence
+from rotordrop.evidence.evidence import Evidence
 from rotordrop.machine import Machine
 from rotordrop.rotor.parameter import Parameter
 from rotordrop.rotor.parameter_table import parameter

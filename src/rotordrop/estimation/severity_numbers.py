@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rotordrop.estimated import IdentifiedValue
 from rotordrop.estimation.bearing_drop import BearingDrop
 from rotordrop.estimation.estimate import Estimate
-from rotordrop.measurement.look import INDEX_WINDOW
+from rotordrop.evidence.look import INDEX_WINDOW
 from rotordrop.rotor.bearing_numbers import Ratings, numbers_of
 from rotordrop.severity.numbers import fatigue_shares, static_safety_of_load, static_safety_of_stress
 

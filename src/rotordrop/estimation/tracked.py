@@ -26,9 +26,9 @@ from rotordrop.estimation.structure_search import (
 )
 from rotordrop.estimation.tracked_loads import check_without_contact_law, checks_begun, of_a_beam
 from rotordrop.estimation.tracked_parameters import UNSURE_GAP
-from rotordrop.identification.evidence import Evidence, Missing
+from rotordrop.evidence.evidence import Evidence, Missing
 from rotordrop.machine import Machine
-from rotordrop.measurement.axes import sees_both_directions
+from rotordrop.record.axes import sees_both_directions
 from rotordrop.rotor.contact_band import reduction_for_contact
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.rotor.reduction import Reduction

@@ -11,7 +11,7 @@ from rotordrop.estimated import NINETY, IdentifiedValue
 from rotordrop.estimation.tracked_loads import INCONSISTENT
 from rotordrop.estimation.tracked_parameters import determination, parameter_widening
 from rotordrop.estimation.unbalance import PlaneUnbalance
-from rotordrop.measurement.synchronous import MarkAngle, angle_since_mark
+from rotordrop.evidence.synchronous import MarkAngle, angle_since_mark
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Smoothed, parameter_sample
 

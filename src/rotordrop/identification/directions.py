@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.identification.initial_state import InitialState, covariance_root
+from rotordrop.evidence.initial_state import InitialState, covariance_root
 from rotordrop.identification.replica import Replica
 
 Array = NDArray[np.float64]

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError
-from rotordrop.identification.sensing import Sensing
-from rotordrop.measurement.preprocess import local_polynomial
+from rotordrop.evidence.preprocess import local_polynomial
+from rotordrop.evidence.sensing import Sensing
 from rotordrop.rotor.parameters import DropModel
 
 Array = NDArray[np.float64]

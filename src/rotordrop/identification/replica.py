@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError
-from rotordrop.identification.evidence import Evidence, known
-from rotordrop.identification.free_fall import MAGNET_FORCES, FreeFall, build_free_fall, kernel_state
-from rotordrop.identification.initial_state import InitialState
+from rotordrop.evidence.evidence import Evidence, known
+from rotordrop.evidence.free_fall import MAGNET_FORCES, FreeFall, build_free_fall, kernel_state
+from rotordrop.evidence.initial_state import InitialState
+from rotordrop.evidence.sensing import Sensing, build_sensing
 from rotordrop.identification.parameter_vector import ParameterVector, with_bearing
-from rotordrop.identification.sensing import Sensing, build_sensing
 from rotordrop.physics import aerodynamics
 from rotordrop.rotor import layout as L
 from rotordrop.rotor.layout import KernelParameters

@@ -12,7 +12,7 @@ from rotordrop._version import __version__
 from rotordrop.estimation.bearing_drop import History
 from rotordrop.estimation.estimate import CrossCheck, Estimate, FittedParameter, Innovations, ReplaySteps
 from rotordrop.estimation.methods import Replay
-from rotordrop.measurement.event_date import event_date
+from rotordrop.record.event_date import event_date
 from rotordrop.report.changed_section import changed_section
 from rotordrop.report.content import (
     SIMULATED_RECORD,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rotordrop._version import __version__
 from rotordrop.estimation.bearing_drop import AirGap, BearingMotions, Motion
-from rotordrop.measurement.simulated import is_simulated
+from rotordrop.record.simulated import is_simulated
 from rotordrop.report.content import (
     SIMULATED_RECORD,
     Card,
@@ -27,7 +27,7 @@ from rotordrop.report.record_quality import quality_statements, record_quality_s
 from rotordrop.units import format_moment
 
 if TYPE_CHECKING:
-    from rotordrop.measurement.look import Look, Synchronous
+    from rotordrop.evidence.look import Look, Synchronous
 
 MOST_LISTED = 40
 """Impacts listed on the page; the JSON has all."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rotordrop._version import __version__
-from rotordrop.measurement.record import sha256_of
+from rotordrop.record.record import sha256_of
 
 if TYPE_CHECKING:
     from rotordrop.study.plan import Study

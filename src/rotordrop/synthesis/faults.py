@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import UsageError
-from rotordrop.measurement.record import Record
+from rotordrop.record.record import Record
 
 Array = NDArray[np.float64]
 

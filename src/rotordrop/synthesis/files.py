@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.atomic_file import atomic_path, make_folder, write_json
-from rotordrop.measurement.record import Record, sha256_of
-from rotordrop.measurement.writers import recording_of, write_delimited, write_hdf5
+from rotordrop.record.record import Record, sha256_of
+from rotordrop.record.writers import recording_of, write_delimited, write_hdf5
 from rotordrop.synthesis.recording import SyntheticDrop
 
 Format = Literal["csv", "h5"]

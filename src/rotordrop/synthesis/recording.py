@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop._version import __version__
-from rotordrop.measurement.record import Record
+from rotordrop.record.record import Record
 from rotordrop.simulate.case import DropCase
 from rotordrop.simulate.result import DropResult
 from rotordrop.synthesis.event import LARGEST_JITTER, DropConditions, HiddenMachine, drop_conditions

@@ -205,7 +205,7 @@ async def _formats(desk: Desk, request: Request) -> Response:
     """Endings of the recordings that can be read."""
 
     def known() -> tuple[str, ...]:
-        from rotordrop.measurement.readers import known_formats
+        from rotordrop.record.readers import known_formats
 
         return known_formats()
 

@@ -24,8 +24,8 @@ from rotordrop.web.workspace import Job, Workspace, is_path
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
-    from rotordrop.measurement.profile import Profile
-    from rotordrop.measurement.record import Record
+    from rotordrop.record.profile import Profile
+    from rotordrop.record.record import Record
 
 MEMORY: dict[str, int] = {
     "channels": 2 * 2**30,
@@ -120,7 +120,7 @@ def machine_of(job: Job) -> Machine | None:
 
 def profile_of(job: Job, options: dict[str, Any]) -> Profile:
     """Reading rules of a job: of the profile that was sent, and the speed where it was given by hand."""
-    from rotordrop.measurement.profile import Profile, SpeedSource, load_profile
+    from rotordrop.record.profile import Profile, SpeedSource, load_profile
     from rotordrop.units import parse_quantity
 
     file = job.file("profile")
@@ -133,7 +133,7 @@ def profile_of(job: Job, options: dict[str, Any]) -> Profile:
 
 def record_of(job: Job, machine: Machine, role: str, options: dict[str, Any]) -> Record | None:
     """Read the record or the tail of a job; None where none was sent."""
-    from rotordrop.measurement.record import read_record
+    from rotordrop.record.record import read_record
 
     file = job.file(role)
     if file is None:
@@ -155,8 +155,8 @@ def _record_file(job: Job) -> Path:
 
 def _channels(job: Job, made: Path, told: dict[str, Any]) -> None:
     """What a recording holds, which sensors look for a channel, and what could be guessed."""
-    from rotordrop.measurement.profile_guess import guess_profile
-    from rotordrop.measurement.readers import read_recording
+    from rotordrop.record.profile_guess import guess_profile
+    from rotordrop.record.readers import read_recording
 
     machine, given = machine_of(job), profile_of(job, told["options"])
     recording = read_recording(_record_file(job), given)
@@ -186,7 +186,7 @@ def _channels(job: Job, made: Path, told: dict[str, Any]) -> None:
 
 
 def _look(job: Job, made: Path, told: dict[str, Any]) -> None:
-    from rotordrop.measurement.look import look
+    from rotordrop.evidence.look import look
     from rotordrop.units import parse_quantity
     from rotordrop.web.drawn import write_look
 

@@ -26,9 +26,9 @@ from rotordrop.web.workspace import Job
 if TYPE_CHECKING:
     from rotordrop.estimation.bearing_drop import BearingDrop
     from rotordrop.estimation.estimate import Estimate
+    from rotordrop.evidence.look import Look
     from rotordrop.machine import Machine
-    from rotordrop.measurement.look import Look
-    from rotordrop.measurement.record import Record
+    from rotordrop.record.record import Record
     from rotordrop.report.time_panels import Panel
     from rotordrop.spectrum.coast_down import CoastDownAnalysis
 
@@ -150,7 +150,7 @@ def write_waterfall(
     options: Mapping[str, Any],
 ) -> None:
     """Write the frequencies of a coast-down: waterfalls and lines, their document, and their report."""
-    from rotordrop.measurement.simulated import is_simulated
+    from rotordrop.record.simulated import is_simulated
     from rotordrop.report.content import SIMULATED_RECORD
     from rotordrop.report.page import write_page
     from rotordrop.report.waterfall_page import waterfall_page

@@ -12,10 +12,10 @@ def _profile(files: Files, options: Mapping[str, Any]) -> list[str]:
     """Lines that make the reading rules; none where the recording speaks for itself."""
     lines = []
     if "profile" in files:
-        lines.append("from rotordrop.measurement.profile import load_profile")
+        lines.append("from rotordrop.record.profile import load_profile")
         lines.append(f"profile = load_profile({files['profile']['name']!r})")
     if options.get("speed"):
-        lines.insert(0, "from rotordrop.measurement.profile import Profile, SpeedSource")
+        lines.insert(0, "from rotordrop.record.profile import Profile, SpeedSource")
         given = "profile" if "profile" in files else "Profile()"
         source = f"SpeedSource(constant={options['speed']!r})"
         lines.append(f'profile = {given}.model_copy(update={{"speed": {source}}})')

@@ -12,8 +12,8 @@ import pytest
 
 from rotordrop.cli.app import INTERRUPTED, run
 from rotordrop.machine import example_machine, example_path
-from rotordrop.measurement import example_record_path, read_record
-from rotordrop.measurement.record import Record
+from rotordrop.record import example_record_path, read_record
+from rotordrop.record.record import Record
 
 LP400 = str(example_path("lp400"))
 

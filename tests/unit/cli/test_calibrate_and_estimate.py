@@ -20,8 +20,8 @@ from rotordrop.estimation.record_facts import BESIDE, COUNTED_TWICE, facts_of
 from rotordrop.estimation.schema import estimate_schema
 from rotordrop.estimation.tracked import is_calibrated
 from rotordrop.machine import CalibrationDrop, CalibrationOrigin, Machine, example_path, load_machine
-from rotordrop.measurement.examples import example_record_path
-from rotordrop.measurement.record import read_record
+from rotordrop.record.examples import example_record_path
+from rotordrop.record.record import read_record
 from rotordrop.track.calibration import BLIND_SCHEDULE, Stage
 from rotordrop.track.consistency import Check
 

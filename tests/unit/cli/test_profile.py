@@ -10,8 +10,8 @@ import pytest
 from rotordrop.cli.app import run
 from rotordrop.errors import RecordError
 from rotordrop.machine import example_machine, example_path
-from rotordrop.measurement import load_profile, read_record
-from rotordrop.measurement.profile import profile_of
+from rotordrop.record import load_profile, read_record
+from rotordrop.record.profile import profile_of
 
 LP400 = str(example_path("lp400"))
 SENSORS = ("S_NDE_A", "S_NDE_B", "S_DE_A", "S_DE_B")

@@ -10,8 +10,8 @@ from rotordrop.cli._recordings import require_own_content
 from rotordrop.cli.app import run
 from rotordrop.errors import UsageError
 from rotordrop.machine import example_path
-from rotordrop.measurement.examples import example_record_path
-from rotordrop.measurement.record import Record
+from rotordrop.record.examples import example_record_path
+from rotordrop.record.record import Record
 
 
 def test_equal_files_under_two_names_are_refused(tmp_path: Path) -> None:

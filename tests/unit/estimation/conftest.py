@@ -14,7 +14,7 @@ from rotordrop.estimation.methods import Tracked
 from rotordrop.estimation.record_facts import facts_of
 from rotordrop.estimation.tracked import TrackedDrop, followed_drops
 from rotordrop.estimation.tracked_estimate import estimate_of
-from rotordrop.identification.evidence import read_evidence
+from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine import Machine, example_machine
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.synthesis import HiddenMachine, SyntheticDrop, hidden_machine, synthesize_drop

@@ -12,10 +12,10 @@ import pytest
 
 from rotordrop.estimation.assumptions import twin_assumptions
 from rotordrop.estimation.tracked import COARSE_BASIS, _seen_at_the_ends, _with_sensors_of, drop_problem
-from rotordrop.identification.evidence import Evidence, Missing, read_evidence
+from rotordrop.evidence.evidence import Evidence, Missing, read_evidence
 from rotordrop.machine import Machine, example_machine, load_machine
-from rotordrop.measurement.examples import example_record_path
-from rotordrop.measurement.record import read_record
+from rotordrop.record.examples import example_record_path
+from rotordrop.record.record import read_record
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.synthesis import hidden_machine, synthesize_drop
 

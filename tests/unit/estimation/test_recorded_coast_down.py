@@ -9,8 +9,8 @@ import pytest
 
 from rotordrop.estimation.recorded_coast_down import recorded_coast_down, with_found_air_gaps
 from rotordrop.machine import example_machine
-from rotordrop.measurement.examples import example_record_path
-from rotordrop.measurement.record import read_record
+from rotordrop.record.examples import example_record_path
+from rotordrop.record.record import read_record
 from rotordrop.spectrum.indentation import displacement_history, find_settling
 from rotordrop.spectrum.machine_candidates import machine_candidates, swing_ranges
 

@@ -23,7 +23,7 @@ from rotordrop.estimation.estimate import Estimate, Verdict
 from rotordrop.estimation.fixed_values import fixed_correlations, read_fixed
 from rotordrop.estimation.replay_estimate import _speed
 from rotordrop.estimation.schema import estimate_schema
-from rotordrop.identification.speed import SpeedFit
+from rotordrop.evidence.speed import SpeedFit
 from rotordrop.machine import Machine, example_path
 from rotordrop.synthesis import SyntheticDrop
 from rotordrop.synthesis.files import write_synthetic

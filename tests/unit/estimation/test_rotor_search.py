@@ -22,10 +22,10 @@ from rotordrop.estimation.tracked_loads import (
     of_a_beam,
     of_the_rotor,
 )
-from rotordrop.identification.evidence import read_evidence
+from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine import example_machine
 from rotordrop.machine.simple import SimpleMachine, simple_machine
-from rotordrop.measurement.record import read_record
+from rotordrop.record.record import read_record
 from rotordrop.rotor.assembly import rotor_fe
 from rotordrop.rotor.modes import free_free_modes
 from rotordrop.rotor.parameters import build_drop_model

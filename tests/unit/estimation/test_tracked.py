@@ -45,11 +45,11 @@ from rotordrop.estimation.tracked_loads import (
     twin_loads,
 )
 from rotordrop.estimation.tracked_parameters import gap_of_record, is_lost
-from rotordrop.identification.evidence import Evidence, Missing, read_evidence
+from rotordrop.evidence.evidence import Evidence, Missing, read_evidence
+from rotordrop.evidence.power_off import PowerOff
 from rotordrop.machine import Machine, example_machine, load_machine
-from rotordrop.measurement.examples import example_record_path
-from rotordrop.measurement.power_off import PowerOff
-from rotordrop.measurement.record import Record, read_record
+from rotordrop.record.examples import example_record_path
+from rotordrop.record.record import Record, read_record
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.synthesis import SyntheticDrop, hidden_machine, synthesize_drop
 from rotordrop.synthesis.score import score_estimate

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rotordrop.estimation.tracked import COARSE_BASIS, recorded_drop
-from rotordrop.identification.evidence import read_evidence
+from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine import Machine
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.synthesis import SyntheticDrop

@@ -13,7 +13,7 @@ from rotordrop.estimation.estimate import Estimate
 from rotordrop.estimation.tracked import TrackedDrop
 from rotordrop.estimation.tracked_unbalance import _polar, plane_unbalances
 from rotordrop.estimation.unbalance import PlaneUnbalance, unbalance_notes
-from rotordrop.measurement.synchronous import MarkAngle
+from rotordrop.evidence.synchronous import MarkAngle
 from rotordrop.synthesis import HiddenMachine
 from rotordrop.synthesis.event import drop_conditions
 

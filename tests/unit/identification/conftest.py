@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from rotordrop.estimated import Estimated
-from rotordrop.identification.air_gap import SettledRest
-from rotordrop.identification.evidence import Evidence, known, read_evidence
-from rotordrop.identification.initial_state import InitialState
+from rotordrop.evidence.air_gap import SettledRest
+from rotordrop.evidence.evidence import Evidence, known, read_evidence
+from rotordrop.evidence.initial_state import InitialState
+from rotordrop.evidence.sensing import Sensing, build_sensing
 from rotordrop.identification.replica import Replica, build_replica
-from rotordrop.identification.sensing import Sensing, build_sensing
 from rotordrop.identification.support import ImpactFit, impact_problem
 from rotordrop.machine import Machine, example_machine
 from rotordrop.rotor.parameters import DropModel, build_drop_model

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import IdentificationError, RecordError
-from rotordrop.identification.air_gap import SettledRest, find_rest, identify_air_gap
-from rotordrop.identification.sensing import Sensing
+from rotordrop.evidence.air_gap import SettledRest, find_rest, identify_air_gap
+from rotordrop.evidence.sensing import Sensing
+from rotordrop.evidence.settled import resting_record
 from rotordrop.machine import Machine
-from rotordrop.measurement.axes import sensor_directions
-from rotordrop.measurement.record import Record
-from rotordrop.measurement.settled import resting_record
+from rotordrop.record.axes import sensor_directions
+from rotordrop.record.record import Record
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.static_sag import sag_of_model
 from rotordrop.synthesis import SyntheticDrop

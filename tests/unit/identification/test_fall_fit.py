@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rotordrop.identification.fall_fit import FallFit, FallReadings
-from rotordrop.identification.initial_state import InitialState
-from rotordrop.identification.sensing import Sensing
+from rotordrop.evidence.fall_fit import FallFit, FallReadings
+from rotordrop.evidence.initial_state import InitialState
+from rotordrop.evidence.sensing import Sensing
 from rotordrop.rotor.parameters import DropModel
 
 OFFSET = 8e-6

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rotordrop.identification.free_fall import build_free_fall, kernel_state, sagging_amplitudes
+from rotordrop.evidence.free_fall import build_free_fall, kernel_state, sagging_amplitudes
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.statics import bending_part, levitated_sag
 from rotordrop.simulate.case import DropCase, LevitatedStart, StateStart

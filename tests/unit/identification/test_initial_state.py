@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import IdentificationError
-from rotordrop.identification.air_gap import SettledRest
-from rotordrop.identification.evidence import Evidence, known
-from rotordrop.identification.initial_state import InitialState, end_of_fall, fit_initial_state, settled_along
+from rotordrop.evidence.air_gap import SettledRest
+from rotordrop.evidence.evidence import Evidence, known
+from rotordrop.evidence.initial_state import InitialState, end_of_fall, fit_initial_state, settled_along
+from rotordrop.evidence.sensing import Sensing, displacements_along
 from rotordrop.identification.modal_expansion import expand_initial_state
 from rotordrop.identification.replica import transferred
-from rotordrop.identification.sensing import Sensing, displacements_along
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.synthesis import SyntheticDrop
 

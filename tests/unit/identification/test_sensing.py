@@ -9,8 +9,8 @@ import pytest
 
 from rotordrop.errors import IdentificationError
 from rotordrop.estimated import Estimated
+from rotordrop.evidence.sensing import Sensing, build_sensing
 from rotordrop.identification.modal_expansion import expansion_matrix
-from rotordrop.identification.sensing import Sensing, build_sensing
 from rotordrop.machine import Machine, Sensor
 from rotordrop.rotor.parameters import DropModel
 

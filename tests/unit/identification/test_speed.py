@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rotordrop.identification.speed import identify_speed
-from rotordrop.measurement.record import Record
+from rotordrop.evidence.speed import identify_speed
+from rotordrop.record.record import Record
 from rotordrop.synthesis import SyntheticDrop
 
 INITIAL = 2.0 * np.pi * 60.0

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import IdentificationError
+from rotordrop.evidence.initial_state import InitialState
 from rotordrop.identification.directions import influential_directions
 from rotordrop.identification.fit import completed, fit_window
 from rotordrop.identification.friction import orbit_disagreement, orbit_distance, sweep_friction
-from rotordrop.identification.initial_state import InitialState
 from rotordrop.identification.parameter_vector import ParameterVector, nuisance_vector, support_vector
 from rotordrop.identification.replica import Replica
 from rotordrop.identification.support import (

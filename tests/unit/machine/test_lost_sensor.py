@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 
 from rotordrop.errors import MachineFileError
+from rotordrop.evidence import check_record
+from rotordrop.evidence.quality.finding import stops
 from rotordrop.machine import example_machine, example_path, loads_machine, machine_text
-from rotordrop.measurement import check_record
-from rotordrop.measurement.examples import example_record_path
-from rotordrop.measurement.quality.finding import stops
-from rotordrop.measurement.record import read_record
+from rotordrop.record.examples import example_record_path
+from rotordrop.record.record import read_record
 
 
 def without(names, folder, marked):

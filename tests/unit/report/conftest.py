@@ -12,10 +12,10 @@ from rotordrop.estimation.methods import Tracked
 from rotordrop.estimation.record_facts import facts_of
 from rotordrop.estimation.tracked import COARSE_BASIS, drop_problem, tracked_drop
 from rotordrop.estimation.tracked_estimate import estimate_of
-from rotordrop.identification.evidence import read_evidence
+from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine import example_machine
-from rotordrop.measurement.record import read_record
 from rotordrop.physics.hertz import LineContact
+from rotordrop.record.record import read_record
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.simulate.certificate import Certificate
 from rotordrop.simulate.result import ContactLog, DropResult

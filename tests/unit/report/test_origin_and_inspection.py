@@ -13,7 +13,7 @@ import pytest
 from rotordrop.estimated import IdentifiedValue
 from rotordrop.estimation.bearing_drop import BearingDrop, simulated_bearings
 from rotordrop.estimation.later_motion import LaterMotion
-from rotordrop.measurement.event_date import event_date
+from rotordrop.record.event_date import event_date
 from rotordrop.report.content import ReportContent
 from rotordrop.report.inspection import inspection_section, limits_section
 from rotordrop.report.origin import Origin, UsedFile, command_line

@@ -15,7 +15,7 @@ from rotordrop.estimation.agreement import Agreement, compare_orbits
 from rotordrop.estimation.bearing_drop import BearingDrop, Motion, Origin, Peak, simulated_bearings
 from rotordrop.estimation.estimate import Estimate, FittedParameter, ReplaySteps, Verdict
 from rotordrop.estimation.methods import Replay
-from rotordrop.identification.first_contact import TimedContact
+from rotordrop.evidence.first_contact import TimedContact
 from rotordrop.identification.friction import FrictionSweep
 from rotordrop.machine import example_machine
 from rotordrop.report.content import Section

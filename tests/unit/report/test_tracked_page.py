@@ -15,8 +15,8 @@ from rotordrop.estimation.bearing_drop import Origin
 from rotordrop.estimation.document import estimate_document
 from rotordrop.estimation.estimate import CrossCheck, Estimate, Verdict
 from rotordrop.estimation.later_motion import LaterMotion
-from rotordrop.measurement.quality.finding import Finding
-from rotordrop.measurement.simulated import is_simulated
+from rotordrop.evidence.quality.finding import Finding
+from rotordrop.record.simulated import is_simulated
 from rotordrop.report.content import Table
 from rotordrop.report.drop_sections import drop_sections
 from rotordrop.report.estimate_page import cross_check_statements, estimate_page, spoken

@@ -11,7 +11,7 @@ import pytest
 from rotordrop.cli.app import run
 from rotordrop.errors import UsageError
 from rotordrop.machine import load_machine
-from rotordrop.measurement.record import sha256_of
+from rotordrop.record.record import sha256_of
 from rotordrop.synthesis import Violations, read_truth
 from rotordrop.synthesis.bench import DROPS, VERSION, make_bench, score_bench
 from rotordrop.synthesis.bench.departures import departures

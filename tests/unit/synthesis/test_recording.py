@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from tests.scaled_machines import scaled_machine
 
-from rotordrop.measurement.axes import planar
+from rotordrop.record.axes import planar
 from rotordrop.synthesis import SensorChain, hidden_machine, synthesize_drop
 from rotordrop.synthesis.event import drop_conditions
 from rotordrop.synthesis.sensor_chain import (

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import OutputError, UsageError
-from rotordrop.measurement.record import read_record
+from rotordrop.record.record import read_record
 from rotordrop.rotor.parameter_table import LOADS, published
 from rotordrop.synthesis import FAULTS, read_truth, score_estimate, with_fault, write_synthetic
 from rotordrop.synthesis.score import LARGE_IMPACT

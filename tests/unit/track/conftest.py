@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from rotordrop.estimation.tracked import COARSE_BASIS, drop_problem
-from rotordrop.identification.evidence import Evidence, read_evidence
+from rotordrop.evidence.evidence import Evidence, read_evidence
 from rotordrop.machine import Machine, example_machine
-from rotordrop.measurement.examples import example_record_path
-from rotordrop.measurement.record import read_record
+from rotordrop.record.examples import example_record_path
+from rotordrop.record.record import read_record
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Forward, PassSettings, Smoothed, forward, smooth

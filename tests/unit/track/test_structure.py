@@ -19,7 +19,7 @@ from rotordrop.errors import UsageError
 from rotordrop.estimated import Estimated
 from rotordrop.estimation.structure import EXTENSIONS
 from rotordrop.estimation.tracked import COARSE_BASIS, drop_problem
-from rotordrop.identification.evidence import Evidence
+from rotordrop.evidence.evidence import Evidence
 from rotordrop.machine import Machine, loads_machine
 from rotordrop.machine.saving import machine_text
 from rotordrop.physics import support

@@ -12,10 +12,10 @@ import pytest
 from rotordrop.errors import IdentificationError, RecordError
 from rotordrop.estimated import NINETY, Estimated
 from rotordrop.estimation.tracked import COARSE_BASIS, drop_problem, recorded_drop
-from rotordrop.identification.evidence import Missing, read_evidence
+from rotordrop.evidence.evidence import Missing, read_evidence
 from rotordrop.machine import Machine, example_machine
-from rotordrop.measurement.record import read_record
 from rotordrop.physics.ball_bearing import bearing_constants, preload_of_offset
+from rotordrop.record.record import read_record
 from rotordrop.rotor.parameter_table import parameter
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.reduction import Reduction
@@ -293,7 +293,7 @@ def test_the_settled_level_is_that_of_the_lowest_point_of_the_sway(lp400, prepar
 @pytest.fixture(scope="module")
 def fast(lp400):
     """A short drop at 150 Hz and what it says."""
-    path = Path(__file__).parents[1] / "measurement" / "recordings" / "drop_150_short.h5"
+    path = Path(__file__).parents[1] / "record" / "recordings" / "drop_150_short.h5"
     return read_evidence(build_drop_model(lp400), read_record(path, lp400), name="fast")
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from rotordrop import load_machine, look
 from rotordrop.machine.simple import EXAMPLES
-from rotordrop.measurement.profile import Profile, load_profile
+from rotordrop.record.profile import Profile, load_profile
 from rotordrop.web.python_lines import estimate_lines, look_lines
 
 SENSORS = {"NDE_A": "S_NDE_A", "NDE_B": "S_NDE_B", "DE_A": "S_DE_A", "DE_B": "S_DE_B"}
@@ -100,7 +100,7 @@ def test_a_file_that_was_not_sent_is_not_there(served, job):
 
 
 def test_the_page_states_what_the_readers_read(served):
-    from rotordrop.measurement.readers import known_formats
+    from rotordrop.record.readers import known_formats
 
     assert tuple(served.ask("GET", "/api/formats").told["formats"]) == known_formats()
 

@@ -12,7 +12,7 @@ import numpy as np
 from rotordrop.atomic_file import make_folder, write_json
 from rotordrop.errors import UsageError
 from rotordrop.machine.saving import save_machine
-from rotordrop.measurement.record import sha256_of
+from rotordrop.record.record import sha256_of
 from rotordrop.synthesis.bench.departures import departures
 from rotordrop.synthesis.bench.drops import DROPS, VERSION, BenchDrop
 from rotordrop.synthesis.bench.rotors import bench_rotor

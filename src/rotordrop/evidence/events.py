@@ -1,0 +1,408 @@
+"""When things happen in a record: the drop, the first contacts, the rest at the end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.errors import NoDropError, RecordError
+from rotordrop.estimated import NINETY
+from rotordrop.evidence.levitated import LevitatedModel, fit_levitated
+from rotordrop.evidence.preprocess import acceleration
+from rotordrop.record.axes import Plane, along_sensors, planar_of, sensor_planes
+from rotordrop.record.recording import Array
+from rotordrop.record.speed import require_speed
+from rotordrop.units import format_quantity
+
+if TYPE_CHECKING:
+    from rotordrop.evidence.fall import Fall
+    from rotordrop.machine import Machine
+    from rotordrop.record.record import Record
+
+FALLEN_SHARE = 0.35
+"""A rotor that sank by this share of the air gap has been dropped."""
+
+NEAREST_CONTACT = 0.6
+"""A rotor closer than this to where it levitated, in nominal air gaps, touches nothing: what shakes it there
+is its own bending after the release."""
+
+MODEL_ERROR = 1.5e-5
+"""Standard uncertainty of the drop instant by what the release model leaves out [s]."""
+
+AFTER_FALL = 2.0
+"""How long after the fall a record is looked at for its first contact [s], before all of it is."""
+
+_BLOCK = 65536
+_CONTACT_FILTER = 1e-3
+_NO_BEGINNING = "the levitated part before the drop is missing"
+
+_THROWN = 1.0
+"""Range over the air gap that no levitated rotor has [1]: that of the limit C/D of ISO 14839-2."""
+
+_UNSURE = 3e-3
+"""How far the first guess of the drop may be off [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DropInstant:
+    """When the magnetic bearings let the rotor go.
+
+    Attributes
+    ----------
+    value : float
+        Power-off, in record time [s].
+    standard_error : float
+        Its standard uncertainty, noise and model together [s].
+    interval_90 : tuple of float
+        Interval that holds it with 90 % probability [s].
+    method : str
+        How it was found.
+    fall : Fall
+        The fit behind it, with remanent lift and misfit.
+    levitated : LevitatedModel
+        Readings of all sensors before the drop.
+    notes : tuple of str
+        What to know about this value.
+    """
+
+    value: float
+    standard_error: float
+    interval_90: tuple[float, float]
+    method: str
+    fall: Fall
+    levitated: LevitatedModel
+    notes: tuple[str, ...] = ()
+
+    @property
+    def contact(self) -> float:
+        """End of the free fall [s]."""
+        return self.fall.end
+
+    def __float__(self) -> float:
+        return self.value
+
+
+@dataclass(frozen=True, kw_only=True)
+class CoarseDrop:
+    """Where the rotor sinks, found without any model.
+
+    Attributes
+    ----------
+    instant : float
+        Drop to within some milliseconds [s].
+    sunk : float
+        When the fastest plane had sunk by `FALLEN_SHARE` of its gap [s].
+    contact : float
+        First sudden acceleration after that, or the end of the record [s].
+    speed : float
+        Shaft speed before the drop [rad/s].
+    """
+
+    instant: float
+    sunk: float
+    contact: float
+    speed: float
+
+
+def find_drop_instant(record: Record, machine: Machine) -> DropInstant:
+    """Find power-off from the readings: levitated motion before, released rotor after.
+
+    Parameters
+    ----------
+    record : Record
+        Readings that begin while the rotor is levitated.
+    machine : Machine
+        The machine, for its gaps, AMB planes and rotor.
+
+    Raises
+    ------
+    RecordError
+        When the rotor does not fall in the record, or the record does not begin before the fall.
+    """
+    whole, planes = with_whole_planes(record)
+    coarse, levitated = drop_and_levitated(record, machine, whole, planes)
+    fall = find_fall(whole, machine, planes, levitated.of_channels(_columns(whole, record)), coarse)
+    return _instant(fall, levitated, record)
+
+
+def with_whole_planes(record: Record) -> tuple[Record, tuple[Plane, ...]]:
+    """The record with those planes only whose sensors give x and y: a lost sensor takes its plane with it.
+
+    Raises
+    ------
+    RecordError
+        When no plane is whole.
+    """
+    whole = [i for i, sensor in enumerate(record.sensors) if _resolved(sensor.node, record)]
+    if len(whole) in (0, len(record.sensors)):
+        return record, sensor_planes(record.sensors)
+    sensors = tuple(record.sensors[i] for i in whole)
+    return replace(record, signals=record.signals[:, whole], sensors=sensors), sensor_planes(sensors)
+
+
+def _columns(part: Record, record: Record) -> list[int]:
+    """Columns of a record that a record with some of its sensors holds."""
+    return [record.sensors.index(sensor) for sensor in part.sensors]
+
+
+def _resolved(node: int, record: Record) -> bool:
+    try:
+        sensor_planes([sensor for sensor in record.sensors if sensor.node == node])
+    except RecordError:
+        return False
+    return True
+
+
+def find_fall(
+    record: Record,
+    machine: Machine,
+    planes: tuple[Plane, ...],
+    levitated: LevitatedModel,
+    coarse: CoarseDrop,
+    *,
+    until: float | None = None,
+) -> Fall:
+    """Fit the fall by the released rotor of the machine, from a first guess of the drop.
+
+    The window ends where the readings leave the free fall, or at `until` [s] whether they fit or not.
+    """
+    window = (coarse.instant, coarse.sunk, coarse.contact)
+    if until is not None:
+        window = (coarse.instant, until, until)
+    # The rotor model brings the compiler with it, and a first look at a record needs neither.
+    from rotordrop.evidence.fall import fit_fall
+    from rotordrop.evidence.release import free_rotor
+
+    return fit_fall(record, planes, free_rotor(machine, planes), levitated, window)
+
+
+def _instant(fall: Fall, levitated: LevitatedModel, record: Record) -> DropInstant:
+    error = float(np.hypot(fall.standard_error, MODEL_ERROR))
+    notes = []
+    if fall.misfit > 2.0:
+        notes.append(
+            f"the fall deviates from the released rotor by {fall.misfit**0.5:.1f} × the noise: the drop "
+            "instant is less "
+            "certain than stated"
+        )
+    step = 1.0 / record.sampling_rate
+    return DropInstant(
+        value=fall.instant,
+        standard_error=error,
+        interval_90=(fall.instant - NINETY * error, fall.instant + NINETY * error),
+        method=f"{fall.method}; {error / step:.2g} of a sample",
+        fall=fall,
+        levitated=levitated,
+        notes=tuple(notes),
+    )
+
+
+def coarse_drop(record: Record, machine: Machine, planes: tuple[Plane, ...]) -> CoarseDrop:
+    """Find where the rotor sinks by a share of the air gap, and the first sudden acceleration after it.
+
+    Raises
+    ------
+    RecordError
+        When it never does, or has done so from the beginning.
+    """
+    gaps = np.array([gap_of(machine, plane) for plane in planes])
+    turn = 2 * np.pi / max(abs(float(require_speed(record)[1][0])), 1.0)
+    first = max(int(min(turn, 0.02) * record.sampling_rate), 8)
+    early = until_fallen(record, planes, gaps, first)
+    found = _coarse_drop(early, machine, planes, gaps, first)
+    if early is not record and found.contact > early.time[-1] - 2.0 * _CONTACT_FILTER:
+        return _coarse_drop(record, machine, planes, gaps, first)
+    return found
+
+
+def until_fallen(record: Record, planes: tuple[Plane, ...], gaps: Array, first: int) -> Record:
+    """A record until shortly after all planes are low; all of it where they never are.
+
+    A coast-down goes on for a minute after its fall of some milliseconds: what is asked of the fall must not
+    hold that minute in memory several times over.
+    """
+
+    def height(part: slice) -> Array:
+        return planar_of(along_sensors(record.signals[part], record.sensors), planes)[:, :, 1]
+
+    start = np.mean(height(slice(first)), axis=0)
+    for begin in range(0, len(record.time), _BLOCK):
+        fallen = (start - height(slice(begin, begin + _BLOCK)) > FALLEN_SHARE * gaps).all(axis=1)
+        if fallen.any():
+            end = begin + int(np.argmax(fallen)) + round(AFTER_FALL * record.sampling_rate)
+            return record if end >= len(record.time) else record.window(-np.inf, float(record.time[end]))
+    return record
+
+
+def drop_and_levitated(
+    record: Record, machine: Machine, whole: Record, planes: tuple[Plane, ...]
+) -> tuple[CoarseDrop, LevitatedModel]:
+    """First guess of the drop, and what all sensors read before it.
+
+    Where one end touches and is thrown up again before the other has sunk, both are low long after the
+    release; what the rotor did before shows as soon as the levitated motion is known.
+
+    Parameters
+    ----------
+    record : Record
+        The record.
+    machine : Machine
+        The machine, for its gaps.
+    whole : Record
+        The record with those planes only whose sensors give x and y.
+    planes : tuple of Plane
+        Those planes.
+
+    Raises
+    ------
+    RecordError
+        When the rotor does not fall in the record, or the record does not begin before the fall.
+    """
+    coarse = coarse_drop(whole, machine, planes)
+    levitated = fit_levitated(record, coarse.instant - _UNSURE, speed=coarse.speed)
+    if levitated.end > coarse.instant - _UNSURE - 2.0 / record.sampling_rate:
+        return coarse, levitated
+    coarse = _sooner(whole, machine, planes, levitated.of_channels(_columns(whole, record)), coarse)
+    return coarse, fit_levitated(record, coarse.instant - _UNSURE, speed=coarse.speed)
+
+
+def _sooner(
+    record: Record, machine: Machine, planes: tuple[Plane, ...], levitated: LevitatedModel, coarse: CoarseDrop
+) -> CoarseDrop:
+    """The first guess of a drop by the way from the levitated motion, whatever its direction."""
+    gaps, gravity = np.array([gap_of(machine, plane) for plane in planes]), float(machine.gravity)
+    near = record.window(-np.inf, coarse.contact)
+    away = planar_of(along_sensors(near.signals - levitated.readings(near.time), record.sensors), planes)
+    way = np.hypot(away[:, :, 0], away[:, :, 1])
+    gone = (way > FALLEN_SHARE * gaps).any(axis=1) & (near.time > levitated.end)
+    if not gone.any():
+        return coarse
+    sunk = int(np.argmax(gone))
+    # the unbalance throws a widely circling plane further than it falls, but not before it was let go
+    fallen = float(near.time[sunk]) - float(np.sqrt(2.0 * np.max(way[sunk]) / gravity))
+    instant = max(fallen, levitated.end)
+    shape = planar_of(along_sensors(near.signals, record.sensors), planes)
+    contact = first_sudden(near, shape, gravity, instant, max(sunk, _first(way > NEAREST_CONTACT * gaps)))
+    return replace(coarse, instant=instant, sunk=float(near.time[sunk]), contact=contact)
+
+
+def _coarse_drop(
+    record: Record, machine: Machine, planes: tuple[Plane, ...], gaps: Array, first: int
+) -> CoarseDrop:
+    speed_time, readings = require_speed(record)
+    shape = planar_of(along_sensors(record.signals, record.sensors), planes)
+    height = shape[:, :, 1]
+    start = np.mean(height[:first], axis=0)
+    deepest = float(np.max((start - np.min(height, axis=0)) / gaps))
+    low = start - height > FALLEN_SHARE * gaps
+    if not low.all(axis=1).any():
+        _refuse_without_drop(record, shape, start, gaps, deepest)
+    sunk = sinking(low)
+    fastest = float(np.max(start - height[sunk]))
+    instant = record.time[sunk] - float(np.sqrt(2 * fastest / float(machine.gravity)))
+    if instant < record.time[0] or record.time[sunk] - record.time[0] < first / record.sampling_rate:
+        raise NoDropError(
+            record.name,
+            f"the rotor has sunk by {format_quantity(fastest, 'length')} at {record.time[sunk]:.6g} s, "
+            f"{(record.time[sunk] - record.time[0]) * 1e3:.3g} ms after the record begins: {_NO_BEGINNING}",
+            "record with pre-trigger",
+            begins_late=True,
+        )
+    before = speed_time < instant
+    speed = float(np.median(readings[before])) if before.any() else float(readings[0])
+    far = np.hypot(*np.moveaxis(shape - np.mean(shape[:first], axis=0), -1, 0)) > NEAREST_CONTACT * gaps
+    contact = first_sudden(record, shape, float(machine.gravity), instant, max(sunk, _first(far)))
+    return CoarseDrop(instant=float(instant), sunk=float(record.time[sunk]), contact=contact, speed=speed)
+
+
+def sinking(low: NDArray[np.bool_]) -> int:
+    """First sample of the fall in which all planes (N, P) come to be low, at which any of them is.
+
+    A plane that circles widely while levitated, such as one between the bearings near a bending critical
+    speed, is low once a turn; what it did before all were low does not count.
+    """
+    both = int(np.argmax(low.all(axis=1)))
+    high = ~low[: both + 1]
+    return int(np.min(np.where(high.any(axis=0), both + 1 - np.argmax(high[::-1], axis=0), 0)))
+
+
+def fall_accelerations(away: Array, reach: float, rate: float) -> Array:
+    """Accelerations of a plane from a tenth of its way to `FALLEN_SHARE` of it [m/s²], one for each time.
+
+    A falling rotor has up to that of gravity; a swing along the race goes slower, by its amplitude over the
+    air gap. No machine, unit or direction need be known; a wrong clock shows by its square. The first way is
+    the fall, unless the record begins while the rotor is still being lifted; later ones are rebounds too.
+
+    Parameters
+    ----------
+    away : array, shape (N,)
+        Distance from where the plane was first [m].
+    reach : float
+        How far it goes in all [m].
+    rate : float
+        Samples per second [Hz].
+    """
+    beyond = away > FALLEN_SHARE * reach
+    begins = np.flatnonzero(beyond & ~np.append(False, beyond[:-1]))
+    near = np.flatnonzero(away < 0.1 * reach)
+    before = np.searchsorted(near, begins) - 1
+    if not len(begins) or before[0] < 0:
+        return np.array([np.inf])  # it circled as wide as this before the fall
+    took = (begins - near[before]) / rate
+    found: Array = 2.0 * reach * (np.sqrt(FALLEN_SHARE) - np.sqrt(0.1)) ** 2 / took**2
+    return found
+
+
+def _first(far: NDArray[np.bool_]) -> int:
+    """First sample at which any plane (N, P) is far, or the last one."""
+    at = np.flatnonzero(far.any(axis=1))
+    return int(at[0]) if len(at) else len(far) - 1
+
+
+def gap_of(machine: Machine, plane: Plane) -> float:
+    """Nominal air gap [m] of the touchdown bearing nearest to a sensor plane."""
+    named = [b for b in machine.touchdown_bearings if b.name == plane.bearing]
+    position = machine.rotor.node_positions
+    nearest = min(
+        named or machine.touchdown_bearings,
+        key=lambda b: abs(position[b.node - 1] - position[plane.node - 1]),
+    )
+    return float(nearest.air_gap)
+
+
+def _refuse_without_drop(record: Record, path: Array, start: Array, gaps: Array, deepest: float) -> None:
+    height = path[:, :, 1]
+    ranges = ", ".join(format_quantity(float(r), "length") for r in np.ptp(height, axis=0))
+    sunk_now = start < -FALLEN_SHARE * gaps
+    thrown = np.ptp(path, axis=0).max() > _THROWN * float(np.min(gaps))
+    if thrown or (sunk_now.any() and deepest < FALLEN_SHARE):
+        raise NoDropError(
+            record.name,
+            f"no drop in the record, and it begins with the rotor at "
+            f"{format_quantity(float(np.min(start)), 'length')} and moving by up to "
+            f"{format_quantity(float(np.ptp(path, axis=0).max()), 'length')}: {_NO_BEGINNING}",
+            "record with pre-trigger",
+            begins_late=True,
+        )
+    raise NoDropError(
+        record.name,
+        f"no drop in the record: the vertical displacement spans {ranges} in its planes and sinks by "
+        f"{deepest:.0%} of the nominal air gap at most, a dropped rotor by more than {FALLEN_SHARE:.0%} in "
+        "all planes",
+        "check that this is the recording of a drop and that its polarity and unit are right",
+        begins_late=False,
+    )
+
+
+def first_sudden(record: Record, shape: Array, gravity: float, instant: float, sunk: int) -> float:
+    """First time after sinking at which the acceleration cannot be that of a free rotor [s]."""
+    curvature = acceleration(shape, record.sampling_rate, width=_CONTACT_FILTER)
+    size = np.max(np.hypot(curvature[:, :, 0], curvature[:, :, 1] + gravity), axis=1)
+    levitated = record.time < instant - _UNSURE
+    usual = float(np.max(size[levitated])) if levitated.any() else 0.0
+    limit = gravity + max(1.5 * gravity, 2.0 * usual)
+    after = np.flatnonzero(size[sunk:] > limit)
+    return float(record.time[sunk + after[0]]) if len(after) else float(record.time[-1])

@@ -1,0 +1,380 @@
+"""What a recorded drop says by itself, with nothing known of the machine."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rotordrop.errors import RecordError
+from rotordrop.evidence.look.events import (
+    Drop,
+    Impact,
+    Whirl,
+    drops_of,
+    impacts_of,
+    standstill_of,
+    whirls_of,
+)
+from rotordrop.evidence.look.motion import Motion, motion_of, slope
+from rotordrop.evidence.quality import Finding, check_record, stops
+from rotordrop.evidence.quality.channels import check_channels
+from rotordrop.evidence.quality.clock import check_blocks, check_clock
+from rotordrop.evidence.quality.finding import ranked
+from rotordrop.evidence.synchronous import Synchronous, synchronous_motion
+from rotordrop.record.arrangement import Arrangement, arrangement_of
+from rotordrop.record.profile import Profile, SpeedSource, load_profile
+from rotordrop.record.readers import read_recording
+from rotordrop.record.record import Record, record_of, sha256_of
+from rotordrop.units import in_si
+
+if TYPE_CHECKING:
+    from rotordrop.machine import Machine
+
+BEFORE_RELEASE = 4e-3
+"""Distance from the release [s], which a look knows to about 2 ms, up to which the rotor surely floats."""
+
+INDEX_WINDOW = 0.2
+"""Time from the release on over which the indices are taken [s], or to the end where that comes first."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlaneLook:
+    """What one plane shows of a drop.
+
+    Attributes
+    ----------
+    plane : str
+        Name of the plane.
+    gap : float
+        Air gap used [m].
+    largest : float
+        Largest distance from the centre [m].
+    largest_time : float
+        When [s].
+    position_index : float
+        Mean distance from the centre over the air gap, from the release on for `INDEX_WINDOW` [1].
+    velocity_index : float or None
+        Root mean square of the velocity of the shaft centre over shaft speed times air gap, over the same
+        time [1]: 1 for a rotor that runs round its whole gap once per turn. None without a speed.
+    """
+
+    plane: str
+    gap: float
+    largest: float
+    largest_time: float
+    position_index: float
+    velocity_index: float | None
+
+    @property
+    def excess(self) -> float:
+        """How far the rotor went beyond the air gap [m]."""
+        return self.largest - self.gap
+
+
+@dataclass(frozen=True, kw_only=True)
+class Look:
+    """A recorded drop at a glance.
+
+    Attributes
+    ----------
+    record : Record
+        The readings in SI units.
+    motion : Motion
+        The path of the shaft in every plane.
+    findings : tuple of Finding
+        What the quality gate says, the worst first.
+    drops : tuple of Drop
+        Every fall in the record.
+    impacts, whirls : tuple
+        Of the first drop.
+    planes : tuple of PlaneLook
+        Of the first drop.
+    standstill : float or None
+        When the shaft came to rest [s].
+    speed : float or None
+        Shaft speed at the release [rad/s].
+    synchronous : tuple of Synchronous
+        1X before the drop against the mark of the shaft, per plane; empty without a keyphasor.
+    notes : tuple of str
+        What was guessed.
+    """
+
+    record: Record
+    motion: Motion
+    findings: tuple[Finding, ...]
+    drops: tuple[Drop, ...]
+    impacts: tuple[Impact, ...]
+    whirls: tuple[Whirl, ...]
+    planes: tuple[PlaneLook, ...]
+    standstill: float | None
+    speed: float | None
+    synchronous: tuple[Synchronous, ...]
+    notes: tuple[str, ...]
+
+    def timeline(self) -> tuple[tuple[float, str], ...]:
+        """Events in the order of time: time [s] and words."""
+        events = [(float(self.record.time[0]), "record begins, rotor levitated")]
+        for number, drop in enumerate(self.drops, start=1):
+            events.append((drop.release, "released" if number == 1 else f"released again, drop {number}"))
+            if drop.permanent_contact is not None:
+                events.append((drop.permanent_contact, "in contact from here on"))
+            events.append((drop.end, "lifted again" if drop.lifted else "record ends"))
+        for plane in self.motion.paths:
+            first = next((impact for impact in self.impacts if impact.plane == plane.name), None)
+            if first is not None:
+                events.append((first.time, f"first impact at {plane.name}"))
+        events += [
+            (
+                whirl.start,
+                whirl.words,
+            )
+            for whirl in self.whirls
+        ]
+        if self.standstill is not None:
+            events.append((self.standstill, "standstill"))
+        return tuple(sorted(events))
+
+    def as_json(self) -> dict[str, Any]:
+        """Everything as JSON-ready numbers and text, in SI units; times in record time."""
+        record = self.record
+        return {
+            "record": record.name,
+            "sha256": record.sha256,
+            "channels": [
+                {"name": sensor.name, "plane": sensor.bearing, "angle_rad": float(sensor.angle)}
+                for sensor in record.sensors
+            ],
+            "sampling_rate_Hz": record.sampling_rate,
+            "start_s": float(record.time[0]),
+            "end_s": float(record.time[-1]),
+            "speed_rad_per_s": self.speed,
+            "standstill_s": self.standstill,
+            "findings": [
+                {
+                    "kind": found.kind,
+                    "severity": found.severity,
+                    "channel": found.channel,
+                    "time_s": found.time,
+                    "message": found.message,
+                    "remedy": found.remedy,
+                }
+                for found in self.findings
+            ],
+            "drops": [
+                {
+                    "release_s": drop.release,
+                    "end_s": drop.end,
+                    "permanent_contact_s": drop.permanent_contact,
+                    "lifted": drop.lifted,
+                }
+                for drop in self.drops
+            ],
+            "planes": [
+                {
+                    "plane": plane.plane,
+                    "air_gap_m": plane.gap,
+                    "largest_displacement_m": plane.largest,
+                    "largest_displacement_time_s": plane.largest_time,
+                    "beyond_air_gap_m": plane.excess,
+                    "position_index": plane.position_index,
+                    "velocity_index": plane.velocity_index,
+                }
+                for plane in self.planes
+            ],
+            "impacts": [
+                {
+                    "plane": impact.plane,
+                    "time_s": impact.time,
+                    "azimuth_rad": impact.azimuth,
+                    "depth_m": impact.depth,
+                    "approach_m_per_s": impact.approach,
+                    "rebound_m_per_s": impact.rebound,
+                }
+                for impact in self.impacts
+            ],
+            "whirls": [
+                {
+                    "plane": whirl.plane,
+                    "start_s": whirl.start,
+                    "end_s": whirl.end,
+                    "turns": whirl.turns,
+                    "frequency_Hz": whirl.frequency,
+                    "sense": whirl.sense,
+                }
+                for whirl in self.whirls
+            ],
+            "synchronous": [
+                {
+                    "plane": found.plane,
+                    "amplitude_m": found.amplitude,
+                    "amplitude_interval_90_m": list(found.amplitude_interval_90),
+                    "phase_rad": found.phase,
+                    "phase_interval_90_rad": list(found.phase_interval_90),
+                    "turns": found.turns,
+                }
+                for found in self.synchronous
+            ],
+            "timeline": [{"time_s": time, "event": words} for time, words in self.timeline()],
+            "notes": list(self.notes),
+        }
+
+
+def look(
+    record: str | FilePath | Record,
+    *,
+    machine: Machine | None = None,
+    gap: float | str | None = None,
+    speed: float | str | None = None,
+    mapping: Sequence[str] = (),
+    profile: Profile | str | FilePath | None = None,
+) -> Look:
+    """Look at a recorded drop with nothing known of the machine, or with its description.
+
+    Parameters
+    ----------
+    record : path-like or Record
+        The recording, or one that was read before.
+    machine : Machine, optional
+        Names and places the sensors and gives the air gaps.
+    gap : float or str, optional
+        Air gap of all planes [m], or a text such as "0.28 mm".
+    speed : float or str, optional
+        Shaft speed before the drop [rad/s], or a text such as "60 Hz", where the recording has none.
+    mapping : sequence of str
+        Planes with channels and angles, ``"NDE: X1 0 deg, Y1 90 deg"``.
+    profile : Profile or path-like, optional
+        Reading rules of the recorder.
+
+    Raises
+    ------
+    RecordError
+        When the recording cannot be read, no channels make a plane, or nothing falls.
+
+    Notes
+    -----
+    The velocity index follows the idea of the non-dimensional velocity of the shaft centre (Vval) of ISMB13,
+    paper 52, the position index that of its counterpart by distance; window and normalisation are those given
+    at `PlaneLook`. Displacements are those of the sensor planes.
+    Not validated: impacts are those of the displacement alone, without a model of the contact.
+    """
+    gap = None if gap is None else in_si(gap, "length", "gap")
+    speed = None if speed is None else in_si(speed, "speed", "speed")
+    read, arrangement = _read(record, machine, speed, mapping, profile)
+    findings = _checked(read, machine)
+    blocking = [found for found in findings if found.kind in _UNREADABLE and found.severity == "stop"]
+    if blocking:
+        raise RecordError(f"{read.name} cannot be looked at: {blocking[0]}")
+    gaps = _gaps(read, machine, gap)
+    motion = motion_of(read, gaps=gaps, angles_known=arrangement is None or arrangement.angles_known)
+    drops = drops_of(motion)
+    if not drops:
+        raise RecordError(
+            f"{read.name}: the rotor does not fall from where it floated; check channels and gap"
+        )
+    turning = _speed_at(read, drops[0].release)
+    return Look(
+        record=read,
+        motion=motion,
+        findings=findings,
+        drops=drops,
+        impacts=impacts_of(motion, drops[0]),
+        whirls=whirls_of(motion, drops[0]),
+        planes=tuple(_plane_looks(motion, drops[0], turning)),
+        standstill=standstill_of(read),
+        speed=turning,
+        synchronous=_synchronous(read, motion, drops[0].release),
+        notes=(*read.notes, *(arrangement.notes if arrangement else ()), *motion.notes),
+    )
+
+
+_UNREADABLE = ("missing samples", "non-monotonic time", "wrong sampling rate")
+
+
+def _read(
+    record: str | FilePath | Record,
+    machine: Machine | None,
+    speed: float | None,
+    mapping: Sequence[str],
+    profile: Profile | str | FilePath | None,
+) -> tuple[Record, Arrangement | None]:
+    if isinstance(record, Record):
+        return record, None
+    path = FilePath(record)
+    rules = profile if isinstance(profile, Profile) else load_profile(profile) if profile else Profile()
+    if speed is not None:
+        rules = rules.model_copy(update={"speed": SpeedSource(constant=f"{speed!r} rad/s")})
+    recording = read_recording(path, rules)
+    arrangement = None if machine is not None else arrangement_of(recording, mapping)
+    sensors = machine.sensors if machine is not None else arrangement.sensors if arrangement else ()
+    if machine is None:
+        rules = rules.model_copy(update={"channels": {}})
+    return record_of(recording, sensors, profile=rules, path=path, sha256=sha256_of(path)), arrangement
+
+
+def _checked(record: Record, machine: Machine | None) -> tuple[Finding, ...]:
+    """Pass the gate: the whole of it with a machine, else what single channels and the clock show."""
+    if machine is not None:
+        return check_record(record, machine)
+    damage = [
+        Finding(kind="damage on reading", message=words, remedy="copy or export it again", severity="warning")
+        for words in record.warnings
+    ]
+    findings = damage + check_clock(record) + check_channels(record)
+    return ranked(findings if stops(findings) else findings + check_blocks(record))
+
+
+def _gaps(record: Record, machine: Machine | None, gap: float | None) -> tuple[float | None, ...]:
+    from rotordrop.evidence.events import gap_of
+    from rotordrop.record.axes import sensor_planes
+
+    planes = sensor_planes(record.sensors)
+    if gap is not None or machine is None:
+        return (gap,) * len(planes)
+    return tuple(gap_of(machine, plane) for plane in planes)
+
+
+def _speed_at(record: Record, release: float) -> float | None:
+    if record.speed_time is None or record.speed_readings is None:
+        return None
+    before = record.speed_readings[record.speed_time <= release]
+    chosen = before[-5:] if len(before) else record.speed_readings[:1]
+    return abs(float(np.median(chosen)))
+
+
+def _synchronous(record: Record, motion: Motion, release: float) -> tuple[Synchronous, ...]:
+    if record.marks is None:
+        return ()
+    found = (
+        synchronous_motion(path.name, motion.time, path.position, record.marks, release - BEFORE_RELEASE)
+        for path in motion.paths
+    )
+    return tuple(one for one in found if one is not None)
+
+
+def _plane_looks(motion: Motion, drop: Drop, speed: float | None) -> list[PlaneLook]:
+    during = (motion.time >= drop.release) & (motion.time <= drop.end)
+    window = during & (motion.time <= drop.release + INDEX_WINDOW)
+    found = []
+    for path in motion.paths:
+        radius = np.where(during, path.radius, 0.0)
+        at = int(np.argmax(radius))
+        velocity = np.hypot(*slope(path.position[window], motion.rate).T)
+        index = float(np.sqrt(np.mean(velocity**2))) / (speed * path.gap) if speed else None
+        found.append(
+            PlaneLook(
+                plane=path.name,
+                gap=path.gap,
+                largest=float(radius[at]),
+                largest_time=float(motion.time[at]),
+                position_index=float(np.mean(path.radius[window])) / path.gap,
+                velocity_index=index,
+            )
+        )
+    return found
+
+
+__all__ = ["Drop", "Impact", "Look", "PlaneLook", "Synchronous", "Whirl", "look"]

@@ -1,0 +1,224 @@
+"""Which sensor is which and which way it reads: decided from gravity and the sense of the orbit.
+
+A fall shows where down is; the levitated 1X orbit runs with the spin. Together they tell an inverted sensor
+from exchanged or turned ones in every plane. Which end is which shows only in how the rotor leaves its
+levitated shape, see `rotordrop.evidence.quality.ends`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotordrop.evidence.quality.finding import Finding
+from rotordrop.record.axes import Plane, along_sensors
+from rotordrop.record.recording import Array
+
+if TYPE_CHECKING:
+    from rotordrop.record.record import Record
+
+Tone = np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
+
+MOST_TILT = 30.0
+"""A fall may lean this far from the vertical [deg]."""
+
+CLEAR_ORBIT = 3.0
+"""Forward over backward part of the orbit above which its sense is clear."""
+
+LEANING = "leaning fall"
+"""Kind of the finding of a fall that leans for no reason of wiring."""
+
+_AFTER_FALL = 0.06
+_SMALLEST_ORBIT = 3e-7
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Change:
+    """A way the sensors of a plane could be wired other than described."""
+
+    signs: tuple[int, ...]
+    order: tuple[int, ...]
+
+    def words(self, names: tuple[str, ...]) -> str:
+        inverted = [name for name, sign in zip(names, self.signs, strict=True) if sign < 0]
+        moved = [name for name, place in zip(names, self.order, strict=True) if names[place] != name]
+        parts = [f"{' and '.join(moved)} exchanged"] if moved else []
+        parts += [f"{' and '.join(inverted)} inverted"] if inverted else []
+        return ", ".join(parts)
+
+
+def _changes(count: int) -> list[_Change]:
+    """No, one or all sensors inverted, combined with no or one pair exchanged; the simplest first."""
+    signs = [tuple(-1 if i == k else 1 for i in range(count)) for k in range(-1, count)] + [(-1,) * count]
+    orders = [tuple(range(count))]
+    for a, b in combinations(range(count), 2):
+        order = list(range(count))
+        order[a], order[b] = order[b], order[a]
+        orders.append(tuple(order))
+    return [_Change(signs=sign, order=order) for order in orders for sign in signs]
+
+
+def check_planes(
+    planes: tuple[Plane, ...],
+    sunk: Array,
+    levitated_1x: Tone,
+    *,
+    fell_straight: bool = False,
+) -> list[Finding]:
+    """Check polarity and order of the sensors in every plane.
+
+    Parameters
+    ----------
+    planes : tuple of Plane
+        Sensor planes as described.
+    sunk : array, shape (S,)
+        Change of the readings by the fall [m].
+    levitated_1x : array, shape (S,), complex
+        1X tone of the levitated readings [m].
+    fell_straight : bool
+        Whether the free rotor with the sensors as described explains the fall before the first contact. Then
+        what leans later is the rotor, whatever exchange would make it point down.
+    """
+    verdicts = [_verdict(plane, sunk, levitated_1x) for plane in planes]
+    if all(verdict == "backward" for verdict in verdicts):
+        return [
+            Finding(
+                kind="swapped axes",
+                message="the fall points down in all planes but the levitated orbit runs against the spin in "
+                "all of them",
+                remedy="either the shaft turns clockwise seen from the DE (x then points the other way), or "
+                "the sensors "
+                "are exchanged in every plane: correct the angles in the machine file or the channel map",
+                severity="stop",
+                channel=", ".join(name for plane in planes for name in plane.names),
+            )
+        ]
+    findings = []
+    for plane, verdict in zip(planes, verdicts, strict=True):
+        if verdict == "fits":
+            continue
+        findings.append(_plane_finding(plane, verdict, sunk, levitated_1x, fell_straight))
+    return findings
+
+
+def _verdict(plane: Plane, sunk: Array, tone: Tone) -> str:
+    identity = _changes(len(plane.columns))[0]
+    down = _tilt(plane, sunk, identity) <= MOST_TILT
+    sense = _sense(plane, tone, identity)
+    if down and sense == 0:
+        return "undecided"
+    if down:
+        return "fits" if sense > 0 else "backward"
+    return "wrong"
+
+
+def _corrected(plane: Plane, readings: Array, change: _Change) -> Array:
+    """Readings of the plane (S_p,) as they would be had the sensors been wired as described."""
+    own = readings[list(plane.columns)]
+    return np.asarray(own[list(change.order)] * np.array(change.signs))
+
+
+def _tilt(plane: Plane, sunk: Array, change: _Change) -> float:
+    """Angle between the fall and straight down [deg]."""
+    x, y = plane.to_planar @ _corrected(plane, sunk, change)
+    return float(np.degrees(np.arctan2(abs(x), -y)))
+
+
+def _sense(plane: Plane, tone: Tone, change: _Change) -> int:
+    """1 for an orbit with the spin, −1 against it, 0 where it is too flat or small to tell."""
+    own = tone[list(plane.columns)][list(change.order)] * np.array(change.signs)
+    x, y = plane.to_planar @ own
+    forward, backward = abs(x + 1j * y) / 2, abs(x - 1j * y) / 2
+    if max(forward, backward) < _SMALLEST_ORBIT:
+        return 0
+    if forward > CLEAR_ORBIT * backward:
+        return 1
+    return -1 if backward > CLEAR_ORBIT * forward else 0
+
+
+def _plane_finding(
+    plane: Plane,
+    verdict: str,
+    sunk: Array,
+    tone: Tone,
+    fell_straight: bool,
+) -> Finding:
+    names = ", ".join(plane.names)
+    if verdict == "undecided":
+        return Finding(
+            kind="sense of the orbit",
+            message=f"the levitated orbit at node {plane.node} is too small or flat to show its sense: "
+            "whether "
+            f"{' and '.join(plane.names)} are exchanged cannot be decided",
+            remedy="make sure by moving the shaft by hand",
+            severity="note",
+            channel=names,
+        )
+    fitting = [
+        change
+        for change in _changes(len(plane.columns))[1:]
+        if _tilt(plane, sunk, change) <= MOST_TILT and _sense(plane, tone, change) >= 0
+    ]
+    own = ", ".join(
+        f"{name} by {sunk[i] * 1e6:+.3g} µm" for name, i in zip(plane.names, plane.columns, strict=True)
+    )
+    tilt = _tilt(plane, sunk, _changes(len(plane.columns))[0])
+    seen = f"the fall changes {own} and so leans {tilt:.0f}° from straight down"
+    if verdict == "backward":
+        seen = f"the fall changes {own}, but the levitated orbit at node {plane.node} runs against the spin"
+    if not fitting:
+        return _leaning(f"{seen}; no exchange or inversion explains it", names)
+    if fell_straight and _sense(plane, tone, _changes(len(plane.columns))[0]) >= 0:
+        return _leaning(f"{seen}, but before the first contact the rotor falls as described", names)
+    simplest = [change for change in fitting if _effort(change) == min(map(_effort, fitting))]
+    causes = " or ".join(change.words(plane.names) for change in simplest)
+    swapped = all(change.order != tuple(sorted(change.order)) for change in simplest)
+    return Finding(
+        kind="swapped axes" if swapped else "inverted polarity",
+        message=f"{seen}; it fits with {causes}",
+        remedy="correct the polarity or the angles in the machine file, or the channel map in the profile",
+        severity="stop",
+        channel=_named_channels(plane, simplest) or names,
+    )
+
+
+def _leaning(message: str, names: str) -> Finding:
+    """A fall that leans for no reason of wiring: strong friction drives a rotor up the side of its bearing.
+
+    Just the most dangerous drops look so; they must not be refused. Sensors turned to other angles show in
+    the fall before the first contact.
+    """
+    return Finding(
+        kind=LEANING,
+        message=message,
+        remedy="strong friction drives a rotor sideways like this; make sure that the angles in the machine "
+        "file are right",
+        severity="warning",
+        channel=names,
+    )
+
+
+def _effort(change: _Change) -> int:
+    return sum(sign < 0 for sign in change.signs) + 2 * (change.order != tuple(sorted(change.order)))
+
+
+def _named_channels(plane: Plane, changes: list[_Change]) -> str:
+    named = [
+        name
+        for i, name in enumerate(plane.names)
+        if any(change.signs[i] < 0 or change.order[i] != i for change in changes)
+    ]
+    return ", ".join(named)
+
+
+def fall_of(record: Record, level: Array, sunk_at: int) -> Array:
+    """Change of the readings by the fall, as true displacement along the sensors, shape (S,).
+
+    Averaged over 60 ms from the fall on: at high speed the first milliseconds lead sideways as much as down.
+    """
+    last = sunk_at + max(int(_AFTER_FALL * record.sampling_rate), 1)
+    mean = np.mean(record.signals[sunk_at:last], axis=0)
+    return along_sensors(mean, record.sensors) - along_sensors(level, record.sensors)

@@ -1,0 +1,273 @@
+"""Which end is which: decided by how the rotor leaves its levitated shape, through the model of the rotor.
+
+Where the described arrangement explains the fall up to the first contact at noise level, it is confirmed.
+Where not, ends exchanged, single channels crossed between the ends and wrong gains are tried on one and the
+same part of the fall. If none of them explains it clearly better, the record does not decide. A gain that is
+off by less than about a third hides behind the remanent lift and is not found here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import combinations, product
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotordrop.estimated import NINETY, Estimated
+from rotordrop.evidence.events import CoarseDrop, find_fall
+from rotordrop.evidence.levitated import LevitatedModel
+from rotordrop.evidence.quality.finding import Finding
+from rotordrop.evidence.quality.sensing import TURNED, WRONG_GAIN, read_otherwise
+from rotordrop.record.axes import Plane
+from rotordrop.record.recording import Array
+from rotordrop.rotor.rotor_form import is_beam
+
+if TYPE_CHECKING:
+    from rotordrop.evidence.fall import Fall
+    from rotordrop.machine import Machine
+    from rotordrop.record.record import Record
+
+GOOD_FIT = 2.0
+"""Mean square of the residual over the noise up to which the arrangement counts as confirmed."""
+
+UNDECIDED_ENDS = "ends"
+"""Kind of the finding that the fall does not say which end is which."""
+
+_BETTER = 3.0
+_NEAR_CONTACT = 6e-4
+"""The fit should reach this close to the first sudden acceleration [s]."""
+
+_POSSIBLE_LIFT = (-0.15, 0.8)
+"""Remanent over static lift that a magnetic bearing can have at power-off."""
+
+_POSSIBLE_SIDEWAYS = 0.25
+"""Horizontal force over static lift that a magnetic bearing can have at power-off [1]."""
+
+_AS_FALLING = 1.0
+"""Horizontal force over static lift from which on no sensors turned so little that the fall still points down
+explain it [1]: the fall is too short to tell, or the rotor touched before."""
+
+_ANY_GAIN = (0.2, 1.8)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Case:
+    """The record read another way."""
+
+    words: str
+    kind: str
+    channels: tuple[str, ...]
+    record: Record
+    levitated: LevitatedModel
+
+
+def check_ends(
+    record: Record,
+    machine: Machine,
+    planes: tuple[Plane, ...],
+    levitated: LevitatedModel,
+    coarse: CoarseDrop,
+) -> list[Finding]:
+    """Compare the fall with the rotor model: as described, ends exchanged, channels crossed, gain wrong."""
+    if len({amb.node for amb in machine.ambs}) < 2 or len(planes) < 2:
+        return [_undecided("it takes two AMB planes in the machine file and two sensor planes")]
+    own = find_fall(record, machine, planes, levitated, coarse)
+    if own.misfit <= GOOD_FIT and own.end >= coarse.contact - _NEAR_CONTACT:
+        return read_otherwise(record, planes, levitated, own) or _implausible_lift(
+            record, planes, levitated, own, machine
+        )
+    cases = _other_cases(record, planes, levitated)
+    if not is_beam(machine.rotor):
+        cases.append(_any_gain(record, levitated))
+    grown = [find_fall(case.record, machine, planes, case.levitated, coarse) for case in cases]
+    until = max([own.end, *(fall.end for fall in grown if fall.misfit <= GOOD_FIT)])
+    mine = find_fall(record, machine, planes, levitated, coarse, until=until).misfit
+    if mine <= GOOD_FIT:
+        return read_otherwise(record, planes, levitated, own) or _implausible_lift(
+            record, planes, levitated, own, machine
+        )
+    finals = [
+        find_fall(case.record, machine, planes, case.levitated, coarse, until=until)
+        if case.kind == "wrong gain" or fall.end >= until - _NEAR_CONTACT
+        else None
+        for case, fall in zip(cases, grown, strict=True)
+    ]
+    decided = _decide(mine, cases, finals)
+    if is_beam(machine.rotor) and decided.severity == "stop":
+        return [_doubted(decided)]
+    if decided.kind not in (UNDECIDED_ENDS, "wrong gain"):
+        return [decided]
+    named = read_otherwise(record, planes, levitated, own)
+    stop = decided.severity == "stop"
+    return [replace(found, severity="stop") if stop else found for found in named] or [decided]
+
+
+def _implausible_lift(
+    record: Record, planes: tuple[Plane, ...], levitated: LevitatedModel, fall: Fall, machine: Machine
+) -> list[Finding]:
+    """A fall that fits only with an impossible remanent lift is too fast or too slow: a gain is wrong."""
+    share = fall.remanent_force[:, 1] / fall.rotor.lift
+    worst = int(np.argmax(np.abs(share - np.mean(_POSSIBLE_LIFT))))
+    if _POSSIBLE_LIFT[0] <= share[worst] <= _POSSIBLE_LIFT[1]:
+        return _implausible_sideways(record, planes, levitated, fall, machine)
+    return [
+        Finding(
+            kind="wrong gain",
+            message=f"the fall fits only with a remanent lift of {fall.remanent_force[worst, 1]:.3g} N at "
+            f"AMB {machine.ambs[worst].name}, {share[worst]:.0%} of its static lift: the rotor seems to "
+            f"fall too {'fast' if share[worst] < 0 else 'slowly'} there",
+            remedy="check sensitivity and gain of the sensors at that end, and the sampling rate",
+            severity="warning",
+        )
+    ]
+
+
+def fell_as_described(
+    record: Record,
+    machine: Machine,
+    planes: tuple[Plane, ...],
+    levitated: LevitatedModel,
+    coarse: CoarseDrop,
+) -> bool:
+    """Whether gravity has shown, before the first contact, that the sensors look where they are said to.
+
+    Sensors that are exchanged or inverted see gravity pull aside or upwards: the free rotor then explains the
+    fall only with a force there as large as the lift that was lost. It need not be explained up to the first
+    sudden acceleration, which may be the second contact: what counts is how well the force is known.
+    """
+    if len({amb.node for amb in machine.ambs}) < 2 or len(planes) < 2:
+        return False
+    fall = find_fall(record, machine, planes, levitated, coarse)
+    if fall.misfit > GOOD_FIT:
+        return False
+    upwards = fall.remanent_force[:, 1] / fall.rotor.lift
+    if np.any(upwards < _POSSIBLE_LIFT[0]) or np.any(upwards > _POSSIBLE_LIFT[1]):
+        return False
+    aside, error = _sideways(record, planes, levitated, fall)
+    return bool(np.all(np.abs(aside) + NINETY * error < 0.5 * _AS_FALLING))
+
+
+def _sideways(
+    record: Record, planes: tuple[Plane, ...], levitated: LevitatedModel, fall: Fall
+) -> tuple[Array, Array]:
+    """Horizontal force at the release over static lift, per magnetic bearing, and its standard error [1]."""
+    from rotordrop.evidence.fall import linearised
+
+    share = fall.remanent_force[:, 0] / fall.rotor.lift
+    jacobian = linearised(record, planes, levitated, fall)[1]
+    variance = np.diag(np.linalg.inv(jacobian.T @ jacobian))[: len(share)] * max(fall.misfit, 1.0)
+    return share, np.sqrt(variance)
+
+
+def _implausible_sideways(
+    record: Record, planes: tuple[Plane, ...], levitated: LevitatedModel, fall: Fall, machine: Machine
+) -> list[Finding]:
+    """A fall that leads aside before anything is touched: the sensors look in other directions.
+
+    In a short fall a force aside and the turning force of the unbalance look alike: what counts is by how
+    much the force is larger than a magnet's at least.
+    """
+    share, error = _sideways(record, planes, levitated, fall)
+    worst = int(np.argmax(np.abs(share)))
+    if not _POSSIBLE_SIDEWAYS < abs(share[worst]) < _AS_FALLING:
+        return []
+    if abs(share[worst]) - NINETY * error[worst] < _POSSIBLE_SIDEWAYS:
+        return []
+    return [
+        Finding(
+            kind=TURNED,
+            message=f"the fall fits only with {fall.remanent_force[worst, 0]:.3g} N sideways at AMB "
+            f"{machine.ambs[worst].name}, {abs(share[worst]):.0%} of its static lift: the rotor seems to "
+            "fall aside there before it touches anything",
+            remedy="check the angles of the sensors at that end",
+            severity="warning",
+        )
+    ]
+
+
+def _decide(mine: float, cases: list[_Case], falls: list[Fall | None]) -> Finding:
+    tried = [(case, fall) for case, fall in zip(cases, falls, strict=True) if fall is not None]
+    best = min(tried, key=lambda pair: pair[1].misfit, default=None)
+    if best is None or best[1].misfit * _BETTER > mine or best[1].misfit > _BETTER * GOOD_FIT:
+        return _undecided(
+            f"as described, the fall deviates from the rotor model by {mine**0.5:.1f} × the noise, and no "
+            "exchange of channels explains it clearly better"
+        )
+    case, fall = best
+    words = case.words
+    if case.kind == "wrong gain":
+        errors = fall.gain_errors
+        index = int(np.argmax(np.abs(errors)))
+        if abs(errors[index]) < WRONG_GAIN:
+            return _undecided(
+                f"as described, the fall deviates from the rotor model by {mine**0.5:.1f} × the noise"
+            )
+        name = case.record.channel_names[index]
+        words = f"{name} reading {1.0 + errors[index]:.3g} × what the fall under gravity gives"
+        case = replace(case, channels=(name,))
+    return Finding(
+        kind=case.kind,
+        message=f"the fall deviates from the rotor model by {mine**0.5:.1f} × the noise as described and by "
+        f"{fall.misfit**0.5:.1f} × with {words}",
+        remedy="correct the channel map, or node and sensitivity of the sensor in the machine file",
+        severity="stop",
+        channel=", ".join(case.channels),
+    )
+
+
+def _other_cases(record: Record, planes: tuple[Plane, ...], levitated: LevitatedModel) -> list[_Case]:
+    cases = []
+    for first, second in combinations(planes, 2):
+        if len(first.columns) == len(second.columns):
+            pairs = list(zip(first.columns, second.columns, strict=True))
+            cases.append(_exchanged(record, levitated, pairs, "swapped ends"))
+        for pair in product(first.columns, second.columns):
+            cases.append(_exchanged(record, levitated, [pair], "swapped channels"))
+    return cases
+
+
+def _any_gain(record: Record, levitated: LevitatedModel) -> _Case:
+    """The record with gains that nobody knows. A beam in place of the rotor falls otherwise than the rotor
+    does, and gains would take that up: a good channel of a machine of 60 kg then read -2.3 ×.
+    """
+    free = tuple(
+        sensor.model_copy(update={"gain": Estimated(value=float(sensor.gain), range=_ANY_GAIN)})
+        for sensor in record.sensors
+    )
+    loose = replace(record, sensors=free)
+    return _Case(words="", kind="wrong gain", channels=(), record=loose, levitated=levitated)
+
+
+def _exchanged(record: Record, levitated: LevitatedModel, pairs: list[tuple[int, int]], kind: str) -> _Case:
+    order = list(range(len(record.sensors)))
+    for a, b in pairs:
+        order[a], order[b] = b, a
+    names = record.channel_names
+    return _Case(
+        words=" and ".join(f"{names[a]} and {names[b]} exchanged" for a, b in pairs),
+        kind=kind,
+        channels=tuple(names[i] for pair in pairs for i in pair),
+        record=replace(record, signals=record.signals[:, order]),
+        levitated=replace(
+            levitated,
+            mean=levitated.mean[order],
+            amplitudes=levitated.amplitudes[:, order],
+            noise=levitated.noise[order],
+        ),
+    )
+
+
+def _doubted(found: Finding) -> Finding:
+    """What no record is refused for: a beam in place of the rotor falls otherwise than the rotor does."""
+    why = "; but a beam stands for the rotor, and the deviation may be that of its bending"
+    return replace(found, message=found.message + why, severity="warning")
+
+
+def _undecided(why: str) -> Finding:
+    return Finding(
+        kind=UNDECIDED_ENDS,
+        message=f"whether the two ends are exchanged cannot be decided: {why}",
+        remedy="make sure by moving one end by hand; check rotor model, sensor nodes and AMB nodes",
+        severity="note",
+    )

@@ -1,0 +1,291 @@
+"""What gravity says about the sensors while the rotor flies between two impacts.
+
+Between impacts nothing holds a dropped rotor: the magnets are off and their remanence has faded. Whatever it
+rings in its bending modes and turns by its unbalance, as a whole it falls with g. How fast the readings fall
+then is a calibration of every sensor, far sharper than the first fall, in which lift remains. A flight whose
+readings the free rotor does not explain at noise level is cut shorter or left out, so a touch that was not
+seen does not pass for a gain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotordrop.estimated import NINETY
+from rotordrop.evidence.levitated import LevitatedModel
+from rotordrop.evidence.quality.finding import Finding
+from rotordrop.evidence.quality.sensing import TURNED, WRONG_GAIN
+from rotordrop.machine.amb import REMANENCE_TIME
+from rotordrop.record.axes import Plane, planar_of, sensor_directions
+from rotordrop.record.recording import Array
+from rotordrop.series import runs_of
+
+if TYPE_CHECKING:
+    from rotordrop.evidence.release import FreeRotor
+    from rotordrop.machine import Machine
+    from rotordrop.record.record import Record
+
+SHORTEST, LONGEST = 0.35, 1.7
+"""Flights that are looked at, over the time of a free fall through the gap [1]: a shorter one says little, of
+a longer one the beginning does."""
+
+MOST_FLIGHTS = 6
+"""Flights that are looked at, the longest ones [1]."""
+
+AFLOAT = 0.85
+"""A rotor farther from the race than this share of its reach touches nothing [1]."""
+
+_FADED = 3.0
+"""Time after the first guess of the drop by which a flight can begin, over that of the remanence [1]."""
+
+_AT_NOISE = 1.4
+"""Mean square of the residual over the noise up to which the free rotor explains a flight [1]."""
+
+_SHORTENED = 0.1
+"""Share by which a flight is cut that it does not explain [1]."""
+
+_ENOUGH_RATE = 25e3
+"""Rate above which samples are left out, which the free rotor does not need [Hz]."""
+
+_MODEL = 0.02
+"""What the rotor of the file leaves out of a flight, as an error of gravity [1]."""
+
+_ONE_FAULT = 4.0
+"""Chi square per degree of freedom that one fault may leave; a touch that was not seen leaves more [1]."""
+
+_OF_REACH = 80.0
+"""Percentile of the distance from the levitated place that stands for the race [%]: few rotors fly long."""
+
+_REFUTED = 0.12
+"""Error of a gain that flights exclude [1], at which a fall that suspects one is no longer heard."""
+
+_WITNESSES = 2
+"""Channels times flights from which on a fault is a warning: a touch that was not seen looks like a gain of
+one channel in one flight, of 28 % at 5.5 standard deviations in one of 298 clean drops."""
+
+_LEVEL = 0.2
+"""Sine of the angle below which a sensor looks too level to be weighed by gravity [1]."""
+
+_SEPARABLE = 1e-9
+"""Least singular value over the largest one that still tells unknowns apart [1]."""
+
+SURE = 5.0
+"""Standard deviations from which on a gain is named [1]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Weighed:
+    """How fast every sensor saw the rotor fall in its flights, over what gravity lets it.
+
+    Attributes
+    ----------
+    share : array, shape (S,)
+        Reading over true displacement [1]; 1 with right gains, angles and clock.
+    covariance : array, shape (S, S)
+        Its covariance [1].
+    flights : int
+        Flights it comes from.
+    """
+
+    share: Array
+    covariance: Array
+    flights: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Fall:
+    """Gravity [m/s²], and the time of a free fall through the gap [s]."""
+
+    gravity: float
+    time: float
+
+
+def weighed(
+    record: Record, machine: Machine, planes: tuple[Plane, ...], levitated: LevitatedModel, drop: float
+) -> Weighed | None:
+    """Weigh the rotor in its flights; None where it never flew."""
+    from rotordrop.evidence.release import free_rotor
+
+    if len({amb.node for amb in machine.ambs}) < 2 or record.speed is None or float(machine.gravity) <= 0.0:
+        return None
+    rotor = free_rotor(machine, planes)
+    count = len(record.sensors)
+    weight: Array = np.zeros((count, count))
+    total: Array = np.zeros(count)
+    flights = 0
+    gap = min(float(bearing.air_gap) for bearing in machine.touchdown_bearings)
+    fall = _Fall(gravity=float(machine.gravity), time=float(np.sqrt(2.0 * gap / float(machine.gravity))))
+    for window in _flights(record, planes, levitated, drop, fall):
+        found = _weighed_in(record, planes, rotor, levitated, window, fall)
+        if found is None:
+            continue
+        share, covariance = found
+        inverse: Array = np.linalg.inv(covariance + _MODEL**2 * np.eye(count)).astype(np.float64)
+        weight += inverse
+        total += inverse @ share
+        flights += 1
+    if not flights:
+        return None
+    error: Array = np.linalg.inv(weight).astype(np.float64)
+    return Weighed(share=error @ total, covariance=error, flights=flights)
+
+
+def with_flights(
+    of_fall: list[Finding], seen: Weighed | None, record: Record, planes: tuple[Plane, ...]
+) -> list[Finding]:
+    """Findings of the first fall with what the flights say; they refute gains and angles that it suspects."""
+    if seen is None:
+        return of_fall
+    own = check_flights(seen, record, planes)
+    error = np.sqrt(np.diag(seen.covariance))
+    right = np.all(np.abs(seen.share - 1.0) + 2.0 * error < _REFUTED)
+    kept = [found for found in of_fall if not (right and found.kind in ("wrong gain", TURNED))]
+    return kept + [found for found in own if found.kind not in {other.kind for other in kept}]
+
+
+def check_flights(seen: Weighed, record: Record, planes: tuple[Plane, ...]) -> list[Finding]:
+    """Name a gain, or sensors at other angles, by which the rotor falls with something other than g."""
+    off = seen.share - 1.0
+    precision = np.linalg.inv(seen.covariance)
+    tried = []
+    for kind, channels, shape in _ways(record, planes):
+        size = float(shape @ precision @ off) / float(shape @ precision @ shape)
+        tried.append((size**2 * float(shape @ precision @ shape), size, kind, channels))
+    gained, size, kind, channels = max(tried, key=lambda one: one[0])
+    left = float(off @ precision @ off) - gained
+    if gained < SURE**2 or abs(size) < WRONG_GAIN or left > _ONE_FAULT * (len(off) - 1):
+        return []
+    names = ", ".join(channels)
+    sole = seen.flights * len(channels) < _WITNESSES
+    error = abs(size) / gained**0.5
+    seen_as = (
+        f"{names} turned by about {np.degrees(np.arctan(size)):+.0f}°"
+        if kind == TURNED
+        else f"{names} reading {1.0 + size:.3g} ± {NINETY * error:.2g} (90 %) of what it should"
+    )
+    return [
+        Finding(
+            kind=kind,
+            message=f"in {seen.flights} flight(s) between impacts, where nothing but gravity pulls it, "
+            f"the rotor falls as it would with {seen_as}"
+            + ("; a single flight, and a touch that was not seen looks alike" if sole else ""),
+            remedy="check the angles of the sensors at that end"
+            if kind == TURNED
+            else "check sensitivity, gain and unit of the channels, and the sampling rate",
+            severity="note" if sole else "warning",
+            channel=names,
+        )
+    ]
+
+
+def _ways(record: Record, planes: tuple[Plane, ...]) -> Iterator[tuple[str, tuple[str, ...], Array]]:
+    """Faults by kind and channels, with what they add to the share of gravity per size."""
+    names = record.channel_names
+    yield "wrong gain", names, np.ones(len(names))
+    for alone, name in zip(np.eye(len(names)), names, strict=True):
+        yield "wrong gain", (name,), alone
+    unit = sensor_directions(record.sensors)
+    for plane in planes:
+        turned, columns = np.zeros(len(names)), list(plane.columns)
+        upright = unit[columns, 1]
+        turned[columns] = unit[columns, 0] / np.where(np.abs(upright) > _LEVEL, upright, np.inf)
+        if np.any(turned):
+            yield TURNED, plane.names, turned
+
+
+def _flights(
+    record: Record, planes: tuple[Plane, ...], levitated: LevitatedModel, drop: float, fall: _Fall
+) -> list[tuple[int, int]]:
+    """First samples and counts of the longest stretches with the rotor away from all races."""
+    gains = np.array([float(sensor.gain) for sensor in record.sensors])
+    path = planar_of((record.signals - levitated.mean) * gains, planes)
+    away = np.hypot(path[..., 0], path[..., 1])
+    fallen = record.time > drop
+    away = away / np.percentile(away[fallen], _OF_REACH, axis=0)
+    landed = np.flatnonzero(fallen & np.any(away > AFLOAT, axis=1))
+    if not len(landed):
+        return []
+    afloat = np.all(away < AFLOAT, axis=1)
+    afloat[: max(int(landed[0]), int(np.searchsorted(record.time, drop + _FADED * REMANENCE_TIME)))] = False
+    starts, lengths = runs_of(afloat)
+    rate = record.sampling_rate
+    found = [
+        (start, min(length, int(LONGEST * fall.time * rate)))
+        for start, length in zip(starts.tolist(), lengths.tolist(), strict=True)
+        if length >= SHORTEST * fall.time * rate
+    ]
+    return sorted(found, key=lambda window: -window[1])[:MOST_FLIGHTS]
+
+
+def _weighed_in(
+    record: Record,
+    planes: tuple[Plane, ...],
+    rotor: FreeRotor,
+    levitated: LevitatedModel,
+    window: tuple[int, int],
+    fall: _Fall,
+) -> tuple[Array, Array] | None:
+    """Share of gravity by every sensor in one flight, cut until the free rotor explains it."""
+    first, count = window
+    thin = max(round(record.sampling_rate / _ENOUGH_RATE), 1)
+    while count >= SHORTEST * fall.time * record.sampling_rate:
+        inside = slice(first, first + count, thin)
+        share, covariance, residual = _fitted(record, planes, rotor, levitated, inside, fall.gravity)
+        if float(np.mean(residual**2)) < _AT_NOISE:
+            return share, covariance
+        half, cut = len(residual) // 2, max(int(_SHORTENED * count), thin)
+        first += cut if np.sum(residual[:half] ** 2) > np.sum(residual[half:] ** 2) else 0
+        count -= cut
+    return None
+
+
+def _fitted(
+    record: Record,
+    planes: tuple[Plane, ...],
+    rotor: FreeRotor,
+    levitated: LevitatedModel,
+    inside: slice,
+    gravity: float,
+) -> tuple[Array, Array, Array]:
+    """Fit a flight by the motion left in the rotor, its unbalance and gravity.
+
+    Returns
+    -------
+    share : array, shape (S,)
+        Share of gravity seen by every sensor [1].
+    covariance : array, shape (S, S)
+        Its covariance [1].
+    residual : array, shape (T, S)
+        Residual over the noise, scaled by the degrees of freedom [1].
+    """
+    from rotordrop.evidence.fall import plane_of_sensor
+    from rotordrop.evidence.release import response_at, response_to_start
+
+    assert record.speed is not None
+    since = record.time[inside] - record.time[inside.start]
+    speed = float(record.speed[inside.start])
+    unit = sensor_directions(record.sensors)
+    gains = np.array([float(sensor.gain) for sensor in record.sensors])
+    noise = np.maximum(levitated.noise * gains, 1e-12)
+    of_plane = plane_of_sensor(planes, len(unit))
+    toward = (unit[:, 0] - 1j * unit[:, 1])[None, :, None]
+    left = response_at(response_to_start(rotor, speed, float(since[-1])), since)[:, of_plane] * toward
+    turning = np.exp(1j * speed * since)[:, None, None] * np.eye(len(planes))[of_plane] * toward
+    parts = [column for seen in (left, turning) for column in (seen.real, -seen.imag)]
+    falls = -0.5 * gravity * since[:, None, None] ** 2 * np.diag(unit[:, 1])
+    columns = np.concatenate([*parts, falls], axis=-1) / noise[None, :, None]
+    readings = record.signals[inside] * gains / noise
+    flat = columns.reshape(-1, columns.shape[-1])
+    size = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
+    u, s, vt = np.linalg.svd(flat / size, full_matrices=False)
+    inverse = np.where(s > _SEPARABLE * s[0], 1.0 / np.maximum(s, 1e-300), 0.0)
+    best = vt.T @ (inverse * (u.T @ readings.ravel()))
+    residual = readings.ravel() - (flat / size) @ best
+    residual *= np.sqrt(len(residual) / max(len(residual) - int(np.sum(inverse > 0.0)), 1))
+    last = slice(-len(unit), None)
+    spread = (vt.T[last] * inverse) / size[last, None]
+    return best[last] / size[last], spread @ spread.T, residual.reshape(readings.shape)

@@ -1,0 +1,334 @@
+"""What a record shows if units, clock and speed are right: a levitated rotor, and a fall one gap deep."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotordrop.errors import NoDropError
+from rotordrop.evidence.events import fall_accelerations, gap_of
+from rotordrop.evidence.levitated import MAINS, OTHER_SUPPLIES, LevitatedModel
+from rotordrop.evidence.quality.finding import Finding
+from rotordrop.record.axes import Plane
+from rotordrop.record.recording import Array
+from rotordrop.units import format_quantity
+
+if TYPE_CHECKING:
+    from rotordrop.machine import Machine
+    from rotordrop.record.record import Record
+
+PLAUSIBLE_MOTION = (0.4, 4.0)
+"""Range of a channel over a drop, in air gaps; outside it a unit or gain must be wrong."""
+
+_FACTORS = {
+    1e6: "µm taken for m, or the like",
+    1e3: "µm taken for mm, or nm for µm",
+    1 / 0.0254: "mil taken for mm, or the like",
+    25.4: "mil and µm mixed up",
+    1 / 25.4: "mil and µm mixed up",
+    1e-3: "mm taken for µm, or µm for nm",
+    1e-6: "m taken for µm, or the like",
+}
+_FEWEST_TURNS = 4.0
+"""Turns of a line before the drop from which it is a speed [1]."""
+
+_NO_HALF = 1e-3
+"""Power at half the strongest line over that at it, below which the half is no line [1]."""
+
+_USUAL_FALL = 0.7
+"""Acceleration of a channel in a fall over gravity [1]: remanence holds back, sensors stand at 45 degrees."""
+
+_POSSIBLE_FALL = (5e-3, 200.0)
+"""Acceleration over gravity outside of which what is seen is no fall by any clock [1]."""
+
+_CLEAR = 0.25
+"""Logarithm of a factor from which on the fall tells a wrong clock from a wrong speed [1]."""
+
+GRAVITY = 9.81
+
+_LONG_ENOUGH = 0.2
+_LOUD = 3e-6
+
+
+def check_units(record: Record, machine: Machine, planes: tuple[Plane, ...]) -> list[Finding]:
+    """Compare how far every channel moves with the air gap."""
+    suspects: dict[int, list[tuple[str, float]]] = {}
+    for plane in planes:
+        gap = gap_of(machine, plane)
+        for name in plane.names:
+            ratio = float(np.ptp(record.reading(name))) / gap
+            if ratio > 0 and not PLAUSIBLE_MOTION[0] <= ratio <= PLAUSIBLE_MOTION[1]:
+                suspects.setdefault(round(math.log10(ratio / 1.5)), []).append((name, ratio))
+    if suspects and not _sinks(record):
+        return []  # nothing falls: the search for the drop says so
+    return [_unit_finding(found, machine) for found in suspects.values()]
+
+
+def _sinks(record: Record) -> bool:
+    """Whether the readings leave the range they begin in, as in a drop of whatever size."""
+    count = max(len(record.time) // 20, 8)
+    first, second = record.signals[:count], record.signals[len(record.time) // 2 :]
+    shift = np.abs(np.mean(second, axis=0) - np.mean(first, axis=0))
+    return float(np.median(shift / np.maximum(np.ptp(first, axis=0), 1e-15))) > 1.0
+
+
+def _nearest(ratio: float) -> float | None:
+    """Unit factor that would explain a motion of `ratio` air gaps instead of one to two and a half."""
+    fitting = [factor for factor in _FACTORS if 0.7 <= ratio / factor <= 2.7]
+    return min(fitting, key=lambda factor: abs(math.log(ratio / factor / 1.5))) if fitting else None
+
+
+def _unit_finding(found: list[tuple[str, float]], machine: Machine) -> Finding:
+    names = ", ".join(name for name, _ in found)
+    ratio = float(np.median([value for _, value in found]))
+    factor = _nearest(ratio)
+    guess = (
+        f"a unit factor of {factor:.4g} ({_FACTORS[factor]}) would explain it"
+        if factor
+        else "no unit factor fits"
+    )
+    gaps = [bearing.air_gap for bearing in machine.touchdown_bearings]
+    if any(gap.status == "estimated" for gap in gaps):
+        sizes = ", ".join(f"{1e6 * float(gap):.0f} µm" for gap in gaps)
+        source = next((gap.source for gap in gaps if gap.source), "estimated")
+        return Finding(
+            kind="wrong air gap",
+            message=f"the readings span {ratio:.3g} × the air gap of the machine file ({sizes}; {source}), a "
+            f"drop 1 to 2.5 ×; {guess}, and so would a wrong estimate of the gap",
+            remedy="use the machine file from before that estimate; if it says the same, correct unit or "
+            "sensitivity in the profile or the machine file",
+            severity="stop",
+            channel=names,
+        )
+    return Finding(
+        kind="wrong unit factor",
+        message=f"the readings span {ratio:.3g} × the nominal air gap, a drop 1 to 2.5 ×; {guess}",
+        remedy="correct unit or sensitivity in the profile or the machine file",
+        severity="stop",
+        channel=names,
+    )
+
+
+def check_speed(record: Record, machine: Machine) -> list[Finding]:
+    """Look for missing, impossible or jumping speed readings."""
+    if record.speed_readings is None or record.speed_time is None:
+        return [
+            Finding(
+                kind="speed missing",
+                message=f"the record has no shaft speed beside {', '.join(record.channel_names)}",
+                remedy='name its channel in a profile ([speed] channel = "..."), or give it by hand '
+                '([speed] constant = "60 Hz")',
+                severity="stop",
+            )
+        ]
+    readings = record.speed_readings
+    bad = np.flatnonzero(~np.isfinite(readings))
+    if len(bad):
+        return [_speed_finding(record, f"{len(bad)} speed readings are not finite", int(bad[0]), "stop")]
+    if len(readings) >= 5:
+        from scipy.ndimage import median_filter
+
+        middle = median_filter(readings, size=5, mode="nearest")
+        usual = np.maximum(np.abs(middle), 0.1 * float(np.max(np.abs(middle))))
+        off = np.flatnonzero(np.abs(readings - middle) > 0.2 * usual)
+        if len(off):
+            seen = format_quantity(float(readings[off[0]]), "speed")
+            near = format_quantity(float(middle[off[0]]), "speed")
+            words = (
+                f"{len(off)} readings jump, the first to {seen} among {near}: tacho pulses missing or double"
+            )
+            return [_speed_finding(record, words, int(off[0]), "warning")]
+    return []
+
+
+def _speed_finding(record: Record, words: str, at: int, severity: str) -> Finding:
+    assert record.speed_time is not None
+    return Finding(
+        kind="speed readings",
+        message=words,
+        remedy="check the tacho; the speed at the drop is taken from a robust fit",
+        severity="stop" if severity == "stop" else "warning",
+        channel="speed",
+        time=float(record.speed_time[at]),
+    )
+
+
+def check_rotation_line(record: Record, end: float, speed: float) -> list[Finding]:
+    """Compare the strongest line of the levitated readings with the shaft speed, the fall with gravity."""
+    line = _strongest_line(record, end)
+    if line is None:
+        return []
+    frequency, resolution, at_half = line
+    expected = abs(speed) / (2 * np.pi)
+    near = max(1.5 * resolution, 0.01 * expected)
+    if abs(frequency - expected) <= near:
+        return []
+    if abs(frequency - 2.0 * expected) <= near and at_half > _NO_HALF:
+        return []  # the second harmonic of a rotor whose first is there too
+    mains = min((*MAINS, *OTHER_SUPPLIES), key=lambda supply: abs(frequency - supply))
+    if abs(frequency - mains) < resolution and abs(2.0 * frequency - expected) > near:  # else 1X and its 2X
+        beside = _strongest_line(record, end, without=mains)
+        if beside is not None and min(abs(beside[0] - k * expected) for k in (1, 2)) <= near:
+            return []  # hum, which has its own name, above the line of the rotor
+    if frequency * (end - float(record.time[0])) < _FEWEST_TURNS:
+        return []
+    return [_other_frequency(record, frequency, expected)]
+
+
+def _other_frequency(record: Record, frequency: float, expected: float) -> Finding:
+    """Say which of clock and speed is wrong: by a clock that is off by a factor a rotor falls by its square.
+
+    The fall alone is known to about a third, by what remains of the lift; near a factor of 1 both stay open.
+    """
+    ratio = frequency / expected
+    named = {
+        60.0: "rpm taken for Hz",
+        1 / 60.0: "Hz taken for rpm",
+        2 * np.pi: "rad/s and Hz mixed up",
+        1 / (2 * np.pi): "rad/s and Hz mixed up",
+    }
+    why = next((text for factor, text in named.items() if abs(ratio * factor - 1) < 0.05), "")
+    share = _fall_share(record)
+    falls = _POSSIBLE_FALL[0] < share < _POSSIBLE_FALL[1]
+    fallen = math.log(share / _USUAL_FALL) if falls else 0.0
+    of_clock = not falls or abs(fallen - 2.0 * math.log(ratio)) < abs(fallen)
+    kind = "wrong sampling rate" if of_clock else "wrong speed unit" if why else "wrong speed"
+    guess = f" ({why})" if why else ""
+    open_ = "" if falls and abs(math.log(ratio)) > _CLEAR else ", though the fall hardly tells the two apart"
+    return Finding(
+        kind=kind,
+        message=f"the levitated rotor turns at {frequency:.4g} Hz in the displacements and at "
+        f"{expected:.4g} Hz by the speed channel, a factor {ratio:.4g}{guess}; it falls with "
+        f"{share:.2g} × gravity, so the {'clock' if of_clock else 'speed'} is wrong{open_}",
+        remedy="correct the sampling interval (time.step) or the speed unit (speed.unit) in the profile",
+        severity="stop",
+        channel=None if of_clock else "speed",
+        time=float(record.time[0]),
+    )
+
+
+def _fall_share(record: Record) -> float:
+    """Acceleration of the fall by the clock of the record, median of the channels, over gravity [1]."""
+    level = first_motion(record)[1]
+    away = np.abs(record.signals - level)
+    reach = np.percentile(away, 98, axis=0)
+    found = [fall_accelerations(a, r, record.sampling_rate)[0] for a, r in zip(away.T, reach, strict=True)]
+    middle = float(np.median(found))
+    return middle / GRAVITY
+
+
+def _strongest_line(
+    record: Record, end: float, without: float | None = None
+) -> tuple[float, float, float] | None:
+    """Strongest line before `end` and the resolution [Hz], and the power at half of it over that at it.
+
+    None where none stands out; a line ``without`` [Hz] is taken off before.
+    """
+    keep = record.time < end
+    count = int(keep.sum())
+    if count < 64:
+        return None
+    window = np.hanning(count)[:, None]
+    part = record.signals[keep] - np.mean(record.signals[keep], axis=0)
+    if without is not None:
+        turned = 2.0 * np.pi * without * record.time[keep]
+        waves = np.column_stack([np.cos(turned), np.sin(turned)])
+        part = part - waves @ np.linalg.lstsq(waves, part, rcond=None)[0]
+    scale = np.maximum(np.std(part, axis=0), 1e-12)
+    power = np.sum(np.abs(np.fft.rfft(window * part / scale, 8 * count, axis=0)) ** 2, axis=1)
+    frequencies = np.fft.rfftfreq(8 * count, 1.0 / record.sampling_rate)
+    resolution = record.sampling_rate / count
+    power[frequencies < 2 * resolution] = 0.0
+    best = int(np.argmax(power))
+    if power[best] < 50.0 * float(np.median(power[power > 0])):
+        return None
+    half = np.abs(frequencies - 0.5 * frequencies[best]) < resolution
+    return float(frequencies[best]), resolution, float(np.max(power[half], initial=0.0) / power[best])
+
+
+def check_levitated(levitated: LevitatedModel, record: Record) -> list[Finding]:
+    """Look for loud hum and noise in the levitated readings."""
+    findings = []
+    for index, name in enumerate(record.channel_names):
+        if levitated.hum is not None:
+            size = float(np.abs(levitated.amplitudes[levitated.tones.index(levitated.hum), index]))
+            if size > _LOUD:
+                findings.append(
+                    Finding(
+                        kind="hum",
+                        message=f"mains hum of {levitated.hum:g} Hz with {format_quantity(size, 'length')} "
+                        "zero to peak",
+                        remedy="ground the sensor driver; the hum found before the drop can be taken off",
+                        severity="warning",
+                        channel=name,
+                    )
+                )
+        noise = float(levitated.noise[index])
+        if noise > _LOUD:
+            findings.append(
+                Finding(
+                    kind="noise",
+                    message=f"{format_quantity(noise, 'length')} rms remain beside 1X, 2X and hum before the "
+                    "drop",
+                    remedy="look for other lines in the spectrum, or filter the sensor",
+                    severity="warning",
+                    channel=name,
+                )
+            )
+    return findings
+
+
+def check_length(record: Record, drop: float, has_tail: bool) -> list[Finding]:
+    """See whether the record reaches far enough behind the drop."""
+    findings = []
+    after = float(record.time[-1]) - drop
+    if after < _LONG_ENOUGH:
+        findings.append(
+            Finding(
+                kind="short record",
+                message=f"it ends {after * 1e3:.4g} ms after the drop; the analysis covers "
+                f"{_LONG_ENOUGH * 1e3:.0f} ms",
+                remedy="record longer, or analyse a shorter time",
+                severity="warning",
+                time=float(record.time[-1]),
+            )
+        )
+    measured = record.measured_speed
+    if measured is not None and abs(float(measured[1][-1])) > 2 * np.pi and not has_tail:
+        findings.append(
+            Finding(
+                kind="record ends before standstill",
+                message=f"the shaft still turns at {format_quantity(abs(float(measured[1][-1])), 'speed')} "
+                "at "
+                f"{record.time[-1]:.6g} s",
+                remedy="give the readings at standstill with --tail: the air gap is found from them",
+                severity="warning",
+                time=float(record.time[-1]),
+            )
+        )
+    return findings
+
+
+def no_drop(error: NoDropError) -> Finding:
+    """What the search for a drop did not find, as a finding."""
+    return Finding(
+        kind="missing pre-trigger" if error.begins_late else "no drop in the record",
+        message=error.seen,
+        remedy=error.remedy,
+        severity="stop",
+    )
+
+
+def first_motion(record: Record) -> tuple[int, Array]:
+    """Sample by which the rotor has begun to fall, whatever units and polarities, and the level before (S,).
+
+    Every channel is scaled by its own largest motion; half of the channels must have moved by a quarter of
+    it.
+    """
+    first = max(int(0.01 * record.sampling_rate), 8)
+    level = np.mean(record.signals[:first], axis=0)
+    away = np.abs(record.signals - level)
+    moved = np.median(away / np.maximum(np.max(away, axis=0), 1e-15), axis=1) > 0.25
+    return int(np.argmax(moved)), level

@@ -1,0 +1,138 @@
+"""From readings along sensor directions to displacements x, y in the planes of the sensors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotordrop.errors import RecordError
+from rotordrop.machine.sensor import Sensor
+from rotordrop.record.recording import Array
+
+if TYPE_CHECKING:
+    from rotordrop.record.record import Record
+
+LEAST_RATIO = 0.026
+"""Smaller ratios of the singular values of the sensor directions count as singular (about 3° apart)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plane:
+    """Sensors that share an axial position, and how to get x, y from them.
+
+    Attributes
+    ----------
+    node : int
+        Node number, counted from 1.
+    bearing : str
+        Name of the touchdown bearing at this end.
+    columns : tuple of int
+        Sensors of the plane, as columns of the record's signals.
+    names : tuple of str
+        Their names.
+    to_planar : array, shape (2, S_p)
+        Displacement (x, y) per displacement along the sensors, least squares.
+    directions : array, shape (S_p, 2)
+        Unit vectors of the sensors in x, y.
+    """
+
+    node: int
+    bearing: str
+    columns: tuple[int, ...]
+    names: tuple[str, ...]
+    to_planar: Array
+    directions: Array
+
+
+def sensor_directions(sensors: Sequence[Sensor]) -> Array:
+    """Unit vectors (x, y) along which the sensors read positive, shape (S, 2)."""
+    angles = np.array([float(sensor.angle) for sensor in sensors])
+    return np.asarray(sensor_polarity(sensors)[:, None] * np.column_stack([np.cos(angles), np.sin(angles)]))
+
+
+def sensor_polarity(sensors: Sequence[Sensor]) -> Array:
+    """Sign of each sensor's reading in the direction of its angle, shape (S,): 1 or -1."""
+    return np.array([sensor.polarity for sensor in sensors], dtype=np.float64)
+
+
+def sees_both_directions(sensors: Sequence[Sensor]) -> bool:
+    """Whether the sensors of a plane look in two directions that are far enough apart."""
+    if len(sensors) < 2:
+        return False
+    strength = np.linalg.svd(sensor_directions(sensors), compute_uv=False)
+    return bool(strength[1] >= LEAST_RATIO * strength[0])
+
+
+def along_sensors(signals: Array, sensors: Sequence[Sensor]) -> Array:
+    """True displacement along every sensor [m], shape (N, S): offset taken off, gain applied."""
+    offset = np.array([float(sensor.offset) for sensor in sensors])
+    gain = np.array([float(sensor.gain) for sensor in sensors])
+    return np.asarray((signals - offset) * gain)
+
+
+def sensor_planes(sensors: Sequence[Sensor]) -> tuple[Plane, ...]:
+    """Group the sensors by node and find how each group gives x and y.
+
+    Raises
+    ------
+    RecordError
+        When a plane has one sensor, or sensors that all look along one line.
+    """
+    nodes = list(dict.fromkeys(sensor.node for sensor in sensors))
+    return tuple(_plane(node, sensors) for node in nodes)
+
+
+def _plane(node: int, sensors: Sequence[Sensor]) -> Plane:
+    columns = tuple(i for i, sensor in enumerate(sensors) if sensor.node == node)
+    members = [sensors[i] for i in columns]
+    directions = sensor_directions(members)
+    if not sees_both_directions(members):
+        seen = ", ".join(f"{sensor.name} at {math.degrees(float(sensor.angle)):.4g}°" for sensor in members)
+        why = "one sensor" if len(members) < 2 else "sensors along one line"
+        raise RecordError(
+            f"the plane at node {node} has {why} ({seen}): x and y cannot be found; a second direction, at "
+            "least 3° "
+            "away, is needed at this node"
+        )
+    return Plane(
+        node=node,
+        bearing=members[0].bearing,
+        columns=columns,
+        names=tuple(sensor.name for sensor in members),
+        to_planar=np.asarray(np.linalg.pinv(directions), dtype=np.float64),
+        directions=directions,
+    )
+
+
+def planar(record: Record) -> tuple[Array, tuple[int, ...]]:
+    """Displacement of the shaft in the planes of the sensors, from any angles, by least squares.
+
+    Parameters
+    ----------
+    record : Record
+        The readings.
+
+    Returns
+    -------
+    displacement : array, shape (N, P, 2)
+        Displacement x, y [m] in each plane, from the origin of the sensors.
+    nodes : tuple of int, length P
+        Node of each plane, counted from 1.
+
+    Raises
+    ------
+    RecordError
+        When the sensors of a plane cannot resolve both directions.
+    """
+    planes = sensor_planes(record.sensors)
+    along = along_sensors(record.signals, record.sensors)
+    return planar_of(along, planes), tuple(plane.node for plane in planes)
+
+
+def planar_of(along: Array, planes: Sequence[Plane]) -> Array:
+    """Displacement (x, y) in each plane, shape (..., P, 2), from displacements along sensors (..., S)."""
+    return np.stack([along[..., list(plane.columns)] @ plane.to_planar.T for plane in planes], axis=-2)

@@ -1,0 +1,177 @@
+"""What has to be said once about a recorder whose files do not say it themselves."""
+
+from __future__ import annotations
+
+import tomllib
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+
+from rotordrop.atomic_file import write_text
+from rotordrop.errors import RecordError, UsageError
+from rotordrop.record.tacho import Edge
+from rotordrop.units import parse_quantity
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class TextLayout(_Section):
+    """How a text file is written, where guessing would go wrong."""
+
+    encoding: str | None = Field(default=None, description="for example utf-8 or latin-1")
+    separator: str | None = Field(
+        default=None, min_length=1, max_length=1, description="one character between columns"
+    )
+    decimal: str | None = Field(default=None, pattern=r"^[.,]$", description="point or comma")
+    first_data_line: int | None = Field(default=None, ge=1, description="counted from 1")
+    names: tuple[str, ...] | None = Field(
+        default=None, description="column names, for files without a header"
+    )
+
+
+class Clock(_Section):
+    """Where the time of the samples comes from."""
+
+    channel: str | None = Field(default=None, description="name of the time column")
+    unit: str | None = Field(default=None, description="unit of the time column")
+    step: str | None = Field(default=None, description='time between samples, for example "50 us"')
+    start: str | None = Field(default=None, description='time of the first sample, for example "-0.25 s"')
+
+    @field_validator("step", "start")
+    @classmethod
+    def _is_time(cls, text: str | None) -> str | None:
+        return _checked(text, "time")
+
+
+class SpeedSource(_Section):
+    """Where the shaft speed comes from."""
+
+    channel: str | None = Field(default=None, description="name of the speed channel")
+    unit: str | None = Field(default=None, description="unit of the speed channel")
+    constant: str | None = Field(default=None, description='speed by hand, for example "60 Hz"')
+    pulses: str | None = Field(default=None, description="name of a channel of tacho or keyphasor pulses")
+    pulses_per_turn: int = Field(default=1, ge=1, le=10_000, description="pulses in one turn of the shaft")
+    edge: Edge = Field(default="rising", description="the edge of a pulse that counts, rising or falling")
+
+    @field_validator("constant")
+    @classmethod
+    def _is_speed(cls, text: str | None) -> str | None:
+        return _checked(text, "speed")
+
+
+class Profile(_Section):
+    """A channel map and the reading rules of one recorder, saved once and used again.
+
+    Attributes
+    ----------
+    format : str, optional
+        Name of the reader, when the suffix of the file does not tell it.
+    channels : dict
+        Sensor name of the machine file -> channel name in the recording.
+    units : dict
+        Channel name in the recording -> unit.
+    unit : str, optional
+        Unit of all displacement channels that name none.
+    sensitivity : str, optional
+        Volts per length of all channels, for example ``"8 mV/um"``.
+    full_scale : str, optional
+        What full scale stands for where a file only knows shares of it (WAV), for example ``"10 V"``.
+    text, time, speed
+        See `TextLayout`, `Clock`, `SpeedSource`.
+    """
+
+    format: str | None = None
+    channels: dict[str, str] = Field(default_factory=dict)
+    units: dict[str, str] = Field(default_factory=dict)
+    unit: str | None = None
+    sensitivity: str | None = None
+    full_scale: str | None = None
+    text: TextLayout = TextLayout()
+    time: Clock = Clock()
+    speed: SpeedSource = SpeedSource()
+
+    @field_validator("sensitivity")
+    @classmethod
+    def _is_sensitivity(cls, text: str | None) -> str | None:
+        return _checked(text, "voltage_sensitivity")
+
+
+def load_profile(path: str | Path) -> Profile:
+    """Read a recorder profile from a TOML file.
+
+    Raises
+    ------
+    RecordError
+        When the file is not TOML or has an entry a profile does not know; names the entry.
+    """
+    path = Path(path)
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise RecordError(f"cannot read the profile {path}: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise RecordError(f"{path} is not a TOML file: {error}") from error
+    return profile_of(content, str(path))
+
+
+def profile_of(content: dict[str, Any], place: str) -> Profile:
+    """Make a profile of the entries of a TOML file, or say which entry is wrong and what belongs there.
+
+    Raises
+    ------
+    RecordError
+        Names every entry that does not fit, with the entries its section knows.
+    """
+    try:
+        return Profile.model_validate(content)
+    except ValidationError as error:
+        told = "\n  also: ".join(_told(entry) for entry in error.errors())
+        raise RecordError(f"{place}: {told}") from error
+
+
+def _told(entry: Any) -> str:
+    """One entry that does not fit, in words."""
+    *sections, name = (str(part) for part in entry["loc"])
+    section = sections[0] if sections and sections[0] in _SECTIONS else ""
+    known = tuple((_SECTIONS[section] if section else Profile).model_fields)
+    where = f"[{section}] " if section else ""
+    if entry["type"] == "extra_forbidden":
+        close = get_close_matches(name, known, 1, 0.6)
+        hint = f"did you mean {close[0]!r}?" if close else f"it knows {', '.join(known)}"
+        what = f"the section [{section}]" if section else "a profile"
+        return f"{where}{name} = {entry['input']!r} is not known in {what}; {hint}"
+    cause = entry.get("ctx", {}).get("error")
+    return f"{where}{name} = {entry['input']!r} does not fit: {cause or _EXPECTED.get(name, entry['msg'])}"
+
+
+_SECTIONS: dict[str, type[BaseModel]] = {"text": TextLayout, "time": Clock, "speed": SpeedSource}
+_EXPECTED = {
+    "channels": 'expected a table, [channels] S_NDE_A = "X1"',
+    "units": 'expected a table, [units] "X1" = "um"',
+    "separator": "expected one sign, such as ';'",
+    "decimal": "expected '.' or ','",
+    "first_data_line": "expected the number of a line, counted from 1",
+    "pulses_per_turn": "expected a whole number from 1 on",
+    "edge": "expected 'rising' or 'falling'",
+    "names": 'expected a list of names, ["Time [s]", ...]',
+}
+
+
+def save_profile(profile: Profile, path: str | Path) -> None:
+    """Write a recorder profile as a TOML file."""
+    import tomlkit
+
+    write_text(path, tomlkit.dumps(profile.model_dump(exclude_defaults=True, exclude_none=True)))
+
+
+def _checked(text: str | None, kind: str) -> str | None:
+    if text is not None:
+        try:
+            parse_quantity(text, kind)
+        except UsageError as error:
+            raise ValueError(str(error)) from error
+    return text

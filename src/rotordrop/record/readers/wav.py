@@ -1,0 +1,97 @@
+"""WAV: sound files, which many recorders write; full scale is 1 until a profile says what it is worth."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import numpy as np
+
+from rotordrop.errors import RecordError
+from rotordrop.record.profile import Profile
+from rotordrop.record.recording import Array, Channel, Recording
+from rotordrop.units import split_quantity
+
+_PCM, _FLOAT, _EXTENSIBLE = 1, 3, 0xFFFE
+
+
+def read_wav(path: Path, profile: Profile) -> Recording:
+    """Read integers of 8, 16, 24 or 32 bits or floating-point samples; channels are named in the profile.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    profile : Profile
+        ``text.names`` names the channels (else ``channel 1``, …), ``full_scale`` says what 1 stands for.
+
+    Raises
+    ------
+    RecordError
+        When blocks are cut off, or the format is another.
+    """
+    content = path.read_bytes()
+    blocks = _blocks(content, path)
+    if b"fmt " not in blocks or b"data" not in blocks or len(blocks[b"fmt "]) < 16:
+        raise RecordError(f"{path} has no format or no samples; it is no WAV file or damaged")
+    kind, channels, rate, _, align, bits = struct.unpack_from("<HHIIHH", blocks[b"fmt "])
+    if kind == _EXTENSIBLE and len(blocks[b"fmt "]) >= 26:
+        kind = struct.unpack_from("<H", blocks[b"fmt "], 24)[0]
+    data = blocks[b"data"]
+    if not channels or not rate or align * 8 != channels * bits or len(data) % align:
+        raise RecordError(
+            f"{path}: {len(data)} bytes of samples do not divide into {channels} channels of {bits} bits; "
+            "the file is damaged, copy it again"
+        )
+    samples = _samples(data, kind, bits, path).reshape(-1, channels)
+    factor, unit = (1.0, "") if profile.full_scale is None else split_quantity(profile.full_scale)
+    names = profile.text.names or tuple(f"channel {number + 1}" for number in range(channels))
+    if len(names) != channels:
+        raise RecordError(f"{path} has {channels} channels and the profile names {len(names)}")
+    time = np.arange(len(samples), dtype=np.float64) / rate
+    series = [
+        Channel(name=n, label=n, unit=profile.units.get(n, unit), values=samples[:, i] * factor, time=time)
+        for i, n in enumerate(names)
+    ]
+    return Recording(
+        channels=tuple(series), notes=("no trigger in the file: record time counts from the start",)
+    )
+
+
+def _blocks(content: bytes, path: Path) -> dict[bytes, bytes]:
+    """Walk the blocks, comparing what each declares with what is there."""
+    if content[:4] != b"RIFF" or content[8:12] != b"WAVE":
+        raise RecordError(f"{path} does not begin with RIFF and WAVE; it is no WAV file")
+    found: dict[bytes, bytes] = {}
+    at = 12
+    while at + 8 <= len(content):
+        name, length = struct.unpack_from("<4sI", content, at)
+        if at + 8 + length > len(content):
+            raise RecordError(
+                f"{path} is truncated: the block {name.decode('latin-1')!r} declares {length} bytes and "
+                f"{len(content) - at - 8} are present; copy the file again"
+            )
+        found.setdefault(name, content[at + 8 : at + 8 + length])
+        at += 8 + length + length % 2
+    declared = struct.unpack_from("<I", content, 4)[0] + 8
+    if declared > len(content) + 1:
+        raise RecordError(
+            f"{path} is truncated: it declares {declared} bytes and has {len(content)}; copy the file again"
+        )
+    return found
+
+
+def _samples(data: bytes, kind: int, bits: int, path: Path) -> Array:
+    if kind == _FLOAT and bits in (32, 64):
+        return np.frombuffer(data, f"<f{bits // 8}").astype(np.float64)
+    if kind != _PCM or bits not in (8, 16, 24, 32):
+        raise RecordError(
+            f"{path}: WAV format {kind} with {bits} bits is not known; export plain PCM or float"
+        )
+    if bits == 8:
+        return (np.frombuffer(data, np.uint8).astype(np.float64) - 128.0) / 128.0
+    if bits == 24:
+        wide = np.zeros((len(data) // 3, 4), dtype=np.uint8)
+        wide[:, 1:] = np.frombuffer(data, np.uint8).reshape(-1, 3)
+        return wide.view("<i4")[:, 0] / 2.0**31
+    return np.frombuffer(data, f"<i{bits // 8}") / 2.0 ** (bits - 1)

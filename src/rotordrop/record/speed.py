@@ -1,0 +1,276 @@
+"""Shaft speed from the readings of a tacho: where it stands at the drop, and how it falls."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotordrop.errors import RecordError
+from rotordrop.record.recording import Array
+
+if TYPE_CHECKING:
+    from rotordrop.record.record import Record
+
+
+BY_HAND_ERROR = 5e-3
+"""Relative standard error of a speed given by hand [1]: a name plate or a display says no more."""
+
+_FEW = 5
+_AFTER = 0.2
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpeedAtDrop:
+    """Speed when the rotor was let go.
+
+    Attributes
+    ----------
+    value : float
+        Speed at the drop [rad/s].
+    standard_error : float
+        Standard error of `value` [rad/s].
+    slope : float
+        Mean rate of change over the first 0.2 s after the drop [rad/s²].
+    scatter : float
+        Standard deviation of one reading [rad/s].
+    readings : int
+        Readings used.
+    """
+
+    value: float
+    standard_error: float
+    slope: float
+    scatter: float
+    readings: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class RotorAngle:
+    """Angle of the rotor over a whole record, from the measured speed.
+
+    Up to power-off the rotor turns evenly. Afterwards the angle is the integral of the readings, shifted so
+    that they begin with the speed before; without readings it is known the less the more friction may have
+    taken.
+
+    Attributes
+    ----------
+    power_off : float
+        End of the even turning, in record time [s].
+    turning : float
+        Speed until then [rad/s].
+    knots : array, shape (K,)
+        Times from power-off on between which the speed changes evenly [s]; the first is power-off.
+    speed : array, shape (K,)
+        Speed there [rad/s].
+    slowing_error : float
+        Standard deviation of the deceleration after power-off where no speed was read [rad/s²].
+    """
+
+    power_off: float
+    turning: float
+    knots: Array
+    speed: Array
+    slowing_error: float = 0.0
+
+    def at(self, time: Array) -> tuple[Array, Array]:
+        """Angle [rad] at record times (N,), ``turning · time`` before power-off, and its deviation."""
+        steps = np.diff(self.knots)
+        turned = np.concatenate([[0.0], np.cumsum(0.5 * steps * (self.speed[1:] + self.speed[:-1]))])
+        slope = np.append(np.diff(self.speed) / steps, 0.0)
+        k = np.clip(np.searchsorted(self.knots, time, side="right") - 1, 0, len(self.knots) - 1)
+        since = time - self.knots[k]
+        after = turned[k] + since * (self.speed[k] + 0.5 * since * slope[k])
+        angle = self.turning * self.power_off + np.where(
+            time < self.power_off, self.turning * (time - self.power_off), after
+        )
+        free = np.maximum(time - self.power_off, 0.0)
+        return angle, 0.5 * self.slowing_error * free**2
+
+
+def rotor_angle(
+    record: Record, power_off: float, turning: float, *, strongest_slowing: float = 0.0
+) -> RotorAngle:
+    """Angle of the rotor over a record.
+
+    Parameters
+    ----------
+    record : Record
+        The record.
+    power_off : float
+        Power-off in record time [s].
+    turning : float
+        Speed before it, without sign [rad/s].
+    strongest_slowing : float
+        Deceleration that the friction of the touchdown bearings reaches at most [rad/s²]; used where no speed
+        was read after power-off: anything from none to that is taken as equally likely.
+    """
+    measured = record.measured_speed
+    later = measured is not None and np.flatnonzero((measured[0] > power_off) & np.isfinite(measured[1]))
+    if measured is None or not np.any(later):
+        slowing = 0.5 * strongest_slowing
+        end = max(float(record.time[-1]), power_off + 1e-3)
+        return RotorAngle(
+            power_off=power_off,
+            turning=turning,
+            knots=np.array([power_off, end]),
+            speed=np.array([turning, turning - slowing * (end - power_off)]),
+            slowing_error=strongest_slowing / float(np.sqrt(12.0)),
+        )
+    time, readings = measured
+    clean = np.abs(_without_outliers(readings[later]))
+    begin = abs(speed_at_drop(record, power_off).value)
+    return RotorAngle(
+        power_off=power_off,
+        turning=turning,
+        knots=np.concatenate([[power_off], time[later]]),
+        speed=np.concatenate([[turning], turning + clean - begin]),
+    )
+
+
+def readings_of_held_signal(time: Array, values: Array) -> tuple[Array, Array]:
+    """Find the readings in a signal that holds each until the next; other signals come back as they are.
+
+    Parameters
+    ----------
+    time : array, shape (N,)
+        Time of the samples [s].
+    values : array, shape (N,)
+        Samples, in any unit.
+
+    Returns
+    -------
+    time, values : array, shape (K,)
+        When a new value appeared and which.
+    """
+    changes = np.flatnonzero(np.diff(values)) + 1
+    if len(changes) < 3 or len(changes) > 0.5 * len(values):
+        return time, values
+    # a reading equal to the one before leaves no step: longer intervals are missed steps
+    interval = int(np.percentile(np.diff(changes), 25, method="lower"))
+    first = changes[0] - interval * (1 + (changes[0] - 1) // interval)
+    at = [max(int(first), 0)]
+    for change in changes:
+        missed = round((change - at[-1]) / interval) - 1
+        at += [int(change) - interval * k for k in range(missed, 0, -1)] if len(at) > 1 else []
+        at.append(int(change))
+    at += list(range(at[-1] + interval, len(values), interval))
+    index = np.array(sorted(set(at)))
+    return time[index], values[index]
+
+
+def speed_at_drop(record: Record, drop: float, *, span: float = 0.5) -> SpeedAtDrop:
+    """Speed at the drop from the readings before it, outliers aside, and how it begins to fall.
+
+    The readings before are taken as constant unless they clearly drift. Those after are left out of the value
+    where there are any before: friction changes the speed within milliseconds of the first contact.
+
+    Parameters
+    ----------
+    record : Record
+        The record, with speed.
+    drop : float
+        Drop instant, in record time [s].
+    span : float
+        Readings up to this long before are used, and up to 0.2 s after [s].
+
+    Raises
+    ------
+    RecordError
+        When the record has no speed near the drop.
+    """
+    time, readings = require_speed(record)
+    if record.speed_by_hand:
+        value = float(np.median(readings))
+        error = BY_HAND_ERROR * abs(value)
+        return SpeedAtDrop(value=value, standard_error=error, slope=0.0, scatter=0.0, readings=0)
+    good = np.isfinite(readings)
+    before = good & (time <= drop) & (time >= drop - span)
+    after = good & (time > drop) & (time <= drop + _AFTER)
+    used = before if int(before.sum()) >= _FEW else before | after
+    if int(used.sum()) < 2:
+        raise RecordError(
+            f"{record.name}: {int(used.sum())} speed readings within {span:g} s of the drop at {drop:.6g} s; "
+            "the "
+            f"speed was read from {time[0]:.6g} s to {time[-1]:.6g} s"
+        )
+    solution, scatter, covariance = _level_or_line(time[used] - drop, readings[used])
+    value = float(solution[0])
+    return SpeedAtDrop(
+        value=value,
+        standard_error=float(scatter * np.sqrt(covariance[0, 0])),
+        slope=_slope_after(time[after] - drop, readings[after] - value),
+        scatter=scatter,
+        readings=int(used.sum()),
+    )
+
+
+def _level_or_line(when: Array, values: Array) -> tuple[Array, float, Array]:
+    """A constant, or a straight line where its slope is beyond doubt."""
+    level = _robust(np.ones((len(when), 1)), values)
+    if len(when) < _FEW:
+        return level
+    line = _robust(np.column_stack([np.ones_like(when), when]), values)
+    doubt = 4.0 * line[1] * float(np.sqrt(line[2][1, 1]))
+    return line if abs(line[0][1]) > doubt else level
+
+
+def _slope_after(when: Array, change: Array) -> float:
+    """Robust slope [rad/s²] of the readings after the drop through the speed at it; 0 without any."""
+    return float(np.median(change / when)) if len(when) else 0.0
+
+
+def smooth_speed(record: Record, *, span: float = 0.1) -> Array:
+    """Speed over the record [rad/s], shape (N,), outliers replaced and smoothed by local straight lines."""
+    from scipy.signal import savgol_filter
+
+    time, readings = require_speed(record)
+    if len(readings) < 5:
+        return np.interp(record.time, time, readings)
+    clean = _without_outliers(readings)
+    width = int(span / float(np.median(np.diff(time)))) // 2 * 2 + 1
+    width = min(max(width, 5), len(clean) - 1 + len(clean) % 2)
+    return np.asarray(np.interp(record.time, time, savgol_filter(clean, width, 1)))
+
+
+def require_speed(record: Record) -> tuple[Array, Array]:
+    """Give the speed readings, time [s] and value [rad/s], or say that they are missing and what to do.
+
+    Raises
+    ------
+    RecordError
+        When the record has no speed.
+    """
+    if record.speed_time is None or record.speed_readings is None:
+        raise RecordError(
+            f"{record.name} has no shaft speed beside {', '.join(record.channel_names)}; name its channel in "
+            "a "
+            'profile ([speed] channel = "..."), or give it by hand ([speed] constant = "60 Hz")'
+        )
+    return record.speed_time, record.speed_readings
+
+
+def _robust(design: Array, values: Array, rounds: int = 12) -> tuple[Array, float, Array]:
+    """Least squares with Huber weights; gives solution, scatter and the unscaled covariance."""
+    weights = np.ones(len(values))
+    scatter = 0.0
+    solution: Array = np.zeros(design.shape[1])
+    for _ in range(rounds):
+        found = np.linalg.lstsq(design * weights[:, None], values * weights, rcond=None)[0]
+        solution = np.asarray(found, dtype=np.float64)
+        rest = values - design @ solution
+        scatter = float(1.4826 * np.median(np.abs(rest)))
+        limit = 1.5 * max(scatter, 1e-9)
+        weights = np.sqrt(np.minimum(1.0, limit / np.maximum(np.abs(rest), limit)))
+    weighted = design * weights[:, None]
+    return solution, scatter, np.asarray(np.linalg.pinv(weighted.T @ weighted), dtype=np.float64)
+
+
+def _without_outliers(readings: Array) -> Array:
+    from scipy.ndimage import median_filter
+
+    middle = median_filter(readings, size=5, mode="nearest")
+    rest = readings - middle
+    limit = 6.0 * 1.4826 * float(np.median(np.abs(rest))) + 1e-6 * float(np.max(np.abs(readings)))
+    return np.where(np.abs(rest) > limit, middle, readings)

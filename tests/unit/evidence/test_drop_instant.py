@@ -1,0 +1,219 @@
+"""The drop instant: power-off to a fraction of a sample, from the readings alone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rotordrop.errors import RecordError
+from rotordrop.estimated import Estimated
+from rotordrop.evidence import EarlyForces, find_drop_instant, first_forces
+from rotordrop.evidence.events import coarse_drop
+from rotordrop.evidence.release import GRID, free_rotor, response_at, tabulate_response
+from rotordrop.machine import example_machine
+from rotordrop.record.axes import sensor_planes
+from rotordrop.synthesis import hidden_machine, synthesize_drop
+
+SAMPLE = 5e-5
+
+
+@pytest.fixture(scope="module")
+def found(drop, machine):
+    return find_drop_instant(drop, machine)
+
+
+@pytest.fixture(scope="module")
+def found_fast(fast_drop, machine):
+    return find_drop_instant(fast_drop, machine)
+
+
+def test_power_off_at_60_hz_within_half_a_sample(found):
+    """Truth of the simulated record: −0.25 ms."""
+    assert found.value == pytest.approx(-0.25e-3, abs=0.5 * SAMPLE)
+    assert found.interval_90[0] < -0.25e-3 < found.interval_90[1]
+    assert found.standard_error < 0.5 * SAMPLE
+    assert 0.8 < found.fall.misfit < 1.2
+
+
+def test_power_off_at_150_hz_within_half_a_sample(found_fast):
+    """Truth of the simulated record: −0.6 ms."""
+    assert found_fast.value == pytest.approx(-0.6e-3, abs=0.5 * SAMPLE)
+    assert found_fast.interval_90[0] < -0.6e-3 < found_fast.interval_90[1]
+    assert 0.8 < found_fast.fall.misfit < 1.2
+
+
+def test_power_off_where_one_end_bounces_before_the_other_has_sunk():
+    """Both ends are low 7 ms after the release first; with the levitated part until then, noise was 7 µm."""
+    lp400 = example_machine("lp400")
+    hidden = hidden_machine(lp400, 20009)
+    made = synthesize_drop(hidden, 2.0 * np.pi * 120.0, 20009, duration=0.1)
+    found = find_drop_instant(made.record, lp400)
+    assert found.value == pytest.approx(made.truth["t_off_in_record_s"], abs=0.5 * SAMPLE)
+    assert found.levitated.end < found.value
+    np.testing.assert_allclose(found.levitated.noise, made.truth["noise_rms_m"], rtol=0.05)
+
+
+def test_the_standard_error_of_the_power_off_is_its_scatter(drop, machine):
+    """Twelve times other noise of 1.5 µm on the same fall; the bound holds 98 of 100 such dozens."""
+    short = drop.window(-0.25, 0.03)
+    found = []
+    for seed in range(12):
+        noise = 1.5e-6 * np.random.default_rng(seed).standard_normal(short.signals.shape)
+        found.append(find_drop_instant(replace(short, signals=short.signals + noise), machine))
+    scatter = np.std([one.value for one in found], ddof=1)
+    stated = np.sqrt(np.mean([one.fall.standard_error**2 for one in found]))
+    assert 0.53 < scatter / stated < 1.50  # √χ²₁₁/11 at 1 and 99 per cent
+
+
+def test_a_sensor_that_reads_more_is_told_by_the_fall(drop, machine):
+    """Five per cent more on one of four channels whose gains are hardly known, against the same record."""
+    loose = Estimated(value=1.0, status="guess", range=(0.7, 1.3))
+    sensors = tuple(sensor.model_copy(update={"gain": loose}) for sensor in machine.sensors)
+    unsure = machine.model_copy(update={"sensors": sensors})
+    record = replace(drop.window(-0.25, 0.03), sensors=sensors)
+    before = find_drop_instant(record, unsure)
+    fallen = record.signals - before.levitated.readings(record.time)
+    more = replace(record, signals=record.signals + 0.05 * fallen * np.array([0.0, 1.0, 0.0, 0.0]))
+    change = find_drop_instant(more, unsure).fall.gain_errors - before.fall.gain_errors
+    assert change == pytest.approx([0.0, 0.05, 0.0, 0.0], abs=0.011)
+    assert change[1] == pytest.approx(0.05, abs=0.005)
+
+
+@pytest.mark.parametrize("push", [-40.0, 40.0])
+def test_the_fall_is_fitted_until_something_pushes(drop, machine, found, push):
+    """From 4 ms after power-off on the rotor is pushed up or down [m/s²], long before it touches."""
+    record = drop.window(-0.25, 0.03)
+    since = np.clip(record.time - found.value - 4e-3, 0.0, None)
+    y = [np.sin(float(sensor.angle)) for sensor in record.sensors]
+    pushed = replace(record, signals=record.signals + 0.5 * push * since[:, None] ** 2 * y)
+    fall = find_drop_instant(pushed, machine).fall
+    assert 3.5e-3 < fall.end - found.value < 5e-3 < found.fall.end - found.value
+    assert fall.instant == pytest.approx(found.value, abs=3.0 * fall.standard_error + 1e-5)
+
+
+def test_the_remanent_lift_is_found_roughly(found, found_fast):
+    """Truth: 27.1 and 87.9 N at 60 Hz, 43.4 and 86.4 N at 150 Hz, time constants 1.8 and 2.2 ms."""
+    np.testing.assert_allclose(found.fall.remanent_force[:, 1], [27.1, 87.9], atol=25.0)
+    np.testing.assert_allclose(found_fast.fall.remanent_force[:, 1], [43.4, 86.4], atol=25.0)
+    assert 1e-3 < found.fall.remanent_time < 4e-3
+
+
+def test_the_instant_moves_with_the_clock(drop, machine, found):
+    later = replace(drop, time=drop.time + 1.234, speed_time=drop.speed_time + 1.234)
+    moved = find_drop_instant(later, machine)
+    assert moved.value - found.value == pytest.approx(1.234, abs=2e-6)
+
+
+def test_first_contacts_without_any_contact_model(drop, fast_drop, machine, found, found_fast):
+    """Truth, from power-off: begin, end [ms] and peak force [N] of the first contacts."""
+    truth = {
+        60: {"NDE": (7.75, 8.70, 3313.0), "DE": (7.11, 9.75, 3603.0)},
+        150: {"NDE": (9.35, 10.04, 4131.0), "DE": (7.24, 9.74, 3410.0)},
+    }
+    for hertz, record, instant, t0 in ((60, drop, found, -0.25e-3), (150, fast_drop, found_fast, -0.6e-3)):
+        contacts = first_forces(record, machine, instant)
+        assert [contact.bearing for contact in contacts] == ["NDE", "DE"]
+        for contact in contacts:
+            begin, end, peak = truth[hertz][contact.bearing]
+            assert (contact.start - t0) * 1e3 == pytest.approx(begin, abs=0.1)
+            assert contact.end is not None
+            assert (contact.end - t0) * 1e3 == pytest.approx(end, abs=0.4)
+            assert contact.peak_force == pytest.approx(peak, rel=0.10)
+            assert 60 < np.degrees(contact.azimuth) < 120
+
+
+def test_forces_at_the_ends_of_the_span_do_not_hide_a_contact(drop, machine, found, monkeypatch):
+    """The first two and the last three knots are hardly seen by the samples: nothing there is a force."""
+    time = np.arange(40) * 1e-4
+    force = np.zeros((40, 2, 2))
+    force[10:20, 0, 1] = 1000.0 * np.sin(np.pi * np.arange(10) / 9)
+    ends = force.copy()
+    ends[[0, 1, -3, -2, -1], :, 0] = 20e3
+    for force_ in (force, ends):
+        early = EarlyForces(time=time, force=force_, error=np.full((40, 2), 20.0), bearings=("NDE", "DE"))
+        monkeypatch.setattr("rotordrop.evidence.contacts.early_forces", lambda *_, early=early, **__: early)
+        (contact,) = first_forces(drop, machine, found)
+        assert contact.bearing == "NDE"
+        assert contact.peak_force == pytest.approx(1000.0 * np.sin(np.pi * 4 / 9))
+        assert contact.start == pytest.approx(1e-3, abs=1e-4)
+        assert contact.end == pytest.approx(1.9e-3, abs=1e-4)
+    ends[-4, 1] = (0.0, 8000.0)  # the last knot that counts; 15 per cent of the largest force is no contact
+    assert [one.bearing for one in first_forces(drop, machine, found)] == ["DE"]
+
+
+def test_first_contacts_need_the_amb_planes(drop, machine, found):
+    with pytest.raises(RecordError, match=r"the machine has 0 AMB planes; give the AMB nodes"):
+        first_forces(drop, machine.changed(ambs=()), found)
+
+
+def test_without_amb_planes_the_instant_is_still_near(drop, machine):
+    """Each plane then falls by itself: the sag that the release sets free is not in this model."""
+    plain = find_drop_instant(drop, machine.changed(ambs=()))
+    assert plain.value == pytest.approx(-0.25e-3, abs=5e-4)
+    assert "AMB planes are not known" in plain.method
+
+
+def test_the_free_rotor_falls_with_gravity_and_answers_a_step(machine, drop):
+    """Without static lift every plane falls by g t²/2 on average, and starts with no velocity."""
+    planes = sensor_planes(drop.sensors)
+    rotor = free_rotor(machine, planes)
+    assert np.sum(rotor.lift) == pytest.approx(rotor.mass * 9.81, rel=1e-6)
+    table = tabulate_response(rotor, 0.0, 0.0, 0.05)
+    fall = np.real(-1j * table @ rotor.lift)
+    assert np.max(np.abs(fall)) < 1e-9
+    drop_of = np.imag(-1j * table @ rotor.lift)
+    time = np.arange(len(table)) * GRID
+    ringing = drop_of + 0.5 * 9.81 * time[:, None] ** 2
+    assert np.max(np.abs(ringing)) < 25e-6
+    assert abs(np.mean(ringing)) < 8e-6
+    np.testing.assert_allclose(
+        drop_of[1], -0.5 * GRID**2 * rotor.lift @ rotor.force_rows @ rotor.plane_rows.T, rtol=1e-3
+    )
+
+
+def test_gyroscopic_coupling_turns_the_answer(machine, drop):
+    rotor = free_rotor(machine, sensor_planes(drop.sensors))
+    still, turning, back = (tabulate_response(rotor, speed, 0.0, 0.01)[-1] for speed in (0.0, 943.0, -943.0))
+    assert np.max(np.abs(still.imag)) < 1e-20
+    assert np.max(np.abs(turning.imag)) > 1e-3 * np.max(np.abs(still))
+    np.testing.assert_allclose(turning, back.conj(), atol=1e-18)
+
+
+def test_a_tabulated_response_is_zero_before_the_release():
+    table = np.arange(5.0)[:, None, None] ** 2 + 0j
+    since = np.array([-1.0, 0.0, 0.5 * GRID, 2.25 * GRID])
+    np.testing.assert_allclose(response_at(table, since)[:, 0, 0], [0.0, 0.0, 0.5, 5.25])
+
+
+def test_no_drop_in_the_record(drop, machine):
+    with pytest.raises(
+        RecordError,
+        match=r"drop_060: no drop in the record: the vertical displacement spans 26.* sinks by 5% of",
+    ):
+        find_drop_instant(drop.window(-0.25, -0.01), machine)
+
+
+def test_a_record_that_begins_in_the_fall(drop, machine):
+    with pytest.raises(
+        RecordError,
+        match=r"sunk by 9\d.* µm at 0.006.* after the record begins: the levitated part .* is missing",
+    ):
+        find_drop_instant(drop.window(0.002, 0.3), machine)
+
+
+def test_the_coarse_search_needs_the_speed(drop, machine):
+    silent = replace(drop, speed=None, speed_time=None, speed_readings=None)
+    with pytest.raises(RecordError, match=r"drop_060 has no shaft speed"):
+        coarse_drop(silent, machine, sensor_planes(drop.sensors))
+
+
+def test_a_rotor_that_rings_strongly_is_released_when_it_was():
+    """An orbit that bends the rotor: power-off came 0.94 ms early, with a lift of 1.4 kN left."""
+    machine = example_machine("lp400")
+    made = synthesize_drop(
+        hidden_machine(machine, 11), 120.0 * 2.0 * np.pi, 110, duration=0.05, tail=False, name="ringing"
+    )
+    found = find_drop_instant(made.record, machine)
+    assert found.value == pytest.approx(made.truth["t_off_in_record_s"], abs=30e-6)
+    assert found.fall.misfit < 1.2
+    assert np.abs(found.fall.remanent_force).max() < 100.0

@@ -1,0 +1,175 @@
+"""What a recorder does to a good record is found under its own name, and a good record is left alone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import butter, sosfilt
+
+from rotordrop.evidence import check_record
+from rotordrop.evidence.quality.recorder import check_filters
+from rotordrop.synthesis import hidden_machine, synthesize_drop
+from rotordrop.synthesis.sensor_chain import PERFECT
+
+
+def filtered(signals, rate, corner, kind):
+    sections = butter(2 if kind == "low" else 1, corner, btype=kind, fs=rate, output="sos")
+    level = np.mean(signals[: int(0.2 * rate)], axis=0)
+    return level + sosfilt(sections, signals - level, axis=0)
+
+
+def first_stop(record, machine):
+    return next((finding for finding in check_record(record, machine) if finding.severity == "stop"), None)
+
+
+def first_warning(record, machine, tail):
+    return next(iter(check_record(record, machine, tail)), None)
+
+
+@pytest.mark.parametrize("corner", [50.0, 100.0, 200.0])
+def test_a_low_pass_in_the_recorder(corner, whole_drop, machine):
+    smooth = replace(whole_drop, signals=filtered(whole_drop.signals, 20e3, corner, "low"))
+    found = first_stop(smooth, machine)
+    assert found.kind == "recorder low-pass"
+    assert "record without the low-pass" in found.remedy
+
+
+@pytest.mark.parametrize("corner", [0.3, 1.0])
+def test_ac_coupling(corner, whole_drop, machine):
+    found = first_stop(
+        replace(whole_drop, signals=filtered(whole_drop.signals, 20e3, corner, "high")), machine
+    )
+    assert found.kind == "AC coupling"
+    assert "cannot rise" in found.message
+
+
+@pytest.mark.parametrize("size", [0.15, 1.0, 4.0])
+def test_filters_are_found_whatever_the_size_of_the_air_gap(size, whole_drop):
+    """A reading at rest of less than 50 µm was not looked at: a machine with a small gap passed."""
+    for kind, corner in (("AC coupling", 1.0), ("recorder low-pass", 100.0)):
+        signals = size * filtered(whole_drop.signals, 20e3, corner, "high" if corner == 1.0 else "low")
+        found = check_filters(replace(whole_drop, signals=signals), 0.0)
+        assert [finding.kind for finding in found] == [kind]
+    assert check_filters(replace(whole_drop, signals=size * whole_drop.signals), 0.0) == []
+
+
+@pytest.mark.parametrize("span", [2e-3, 20e-3, 50e-3])
+def test_a_gap_bridged_by_a_straight_line(span, whole_drop, machine):
+    signals = whole_drop.signals.copy()
+    start, count = 6400, int(span * 20e3)
+    line = np.linspace(signals[start, 2], signals[start + count, 2], count + 1)
+    signals[start : start + count + 1, 2] = np.round(line, 9)
+    found = first_stop(replace(whole_drop, signals=signals), machine)
+    assert (found.kind, found.channel) == ("bridged gap", whole_drop.channel_names[2])
+    assert found.time == pytest.approx(float(whole_drop.time[start]), abs=2e-4)
+
+
+def test_a_second_drop(whole_drop, machine):
+    once = whole_drop.window(-0.25, 0.6)
+    rng = np.random.default_rng(0)
+    again = once.signals + rng.normal(0.0, 0.3e-6, once.signals.shape)
+    ramp = np.linspace(0.0, 1.0, 400)[:, None]
+    lift = once.signals[-1] * (1 - ramp) + again[0] * ramp
+    lift += rng.normal(0.0, 0.5e-6, lift.shape)
+    signals = np.vstack([once.signals, lift, again])
+    time = once.time[0] + np.arange(len(signals)) / 20e3
+    speed = np.full(len(time), float(once.speed_readings[0]))
+    changes = {"speed": speed, "speed_time": time[[0, -1]], "speed_readings": speed[:2]}
+    twice = replace(once, time=time, signals=signals, **changes)
+    found = first_stop(twice, machine)
+    assert found.kind == "second drop"
+    assert found.time == pytest.approx(0.87, abs=5e-3)
+
+
+@pytest.mark.parametrize(("factor", "after", "kind"), [(0.0, -1.0, "dead speed"), (0.0, 0.0, "dead speed")])
+def test_a_dead_speed(factor, after, kind, whole_drop, machine):
+    dead = np.where(whole_drop.speed_time > after, factor, 1.0) * whole_drop.speed_readings
+    found = first_stop(replace(whole_drop, speed_readings=dead), machine)
+    assert (found.kind, found.channel) == (kind, "speed")
+
+
+def test_a_negative_speed_is_told(whole_drop, tail, machine):
+    found = check_record(replace(whole_drop, speed_readings=-whole_drop.speed_readings), machine, tail)
+    assert "negative speed" in [finding.kind for finding in found]
+
+
+def test_a_good_record_is_left_alone(whole_drop, fast_drop, tail, machine):
+    assert check_record(whole_drop, machine, tail) == ()
+    mine = {"recorder low-pass", "AC coupling", "bridged gap", "clipping", "second drop", "dead speed"}
+    assert not mine & {finding.kind for finding in check_record(fast_drop, machine)}
+
+
+def late(record, channel, delay):
+    signals = record.signals.copy()
+    moved = np.interp(record.time - delay, record.time, signals[:, channel])
+    signals[:, channel] = np.where(record.time - delay < record.time[0], signals[:, channel], moved)
+    return replace(record, signals=signals)
+
+
+@pytest.mark.parametrize(("channel", "delay"), [(1, 5e-4), (2, 1e-3), (3, 2e-3)])
+def test_a_late_channel(channel, delay, drop, tail, machine):
+    """A delay between the channels was called a wrong gain, or nothing at all."""
+    found = first_warning(late(drop, channel, delay), machine, tail)
+    assert (found.kind, found.channel) == ("late channel", drop.channel_names[channel])
+    if delay < 7e-4:
+        assert f"{drop.channel_names[channel]} about 0.4 ms late" in found.message
+
+
+def test_sensors_that_saturate_softly(drop, tail, machine):
+    level = 1.2 * float(np.max(np.abs(drop.signals)))
+    bent = [replace(one, signals=level * np.tanh(one.signals / level)) for one in (drop, tail)]
+    found = first_warning(bent[0], machine, bent[1])
+    assert found.kind == "soft saturation"
+    assert set(found.channel.split(", ")) == set(drop.channel_names)
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_a_clock_that_is_wrong_by_two(factor, drop, machine):
+    """A doubled rate puts 1X where 2X may be: only the fall, four times as fast, tells."""
+    start = drop.time[0]
+    changes = {
+        "time": start + (drop.time - start) / factor,
+        "sampling_rate": factor * drop.sampling_rate,
+        "speed_time": start + (drop.speed_time - start) / factor,
+    }
+    found = first_stop(replace(drop, **changes), machine)
+    assert found.kind == "wrong sampling rate"
+    assert "so the clock is wrong" in found.message
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_a_speed_that_is_wrong_by_two(factor, drop, machine):
+    found = first_stop(replace(drop, speed_readings=factor * drop.speed_readings), machine)
+    assert (found.kind, found.channel) == ("wrong speed", "speed")
+    assert "so the speed is wrong" in found.message
+
+
+def test_sensors_without_noise_are_not_judged_finer_than_the_model_is(machine):
+    hidden = hidden_machine(machine, 3)
+    made = synthesize_drop(hidden, 2 * np.pi * 90.0, 3, sensor_chain=PERFECT, duration=0.1, tolerance=1e-6)
+    kinds = {found.kind for found in check_record(made.record, machine, made.tail)}
+    assert not kinds & {"late channel", "wrong gain", "soft saturation", "turned sensors"}
+
+
+@pytest.mark.parametrize("gain", [0.9, 1.1])
+def test_a_tenth_in_all_gains_shows_in_no_fall(gain, drop, tail, machine):
+    """Less lift that remains fits as well: the record does not say it, and nothing is invented."""
+    wrong = [replace(one, signals=gain * one.signals) for one in (drop, tail)]
+    assert "wrong gain" not in {finding.kind for finding in check_record(*wrong[:1], machine, wrong[1])}
+
+
+def test_hum_on_the_tail_is_no_exchanged_channel(whole_drop, tail, machine):
+    """Mains hum moves all channels alike, at an angle to the race that looked like a crossed channel."""
+    humming = tail.signals + 20e-6 * np.sin(2 * np.pi * 50.0 * tail.time)[:, None]
+    kinds = {found.kind for found in check_record(whole_drop, machine, replace(tail, signals=humming))}
+    assert "swapped channels" not in kinds
+
+
+def test_a_single_run_of_equal_readings_is_stuck(drop, machine):
+    """A recorder of many bits repeats no reading: the one run was compared with itself and passed."""
+    rng = np.random.default_rng(5)
+    signals = drop.signals + rng.normal(0.0, 1e-9, drop.signals.shape)
+    signals[6000:6014, 2] = signals[6000, 2]
+    found = first_stop(replace(drop, signals=signals), machine)
+    assert (found.kind, found.channel) == ("stuck channel", drop.channel_names[2])
+    assert "14 samples (0.7 ms)" in found.message

@@ -1,0 +1,234 @@
+"""What a record says by itself: on paths whose events are known because they are written down here."""
+
+import json
+import subprocess
+import sys
+
+import jsonschema
+import numpy as np
+import pytest
+
+from rotordrop.cli.app import run
+from rotordrop.errors import RecordError, UsageError
+from rotordrop.evidence.look import look
+from rotordrop.evidence.look.schema import look_schema
+from rotordrop.machine import example_path
+from rotordrop.record import example_record_path
+
+RATE = 20_000.0
+GAP = 250e-6
+G = 9.81
+RELEASE = 0.1
+NOISE = 0.3e-6
+
+
+def fall_and_bounce(restitution=0.5, until=1.0, rest_for=0.4):
+    """Path (N, 2) of a mass point in a round hole: levitated, falling straight, bouncing, at rest."""
+    time = np.arange(0.0, until, 1.0 / RATE)
+    y = np.zeros_like(time)
+    hits = []
+    start, height, speed = RELEASE, 0.0, 0.0
+    y[time < start] = 0.0
+    while True:
+        flight = (speed + np.sqrt(speed**2 + 2 * G * (height + GAP))) / G
+        during = (time >= start) & (time < start + flight)
+        y[during] = height + speed * (time[during] - start) - 0.5 * G * (time[during] - start) ** 2
+        impact = G * flight - speed
+        start, height, speed = start + flight, -GAP, impact * restitution
+        hits.append((start, impact, speed))
+        if speed**2 / (2 * G) < 1e-6 or start > until:
+            break
+    y[time >= start] = -GAP
+    orbit = 5e-6 * np.exp(2j * np.pi * 60.0 * time) * (time < RELEASE)
+    return time, np.column_stack([orbit.real, y + orbit.imag]), hits
+
+
+def written(path, time, planes, angles=(0.0, 90.0), origin=(0.0, 0.0), speed=60.0, seed=1):
+    """A CSV of sensors along the given angles in every plane, with noise."""
+    rng = np.random.default_rng(seed)
+    directions = np.array([[np.cos(np.radians(a)), np.sin(np.radians(a))] for a in angles])
+    columns, names = [time], ["Time [s]"]
+    for name, motion in planes.items():
+        readings = (motion + np.array(origin)) @ directions.T
+        columns += list((readings + rng.normal(0.0, NOISE, readings.shape)).T * 1e6)
+        names += [f"{name}_X [um]", f"{name}_Y [um]"]
+    columns.append(np.full(len(time), speed))
+    rows = [",".join(f"{value:.6f}" for value in row) for row in zip(*columns, strict=True)]
+    path.write_text("\n".join([",".join([*names, "Speed [Hz]"]), *rows]) + "\n")
+    return path
+
+
+@pytest.mark.parametrize("angles", [(0.0, 90.0), (45.0, 135.0), (200.0, 290.0), (90.0, 0.0)])
+def test_release_impacts_and_contact_of_a_bouncing_point(angles, tmp_path):
+    time, path, hits = fall_and_bounce()
+    file = written(tmp_path / "drop.csv", time, {"NDE": path, "DE": path}, angles, origin=(30e-6, -80e-6))
+    seen = look(file, gap=GAP)
+    assert seen.drops[0].release == pytest.approx(RELEASE, abs=2e-3)
+    found = [impact for impact in seen.impacts if impact.plane == "NDE"]
+    clear = [hit for hit in hits if hit[2] ** 2 / (2 * G) > 0.05 * GAP]
+    assert len(clear) >= 2
+    for impact, (at, approach, rebound) in zip(found, clear, strict=False):
+        assert impact.time == pytest.approx(at, abs=0.3e-3)
+        assert np.degrees(impact.azimuth) == pytest.approx(-90.0, abs=2.0)
+        assert impact.approach == pytest.approx(approach, abs=6e-3)
+        assert impact.rebound == pytest.approx(rebound, abs=6e-3)
+    assert seen.drops[0].permanent_contact == pytest.approx(hits[-1][0], abs=15e-3)
+    for plane in seen.planes:
+        assert plane.largest == pytest.approx(GAP, abs=2e-6)
+    assert seen.speed == pytest.approx(120 * np.pi)
+    assert seen.findings == ()
+
+
+def test_the_gap_comes_from_the_depth_of_the_rest_where_it_is_not_given(tmp_path):
+    time, path, _ = fall_and_bounce()
+    seen = look(written(tmp_path / "drop.csv", time, {"NDE": path, "DE": 0.8 * path}))
+    assert [plane.gap for plane in seen.planes] == pytest.approx([GAP, 0.8 * GAP], abs=1e-6)
+    assert any("air gap 250 µm taken from where the rotor floated" in note for note in seen.notes)
+
+
+@pytest.mark.parametrize(("frequency", "sense"), [(25.0, "forward"), (-40.0, "backward")])
+def test_a_whirl_has_its_sense_frequency_and_turns(frequency, sense, tmp_path):
+    time, path, _ = fall_and_bounce(until=1.2)
+    spell = (time >= 0.4) & (time < 0.6)
+    angle = -np.pi / 2 + 2 * np.pi * frequency * (time[spell] - 0.4)
+    path[spell] = 1.02 * GAP * np.column_stack([np.cos(angle), np.sin(angle)])
+    seen = look(written(tmp_path / "drop.csv", time, {"NDE": path, "DE": path}), gap=GAP)
+    whirl = next(whirl for whirl in seen.whirls if whirl.plane == "NDE")
+    assert whirl.sense == sense
+    assert whirl.frequency == pytest.approx(abs(frequency), rel=0.05)
+    assert whirl.turns == pytest.approx(frequency * 0.2, abs=0.35)
+    assert (whirl.start, whirl.end) == pytest.approx((0.4, 0.6), abs=0.02)
+
+
+def test_a_gap_may_be_a_text_with_its_unit_and_a_bare_speed_is_refused():
+    path = example_record_path("lp400_drop_060")
+    assert [one.gap for one in look(path, gap="0.28 mm").planes] == pytest.approx([0.28e-3, 0.28e-3])
+    with pytest.raises(UsageError, match="speed = 60 has no unit; write '60 Hz' or '60 rpm'"):
+        look(path, gap="0.28 mm", speed=60)
+
+
+def test_the_velocity_index_of_a_synchronous_whirl_at_full_gap_is_one(tmp_path):
+    time, path, _ = fall_and_bounce(restitution=0.05)
+    spell = time >= RELEASE + 0.02
+    spell &= time < RELEASE + 0.5
+    angle = -np.pi / 2 + 2 * np.pi * 60.0 * (time[spell] - RELEASE - 0.02)
+    path[spell] = GAP * np.column_stack([np.cos(angle), np.sin(angle)])
+    seen = look(written(tmp_path / "drop.csv", time, {"NDE": path, "DE": path}), gap=GAP)
+    assert seen.planes[0].velocity_index == pytest.approx(np.sqrt(0.9), abs=0.05)
+    assert seen.planes[0].position_index == pytest.approx(0.95, abs=0.04)
+
+
+def test_a_second_drop_is_told(tmp_path):
+    _, path, _ = fall_and_bounce(until=0.6)
+    twice = np.concatenate([path, path])
+    clock = np.arange(len(twice)) / RATE
+    seen = look(written(tmp_path / "drop.csv", clock, {"NDE": twice, "DE": twice}), gap=GAP)
+    assert [drop.release for drop in seen.drops] == pytest.approx([RELEASE, 0.6 + RELEASE], abs=2e-3)
+    assert [drop.lifted for drop in seen.drops] == [True, False]
+    assert seen.drops[0].end == pytest.approx(0.6, abs=2e-3)
+    assert any("released again, drop 2" in words for _, words in seen.timeline())
+    assert all(impact.time < 0.61 for impact in seen.impacts), "impacts are those of the first drop"
+
+
+def test_channels_are_named_where_their_names_do_not_tell(tmp_path):
+    time, path, _ = fall_and_bounce()
+    file = written(tmp_path / "drop.csv", time, {"NDE": path, "DE": path})
+    text = (
+        file.read_text()
+        .replace("NDE_X", "alpha")
+        .replace("NDE_Y", "bravo")
+        .replace("DE_X", "c")
+        .replace("DE_Y", "d")
+    )
+    file.write_text(text)
+    with pytest.raises(RecordError, match=r"no two channels of alpha, bravo, c, d, Speed are a pair.*--map"):
+        look(file, gap=GAP)
+    seen = look(file, gap=GAP, mapping=["left: alpha 0 deg, bravo 90 deg", "right: c 0 deg, d 90 deg"])
+    assert [plane.plane for plane in seen.planes] == ["left", "right"]
+    with pytest.raises(UsageError, match=r"there is no channel 'e'; there are alpha, bravo"):
+        look(file, mapping=["left: e 0 deg, alpha 90 deg"])
+    with pytest.raises(UsageError, match=r'is not "PLANE: CHANNEL angle, CHANNEL angle"'):
+        look(file, mapping=["alpha"])
+
+
+def test_a_record_without_a_fall_is_refused(tmp_path):
+    time, _, _ = fall_and_bounce()
+    still = 5e-6 * np.column_stack([np.cos(377 * time), np.sin(377 * time)])
+    with pytest.raises(RecordError, match=r"nothing falls in the record: the shaft strays by "):
+        look(written(tmp_path / "drop.csv", time, {"NDE": still, "DE": still}))
+
+
+@pytest.mark.parametrize("amplitude", [5.0, 20.0, 45.0])
+def test_a_settled_tail_is_no_drop(amplitude, tmp_path):
+    """A rotor that swings along its race was taken for one that falls again and again: 17 drops."""
+    time = np.arange(0.0, 3.0, 1e-3)
+    swing = amplitude * 1e-6 * np.exp(-time / 8.0) * np.cos(2 * np.pi * 29.0 * time + 0.4)
+    path = np.column_stack([swing, np.square(swing) / (2 * GAP) - GAP])
+    with pytest.raises(RecordError, match=r"nothing falls in the record: the shaft (moves away|strays) by"):
+        look(written(tmp_path / "tail.csv", time, {"NDE": path, "DE": 0.6 * path}))
+
+
+def test_the_bundled_tail_is_no_drop(machine):
+    for described in (None, machine):
+        with pytest.raises(RecordError, match=r"with [01]\.\d+ m/s².*'estimate --tail'"):
+            look(example_record_path("lp400_drop_060_tail"), machine=described)
+
+
+def test_the_bundled_drop_with_and_without_its_machine(machine):
+    record = example_record_path("lp400_drop_060")
+    alone, known = look(record), look(record, machine=machine)
+    assert alone.drops[0].release == pytest.approx(0.0, abs=2e-3)
+    for one in alone.planes:
+        other = next(plane for plane in known.planes if plane.plane == one.plane)
+        assert one.largest == pytest.approx(other.largest, rel=0.15), "where it floats counts as the centre"
+    for name in ("NDE", "DE"):
+        first = [next(hit.time for hit in seen.impacts if hit.plane == name) for seen in (alone, known)]
+        assert first[0] == pytest.approx(first[1], abs=1e-3)
+    jsonschema.validate(alone.as_json(), look_schema())
+
+
+def test_every_number_of_the_document_is_that_of_what_was_seen(machine):
+    seen = look(example_record_path("lp400_drop_060"), machine=machine)
+    written = json.loads(json.dumps(seen.as_json(), allow_nan=False))
+    assert written["speed_rad_per_s"] == pytest.approx(2.0 * np.pi * 60.0, rel=2e-3)
+    assert [(one["name"], one["plane"]) for one in written["channels"]] == [
+        (sensor.name, sensor.bearing) for sensor in machine.sensors
+    ]
+    (drop,) = written["drops"]
+    assert drop["release_s"] == seen.drops[0].release == pytest.approx(0.0, abs=2e-3)
+    for entry, plane in zip(written["planes"], seen.planes, strict=True):
+        assert entry["beyond_air_gap_m"] == pytest.approx(
+            entry["largest_displacement_m"] - entry["air_gap_m"]
+        )
+        assert (entry["plane"], entry["largest_displacement_m"]) == (plane.plane, plane.largest)
+        assert entry["largest_displacement_time_s"] == plane.largest_time
+        assert entry["position_index"] == plane.position_index
+        assert entry["velocity_index"] == plane.velocity_index
+    names = ("plane", "time", "azimuth", "depth", "approach", "rebound")
+    keys = ("plane", "time_s", "azimuth_rad", "depth_m", "approach_m_per_s", "rebound_m_per_s")
+    assert len(written["impacts"]) == len(seen.impacts) > 4
+    for entry, impact in zip(written["impacts"], seen.impacts, strict=True):
+        assert tuple(entry[key] for key in keys) == tuple(getattr(impact, name) for name in names)
+    first = next(hit for hit in written["impacts"] if hit["plane"] == "DE")
+    # The remanent lift makes the fall through the gap longer and slower than a free one.
+    gap = next(one["air_gap_m"] for one in written["planes"] if one["plane"] == "DE")
+    assert np.sqrt(2.0 * gap / G) < first["time_s"] - drop["release_s"] < 1.5 * np.sqrt(2.0 * gap / G)
+    assert 0.5 * np.sqrt(2.0 * gap * G) < first["approach_m_per_s"] < 1.05 * np.sqrt(2.0 * gap * G)
+    assert [one["event"] for one in written["timeline"]] == [words for _, words in seen.timeline()]
+
+
+def test_the_command_writes_page_and_json_and_needs_no_compiler(tmp_path, capsys):
+    record = str(example_record_path("lp400_drop_060"))
+    page, file = tmp_path / "look.html", tmp_path / "look.json"
+    assert run(["look", record, "--gap", "280 um", "--report", str(page), "--json", str(file)]) == 0
+    told = capsys.readouterr().out
+    assert "first impact at NDE" in told
+    assert "This record is simulated" in told
+    jsonschema.validate(json.loads(file.read_text()), look_schema())
+    assert "Path of the rotor centre against the clearance circle" in page.read_text()
+    assert run(["look", record, str(example_path("lp400"))]) == 0
+    program = (
+        "import sys; from rotordrop.evidence.look import look; "
+        f"look({record!r}); assert not {{'numba', 'plotly', 'scipy.signal'}} & set(sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True)

@@ -1,0 +1,93 @@
+"""Power-off of records without a levitated part, and of records with a plane that lost a sensor."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rotordrop.errors import RecordError
+from rotordrop.evidence.events import find_drop_instant, sinking, with_whole_planes
+from rotordrop.evidence.power_off import PowerOff, find_power_off
+from rotordrop.machine import example_machine, load_machine
+from rotordrop.synthesis import hidden_machine, synthesize_drop
+
+LONG_ROTOR = Path(__file__).parents[2] / "machines" / "long_rotor.toml"
+
+
+@pytest.fixture(scope="module")
+def drop():
+    machine = example_machine("lp400")
+    return machine, synthesize_drop(
+        hidden_machine(machine, 71), 2.0 * math.pi * 100.0, 71, duration=0.05, tail=False
+    )
+
+
+def from_time(record, start):
+    keep = record.time >= start
+    return replace(record, time=record.time[keep], signals=record.signals[keep], speed=record.speed[keep])
+
+
+@pytest.mark.parametrize("late", [0.0, 1e-3, 2.5e-3])
+def test_a_record_that_begins_with_the_fall_gives_power_off_to_its_stated_error(drop, late):
+    machine, made = drop
+    true = made.truth["t_off_in_record_s"]
+    found = find_power_off(from_time(made.record, true + late), machine)
+    assert isinstance(found, PowerOff)
+    assert abs(found.value - true) < 2.5 * found.standard_error
+    assert found.standard_error < 2e-3
+    assert "no levitated part" in found.notes[0]
+    assert 3e-3 < found.contact - true < 12e-3
+
+
+def test_a_record_with_levitation_is_read_as_before(drop):
+    machine, made = drop
+    assert find_power_off(made.record, machine).value == find_drop_instant(made.record, machine).value
+
+
+def test_a_record_that_begins_just_before_contact_is_refused(drop):
+    machine, made = drop
+    late = from_time(made.record, made.truth["t_off_in_record_s"] + 6e-3)
+    with pytest.raises(RecordError, match=r"pre-trigger|no drop in the record"):
+        find_power_off(late, machine)
+
+
+def test_a_plane_that_lost_a_sensor_is_left_out(drop):
+    _, made = drop
+    record = made.record
+    keep = [0, 2, 3]
+    three = replace(
+        record,
+        signals=np.ascontiguousarray(record.signals[:, keep]),
+        sensors=tuple(record.sensors[i] for i in keep),
+    )
+    whole, planes = with_whole_planes(three)
+    assert whole.signals.shape[1] == 2 and len(planes) == 1
+    same, both = with_whole_planes(record)
+    assert same is record and len(both) == 2
+    one = replace(three, signals=three.signals[:, :1], sensors=three.sensors[:1])
+    with pytest.raises(RecordError, match="has one sensor"):
+        with_whole_planes(one)
+
+
+def test_a_plane_that_circles_widely_while_levitated_does_not_begin_the_fall():
+    """Between the bearings, near a bending critical speed, an orbit may be as wide as a third of the gap."""
+    low = np.zeros((1000, 3), dtype=bool)
+    low[10:700:7, 2] = True  # once a turn
+    low[800:, 0] = low[806:, 1] = low[792:, 2] = True
+    assert sinking(low) == 792
+    assert sinking(low[800:]) == 0
+    assert sinking(low[:, :2]) == 800
+
+
+def test_power_off_of_a_long_rotor_that_circles_widely_at_mid_span():
+    """Three planes, 217 micrometres from side to side at the third: taken for a record without levitation."""
+    machine = load_machine(LONG_ROTOR)
+    made = synthesize_drop(
+        hidden_machine(machine, 41), 2.0 * math.pi * 140.0, 4101, duration=0.05, tail=False, tolerance=1e-6
+    )
+    found = find_power_off(made.record, machine)
+    assert abs(found.value - made.truth["t_off_in_record_s"]) < 3.0 * found.standard_error < 1e-4

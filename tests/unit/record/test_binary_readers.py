@@ -1,0 +1,431 @@
+"""Binary recordings: the same samples in every format, and damage that must not pass silently."""
+
+import re
+import resource
+
+import h5py
+import numpy as np
+import pytest
+import scipy.io
+
+from rotordrop.errors import RecordError
+from rotordrop.record import Profile, example_record_path, read_record, save_record, write_delimited
+from rotordrop.record.readers import find_reader, known_formats, read_recording
+
+
+@pytest.fixture(scope="module")
+def short(drop):
+    return drop.window(-0.05, 0.05)
+
+
+def as_matlab(record, path, *, packed=True, time=False):
+    speed = {"t": record.speed_time, "hz": record.speed_readings / (2 * np.pi)}
+    content = {
+        "disp_um": (record.signals * 1e6).astype(np.float64),
+        "channel": np.array(record.channel_names, dtype=object),
+        "speed": speed,
+        "info": "LP-400 drop",
+    }
+    content |= {"t": record.time} if time else {"fs": record.sampling_rate, "t0": record.time[0]}
+    scipy.io.savemat(path, content, do_compression=packed)
+
+
+def as_tdms(record, path, *, without=()):
+    nptdms = pytest.importorskip("nptdms")
+
+    def channel(group, name, values, unit, start, step):
+        properties = {
+            "wf_increment": step,
+            "wf_start_offset": start,
+            "wf_start_time": np.datetime64("2019-10-16"),
+            "unit_string": unit,
+        }
+        properties = {key: value for key, value in properties.items() if key not in without}
+        return nptdms.ChannelObject(group, name, values, properties=properties)
+
+    objects = [
+        channel("Displacement", name, record.signals[:, i] * 1e6, "um", record.time[0], 5e-5)
+        for i, name in enumerate(record.channel_names)
+    ]
+    step = float(np.median(np.diff(record.speed_time)))
+    objects.append(
+        channel("Speed", "ShaftSpeed", record.speed_readings / (2 * np.pi), "Hz", record.speed_time[0], step)
+    )
+    with nptdms.TdmsWriter(path) as writer:
+        writer.write_segment([nptdms.RootObject({"name": "drop"}), *objects])
+
+
+def as_uff(record, path, binary=True):
+    """Dataset 58 as the format prescribes, written by hand: an independent counterpart of the reader."""
+    pytest.importorskip("pyuff")
+    count = len(record.time)
+    parts = []
+    for i, name in enumerate(record.channel_names):
+        kind = (
+            f"{58:6d}b{1:6d}{2:6d}{11:12d}{8 * count:12d}{0:6d}{0:6d}{0:12d}{0:12d}"
+            if binary
+            else f"{58:6d}{'':74}"
+        )
+        lines = [f"{-1:6d}", kind, *(f"{text:<80}" for text in (name, "drop", "NONE", "NONE", "NONE"))]
+        lines.append(f"{1:5d}{0:10d}{0:5d}{0:10d} {'NONE':>10}{1:10d}{1:4d} {'NONE':>10}{0:10d}{0:4d} ")
+        lines.append(f"{4:10d}{count:10d}{1:10d}{record.time[0]:13.5e}{5e-5:13.5e}{0.0:13.5e}")
+        for what, label, unit in (
+            (17, "Time", "s"),
+            (8, "Displacement", "m"),
+            (0, "NONE", "NONE"),
+            (0, "NONE", "NONE"),
+        ):
+            lines.append(f"{what:10d}{0:5d}{0:5d}{0:5d} {label:<20} {unit:<20}")
+        parts.append(("\n".join(lines) + "\n").encode())
+        values = record.signals[:, i]
+        if binary:
+            parts.append(values.astype("<f8").tobytes())
+        else:
+            rows = [values[k : k + 4] for k in range(0, count, 4)]
+            parts.append("".join("".join(f"{v:20.11e}" for v in row) + "\n" for row in rows).encode())
+        parts.append(f"{-1:6d}\n".encode())
+    path.write_bytes(b"".join(parts))
+
+
+WRITERS = {"mat": as_matlab, "tdms": as_tdms, "uff": as_uff, "h5": save_record}
+
+
+@pytest.mark.parametrize("suffix", WRITERS)
+def test_every_format_gives_the_same_samples(suffix, short, machine, tmp_path):
+    path = tmp_path / f"drop.{suffix}"
+    WRITERS[suffix](short, path)
+    record = read_record(path, machine)
+    np.testing.assert_allclose(record.signals, short.signals, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(record.time, short.time, rtol=0, atol=1e-9)
+    if suffix == "uff":
+        assert record.speed is None
+    else:
+        np.testing.assert_allclose(record.speed, short.speed, rtol=1e-6)
+
+
+@pytest.mark.parametrize("suffix", ["mat", "tdms", "uff", "h5"])
+@pytest.mark.parametrize("kept", [0.03, 0.3, 0.6, 0.9, 0.999])
+def test_truncated_files_are_refused(suffix, kept, short, machine, tmp_path):
+    path = tmp_path / f"drop.{suffix}"
+    WRITERS[suffix](short, path)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: int(kept * len(whole))])
+    with pytest.raises(
+        RecordError, match=r"truncated|declares|no intact HDF5|cannot be read|is truncated|no TDMS segment"
+    ):
+        read_record(path, machine)
+
+
+def test_matlab_vectors_with_a_time_vector(short, machine, tmp_path):
+    path = tmp_path / "drop.mat"
+    columns = {f"{name}_um": short.signals[:, i] * 1e6 for i, name in enumerate(short.channel_names)}
+    scipy.io.savemat(path, columns | {"t": short.time})
+    record = read_record(path, machine)
+    np.testing.assert_allclose(record.signals, short.signals, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(record.time, short.time, rtol=0, atol=1e-12)
+
+
+def test_matlab_without_clock_is_refused(short, machine, tmp_path):
+    path = tmp_path / "drop.mat"
+    scipy.io.savemat(path, {"S_NDE_A": short.signals[:, 0]})
+    with pytest.raises(RecordError, match=r"no samples with a clock among S_NDE_A"):
+        read_record(path, machine)
+
+
+def as_matlab_73(record, path, structured=False):
+    """What MATLAB writes with '-v7.3': HDF5 behind 512 bytes of its own, columns as rows, text as numbers."""
+    with h5py.File(path, "w", userblock_size=512) as file:
+        folder = file.create_group("drop") if structured else file
+
+        def put(name, values, kind="double"):
+            values = np.atleast_2d(values)
+            dataset = folder.create_dataset(name, data=values.T if structured else values)
+            dataset.attrs["MATLAB_class"] = np.bytes_(kind)
+
+        for i, name in enumerate(record.channel_names):
+            put(f"{name}_um", record.signals[:, i] * 1e6)
+        put("t", record.time)
+        put("note", [ord(sign) for sign in "LP-400"], "char")
+    content = bytearray(path.read_bytes())
+    content[:512] = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(508, b" ") + b"\x00\x02IM"
+    path.write_bytes(content)
+
+
+@pytest.mark.parametrize("structured", [False, True])
+def test_matlab_73_is_read(short, machine, tmp_path, structured):
+    path = tmp_path / "drop.mat"
+    as_matlab_73(short, path, structured)
+    record = read_record(path, machine)
+    np.testing.assert_allclose(record.signals, short.signals, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(record.time, short.time, rtol=0, atol=1e-12)
+    assert "LP-400" in record.metadata.values()
+    path.write_bytes(path.read_bytes()[:600])
+    with pytest.raises(RecordError, match=r"no intact HDF5 file .*it has 600 bytes"):
+        read_record(path, machine)
+
+
+def test_matlab_structures_with_name_and_unit(short, machine, tmp_path):
+    """One structure per channel, as several recorders export."""
+    path = tmp_path / "drop.mat"
+    entries = [
+        {"name": name, "unit": "um", "data": short.signals[:, i] * 1e6, "dt": 5e-5, "t0": short.time[0]}
+        for i, name in enumerate(short.channel_names)
+    ]
+    scipy.io.savemat(path, {"channels": np.array(entries, dtype=object)})
+    record = read_record(path, machine)
+    np.testing.assert_allclose(record.signals, short.signals, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(record.time, short.time, rtol=0, atol=1e-12)
+
+
+def test_a_packed_matlab_variable_with_a_flipped_byte_is_refused(short, machine, tmp_path):
+    path = tmp_path / "drop.mat"
+    as_matlab(short, path)
+    content = bytearray(path.read_bytes())
+    content[len(content) // 3] ^= 0x55
+    path.write_bytes(content)
+    with pytest.raises(RecordError, match=r"cannot be unpacked|unpacks to"):
+        read_record(path, machine)
+
+
+def test_matlab_lengths_are_those_of_the_file(short, tmp_path):
+    path = tmp_path / "drop.mat"
+    as_matlab(short, path, packed=False, time=True)
+    path.write_bytes(path.read_bytes() + b"\x0e\x00\x00\x00\xff\x00\x00\x00")
+    with pytest.raises(RecordError, match=r"declares 255 bytes and 0 are present"):
+        read_recording(path, Profile())
+
+
+def test_uff_with_another_count_than_declared_is_refused(short, machine, tmp_path):
+    path = tmp_path / "drop.uff"
+    as_uff(short, path)
+    content = path.read_bytes()
+    declared = f"{4:10d}{len(short.time):10d}".encode()
+    path.write_bytes(content.replace(declared, f"{4:10d}{len(short.time) - 7:10d}".encode(), 1))
+    with pytest.raises(RecordError, match=rf"'S_NDE_A' declares {len(short.time) - 7} samples"):
+        read_record(path, machine)
+
+
+def test_uff_as_text(short, machine, tmp_path):
+    path = tmp_path / "drop.uff"
+    as_uff(short.window(-0.01, 0.0), path, binary=False)
+    record = read_record(path, machine)
+    np.testing.assert_allclose(record.signals, short.window(-0.01, 0.0).signals, rtol=1e-6)
+
+
+def test_tdms_with_garbage_behind_is_refused(short, machine, tmp_path):
+    path = tmp_path / "drop.tdms"
+    as_tdms(short, path)
+    size = path.stat().st_size
+    path.write_bytes(path.read_bytes() + b"garbage" * 8)
+    with pytest.raises(RecordError, match=rf"no TDMS segment at byte {size} of {size + 56}"):
+        read_record(path, machine)
+
+
+def test_tdms_that_was_never_closed_is_refused(short, machine, tmp_path):
+    path = tmp_path / "drop.tdms"
+    as_tdms(short, path)
+    content = bytearray(path.read_bytes())
+    content[12:20] = b"\xff" * 8
+    path.write_bytes(content)
+    with pytest.raises(RecordError, match=r"the segment at byte 0 declares no length"):
+        read_record(path, machine)
+
+
+def test_a_tdms_channel_without_clock_is_refused_by_name(short, machine, tmp_path):
+    path = tmp_path / "drop.tdms"
+    as_tdms(short, path, without=("wf_increment",))
+    with pytest.raises(
+        RecordError,
+        match=r"channel 'Displacement/S_\w+' has no waveform property 'wf_increment'",
+    ):
+        read_record(path, machine)
+
+
+class TestDangerousHDF5:
+    """What points outside the file, or is not there, is refused before it is read."""
+
+    @pytest.fixture
+    def file(self, short, tmp_path):
+        path = tmp_path / "drop.h5"
+        save_record(short, path)
+        return path
+
+    def test_an_external_link(self, file, machine, tmp_path):
+        with h5py.File(file, "r+") as h5:
+            h5["displacement/other"] = h5py.ExternalLink(str(tmp_path / "secret.h5"), "/x")
+        with pytest.raises(RecordError, match=r"'displacement/other' is a ExternalLink \(to .*secret.h5:/x"):
+            read_record(file, machine)
+
+    def test_external_storage(self, file, machine, tmp_path):
+        (tmp_path / "raw.bin").write_bytes(b"\x00" * 800)
+        with h5py.File(file, "r+") as h5:
+            h5.create_dataset("raw", (100,), "f8", external=[(str(tmp_path / "raw.bin"), 0, 800)])
+        with pytest.raises(RecordError, match=r"the data of 'raw' lie in the file .*raw.bin"):
+            read_record(file, machine)
+
+    def test_a_virtual_dataset(self, file, machine, tmp_path):
+        layout = h5py.VirtualLayout(shape=(100,), dtype="f8")
+        layout[:] = h5py.VirtualSource(str(tmp_path / "other.h5"), "x", shape=(100,))
+        with h5py.File(file, "r+") as h5:
+            h5.create_virtual_dataset("virtual", layout)
+        with pytest.raises(RecordError, match=r"'virtual' is a virtual dataset"):
+            read_record(file, machine)
+
+    def test_a_shape_bomb(self, file, machine):
+        with h5py.File(file, "r+") as h5:
+            h5.create_dataset("bomb", (10**12,), "f8", chunks=(1024,))
+        with pytest.raises(
+            RecordError, match=r"'bomb' claims 1000000000000 samples in \d+ bytes; .*exhaust memory"
+        ):
+            read_record(file, machine)
+
+    def test_blocks_that_were_never_written(self, file, machine):
+        with h5py.File(file, "r+") as h5:
+            item = h5.create_dataset("cut", (4096,), "f8", chunks=(1024,))
+            item[:2048] = 1.0
+        with pytest.raises(RecordError, match=r"of 'cut' only 2 of 4 blocks were written"):
+            read_record(file, machine)
+
+    def test_no_clock(self, file, machine):
+        with h5py.File(file, "r+") as h5:
+            del h5["displacement/S_DE_A"].attrs["dt_s"]
+        with pytest.raises(
+            RecordError, match=r"'displacement/S_DE_A' has neither an attribute 'fs_hz' or 'dt_s'"
+        ):
+            read_record(file, machine)
+
+    def test_a_flipped_byte_is_noticed(self, file, machine):
+        with h5py.File(file, "r") as h5:
+            offset = h5["displacement/S_DE_A"].id.get_chunk_info(0).byte_offset
+        content = bytearray(file.read_bytes())
+        content[offset + 40] ^= 0x10
+        file.write_bytes(content)
+        with pytest.raises(RecordError, match=r"'displacement/S_DE_A' cannot be unpacked"):
+            read_record(file, machine)
+
+    def test_channels_of_different_length(self, file, machine):
+        with h5py.File(file, "r+") as h5:
+            values, attributes = h5["displacement/S_DE_A"][:-5], dict(h5["displacement/S_DE_A"].attrs)
+            del h5["displacement/S_DE_A"]
+            h5["displacement/S_DE_A"] = values
+            h5["displacement/S_DE_A"].attrs.update(attributes)
+        with pytest.raises(
+            RecordError, match=r"'displacement/S_NDE_A' has 2001 samples and 'displacement/S_DE_A' 1996"
+        ):
+            read_record(file, machine)
+
+    def test_clocks_that_differ(self, file, machine):
+        with h5py.File(file, "r+") as h5:
+            h5["displacement/S_DE_B"].attrs["t0_s"] = -0.0495
+        with pytest.raises(RecordError, match=r"clocks of .* and 'displacement/S_DE_B' differ by 500 µs"):
+            read_record(file, machine)
+
+
+def test_the_bundled_recording_reads(machine, whole_drop, tail):
+    assert whole_drop.signals.shape == (45001, 4)
+    assert whole_drop.sampling_rate == 20000.0
+    assert whole_drop.time[0] == -0.25
+    np.testing.assert_allclose(whole_drop.signals[0] * 1e6, [8.185, -6.976, -16.846, -16.315], atol=5e-4)
+    assert tail.signals.shape == (3000, 4)
+    assert tail.sampling_rate == 1000.0
+    assert example_record_path("lp400_drop_060").name == "drop_060.h5"
+
+
+def test_another_package_may_add_a_reader(monkeypatch, machine, short):
+    class Entry:
+        name = "vendor"
+
+        @staticmethod
+        def load():
+            return lambda path, profile: "read by the vendor"
+
+    monkeypatch.setattr(
+        "rotordrop.record.readers.entry_points",
+        lambda group: [Entry()] if group == "rotordrop.readers" else [],
+    )
+    assert find_reader("vendor", None)(None, None) == "read by the vendor"
+    assert "vendor" in known_formats()
+
+
+def test_text_written_here_is_read_back(short, machine, tmp_path):
+    from rotordrop.record import recording_of
+
+    recording = recording_of(
+        short.time, short.signals, short.channel_names, speed_time=short.speed_time,
+        speed=short.speed_readings, metadata={"Machine": "LP-400"},
+    )  # fmt: skip
+    for separator, decimal in ((";", ","), (",", "."), ("\t", ".")):
+        path = tmp_path / "drop.csv"
+        write_delimited(recording, path, separator=separator, decimal=decimal)
+        record = read_record(path, machine)
+        np.testing.assert_allclose(record.signals, short.signals, rtol=0, atol=0.6e-9)
+        np.testing.assert_allclose(record.time, short.time, rtol=0, atol=1e-9)
+        assert record.metadata["Machine"] == "LP-400"
+
+
+class TestFilesThatEndTheLibrary:
+    """Damage that makes a library crash, loop or eat memory ends its child process, never this one."""
+
+    def test_a_crash_of_scipy(self, short, tmp_path):
+        path = tmp_path / "drop.mat"
+        scipy.io.savemat(path, {"S_NDE_A": short.signals[:, 0], "t": short.time})
+        content = bytearray(path.read_bytes())
+        tag = content.index(b"\x09\x00\x00\x00", 128 + 48)  # the type of the samples, double
+        content[tag : tag + 4] = b"\x00\x00\x09\x7f"
+        path.write_bytes(content)
+        with pytest.raises(RecordError, match=r"was ended by signal 11; the file is damaged|cannot be read"):
+            read_recording(path, Profile())
+
+    def test_an_endless_loop_of_the_hdf5_library(self, tmp_path):
+        path = tmp_path / "drop.h5"
+        with h5py.File(path, "w") as file:
+            dataset = file.create_dataset("S", data=np.arange(50.0))
+            for number in range(3):
+                dataset.attrs[f"text {number}"] = 40 * "word "
+        content = bytearray(path.read_bytes())
+        heap = content.index(b"GCOL")
+        content[heap + 16 : heap + 528] = bytes(512)
+        path.write_bytes(content)
+        started = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+        try:
+            read_recording(path, Profile())
+        except RecordError as error:
+            assert re.search(r"cannot be read within 4 s|no intact HDF5 file|clock", str(error))
+        assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - started < 5.5
+
+    def test_a_file_that_unpacks_to_far_more(self, tmp_path):
+        path = tmp_path / "drop.h5"
+        with h5py.File(path, "w") as file:
+            file.create_dataset("S", (5 * 10**8,), "i1", chunks=(10**6,), compression="gzip", fillvalue=0)
+            for start in range(0, 5 * 10**7, 10**6):
+                file["S"][start : start + 10**6] = 0
+        with pytest.raises(RecordError, match=r"claims 500000000 samples in \d+ bytes; .*at most 67 MB"):
+            read_recording(path, Profile())
+
+    def test_a_link_that_leads_nowhere(self, short, machine, tmp_path):
+        path = tmp_path / "drop.h5"
+        save_record(short, path)
+        content = path.read_bytes()
+        path.write_bytes(content.replace(b"S_DE_B\x00", b"S_DE_B\xff"))
+        with pytest.raises(RecordError, match=r"no intact HDF5 file|leads nowhere|no channel 'S_DE_B'"):
+            read_record(path, machine)
+
+    def test_thousands_of_series(self, tmp_path):
+        path = tmp_path / "drop.h5"
+        with h5py.File(path, "w") as file:
+            for number in range(2100):
+                file[f"series {number}"] = np.arange(3)
+        with pytest.raises(RecordError, match=r"more than 2000 datasets"):
+            read_recording(path, Profile())
+
+    def test_one_child_reads_a_small_file_fast(self, short, machine, tmp_path):
+        """Processor time of the child, start and imports included: wall time depends on who else runs."""
+        path = tmp_path / "drop.h5"
+        save_record(short, path)
+        used = []
+        for _ in range(3):
+            before = resource.getrusage(resource.RUSAGE_CHILDREN)
+            read_record(path, machine)
+            after = resource.getrusage(resource.RUSAGE_CHILDREN)
+            used.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+        assert min(used) < 0.3

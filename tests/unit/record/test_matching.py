@@ -1,0 +1,212 @@
+"""Channels find their sensors, by name or map, and their units."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rotordrop.errors import RecordError, UsageError
+from rotordrop.record import (
+    Profile,
+    example_record_path,
+    load_profile,
+    read_record,
+    save_profile,
+    save_record,
+)
+from rotordrop.record.profile import SpeedSource
+from rotordrop.record.record import record_of
+from rotordrop.record.recording import Channel, Recording
+
+TIME = np.arange(10) * 1e-4
+
+
+def channel(name, unit="um", values=None, label=None):
+    return Channel(
+        name=name,
+        label=label or name,
+        unit=unit,
+        values=np.arange(10.0) if values is None else values,
+        time=TIME,
+    )
+
+
+def recording(*names, unit="um", extra=()):
+    return Recording(channels=(*(channel(name, unit) for name in names), *extra))
+
+
+SENSORS = ("S_NDE_A", "S_NDE_B", "S_DE_A", "S_DE_B")
+
+
+def test_channels_come_in_the_order_of_the_sensors(machine):
+    record = record_of(recording(*reversed(SENSORS)), machine.sensors)
+    assert record.channel_names == SENSORS
+
+
+def test_spelling_may_differ(machine):
+    record = record_of(recording("s-nde-a", "S NDE B", "sDEa", "S_DE_B"), machine.sensors)
+    assert record.signals.shape == (10, 4)
+
+
+def test_a_missing_channel_is_named_with_what_there_is(machine):
+    with pytest.raises(
+        RecordError, match=r"no channel 'S_DE_B' for sensor S_DE_B; it has S_NDE_A, .*did you mean"
+    ):
+        record_of(recording("S_NDE_A", "S_NDE_B", "S_DE_A", "S_DE_C"), machine.sensors)
+
+
+def test_a_map_finds_channels_of_any_name(machine):
+    profile = Profile(channels=dict(zip(SENSORS, ("ch1", "ch2", "ch3", "ch4"), strict=True)))
+    assert record_of(
+        recording("ch1", "ch2", "ch3", "ch4"), machine.sensors, profile=profile
+    ).signals.shape == (10, 4)
+
+
+def test_a_map_with_an_unknown_sensor_is_refused(machine):
+    with pytest.raises(RecordError, match=r"names a sensor 'S_XX'; the machine has S_NDE_A, S_NDE_B"):
+        record_of(recording(*SENSORS), machine.sensors, profile=Profile(channels={"S_XX": "ch1"}))
+
+
+def test_a_channel_mapped_twice_is_refused(machine):
+    profile = Profile(channels={"S_NDE_B": "S_NDE_A"})
+    with pytest.raises(RecordError, match=r"'S_NDE_A' is mapped to two sensors, the second is S_NDE_B"):
+        record_of(recording(*SENSORS), machine.sensors, profile=profile)
+
+
+def test_two_channels_of_one_name_are_refused(machine):
+    twice = Recording(channels=tuple(channel(n, label=f"{g}/{n}") for g in "ab" for n in SENSORS))
+    with pytest.raises(RecordError, match=r"sensor S_NDE_A fits the channels 'a/S_NDE_A', 'b/S_NDE_A'"):
+        record_of(twice, machine.sensors)
+
+
+def test_a_missing_unit_is_refused(machine):
+    with pytest.raises(RecordError, match=r"channel 'S_NDE_A' has no unit; name it in the profile"):
+        record_of(recording(*SENSORS, unit=""), machine.sensors)
+    record = record_of(recording(*SENSORS, unit=""), machine.sensors, profile=Profile(unit="mil"))
+    np.testing.assert_allclose(record.signals[1], 25.4e-6)
+
+
+def test_a_unit_that_is_no_length_is_refused(machine):
+    with pytest.raises(
+        RecordError, match=r"channel 'S_NDE_A' is in 'kN', which is neither a length nor a voltage"
+    ):
+        record_of(recording(*SENSORS, unit="kN"), machine.sensors)
+
+
+def test_volts_without_any_sensitivity_are_refused(machine):
+    blind = tuple(sensor.model_copy(update={"sensitivity": None}) for sensor in machine.sensors)
+    with pytest.raises(
+        RecordError, match=r"'S_NDE_A' is in volts and neither the recording nor the machine file"
+    ):
+        record_of(recording(*SENSORS, unit="V"), blind)
+    record = record_of(recording(*SENSORS, unit="mV"), blind, profile=Profile(sensitivity="4 mV/um"))
+    np.testing.assert_allclose(record.signals[1], 0.25e-6)
+
+
+def test_a_machine_without_sensors_is_refused():
+    with pytest.raises(RecordError, match="the machine has no sensors"):
+        record_of(recording(*SENSORS), ())
+
+
+def test_one_speed_channel_is_found_by_unit_or_name(machine):
+    for extra in (channel("N", "rpm", np.full(10, 3600.0)), channel("Drehzahl", "Hz", np.full(10, 60.0))):
+        record = record_of(recording(*SENSORS, extra=(extra,)), machine.sensors)
+        np.testing.assert_allclose(record.speed, 120 * np.pi)
+
+
+def test_two_speed_channels_need_a_choice(machine):
+    both = recording(
+        *SENSORS, extra=(channel("N1", "rpm", np.full(10, 3600.0)), channel("N2", "Hz", np.full(10, 50.0)))
+    )
+    with pytest.raises(RecordError, match=r"'N1', 'N2' could all be the shaft speed"):
+        record_of(both, machine.sensors)
+    record = record_of(both, machine.sensors, profile=Profile(speed=SpeedSource(channel="N2")))
+    np.testing.assert_allclose(record.speed, 100 * np.pi)
+    with pytest.raises(RecordError, match=r"no speed channel 'N3'; it has S_NDE_A"):
+        record_of(both, machine.sensors, profile=Profile(speed=SpeedSource(channel="N3")))
+
+
+def test_a_speed_without_unit_is_refused(machine):
+    with pytest.raises(RecordError, match=r"the speed channel 'Speed' has no unit"):
+        record_of(recording(*SENSORS, extra=(channel("Speed", ""),)), machine.sensors)
+    with pytest.raises(
+        RecordError, match=r"the speed channel 'Speed' is in 'km/h'; expected Hz, rpm or rad/s"
+    ):
+        record_of(recording(*SENSORS, extra=(channel("Speed", "km/h"),)), machine.sensors)
+
+
+def test_a_profile_is_saved_and_read_back(tmp_path):
+    profile = Profile(
+        channels={"S_NDE_A": "ch 1"},
+        unit="um",
+        sensitivity="8 mV/um",
+        speed=SpeedSource(channel="N", unit="rpm"),
+    )
+    save_profile(profile, tmp_path / "recorder.toml")
+    assert load_profile(tmp_path / "recorder.toml") == profile
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("chanels = {}", r"chanels = \{\} is not known.*did you mean 'channels'"),
+        ("[time]\nstep = '50'", r"\[time\] step = '50'.*has no unit"),
+        ("[speed]\nconstant = '60 m'", r"\[speed\] constant = '60 m'.*is not a speed"),
+        ("[text]\ndecimal = ';'", r"\[text\] decimal = ';'"),
+        ("a =", r"is not a TOML file"),
+    ],
+)
+def test_a_wrong_profile_names_the_entry(text, words, tmp_path):
+    path = tmp_path / "recorder.toml"
+    path.write_text(text)
+    with pytest.raises(RecordError, match=words):
+        load_profile(path)
+
+
+def test_a_profile_file_may_be_given_by_path(machine, tmp_path):
+    path = tmp_path / "recorder.toml"
+    path.write_text('[speed]\nconstant = "61 Hz"\n')
+    record = read_record(example_record_path("lp400_drop_060"), machine, profile=path)
+    assert record.speed[0] == pytest.approx(122 * np.pi)
+
+
+def test_a_record_is_saved_and_read_back_exactly(drop, machine, tmp_path):
+    save_record(drop, tmp_path / "copy.h5")
+    copy = read_record(tmp_path / "copy.h5", machine)
+    np.testing.assert_array_equal(copy.signals, drop.signals)
+    np.testing.assert_allclose(copy.time, drop.time, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(copy.speed_readings, drop.speed_readings, rtol=1e-12)
+    assert copy.metadata["source"] == "drop_060.h5"
+    assert copy.metadata["source_sha256"] == drop.sha256
+    assert len(drop.sha256) == 64
+
+
+def test_no_partial_file_is_left_when_writing_fails(drop, tmp_path):
+    from rotordrop.errors import OutputError
+    from rotordrop.record import recording_of, write_hdf5
+
+    coarse = recording_of(drop.time, drop.signals, drop.channel_names)
+    with pytest.raises(OutputError, match=r"needs 2.* steps of 1e-09 m; 16 bits have 32767"):
+        write_hdf5(coarse, tmp_path / "drop.h5", step=1e-9)
+    assert list(Path(tmp_path).iterdir()) == []
+
+
+def test_a_window_outside_the_record_is_refused(drop):
+    with pytest.raises(RecordError, match=r"reaches from -0.25 s to 0.3 s; nothing lies between 5 s and 6 s"):
+        drop.window(5.0, 6.0)
+
+
+def test_an_unknown_channel_is_refused(drop):
+    with pytest.raises(RecordError, match=r"no channel 'S_X'; it has S_NDE_A"):
+        drop.reading("S_X")
+    np.testing.assert_array_equal(drop.reading("S_DE_B"), drop.signals[:, 3])
+
+
+def test_a_record_cannot_be_written_to(drop):
+    with pytest.raises(ValueError, match="read-only"):
+        drop.signals[0, 0] = 0.0
+
+
+def test_an_unknown_example_is_refused():
+    with pytest.raises(UsageError, match=r"no example recording 'paper_drop'; there are lp400_drop_060"):
+        example_record_path("paper_drop")

@@ -1,0 +1,47 @@
+"""What is cut out of a record, and how its channels come to one clock."""
+
+import numpy as np
+import pytest
+
+from rotordrop.errors import RecordError
+from rotordrop.machine import example_machine
+from rotordrop.record.record import record_of
+from rotordrop.record.recording import Channel, Recording
+
+
+def test_a_window_holds_the_samples_at_its_bounds_whatever_their_rounding(drop):
+    step = 1.0 / drop.sampling_rate
+    first, last = 100, 5000
+    for off in (-1e-6 * step, 0.0, 1e-6 * step):
+        cut = drop.window(drop.time[first] + off, drop.time[last] + off)
+        np.testing.assert_array_equal(cut.time, drop.time[first : last + 1])
+        np.testing.assert_array_equal(cut.signals, drop.signals[first : last + 1])
+    later = drop.window(drop.time[first] + 0.5 * step, drop.time[last] - 0.5 * step)
+    np.testing.assert_array_equal(later.time, drop.time[first + 1 : last])
+
+
+def _unequal(times, shift=0.0):
+    """Four sensors, the first two sampled `times` as fast as the others."""
+    channels = []
+    for number, name in enumerate(("S_NDE_A", "S_NDE_B", "S_DE_A", "S_DE_B")):
+        rate = 10_000.0 * (times if number < 2 else 1)
+        time = np.arange(round(0.2 * rate)) / rate + (shift if number < 2 else 0.0)
+        values = np.sin(2.0 * np.pi * 60.0 * time + number)
+        channels.append(Channel(name=name, label=name, unit="um", values=values, time=time))
+    return Recording(channels=tuple(channels))
+
+
+@pytest.mark.parametrize("times", [2, 5])
+def test_channels_of_several_rates_come_to_the_slowest_with_samples_as_they_were_read(times):
+    recording = _unequal(times)
+    record = record_of(recording, example_machine("lp400").sensors)
+    assert record.sampling_rate == 10_000.0
+    assert np.array_equal(record.signals[:, 0], 1e-6 * recording.channels[0].values[::times])
+    assert np.array_equal(record.signals[:, 3], 1e-6 * recording.channels[3].values)
+    assert [note for note in record.notes if f"every {times}th sample is used" in note] != []
+
+
+@pytest.mark.parametrize(("times", "shift"), [(1.5, 0.0), (2, 20e-6)])
+def test_channels_whose_clocks_never_meet_are_refused(times, shift):
+    with pytest.raises(RecordError, match="sampled together"):
+        record_of(_unequal(times, shift), example_machine("lp400").sensors)
