@@ -39,6 +39,7 @@ lint: $(READY) ## check style, types and layers
 	@$(BIN)/lint-imports --no-cache
 
 docs: $(READY) ## build the documentation and run its examples
+	@$(BIN)/python docs/generate_validation.py
 	@$(BIN)/python -m sphinx -q -W --keep-going -b doctest docs docs/_build/doctest
 	@NUMBA_DISABLE_JIT=1 $(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build/html
 	@echo "The documentation is $(CURDIR)/docs/_build/html/index.html"

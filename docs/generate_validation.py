@@ -1,6 +1,6 @@
-"""Write ``docs/validation.md``: every public validation case, computed now, with the kind of its reference.
+"""Write ``docs/generated/validation.md``: every public validation case, computed now, with its kind of reference.
 
-Run it with ``python docs/generate_validation.py``; the cases are files under ``tests/validation/cases`` and
+``make docs`` runs it; the cases are files under ``tests/validation/cases`` and
 the functions that compute them stand in the test modules beside.
 """
 
@@ -13,8 +13,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "tests" / "validation"
-PAGE = ROOT / "docs" / "validation.md"
-sys.path.insert(0, str(FOLDER))
+PAGE = ROOT / "docs" / "generated" / "validation.md"
+sys.path[:0] = [str(FOLDER), str(ROOT)]
 
 from cases import Case, Compute, Expected, case_names, load_case  # noqa: E402
 
@@ -133,5 +133,6 @@ def _in_terms(entry: Expected, value: float) -> str:
 
 
 if __name__ == "__main__":
+    PAGE.parent.mkdir(exist_ok=True)
     PAGE.write_text(page(), encoding="utf-8")
     print(f"wrote {PAGE.relative_to(ROOT)}")

@@ -27,7 +27,7 @@ def write(folder: Path) -> None:
         file = folder / name
         if not file.exists() or file.read_text(encoding="utf-8") != text:
             file.write_text(text, encoding="utf-8")
-    for stale in set(folder.glob("*.md")) - {folder / name for name in pages}:
+    for stale in set(folder.glob("*.md")) - {folder / name for name in (*pages, "validation.md")}:
         stale.unlink()
 
 
