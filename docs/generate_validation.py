@@ -1,4 +1,4 @@
-"""Write ``docs/generated/validation.md``: every public validation case, computed now, with its kind of reference.
+"""Write ``docs/generated/validation.md``: every public validation case, computed now, with its reference.
 
 ``make docs`` runs it; the cases are files under ``tests/validation/cases`` and
 the functions that compute them stand in the test modules beside.
