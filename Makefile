@@ -58,7 +58,7 @@ wheelhouse: $(READY) ## collect into the folder wheelhouse what an installation 
 	@rm -rf wheelhouse
 	@$(BIN)/python -m pip download --quiet --disable-pip-version-check --only-binary :all: --require-hashes \
 		-r requirements.lock -d wheelhouse
-	@$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation -w wheelhouse .
+	@$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation -w wheelhouse . ./bench
 	@echo "Copy this folder with wheelhouse to a computer of the same kind and with the same Python; there: make offline"
 
 offline: ## make .venv from the folder wheelhouse, without a network
@@ -67,13 +67,14 @@ offline: ## make .venv from the folder wheelhouse, without a network
 	@"$(PYTHON)" -m venv .venv
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-index --find-links wheelhouse \
 		--require-hashes -r requirements.lock
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-index --no-deps wheelhouse/rotordrop-*.whl
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-index --no-deps \
+		wheelhouse/rotordrop-*.whl wheelhouse/rotordrop_bench-*.whl
 	@echo "Installed: .venv/bin/rotordrop"
 
 clean: ## remove what was built, the virtual environment included
 	rm -rf .venv wheelhouse output build dist docs/_build docs/generated
 
-$(READY): requirements.lock pyproject.toml
+$(READY): requirements.lock pyproject.toml bench/pyproject.toml
 	@if [ -z "$(PYTHON)" ]; then \
 		echo "rotordrop needs Python 3.11 or newer, and the python3 found here is" \
 			"$$(python3 -V 2>&1 || true). Install a newer one and call: make PYTHON=/path/to/python3" >&2; exit 1; fi
@@ -84,5 +85,5 @@ $(READY): requirements.lock pyproject.toml
 			"on Debian and Ubuntu install the package python3-venv" >&2; exit 1; }
 	@echo "Installing into .venv what requirements.lock names (once, some minutes) ..."
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e . -e bench
 	@touch $(READY)

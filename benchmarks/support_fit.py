@@ -26,7 +26,7 @@ from rotordrop.identification.replica import build_replica
 from rotordrop.identification.support import SupportFit, fit_support, impact_problem
 from rotordrop.machine import example_machine
 from rotordrop.rotor.parameters import build_drop_model
-from rotordrop.synthesis import hidden_machine, synthesize_drop
+from rotordrop_bench import hidden_machine, synthesize_drop
 
 STARTS = 8
 SEED = 1000

@@ -140,7 +140,7 @@ def follow_tests(folder: str, interpreted: bool) -> None:
 
 
 def with_sources(tree: Path) -> None:
-    sys.path[:0] = [str(tree / "src"), str(tree)]
+    sys.path[:0] = [str(tree / "src"), str(tree / "bench" / "src"), str(tree)]
     os.environ["PYTHONPATH"] = f"{tree / 'src'}{os.pathsep}{tree}"
     sys.dont_write_bytecode = True
 
@@ -368,7 +368,7 @@ def run_tests(tree: str, order: list[str], way: str, cache: str, pipe: Any) -> N
     for locator in vars(caching).values():
         if isinstance(locator, type) and hasattr(locator, "get_source_stamp"):
             locator.get_source_stamp = lambda self: (0.0, 0)  # type: ignore[attr-defined]
-    importlib.import_module("rotordrop.physics._compile").cache_folder = lambda: cache  # type: ignore[attr-defined]
+    importlib.import_module("rotordrop.physics._compile").cache_folder = lambda *_: cache  # type: ignore[attr-defined]
     files = list(dict.fromkeys(name.split("::")[0] for name in order))
     watched = Progress(order, pipe)
     with (
@@ -445,7 +445,7 @@ class Copies:
         self.cache.mkdir(exist_ok=True)
         shutil.rmtree(self.clean, ignore_errors=True)
         ignore = shutil.ignore_patterns("__pycache__", "*.pyc", "_build")
-        for name in ("src", "tests", "docs", "tools", "studies", "benchmarks"):
+        for name in ("src", "bench", "tests", "docs", "tools", "studies", "benchmarks"):
             if (ROOT / name).exists():
                 shutil.copytree(ROOT / name, self.clean / name, ignore=ignore)
         for path in ROOT.iterdir():

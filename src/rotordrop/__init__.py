@@ -41,8 +41,6 @@ if TYPE_CHECKING:
     from rotordrop.study import load_study as load_study
     from rotordrop.study import run_study as run_study
     from rotordrop.study import sweep as sweep
-    from rotordrop.synthesis import score_estimate as score_estimate
-    from rotordrop.synthesis import synthesize_drop as synthesize_drop
     from rotordrop.units import format_quantity as format_quantity
     from rotordrop.units import parse_quantity as parse_quantity
 
@@ -77,10 +75,8 @@ _PUBLIC = {
     "read_record": "rotordrop.record",
     "run_study": "rotordrop.study",
     "save_machine": "rotordrop.machine",
-    "score_estimate": "rotordrop.synthesis",
     "simulate_drop": "rotordrop.simulate.drop",
     "sweep": "rotordrop.study",
-    "synthesize_drop": "rotordrop.synthesis",
 }
 
 __all__ = ["__version__", *_PUBLIC]

@@ -28,8 +28,8 @@ from rotordrop.estimation.changed import changes
 from rotordrop.machine import example_machine
 from rotordrop.machine.parameter_paths import value_of_path
 from rotordrop.rotor.parameters import build_drop_model
-from rotordrop.synthesis.event import FINER, HiddenMachine, hidden_machine
-from rotordrop.synthesis.recording import synthesize_drop
+from rotordrop_bench.event import FINER, HiddenMachine, hidden_machine
+from rotordrop_bench.recording import synthesize_drop
 
 HZ = 2.0 * math.pi
 BEARINGS = ("NDE", "DE")

@@ -18,8 +18,8 @@ import time
 from pathlib import Path
 from typing import Any
 
-from rotordrop.synthesis.bench import VERSION, score_bench
-from rotordrop.synthesis.bench.make import chosen_drops
+from rotordrop_bench import VERSION, score_bench
+from rotordrop_bench.make import chosen_drops
 
 HERE = Path(__file__).parent
 STEP = 5

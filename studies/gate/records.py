@@ -17,8 +17,8 @@ import numpy as np
 
 from rotordrop.machine import Machine
 from rotordrop.record.record import Record
-from rotordrop.synthesis import SensorChain, hidden_machine, synthesize_drop
-from rotordrop.synthesis.bench.rotors import bench_rotor
+from rotordrop_bench import SensorChain, hidden_machine, synthesize_drop
+from rotordrop_bench.rotors import bench_rotor
 
 ROTORS = {"5 kg": (100.0, 450.0), "60 kg": (40.0, 400.0), "140 kg": (30.0, 180.0)}
 """Rotors by name with the range of their speeds [Hz]."""

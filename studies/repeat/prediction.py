@@ -25,8 +25,8 @@ from rotordrop.simulate.case import DropCase
 from rotordrop.simulate.drop import simulate_drop
 from rotordrop.study.repeat import Recorded, place_among, repeat_study
 from rotordrop.study.run import run_study
-from rotordrop.synthesis.event import HiddenMachine, drop_conditions, hidden_machine
-from rotordrop.synthesis.recording import synthesize_drop
+from rotordrop_bench.event import HiddenMachine, drop_conditions, hidden_machine
+from rotordrop_bench.recording import synthesize_drop
 
 HZ = 2.0 * math.pi
 CALIBRATED_AT, PREDICTED_AT = (60.0, 100.0), 210.0

@@ -14,7 +14,7 @@ import numpy as np
 
 from rotordrop.estimated import Estimated
 from rotordrop.machine import Machine, TouchdownBearing, example_machine
-from rotordrop.synthesis import HiddenMachine, SensorChain
+from rotordrop_bench import HiddenMachine, SensorChain
 
 RESULTS = Path(os.environ.get("STUDY_RESULTS", Path(__file__).parent / "results"))
 SPEEDS_HZ = (60.0, 100.0, 150.0, 210.0)

@@ -43,7 +43,7 @@ from rotordrop.identification.support import (
     refit_with_friction,
 )
 from rotordrop.rotor.parameters import build_drop_model
-from rotordrop.synthesis import hidden_machine, synthesize_drop
+from rotordrop_bench import hidden_machine, synthesize_drop
 
 Array = NDArray[np.float64]
 

@@ -38,8 +38,8 @@ from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.simulate.case import DropCase, StateStart
 from rotordrop.simulate.drop import simulate_drop
 from rotordrop.simulate.result import DropResult
-from rotordrop.synthesis import HiddenMachine, hidden_machine, synthesize_drop
-from rotordrop.synthesis.event import drop_conditions
+from rotordrop_bench import HiddenMachine, hidden_machine, synthesize_drop
+from rotordrop_bench.event import drop_conditions
 
 Array = NDArray[np.float64]
 

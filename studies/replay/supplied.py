@@ -23,7 +23,7 @@ from rotordrop.errors import RotordropError
 from rotordrop.estimation import Replay, estimate_drop
 from rotordrop.estimation.document import estimate_document
 from rotordrop.record.record import Record, read_record
-from rotordrop.synthesis.score import score_estimate
+from rotordrop_bench.score import score_estimate
 
 KEPT = ("value", "standard_error", "interval_90", "lower", "upper", "status", "time_s")
 

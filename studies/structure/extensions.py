@@ -3,7 +3,7 @@
 Usage: python studies/structure/extensions.py CASE SEED [SEED ...] [--machine lp400] [--half | --calibrated]
 
 Each machine is drawn around the description of its owner, who gives guesses only, with the structure of
-the case, synthesized by `rotordrop.synthesis`, which shares nothing with the extensions. One drop
+the case, synthesized by `rotordrop_bench`, which shares nothing with the extensions. One drop
 with its settled tail is estimated alone, without extensions and with them; ``--half`` makes the
 departure half as large. With ``--calibrated`` the machine is calibrated on two other drops first, and the
 estimate is made with it, as it is. ``forms`` runs the forms that no extension stands for. Seeds up to 9999
@@ -26,9 +26,9 @@ from rotordrop.estimation import estimate_drop, structure_search, tracked
 from rotordrop.estimation.calibrated import calibrate_machine
 from rotordrop.machine import Machine
 from rotordrop.machine.examples import example_machine
-from rotordrop.synthesis import SyntheticDrop, hidden_machine, synthesize_drop
-from rotordrop.synthesis.bench.departures import LARGE, SLIGHT, departures
-from rotordrop.synthesis.violations import Violations
+from rotordrop_bench import SyntheticDrop, hidden_machine, synthesize_drop
+from rotordrop_bench.departures import LARGE, SLIGHT, departures
+from rotordrop_bench.violations import Violations
 
 RESULTS = Path(__file__).parent / "results"
 SCORED_FROM = 20001

@@ -28,8 +28,8 @@ from rotordrop.estimation import estimate_drop
 from rotordrop.estimation.calibrated import calibrate_machine, calibration_json
 from rotordrop.estimation.estimate import Estimate
 from rotordrop.machine import example_machine
-from rotordrop.synthesis.event import hidden_machine
-from rotordrop.synthesis.recording import SyntheticDrop, synthesize_drop
+from rotordrop_bench.event import hidden_machine
+from rotordrop_bench.recording import SyntheticDrop, synthesize_drop
 
 SPEEDS_HZ = {
     "lp400": ((60.0, 150.0), (60.0, 100.0, 150.0, 210.0)),

@@ -28,8 +28,8 @@ from rotordrop.estimation import estimate_drop
 from rotordrop.estimation.calibrated import calibrate_machine
 from rotordrop.machine import Machine, example_machine
 from rotordrop.record.record import Record
-from rotordrop.synthesis import SensorChain, hidden_machine, synthesize_drop
-from rotordrop.synthesis.recording import SyntheticDrop
+from rotordrop_bench import SensorChain, hidden_machine, synthesize_drop
+from rotordrop_bench.recording import SyntheticDrop
 
 SPEEDS_HZ = (60.0, 150.0, 100.0, 210.0)
 """The first two drops calibrate, the last two are scored [Hz]."""

@@ -30,13 +30,13 @@ from rotordrop.estimation.tracked import FINE_BASIS, drop_problem
 from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine import example_machine
 from rotordrop.rotor.parameters import build_drop_model
-from rotordrop.synthesis import hidden_machine, synthesize_drop
-from rotordrop.synthesis.recording import SyntheticDrop
 from rotordrop.track import _filter as F
 from rotordrop.track import _propagation as P
 from rotordrop.track import forces
 from rotordrop.track.problem import DropProblem, private_copy
 from rotordrop.track.smoother import PassSettings, fastest_frequency, forward, smooth
+from rotordrop_bench import hidden_machine, synthesize_drop
+from rotordrop_bench.recording import SyntheticDrop
 
 Array = NDArray[np.float64]
 HERE = Path(__file__).parent

@@ -17,7 +17,7 @@ import numpy as np
 
 from rotordrop.evidence.power_off import find_power_off
 from rotordrop.machine import example_machine
-from rotordrop.synthesis import hidden_machine, synthesize_drop
+from rotordrop_bench import hidden_machine, synthesize_drop
 
 HERE = Path(__file__).parent
 SPEED_HZ = 200.0

@@ -20,7 +20,7 @@ from blind_calibration import HERE, SPEEDS_HZ, drops_of
 from rotordrop.estimation import Replay, estimate_drop
 from rotordrop.estimation.document import estimate_document
 from rotordrop.machine import Machine
-from rotordrop.synthesis.recording import SyntheticDrop
+from rotordrop_bench.recording import SyntheticDrop
 
 FIELDS = (
     ("peak_force_N", "peak_force_N", 1.0),

@@ -32,11 +32,11 @@ from rotordrop.estimation.tracked import COARSE_BASIS, _first_contact, drop_prob
 from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine import example_machine
 from rotordrop.rotor.parameters import build_drop_model
-from rotordrop.synthesis import hidden_machine, synthesize_drop
-from rotordrop.synthesis.violations import Violations
 from rotordrop.track.calibration import BLIND_SCHEDULE, Stage, shifted, stage_settings, track
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import PassSettings, forward
+from rotordrop_bench import hidden_machine, synthesize_drop
+from rotordrop_bench.violations import Violations
 
 Array = NDArray[np.float64]
 HERE = Path(__file__).parent

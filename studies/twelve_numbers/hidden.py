@@ -42,11 +42,11 @@ from rotordrop.rotor.modes import free_free_modes
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.rotor_form import is_beam
 from rotordrop.rotor.unknowns import Unknown, all_unknowns
-from rotordrop.synthesis import SensorChain, hidden_machine, synthesize_drop, write_synthetic
-from rotordrop.synthesis.bench.drops import SPEEDS
-from rotordrop.synthesis.bench.rotors import ROTORS
 from rotordrop.track.input_state import input_state_estimate, lent_by_record
 from rotordrop.track.prior import fall_time
+from rotordrop_bench import SensorChain, hidden_machine, synthesize_drop, write_synthetic
+from rotordrop_bench.drops import SPEEDS
+from rotordrop_bench.rotors import ROTORS
 
 RESULTS = Path(__file__).parent / "results"
 MEASURED = 0.01

@@ -24,9 +24,9 @@ from rotordrop.errors import RotordropError
 from rotordrop.estimation import estimate_drop
 from rotordrop.machine import example_path, load_machine
 from rotordrop.record.tacho import passages
-from rotordrop.synthesis import hidden_machine, synthesize_drop
-from rotordrop.synthesis.event import drop_conditions
-from rotordrop.synthesis.motion import true_motion
+from rotordrop_bench import hidden_machine, synthesize_drop
+from rotordrop_bench.event import drop_conditions
+from rotordrop_bench.motion import true_motion
 
 RESULTS = Path(__file__).parent / "results" / "phase.jsonl"
 ROTORS = {"60 kg": ("lp400", (60.0, 250.0)), "13 kg": ("small", (150.0, 500.0))}

@@ -20,7 +20,7 @@ def check(folder: Path) -> subprocess.CompletedProcess[str]:
         cwd=folder,
         capture_output=True,
         text=True,
-        env=os.environ | {"PYTHONPATH": str(folder / "src")},
+        env=os.environ | {"PYTHONPATH": f"{folder / 'src'}{os.pathsep}{folder / 'bench' / 'src'}"},
     )
 
 
@@ -109,5 +109,8 @@ def _skeleton(folder: Path) -> None:
         (root / name / "__init__.py").write_text("")
     (root / "__init__.py").write_text("")
     (root / "physics" / "_compile.py").write_text("import numba\n")
+    bench = folder / "bench" / "src" / "rotordrop_bench"
+    bench.mkdir(parents=True)
+    (bench / "__init__.py").write_text("")
     for name in ("ball_bearing", "ball_bearing_response"):
         (root / "physics" / f"{name}.py").write_text("")

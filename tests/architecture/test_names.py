@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-PACKAGE = Path(__file__).resolve().parents[2] / "src" / "rotordrop"
-FILES = sorted(PACKAGE.rglob("*.py"))
+ROOT = Path(__file__).resolve().parents[2]
+FILES = sorted(file for source in ("src", "bench/src") for file in (ROOT / source).rglob("*.py"))
 
 EMPTY_NAMES = re.compile(r"(^|_)(utils?|helpers?|managers?|process(ing|or)?|data|misc|common)($|_)")
 

@@ -106,8 +106,8 @@ def test_an_old_python_is_refused_with_the_way_out(tmp_path):
     (tmp_path / "python3").write_text("#!/bin/sh\n[ \"$1\" = -V ] && echo 'Python 3.9.2' && exit 0\nexit 1\n")
     (tmp_path / "python3").chmod(0o755)
     clone = tmp_path / "clone"
-    clone.mkdir()
-    for name in ("Makefile", "requirements.lock", "pyproject.toml"):
+    (clone / "bench").mkdir(parents=True)
+    for name in ("Makefile", "requirements.lock", "pyproject.toml", "bench/pyproject.toml"):
         (clone / name).write_bytes((ROOT / name).read_bytes())
     make = shutil.which("make")
     assert make is not None

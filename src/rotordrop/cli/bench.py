@@ -19,7 +19,7 @@ from rotordrop.errors import UsageError
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from rotordrop.synthesis.bench import BenchScores
+    from rotordrop_bench import BenchScores
 
 
 class Action(StrEnum):
@@ -70,8 +70,8 @@ def bench(
 
 
 def _list(only: list[str], json_file: Path | None) -> None:
-    from rotordrop.synthesis.bench import VERSION
-    from rotordrop.synthesis.bench.make import chosen_drops
+    from rotordrop_bench import VERSION
+    from rotordrop_bench.make import chosen_drops
 
     drops = chosen_drops(only)
 
@@ -90,8 +90,8 @@ def _list(only: list[str], json_file: Path | None) -> None:
 
 
 def _make(folder: Path, only: list[str], json_file: Path | None) -> None:
-    from rotordrop.synthesis.bench import make_bench
-    from rotordrop.synthesis.bench.make import chosen_drops
+    from rotordrop_bench import make_bench
+    from rotordrop_bench.make import chosen_drops
 
     with progress_bar("making drops") as report:
         made = make_bench(folder, only, report)
@@ -105,7 +105,7 @@ def _make(folder: Path, only: list[str], json_file: Path | None) -> None:
 
 
 def _score(folder: Path, estimates: Path, only: list[str], every: bool, json_file: Path | None) -> None:
-    from rotordrop.synthesis.bench import score_bench
+    from rotordrop_bench import score_bench
 
     scores = score_bench(folder, estimates, only)
 
@@ -130,7 +130,7 @@ def _table(scores: BenchScores, every: bool) -> Any:
     from rich import box
     from rich.table import Table
 
-    from rotordrop.synthesis.bench import VERSION
+    from rotordrop_bench import VERSION
 
     table = Table(title=f"DropBench, version {VERSION}", title_justify="left", box=box.SIMPLE_HEAD)
     for column in ("family", "quantity"):

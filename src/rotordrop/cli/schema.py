@@ -47,7 +47,7 @@ def schema(
     elif document is Document.numbers:
         from rotordrop.machine.simple import simple_schema as schema_of
     elif document is Document.violations:
-        from rotordrop.synthesis.violations import violations_schema as schema_of
+        from rotordrop_bench.violations import violations_schema as schema_of
     elif document is Document.look:
         from rotordrop.evidence.look.schema import look_schema as schema_of
     else:

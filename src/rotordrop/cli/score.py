@@ -41,7 +41,7 @@ def score(
     json_file: JsonOption = None,
 ) -> None:
     """Compare an estimate with the truth of a simulated recording, quantity by quantity."""
-    from rotordrop.synthesis import score_estimate
+    from rotordrop_bench import score_estimate
 
     scores = score_estimate(estimate, truth, drop=drop)
 

@@ -17,7 +17,7 @@ from rotordrop.errors import UsageError
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from rotordrop.synthesis import SyntheticDrop
+    from rotordrop_bench import SyntheticDrop
 
 
 def synthesize(
@@ -66,12 +66,12 @@ def synthesize(
     json_file: JsonOption = None,
 ) -> None:
     """Make simulated recordings of drops; the hidden truth goes into a folder of its own."""
-    from rotordrop.synthesis import FAULTS, VIOLATIONS
+    from rotordrop_bench import FAULTS, VIOLATIONS
 
     if (not violation.endswith(".toml") and _listed(violation, VIOLATIONS)) or _listed(fault, FAULTS):
         return
     from rotordrop.machine import load_machine
-    from rotordrop.synthesis import SensorChain, hidden_machine, synthesize_drop, write_synthetic
+    from rotordrop_bench import SensorChain, hidden_machine, synthesize_drop, write_synthetic
 
     chain = SensorChain(sampling_rate=sampling_rate, noise=noise, bits=bits)
     written: list[dict[str, Any]] = []
@@ -118,7 +118,7 @@ def _name(speed: float, index: int, speeds: list[float]) -> str:
 def _faulty(drop: SyntheticDrop, fault: str | None) -> SyntheticDrop:
     from dataclasses import replace
 
-    from rotordrop.synthesis import with_fault
+    from rotordrop_bench import with_fault
 
     if fault is None:
         return drop

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -26,17 +26,23 @@ _CONSTANTS = (_PACKAGE / "rotor" / "layout.py", _PACKAGE / "physics" / "elementa
 """Compiled into the kernels as numbers though they have no kernel themselves."""
 
 
-def _kernel_sources() -> list[Path]:
-    folders = ("physics", "rotor", "simulate", "synthesis", "track")
-    files = (file for folder in folders for file in sorted((_PACKAGE / folder).glob("*.py")))
+_FOLDERS = tuple(_PACKAGE / name for name in ("physics", "rotor", "simulate", "track"))
+"""Where the kernels of this package stand."""
+
+
+def _kernel_sources(folders: Iterable[Path]) -> list[Path]:
+    files = (file for folder in folders for file in sorted(folder.glob("*.py")))
     return [file for file in files if file in _CONSTANTS or _MARK in file.read_text(encoding="utf-8")]
 
 
-@lru_cache(maxsize=1)
-def cache_folder() -> str:
-    """Folder of the compiled kernels, named after a digest of their sources and of the compiler's version."""
+@lru_cache
+def cache_folder(beside: Path | None = None) -> str:
+    """Folder of the compiled kernels, named after a digest of their sources and of the compiler's version.
+
+    Kernels of another package, in the folder `beside`, call those of this one: the sources of both count.
+    """
     digest = hashlib.sha256(numba.__version__.encode())
-    for file in _kernel_sources():
+    for file in _kernel_sources((*_FOLDERS, *([] if beside is None else [beside]))):
         digest.update(file.name.encode())
         digest.update(file.read_bytes())
     caches = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
@@ -66,7 +72,8 @@ def _compiled(function: Function, **options: Any) -> Function:
     settings: Any = config
     options |= {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": False}
     previous = settings.CACHE_DIR
-    settings.CACHE_DIR = cache_folder()
+    home = Path(function.__code__.co_filename).resolve().parent
+    settings.CACHE_DIR = cache_folder(None if home in _FOLDERS else home)
     try:
         compiled = numba.njit(**options)(function)
     finally:

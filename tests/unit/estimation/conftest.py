@@ -17,7 +17,7 @@ from rotordrop.estimation.tracked_estimate import estimate_of
 from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine import Machine, example_machine
 from rotordrop.rotor.parameters import build_drop_model
-from rotordrop.synthesis import HiddenMachine, SyntheticDrop, hidden_machine, synthesize_drop
+from rotordrop_bench import HiddenMachine, SyntheticDrop, hidden_machine, synthesize_drop
 
 SPEED = 2.0 * math.pi * 60.0
 SEED = 4

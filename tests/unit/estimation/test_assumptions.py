@@ -17,7 +17,7 @@ from rotordrop.machine import Machine, example_machine, load_machine
 from rotordrop.record.examples import example_record_path
 from rotordrop.record.record import read_record
 from rotordrop.rotor.parameters import build_drop_model
-from rotordrop.synthesis import hidden_machine, synthesize_drop
+from rotordrop_bench import hidden_machine, synthesize_drop
 
 UNTIL = 3e-3
 

@@ -13,7 +13,7 @@ from rotordrop.estimation.tracked_parameters import NOT_DETERMINED
 from rotordrop.machine import Machine, load_machine, save_machine
 from rotordrop.rotor.parameter_table import parameter, row_of
 from rotordrop.rotor.unknowns import prior
-from rotordrop.synthesis import HiddenMachine, SyntheticDrop, synthesize_drop
+from rotordrop_bench import HiddenMachine, SyntheticDrop, synthesize_drop
 
 BEARINGS = ("NDE", "DE")
 OTHER_SPEED = 2.0 * math.pi * 150.0

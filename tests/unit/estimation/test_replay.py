@@ -25,9 +25,9 @@ from rotordrop.estimation.replay_estimate import _speed
 from rotordrop.estimation.schema import estimate_schema
 from rotordrop.evidence.speed import SpeedFit
 from rotordrop.machine import Machine, example_path
-from rotordrop.synthesis import SyntheticDrop
-from rotordrop.synthesis.files import write_synthetic
-from rotordrop.synthesis.score import score_estimate
+from rotordrop_bench import SyntheticDrop
+from rotordrop_bench.files import write_synthetic
+from rotordrop_bench.score import score_estimate
 
 BEARINGS = ("NDE", "DE")
 LOADS = ("peak_force_N", "mean_force_0p15_0p2_N", "peak_stress_Pa", "mean_stress_Pa")

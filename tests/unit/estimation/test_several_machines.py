@@ -18,8 +18,8 @@ from tests.unit.estimation.conftest import calibrated_about
 from rotordrop.estimation import Tracked, estimate_drop
 from rotordrop.estimation.document import estimate_document
 from rotordrop.machine import Machine, example_machine, load_machine
-from rotordrop.synthesis import hidden_machine, synthesize_drop
-from rotordrop.synthesis.score import score_estimate
+from rotordrop_bench import hidden_machine, synthesize_drop
+from rotordrop_bench.score import score_estimate
 
 HEAVY = Path(__file__).parents[2] / "machines" / "long_rotor.toml"
 SPEEDS = {"small": 300.0, "paper": 100.0, "heavy": 130.0}

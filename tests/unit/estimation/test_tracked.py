@@ -51,8 +51,6 @@ from rotordrop.machine import Machine, example_machine, load_machine
 from rotordrop.record.examples import example_record_path
 from rotordrop.record.record import Record, read_record
 from rotordrop.rotor.parameters import build_drop_model
-from rotordrop.synthesis import SyntheticDrop, hidden_machine, synthesize_drop
-from rotordrop.synthesis.score import score_estimate
 from rotordrop.track.calibration import TrackedDrops, beside_the_record
 from rotordrop.track.consistency import Check
 from rotordrop.track.input_state import (
@@ -60,6 +58,8 @@ from rotordrop.track.input_state import (
     lent_by_record,
 )
 from rotordrop.track.smoother import parameter_sample
+from rotordrop_bench import SyntheticDrop, hidden_machine, synthesize_drop
+from rotordrop_bench.score import score_estimate
 
 BEARINGS = ("NDE", "DE")
 SPEED = 2.0 * math.pi * 60.0

@@ -18,7 +18,7 @@ from rotordrop.report.estimate_page import estimate_page
 from rotordrop.report.page import render_page
 from rotordrop.report.quantity import Quantity
 from rotordrop.rotor.parameter_table import published, rows
-from rotordrop.synthesis import SyntheticDrop
+from rotordrop_bench import SyntheticDrop
 
 BEARINGS = ("NDE", "DE")
 

@@ -12,10 +12,10 @@ from rotordrop.estimation.tracked import COARSE_BASIS, recorded_drop
 from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine import Machine
 from rotordrop.rotor.parameters import build_drop_model
-from rotordrop.synthesis import SyntheticDrop
 from rotordrop.track.forces import ForceHistory, force_history
 from rotordrop.track.problem import build_problem
 from rotordrop.track.smoother import PassSettings, forward, smooth
+from rotordrop_bench import SyntheticDrop
 
 UNTIL = 0.025
 

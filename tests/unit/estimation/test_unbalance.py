@@ -14,8 +14,8 @@ from rotordrop.estimation.tracked import TrackedDrop
 from rotordrop.estimation.tracked_unbalance import _polar, plane_unbalances
 from rotordrop.estimation.unbalance import PlaneUnbalance, unbalance_notes
 from rotordrop.evidence.synchronous import MarkAngle
-from rotordrop.synthesis import HiddenMachine
-from rotordrop.synthesis.event import drop_conditions
+from rotordrop_bench import HiddenMachine
+from rotordrop_bench.event import drop_conditions
 
 SPEED = 2.0 * math.pi * 60.0
 TURN = 1.0 / 60.0

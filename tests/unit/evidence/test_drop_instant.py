@@ -12,7 +12,7 @@ from rotordrop.evidence.events import coarse_drop
 from rotordrop.evidence.release import GRID, free_rotor, response_at, tabulate_response
 from rotordrop.machine import example_machine
 from rotordrop.record.axes import sensor_planes
-from rotordrop.synthesis import hidden_machine, synthesize_drop
+from rotordrop_bench import hidden_machine, synthesize_drop
 
 SAMPLE = 5e-5
 

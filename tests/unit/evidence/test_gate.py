@@ -17,7 +17,7 @@ from rotordrop.evidence.quality.clock import check_clock
 from rotordrop.evidence.quality.ends import fell_as_described
 from rotordrop.evidence.quality.motion import check_rotation_line, first_motion
 from rotordrop.record.axes import sensor_planes
-from rotordrop.synthesis import hidden_machine, synthesize_drop
+from rotordrop_bench import hidden_machine, synthesize_drop
 
 HZ = 2 * np.pi
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from rotordrop.evidence import check_record
-from rotordrop.synthesis import SensorChain, hidden_machine, synthesize_drop
-from rotordrop.synthesis.bench.rotors import bench_rotor
+from rotordrop_bench import SensorChain, hidden_machine, synthesize_drop
+from rotordrop_bench.rotors import bench_rotor
 
 SPEEDS = {"5 kg": (100.0, 450.0), "60 kg": (40.0, 400.0), "140 kg": (30.0, 180.0)}
 RATES = (10e3, 20e3, 20e3, 25.6e3, 51.2e3)

@@ -11,7 +11,7 @@ from rotordrop.evidence.levitated import fit_levitated
 from rotordrop.evidence.quality.flight import check_flights, weighed
 from rotordrop.evidence.release import GRID, FallResponses, free_rotor, tabulate_response
 from rotordrop.record.axes import sensor_planes
-from rotordrop.synthesis import hidden_machine, synthesize_drop
+from rotordrop_bench import hidden_machine, synthesize_drop
 
 
 @pytest.fixture(scope="module")

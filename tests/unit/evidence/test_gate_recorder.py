@@ -8,8 +8,8 @@ from scipy.signal import butter, sosfilt
 
 from rotordrop.evidence import check_record
 from rotordrop.evidence.quality.recorder import check_filters
-from rotordrop.synthesis import hidden_machine, synthesize_drop
-from rotordrop.synthesis.sensor_chain import PERFECT
+from rotordrop_bench import hidden_machine, synthesize_drop
+from rotordrop_bench.sensor_chain import PERFECT
 
 
 def filtered(signals, rate, corner, kind):

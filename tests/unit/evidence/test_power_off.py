@@ -13,7 +13,7 @@ from rotordrop.errors import RecordError
 from rotordrop.evidence.events import find_drop_instant, sinking, with_whole_planes
 from rotordrop.evidence.power_off import PowerOff, find_power_off
 from rotordrop.machine import example_machine, load_machine
-from rotordrop.synthesis import hidden_machine, synthesize_drop
+from rotordrop_bench import hidden_machine, synthesize_drop
 
 LONG_ROTOR = Path(__file__).parents[2] / "machines" / "long_rotor.toml"
 

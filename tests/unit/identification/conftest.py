@@ -18,8 +18,8 @@ from rotordrop.identification.support import ImpactFit, impact_problem
 from rotordrop.machine import Machine, example_machine
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.rotor.reduction import Reduction
-from rotordrop.synthesis import SyntheticDrop, hidden_machine, synthesize_drop
-from rotordrop.synthesis.sensor_chain import PERFECT
+from rotordrop_bench import SyntheticDrop, hidden_machine, synthesize_drop
+from rotordrop_bench.sensor_chain import PERFECT
 
 SPEED = 2.0 * math.pi * 100.0
 BASIS = Reduction(modes=6, attachment=True)

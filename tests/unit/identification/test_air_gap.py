@@ -16,7 +16,7 @@ from rotordrop.record.axes import sensor_directions
 from rotordrop.record.record import Record
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.static_sag import sag_of_model
-from rotordrop.synthesis import SyntheticDrop
+from rotordrop_bench import SyntheticDrop
 
 
 def gaps(model: DropModel) -> np.ndarray:

@@ -15,7 +15,7 @@ from rotordrop.evidence.sensing import Sensing, displacements_along
 from rotordrop.identification.modal_expansion import expand_initial_state
 from rotordrop.identification.replica import transferred
 from rotordrop.rotor.parameters import DropModel, build_drop_model
-from rotordrop.synthesis import SyntheticDrop
+from rotordrop_bench import SyntheticDrop
 
 
 def bearing_state(initial: InitialState, time: float) -> np.ndarray:

@@ -9,7 +9,7 @@ import pytest
 
 from rotordrop.evidence.speed import identify_speed
 from rotordrop.record.record import Record
-from rotordrop.synthesis import SyntheticDrop
+from rotordrop_bench import SyntheticDrop
 
 INITIAL = 2.0 * np.pi * 60.0
 

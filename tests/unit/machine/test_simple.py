@@ -14,7 +14,7 @@ from rotordrop.machine.simple import SimpleMachine, simple_machine
 from rotordrop.rotor.assembly import rotor_fe
 from rotordrop.rotor.machine_summary import summarise_machine
 from rotordrop.rotor.modes import free_free_modes
-from rotordrop.synthesis.bench.rotors import ROTORS
+from rotordrop_bench.rotors import ROTORS
 
 
 def test_mass_and_centre_of_mass_are_those_given_and_planes_are_nodes():

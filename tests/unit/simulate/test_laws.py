@@ -13,7 +13,7 @@ from rotordrop.simulate._rhs import drop_derivative
 from rotordrop.simulate.case import CentredStart, DropCase, PlacedStart, StateStart
 from rotordrop.simulate.drop import simulate_drop
 from rotordrop.simulate.levitation import rigid_amplitudes, start_of_drop
-from rotordrop.synthesis.settled import settled_coordinates
+from rotordrop_bench.settled import settled_coordinates
 
 SPEED = 2.0 * np.pi * 60.0
 AZIMUTHS = np.radians(np.arange(8) * 45.0 + 10.0)

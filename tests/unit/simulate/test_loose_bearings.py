@@ -16,7 +16,7 @@ from rotordrop.rotor.machine_warnings import machine_warnings
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.simulate.case import DropCase
 from rotordrop.simulate.drop import simulate_drop
-from rotordrop.synthesis.settled import settled_coordinates
+from rotordrop_bench.settled import settled_coordinates
 
 B6016 = (
     '{ rows = 1, clearance = "C3", bore_diameter = "80 mm", ball_diameter = "13.494 mm", ball_count = 14, '

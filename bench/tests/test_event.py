@@ -8,10 +8,10 @@ import pytest
 from rotordrop.errors import UsageError
 from rotordrop.machine import example_machine
 from rotordrop.rotor.parameter_table import rows
-from rotordrop.synthesis import VIOLATIONS, Violations, hidden_machine
-from rotordrop.synthesis.event import LARGEST_JITTER, LARGEST_ORBIT, drop_conditions
-from rotordrop.synthesis.random_streams import stream
-from rotordrop.synthesis.true_values import machine_truth
+from rotordrop_bench import VIOLATIONS, Violations, hidden_machine
+from rotordrop_bench.event import LARGEST_JITTER, LARGEST_ORBIT, drop_conditions
+from rotordrop_bench.random_streams import stream
+from rotordrop_bench.true_values import machine_truth
 
 
 def test_the_same_seed_draws_the_same_machine(known, hidden):

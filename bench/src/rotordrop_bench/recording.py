@@ -12,12 +12,12 @@ from rotordrop._version import __version__
 from rotordrop.record.record import Record
 from rotordrop.simulate.case import DropCase
 from rotordrop.simulate.result import DropResult
-from rotordrop.synthesis.event import LARGEST_JITTER, DropConditions, HiddenMachine, drop_conditions
-from rotordrop.synthesis.hidden_drop import true_drop
-from rotordrop.synthesis.hidden_rest import hidden_rest
-from rotordrop.synthesis.motion import housing_motion, true_motion
-from rotordrop.synthesis.random_streams import stream
-from rotordrop.synthesis.sensor_chain import (
+from rotordrop_bench.event import LARGEST_JITTER, DropConditions, HiddenMachine, drop_conditions
+from rotordrop_bench.hidden_drop import true_drop
+from rotordrop_bench.hidden_rest import hidden_rest
+from rotordrop_bench.motion import housing_motion, true_motion
+from rotordrop_bench.random_streams import stream
+from rotordrop_bench.sensor_chain import (
     SensorChain,
     SensorErrors,
     directions,
@@ -28,8 +28,8 @@ from rotordrop.synthesis.sensor_chain import (
     speed_readings,
     true_rows,
 )
-from rotordrop.synthesis.settled import Swing, swinging_amplitudes
-from rotordrop.synthesis.true_values import true_histories, true_values
+from rotordrop_bench.settled import Swing, swinging_amplitudes
+from rotordrop_bench.true_values import true_histories, true_values
 
 Array = NDArray[np.float64]
 

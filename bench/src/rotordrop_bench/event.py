@@ -16,9 +16,9 @@ from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.rotor.reduction import Reduction
 from rotordrop.rotor.structure_table import structure_rows as structure_rows_of
 from rotordrop.simulate.case import LevitatedStart
-from rotordrop.synthesis.random_streams import stream
-from rotordrop.synthesis.structure import structure_rows, violated, without_structure
-from rotordrop.synthesis.violations import Violations, named_violations
+from rotordrop_bench.random_streams import stream
+from rotordrop_bench.structure import structure_rows, violated, without_structure
+from rotordrop_bench.violations import Violations, named_violations
 
 Array = NDArray[np.float64]
 

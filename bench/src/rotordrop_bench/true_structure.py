@@ -6,11 +6,11 @@ import math
 from typing import Any
 
 from rotordrop.machine import TouchdownBearing
-from rotordrop.synthesis.event import DropConditions, HiddenMachine
-from rotordrop.synthesis.sensor_chain import SensorErrors, true_places
-from rotordrop.synthesis.structure import support_matrices
-from rotordrop.synthesis.violation_parts import BearingViolations
-from rotordrop.synthesis.violations import Violations
+from rotordrop_bench.event import DropConditions, HiddenMachine
+from rotordrop_bench.sensor_chain import SensorErrors, true_places
+from rotordrop_bench.structure import support_matrices
+from rotordrop_bench.violation_parts import BearingViolations
+from rotordrop_bench.violations import Violations
 
 KINDS: dict[str, tuple[str, ...]] = {
     "turned support axes": (

@@ -14,13 +14,13 @@ from rotordrop.rotor.modes import free_free_modes
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.simulate.case import CentredStart, DropCase, LevitatedStart, PlacedStart
 from rotordrop.simulate.drop import simulate_drop
-from rotordrop.synthesis import Violations, hidden_machine
-from rotordrop.synthesis import _hidden_rhs as H
-from rotordrop.synthesis.hidden_drop import _integrated, simulate_hidden
-from rotordrop.synthesis.hidden_rest import hidden_energy, hidden_rest
-from rotordrop.synthesis.settled import without_magnets
-from rotordrop.synthesis.structure import no_structure, structure_rows, violated
-from rotordrop.synthesis.violation_parts import UnbalanceJump
+from rotordrop_bench import Violations, hidden_machine
+from rotordrop_bench import _hidden_rhs as H
+from rotordrop_bench.hidden_drop import _integrated, simulate_hidden
+from rotordrop_bench.hidden_rest import hidden_energy, hidden_rest
+from rotordrop_bench.settled import without_magnets
+from rotordrop_bench.structure import no_structure, structure_rows, violated
+from rotordrop_bench.violation_parts import UnbalanceJump
 
 SPEED = 2.0 * np.pi * 120.0
 LEVITATED = LevitatedStart(rotor_angle=1.0, remanent_force=np.array([[2.0, 30.0], [-3.0, 20.0]]))

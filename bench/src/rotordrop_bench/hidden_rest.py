@@ -12,8 +12,8 @@ from rotordrop.physics.contact import contact_energy
 from rotordrop.rotor import layout as L
 from rotordrop.rotor.layout import KernelParameters
 from rotordrop.rotor.parameters import DropModel
-from rotordrop.synthesis import _hidden_rhs as H
-from rotordrop.synthesis.settled import coordinate_masses, lowest_energy, settled_coordinates, without_magnets
+from rotordrop_bench import _hidden_rhs as H
+from rotordrop_bench.settled import coordinate_masses, lowest_energy, settled_coordinates, without_magnets
 
 Array = NDArray[np.float64]
 

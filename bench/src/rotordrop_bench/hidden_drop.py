@@ -18,9 +18,9 @@ from rotordrop.simulate.certificate import Certificate, peaks_of, refined_peak
 from rotordrop.simulate.drop import FIRST_STEP, error_scale, simulate_drop, tableau_of
 from rotordrop.simulate.levitation import start_of_drop
 from rotordrop.simulate.result import ContactLog, DropResult
-from rotordrop.synthesis import _hidden_rhs as H
-from rotordrop.synthesis._hidden_loop import integrate_hidden
-from rotordrop.synthesis.violation_parts import UnbalanceJump
+from rotordrop_bench import _hidden_rhs as H
+from rotordrop_bench._hidden_loop import integrate_hidden
+from rotordrop_bench.violation_parts import UnbalanceJump
 
 Array = NDArray[np.float64]
 

@@ -15,10 +15,10 @@ from rotordrop.rotor.parameter_table import rows
 from rotordrop.rotor.statics import bearing_load_shares
 from rotordrop.simulate.certificate import refined_peak
 from rotordrop.simulate.result import DropResult
-from rotordrop.synthesis.event import DropConditions, HiddenMachine
-from rotordrop.synthesis.motion import true_motion
-from rotordrop.synthesis.sensor_chain import SensorChain, SensorErrors
-from rotordrop.synthesis.true_structure import (
+from rotordrop_bench.event import DropConditions, HiddenMachine
+from rotordrop_bench.motion import true_motion
+from rotordrop_bench.sensor_chain import SensorChain, SensorErrors
+from rotordrop_bench.true_structure import (
     true_structure,
     turned_supports,
     violated_kinds,

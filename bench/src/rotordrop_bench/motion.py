@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from rotordrop.simulate.levitation import levitated_orbit, levitated_static
 from rotordrop.simulate.result import DropResult
-from rotordrop.synthesis.event import DropConditions, HiddenMachine
+from rotordrop_bench.event import DropConditions, HiddenMachine
 
 Array = NDArray[np.float64]
 

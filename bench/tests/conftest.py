@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rotordrop.machine import Machine, example_machine
-from rotordrop.synthesis import HiddenMachine, SyntheticDrop, hidden_machine, synthesize_drop
+from rotordrop_bench import HiddenMachine, SyntheticDrop, hidden_machine, synthesize_drop
 
 SPEED = 2.0 * np.pi * 60.0
 

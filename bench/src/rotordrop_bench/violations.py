@@ -13,7 +13,7 @@ from rotordrop.machine import Machine
 from rotordrop.machine.description import Channel, Name
 from rotordrop.machine.loading import load_description
 from rotordrop.machine.schema import description_schema
-from rotordrop.synthesis.violation_parts import (
+from rotordrop_bench.violation_parts import (
     BearingViolations,
     ChainViolation,
     MagnetViolation,

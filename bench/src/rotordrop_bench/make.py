@@ -13,14 +13,14 @@ from rotordrop.atomic_file import make_folder, write_json
 from rotordrop.errors import UsageError
 from rotordrop.machine.saving import save_machine
 from rotordrop.record.record import sha256_of
-from rotordrop.synthesis.bench.departures import departures
-from rotordrop.synthesis.bench.drops import DROPS, VERSION, BenchDrop
-from rotordrop.synthesis.bench.rotors import bench_rotor
-from rotordrop.synthesis.event import hidden_machine
-from rotordrop.synthesis.files import write_record
-from rotordrop.synthesis.recording import SyntheticDrop, synthesize_drop
-from rotordrop.synthesis.sensor_chain import SensorChain
-from rotordrop.synthesis.violations import Violations
+from rotordrop_bench.departures import departures
+from rotordrop_bench.drops import DROPS, VERSION, BenchDrop
+from rotordrop_bench.event import hidden_machine
+from rotordrop_bench.files import write_record
+from rotordrop_bench.recording import SyntheticDrop, synthesize_drop
+from rotordrop_bench.rotors import bench_rotor
+from rotordrop_bench.sensor_chain import SensorChain
+from rotordrop_bench.violations import Violations
 
 DURATION = 0.3
 LATEST_CONTACT = 0.1

@@ -9,9 +9,9 @@ import pytest
 from tests.scaled_machines import scaled_machine
 
 from rotordrop.record.axes import planar
-from rotordrop.synthesis import SensorChain, hidden_machine, synthesize_drop
-from rotordrop.synthesis.event import drop_conditions
-from rotordrop.synthesis.sensor_chain import (
+from rotordrop_bench import SensorChain, hidden_machine, synthesize_drop
+from rotordrop_bench.event import drop_conditions
+from rotordrop_bench.sensor_chain import (
     PERFECT,
     SensorErrors,
     fitted_to,
@@ -19,7 +19,7 @@ from rotordrop.synthesis.sensor_chain import (
     readings,
     shape_at,
 )
-from rotordrop.synthesis.settled import Swing, settled_coordinates, swinging_amplitudes
+from rotordrop_bench.settled import Swing, settled_coordinates, swinging_amplitudes
 
 SPEED = 2.0 * np.pi * 60.0
 

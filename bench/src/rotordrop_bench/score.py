@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import UsageError
-from rotordrop.synthesis.truth import Truth, read_truth, truth_of
+from rotordrop_bench.truth import Truth, read_truth, truth_of
 
 Array = NDArray[np.float64]
 Estimate = Mapping[str, Any]

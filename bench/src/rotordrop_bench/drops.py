@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import cycle
 
-from rotordrop.synthesis.bench.departures import DEPARTURES, LARGE, SLIGHT
-from rotordrop.synthesis.bench.rotors import ROTORS
+from rotordrop_bench.departures import DEPARTURES, LARGE, SLIGHT
+from rotordrop_bench.rotors import ROTORS
 
 VERSION = "1"
 """Changes whenever a drop of the list does; scores of different versions are not comparable."""

@@ -27,7 +27,7 @@ from rotordrop.simulate._loop import (
     scaled_error,
 )
 from rotordrop.simulate._tableau import Tableau
-from rotordrop.synthesis._hidden_rhs import hidden_derivative
+from rotordrop_bench._hidden_rhs import hidden_derivative
 
 Array = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ from tests.scaled_machines import scaled_machine
 from rotordrop.rotor import layout as L
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.simulate._rhs import drop_derivative
-from rotordrop.synthesis import hidden_machine, synthesize_drop
-from rotordrop.synthesis.settled import settled_coordinates
+from rotordrop_bench import hidden_machine, synthesize_drop
+from rotordrop_bench.settled import settled_coordinates
 
 SIZES = [(5.0, 1.0), (36.0, 1.0), (60.0, 1.2), (130.0, 1.5), (6000.0, 1.0), (6000.0, 1.3)]
 

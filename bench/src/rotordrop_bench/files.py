@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rotordrop.atomic_file import atomic_path, make_folder, write_json
 from rotordrop.record.record import Record, sha256_of
 from rotordrop.record.writers import recording_of, write_delimited, write_hdf5
-from rotordrop.synthesis.recording import SyntheticDrop
+from rotordrop_bench.recording import SyntheticDrop
 
 Format = Literal["csv", "h5"]
 TRUTH_FOLDER = "truth"

@@ -12,12 +12,11 @@ from rotordrop.cli.app import run
 from rotordrop.errors import UsageError
 from rotordrop.machine import load_machine
 from rotordrop.record.record import sha256_of
-from rotordrop.synthesis import Violations, read_truth
-from rotordrop.synthesis.bench import DROPS, VERSION, make_bench, score_bench
-from rotordrop.synthesis.bench.departures import departures
-from rotordrop.synthesis.bench.make import chosen_drops
-from rotordrop.synthesis.bench.rotors import ROTORS, bench_rotor
-from rotordrop.synthesis.true_structure import KINDS, violated_kinds
+from rotordrop_bench import DROPS, VERSION, Violations, make_bench, read_truth, score_bench
+from rotordrop_bench.departures import departures
+from rotordrop_bench.make import chosen_drops
+from rotordrop_bench.rotors import ROTORS, bench_rotor
+from rotordrop_bench.true_structure import KINDS, violated_kinds
 
 MADE = ("drop_004", "drop_034")
 

@@ -11,10 +11,10 @@ import numpy as np
 
 from rotordrop.errors import UsageError
 from rotordrop.rotor.parameter_table import LOADS, published
-from rotordrop.synthesis.bench.drops import VERSION
-from rotordrop.synthesis.bench.make import chosen_drops, truth_path
-from rotordrop.synthesis.score import score_estimate
-from rotordrop.synthesis.truth import Truth, read_truth
+from rotordrop_bench.drops import VERSION
+from rotordrop_bench.make import chosen_drops, truth_path
+from rotordrop_bench.score import score_estimate
+from rotordrop_bench.truth import Truth, read_truth
 
 LOST = 0.1
 """A peak force wrong by more than this share is lost [1]."""

@@ -12,9 +12,9 @@ import pytest
 from rotordrop.errors import OutputError, UsageError
 from rotordrop.record.record import read_record
 from rotordrop.rotor.parameter_table import LOADS, published
-from rotordrop.synthesis import FAULTS, read_truth, score_estimate, with_fault, write_synthetic
-from rotordrop.synthesis.score import LARGE_IMPACT
-from rotordrop.synthesis.truth import truth_of
+from rotordrop_bench import FAULTS, read_truth, score_estimate, with_fault, write_synthetic
+from rotordrop_bench.score import LARGE_IMPACT
+from rotordrop_bench.truth import truth_of
 
 
 @pytest.fixture(scope="module")

@@ -9,12 +9,12 @@ import pytest
 
 from rotordrop.errors import MachineFileError, UsageError
 from rotordrop.machine import example_machine
-from rotordrop.synthesis import Violations, hidden_machine, load_violations, score_estimate, synthesize_drop
-from rotordrop.synthesis.event import drop_conditions
-from rotordrop.synthesis.sensor_chain import PERFECT, lagging
-from rotordrop.synthesis.true_structure import KINDS, violated_kinds
-from rotordrop.synthesis.truth import truth_of
-from rotordrop.synthesis.violations import violations_schema
+from rotordrop_bench import Violations, hidden_machine, load_violations, score_estimate, synthesize_drop
+from rotordrop_bench.event import drop_conditions
+from rotordrop_bench.sensor_chain import PERFECT, lagging
+from rotordrop_bench.true_structure import KINDS, violated_kinds
+from rotordrop_bench.truth import truth_of
+from rotordrop_bench.violations import violations_schema
 
 SPEED = 2.0 * np.pi * 60.0
 
