@@ -46,7 +46,7 @@ PACKAGE = ROOT / "src" / "rotordrop"
 KEPT = ROOT / "tests" / "mutation" / "mutants.json"
 WORK = ROOT / "build" / "mutation"
 SEED = 2026
-WANTED = dict.fromkeys(("evidence", "identification", "track", "estimation", "spectrum"), 26)
+WANTED = dict.fromkeys(("evidence", "identification", "track", "twin", "spectrum"), 26)
 OTHERS = 20
 LIMIT = 60.0
 """Processor time for a fault [s]."""

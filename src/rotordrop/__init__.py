@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from rotordrop.estimation import Tracked as Tracked
     from rotordrop.estimation import estimate_drop as estimate_drop
     from rotordrop.estimation import estimate_drops as estimate_drops
-    from rotordrop.estimation.calibrated import calibrate_machine as calibrate_machine
     from rotordrop.evidence import check_record as check_record
     from rotordrop.evidence.look import look as look
     from rotordrop.machine import Machine as Machine
@@ -41,6 +40,7 @@ if TYPE_CHECKING:
     from rotordrop.study import load_study as load_study
     from rotordrop.study import run_study as run_study
     from rotordrop.study import sweep as sweep
+    from rotordrop.twin.calibrated import calibrate_machine as calibrate_machine
     from rotordrop.units import format_quantity as format_quantity
     from rotordrop.units import parse_quantity as parse_quantity
 
@@ -58,7 +58,7 @@ _PUBLIC = {
     "Replay": "rotordrop.estimation",
     "Tracked": "rotordrop.estimation",
     "build_drop_model": "rotordrop.rotor.parameters",
-    "calibrate_machine": "rotordrop.estimation.calibrated",
+    "calibrate_machine": "rotordrop.twin.calibrated",
     "check_record": "rotordrop.evidence",
     "estimate_drop": "rotordrop.estimation",
     "estimate_drops": "rotordrop.estimation",

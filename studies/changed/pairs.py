@@ -23,8 +23,8 @@ from pathlib import Path
 from typing import Any
 
 from rotordrop.errors import RotordropError
+from rotordrop.estimate.changed import changes
 from rotordrop.estimation import Tracked, estimate_drop
-from rotordrop.estimation.changed import changes
 from rotordrop.machine import example_machine
 from rotordrop.machine.parameter_paths import value_of_path
 from rotordrop.rotor.parameters import build_drop_model

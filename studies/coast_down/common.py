@@ -23,7 +23,7 @@ def machine_with_drag(path: Path, record: Path | None) -> Machine:
     machine = load_machine(path)
     if record is None:
         return machine
-    from rotordrop.estimation.recorded_coast_down import recorded_coast_down, with_recorded_drag
+    from rotordrop.estimate.recorded_coast_down import recorded_coast_down, with_recorded_drag
     from rotordrop.record.record import read_record
 
     return with_recorded_drag(machine, recorded_coast_down(machine, read_record(record, machine)))

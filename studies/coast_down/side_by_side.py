@@ -16,8 +16,8 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 from common import keep
 
-from rotordrop.estimation.recorded_coast_down import recorded_coast_down, with_recorded_drag
-from rotordrop.estimation.simulated_coast_down import simulated_coast_down
+from rotordrop.estimate.recorded_coast_down import recorded_coast_down, with_recorded_drag
+from rotordrop.estimate.simulated_coast_down import simulated_coast_down
 from rotordrop.machine import load_machine
 from rotordrop.record.record import read_record
 from rotordrop.simulate.case import LevitatedStart

@@ -20,14 +20,14 @@ from typing import Any
 
 import numpy as np
 
-from rotordrop.estimated import NINETY
-from rotordrop.estimation.tracked_loads import (
+from rotordrop.estimate.allowances import (
     MODEL_FORCE_SIGMA,
     MODEL_MEAN_FORCE_SIGMA,
     MODEL_MEAN_STRESS_SIGMA,
     MODEL_STRESS_SIGMA,
 )
-from rotordrop.estimation.tracked_parameters import MODEL_GAP_SIGMA
+from rotordrop.estimated import NINETY
+from rotordrop.twin.tracked_parameters import MODEL_GAP_SIGMA
 
 STUDIES = Path(__file__).parent.parent
 NUMBERS = {

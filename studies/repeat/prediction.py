@@ -19,12 +19,12 @@ from typing import Any
 
 import numpy as np
 
-from rotordrop.estimation.calibrated import calibrate_machine
 from rotordrop.machine import Machine, example_machine, load_machine, save_machine
 from rotordrop.simulate.case import DropCase
 from rotordrop.simulate.drop import simulate_drop
 from rotordrop.study.repeat import Recorded, place_among, repeat_study
 from rotordrop.study.run import run_study
+from rotordrop.twin.calibrated import calibrate_machine
 from rotordrop_bench.event import HiddenMachine, drop_conditions, hidden_machine
 from rotordrop_bench.recording import synthesize_drop
 

@@ -24,7 +24,6 @@ import numpy as np
 from common import informed, known_machine, radians, size_of, speed_of, value_of, write
 from numpy.typing import NDArray
 
-from rotordrop.estimation.uncertainty import best_candidate, seen_at_bearings, whole_drop
 from rotordrop.evidence.evidence import Evidence, read_evidence
 from rotordrop.evidence.evidence import known as present
 from rotordrop.evidence.initial_state import InitialState, fit_initial_state
@@ -34,6 +33,7 @@ from rotordrop.identification.replica import build_replica
 from rotordrop.identification.support import impact_problem
 from rotordrop.machine import Machine
 from rotordrop.record.record import Record
+from rotordrop.replay.uncertainty import best_candidate, seen_at_bearings, whole_drop
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.simulate.case import DropCase, StateStart
 from rotordrop.simulate.drop import simulate_drop

@@ -20,8 +20,8 @@ from typing import Any
 from common import RESULTS, known_machine, write
 
 from rotordrop.errors import RotordropError
+from rotordrop.estimate.document import estimate_document
 from rotordrop.estimation import Replay, estimate_drop
-from rotordrop.estimation.document import estimate_document
 from rotordrop.record.record import Record, read_record
 from rotordrop_bench.score import score_estimate
 

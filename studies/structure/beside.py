@@ -17,10 +17,11 @@ from pathlib import Path
 from extensions import CASES, SPEED_HZ, recorded
 
 from rotordrop.errors import RotordropError
-from rotordrop.estimation import estimate_drop, structure_search, tracked
-from rotordrop.estimation.structure import EXTENSIONS
-from rotordrop.estimation.structure_search import BACK_PASSES, Candidate, Search, gain_of
+from rotordrop.estimation import estimate_drop
 from rotordrop.machine.examples import example_machine
+from rotordrop.twin import structure_search, tracked
+from rotordrop.twin.structure import EXTENSIONS
+from rotordrop.twin.structure_search import BACK_PASSES, Candidate, Search, gain_of
 
 FOUND = Path(__file__).parent / "beside.json"
 CASES["cross-axis 2 %"] = ({"sensors": {"cross_axis": 0.02}}, {}, "cross-axis sensitivity")

@@ -22,10 +22,11 @@ from typing import Any
 import numpy as np
 
 from rotordrop.errors import RotordropError
-from rotordrop.estimation import estimate_drop, structure_search, tracked
-from rotordrop.estimation.calibrated import calibrate_machine
+from rotordrop.estimation import estimate_drop
 from rotordrop.machine import Machine
 from rotordrop.machine.examples import example_machine
+from rotordrop.twin import structure_search, tracked
+from rotordrop.twin.calibrated import calibrate_machine
 from rotordrop_bench import SyntheticDrop, hidden_machine, synthesize_drop
 from rotordrop_bench.departures import LARGE, SLIGHT, departures
 from rotordrop_bench.violations import Violations

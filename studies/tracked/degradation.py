@@ -25,9 +25,9 @@ from blind_calibration import HERE, drop_scores, half_width, holds
 from rotordrop.errors import RotordropError
 from rotordrop.estimated import Estimated
 from rotordrop.estimation import estimate_drop
-from rotordrop.estimation.calibrated import calibrate_machine
 from rotordrop.machine import Machine, example_machine
 from rotordrop.record.record import Record
+from rotordrop.twin.calibrated import calibrate_machine
 from rotordrop_bench import SensorChain, hidden_machine, synthesize_drop
 from rotordrop_bench.recording import SyntheticDrop
 

@@ -26,7 +26,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rotordrop.estimation.tracked import FINE_BASIS, drop_problem
 from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine import example_machine
 from rotordrop.rotor.parameters import build_drop_model
@@ -35,6 +34,7 @@ from rotordrop.track import _propagation as P
 from rotordrop.track import forces
 from rotordrop.track.problem import DropProblem, private_copy
 from rotordrop.track.smoother import PassSettings, fastest_frequency, forward, smooth
+from rotordrop.twin.tracked import FINE_BASIS, drop_problem
 from rotordrop_bench import hidden_machine, synthesize_drop
 from rotordrop_bench.recording import SyntheticDrop
 

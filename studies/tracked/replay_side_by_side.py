@@ -17,8 +17,8 @@ from typing import Any
 
 from blind_calibration import HERE, SPEEDS_HZ, drops_of
 
+from rotordrop.estimate.document import estimate_document
 from rotordrop.estimation import Replay, estimate_drop
-from rotordrop.estimation.document import estimate_document
 from rotordrop.machine import Machine
 from rotordrop_bench.recording import SyntheticDrop
 

@@ -27,11 +27,8 @@ import numpy as np
 
 from rotordrop import estimate_drop
 from rotordrop.errors import RotordropError
+from rotordrop.estimate.allowances import BEAM_FORCE_SIGMA
 from rotordrop.estimated import NINETY, Estimated
-from rotordrop.estimation.narrowing import DRAWING
-from rotordrop.estimation.rotor_search import with_found_rotor
-from rotordrop.estimation.tracked import COARSE_BASIS, ROTOR_SEEN, drop_problem, recorded_drop
-from rotordrop.estimation.tracked_loads import BEAM_FORCE_SIGMA
 from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine import Machine
 from rotordrop.machine.rotor import Rotor
@@ -44,6 +41,9 @@ from rotordrop.rotor.rotor_form import is_beam
 from rotordrop.rotor.unknowns import Unknown, all_unknowns
 from rotordrop.track.input_state import input_state_estimate, lent_by_record
 from rotordrop.track.prior import fall_time
+from rotordrop.twin.narrowing import DRAWING
+from rotordrop.twin.rotor_search import with_found_rotor
+from rotordrop.twin.tracked import COARSE_BASIS, ROTOR_SEEN, drop_problem, recorded_drop
 from rotordrop_bench import SensorChain, hidden_machine, synthesize_drop, write_synthetic
 from rotordrop_bench.drops import SPEEDS
 from rotordrop_bench.rotors import ROTORS

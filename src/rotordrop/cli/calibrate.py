@@ -18,7 +18,7 @@ from rotordrop.errors import ConsistencyError
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from rotordrop.estimation.calibrated import Calibration
+    from rotordrop.twin.calibrated import Calibration
 
 
 def calibrate(
@@ -50,11 +50,11 @@ def calibrate(
     json: JsonOption = None,
 ) -> None:
     """Calibrate a machine on recorded drops."""
-    from rotordrop.estimation.calibrated import calibrate_machine, calibration_json
     from rotordrop.evidence.quality import check_record
     from rotordrop.evidence.quality.finding import refuse_unusable
     from rotordrop.machine import load_machine, save_machine
     from rotordrop.record.record import read_record
+    from rotordrop.twin.calibrated import calibrate_machine, calibration_json
 
     require_places(output, json)
     require_own_names(records)

@@ -17,7 +17,7 @@ from rotordrop.cli._output import deliver, require_places
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from rotordrop.estimation.changed import Changes
+    from rotordrop.estimate.changed import Changes
 
 
 def changed(
@@ -27,7 +27,7 @@ def changed(
 ) -> None:
     """Say what changed on a machine between two recorded drops."""
     from rotordrop.cli.compare import read_estimate
-    from rotordrop.estimation.changed import changes
+    from rotordrop.estimate.changed import changes
 
     require_places(json)
     found = changes(read_estimate(first), read_estimate(second))
@@ -45,7 +45,7 @@ def _finite(content: dict[str, object]) -> dict[str, object]:
 def _summary(out: Console, found: Changes) -> None:
     from rich.table import Table
 
-    from rotordrop.estimation.changed import asked_for
+    from rotordrop.estimate.changed import asked_for
     from rotordrop.report.quantity import Quantity
     from rotordrop.rotor.parameter_table import row_of
     from rotordrop.units import format_chance

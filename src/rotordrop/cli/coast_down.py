@@ -149,7 +149,7 @@ def _end(text: str) -> float | None:
 
 def _with_recorded_drag(machine: Machine, path: Path) -> Machine:
     """Drag as the recorded speed shows it: linear and quadratic from the air, dry from the races."""
-    from rotordrop.estimation.recorded_coast_down import recorded_coast_down, with_recorded_drag
+    from rotordrop.estimate.recorded_coast_down import recorded_coast_down, with_recorded_drag
     from rotordrop.record.record import read_record
 
     return with_recorded_drag(machine, recorded_coast_down(machine, read_record(path, machine)))
@@ -178,7 +178,7 @@ def _write_report(
 
 
 def _analysis(machine: Machine, path: Path, progress: Progress) -> CoastDownAnalysis:
-    from rotordrop.estimation.simulated_coast_down import simulated_coast_down
+    from rotordrop.estimate.simulated_coast_down import simulated_coast_down
     from rotordrop.spectrum.coast_down import analyse_coast_down
     from rotordrop.spectrum.machine_candidates import machine_candidates
 

@@ -21,7 +21,7 @@ from rotordrop.errors import ConsistencyError, UsageError
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from rotordrop.estimation.estimate import Estimate
+    from rotordrop.estimate.estimate import Estimate
     from rotordrop.machine import Machine
     from rotordrop.report.origin import Origin
 
@@ -78,8 +78,8 @@ def estimate(
 ) -> None:
     """Estimate touchdown-bearing force and stress from recorded drops."""
     from rotordrop.cli.compare import read_estimate
+    from rotordrop.estimate.histories import require_format
     from rotordrop.estimation import Replay, Tracked, estimate_drops
-    from rotordrop.estimation.histories import require_format
     from rotordrop.machine import load_machine
     from rotordrop.record.record import read_record
     from rotordrop.report.origin import origin_here
@@ -127,7 +127,7 @@ def _places(named: Path | None, records: Sequence[Path]) -> list[Path]:
 
 
 def _require_calibrated(description: Machine, file: Path) -> None:
-    from rotordrop.estimation.tracked import is_calibrated
+    from rotordrop.twin.tracked import is_calibrated
 
     if not is_calibrated(description):
         raise UsageError(
@@ -145,7 +145,7 @@ def _write(
     origin: Origin,
     since: Mapping[str, Any] | None,
 ) -> None:
-    from rotordrop.estimation.document import combined, estimate_document
+    from rotordrop.estimate.document import combined, estimate_document
     from rotordrop.report.estimate_page import estimate_page, estimate_summary
     from rotordrop.report.page import write_page
     from rotordrop.report.terminal import print_summary

@@ -51,7 +51,7 @@ def schema(
     elif document is Document.look:
         from rotordrop.evidence.look.schema import look_schema as schema_of
     else:
-        from rotordrop.estimation.schema import estimate_schema as schema_of
+        from rotordrop.estimate.schema import estimate_schema as schema_of
 
     text = json.dumps(schema_of(), indent=2, ensure_ascii=False) + "\n"
     deliver_text(text, output, overwrite=force)

@@ -82,7 +82,7 @@ def waterfall(
     json_file: JsonOption = None,
 ) -> None:
     """Find and name the frequencies of a coast-down, and say whether 0.2 s held the maximum."""
-    from rotordrop.estimation.recorded_coast_down import with_found_air_gaps
+    from rotordrop.estimate.recorded_coast_down import with_found_air_gaps
     from rotordrop.machine import load_machine
     from rotordrop.report.origin import origin_here
     from rotordrop.report.page import write_page
@@ -135,8 +135,8 @@ def waterfall(
 
 def _signal(machine: Machine, path: Path, profile: Path | None) -> tuple[CoastDownSignal, str]:
     """Open a recording or a simulated file, with the sentence that says it is simulated."""
-    from rotordrop.estimation.recorded_coast_down import recorded_coast_down
-    from rotordrop.estimation.simulated_coast_down import simulated_coast_down
+    from rotordrop.estimate.recorded_coast_down import recorded_coast_down
+    from rotordrop.estimate.simulated_coast_down import simulated_coast_down
     from rotordrop.record.record import read_record
     from rotordrop.record.simulated import is_simulated
     from rotordrop.report.content import SIMULATED_RECORD

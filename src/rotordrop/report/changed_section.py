@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from rotordrop.errors import UsageError
-from rotordrop.estimation.changed import Change, asked_for, changes
-from rotordrop.estimation.document import estimate_document
-from rotordrop.estimation.estimate import Estimate
+from rotordrop.estimate.changed import Change, asked_for, changes
+from rotordrop.estimate.document import estimate_document
+from rotordrop.estimate.estimate import Estimate
 from rotordrop.report.content import Cell, Section, Statement, Table
 from rotordrop.report.quantity import Quantity, written
 from rotordrop.rotor.parameter_table import row_of

@@ -9,7 +9,7 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from rotordrop.estimation.bearing_drop import AirGap
+from rotordrop.estimate.bearing_drop import AirGap
 from rotordrop.report.style import (
     BAND_FILL,
     COLOURS,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.estimated import IdentifiedValue
-from rotordrop.estimation.bearing_drop import BearingDrop
 from rotordrop.report.content import Card, Cell, KeyFigure, Table
 from rotordrop.report.quantity import Quantity
 from rotordrop.rotor.parameter import Role

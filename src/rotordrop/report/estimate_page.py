@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from rotordrop._version import __version__
-from rotordrop.estimation.bearing_drop import History
-from rotordrop.estimation.estimate import CrossCheck, Estimate, FittedParameter, Innovations, ReplaySteps
-from rotordrop.estimation.methods import Replay
+from rotordrop.estimate.bearing_drop import History
+from rotordrop.estimate.estimate import CrossCheck, Estimate, FittedParameter, Innovations, ReplaySteps
+from rotordrop.estimate.methods import Replay
 from rotordrop.record.event_date import event_date
 from rotordrop.report.changed_section import changed_section
 from rotordrop.report.content import (

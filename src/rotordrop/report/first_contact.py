@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import plotly.graph_objects as go
 
-from rotordrop.estimation.bearing_drop import BearingDrop, FirstContact
+from rotordrop.estimate.bearing_drop import BearingDrop, FirstContact
 from rotordrop.report.style import (
     INK,
     LIMIT,

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import plotly.graph_objects as go
 
-from rotordrop.estimation.bearing_drop import BearingDrop, Impact
+from rotordrop.estimate.bearing_drop import BearingDrop, Impact
 from rotordrop.report.content import Table
 from rotordrop.report.quantity import Quantity
 from rotordrop.report.style import MUTED, axis_title, panels, single

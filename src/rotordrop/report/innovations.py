@@ -8,8 +8,8 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
+from rotordrop.estimate.bearing_drop import History
 from rotordrop.estimated import NINETY
-from rotordrop.estimation.bearing_drop import History
 from rotordrop.report.style import (
     LIMIT,
     MICRO,

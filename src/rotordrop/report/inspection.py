@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from rotordrop.estimation.bearing_drop import BearingDrop
-from rotordrop.estimation.estimate import Estimate
+from rotordrop.estimate.bearing_drop import BearingDrop
+from rotordrop.estimate.estimate import Estimate
 from rotordrop.machine.ball_bearing import STATIC_STRESS
 from rotordrop.report.content import Section, Statement, Table
 from rotordrop.report.quantity import Quantity

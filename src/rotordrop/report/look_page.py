@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop._version import __version__
-from rotordrop.estimation.bearing_drop import AirGap, BearingMotions, Motion
+from rotordrop.estimate.bearing_drop import AirGap, BearingMotions, Motion
 from rotordrop.record.simulated import is_simulated
 from rotordrop.report.content import (
     SIMULATED_RECORD,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from rotordrop.estimation.bearing_drop import BearingDrop, BearingMotions, Motion
+from rotordrop.estimate.bearing_drop import BearingDrop, BearingMotions, Motion
 from rotordrop.report.decimation import peak_indices
 from rotordrop.report.style import (
     LIMIT,

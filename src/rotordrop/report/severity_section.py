@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from rotordrop.estimation.estimate import Estimate
-from rotordrop.estimation.severity_numbers import severity_values
+from rotordrop.estimate.estimate import Estimate
+from rotordrop.estimate.severity_numbers import severity_values
 from rotordrop.report.content import Cell, Section, Table
 from rotordrop.report.quantity import Quantity
 from rotordrop.rotor.bearing_numbers import numbers_of

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotordrop._version import __version__
-from rotordrop.estimation.bearing_drop import BearingDrop, History, simulated_bearings
+from rotordrop.estimate.bearing_drop import BearingDrop, History, simulated_bearings
 from rotordrop.machine.usual_values import doubts_of_speed
 from rotordrop.report.content import Card, Figure, KeyFigure, ReportContent, Section, Statement
 from rotordrop.report.drop_sections import drop_sections, speed_figure, static_limit_statement

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from rotordrop.estimation.bearing_drop import simulated_bearings
-from rotordrop.estimation.document import bearing_entry
+from rotordrop.estimate.bearing_drop import simulated_bearings
+from rotordrop.estimate.document import bearing_entry
 from rotordrop.simulate.result import DropResult
 
 

@@ -11,7 +11,7 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
-from rotordrop.estimation.bearing_drop import AirGap, Band, History, Role
+from rotordrop.estimate.bearing_drop import AirGap, Band, History, Role
 from rotordrop.report.decimation import block_envelope, peak_indices
 
 Array = NDArray[np.float64]

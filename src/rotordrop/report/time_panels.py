@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import plotly.graph_objects as go
 
-from rotordrop.estimation.bearing_drop import AirGap, Band, History, Peak
+from rotordrop.estimate.bearing_drop import AirGap, Band, History, Peak
 from rotordrop.report.quantity import written
 from rotordrop.report.style import (
     INK,

@@ -256,7 +256,7 @@ def _since(job: Job) -> dict[str, Any] | None:
 
 
 def _waterfall(job: Job, made: Path, told: dict[str, Any]) -> None:
-    from rotordrop.estimation.recorded_coast_down import recorded_coast_down, with_found_air_gaps
+    from rotordrop.estimate.recorded_coast_down import recorded_coast_down, with_found_air_gaps
     from rotordrop.spectrum.coast_down import analyse_coast_down
     from rotordrop.spectrum.machine_candidates import machine_candidates
     from rotordrop.web.drawn import write_waterfall

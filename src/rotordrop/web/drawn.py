@@ -24,8 +24,8 @@ from rotordrop.web.traces import write_traces
 from rotordrop.web.workspace import Job
 
 if TYPE_CHECKING:
-    from rotordrop.estimation.bearing_drop import BearingDrop
-    from rotordrop.estimation.estimate import Estimate
+    from rotordrop.estimate.bearing_drop import BearingDrop
+    from rotordrop.estimate.estimate import Estimate
     from rotordrop.evidence.look import Look
     from rotordrop.machine import Machine
     from rotordrop.record.record import Record
@@ -102,7 +102,7 @@ def write_estimate(
     since: Mapping[str, Any] | None = None,
 ) -> None:
     """Write what an estimate says: histories with bands, its document, its report, and its page as JSON."""
-    from rotordrop.estimation.document import estimate_document
+    from rotordrop.estimate.document import estimate_document
     from rotordrop.report.estimate_page import estimate_page
     from rotordrop.report.page import write_page
     from rotordrop.report.rotor_drawing import rotor_outline

@@ -105,7 +105,7 @@ def waterfall_lines(
     rules = _profile(files, options)
     head = [
         "from rotordrop import load_machine, read_record",
-        "from rotordrop.estimation.recorded_coast_down import recorded_coast_down, with_found_air_gaps",
+        "from rotordrop.estimate.recorded_coast_down import recorded_coast_down, with_found_air_gaps",
         "from rotordrop.spectrum.coast_down import analyse_coast_down",
         "from rotordrop.spectrum.machine_candidates import machine_candidates",
         *rules,

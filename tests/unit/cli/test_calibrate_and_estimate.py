@@ -15,15 +15,15 @@ import pytest
 
 from rotordrop.cli.app import INTERRUPTED, run
 from rotordrop.errors import ConsistencyError, UsageError
+from rotordrop.estimate.record_facts import BESIDE, COUNTED_TWICE, facts_of
+from rotordrop.estimate.schema import estimate_schema
 from rotordrop.estimated import Estimated
-from rotordrop.estimation.record_facts import BESIDE, COUNTED_TWICE, facts_of
-from rotordrop.estimation.schema import estimate_schema
-from rotordrop.estimation.tracked import is_calibrated
 from rotordrop.machine import CalibrationDrop, CalibrationOrigin, Machine, example_path, load_machine
 from rotordrop.record.examples import example_record_path
 from rotordrop.record.record import read_record
 from rotordrop.track.calibration import BLIND_SCHEDULE, Stage
 from rotordrop.track.consistency import Check
+from rotordrop.twin.tracked import is_calibrated
 
 LP400 = str(example_path("lp400"))
 RECORD = str(example_record_path("lp400_drop_060"))
@@ -37,7 +37,7 @@ SHORT = 0.03
 def shortened() -> Iterator[None]:
     """The estimator with a few passes over the first impacts only."""
     with pytest.MonkeyPatch.context() as patch:
-        module = "rotordrop.estimation.tracked"
+        module = "rotordrop.twin.tracked"
         patch.setattr(f"{module}.BLIND_SCHEDULE", BLIND_SCHEDULE[:4])
         patch.setattr(
             f"{module}.CALIBRATION_SCHEDULE", (Stage(until=SHORT, force=0.07, share=0.01, passes=1),)
@@ -158,7 +158,7 @@ def beside(*_: object) -> tuple[Check, ...]:
 def test_an_estimate_beside_its_record_is_written_and_ends_with_its_own_code(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("rotordrop.estimation.tracked.consistency_checks", beside)
+    monkeypatch.setattr("rotordrop.twin.tracked.consistency_checks", beside)
     out, page = tmp_path / "out.json", tmp_path / "report.html"
     arguments = ["estimate", str(folder / "calibrated.toml"), RECORD, "--tail", TAIL, "--quick"]
     code = run([*arguments, "--json", str(out), "--report", str(page)])
@@ -176,7 +176,7 @@ def test_an_estimate_beside_its_record_is_written_and_ends_with_its_own_code(
 def test_a_calibration_beside_its_drops_is_not_written(
     shortened: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("rotordrop.estimation.calibrated.consistency_checks", beside)
+    monkeypatch.setattr("rotordrop.twin.calibrated.consistency_checks", beside)
     output = tmp_path / "calibrated.toml"
     arguments = ["calibrate", LP400, RECORD, "--tail", TAIL, "--output", str(output)]
     assert run(arguments) == ConsistencyError.exit_code

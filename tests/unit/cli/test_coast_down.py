@@ -15,8 +15,8 @@ import pytest
 
 from rotordrop.cli.app import run
 from rotordrop.errors import RecordError
-from rotordrop.estimation.recorded_coast_down import recorded_coast_down, with_recorded_drag
-from rotordrop.estimation.simulated_coast_down import simulated_coast_down
+from rotordrop.estimate.recorded_coast_down import recorded_coast_down, with_recorded_drag
+from rotordrop.estimate.simulated_coast_down import simulated_coast_down
 from rotordrop.machine import example_machine, example_path, load_machine, save_machine
 from rotordrop.record.record import read_record
 from rotordrop.report.waterfall_page import waterfall_page

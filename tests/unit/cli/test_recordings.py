@@ -43,7 +43,7 @@ def test_a_tail_of_another_recorder_has_a_profile_of_its_own(
         raise UsageError("seen")
 
     monkeypatch.setattr("rotordrop.estimation.estimate_drops", noted)
-    monkeypatch.setattr("rotordrop.estimation.calibrated.calibrate_machine", noted)
+    monkeypatch.setattr("rotordrop.twin.calibrated.calibrate_machine", noted)
     call = [
         verb,
         str(example_path("lp400")),

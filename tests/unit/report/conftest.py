@@ -7,11 +7,9 @@ from importlib import resources
 import numpy as np
 import pytest
 
-from rotordrop.estimation.estimate import Estimate
-from rotordrop.estimation.methods import Tracked
-from rotordrop.estimation.record_facts import facts_of
-from rotordrop.estimation.tracked import COARSE_BASIS, drop_problem, tracked_drop
-from rotordrop.estimation.tracked_estimate import estimate_of
+from rotordrop.estimate.estimate import Estimate
+from rotordrop.estimate.methods import Tracked
+from rotordrop.estimate.record_facts import facts_of
 from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine import example_machine
 from rotordrop.physics.hertz import LineContact
@@ -20,6 +18,8 @@ from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.simulate.certificate import Certificate
 from rotordrop.simulate.result import ContactLog, DropResult
 from rotordrop.track.calibration import CALIBRATED_SCHEDULE, track
+from rotordrop.twin.tracked import COARSE_BASIS, drop_problem, tracked_drop
+from rotordrop.twin.tracked_estimate import estimate_of
 
 GAPS = (275e-6, 285e-6)
 TIME = np.linspace(0.0, 0.2, 4001)

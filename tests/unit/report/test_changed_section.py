@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import copy
 
-from rotordrop.estimation.document import estimate_document
-from rotordrop.estimation.estimate import Estimate
+from rotordrop.estimate.document import estimate_document
+from rotordrop.estimate.estimate import Estimate
 from rotordrop.report.changed_section import HEADING, NOTHING_GIVEN, changed_section
 from rotordrop.report.estimate_page import estimate_page
 from rotordrop.report.machine_sections import spoken_key

@@ -9,8 +9,8 @@ import pytest
 from scipy.io import loadmat
 
 from rotordrop.errors import OutputError
-from rotordrop.estimation.bearing_drop import Origin
-from rotordrop.estimation.estimate import Estimates
+from rotordrop.estimate.bearing_drop import Origin
+from rotordrop.estimate.estimate import Estimates
 from rotordrop.physics.ball_bearing import bearing_constants
 from rotordrop.report.estimate_page import estimate_page
 

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from rotordrop.estimated import IdentifiedValue
-from rotordrop.estimation.bearing_drop import (
+from rotordrop.estimate.bearing_drop import (
     AirGap,
     Band,
     BearingDrop,
@@ -22,6 +21,7 @@ from rotordrop.estimation.bearing_drop import (
     Peak,
     highest,
 )
+from rotordrop.estimated import IdentifiedValue
 from rotordrop.report.drop_sections import displacement_figure, drop_sections, speed_figure
 from rotordrop.report.first_contact import first_contact_figure
 from rotordrop.report.friction_curve import FrictionLaw, friction_curve_figure

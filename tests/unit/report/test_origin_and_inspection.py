@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
+from rotordrop.estimate.bearing_drop import BearingDrop, simulated_bearings
+from rotordrop.estimate.later_motion import LaterMotion
 from rotordrop.estimated import IdentifiedValue
-from rotordrop.estimation.bearing_drop import BearingDrop, simulated_bearings
-from rotordrop.estimation.later_motion import LaterMotion
 from rotordrop.record.event_date import event_date
 from rotordrop.report.content import ReportContent
 from rotordrop.report.inspection import inspection_section, limits_section

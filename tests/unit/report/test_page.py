@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import OutputError
-from rotordrop.estimation.bearing_drop import History
+from rotordrop.estimate.bearing_drop import History
 from rotordrop.report.content import (
     Card,
     Figure,

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from rotordrop.estimate.agreement import Agreement, compare_orbits
+from rotordrop.estimate.bearing_drop import BearingDrop, Motion, Origin, Peak, simulated_bearings
+from rotordrop.estimate.estimate import Estimate, FittedParameter, ReplaySteps, Verdict
+from rotordrop.estimate.methods import Replay
 from rotordrop.estimated import Correlation, IdentifiedValue
-from rotordrop.estimation.agreement import Agreement, compare_orbits
-from rotordrop.estimation.bearing_drop import BearingDrop, Motion, Origin, Peak, simulated_bearings
-from rotordrop.estimation.estimate import Estimate, FittedParameter, ReplaySteps, Verdict
-from rotordrop.estimation.methods import Replay
 from rotordrop.evidence.first_contact import TimedContact
 from rotordrop.identification.friction import FrictionSweep
 from rotordrop.machine import example_machine

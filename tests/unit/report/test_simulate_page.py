@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rotordrop.estimation.bearing_drop import simulated_bearings, simulated_gap
+from rotordrop.estimate.bearing_drop import simulated_bearings, simulated_gap
 from rotordrop.machine import example_machine
 from rotordrop.report.content import ReportContent
 from rotordrop.report.machine_sections import defaults_section, friction_section, spoken_key, weight_shares

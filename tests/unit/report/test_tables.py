@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from rotordrop.estimate.bearing_drop import simulated_bearings
+from rotordrop.estimate.estimate import CrossCheck
 from rotordrop.estimated import IdentifiedValue
-from rotordrop.estimation.bearing_drop import simulated_bearings
-from rotordrop.estimation.estimate import CrossCheck
 from rotordrop.report.content import Table
 from rotordrop.report.estimate_page import cross_check_statements, cross_check_table
 from rotordrop.report.impacts import impact_figure, impact_table, ring_forces

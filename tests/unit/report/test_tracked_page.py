@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rotordrop.estimate.bearing_drop import Origin
+from rotordrop.estimate.document import estimate_document
+from rotordrop.estimate.estimate import CrossCheck, Estimate, Verdict
+from rotordrop.estimate.later_motion import LaterMotion
 from rotordrop.estimated import IdentifiedValue
-from rotordrop.estimation.bearing_drop import Origin
-from rotordrop.estimation.document import estimate_document
-from rotordrop.estimation.estimate import CrossCheck, Estimate, Verdict
-from rotordrop.estimation.later_motion import LaterMotion
 from rotordrop.evidence.quality.finding import Finding
 from rotordrop.record.simulated import is_simulated
 from rotordrop.report.content import Table

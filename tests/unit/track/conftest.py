@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rotordrop.estimation.tracked import COARSE_BASIS, drop_problem
 from rotordrop.evidence.evidence import Evidence, read_evidence
 from rotordrop.machine import Machine, example_machine
 from rotordrop.record.examples import example_record_path
@@ -13,6 +12,7 @@ from rotordrop.record.record import read_record
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Forward, PassSettings, Smoothed, forward, smooth
+from rotordrop.twin.tracked import COARSE_BASIS, drop_problem
 
 
 @pytest.fixture(scope="session")

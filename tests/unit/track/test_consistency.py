@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rotordrop.estimation.tracked import COARSE_BASIS, drop_problem
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.track.consistency import (
     CORRELATION_LIMIT,
@@ -19,6 +18,7 @@ from rotordrop.track.consistency import (
     normalised_innovations,
 )
 from rotordrop.track.smoother import PassSettings, forward, smooth
+from rotordrop.twin.tracked import COARSE_BASIS, drop_problem
 
 SETTINGS = PassSettings(impulse=3e-3, share=0.03)
 

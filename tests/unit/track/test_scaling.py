@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from tests.scaled_machines import scaled_machine
 
-from rotordrop.estimation.tracked import COARSE_BASIS
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.track._filter import is_plausible
 from rotordrop.track.calibration import BLIND_SCHEDULE, CALIBRATED_SCHEDULE, shifted, stage_settings
 from rotordrop.track.prior import fall_time
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import PassSettings
+from rotordrop.twin.tracked import COARSE_BASIS
 
 LAST = CALIBRATED_SCHEDULE[-1]
 

@@ -17,8 +17,6 @@ from tests.unit.track.test_propagation import (
 
 from rotordrop.errors import UsageError
 from rotordrop.estimated import Estimated
-from rotordrop.estimation.structure import EXTENSIONS
-from rotordrop.estimation.tracked import COARSE_BASIS, drop_problem
 from rotordrop.evidence.evidence import Evidence
 from rotordrop.machine import Machine, loads_machine
 from rotordrop.machine.saving import machine_text
@@ -30,6 +28,8 @@ from rotordrop.simulate.case import DropCase
 from rotordrop.simulate.drop import simulate_drop
 from rotordrop.track._filter import lag_step
 from rotordrop.track.problem import DropProblem
+from rotordrop.twin.structure import EXTENSIONS
+from rotordrop.twin.tracked import COARSE_BASIS, drop_problem
 
 STRUCTURE = {
     "support.coupling": 0.2,

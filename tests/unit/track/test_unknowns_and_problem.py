@@ -11,7 +11,6 @@ import pytest
 
 from rotordrop.errors import IdentificationError, RecordError
 from rotordrop.estimated import NINETY, Estimated
-from rotordrop.estimation.tracked import COARSE_BASIS, drop_problem, recorded_drop
 from rotordrop.evidence.evidence import Missing, read_evidence
 from rotordrop.machine import Machine, example_machine
 from rotordrop.physics.ball_bearing import bearing_constants, preload_of_offset
@@ -29,6 +28,7 @@ from rotordrop.track.problem import (
     settled_displacement,
 )
 from rotordrop.track.transfer import transferred
+from rotordrop.twin.tracked import COARSE_BASIS, drop_problem, recorded_drop
 
 NO_TAIL = Missing(reason="none was given")
 

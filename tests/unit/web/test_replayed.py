@@ -12,7 +12,7 @@ from tests.unit.report.test_replay_page import agreement as agreement
 from tests.unit.report.test_replay_page import drop as drop
 from tests.unit.web.test_same_numbers import NAMES
 
-from rotordrop.estimation.estimate import Estimate
+from rotordrop.estimate.estimate import Estimate
 from rotordrop.web.drawn import write_estimate
 from rotordrop.web.traces import open_traces
 from rotordrop.web.workspace import Workspace

@@ -1,0 +1,1 @@
+"""What a recorded drop says about force and stress: the result, whichever method found it."""

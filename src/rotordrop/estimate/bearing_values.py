@@ -1,0 +1,67 @@
+"""Values of one bearing that follow from its identified parameters, whichever method identified them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+from rotordrop.estimate.estimate import FittedParameter
+from rotordrop.estimated import NINETY, IdentifiedValue
+from rotordrop.machine import Machine
+from rotordrop.rotor.bearing_numbers import numbers_of
+from rotordrop.rotor.parameter_table import published
+
+
+def published_values(name: str, found: Sequence[FittedParameter]) -> dict[str, IdentifiedValue]:
+    """Parameters of the bearing of a name by the field names of the published document, in its order."""
+    own = {one.row.field: one.estimate for one in found if one.row.owner == "bearing" and one.owner == name}
+    return {field: own[field] for field in published() if field in own}
+
+
+def static_friction(ratio: float, dynamic: IdentifiedValue) -> IdentifiedValue:
+    """Static coefficient at its prior ratio to the dynamic one: sliding drops say little about it."""
+    low, high = dynamic.interval_90 or (dynamic.value, dynamic.value)
+    return IdentifiedValue(
+        value=ratio * dynamic.value,
+        status="the record does not determine it",
+        standard_error=None if dynamic.standard_error is None else ratio * dynamic.standard_error,
+        interval_90=(0.85 * ratio * low, 1.15 * ratio * high),
+        unit="1",
+    )
+
+
+def equivalent_stiffness(
+    machine: Machine, b: int, load: float, support: IdentifiedValue, preload: IdentifiedValue | None
+) -> IdentifiedValue:
+    """Support and bearing in series [N/m], the bearing by its tangent at its static load [N].
+
+    What holds the balls is not well known, the preload from the record or a clearance from the machine file,
+    and the interval holds it beside that of the support.
+    """
+    bearing = machine.touchdown_bearings[b]
+    path = "preload" if preload is not None else "clearance"
+    held = preload if preload is not None else getattr(bearing.bearing, path, None)
+
+    def races(value: float) -> float:
+        changed = machine.with_values({f"{bearing.name}.bearing.{path}": value})
+        return numbers_of(changed.touchdown_bearings[b]).tangent_stiffness(load)
+
+    within = (held.interval_90 or getattr(held, "range", None)) if held is not None else None
+    own = numbers_of(bearing).tangent_stiffness(load) if held is None else races(float(held))
+    softer, stiffer = (own, own) if within is None else sorted(map(races, within))
+    value = _series(support.value, own)
+    low, high = support.interval_90 or (support.value, support.value)
+    down = math.hypot(value - _series(low, own), value - _series(support.value, softer))
+    up = math.hypot(_series(high, own) - value, _series(support.value, stiffer) - value)
+    return replace(
+        support,
+        value=value,
+        interval_90=(value - down, value + up),
+        standard_error=(down + up) / (2.0 * NINETY),
+        start=None,
+    )
+
+
+def _series(one: float, other: float) -> float:
+    return one * other / (one + other)

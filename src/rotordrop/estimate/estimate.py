@@ -1,0 +1,493 @@
+"""The estimate of one recorded drop: one frozen result for every method; pages and documents draw from it.
+
+Nothing in here points into a filter: the arrays of a pass are hundreds of megabytes and go when the estimate
+is made.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from html import escape
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.atomic_file import write_json
+from rotordrop.estimate.advice import Advice
+from rotordrop.estimate.agreement import Agreement
+from rotordrop.estimate.bearing_drop import BearingDrop
+from rotordrop.estimate.later_motion import LaterMotion
+from rotordrop.estimate.methods import Method
+from rotordrop.estimate.unbalance import PlaneUnbalance
+from rotordrop.estimated import Correlation, IdentifiedValue
+from rotordrop.evidence.events import DropInstant
+from rotordrop.evidence.first_contact import TimedContact as TimedContact
+from rotordrop.evidence.power_off import PowerOff
+from rotordrop.evidence.quality.finding import Finding
+from rotordrop.evidence.speed import SpeedFit
+from rotordrop.identification.friction import FrictionSweep as FrictionSweep
+from rotordrop.machine import Machine
+from rotordrop.record.record import Record
+from rotordrop.rotor.parameter import Parameter
+from rotordrop.track.consistency import Check
+from rotordrop.units import format_quantity
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+Array = NDArray[np.float64]
+
+
+class Verdict(Enum):
+    """What model and record say of each other; the values are the sentences a reader sees first."""
+
+    CONSISTENT = "The model is consistent with the record."
+    EXTENDED = "With an extension of the usual model, the model is consistent with the record."
+    ONE_DIRECTION = (
+        "Not every plane shows both directions: forces across the missing one rest on the model alone. "
+        "Intervals are 2 × as wide, and no independent cross-check is possible."
+    )
+    HELD = (
+        "The model is not consistent with the record. Only ranges are stated: they hold the independent "
+        "cross-check too."
+    )
+    GIVEN_WAY = (
+        "The model is not consistent with the record and lost it at a bearing. Loads there are those of the "
+        "independent cross-check, as ranges."
+    )
+    OPEN_LOOP = (
+        "This is the paper's route, an open-loop replay: one drop like the recorded one. The tracked twin "
+        "(--method tracked) follows the record and gives narrower intervals."
+    )
+
+    @property
+    def holds(self) -> bool:
+        """Whether single numbers may be relied on within their intervals."""
+        return self not in (Verdict.HELD, Verdict.GIVEN_WAY)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CrossCheck:
+    """One number found in two ways.
+
+    Attributes
+    ----------
+    name : str
+        What is compared, for example ``"NDE peak force"``.
+    estimate : IdentifiedValue
+        The number of the tracked twin.
+    check : float
+        The number of the estimate without contact law, in the same unit.
+    accuracy : float
+        Known accuracy of the latter, relative [1]; a larger difference is a warning.
+    replaced : bool
+        Whether the estimate has given way to the cross-check.
+    """
+
+    name: str
+    estimate: IdentifiedValue
+    check: float
+    accuracy: float
+    replaced: bool = False
+
+    @property
+    def difference(self) -> float:
+        """Relative difference of the cross-check from the twin [1]."""
+        return self.check / self.estimate.value - 1.0 if self.estimate.value else math.nan
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the difference stays within the known accuracy."""
+        return abs(self.difference) <= self.accuracy
+
+
+@dataclass(frozen=True, kw_only=True)
+class FittedParameter:
+    """One unknown: its row in the parameter table, what was known before, and what the record made of it.
+
+    ``owner`` is the bearing, magnet or unbalance it belongs to; ``prior`` None where nothing was known.
+    """
+
+    row: Parameter
+    owner: str
+    prior: IdentifiedValue | None
+    estimate: IdentifiedValue
+
+    @property
+    def path(self) -> str:
+        """Path in the machine, such as ``"NDE.support.stiffness"``."""
+        return self.row.path_of(self.owner)
+
+    @property
+    def scope(self) -> str:
+        """Whether it belongs to the machine or to this drop alone."""
+        return "machine" if self.row.owner in ("bearing", "sensor", "rotor") else "drop"
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointEstimate:
+    """How the errors of what belongs to the machine hang together, in the measures it is estimated in.
+
+    Attributes
+    ----------
+    paths : tuple of str, length n
+        Parameters, gains and offsets of the sensors.
+    mean, prior_mean, prior_sigma : ndarray, shape (n,)
+        What the record made of them, and what was known before.
+    covariance : ndarray, shape (n, n)
+        Of the errors of the mean, as the filter holds it.
+    """
+
+    paths: tuple[str, ...]
+    mean: Array
+    covariance: Array
+    prior_mean: Array
+    prior_sigma: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class Structure:
+    """Something the machine has beyond the usual model, as far as the record says.
+
+    Attributes
+    ----------
+    name : str
+        What it is called.
+    gain : float
+        Rise of the logarithm of the marginal likelihood that it brought [1]; infinite where the model without
+        it needed larger unknown impulses.
+    sentence : str
+        What was found, with intervals.
+    """
+
+    name: str
+    gain: float
+    sentence: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorErrors:
+    """Gain error [1] and offset [m] of one sensor as estimated, and its noise (standard deviation) [m]."""
+
+    sensor: str
+    gain_error: IdentifiedValue
+    offset: IdentifiedValue
+    noise: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Innovations:
+    """What every reading said beyond the prediction from all before it; N samples, C channels.
+
+    Attributes
+    ----------
+    channels : tuple of str
+        Names of the sensors.
+    time : ndarray, shape (N,)
+        Time from power-off [s].
+    values, deviation : ndarray, shape (N, C)
+        Reading minus prediction and its expected standard deviation [m]; NaN where nothing was read.
+    limits : tuple of float
+        Mean normalised squares between which model and record count as consistent [1].
+    """
+
+    channels: tuple[str, ...]
+    time: Array
+    values: Array
+    deviation: Array
+    limits: tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReplaySteps:
+    """The steps of the paper's route beside the common result.
+
+    Attributes
+    ----------
+    speed : SpeedFit
+        Speed at power-off and how it falls.
+    contacts : tuple of TimedContact
+        First contact of every bearing in the record, with the stiffness of eq. (17).
+    friction : FrictionSweep or None
+        Sweep of the friction coefficient; None when it was taken over.
+    correlations : tuple of Correlation
+        Correlations of support values.
+    speed_time, speed_simulated : ndarray, shape (T,)
+        Simulated speed [rad/s] against time [s].
+    fixed : str
+        Where supports and friction were taken from; empty when they were identified.
+    draws, rejected : int or None
+        Draws behind the intervals, and those that did not keep to the record; None where none were made.
+    identified : Machine
+        The machine with what was identified.
+    document : mapping
+        Initial state, settled rest and search, ready for the published document.
+    """
+
+    speed: SpeedFit
+    contacts: tuple[TimedContact, ...]
+    friction: FrictionSweep | None
+    correlations: tuple[Correlation, ...]
+    speed_time: Array
+    speed_simulated: Array
+    fixed: str
+    draws: int | None
+    rejected: int | None
+    identified: Machine
+    document: Mapping[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Estimate:
+    """Force and stress of one recorded drop, with everything a page or a document says of it.
+
+    Attributes
+    ----------
+    name : str
+        Name of the drop.
+    method : Tracked or Replay
+        How it was made.
+    machine : Machine
+        The machine as it was given.
+    record : Record
+        The recording.
+    drop_instant : DropInstant or PowerOff
+        Power-off in record time.
+    speed : float
+        Speed at power-off [rad/s].
+    until : float
+        End of the estimated part [s from power-off].
+    verdict : Verdict
+        What model and record say of each other.
+    checks : tuple of Check
+        The consistency checks behind it; empty for a replay.
+    bearings : tuple of BearingDrop
+        Histories, peaks, impacts and values of every bearing.
+    parameters : tuple of FittedParameter
+        Every unknown with prior and estimate.
+    sensors : tuple of SensorErrors
+        Gain, offset and noise of every sensor; empty for a replay.
+    joint : JointEstimate or None
+        How the errors of parameters and sensors hang together; None where they are not held together.
+    unbalance : tuple of PlaneUnbalance
+        Amount and phase of the unbalance of every plane; empty for a replay.
+    structure : tuple of Structure
+        What the machine has beyond the usual model; empty where that does.
+    cross_check : tuple of CrossCheck
+        Comparisons with the estimate without contact law; empty where none was made.
+    innovations : Innovations or None
+        What the filter did not foresee; None for a replay.
+    nis, noise_factor : float or None
+        Mean normalised innovation squared [1], and size of the unknown impulses over the usual one [1].
+    agreement : Agreement or None
+        How far the replayed drop follows the record.
+    replay : ReplaySteps or None
+        The steps of the paper's route.
+    advice : tuple of Advice
+        Further numbers that would narrow the peak forces of a machine that is known by few; the best first.
+    later : tuple of LaterMotion
+        What the rest of the record shows; empty where it has none.
+    findings : tuple of Finding
+        What the gate found in the record.
+    warnings, notes : tuple of str
+        What makes the numbers less certain, and what is worth knowing and does not.
+    simulated_record : bool
+        Whether the record is known to be simulated.
+    """
+
+    name: str
+    method: Method
+    machine: Machine
+    record: Record
+    drop_instant: DropInstant | PowerOff
+    speed: float
+    until: float
+    verdict: Verdict
+    bearings: tuple[BearingDrop, ...]
+    parameters: tuple[FittedParameter, ...]
+    checks: tuple[Check, ...] = ()
+    sensors: tuple[SensorErrors, ...] = ()
+    joint: JointEstimate | None = None
+    unbalance: tuple[PlaneUnbalance, ...] = ()
+    structure: tuple[Structure, ...] = ()
+    cross_check: tuple[CrossCheck, ...] = ()
+    innovations: Innovations | None = None
+    nis: float | None = None
+    noise_factor: float | None = None
+    agreement: Agreement | None = None
+    replay: ReplaySteps | None = None
+    advice: tuple[Advice, ...] = ()
+    later: tuple[LaterMotion, ...] = ()
+    findings: tuple[Finding, ...] = ()
+    warnings: tuple[str, ...] = field(default=())
+    notes: tuple[str, ...] = field(default=())
+    simulated_record: bool = False
+
+    @property
+    def consistent(self) -> bool:
+        """Whether single numbers may be relied on within their intervals."""
+        return self.verdict.holds
+
+    @property
+    def sentence(self) -> str:
+        """The verdict, with what failed."""
+        failed = "; ".join(check.message for check in self.checks if not check.passed)
+        said = " ".join((self.verdict.value, *(one.sentence for one in self.structure)))
+        return f"{said} {failed[:1].upper()}{failed[1:]}." if failed else said
+
+    def bearing(self, name: str) -> BearingDrop:
+        """What happened at the bearing of a name.
+
+        Raises
+        ------
+        KeyError
+            If the machine has no such bearing; names those it has.
+        """
+        for one in self.bearings:
+            if one.name == name:
+                return one
+        raise KeyError(f"no bearing {name!r}; the machine has {', '.join(b.name for b in self.bearings)}")
+
+    def ball_loads(self, bearing: str) -> Array:
+        """Load of every ball of a bearing [N], shape (T, rows, Z), at the times of its force."""
+        from rotordrop.estimate.histories import loads_of_balls
+
+        return loads_of_balls(self, bearing)
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """Histories as a table with columns (bearing, quantity) against time [s]; units in ``attrs``."""
+        from rotordrop.estimate.histories import as_dataframe
+
+        return as_dataframe(self)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Histories as a labelled data set with units and long names (needs ``rotordrop[xarray]``)."""
+        from rotordrop.estimate.histories import as_dataset
+
+        return as_dataset(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The estimate as the command line writes it as JSON."""
+        from rotordrop.estimate.document import estimate_document
+
+        return estimate_document(self)
+
+    def save(self, path: str | Path) -> None:
+        """Write the numbers (``.json``) or histories (``.h5``, ``.nc``, ``.csv``, ``.mat``, ``.parquet``).
+
+        Raises
+        ------
+        OutputError
+            If the suffix names no format, or the file cannot be written.
+        """
+        if Path(path).suffix.lower() == ".json":
+            write_json(path, self.to_dict())
+            return
+        from rotordrop.estimate.histories import write_histories
+
+        write_histories(self, path)
+
+    @property
+    def figures(self) -> Mapping[str, Any]:
+        """Figures of the report by name, such as ``"force"`` and ``"displacement NDE"``; plotly figures."""
+        found: Mapping[str, Any] = _above("rotordrop.report.estimate_page", "estimate_figures")(self)
+        return found
+
+    def report(self, path: str | Path) -> None:
+        """Write the report, one offline HTML file."""
+        page = _above("rotordrop.report.estimate_page", "estimate_page")(self)
+        _above("rotordrop.report.page", "write_page")(page, path)
+
+    def data(self, folder: str | Path) -> None:
+        """Write every table and figure of the report as CSV into a folder."""
+        page = _above("rotordrop.report.estimate_page", "estimate_page")(self)
+        _above("rotordrop.report.csv_files", "write_data")(page, folder)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row per bearing with peaks, intervals and air gap, for a table of many drops [SI]."""
+        return [_row(self, bearing) for bearing in self.bearings]
+
+    def __repr__(self) -> str:
+        """Drop, machine and the peak force of every bearing."""
+        return (
+            f"<Estimate {self.name} of {self.machine.name}: {'; '.join(self._peaks())}. {self.verdict.value}>"
+        )
+
+    def _peaks(self) -> list[str]:
+        return [f"{b.name} {_peak_text(b.peak_force.known)}" for b in self.bearings]
+
+    def _repr_html_(self) -> str:
+        return summary_html([self])
+
+
+class Estimates(tuple[Estimate, ...]):
+    """Estimates of several drops; a tuple with one table."""
+
+    __slots__ = ()
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """One row per drop and bearing: verdict, peaks with intervals, air gap [SI]."""
+        import pandas
+
+        return pandas.DataFrame([row for estimate in self for row in estimate.rows()])
+
+    def _repr_html_(self) -> str:
+        return summary_html(self)
+
+
+def summary_html(estimates: Iterable[Estimate]) -> str:
+    """A small table of drops and bearings for a notebook; names from files are escaped."""
+    head = "".join(f"<th>{text}</th>" for text in ("drop", "bearing", "peak force", "peak stress", "verdict"))
+    rows = []
+    for estimate in estimates:
+        for bearing in estimate.bearings:
+            cells = (
+                estimate.name,
+                bearing.name,
+                _peak_text(bearing.peak_force.known),
+                _peak_text(bearing.peak_stress.known, "pressure"),
+                estimate.verdict.value,
+            )
+            rows.append("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>")
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
+
+
+def _peak_text(known: IdentifiedValue, kind: str = "force") -> str:
+    text = format_quantity(known.value, kind)
+    if known.interval_90 is None:
+        return text
+    low, high = (format_quantity(value, kind) for value in known.interval_90)
+    return f"{text} (90 %: {low} to {high})"
+
+
+def _row(estimate: Estimate, bearing: BearingDrop) -> dict[str, Any]:
+    row: dict[str, Any] = {
+        "drop": estimate.name,
+        "bearing": bearing.name,
+        "consistent": estimate.consistent,
+        "speed [Hz]": estimate.speed / (2.0 * math.pi),
+    }
+    numbers = {
+        "peak force [N]": bearing.peak_force.known,
+        "peak stress [Pa]": bearing.peak_stress.known,
+        "air gap [m]": bearing.values.get("air_gap_m"),
+    }
+    for name, known in numbers.items():
+        low, high = (known.interval_90 if known else None) or (math.nan, math.nan)
+        row |= {name: known.value if known else math.nan, f"{name} 5 %": low, f"{name} 95 %": high}
+    return row
+
+
+def _above(module: str, name: str) -> Any:
+    """Something of the layer above: pages draw from estimates; who holds one asks it for its page.
+
+    The only place where a lower layer reaches up; by name, so that nothing here depends on how pages look.
+    """
+    return getattr(import_module(module), name)

@@ -1,0 +1,226 @@
+"""Histories of an estimate as columns against one time, and as files of the usual programs."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.atomic_file import atomic_path, new_hdf5
+from rotordrop.errors import OutputError, UsageError
+from rotordrop.estimate.bearing_drop import BearingDrop
+from rotordrop.rotor.bearing_numbers import numbers_of
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+    from rotordrop.estimate.estimate import Estimate
+    from rotordrop.machine import Machine
+
+Array = NDArray[np.float64]
+
+FORMATS = (".h5", ".nc", ".csv", ".mat", ".parquet")
+"""Suffixes of the files that histories can be written to."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Column:
+    """One quantity of one bearing against time.
+
+    Attributes
+    ----------
+    quantity, bearing : str
+        What it is, such as "force", and where.
+    unit, text : str
+        SI unit and name for people.
+    values : ndarray, shape (T,)
+        Values; NaN where the history does not reach.
+    """
+
+    quantity: str
+    bearing: str
+    unit: str
+    text: str
+    values: Array
+
+    @property
+    def label(self) -> str:
+        """Heading of a column, such as "NDE force [N]"."""
+        return f"{self.bearing} {self.quantity.replace('_', ' ')} [{self.unit}]"
+
+
+def history_columns(estimate: Estimate) -> tuple[Array, tuple[Column, ...]]:
+    """Time from power-off [s], shape (T,), and every history of every bearing against it."""
+    time = estimate.bearings[0].force.time
+    return time, tuple(
+        column for bearing in estimate.bearings for column in _columns(bearing, estimate.machine, time)
+    )
+
+
+def _columns(bearing: BearingDrop, machine: Machine, time: Array) -> Iterator[Column]:
+    def column(quantity: str, unit: str, text: str, at: Array, values: Array) -> Column:
+        on_time = values if at is time else np.interp(time, at, values, left=np.nan, right=np.nan)
+        return Column(quantity=quantity, bearing=bearing.name, unit=unit, text=text, values=on_time)
+
+    for name, unit, text, history, band in (
+        ("force", "N", "ball force on the race", bearing.force, bearing.force_band),
+        ("stress", "Pa", "largest Hertz stress at the inner race", bearing.stress, bearing.stress_band),
+    ):
+        yield column(name, unit, text, history.time, history.values)
+        if band is not None:
+            yield column(f"{name}_lower", unit, f"{text}, lower end of 90 %", band.time, band.lower)
+            yield column(f"{name}_upper", unit, f"{text}, upper end of 90 %", band.time, band.upper)
+    if bearing.force_vector is not None:
+        for k, axis in enumerate("xy"):
+            text = f"ball force on the race along {axis}"
+            yield column(f"force_{axis}", "N", text, bearing.force.time, bearing.force_vector[:, k])
+    for motion in bearing.motions:
+        for k, axis in enumerate("xy"):
+            text = f"displacement of the rotor along {axis}, {motion.label}"
+            name = f"{motion.role.replace(', ', ' ').replace(' ', '_')}_{axis}"
+            yield column(name, "m", text, motion.time, motion.displacement[:, k])
+    load = _largest_load(bearing, machine)
+    yield column("largest_ball_load", "N", "load of the most loaded ball", bearing.stress.time, load)
+
+
+def _largest_load(bearing: BearingDrop, machine: Machine) -> Array:
+    """Load of the most loaded ball [N], from its stress."""
+    return numbers_of(machine.bearing(bearing.name)).load_of_stress(bearing.stress.values)
+
+
+def loads_of_balls(estimate: Estimate, name: str) -> Array:
+    """Load of every ball of a bearing [N], shape (T, rows, Z), against the time of its force.
+
+    Raises
+    ------
+    UsageError
+        Where the direction of the force is not known: a bearing whose loads are those of the cross-check.
+    """
+    bearing = estimate.bearing(name)
+    if bearing.force_vector is None:
+        raise UsageError(
+            f"the loads of single balls at {name} are not known: its force comes from the "
+            f"{bearing.peak_force.origin}, which gives no direction; take the largest load"
+        )
+    return numbers_of(estimate.machine.bearing(name)).element_loads_under(bearing.force_vector)
+
+
+def as_dataframe(estimate: Estimate) -> pandas.DataFrame:
+    """Histories as a table with columns (bearing, quantity), indexed by time [s]; units in ``attrs``."""
+    import pandas
+
+    time, columns = history_columns(estimate)
+    frame = pandas.DataFrame(
+        {(c.bearing, c.quantity): c.values for c in columns}, index=pandas.Index(time, name="time")
+    )
+    frame.columns.names = ["bearing", "quantity"]
+    frame.attrs = {"units": {c.quantity: c.unit for c in columns}, "drop": estimate.name}
+    return frame
+
+
+def as_dataset(estimate: Estimate) -> xarray.Dataset:
+    """Histories as a labelled data set over time and bearing; every variable has units and a long name."""
+    import xarray
+
+    time, columns = history_columns(estimate)
+    names = [bearing.name for bearing in estimate.bearings]
+    variables = {}
+    for quantity in dict.fromkeys(c.quantity for c in columns):
+        found = {c.bearing: c for c in columns if c.quantity == quantity}
+        one = next(iter(found.values()))
+        missing = np.full(len(time), np.nan)
+        values = np.stack([found[n].values if n in found else missing for n in names], axis=1)
+        variables[quantity] = (("time", "bearing"), values, {"units": one.unit, "long_name": one.text})
+    attributes = {"drop": estimate.name, "machine": estimate.machine.name, "verdict": estimate.sentence}
+    data = xarray.Dataset(variables, coords={"time": time, "bearing": names}, attrs=attributes)
+    data["time"].attrs = {"units": "s", "long_name": "time from power-off"}
+    return data
+
+
+def write_histories(estimate: Estimate, path: str | Path) -> None:
+    """Write the histories to a file whose suffix says the format: .h5, .nc, .csv, .mat or .parquet."""
+    path = Path(path)
+    suffix = require_format(path)
+    time, columns = history_columns(estimate)
+    {".csv": _csv, ".mat": _mat, ".parquet": _parquet}.get(suffix, _hdf5)(estimate, time, columns, path)
+
+
+def require_format(path: Path) -> str:
+    """Suffix of a file for histories; refuse one that names no format, or whose package is missing."""
+    suffix = path.suffix.lower()
+    if suffix not in FORMATS:
+        raise OutputError(
+            f"{path}: {suffix or 'no suffix'!r} is not a format of histories; "
+            f"write one of {', '.join(FORMATS)}"
+        )
+    if suffix == ".parquet" and find_spec("pyarrow") is None:
+        raise OutputError(
+            f"{path}: Parquet needs a package that is not installed; install rotordrop[parquet], "
+            "or write .csv or .h5"
+        )
+    return suffix
+
+
+def _csv(estimate: Estimate, time: Array, columns: tuple[Column, ...], path: Path) -> None:
+    """Comma and decimal point; the first line says the columns with their units."""
+    table = np.column_stack([time, *(c.values for c in columns)])
+    header = ",".join(["time [s]", *(c.label for c in columns)])
+    with atomic_path(path) as temporary:
+        np.savetxt(temporary, table, delimiter=",", header=header, comments="", fmt="%.9g", encoding="utf-8")
+
+
+def _mat(estimate: Estimate, time: Array, columns: tuple[Column, ...], path: Path) -> None:
+    """MATLAB 5: ``time`` and one struct per bearing; ``units`` says what is in which unit."""
+    from scipy.io import savemat
+
+    content: dict[str, Any] = {"time": time, "drop": estimate.name, "machine": estimate.machine.name}
+    for c in columns:
+        content.setdefault(re.sub(r"\W", "_", f"b_{c.bearing}"), {})[c.quantity[:31]] = c.values
+    content["units"] = {c.quantity[:31]: c.unit for c in columns} | {"time": "s"}
+    with atomic_path(path) as temporary, temporary.open("wb") as stream:
+        savemat(stream, content, do_compression=True, oned_as="column")
+
+
+def _parquet(estimate: Estimate, time: Array, columns: tuple[Column, ...], path: Path) -> None:
+    import pyarrow
+    from pyarrow import parquet
+
+    fields = {"time [s]": time} | {c.label: c.values for c in columns}
+    with atomic_path(path) as temporary:
+        parquet.write_table(pyarrow.table(fields), temporary)
+
+
+def _hdf5(estimate: Estimate, time: Array, columns: tuple[Column, ...], path: Path) -> None:
+    """HDF5 that opens as NetCDF4: every quantity over time and bearing, with units and long name."""
+    import h5py
+
+    names = [bearing.name for bearing in estimate.bearings]
+    with new_hdf5(path, track_order=True) as file:
+        file.attrs["Conventions"] = "CF-1.8"
+        file.attrs["format"] = "rotordrop histories 1"
+        file.attrs["drop"], file.attrs["machine"] = estimate.name, estimate.machine.name
+        file.attrs["verdict"] = estimate.sentence
+        file.attrs["record_sha256"] = estimate.record.sha256
+        file["time"] = time
+        file["time"].attrs.update({"units": "s", "long_name": "time from power-off"})
+        file["bearing"] = np.array(names, dtype=h5py.string_dtype())
+        for name in ("time", "bearing"):
+            file[name].make_scale(name)
+        for quantity in dict.fromkeys(c.quantity for c in columns):
+            found = {c.bearing: c for c in columns if c.quantity == quantity}
+            values = np.full((len(time), len(names)), np.nan)
+            for k, name in enumerate(names):
+                if name in found:
+                    values[:, k] = found[name].values
+            data = file.create_dataset(quantity, data=values, compression="gzip", shuffle=True)
+            one = next(iter(found.values()))
+            data.attrs.update({"units": one.unit, "long_name": one.text})
+            data.dims[0].attach_scale(file["time"])
+            data.dims[1].attach_scale(file["bearing"])

@@ -1,0 +1,100 @@
+"""How severe a found drop was at a bearing: safety, impulse, energy, indices, fatigue, with intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.estimate.bearing_drop import BearingDrop
+from rotordrop.estimate.estimate import Estimate
+from rotordrop.estimated import IdentifiedValue
+from rotordrop.evidence.look import INDEX_WINDOW
+from rotordrop.rotor.bearing_numbers import Ratings, numbers_of
+from rotordrop.severity.numbers import fatigue_shares, static_safety_of_load, static_safety_of_stress
+
+Array = NDArray[np.float64]
+Factor = Callable[[float], float]
+
+
+def severity_values(estimate: Estimate, bearing: BearingDrop) -> dict[str, IdentifiedValue]:
+    """Severity of one bearing by the fields of `severity.numbers.SEVERITY`; what is not known is left out.
+
+    Intervals follow from those of the peaks and impacts. Impulse and energy add the errors of all impacts as
+    if they were one, because they rest on the same contact and the same machine.
+    """
+    return dict(_values(estimate, bearing))
+
+
+def _values(estimate: Estimate, bearing: BearingDrop) -> Iterator[tuple[str, IdentifiedValue]]:
+    stress, force = bearing.peak_stress, bearing.peak_force
+    if stress.value > 0.0:
+        yield "severity.static_safety", _falling(stress.known, static_safety_of_stress)
+    ratings = numbers_of(estimate.machine.bearing(bearing.name)).ratings()
+    if ratings is not None and force.value > 0.0:
+        yield (
+            "severity.static_safety_of_rating",
+            _falling(force.known, lambda load: static_safety_of_load(ratings.static, load)),
+        )
+    if "impacts" not in bearing.missing:
+        yield "severity.impulse_N_s", _sum([one.impulse for one in bearing.impacts], "N s")
+        yield "severity.skid_energy_J", _sum([one.dissipated_energy for one in bearing.impacts], "J")
+    yield from _indices(estimate, bearing)
+    if ratings is not None and bearing.force_vector is not None and bearing.impacts:
+        loads = numbers_of(estimate.machine.bearing(bearing.name)).element_loads_under(bearing.force_vector)
+        yield from _fatigue(bearing, ratings, loads, estimate.speed)
+
+
+def _falling(known: IdentifiedValue, factor: Factor) -> IdentifiedValue:
+    """A safety factor, which falls where the load rises."""
+    interval = None
+    if known.interval_90 is not None and known.interval_90[0] > 0.0:
+        interval = (factor(known.interval_90[1]), factor(known.interval_90[0]))
+    return IdentifiedValue(value=factor(known.value), status=known.status, interval_90=interval, unit="1")
+
+
+def _sum(parts: list[IdentifiedValue], unit: str) -> IdentifiedValue:
+    if any(one.interval_90 is None for one in parts):
+        return IdentifiedValue(value=sum(one.value for one in parts), unit=unit)
+    low, high = (sum(one.interval_90[k] for one in parts if one.interval_90) for k in (0, 1))
+    return IdentifiedValue(value=sum(one.value for one in parts), interval_90=(low, high), unit=unit)
+
+
+def _indices(estimate: Estimate, bearing: BearingDrop) -> Iterator[tuple[str, IdentifiedValue]]:
+    """Position and velocity index of the motion, as `rotordrop.look` has them; intervals from the air gap."""
+    motion, gap = bearing.motions[-1], bearing.values.get("air_gap_m")
+    if gap is None or not gap.value > 0.0 or len(motion.time) < 3:
+        return
+    during = (motion.time >= 0.0) & (motion.time <= INDEX_WINDOW)
+    time, path = motion.time[during], motion.displacement[during]
+    velocity = np.gradient(path, time, axis=0)
+    yield "severity.position_index", _over_gap(float(np.mean(np.hypot(*path.T))), gap)
+    if estimate.speed > 0.0:
+        rms = float(np.sqrt(np.mean(np.sum(velocity**2, axis=1))))
+        yield "severity.velocity_index", _over_gap(rms / estimate.speed, gap)
+
+
+def _over_gap(length: float, gap: IdentifiedValue) -> IdentifiedValue:
+    interval = None
+    if gap.interval_90 is not None and gap.interval_90[0] > 0.0:
+        interval = (length / gap.interval_90[1], length / gap.interval_90[0])
+    return IdentifiedValue(value=length / gap.value, status=gap.status, interval_90=interval, unit="1")
+
+
+def _fatigue(
+    bearing: BearingDrop, ratings: Ratings, loads: Array, speed: float
+) -> Iterator[tuple[str, IdentifiedValue]]:
+    """Shares of the rating life as if the race turned with the rotor from the first impact on.
+
+    It turns slower, so that the number is an upper end; the lower one is nothing.
+    """
+    time = bearing.force.time
+    spin = np.where(time >= bearing.impacts[0].start, speed, 0.0)
+    low, high = bearing.peak_force.interval_90 or (bearing.peak_force.value, bearing.peak_force.value)
+    factor = (high / bearing.peak_force.value) ** 3
+    names = ("fatigue_by_segments", "fatigue_by_16281", "fatigue_by_rainflow")
+    for name, share in zip(names, fatigue_shares(ratings, time, loads, spin), strict=True):
+        least = 0.0 if name != "fatigue_by_rainflow" else (low / bearing.peak_force.value) ** 3 * share
+        interval = (least, factor * share)
+        yield f"severity.{name}", IdentifiedValue(value=share, interval_90=interval, unit="1")

@@ -1,0 +1,126 @@
+"""From a recorded drop to force and stress, with their uncertainty."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from rotordrop.estimate.methods import Method as Method
+from rotordrop.estimate.methods import Replay as Replay
+from rotordrop.estimate.methods import Tracked as Tracked
+
+if TYPE_CHECKING:
+    from rotordrop.estimate.estimate import Estimate, Estimates
+    from rotordrop.machine import Machine
+    from rotordrop.record.record import Record
+
+Progress = Callable[[str, float], None]
+FOLLOWED = Tracked()
+
+
+def estimate_drop(
+    machine: Machine,
+    record: Record,
+    tail: Record | None = None,
+    *,
+    method: Method = FOLLOWED,
+    name: str | None = None,
+    progress: Progress | None = None,
+) -> Estimate:
+    """Estimate force and stress of the touchdown bearings from one recorded drop.
+
+    Parameters
+    ----------
+    machine : Machine
+        The machine, with guesses where nothing better is known.
+    record : Record
+        The recorded drop.
+    tail : Record, optional
+        The settled tail; the replay needs it when the record does not reach standstill.
+    method : Tracked or Replay
+        A drop model that follows the record, or the paper's open-loop replay, with options.
+    name : str, optional
+        Name of the drop; the file's by default.
+    progress : callable, optional
+        Called with a text and the fraction done.
+
+    Raises
+    ------
+    RecordError
+        If the record cannot be used.
+    IdentificationError
+        If no estimate can be made of it.
+
+    Examples
+    --------
+    >>> from rotordrop.estimation import Replay, Tracked
+    >>> Tracked(quick=True)
+    Tracked(quick=True)
+    >>> Replay(draws=128).draws
+    128
+    """
+    names = None if name is None else [name]
+    return estimate_drops(machine, [record], [tail], method=method, names=names, progress=progress)[0]
+
+
+def estimate_drops(
+    machine: Machine,
+    records: Sequence[Record],
+    tails: Sequence[Record | None] | None = None,
+    *,
+    method: Method = FOLLOWED,
+    names: Sequence[str] | None = None,
+    progress: Progress | None = None,
+) -> Estimates:
+    """Estimate several recorded drops of one machine; tracked ones share its parameters in one fit.
+
+    The result is a tuple with one table of all drops, ``.to_dataframe()``.
+
+    Parameters
+    ----------
+    machine : Machine
+        The machine, calibrated or with guesses.
+    records, tails : sequence of Record
+        The drops and their settled tails (None where there is none, or left out).
+    method : Tracked or Replay
+        How, with options.
+    names : sequence of str, optional
+        Names of the drops; file stems by default.
+    progress : callable, optional
+        Called with a text and the fraction done.
+
+    Raises
+    ------
+    RecordError, IdentificationError
+        As for `estimate_drop`; nothing is computed before every record has passed the gate.
+    """
+    from rotordrop.errors import UsageError
+    from rotordrop.estimate.estimate import Estimates
+    from rotordrop.estimate.record_facts import facts_of
+
+    if not isinstance(method, Tracked | Replay):
+        raise UsageError(f"the method is {method!r}; expected Tracked(...) or Replay(...).")
+    tails = [None] * len(records) if tails is None else tails
+    if len(tails) != len(records):
+        raise UsageError(f"{len(tails)} tails for {len(records)} records; expected one, or None, for each.")
+    stems = names or [r.path.stem if r.path else f"drop_{i + 1}" for i, r in enumerate(records)]
+    facts = [
+        facts_of(machine, record, tail, stem)
+        for record, tail, stem in zip(records, tails, stems, strict=True)
+    ]
+    if isinstance(method, Replay):
+        from rotordrop.replay.replay import replay_drop
+
+        return Estimates(
+            replay_drop(machine, record, tail, method, one, name=stem, progress=progress)
+            for record, tail, stem, one in zip(records, tails, stems, facts, strict=True)
+        )
+    from rotordrop.evidence.evidence import read_evidence
+    from rotordrop.rotor.parameters import build_drop_model
+    from rotordrop.twin.tracked import followed_drops
+    from rotordrop.twin.tracked_estimate import estimate_of
+
+    model = build_drop_model(machine)
+    evidence = [read_evidence(model, r, t, name=n) for r, t, n in zip(records, tails, stems, strict=True)]
+    drops = followed_drops(machine, evidence, quick=method.quick, progress=progress)
+    return Estimates(estimate_of(drop, method, one) for drop, one in zip(drops, facts, strict=True))

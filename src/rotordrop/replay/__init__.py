@@ -1,0 +1,1 @@
+"""The paper's open-loop replay of a recorded drop."""

@@ -1,0 +1,433 @@
+"""Calibrate a machine: one fit over several drops, written back with intervals and provenance."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.errors import IdentificationError, UsageError
+from rotordrop.estimate.document import structure_json
+from rotordrop.estimate.estimate import Structure
+from rotordrop.estimated import NINETY, Estimated, IdentifiedValue, Verdict
+from rotordrop.evidence.evidence import read_evidence
+from rotordrop.machine import CalibrationDrop, CalibrationOrigin, Machine, RecordedLift
+from rotordrop.record.record import Record
+from rotordrop.rotor.parameter import Parameter
+from rotordrop.rotor.parameter_table import parameter, row_of, rows, separating_measurement
+from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.rotor.statics import bearing_load_shares
+from rotordrop.rotor.unknowns import typical_depth, weight_per_magnet
+from rotordrop.track.consistency import Check, consistency_checks, judged_by
+from rotordrop.track.problem import DropProblem
+from rotordrop.track.smoother import Smoothed, parameter_sample
+from rotordrop.track.unknown_impulses import likeliest_noise, with_noise
+from rotordrop.twin.joint_spread import joint_spread
+from rotordrop.twin.structure_sentence import structure_of
+from rotordrop.twin.tracked import CALIBRATION_SCHEDULE, track_drops
+from rotordrop.twin.tracked_loads import INCONSISTENT_WIDENING
+from rotordrop.twin.tracked_parameters import (
+    NOT_DETERMINED,
+    identified,
+    model_error,
+    parameter_widening,
+)
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, float], None]
+
+CONFOUNDED = 0.9
+"""Correlation from which two parameters are reported as confounded [1]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Identifiability:
+    """What the records say about one parameter: its prior and posterior standard deviation, and the verdict.
+
+    Standard deviations are of the logarithm for positive parameters; the verdict is that of its value.
+    """
+
+    path: str
+    prior_sigma: float
+    posterior_sigma: float
+    verdict: Verdict
+
+
+@dataclass(frozen=True, kw_only=True)
+class Confounded:
+    """Two parameters the records cannot tell apart, their correlation [1], and what would separate them."""
+
+    first: str
+    second: str
+    correlation: float
+    way_out: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Calibration:
+    """A calibrated machine with what stands behind it.
+
+    Attributes
+    ----------
+    machine : Machine
+        The machine with estimates in place of guesses.
+    values : dict
+        Every estimated parameter by path.
+    identifiability : tuple of Identifiability
+        What the records determine.
+    confounded : tuple of Confounded
+        What they cannot tell apart.
+    checks : dict
+        Consistency checks of each drop.
+    consistent : bool
+        Whether all checks of all drops passed.
+    structure : tuple of Structure
+        What the machine has beyond the usual model; empty where that does.
+    """
+
+    machine: Machine
+    values: dict[str, IdentifiedValue]
+    identifiability: tuple[Identifiability, ...]
+    confounded: tuple[Confounded, ...]
+    checks: dict[str, tuple[Check, ...]]
+    consistent: bool
+    nis: dict[str, float]
+    structure: tuple[Structure, ...] = ()
+
+    def sentence(self) -> str:
+        """The outcome in words."""
+        found, weakly = (
+            sum(entry.verdict == verdict for entry in self.identifiability)
+            for verdict in ("determined", "weakly determined")
+        )
+        text = (
+            f"{found} of {len(self.identifiability)} parameters are determined by {len(self.checks)} drop(s)"
+            f", {weakly} more weakly"
+        )
+        found_too = "".join(f" {one.sentence}" for one in self.structure)
+        if self.consistent:
+            return f"{text}; the model is consistent with all of them.{found_too}"
+        bad = [name for name, checks in self.checks.items() if not all(check.passed for check in checks)]
+        return f"{text}; the model is not consistent with {', '.join(bad)}: intervals are doubled.{found_too}"
+
+
+def calibrate_machine(
+    machine: Machine,
+    records: Sequence[Record],
+    tails: Sequence[Record | None],
+    *,
+    names: Sequence[str] | None = None,
+    progress: Progress | None = None,
+) -> Calibration:
+    """Fit the parameters of a machine to several recorded drops.
+
+    Parameters
+    ----------
+    machine : Machine
+        The machine with guesses.
+    records, tails : sequence of Record
+        Drops of this machine, and their settled tails (None where there is none).
+    names : sequence of str, optional
+        Names of the drops.
+    progress : callable, optional
+        Called with a sentence and the fraction done.
+
+    Returns
+    -------
+    Calibration
+        The machine with estimates, what the records determine and what not.
+    """
+    stems = list(names or [r.path.stem if r.path else f"drop_{i + 1}" for i, r in enumerate(records)])
+    model = build_drop_model(machine)
+    evidence = [read_evidence(model, r, t, name=n) for r, t, n in zip(records, tails, stems, strict=True)]
+    found = track_drops(machine, evidence, calibrate_only=True, progress=progress)
+    machine, usual = found.machine, found.fit
+    factor = likeliest_noise(usual, CALIBRATION_SCHEDULE[-1])
+    tracked = with_noise(usual, CALIBRATION_SCHEDULE[-1], factor)
+    checks = {
+        name: consistency_checks(
+            problem,
+            replace(smoothed, filtered=judged_by(problem, smoothed.filtered, past.filtered)),
+            factor,
+        )
+        for name, problem, smoothed, past in zip(
+            stems, tracked.problems, tracked.smoothed, usual.smoothed, strict=True
+        )
+    }
+    consistent = all(check.passed for one in checks.values() for check in one)
+    problem, smoothed = tracked.problems[-1], tracked.smoothed[-1]
+    at = parameter_sample(smoothed)
+    covariance = smoothed.covariance(at)
+    mean = smoothed.means[at]
+    widening = 1.0 if consistent else INCONSISTENT_WIDENING
+    values = _values(problem, mean, covariance, widening)
+    bearings = [bearing.name for bearing in machine.touchdown_bearings]
+    identifiability = _identifiability(problem, covariance, values)
+    known = _as_known(at_fitted_exponents(machine, values), identifiability)
+    beside = "" if consistent else " (not consistent with them)"  # for people: nothing reads a source
+    source = f"calibrated on {', '.join(stems)}{beside}"
+    fitted = machine_values(bearings, known, source)
+    joint = joint_spread(problem, mean, covariance, known)
+    said = values | _of_drop(problem, mean, covariance)
+    drops = [
+        CalibrationDrop(name=name, sha256=record.sha256, lift=_lift(one, followed))
+        for name, record, one, followed in zip(
+            stems, records, tracked.problems, tracked.smoothed, strict=True
+        )
+    ]
+    origin = CalibrationOrigin(drops=tuple(drops), consistent=consistent, joint=joint)
+    return Calibration(
+        machine=_possible(_with_unbalance(machine, said), fitted, stems).calibrated_on(origin),
+        values=values,
+        identifiability=identifiability,
+        confounded=_confounded(problem, covariance),
+        checks=checks,
+        consistent=consistent,
+        nis=dict(zip(stems, usual.nis, strict=True)),
+        structure=tuple(structure_of(one, machine, said) for one in found.kept),
+    )
+
+
+def _of_drop(problem: DropProblem, mean: Array, covariance: Array) -> dict[str, IdentifiedValue]:
+    """What was found of the last drop alone: unbalance, remanent lift, drag of the air."""
+    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    first = problem.n_dynamic
+    return {
+        unknown.path: identified(unknown, float(mean[first + k]), float(sigma[first + k]))
+        for k, unknown in enumerate(problem.unknowns)
+        if unknown.scope == "drop"
+    }
+
+
+def _lift(problem: DropProblem, smoothed: Smoothed) -> tuple[RecordedLift, ...]:
+    """What a drop shows of the remanent force of each magnet, in shares of the weight it carries."""
+    at, machine = parameter_sample(smoothed), problem.model.machine
+    mean, sigma = smoothed.means[at], np.sqrt(np.maximum(np.diag(smoothed.covariance(at)), 0.0))
+    share = weight_per_magnet(machine)
+    found = {
+        unknown.path: (
+            float(mean[problem.n_dynamic + k]) / share,
+            float(sigma[problem.n_dynamic + k]) / share,
+        )
+        for k, unknown in enumerate(problem.unknowns)
+        if unknown.parameter.owner == "magnet"
+    }
+    sideways, up = (parameter(f"remanent_force.{axis}", "magnet") for axis in "xy")
+    return tuple(
+        RecordedLift(
+            magnet=amb.name,
+            sideways=found[sideways.path_of(amb.name)][0],
+            sideways_error=found[sideways.path_of(amb.name)][1],
+            up=found[up.path_of(amb.name)][0],
+            up_error=found[up.path_of(amb.name)][1],
+        )
+        for amb in machine.ambs
+    )
+
+
+def _with_unbalance(machine: Machine, said: Mapping[str, IdentifiedValue]) -> Machine:
+    """The machine with an unbalance as large as the one found where that is beyond the described one.
+
+    What was described then is the width of a prior, and no amount that a simulation could use.
+    """
+    values = {}
+    for i, unbalance in enumerate(machine.unbalances):
+        if unbalance.beyond_described is not None:
+            along = [said[f"unbalance.{i}.{part}"].value for part in ("cosine", "sine")]
+            found = math.hypot(*along)
+            factor = float(unbalance.beyond_described) * found / float(unbalance.amount)
+            values[f"unbalance.{i}.amount"] = Estimated(value=found, status="guess")
+            values[f"unbalance.{i}.beyond_described"] = Estimated(value=factor, status="guess")
+    return machine.with_values(values) if values else machine
+
+
+def _possible(machine: Machine, fitted: dict[str, Estimated], drops: Sequence[str]) -> Machine:
+    """The machine with the fitted values, if there can be such a machine."""
+    try:
+        return machine.with_values(fitted)
+    except UsageError as error:
+        raise IdentificationError(
+            f"the fit to {', '.join(drops)} ended at a machine that cannot be: {error}. The description is "
+            "too far from the machine, or a sensor is missing, swapped or reversed; check sensors, bearing "
+            "nodes and ranges, and that all drops are of this machine."
+        ) from error
+
+
+def _values(
+    problem: DropProblem, mean: Array, covariance: Array, widening: float
+) -> dict[str, IdentifiedValue]:
+    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    values: dict[str, IdentifiedValue] = {}
+    for k, unknown in enumerate(problem.unknowns):
+        if unknown.scope != "machine":
+            continue
+        i = problem.n_dynamic + k
+        error = model_error(unknown, float(sigma[i]))
+        wide = parameter_widening(unknown, error, widening)
+        values[unknown.path] = identified(unknown, float(mean[i]), error, wide)
+    first = problem.n_dynamic + len(problem.unknowns)
+    for c, sensor in enumerate(problem.model.machine.sensors):
+        gain, offset = first + c, first + problem.n_channels + c
+        reading = 1.0 + float(mean[gain])
+        values[f"sensors.{sensor.name}.gain"] = _plain(
+            1.0 / reading, float(sigma[gain]) / reading**2, widening, "1"
+        )
+        values[f"sensors.{sensor.name}.offset"] = _plain(
+            float(mean[offset]), float(sigma[offset]), widening, "m"
+        )
+    return values
+
+
+def _plain(value: float, sigma: float, widening: float, unit: str) -> IdentifiedValue:
+    half = NINETY * sigma * widening
+    return IdentifiedValue(
+        value=value, standard_error=sigma * widening, interval_90=(value - half, value + half), unit=unit
+    )
+
+
+def at_fitted_exponents(machine: Machine, values: dict[str, IdentifiedValue]) -> dict[str, IdentifiedValue]:
+    """Values whose contact stiffness belongs to the fitted contact exponent.
+
+    The fit, and what is reported, gives the stiffness [N/m^n] of the exponent in the machine description, to
+    be compared with it; a description holds one pair, with the same force at a typical indentation.
+    """
+    found = dict(values)
+    for bearing in machine.touchdown_bearings:
+        exponent = values.get(f"{bearing.name}.contact.exponent")
+        stiffness = values.get(f"{bearing.name}.contact.stiffness")
+        if exponent is None or stiffness is None or stiffness.interval_90 is None:
+            continue
+        exponent = _within_limits(exponent, parameter("contact.exponent"))
+        found[f"{bearing.name}.contact.exponent"] = exponent
+        depth = typical_depth(bearing, float(np.mean(bearing_load_shares(machine))))
+        factor = depth ** (float(bearing.contact.exponent) - exponent.value)
+        low, high = stiffness.interval_90
+        found[f"{bearing.name}.contact.stiffness"] = replace(
+            stiffness, value=factor * stiffness.value, interval_90=(factor * low, factor * high)
+        )
+    return found
+
+
+def _within_limits(value: IdentifiedValue, row: Parameter) -> IdentifiedValue:
+    interval = value.interval_90 or (value.value, value.value)
+    low, middle, high = (row.within(number) for number in (interval[0], value.value, interval[1]))
+    return replace(value, value=middle, interval_90=(low, high))
+
+
+def _as_known(
+    values: dict[str, IdentifiedValue], identifiability: tuple[Identifiability, ...]
+) -> dict[str, IdentifiedValue]:
+    """Values of which a parameter that the records do not determine has the interval of its prior.
+
+    What the fit leaves of its uncertainty rests on a random walk of the filter; an estimate with the
+    calibrated machine would take it for knowledge.
+    """
+    found = dict(values)
+    for entry in identifiability:
+        path = entry.path
+        if entry.verdict in NOT_DETERMINED and row_of(path).logarithmic:
+            row, value, reach = row_of(path), found[path].value, math.exp(NINETY * entry.prior_sigma)
+            interval = (row.within(value / reach), row.within(value * reach))
+            found[path] = replace(found[path], interval_90=interval)
+    return found
+
+
+def machine_values(
+    bearings: Sequence[str], values: dict[str, IdentifiedValue], source: str
+) -> dict[str, Estimated]:
+    """Calibrated values as entries of a machine description, the horizontal support with them.
+
+    What the records do not determine stays a guess, so that no later estimate calls it known.
+    """
+    entries = {}
+    for path, value in values.items():
+        known = value.status not in NOT_DETERMINED
+        entries[path] = Estimated(
+            value=value.value,
+            status="estimated" if known else "guess",
+            interval_90=value.interval_90 if known else None,
+            range=None if known else value.interval_90,
+            source=source if known else f"{source}; {value.status}",
+            unit=value.unit,
+        )
+    for name in bearings:
+        ratio = entries.pop(parameter("support.anisotropy").path_of(name), None)
+        if ratio is None:
+            continue
+        vertical = entries[parameter("support.stiffness").path_of(name)]
+        low, high = vertical.interval_90 or vertical.range or (vertical.value, vertical.value)
+        scaled = (low * ratio.value, high * ratio.value)
+        entries[f"{name}.support.stiffness_horizontal"] = replace(
+            vertical,
+            value=vertical.value * ratio.value,
+            interval_90=None if vertical.interval_90 is None else scaled,
+            range=None if vertical.range is None else scaled,
+        )
+    return entries
+
+
+def _identifiability(
+    problem: DropProblem, covariance: Array, values: dict[str, IdentifiedValue]
+) -> tuple[Identifiability, ...]:
+    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return tuple(
+        Identifiability(
+            path=unknown.path,
+            prior_sigma=unknown.sigma,
+            posterior_sigma=float(sigma[problem.n_dynamic + k]),
+            verdict=values[unknown.path].status,
+        )
+        for k, unknown in enumerate(problem.unknowns)
+        if unknown.scope == "machine"
+    )
+
+
+def _confounded(problem: DropProblem, covariance: Array) -> tuple[Confounded, ...]:
+    start, n_p = problem.n_dynamic, len(problem.unknowns)
+    known = [(u.parameter, u.owner) for u in problem.unknowns]
+    known += [(row, s.name) for row in rows("sensor") for s in problem.model.machine.sensors]
+    count = n_p + 2 * problem.n_channels
+    block = covariance[start : start + count, start : start + count]
+    sigma = np.sqrt(np.maximum(np.diag(block), 1e-300))
+    correlation = block / np.outer(sigma, sigma)
+    pairs = [(i, j) for i in range(count) for j in range(i) if abs(correlation[i, j]) > CONFOUNDED]
+    return tuple(
+        Confounded(
+            first=known[j][0].path_of(known[j][1]),
+            second=known[i][0].path_of(known[i][1]),
+            correlation=float(correlation[i, j]),
+            way_out=separating_measurement(known[j][0], known[i][0]),
+        )
+        for i, j in sorted(pairs, key=lambda pair: -abs(correlation[pair]))
+    )
+
+
+def calibration_json(calibration: Calibration) -> dict[str, object]:
+    """The calibration ready for JSON: values, identifiability, confounded pairs, checks."""
+    return {
+        "values": {path: value.as_json() for path, value in calibration.values.items()},
+        "identifiability": [
+            {
+                "path": e.path,
+                "prior_standard_deviation": e.prior_sigma,
+                "posterior_standard_deviation": e.posterior_sigma,
+                "verdict": e.verdict,
+            }
+            for e in calibration.identifiability
+        ],
+        "confounded": [
+            {"first": c.first, "second": c.second, "correlation": c.correlation, "separated_by": c.way_out}
+            for c in calibration.confounded
+        ],
+        "checks": {
+            name: [{"name": c.name, "passed": c.passed, "message": c.message} for c in checks]
+            for name, checks in calibration.checks.items()
+        },
+        "consistent": calibration.consistent,
+        "structure": structure_json(calibration.structure),
+        "nis": {name: value if math.isfinite(value) else None for name, value in calibration.nis.items()},
+        "sentence": calibration.sentence(),
+    }

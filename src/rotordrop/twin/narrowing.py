@@ -1,0 +1,104 @@
+"""Which further number about a machine would narrow the intervals of a drop most, and by how much."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.estimate.advice import WORTH_SAYING, Advice
+from rotordrop.estimate.allowances import BEAM_FORCE_SIGMA, MODEL_FORCE_SIGMA
+from rotordrop.estimated import NINETY
+from rotordrop.rotor.rotor_form import is_beam
+from rotordrop.track.forces import ForceHistory, force_gradient
+from rotordrop.track.problem import DropProblem
+from rotordrop.track.smoother import Smoothed, smooth
+
+Array = NDArray[np.float64]
+
+DRAWING = "the rotor by its sections, from a drawing,"
+TOLD = 3
+"""Measurements that are told."""
+
+
+def narrowing(
+    problem: DropProblem, smoothed: Smoothed, forces: ForceHistory, widening: float = 1.0
+) -> tuple[Advice, ...]:
+    """Measurements worth making, the one that narrows most first.
+
+    A number that becomes known takes away the part of the variance of a force that it explains: of a normal
+    distribution that is ``cᵀ P⁻¹ c`` with the covariance c of force and numbers, and P of the numbers. What
+    every model here leaves out stays.
+
+    Parameters
+    ----------
+    problem, smoothed : DropProblem, Smoothed
+        A followed drop, estimated alone.
+    forces : ForceHistory
+        Its forces.
+    widening : float
+        Factor on all intervals [1].
+    """
+    names = problem.model.bearing_names
+    peaks = [int(np.argmax(forces.magnitude[:, b])) for b in range(len(names))]
+    at_peaks = smooth(smoothed.filtered, kept=peaks)
+    beam = BEAM_FORCE_SIGMA if is_beam(problem.model.machine.rotor) else 0.0
+    before: dict[str, float] = {}
+    after: dict[str, dict[str, float]] = {name: {} for name, _ in _measurements(problem)}
+    drawing: dict[str, float] = {}
+    for b, (name, at) in enumerate(zip(names, peaks, strict=True)):
+        covariance = at_peaks.covariance(at)
+        gradient = force_gradient(problem, smoothed.means[at], b)
+        shared = covariance @ gradient
+        variance, force = max(float(gradient @ shared), 0.0), float(forces.magnitude[at, b])
+        rest = (MODEL_FORCE_SIGMA**2 + beam**2) * force**2
+        before[name] = NINETY * widening * math.sqrt(variance + rest)
+        drawing[name] = NINETY * widening * math.hypot(math.sqrt(variance), MODEL_FORCE_SIGMA * force)
+        for measurement, entries in _measurements(problem):
+            known = explained(covariance[np.ix_(entries, entries)], shared[entries])
+            left = max(variance - known, 0.0)
+            after[measurement][name] = NINETY * widening * math.sqrt(left + rest)
+    listed = [
+        Advice(
+            measurement=measurement,
+            paths=tuple(_paths(problem)[entry] for entry in entries),
+            half_widths=before,
+            narrowed=after[measurement],
+        )
+        for measurement, entries in _measurements(problem)
+    ]
+    if beam:
+        listed.append(Advice(measurement=DRAWING, paths=("rotor",), half_widths=before, narrowed=drawing))
+    listed.sort(key=lambda one: one.left)
+    return tuple(one for one in listed[:TOLD] if one.left < WORTH_SAYING)
+
+
+def explained(covariance: Array, shared: Array) -> float:
+    """Part of a variance that numbers explain, from their covariance and what they share with it."""
+    sigma = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    scaled = covariance / np.outer(sigma, sigma)
+    # Numbers that a record only knows together make the matrix singular: what they share counts once.
+    return float((shared / sigma) @ np.linalg.pinv(scaled, rcond=1e-6, hermitian=True) @ (shared / sigma))
+
+
+def _measurements(problem: DropProblem) -> Iterator[tuple[str, list[int]]]:
+    """What can be measured, and the entries of the estimate it would make known."""
+    groups: dict[str, list[int]] = {}
+    for k, unknown in enumerate(problem.unknowns):
+        if unknown.parameter.measured_by:
+            name = unknown.parameter.measured_by.format(owner=unknown.owner)
+            groups.setdefault(name, []).append(problem.n_dynamic + k)
+    first = problem.n_dynamic + len(problem.unknowns)
+    groups["a calibration of the displacement sensors"] = list(range(first, first + problem.n_channels))
+    yield from groups.items()
+
+
+def _paths(problem: DropProblem) -> dict[int, str]:
+    """Paths of the entries of the estimate."""
+    first = problem.n_dynamic + len(problem.unknowns)
+    paths = {problem.n_dynamic + k: unknown.path for k, unknown in enumerate(problem.unknowns)}
+    return paths | {
+        first + c: f"sensors.{sensor.name}.gain" for c, sensor in enumerate(problem.model.machine.sensors)
+    }

@@ -1,0 +1,333 @@
+"""From a followed drop to its estimate: which numbers hold, which give way, and nothing of the filter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.errors import IdentificationError
+from rotordrop.estimate.advice import Advice
+from rotordrop.estimate.assumptions import twin_assumptions
+from rotordrop.estimate.bearing_drop import BearingDrop
+from rotordrop.estimate.estimate import (
+    CrossCheck,
+    Estimate,
+    FittedParameter,
+    Innovations,
+    SensorErrors,
+    Structure,
+    Verdict,
+)
+from rotordrop.estimate.later_motion import LaterMotion, later_motion
+from rotordrop.estimate.methods import Tracked
+from rotordrop.estimate.record_facts import RecordFacts
+from rotordrop.estimate.unbalance import PlaneUnbalance, unbalance_notes
+from rotordrop.estimated import IdentifiedValue
+from rotordrop.rotor.bearing_numbers import numbers_of
+from rotordrop.rotor.rotor_form import is_beam
+from rotordrop.track.consistency import NIS_RANGE, Check
+from rotordrop.track.input_state import InputEstimate, at_bearings
+from rotordrop.twin.narrowing import DRAWING, narrowing
+from rotordrop.twin.structure_sentence import structure_of
+from rotordrop.twin.tracked import TrackedDrop
+from rotordrop.twin.tracked_loads import (
+    INCONSISTENT_WIDENING,
+    Loads,
+    bearing_drop,
+    check_of_the_rotor,
+    cross_checks,
+    holding_cross_check,
+    is_apart,
+    is_beside,
+    loads_of_cross_check,
+    of_the_rotor,
+    twin_loads,
+)
+from rotordrop.twin.tracked_parameters import (
+    bearing_values,
+    gap_of_record,
+    is_lost,
+    joint_estimate,
+    parameters,
+    sensor_errors,
+)
+from rotordrop.twin.tracked_unbalance import plane_unbalances
+
+Array = NDArray[np.float64]
+
+QUICK = (
+    "Quick estimate: one pass over the record, {}without the search for the size of the unknown impulses. "
+    "For a number that decides, leave --quick out."
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Judgement:
+    """How far the twin is believed.
+
+    ``check`` is the estimate without contact law, if one was made; ``widening`` the factor on the twin's
+    intervals [1]; ``parameters`` and ``sensors`` what it identified; ``given_way`` the bearings whose numbers
+    are not the twin's.
+    """
+
+    verdict: Verdict
+    check: InputEstimate | None
+    widening: float
+    parameters: tuple[FittedParameter, ...]
+    sensors: tuple[SensorErrors, ...]
+    given_way: tuple[bool, ...]
+
+    @property
+    def fits(self) -> bool:
+        """Whether the twin's own numbers hold."""
+        return self.verdict.holds
+
+
+def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estimate:
+    """The estimate of a followed drop; it keeps nothing of the filter.
+
+    Raises
+    ------
+    IdentificationError
+        If the model does not fit the record and the sensors see too little for a cross-check: the errors of
+        its numbers have no limit then.
+    """
+    drop, check = _cross_checked(drop, method)
+    problem, evidence = drop.problem, drop.evidence
+    judged = _judge(drop, check)
+    later = _later(drop, judged)
+    advice = _advice(drop, judged)
+    unbalance = _unbalance(drop, judged)
+    quick = (QUICK.format("" if judged.check else "without the independent cross-check and "),)
+    return Estimate(
+        name=evidence.name,
+        method=method,
+        machine=problem.model.machine,
+        record=evidence.record,
+        drop_instant=evidence.power_off,
+        speed=float(problem.mean[problem.model.layout.rotor_speed]),
+        until=float(problem.time[-1]),
+        verdict=judged.verdict,
+        bearings=_bearings(drop, judged),
+        parameters=judged.parameters,
+        checks=drop.checks,
+        sensors=judged.sensors,
+        joint=joint_estimate(problem, drop.smoothed) if judged.fits else None,
+        unbalance=unbalance,
+        structure=_structure(drop, judged),
+        cross_check=_comparisons(drop, judged),
+        innovations=_innovations(drop),
+        nis=drop.judged.nis,
+        noise_factor=drop.noise_factor,
+        advice=advice,
+        later=later,
+        findings=facts.findings,
+        warnings=facts.warnings_with(
+            *evidence.power_off.notes, *(one.sentence() for one in later if one.larger)
+        ),
+        notes=(
+            *twin_assumptions(evidence, problem),
+            *(check.note for check in drop.checks if check.note),
+            *(f"a further number: {one.sentence()}" for one in advice),
+            *unbalance_notes(unbalance),
+            *(quick if method.quick else ()),
+        ),
+        simulated_record=facts.simulated,
+    )
+
+
+def _advice(drop: TrackedDrop, judged: _Judgement) -> tuple[Advice, ...]:
+    """What to measure of a machine whose rotor is not known by its drawing; of others it costs a pass."""
+    unsure = any(unknown.parameter.owner == "rotor" for unknown in drop.problem.unknowns)
+    if not unsure or drop.drops != 1:
+        return ()
+    if judged.fits:
+        return narrowing(drop.problem, drop.smoothed, drop.forces, judged.widening)
+    return _by_a_drawing(drop, judged)
+
+
+def _by_a_drawing(drop: TrackedDrop, judged: _Judgement) -> tuple[Advice, ...]:
+    """What a drawing of the rotor brings at least, where the twin with a beam does not fit the record.
+
+    Its covariances say nothing then, so no other number can be weighed. The error of a beam is known and
+    falls away; the rest stays as wide as the cross-check leaves it, though a twin of the rotor may well fit.
+    """
+    if judged.check is None or not is_beam(drop.problem.model.machine.rotor):
+        return ()
+    drawn = replace(drop, forces=of_the_rotor(drop.forces))
+    known = replace(judged, check=check_of_the_rotor(judged.check))
+    before, after = (
+        {
+            name: 0.5 * (high - low)
+            for b, name in enumerate(drop.problem.model.bearing_names)
+            for low, high in [_loads(one, by, b).peak_force.interval_90 or (0.0, 0.0)]
+        }
+        for one, by in ((drop, judged), (drawn, known))
+    )
+    return (Advice(measurement=DRAWING, paths=("rotor",), half_widths=before, narrowed=after, at_most=True),)
+
+
+def _unbalance(drop: TrackedDrop, judged: _Judgement) -> tuple[PlaneUnbalance, ...]:
+    evidence = drop.evidence
+    return plane_unbalances(
+        drop.problem,
+        drop.smoothed,
+        evidence.record.marks,
+        evidence.power_off.value,
+        fits=judged.fits,
+        widening=judged.widening,
+    )
+
+
+def _structure(drop: TrackedDrop, judged: _Judgement) -> tuple[Structure, ...]:
+    values = {parameter.path: parameter.estimate for parameter in judged.parameters}
+    machine = drop.problem.model.machine
+    return tuple(structure_of(kept, machine, values) for kept in drop.kept)
+
+
+def _cross_checked(drop: TrackedDrop, method: Tracked) -> tuple[TrackedDrop, InputEstimate | None]:
+    """The drop with one check more, and the estimate without contact law, if one is made.
+
+    A twin whose innovations are white may still be wrong where its contact law is: a peak that is a factor
+    apart from the cross-check is not called consistent, nor is one with a beam in place of the rotor, whose
+    innovations are white by larger impulses, beyond the accuracy of the cross-check. The twin lends nothing
+    to the cross-check, since what it says of gaps and sensors may be as wrong as what it says of forces. A
+    quick estimate does without it, but not for a bearing with play, whose force no study has validated.
+    """
+    problem = drop.problem
+    departs = is_apart if is_beam(problem.model.machine.rotor) else is_beside
+    with_play = any(not numbers_of(b).held for b in problem.model.machine.touchdown_bearings)
+    if not drop.sees_all_directions or (drop.consistent and method.quick and not with_play):
+        return drop, None
+    if drop.consistent:
+        check = drop.without_contact_law()
+        apart = [
+            f"the peak force at {name} is {peak:.0f} N, without a contact law {check.peak[b]:.0f} N"
+            for b, name in enumerate(problem.model.bearing_names)
+            if departs(peak := float(drop.forces.magnitude[:, b].max()), check, b)
+        ]
+        if not apart:
+            return drop, check
+        failed = Check(name="cross-check", passed=False, message="; ".join(apart))
+        return replace(drop, checks=(*drop.checks, failed)), check
+    return drop, drop.without_contact_law()
+
+
+def _judge(drop: TrackedDrop, check: InputEstimate | None) -> _Judgement:
+    """Weigh the twin's own checks and the estimate without contact law."""
+    problem, smoothed = drop.problem, drop.smoothed
+    if not drop.consistent and check is None:
+        _refuse_unchecked(drop)
+    fits = drop.consistent or check is None
+    widening = 1.0 if drop.consistent else INCONSISTENT_WIDENING
+    found = parameters(problem, smoothed, fits=fits, widening=widening)
+    given_way = [False] * len(problem.model.bearing_names)
+    if not fits and check is not None:
+        given_way = [_gives_way(drop, found, check, b) for b in range(len(given_way))]
+    verdict = Verdict.CONSISTENT if drop.consistent else Verdict.ONE_DIRECTION
+    if drop.consistent and drop.kept:
+        verdict = Verdict.EXTENDED
+    if not fits:
+        verdict = Verdict.GIVEN_WAY if any(given_way) else Verdict.HELD
+    return _Judgement(
+        verdict=verdict,
+        check=check,
+        widening=widening,
+        parameters=tuple(_with_own_gap(drop, parameter, given_way) for parameter in found),
+        sensors=sensor_errors(problem, smoothed, fits=fits, widening=widening),
+        given_way=tuple(given_way),
+    )
+
+
+def _refuse_unchecked(drop: TrackedDrop) -> None:
+    failed = [check for check in drop.checks if not check.passed]
+    if len(failed) == 1:  # the directions themselves: the model fits what is seen
+        return
+    raise IdentificationError(
+        f"the model does not fit the record {drop.evidence.name} "
+        f"({'; '.join(check.message for check in failed)}), and "
+        "nothing can check its force; expected a model that fits, or both directions in two planes. "
+        "Calibrate on drops with all sensors, estimate without --quick, or leave this drop out."
+    )
+
+
+def _gives_way(drop: TrackedDrop, found: tuple[FittedParameter, ...], check: InputEstimate, b: int) -> bool:
+    """Whether the twin has lost the drop at a bearing: by its peak force, or by an air gap that cannot be."""
+    name = drop.problem.model.bearing_names[b]
+    gap = next(parameter.estimate for parameter in found if parameter.path == f"{name}.air_gap")
+    return is_beside(float(drop.forces.magnitude[:, b].max()), check, b) or is_lost(drop.problem, gap, b)
+
+
+def _with_own_gap(drop: TrackedDrop, parameter: FittedParameter, given_way: list[bool]) -> FittedParameter:
+    for b, name in enumerate(drop.problem.model.bearing_names):
+        if given_way[b] and parameter.path == f"{name}.air_gap":
+            return replace(parameter, estimate=gap_of_record(drop.problem, b))
+    return parameter
+
+
+def _bearings(drop: TrackedDrop, judged: _Judgement) -> tuple[BearingDrop, ...]:
+    measured = _measured(drop, judged, drop.problem.readings)
+    found = []
+    for b in range(len(drop.problem.model.bearing_names)):
+        values: dict[str, IdentifiedValue] = bearing_values(drop.problem, judged.parameters, b)
+        held = None if judged.fits else judged.check
+        found.append(
+            bearing_drop(drop.problem, drop.forces, b, _loads(drop, judged, b), measured[:, b], values, held)
+        )
+    return tuple(found)
+
+
+def _loads(drop: TrackedDrop, judged: _Judgement, b: int) -> Loads:
+    twin = _twin(drop, judged, b)
+    if judged.fits or judged.check is None:
+        return twin
+    if judged.given_way[b]:
+        return loads_of_cross_check(judged.check, b)
+    return holding_cross_check(twin, drop.forces, judged.check, b)
+
+
+def _twin(drop: TrackedDrop, judged: _Judgement, b: int) -> Loads:
+    numbers = numbers_of(drop.problem.model.machine.touchdown_bearings[b])
+    return twin_loads(drop.forces, b, judged.widening, numbers.stress_sigma)
+
+
+def _comparisons(drop: TrackedDrop, judged: _Judgement) -> tuple[CrossCheck, ...]:
+    if judged.check is None:
+        return ()
+    found: list[CrossCheck] = []
+    for b, name in enumerate(drop.problem.model.bearing_names):
+        twin = _twin(drop, judged, b)
+        found += cross_checks(name, twin, drop.forces, judged.check, b, replaced=judged.given_way[b])
+    return tuple(found)
+
+
+def _measured(drop: TrackedDrop, judged: _Judgement, readings: Array) -> Array:
+    """Motion at the bearings [m], shape (N, B, 2), sensor errors as estimated or by the record alone."""
+    estimate = drop.smoothed.means[-1] if judged.fits else drop.problem.mean
+    gain_errors, offsets = drop.problem.sensor_errors(estimate)
+    return at_bearings(drop.problem, (readings - offsets) / (1.0 + gain_errors))
+
+
+def _later(drop: TrackedDrop, judged: _Judgement) -> tuple[LaterMotion, ...]:
+    evidence = drop.evidence
+    return later_motion(
+        drop.problem.model.bearing_names,
+        evidence.time,
+        _measured(drop, judged, evidence.readings(np.inf)),
+        until=float(drop.problem.time[-1]),
+        noise=float(np.sqrt(np.mean(drop.problem.variances))),
+    )
+
+
+def _innovations(drop: TrackedDrop) -> Innovations:
+    filtered = drop.judged
+    done = filtered.done
+    return Innovations(
+        channels=tuple(sensor.name for sensor in drop.problem.model.machine.sensors),
+        time=drop.problem.time[:done].copy(),
+        values=filtered.innovations[:done, :-1].copy(),
+        deviation=np.sqrt(filtered.innovation_variances[:done, :-1]),
+        limits=NIS_RANGE,
+    )

@@ -1,0 +1,432 @@
+"""Force and stress of a followed drop: histories with bands, peaks, means and impacts with intervals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.estimate.allowances import (
+    BEAM_FORCE_SIGMA,
+    MODEL_FORCE_SIGMA,
+    MODEL_MEAN_FORCE_SIGMA,
+    MODEL_MEAN_STRESS_SIGMA,
+    MODEL_STRESS_SIGMA,
+)
+from rotordrop.estimate.bearing_drop import (
+    LATE,
+    AirGap,
+    Band,
+    BearingDrop,
+    History,
+    Impact,
+    Motion,
+    Origin,
+    Peak,
+    deepest,
+    mean_late,
+)
+from rotordrop.estimate.estimate import CrossCheck
+from rotordrop.estimated import NINETY, IdentifiedValue, Verdict
+from rotordrop.rotor.rotor_form import is_beam
+from rotordrop.simulate.certificate import refined_peak
+from rotordrop.track.calibration import TrackedDrops
+from rotordrop.track.consistency import direction_check
+from rotordrop.track.forces import ForceHistory
+from rotordrop.track.input_state import (
+    MEAN_ERROR,
+    InputEstimate,
+    input_state_estimate,
+    lent_by_record,
+)
+from rotordrop.track.problem import DropProblem
+
+Array = NDArray[np.float64]
+
+INCONSISTENT_WIDENING = 2.0
+"""Factor on intervals when the model is not consistent with the record [1]; those of force and stress grow
+further until they hold the cross-check as well."""
+FACTOR_APART = 2.0
+"""Factor between twin and cross-check from which the twin cannot have followed the drop [1]."""
+MEAN_STRESS_ERROR = 0.10
+"""Relative error of a mean stress that rests on the preload of the machine file [1]: by its third root."""
+
+INCONSISTENT: Verdict = "the model does not fit the record"
+"""Status of a number whose interval had to be widened to hold the cross-check."""
+OF_CROSS_CHECK: Verdict = "of the cross-check: the model does not fit the record"
+"""Status of a number that does not rest on the twin, because the twin lost the record."""
+NO_LATE_MEAN = f"the estimated part ends before {1e3 * LATE[1]:.0f} ms"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Loads:
+    """Force and stress of one bearing, all from one origin."""
+
+    force: History
+    force_band: Band
+    stress: History
+    stress_band: Band
+    peak_force: Peak
+    peak_stress: Peak
+    means: Mapping[str, IdentifiedValue]
+    missing: Mapping[str, str] = field(default_factory=dict)
+
+
+def of_a_beam(forces: ForceHistory) -> ForceHistory:
+    """Forces with the error of a beam that stands for the rotor; stress goes with the third root of force."""
+    return replace(
+        forces,
+        magnitude_sigma=np.hypot(forces.magnitude_sigma, BEAM_FORCE_SIGMA * forces.magnitude),
+        stress_sigma=np.hypot(forces.stress_sigma, BEAM_FORCE_SIGMA / 3.0 * forces.stress),
+    )
+
+
+def of_the_rotor(forces: ForceHistory) -> ForceHistory:
+    """Forces without the error of a beam, as the rotor itself in its place would leave them."""
+    return replace(
+        forces,
+        magnitude_sigma=_without(forces.magnitude_sigma, BEAM_FORCE_SIGMA * forces.magnitude),
+        stress_sigma=_without(forces.stress_sigma, BEAM_FORCE_SIGMA / 3.0 * forces.stress),
+    )
+
+
+def check_without_contact_law(problem: DropProblem) -> InputEstimate:
+    """The cross-check, with the error of a beam where one stands for the rotor; the twin lends nothing."""
+    check = input_state_estimate(problem, lent_by_record(problem))
+    return check_of_a_beam(check) if is_beam(problem.model.machine.rotor) else check
+
+
+def checks_begun(pool: Executor, fit: TrackedDrops) -> list[Future[InputEstimate] | None]:
+    """The cross-check of every drop of a fit that is seen in all directions, begun in a pool."""
+    return [
+        pool.submit(check_without_contact_law, problem) if direction_check(problem, drop).passed else None
+        for problem, drop in zip(fit.problems, fit.smoothed, strict=True)
+    ]
+
+
+def check_of_a_beam(check: InputEstimate) -> InputEstimate:
+    """The cross-check with the error of a beam that stands for the rotor."""
+    beam = NINETY * BEAM_FORCE_SIGMA
+    return replace(
+        check,
+        peak_error=np.hypot(check.peak_error, beam),
+        stress_error=np.hypot(check.stress_error, beam / 3.0),
+    )
+
+
+def check_of_the_rotor(check: InputEstimate) -> InputEstimate:
+    """The cross-check without the error of a beam."""
+    beam = NINETY * BEAM_FORCE_SIGMA
+    return replace(
+        check,
+        peak_error=_without(check.peak_error, beam),
+        stress_error=_without(check.stress_error, beam / 3.0),
+    )
+
+
+def _without(sigma: Array, part: Array | float) -> Array:
+    """A standard deviation, shape and unit of ``sigma``, less an independent part of it."""
+    return np.sqrt(np.maximum(sigma * sigma - part * part, 0.0))
+
+
+def with_interval(
+    value: float, sigma: float, widening: float = 1.0, unit: str = "", left_out: float = 0.0
+) -> IdentifiedValue:
+    """A magnitude with a symmetric 90 % interval, which does not go below zero.
+
+    ``left_out`` is the standard deviation by what the model leaves out alone, independent of the rest.
+    """
+    half = NINETY * sigma * widening
+    low = max(value - half, 0.0) if value >= 0.0 else value - half
+    return IdentifiedValue(
+        value=value,
+        standard_error=sigma * widening,
+        interval_90=(low, value + half),
+        allowance_90=NINETY * left_out * widening if left_out > 0.0 else None,
+        unit=unit,
+    )
+
+
+def twin_loads(forces: ForceHistory, b: int, widening: float, ball_sigma: float = 0.0) -> Loads:
+    """Force and stress of one bearing as the twin has them; bands are as wide as the stated intervals.
+
+    ``ball_sigma`` is the relative standard deviation of the stress by balls inferred from a designation [1].
+    """
+    force, force_sigma = _history(forces, forces.magnitude, forces.magnitude_sigma, b, MODEL_FORCE_SIGMA)
+    model_sigma = math.hypot(MODEL_STRESS_SIGMA, ball_sigma)
+    stress, stress_sigma = _history(forces, forces.stress, forces.stress_sigma, b, model_sigma)
+    mean_stress = float(np.mean(stress.values))
+    spread = float(np.mean(forces.stress_sigma[:, b]))
+    left_out = math.hypot(MODEL_MEAN_STRESS_SIGMA, ball_sigma) * mean_stress
+    sigma = math.hypot(spread, left_out)
+    means = {"mean_stress_Pa": with_interval(mean_stress, sigma, widening, "Pa", left_out)}
+    late_mean = mean_late(force)
+    if late_mean is not None:
+        sigma = MODEL_MEAN_FORCE_SIGMA * late_mean
+        means["mean_force_0p15_0p2_N"] = with_interval(late_mean, sigma, widening, "N", sigma)
+    return Loads(
+        force=force,
+        force_band=_band(force, NINETY * widening * force_sigma),
+        stress=stress,
+        stress_band=_band(stress, NINETY * widening * stress_sigma),
+        peak_force=_peak(force, force_sigma, widening, "N", MODEL_FORCE_SIGMA),
+        peak_stress=_peak(stress, stress_sigma, widening, "Pa", model_sigma),
+        means=means,
+        missing={} if late_mean is not None else {"mean_force_0p15_0p2_N": NO_LATE_MEAN},
+    )
+
+
+def _history(
+    forces: ForceHistory, values: Array, sigma: Array, b: int, model_share: float
+) -> tuple[History, Array]:
+    history = History(label="estimated", time=forces.time, values=values[:, b], role="estimated")
+    return history, np.hypot(sigma[:, b], model_share * values[:, b])
+
+
+def _band(history: History, half: Array) -> Band:
+    lower = np.maximum(history.values - half, 0.0)
+    return Band(time=history.time, lower=lower, upper=history.values + half)
+
+
+def _peak(history: History, sigma: Array, widening: float, unit: str, model_share: float) -> Peak:
+    value, moment = refined_peak(history.time, history.values)
+    error = float(sigma[int(np.argmax(history.values))])
+    known = with_interval(value, error, widening, unit, model_share * value)
+    return Peak(known=known, time=moment, origin=Origin.TWIN)
+
+
+def holding(value: IdentifiedValue, ratio: float, accuracy: float) -> IdentifiedValue:
+    """The value with an interval that also holds ``ratio`` times it, within a relative accuracy [1]."""
+    low, high = value.interval_90 or (value.value, value.value)
+    other = value.value * ratio if math.isfinite(ratio) else value.value
+    low, high = min(low, other - accuracy * abs(other)), max(high, other + accuracy * abs(other))
+    if value.value >= 0.0:
+        low = max(low, 0.0)
+    return replace(
+        value,
+        interval_90=(low, high),
+        standard_error=(high - low) / (2.0 * NINETY),
+        allowance_90=None,
+        status=INCONSISTENT,
+    )
+
+
+def is_beside(peak: float, check: InputEstimate, b: int) -> bool:
+    """Whether a peak [N] is so far from the cross-check that the twin cannot have followed the drop."""
+    return not 1.0 / FACTOR_APART <= _over_check(peak, check, b) <= FACTOR_APART
+
+
+def is_apart(peak: float, check: InputEstimate, b: int) -> bool:
+    """Whether a peak [N] lies outside the known accuracy of the cross-check."""
+    return abs(_over_check(peak, check, b) - 1.0) > float(check.peak_error[b])
+
+
+def _over_check(peak: float, check: InputEstimate, b: int) -> float:
+    """A peak over that of the cross-check [1]; 1 where there is no impact or nothing to compare it with."""
+    found = float(check.peak[b])
+    return peak / found if math.isfinite(found) and found > 0.0 and peak > 0.0 else 1.0
+
+
+def holding_cross_check(loads: Loads, forces: ForceHistory, check: InputEstimate, b: int) -> Loads:
+    """Force and stress where model and record disagree, with intervals that hold the cross-check.
+
+    The error of the twin's own numbers is not known then: up to 340 % where a support is stiffer in one
+    direction than the model allows, with innovations 14 % too large.
+    """
+    force_ratio = float(check.peak[b]) / max(loads.peak_force.value, 1e-9)
+    stress_ratio = float(check.peak_stress[b]) / max(loads.peak_stress.value, 1e-9)
+    peak_error, stress_error = float(check.peak_error[b]), float(check.stress_error[b])
+    ratios = {"mean_stress_Pa": (stress_ratio, stress_error)}
+    if np.isfinite(check.mean_late[b]):
+        late = (forces.time >= LATE[0]) & (forces.time <= LATE[1])
+        vector = forces.force[late, b].mean(axis=0)
+        ratio = float(check.mean_late[b] / max(np.hypot(*vector), 1e-9))
+        ratios["mean_force_0p15_0p2_N"] = (ratio, MEAN_ERROR)
+    peak_force = replace(loads.peak_force, known=holding(loads.peak_force.known, force_ratio, peak_error))
+    peak_stress = replace(
+        loads.peak_stress, known=holding(loads.peak_stress.known, stress_ratio, stress_error)
+    )
+    return replace(
+        loads,
+        force_band=_stretched(loads.force_band, loads.force, peak_force),
+        stress_band=_stretched(loads.stress_band, loads.stress, peak_stress),
+        peak_force=peak_force,
+        peak_stress=peak_stress,
+        means={
+            name: holding(value, *ratios[name]) if name in ratios else value
+            for name, value in loads.means.items()
+        },
+    )
+
+
+def _stretched(band: Band, history: History, peak: Peak) -> Band:
+    """The band with the relative width of the stated peak everywhere, so that both say the same."""
+    low, high = peak.interval_90 or (peak.value, peak.value)
+    scale = history.values / max(peak.value, 1e-300)
+    return replace(
+        band, lower=np.minimum(band.lower, low * scale), upper=np.maximum(band.upper, high * scale)
+    )
+
+
+def loads_of_cross_check(check: InputEstimate, b: int) -> Loads:
+    """What the cross-check knows, with twice the error it is known to make on drops that the model fits."""
+    peak_error, stress_error = float(check.peak_error[b]), float(check.stress_error[b])
+    force = History(label="cross-check", time=check.time, values=check.magnitude[:, b], role="cross-check")
+    stress = History(label="cross-check", time=check.time, values=check.stress[:, b], role="cross-check")
+    means = {"mean_stress_Pa": _doubled(float(np.mean(stress.values)), MEAN_STRESS_ERROR, "Pa")}
+    late = float(check.mean_magnitude_late[b])
+    if math.isfinite(late):
+        means["mean_force_0p15_0p2_N"] = _doubled(late, MEAN_ERROR, "N")
+    return Loads(
+        force=force,
+        force_band=_band(force, 2.0 * peak_error * force.values),
+        stress=stress,
+        stress_band=_band(stress, 2.0 * stress_error * stress.values),
+        peak_force=_checked_peak(force, peak_error, "N"),
+        peak_stress=_checked_peak(stress, stress_error, "Pa"),
+        means=means,
+        missing={
+            "impacts": "the twin, which tells impacts apart, lost the record",
+            **({} if math.isfinite(late) else {"mean_force_0p15_0p2_N": NO_LATE_MEAN}),
+        },
+    )
+
+
+def _checked_peak(history: History, error: float, unit: str) -> Peak:
+    at = int(np.argmax(history.values))
+    return Peak(
+        known=_doubled(float(history.values[at]), error, unit),
+        time=float(history.time[at]),
+        origin=Origin.CROSS_CHECK,
+    )
+
+
+def _doubled(value: float, error: float, unit: str) -> IdentifiedValue:
+    return IdentifiedValue(
+        value=value,
+        status=OF_CROSS_CHECK,
+        interval_90=(max(1.0 - 2.0 * error, 0.0) * value, (1.0 + 2.0 * error) * value),
+        standard_error=2.0 * error * value / NINETY,
+        unit=unit,
+    )
+
+
+def bearing_drop(
+    problem: DropProblem,
+    forces: ForceHistory,
+    b: int,
+    loads: Loads,
+    measured: Array,
+    values: Mapping[str, IdentifiedValue],
+    cross_check: InputEstimate | None,
+) -> BearingDrop:
+    """Everything about one bearing; ``measured`` (N, 2) is the motion that its sensors show [m]."""
+    name = problem.model.bearing_names[b]
+    gap = values["air_gap_m"]
+    low, high = gap.interval_90 or (gap.value, gap.value)
+    estimated = Motion(
+        label="estimated", time=forces.time, displacement=forces.displacement[:, b], role="estimated"
+    )
+    shown = Motion(
+        label="measured", time=forces.time, displacement=measured[: len(forces.time)], role="measured"
+    )
+    impacts: tuple[Impact, ...] = ()
+    if loads.peak_force.origin is Origin.TWIN:
+        widening = 1.0 if cross_check is None else INCONSISTENT_WIDENING
+        impacts = twin_impacts(forces, b, widening, cross_check)
+    first = impacts[0] if impacts else None
+    return BearingDrop(
+        name=name,
+        motions=(shown, estimated) if loads.peak_force.origin is Origin.TWIN else (shown,),
+        air_gap=AirGap(lower=low, upper=high),
+        force=loads.force,
+        force_band=loads.force_band,
+        force_vector=forces.force[:, b] if loads.peak_force.origin is Origin.TWIN else None,
+        stress=loads.stress,
+        stress_band=loads.stress_band,
+        preload_stress=float(loads.stress.values[0]),
+        peak_force=loads.peak_force,
+        peak_stress=loads.peak_stress,
+        values={**values, **loads.means},
+        missing=loads.missing,
+        impacts=impacts,
+        impact_force="bearing force",
+        first_contact=None if first is None else deepest(estimated, first.start, first.end, gap.value),
+    )
+
+
+def twin_impacts(
+    forces: ForceHistory, b: int, widening: float, cross_check: InputEstimate | None
+) -> tuple[Impact, ...]:
+    """Every impact at a bearing in the order of their beginning; intervals hold a given cross-check."""
+    touching = forces.indentation[:, b] > 0.0
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], touching.astype(int), [0]])))
+    found = []
+    for first, last in zip(edges[0::2], edges[1::2], strict=True):
+        impact = _impact(forces, b, int(first), int(last), widening)
+        found.append(impact if cross_check is None else _impact_holding(impact, cross_check, b))
+    return tuple(found)
+
+
+def _impact(forces: ForceHistory, b: int, first: int, last: int, widening: float) -> Impact:
+    window = slice(max(first - 1, 0), min(last + 2, len(forces.time)))
+    peak, moment = refined_peak(forces.time[window], forces.magnitude[window, b])
+    at = window.start + int(np.argmax(forces.magnitude[window, b]))
+    relative = math.hypot(float(forces.magnitude_sigma[at, b]) / max(peak, 1e-9), MODEL_FORCE_SIGMA)
+    dt = float(forces.time[1] - forces.time[0])
+    impulse = dt * float(np.sum(forces.contact_force[first:last, b]))
+    lost = dt * float(np.sum(forces.contact_power[first:last, b]))
+    middle = first + int(np.argmax(forces.contact_force[first:last, b]))
+    return Impact(
+        start=float(forces.time[first]),
+        end=float(forces.time[last - 1]),
+        azimuth=float(forces.azimuth[middle, b]),
+        peak_time=moment,
+        peak_force=with_interval(peak, relative * peak, widening, "N"),
+        impulse=with_interval(impulse, relative * impulse, widening, "N s"),
+        dissipated_energy=with_interval(lost, 2.0 * relative * abs(lost), widening, "J"),
+    )
+
+
+def _impact_holding(impact: Impact, cross_check: InputEstimate, b: int) -> Impact:
+    """An impact whose intervals hold what the cross-check finds in its time."""
+    during = (cross_check.time >= impact.start) & (cross_check.time <= impact.end)
+    if not during.any() or impact.peak_force.value <= 0.0:
+        return impact
+    ratio = float(cross_check.magnitude[during, b].max()) / impact.peak_force.value
+    error = float(cross_check.peak_error[b])
+    return replace(
+        impact,
+        peak_force=holding(impact.peak_force, ratio, error),
+        impulse=holding(impact.impulse, ratio, error),
+        dissipated_energy=holding(impact.dissipated_energy, ratio, 2.0 * error),
+    )
+
+
+def cross_checks(
+    name: str, twin: Loads, forces: ForceHistory, check: InputEstimate, b: int, *, replaced: bool
+) -> tuple[CrossCheck, ...]:
+    """Peak force, peak stress and late mean force vector of one bearing, found in both ways."""
+    pairs = [
+        ("peak force", twin.peak_force.known, check.peak[b], float(check.peak_error[b])),
+        ("peak stress", twin.peak_stress.known, check.peak_stress[b], float(check.stress_error[b])),
+    ]
+    if np.isfinite(check.mean_late[b]):
+        late = (forces.time >= LATE[0]) & (forces.time <= LATE[1])
+        mean = float(np.hypot(*forces.force[late, b].mean(axis=0)))
+        vector = IdentifiedValue(value=mean, unit="N")
+        pairs.append(("force of the mean, 150 to 200 ms", vector, check.mean_late[b], MEAN_ERROR))
+    return tuple(
+        CrossCheck(
+            name=f"{name} {what}",
+            estimate=estimate,
+            check=float(other),
+            accuracy=accuracy,
+            replaced=replaced,
+        )
+        for what, estimate, other, accuracy in pairs
+    )

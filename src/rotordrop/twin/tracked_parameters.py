@@ -1,0 +1,215 @@
+"""Identified parameters and sensor errors of a followed drop: values with intervals, priors and verdicts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.estimate.bearing_values import equivalent_stiffness, published_values, static_friction
+from rotordrop.estimate.estimate import FittedParameter, JointEstimate, SensorErrors
+from rotordrop.estimated import NINETY, IdentifiedValue, Verdict
+from rotordrop.rotor.parameter import Parameter
+from rotordrop.rotor.parameter_table import parameter
+from rotordrop.rotor.unknowns import Unknown, sensor_prior, smallest_gap
+from rotordrop.track.consistency import PARAMETER_LIMIT
+from rotordrop.track.problem import DropProblem
+from rotordrop.track.smoother import Smoothed, parameter_sample
+from rotordrop.twin.tracked_loads import INCONSISTENT, OF_CROSS_CHECK, with_interval
+
+Array = NDArray[np.float64]
+
+MODEL_GAP_SIGMA = 0.008
+"""Standard deviation of a gap, over it, by what confounds it with gains and offsets beyond the fit [1].
+
+Sensors that read 1 % of the motion across, as mounted 0.6° aside, moved gaps of lone drops by up to 2 %.
+"""
+UNSURE_GAP = 0.05
+"""Relative prior standard deviation from which an air gap counts as guessed [1]."""
+PARAMETER_WIDENING = 1.5
+"""Factor on standard errors of parameters for what the linearised fit leaves out [1]."""
+UNDETERMINED: Verdict = "the record does not determine it"
+KNOWN: Verdict = "known from the calibration"
+NOT_DETERMINED: tuple[Verdict, ...] = (UNDETERMINED, KNOWN)
+"""Verdicts on a parameter that the record says little about; the second where it was calibrated before."""
+DETERMINED_SHARE, WEAKLY_DETERMINED_SHARE = 0.3, 0.7
+"""Standard error over that of the prior up to which a parameter is determined, and weakly determined [1]."""
+
+
+def determination(share: float, *, calibrated: bool = False) -> Verdict:
+    """Verdict on a parameter whose standard error is this share of its prior's [1]."""
+    if share < DETERMINED_SHARE:
+        return "determined"
+    if share < WEAKLY_DETERMINED_SHARE:
+        return "weakly determined"
+    return KNOWN if calibrated else UNDETERMINED
+
+
+def identified(unknown: Unknown, theta: float, sigma: float, widening: float = 1.0) -> IdentifiedValue:
+    """An estimated parameter as a value with interval, start and verdict."""
+    half = NINETY * sigma * widening
+    interval = (unknown.value_of(theta - half), unknown.value_of(theta + half))
+    return IdentifiedValue(
+        value=unknown.value_of(theta),
+        status=determination(sigma / unknown.sigma, calibrated=unknown.calibrated),
+        standard_error=unknown.standard_error(theta, sigma * widening),
+        interval_90=within_bounds(unknown.parameter, interval),
+        start=unknown.value_of(unknown.begin),
+        unit=unknown.unit,
+    )
+
+
+def within_bounds(row: Parameter, interval: tuple[float, float]) -> tuple[float, float]:
+    """An interval that ends where the quantity does: no air gap is below zero."""
+    low, high = interval
+    return (max(low, 0.0), max(high, 0.0)) if row is parameter("air_gap") else interval
+
+
+def left_out(unknown: Unknown) -> float:
+    """Standard error of a parameter by what the fit leaves out of it."""
+    return MODEL_GAP_SIGMA * unknown.begin if unknown.parameter is parameter("air_gap") else 0.0
+
+
+def model_error(unknown: Unknown, sigma: float) -> float:
+    """Standard error of a parameter with what the fit leaves out of it."""
+    return math.hypot(sigma, left_out(unknown))
+
+
+def parameter_widening(unknown: Unknown, sigma: float, widening: float = 1.0) -> float:
+    """Factor on a parameter's standard error [1]; the widened error stays within that of the prior."""
+    return max(1.0, min(PARAMETER_WIDENING * widening, unknown.sigma / max(sigma, 1e-300)))
+
+
+def parameters(
+    problem: DropProblem, smoothed: Smoothed, *, fits: bool, widening: float
+) -> tuple[FittedParameter, ...]:
+    """Every unknown as it was shortly after the first contacts, beside what was known before.
+
+    Where model and record disagree, a parameter may be anything between its prior and the fit.
+    """
+    at = parameter_sample(smoothed)
+    theta = smoothed.means[at][problem.parameter_slice]
+    sigma = np.sqrt(np.maximum(np.diag(smoothed.covariance(at))[problem.parameter_slice], 0.0))
+    found = []
+    for unknown, t, s in zip(problem.unknowns, theta, sigma, strict=True):
+        error = model_error(unknown, float(s))
+        prior = identified(unknown, unknown.mean, unknown.sigma)
+        wider = parameter_widening(unknown, error, widening)
+        value = identified(unknown, float(t), error, wider)
+        if not fits:
+            value = replace(value, status=INCONSISTENT, interval_90=_hull(value, prior))
+        elif (allowed := left_out(unknown)) > 0.0:
+            value = replace(value, allowance_90=NINETY * wider * allowed)
+        found.append(FittedParameter(row=unknown.parameter, owner=unknown.owner, prior=prior, estimate=value))
+    return tuple(found)
+
+
+def joint_estimate(problem: DropProblem, smoothed: Smoothed) -> JointEstimate:
+    """What belongs to the machine as it was shortly after the first contacts, with all covariances."""
+    at, places = parameter_sample(smoothed), problem.machine_indices
+    sensors = problem.model.machine.sensors
+    paths = [unknown.path for unknown in problem.unknowns if unknown.scope == "machine"]
+    paths += [parameter(part, "sensor").path_of(s.name) for part in ("gain", "offset") for s in sensors]
+    before = prior_of(problem)
+    return JointEstimate(
+        paths=tuple(paths),
+        mean=smoothed.means[at][places],
+        covariance=smoothed.covariance(at)[np.ix_(places, places)],
+        prior_mean=before[0][places],
+        prior_sigma=before[1][places],
+    )
+
+
+def prior_of(problem: DropProblem) -> tuple[Array, Array]:
+    """Mean and standard deviation of every entry of an estimate before anything of its record was read.
+
+    The prior of the problem itself knows the settled tail already.
+    """
+    mean, sigma = problem.mean.copy(), np.sqrt(np.diag(problem.covariance))
+    gap = smallest_gap(problem.model.machine)
+    for place, unknown in enumerate(problem.unknowns, start=problem.n_dynamic):
+        mean[place], sigma[place] = unknown.mean, unknown.sigma
+    first = problem.parameter_slice.stop
+    for c, sensor in enumerate(problem.model.machine.sensors):
+        known = sensor_prior(parameter("offset", "sensor"), sensor.offset, gap)
+        offset = first + problem.n_channels + c
+        mean[offset], sigma[offset] = known.mean, known.sigma
+    return mean, sigma
+
+
+def _hull(one: IdentifiedValue, other: IdentifiedValue) -> tuple[float, float]:
+    (a, b), (c, d) = (v.interval_90 or (v.value, v.value) for v in (one, other))
+    return min(a, c), max(b, d)
+
+
+def gap_of_record(problem: DropProblem, b: int) -> IdentifiedValue:
+    """Air gap [m] by settled tail and machine file alone, for a twin that lost the record."""
+    entry = problem.gap_entries[b]
+    value = float(problem.mean[entry])
+    return replace(
+        with_interval(
+            value, math.hypot(math.sqrt(problem.covariance[entry, entry]), MODEL_GAP_SIGMA * value)
+        ),
+        status=OF_CROSS_CHECK,
+        unit="m",
+    )
+
+
+def is_lost(problem: DropProblem, gap: IdentifiedValue, b: int) -> bool:
+    """Whether an estimated air gap is none that the machine can have, by settled tail and machine file."""
+    entry = problem.gap_entries[b]
+    sigma = math.sqrt(problem.covariance[entry, entry])
+    return gap.value <= 0.0 or abs(gap.value - float(problem.mean[entry])) > PARAMETER_LIMIT * sigma
+
+
+def bearing_values(
+    problem: DropProblem, found: Sequence[FittedParameter], b: int
+) -> dict[str, IdentifiedValue]:
+    """Identified values of one bearing by the field names of the published document."""
+    bearing = problem.model.machine.touchdown_bearings[b]
+    values = published_values(bearing.name, found)
+    if "friction.dynamic" in values:  # a bearing described without friction has none to find
+        ratio = float(bearing.friction.static) / float(bearing.friction.dynamic)
+        values["friction.static"] = static_friction(ratio, values["friction.dynamic"])
+    values["equivalent_stiffness_N_per_m"] = equivalent_stiffness(
+        problem.model.machine,
+        b,
+        float(problem.model.load_shares[b]),
+        values["support.stiffness_N_per_m"],
+        values.get("preload_N"),
+    )
+    return values
+
+
+def sensor_errors(
+    problem: DropProblem, smoothed: Smoothed, *, fits: bool, widening: float
+) -> tuple[SensorErrors, ...]:
+    """Gain and offset of every sensor at the end of the drop, and its noise."""
+    last = len(smoothed.means) - 1
+    sigma = np.sqrt(np.maximum(np.diag(smoothed.covariance(last)), 0.0))
+    gain, offset = problem.sensor_errors(smoothed.means[last])
+    gain_sigma, offset_sigma = problem.sensor_errors(sigma)
+    status: Verdict = "determined" if fits else INCONSISTENT
+
+    def known(value: float, error: float, unit: str) -> IdentifiedValue:
+        half = NINETY * widening * error
+        return IdentifiedValue(
+            value=value,
+            standard_error=widening * error,
+            interval_90=(value - half, value + half),
+            status=status,
+            unit=unit,
+        )
+
+    return tuple(
+        SensorErrors(
+            sensor=sensor.name,
+            gain_error=known(float(gain[c]), float(gain_sigma[c]), "1"),
+            offset=known(float(offset[c]), float(offset_sigma[c]), "m"),
+            noise=float(np.sqrt(problem.variances[c])),
+        )
+        for c, sensor in enumerate(problem.model.machine.sensors)
+    )

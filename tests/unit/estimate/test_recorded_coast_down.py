@@ -1,0 +1,124 @@
+"""A recorded coast-down counts from the centre of the bearing, wherever the rotor floated before."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rotordrop.estimate.recorded_coast_down import recorded_coast_down, with_found_air_gaps
+from rotordrop.machine import example_machine
+from rotordrop.record.examples import example_record_path
+from rotordrop.record.record import read_record
+from rotordrop.spectrum.indentation import displacement_history, find_settling
+from rotordrop.spectrum.machine_candidates import machine_candidates, swing_ranges
+
+# Of the bundled recording, which is simulated: the DE floats 26.5 µm below the centre of its bearing.
+TRUE_GAP = {"NDE": 275e-6, "DE": 285e-6}
+TRUE_LARGEST = {"NDE": 306.7e-6, "DE": 308.6e-6}
+
+
+@pytest.fixture(scope="module")
+def machine():
+    return example_machine("lp400")
+
+
+@pytest.fixture(scope="module")
+def record(machine):
+    return read_record(example_record_path("lp400_drop_060"), machine)
+
+
+def displaced(record, sideways):
+    """The record with all sensors reading a distance [m] aside, as with zeros that are off."""
+    angle = np.array([float(sensor.angle) for sensor in record.sensors])
+    return replace(record, signals=record.signals + sideways * np.cos(angle))
+
+
+def test_air_gap_and_largest_displacement_are_those_of_the_estimate(machine, record):
+    signal = recorded_coast_down(machine, record)
+    for name, moved in signal.planes.items():
+        # The vertical zeros of the sensors are off by up to 7 µm, which the tail cannot tell from the gap.
+        assert signal.air_gap[name] == pytest.approx(TRUE_GAP[name], abs=9e-6)
+        assert abs(signal.air_gap[name] - TRUE_GAP[name]) < 1.65 * signal.air_gap_error[name]
+        found = displacement_history(
+            moved, signal.sampling_rate, air_gap=signal.air_gap[name], start_time=signal.start_time
+        )
+        beyond = TRUE_LARGEST[name] - TRUE_GAP[name]
+        assert found.largest_indentation == pytest.approx(beyond, abs=3e-6)
+    assert found.largest == pytest.approx(TRUE_LARGEST["DE"], abs=1.5e-6)
+    assert found.largest_time == pytest.approx(8.9e-3, abs=0.4e-3)
+    assert "above the rest of the last 1 s" in signal.centre
+
+
+def test_the_found_gap_is_handed_on_with_its_interval(machine, record):
+    """The interval is that of a normal error on both sides; a search may not leave it."""
+    signal = recorded_coast_down(machine, record)
+    for name, gap in signal.air_gap.items():
+        found = with_found_air_gaps(machine, signal).bearing(name).air_gap
+        half = 1.6448536 * signal.air_gap_error[name]
+        assert float(found) == gap and found.status == "estimated"
+        assert found.interval_90 == pytest.approx((gap - half, gap + half), rel=1e-6)
+        assert (found.lower, found.upper) == pytest.approx((gap - half, gap + half), rel=1e-6)
+    rough = replace(signal, air_gap_error=dict(signal.air_gap))
+    for name, gap in signal.air_gap.items():
+        assert with_found_air_gaps(machine, rough).bearing(name).air_gap.lower == 0.5 * gap
+
+
+def test_the_speed_counts_from_power_off(machine, record):
+    """One that was given by hand says from where the rotor fell, not how it slowed down."""
+    signal = recorded_coast_down(machine, record)
+    time, speed = record.measured_speed
+    np.testing.assert_array_equal(signal.speed, speed)
+    assert np.ptp(time - signal.speed_time) < 1e-9
+    falling = signal.start_time + np.arange(signal.planes["DE"].shape[0]) / signal.sampling_rate
+    off = time[0] - signal.speed_time[0]
+    assert record.time[record.time >= off][0] - off == pytest.approx(falling[0], abs=1e-9)
+    assert signal.profile is not None
+    assert signal.profile.speed_at([0.0])[0] == pytest.approx(2.0 * np.pi * 60.0, rel=2e-3)
+    by_hand = recorded_coast_down(machine, replace(record, speed_by_hand=True))
+    assert (by_hand.speed, by_hand.speed_time, by_hand.profile) == (None, None, None)
+
+
+def test_the_levitated_position_does_not_matter(machine, record):
+    aside = recorded_coast_down(machine, displaced(record, 30e-6))
+    plain = recorded_coast_down(machine, record)
+    for name, moved in plain.planes.items():
+        assert aside.planes[name][:] == pytest.approx(moved[:], abs=1e-9)
+        assert aside.air_gap[name] == pytest.approx(plain.air_gap[name], abs=1e-9)
+
+
+def test_a_swing_along_the_race_is_no_bounce(machine, record):
+    signal = recorded_coast_down(machine, record)
+    for name, moved in signal.planes.items():
+        settled = find_settling(moved, signal.sampling_rate, start_time=signal.start_time)
+        assert settled.settled
+        assert 0.05 < settled.last_lift_off < 0.15
+        assert settled.contact_radius == pytest.approx(signal.air_gap[name] + 4e-6, abs=3e-6)
+
+
+def test_pendulum_length_and_plane_follow_from_the_found_gap(machine, record):
+    signal = recorded_coast_down(machine, record)
+    found = with_found_air_gaps(machine, signal)
+    swings = {swing.bearing: swing for swing in swing_ranges(found)}
+    assert swings["DE"].length == pytest.approx(287.3e-6, abs=2e-6)
+    assert swings["DE"].small == pytest.approx(29.4, abs=0.1)
+    assert swings["DE"].lowest < 28.8 < 29.4 < swings["DE"].highest
+    named = {c.name: c.planes for c in machine_candidates(found, {name: name for name in signal.planes})}
+    assert named["pendulum NDE"] == ("NDE",)
+    assert named["pendulum DE"] == ("DE",)
+
+
+def test_a_record_that_ends_in_the_fall_says_that_the_centre_is_a_guess(machine, record):
+    early = record.time < record.time[0] + 2.5e-1 + 0.05
+    short = replace(
+        record,
+        time=record.time[early],
+        signals=record.signals[early],
+        speed=None if record.speed is None else record.speed[early],
+    )
+    signal = recorded_coast_down(machine, short)
+    assert signal.air_gap == {"NDE": 250e-6, "DE": 250e-6}
+    assert signal.air_gap_error is None
+    assert "taken as the zero of the sensors, the air gap from the machine file" in signal.centre
+    assert with_found_air_gaps(machine, signal) is machine

@@ -1,0 +1,324 @@
+"""The paper's route, end to end, on a record whose truth is known."""
+
+from __future__ import annotations
+
+import json
+import math
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+
+from rotordrop.cli.app import run
+from rotordrop.errors import IdentificationError, UsageError
+from rotordrop.estimate.document import estimate_document
+from rotordrop.estimate.estimate import Estimate, Verdict
+from rotordrop.estimate.fixed_values import fixed_correlations, read_fixed
+from rotordrop.estimate.schema import estimate_schema
+from rotordrop.estimated import IdentifiedValue
+from rotordrop.estimation import Replay, estimate_drop
+from rotordrop.evidence.speed import SpeedFit
+from rotordrop.machine import Machine, example_path
+from rotordrop.replay import replay_estimate, uncertainty
+from rotordrop.replay.replay_estimate import _speed
+from rotordrop_bench import SyntheticDrop
+from rotordrop_bench.files import write_synthetic
+from rotordrop_bench.score import score_estimate
+
+BEARINGS = ("NDE", "DE")
+LOADS = ("peak_force_N", "mean_force_0p15_0p2_N", "peak_stress_Pa", "mean_stress_Pa")
+
+
+@pytest.fixture(scope="module")
+def fitted() -> dict[str, Any]:
+    """Problem and unknowns from which the draws of the replay were made."""
+    return {}
+
+
+@pytest.fixture(scope="module")
+def replayed(known: Machine, synthetic: SyntheticDrop, fitted: dict[str, Any]) -> Estimate:
+    """The recorded drop replayed from its owner's guesses, with few starts and hardly a draw."""
+
+    def drawing(problem: Any, x: Any, covariance: Any, **options: Any) -> Any:
+        fitted.update(problem=problem, x=x)
+        return uncertainty.draw_drops(problem, x, covariance, **options)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("rotordrop.replay.replay.FRICTION_DRAWS", 2)
+        patch.setattr("rotordrop.replay.replay.draw_drops", drawing)
+        method = Replay(starts=2, draws=2, threads=2)
+        return estimate_drop(known, synthetic.record, synthetic.tail, method=method)
+
+
+@pytest.fixture(scope="module")
+def document(replayed: Estimate) -> dict[str, Any]:
+    """What would be written of it."""
+    whole: dict[str, Any] = json.loads(json.dumps(estimate_document(replayed), allow_nan=False))
+    return whole
+
+
+def test_supports_friction_and_force_come_near_the_truth(
+    document: dict[str, Any], synthetic: SyntheticDrop
+) -> None:
+    score = score_estimate(document, synthetic.truth, drop="drop_1")["bearings"]
+    allowed = {
+        "support.stiffness_N_per_m": 0.06,
+        "support.mass_kg": 0.06,
+        "support.damping_N_s_per_m": 0.4,
+        "friction.dynamic": 0.1,
+        "peak_force_N": 0.04,
+        "peak_stress_Pa": 0.02,
+    }
+    for name in BEARINGS:
+        for path, limit in allowed.items():
+            assert abs(score[name][path]["relative_error"]) < limit, (name, path)
+        assert abs(score[name]["air_gap_m"]["error"]) < 3.0 * 10.5e-6
+
+
+def test_the_guesses_themselves_were_far_off(document: dict[str, Any], synthetic: SyntheticDrop) -> None:
+    entry, truth = document["bearings"]["DE"]["support"]["stiffness_N_per_m"], synthetic.truth["support"][1]
+    assert abs(entry["start"] / truth["K"] - 1.0) > 0.1
+
+
+def test_document_follows_the_published_schema(document: dict[str, Any]) -> None:
+    jsonschema.Draft202012Validator(estimate_schema()).validate(document)
+    assert document["method"] == "replay" and document["fixed"] is None
+    broken = {**document, "method": "guess"}
+    assert not jsonschema.Draft202012Validator(estimate_schema()).is_valid(broken)
+
+
+def test_few_draws_give_no_interval_and_say_why(document: dict[str, Any], replayed: Estimate) -> None:
+    assert replayed.replay is not None and replayed.verdict is Verdict.OPEN_LOOP
+    reason = f"no interval: {replayed.replay.draws} draws, at least 64 are needed"
+    for name in BEARINGS:
+        entry = document["bearings"][name]
+        assert all("interval_90" not in entry[field] for field in LOADS)
+        assert entry["not_stated"] == dict.fromkeys(LOADS, reason)
+    assert any("64 are needed for intervals" in words for words in document["warnings"])
+
+
+def test_draws_of_the_rest_position_fall_on_one_path(replayed: Estimate, fitted: dict[str, Any]) -> None:
+    """A vertical zero that is off moves rest and fall alike: seen from rest, nothing moves before contact."""
+    problem = fitted["problem"]
+    best = uncertainty.best_candidate(problem, fitted["x"])
+    initial = problem.replica.initial
+    _, orbit = uncertainty._numbers(problem, best, 6e-3)
+    for height in range(initial.unknowns.rest.start + 1, initial.unknowns.rest.stop, 2):
+        column = initial.covariance[:, height]
+        drawn = replace(best, fall=best.fall + column / math.sqrt(column[height]))
+        assert drawn.fall[height] - best.fall[height] > 5e-6
+        _, other = uncertainty._numbers(problem, drawn, 6e-3)
+        assert np.max(np.abs(other - orbit)) < 0.05e-6
+
+
+def test_the_drop_is_simulated_at_both_limits_of_the_air_gap(replayed: Estimate) -> None:
+    for bearing in replayed.bearings:
+        assert bearing.air_gap is not None
+        assert bearing.air_gap.lower <= bearing.values["air_gap_m"].value <= bearing.air_gap.upper
+        measured, lower, upper = bearing.at_gap_limits
+        middle = bearing.motions[1]
+        assert (measured.role, lower.role) == ("measured", "simulated, lower gap")
+        early = middle.time < 9e-3
+        for one in (lower, upper):
+            apart = np.abs(one.displacement - middle.displacement)[early]
+            assert 0.0 < apart.max() < 20e-6
+
+
+def test_every_number_of_the_document_is_that_of_its_source(
+    document: dict[str, Any], replayed: Estimate
+) -> None:
+    steps, agreement = replayed.replay, replayed.agreement
+    assert steps is not None and agreement is not None
+    speed = document["speed"]
+    assert speed["friction_loss_Hz"] == pytest.approx(steps.speed.friction_loss / (2.0 * math.pi))
+    assert speed["simulated_end_Hz"] == pytest.approx(steps.speed_simulated[-1] / (2.0 * math.pi))
+    assert 0.0 <= speed["friction_loss_Hz"] < document["speed_Hz"] - speed["simulated_end_Hz"]
+    assert document["speed_Hz"] == pytest.approx(replayed.speed / (2.0 * math.pi))
+    for name, contact, compared in zip(BEARINGS, steps.contacts, agreement.bearings, strict=True):
+        entry, found = document["bearings"][name], document["first_contact"][name]
+        bearing = replayed.bearing(name)
+        assert (
+            entry["peak_force_N"]["value"]
+            == bearing.peak_force.value
+            == pytest.approx(bearing.force.values.max(), rel=1e-3)
+        )
+        assert entry["peak_stress_Pa"]["time_s"] == bearing.peak_stress.time
+        assert entry["stress_statistics_Pa"]["maximum"] == bearing.peak_stress.value
+        assert (found["start_s"], found["end_s"]) == (contact.start, contact.end)
+        assert found["half_period_stiffness_N_per_m"] == contact.equivalent_stiffness
+        bounce = document["agreement"]["bearings"][name]
+        assert bounce["measured_bounce_m"] == compared.measured_bounce
+        assert bounce["measured_bounce_m"] == pytest.approx(bounce["simulated_bounce_m"], rel=0.3)
+        assert 5e-6 < bounce["measured_bounce_m"] < 400e-6
+
+
+def test_the_speed_that_friction_took_is_shown_in_hertz() -> None:
+    air = IdentifiedValue(value=9.0)
+    fit = SpeedFit(
+        initial=377.0,
+        initial_error=0.1,
+        profile_time_constant=6.0,
+        aero_time_constant=air,
+        friction_loss=math.pi,
+        residual=0.1,
+    )
+    fall: Any = SimpleNamespace(speed=fit)
+    shown = _speed(fall, 4.0 * math.pi)
+    assert (shown["friction_loss_Hz"], shown["simulated_end_Hz"]) == (0.5, 2.0)
+    assert shown["profile_time_constant_s"] == 6.0
+
+
+def test_the_equivalent_stiffness_is_support_and_bearing_in_series(
+    document: dict[str, Any], synthetic: SyntheticDrop
+) -> None:
+    """Not the half period of the first contact, which gravity and a second impact make 4 to 24 times off."""
+    for b, name in enumerate(BEARINGS):
+        entry = document["bearings"][name]
+        support = entry["support"]["stiffness_N_per_m"]["value"]
+        found = entry["equivalent_stiffness_N_per_m"]["value"]
+        assert 0.3 * support < found < support
+        true = synthetic.truth["support"][b]["K"]
+        assert found < true
+
+
+def test_simulated_orbit_follows_the_record_over_the_first_impacts(replayed: Estimate) -> None:
+    assert replayed.agreement is not None
+    names = [window.name for window in replayed.agreement.windows]
+    rms = {window.name: window.rms for window in replayed.agreement.windows}
+    assert names[0] == "first contact" and len(names) == 4
+    assert np.all(rms["first contact"] < 1.5e-6)
+    assert np.all(rms["20 ms"] < 3e-6)
+    assert np.all(replayed.agreement.horizon > 0.025)
+    measured = replayed.agreement.bearings[0].measured_contacts[0]
+    assert replayed.agreement.bearings[0].simulated_contacts[0] == pytest.approx(measured, abs=1.5e-4)
+
+
+def test_the_machine_file_may_take_over_what_was_found(replayed: Estimate) -> None:
+    assert replayed.replay is not None
+    for b, name in enumerate(BEARINGS):
+        bearing = replayed.replay.identified.touchdown_bearings[b]
+        found = replayed.bearing(name).values
+        assert float(bearing.support.stiffness) == pytest.approx(found["support.stiffness_N_per_m"].value)
+        assert float(bearing.air_gap) == pytest.approx(found["air_gap_m"].value)
+        assert float(bearing.friction.dynamic) == pytest.approx(found["friction.dynamic"].value)
+
+
+def test_fixed_takes_supports_and_friction_with_their_errors(
+    known: Machine, synthetic: SyntheticDrop, document: dict[str, Any]
+) -> None:
+    method = Replay(fixed=document, draws=0)
+    again = estimate_drop(known, synthetic.record, synthetic.tail, method=method)
+    assert again.replay is not None
+    assert "support" not in again.replay.document["identification"] and again.replay.friction is None
+    for name in BEARINGS:
+        for path in ("support.stiffness_N_per_m", "support.mass_kg", "friction.dynamic"):
+            part = document["bearings"][name]
+            for key in path.split("."):
+                part = part[key]
+            value = again.bearing(name).values[path]
+            assert value.value == pytest.approx(part["value"], rel=1e-9)
+            assert value.status == "taken over"
+            assert value.interval_90 == pytest.approx(part["interval_90"], rel=1e-6), (name, path)
+    assert estimate_document(again)["fixed"] == "an earlier estimate"
+    pairs = {(pair.first, pair.second): pair.value for pair in fixed_correlations(document)}
+    assert pairs["NDE.support.stiffness", "NDE.support.mass"] > 0.5
+
+
+def test_correlations_of_another_form_are_refused() -> None:
+    """They were passed over, and intervals that rest on them came out others without a word."""
+    document = {"bearings": {}, "identification": {"support": {"correlations": {"K ~ M": 0.9}}}}
+    with pytest.raises(
+        UsageError, match=r"an earlier estimate holds the correlations \{'K ~ M': 0.9\}; .*'first'"
+    ):
+        read_fixed(document)
+
+
+def test_an_unknown_method_is_named(known: Machine, synthetic: SyntheticDrop) -> None:
+    with pytest.raises(UsageError, match=r"the method is 'guess'; expected Tracked\(...\) or Replay\(...\)"):
+        estimate_drop(known, synthetic.record, method="guess")  # type: ignore[arg-type]
+
+
+def test_a_record_that_ends_before_standstill_needs_a_tail(known: Machine, synthetic: SyntheticDrop) -> None:
+    with pytest.raises(IdentificationError, match=r"the shaft still turns at 5\d\.\d+ Hz .*--tail"):
+        estimate_drop(known, synthetic.record, method=Replay())
+
+
+def test_fixed_that_lacks_a_support_is_refused(
+    known: Machine, synthetic: SyntheticDrop, document: dict[str, Any]
+) -> None:
+    poorer = json.loads(json.dumps(document))
+    del poorer["bearings"]["DE"]["support"]["mass_kg"]
+    with pytest.raises(UsageError, match=r"has no 'support\.mass_kg' for 'DE'"):
+        estimate_drop(known, synthetic.record, synthetic.tail, method=Replay(fixed=poorer))
+
+
+@pytest.mark.slow
+def test_command_writes_numbers_and_report(
+    synthetic: SyntheticDrop, document: dict[str, Any], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    record, tail, *_ = write_synthetic(synthetic, tmp_path, formats=("h5",), histories=False)
+    earlier, out, page = tmp_path / "earlier.json", tmp_path / "out.json", tmp_path / "report.html"
+    earlier.write_text(json.dumps(document))
+    arguments = ["estimate", str(example_path("lp400")), str(record), "--tail", str(tail)]
+    arguments += ["--method", "replay", "--fixed", str(earlier), "--json", str(out), "--report", str(page)]
+    assert run(arguments) == 0
+    written = json.loads(out.read_text())
+    jsonschema.Draft202012Validator(estimate_schema()).validate(written)
+    for name in BEARINGS:
+        entry = written["bearings"][name]["peak_force_N"]
+        low, high = entry["interval_90"]
+        assert low < high and 0.0 < entry["time_s"] < 0.2
+        assert math.isfinite(entry["value"])
+    assert written["fixed"] == str(earlier)
+    assert written["identification"]["draws"]["count"] >= 64
+    html = page.read_text(encoding="utf-8")
+    assert "NDE" in html and "This record is simulated" in html
+    assert 'src="http' not in html
+    assert str(page) in capsys.readouterr().out.replace("\n", "")
+
+
+def test_fixed_belongs_to_the_replay(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    machine = str(example_path("lp400"))
+    assert run(["estimate", machine, str(tmp_path / "r.csv"), "--fixed", str(tmp_path / "e.json")]) != 0
+    assert "--fixed belongs to --method replay" in " ".join(capsys.readouterr().err.split())
+
+
+def test_no_number_lies_outside_its_own_interval() -> None:
+    """The replay is one of many possible drops: its late mean may lie beyond nine of ten draws."""
+    sample = np.linspace(400.0, 430.0, 64)
+    mean = replay_estimate._mean(IdentifiedValue(value=415.0, unit="N"), sample, 0.01)
+    assert mean.value == np.median(sample)
+    peak = replay_estimate.with_draws(IdentifiedValue(value=470.0, unit="N"), sample, 0.01)
+    for value in (mean, peak):
+        low, high = value.interval_90 or (math.nan, math.nan)
+        assert low < value.value < high
+    assert high == pytest.approx(470.0 + 1.6448536 * 4.7)
+
+
+def test_a_fit_whose_draws_do_not_keep_to_the_record_is_no_basis() -> None:
+    best = np.zeros(2)
+
+    def residual(x: np.ndarray, window: float) -> np.ndarray:
+        if np.any(x != best):
+            raise IdentificationError("beside the record")
+        return np.zeros(3)
+
+    problem: Any = SimpleNamespace(
+        residual=residual,
+        bounds=(np.full(2, -9.0), np.full(2, 9.0)),
+        prior_sigma=np.ones(2),
+        remaining_directions=np.zeros((1, 1)),
+        split=lambda x: (x, np.zeros(1)),
+    )
+    with ThreadPoolExecutor(1) as pool:
+        message = r"of 64 draws of the uncertain values only 0 keep to the record up to 7.5 ms"
+        with pytest.raises(IdentificationError, match=message):
+            uncertainty._keeping(problem, best, np.eye(2), 7.5e-3, 16, pool)
+        problem.residual = lambda x, window: np.zeros(3)
+        kept, rejected = uncertainty._keeping(problem, best, np.eye(2), 7.5e-3, 16, pool)
+    assert (len(kept), rejected) == (16, 0)

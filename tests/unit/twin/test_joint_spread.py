@@ -1,0 +1,135 @@
+"""The joint distribution in a calibrated file says no more than its intervals, and keeps the correlations."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from rotordrop.estimated import NINETY
+from rotordrop.machine import example_machine
+from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin
+from rotordrop.rotor.joint_values import correlate
+from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.rotor.unknowns import bearing_unknowns
+from rotordrop.twin.calibrated import at_fitted_exponents
+from rotordrop.twin.joint_spread import joint_spread
+from rotordrop.twin.tracked_parameters import identified
+
+
+@pytest.fixture(scope="module")
+def model():
+    return build_drop_model(example_machine("lp400"), "quick")
+
+
+@pytest.fixture(scope="module")
+def problem(model):
+    unknowns = [one for b in range(2) for one in bearing_unknowns(model, b)]
+    return SimpleNamespace(unknowns=unknowns, n_dynamic=3, model=model)
+
+
+@pytest.fixture(scope="module")
+def covariance(problem):
+    random = np.random.default_rng(4)
+    n = len(problem.unknowns)
+    mix = random.standard_normal((n, 2 * n))
+    correlation = np.corrcoef(mix)
+    sigma = np.array([0.3 * one.sigma for one in problem.unknowns])
+    whole = np.zeros((3 + n, 3 + n))
+    whole[3:, 3:] = sigma[:, None] * correlation * sigma
+    return whole
+
+
+def middle(problem):
+    return np.concatenate([np.zeros(3), [one.begin for one in problem.unknowns]])
+
+
+def stated(problem, covariance, widening):
+    sigma = np.sqrt(np.diag(covariance)[3:])
+    return {
+        one.path: identified(one, one.begin, float(s), widening)
+        for one, s in zip(problem.unknowns, sigma, strict=True)
+    }
+
+
+def test_spreads_are_those_of_the_intervals(problem, covariance):
+    known = at_fitted_exponents(problem.model.machine, stated(problem, covariance, 1.5))
+    spread = joint_spread(problem, middle(problem), covariance, known)
+    sigma = np.sqrt(np.diag(spread.matrix))
+    for path in ("NDE.air_gap", "DE.support.mass", "NDE.preload", "DE.friction.dynamic"):
+        low, high = known[path].interval_90
+        k = spread.paths.index(path)
+        width = np.log(high / low) if spread.logarithmic[k] else high - low
+        assert sigma[k] == pytest.approx(width / (2.0 * NINETY), rel=1e-6)
+
+
+def test_correlations_are_those_of_the_fit(problem, covariance):
+    spread = joint_spread(problem, middle(problem), covariance, stated(problem, covariance, 1.0))
+    paths = [one.path for one in problem.unknowns]
+    i, j = (paths.index(f"NDE.support.{name}") for name in ("stiffness", "mass"))
+    a, b = (spread.paths.index(f"NDE.support.{name}") for name in ("stiffness", "mass"))
+    matrix = spread.matrix
+    found = matrix[a, b] / np.sqrt(matrix[a, a] * matrix[b, b])
+    whole = covariance[3:, 3:]
+    assert found == pytest.approx(whole[i, j] / np.sqrt(whole[i, i] * whole[j, j]))
+
+
+def test_the_horizontal_support_follows_the_vertical_one(problem, covariance):
+    """Its logarithm is the sum of two: stiffness and ratio."""
+    spread = joint_spread(problem, middle(problem), covariance, stated(problem, covariance, 1.0))
+    assert "NDE.support.anisotropy" not in spread.paths
+    a, b = (spread.paths.index(f"NDE.support.{name}") for name in ("stiffness", "stiffness_horizontal"))
+    paths = [one.path for one in problem.unknowns]
+    i, j = (3 + paths.index(f"NDE.support.{name}") for name in ("stiffness", "anisotropy"))
+    expected = covariance[i, i] + covariance[j, j] + 2.0 * covariance[i, j]
+    assert spread.matrix[b, b] == pytest.approx(expected, rel=1e-6)
+    assert spread.matrix[a, a] == pytest.approx(covariance[i, i], rel=1e-6)
+
+
+def test_contact_stiffness_is_that_of_the_fitted_exponent(problem, covariance):
+    """The force at the typical indentation varies as fitted, whatever exponent is drawn."""
+    from rotordrop.rotor.unknowns import typical_depth
+
+    spread = joint_spread(problem, middle(problem), covariance, stated(problem, covariance, 1.0))
+    machine = problem.model.machine
+    depth = typical_depth(machine.touchdown_bearings[0], float(np.mean(problem.model.load_shares)))
+    k, n = (spread.paths.index(f"NDE.contact.{name}") for name in ("stiffness", "exponent"))
+    along = np.zeros(len(spread.paths))
+    along[k], along[n] = 1.0, float(machine.touchdown_bearings[0].contact.exponent) * np.log(depth)
+    paths = [one.path for one in problem.unknowns]
+    i = 3 + paths.index("NDE.contact.stiffness")
+    assert along @ spread.matrix @ along == pytest.approx(covariance[i, i], rel=0.02)
+
+
+def calibrated_in_file(problem, spread):
+    origin = CalibrationOrigin(drops=(CalibrationDrop(name="one"),), consistent=True, joint=spread)
+    return replace(problem.model, machine=problem.model.machine.model_copy(update={"calibration": origin}))
+
+
+def test_a_later_drop_begins_with_the_correlations_of_the_fit(problem, covariance):
+    """Through the file and back, whatever its values mean, and with the variances that its intervals say."""
+    spread = joint_spread(problem, middle(problem), covariance, stated(problem, covariance, 1.5))
+    unknowns = [replace(one, calibrated=True) for one in problem.unknowns]
+    sigma = 1.0 + np.arange(len(unknowns))
+    block = np.diag(sigma**2)
+    correlate(calibrated_in_file(problem, spread), unknowns, block)
+    fitted = covariance[3:, 3:]
+    own = np.sqrt(np.diag(fitted))
+    assert block / np.outer(sigma, sigma) == pytest.approx(fitted / np.outer(own, own), abs=1e-6)
+
+
+def test_a_value_changed_since_errs_alone(problem, covariance):
+    spread = joint_spread(problem, middle(problem), covariance, stated(problem, covariance, 1.0))
+    unknowns = [replace(one, calibrated=k != 2) for k, one in enumerate(problem.unknowns)]
+    block = np.eye(len(unknowns))
+    correlate(calibrated_in_file(problem, spread), unknowns, block)
+    assert np.count_nonzero(block[2]) == 1 and np.count_nonzero(block[1]) > 2
+    assert np.linalg.eigvalsh(block).min() > 0.0
+
+
+def test_a_file_without_a_joint_distribution_correlates_nothing(problem):
+    block = np.eye(len(problem.unknowns))
+    correlate(problem.model, problem.unknowns, block)
+    assert (block == np.eye(len(problem.unknowns))).all()

@@ -1,0 +1,331 @@
+"""Numbers that one part finds and another writes: none is lost, doubled or taken for another on the way."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rotordrop.estimate import simulated_coast_down
+from rotordrop.estimate.bearing_drop import Motion, deepest
+from rotordrop.estimate.bearing_values import equivalent_stiffness
+from rotordrop.estimate.document import _heading
+from rotordrop.estimate.estimate import Verdict
+from rotordrop.estimate.later_motion import RESOLVED, later_motion
+from rotordrop.estimated import IdentifiedValue
+from rotordrop.machine import example_machine
+from rotordrop.rotor.bearing_numbers import numbers_of
+from rotordrop.rotor.parameter_table import parameter
+from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.rotor.unknowns import all_unknowns
+from rotordrop.twin import tracked_estimate
+from rotordrop.twin.calibrated import CONFOUNDED, _confounded, _values
+from rotordrop.twin.tracked_loads import twin_impacts
+from rotordrop.twin.tracked_parameters import (
+    PARAMETER_WIDENING,
+    determination,
+    parameter_widening,
+    sensor_errors,
+    within_bounds,
+)
+
+NINETY = 1.6448536269514722
+SENSORS = 4
+
+
+@pytest.fixture(scope="module")
+def problem() -> Any:
+    """The unknowns of a machine, behind five entries of the motion and before gains and offsets."""
+    model = build_drop_model(example_machine("lp400"), "quick")
+    unknowns = all_unknowns(model)
+    first = 5 + len(unknowns)
+    return SimpleNamespace(
+        model=model,
+        unknowns=unknowns,
+        n_dynamic=5,
+        n_channels=SENSORS,
+        variances=np.array([1.0, 4.0, 9.0, 16.0]) * 1e-14,
+        sensor_errors=lambda entries: (
+            entries[first : first + SENSORS],
+            entries[first + SENSORS : first + 2 * SENSORS],
+        ),
+    )
+
+
+def test_the_first_contact_is_as_deep_as_the_motion_in_its_time() -> None:
+    """Before it the rotor turns further out, and after it, too."""
+    time = np.arange(0.0, 0.1, 1e-3)
+    path = np.zeros((100, 2))
+    path[:, 1] = -250e-6
+    path[5], path[21], path[60] = (-400e-6, 0.0), (180e-6, -240e-6), (0.0, -500e-6)
+    motion = Motion(label="estimated", time=time, displacement=path)
+    found = deepest(motion, 0.02, 0.03, 280e-6)
+    assert found.deepest_time == pytest.approx(0.021)
+    assert found.indentation == pytest.approx(20e-6)
+    assert (found.start, found.end) == (0.02, 0.03)
+
+
+def test_the_rest_of_a_record_is_compared_where_it_has_readings() -> None:
+    time = np.arange(-0.01, 0.4, 1e-3)
+    motion = np.zeros((len(time), 3, 2))
+    motion[:, :, 1] = -100e-6
+    early, late = np.searchsorted(time, 0.05), np.searchsorted(time, 0.30)
+    motion[2, :, 1] = -900e-6  # levitated still: not in the drop
+    motion[early, :, 0], motion[early, :, 1] = 240e-6, -180e-6
+    motion[late, :, 1] = -330e-6
+    motion[time > 0.2, 1] = np.nan  # its sensors fall silent
+    motion[time <= 0.2, 2] = np.nan
+    (found,) = later_motion(("NDE", "DE", "MID"), time, motion, 0.2, 1e-6)
+    assert (found.bearing, found.resolved) == ("NDE", RESOLVED * 1e-6)
+    assert (found.first, found.later) == pytest.approx((300e-6, 330e-6))
+    assert (found.first_time, found.later_time) == pytest.approx((time[early], time[late]))
+    assert found.larger
+
+
+def test_a_gap_ends_at_zero_and_nothing_else_does() -> None:
+    gap, mass = parameter("air_gap"), parameter("support.mass")
+    for interval, inside in (((-3e-6, -1e-6), (0, 0)), ((-1e-6, 5e-6), (0, 5e-6)), ((2e-6, 5e-6),) * 2):
+        assert within_bounds(gap, interval) == inside
+        assert within_bounds(mass, interval) == interval
+
+
+def test_a_parameter_is_widened_up_to_its_prior_and_never_narrowed(problem: Any) -> None:
+    for unknown in problem.unknowns:
+        for share, factor in ((0.1, PARAMETER_WIDENING), (0.8, 1.25), (1.0, 1.0), (1.5, 1.0), (0.0, 1.5)):
+            found = parameter_widening(unknown, share * unknown.sigma)
+            assert found == pytest.approx(factor), (unknown.path, share)
+        assert parameter_widening(unknown, 0.1 * unknown.sigma, 2.0) == pytest.approx(2 * PARAMETER_WIDENING)
+
+
+def test_sensor_errors_are_those_at_the_end_of_the_drop(problem: Any) -> None:
+    size = problem.n_dynamic + len(problem.unknowns) + 2 * SENSORS
+    first = size - 2 * SENSORS
+    dice = np.random.default_rng(3)
+    means, sigma = dice.normal(size=(3, size)), dice.uniform(0.01, 0.5, size)
+    smoothed: Any = SimpleNamespace(means=means, covariance=lambda at: np.diag((1 + 2 - at) * sigma**2))
+    for widening in (1.0, 2.0):
+        found = sensor_errors(problem, smoothed, fits=True, widening=widening)
+        assert [one.sensor for one in found] == [s.name for s in problem.model.machine.sensors]
+        for c, one in enumerate(found):
+            assert one.noise == pytest.approx((c + 1) * 1e-7)
+            for at, value in ((first + c, one.gain_error), (first + SENSORS + c, one.offset)):
+                middle, half = means[2, at], NINETY * widening * sigma[at]
+                assert value.value == middle
+                assert value.standard_error == pytest.approx(widening * sigma[at])
+                assert value.interval_90 == pytest.approx((middle - half, middle + half), rel=1e-12)
+
+
+def test_a_calibrated_gain_undoes_the_error_of_the_sensor() -> None:
+    """A sensor that reads (1 + g) times the motion needs the gain 1 / (1 + g); its error by differences."""
+    names = ("A", "B")
+    machine = SimpleNamespace(sensors=tuple(SimpleNamespace(name=name) for name in names))
+    only: Any = SimpleNamespace(
+        unknowns=(), n_dynamic=3, n_channels=2, model=SimpleNamespace(machine=machine)
+    )
+    errors, offsets = np.array([0.1, -0.2]), np.array([3e-6, -4e-6])
+    sigma = np.array([1.0, 1.0, 1.0, 0.02, 0.01, 1e-6, 2e-6])
+    mean = np.concatenate([np.zeros(3), errors, offsets])
+    found = _values(only, mean, np.diag(sigma**2), 1.5)
+    for c, name in enumerate(names):
+        gain, offset = found[f"sensors.{name}.gain"], found[f"sensors.{name}.offset"]
+        assert gain.value * (1.0 + errors[c]) == pytest.approx(1.0)
+        step = 1e-4
+        slope = (1.0 / (1.0 + errors[c] - step) - 1.0 / (1.0 + errors[c] + step)) / (2.0 * step)
+        assert gain.standard_error == pytest.approx(1.5 * slope * sigma[3 + c], rel=1e-6)
+        assert (offset.value, offset.standard_error) == (offsets[c], pytest.approx(1.5 * sigma[5 + c]))
+        for value in (gain, offset):
+            low, high = value.interval_90 or (math.nan, math.nan)
+            assert high - value.value == pytest.approx(value.value - low)
+            assert high - low == pytest.approx(2.0 * NINETY * (value.standard_error or math.nan))
+
+
+def test_what_is_called_confounded_is_what_correlates(problem: Any) -> None:
+    """A pair at -0.95, a parameter and an offset at 0.92, and a pair at 0.6 that is not mentioned."""
+    first, unknowns = problem.n_dynamic, problem.unknowns
+    sensors = problem.model.machine.sensors
+    offset = first + len(unknowns) + problem.n_channels
+    sigma = np.geomspace(0.01, 3.0, offset + problem.n_channels)
+    correlation = np.eye(len(sigma))
+    pairs = {(first, first + 3): -0.95, (first + 1, offset): 0.92, (first + 2, first + 4): 0.6}
+    for (i, j), value in pairs.items():
+        correlation[i, j] = correlation[j, i] = value
+    found = _confounded(problem, correlation * np.outer(sigma, sigma))
+    assert [(pair.first, pair.second) for pair in found] == [
+        (unknowns[0].path, unknowns[3].path),
+        (unknowns[1].path, f"sensors.{sensors[0].name}.offset"),
+    ]
+    assert [pair.correlation for pair in found] == pytest.approx([-0.95, 0.92])
+    assert all(abs(pair.correlation) > CONFOUNDED and pair.way_out for pair in found)
+
+
+def test_innovations_keep_their_channels_and_their_deviation() -> None:
+    """The last column of the filter is the speed; behind the last sample followed there is nothing."""
+    dice = np.random.default_rng(6)
+    innovations, variances = dice.normal(size=(50, 5)), dice.uniform(1.0, 2.0, (50, 5))
+    filtered = SimpleNamespace(done=40, innovations=innovations, innovation_variances=variances)
+    sensors = tuple(SimpleNamespace(name=name) for name in "ABCD")
+    machine = SimpleNamespace(sensors=sensors)
+    drop: Any = SimpleNamespace(
+        judged=filtered,
+        problem=SimpleNamespace(time=np.arange(50.0), model=SimpleNamespace(machine=machine)),
+    )
+    found = tracked_estimate._innovations(drop)
+    assert found.channels == ("A", "B", "C", "D")
+    assert found.values.shape == found.deviation.shape == (40, 4) and found.time[-1] == 39.0
+    assert found.values == pytest.approx(innovations[:40, :4])
+    assert found.deviation**2 == pytest.approx(variances[:40, :4])
+
+
+def test_the_rest_of_the_record_counts_above_the_noise_of_the_sensors(
+    problem: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    time = np.arange(0.0, 0.4, 1e-3)
+    monkeypatch.setattr(tracked_estimate, "_measured", lambda *_: np.ones((400, 2, 2)))
+    evidence = SimpleNamespace(time=time, readings=lambda until: np.zeros((400, 4)))
+    drop: Any = SimpleNamespace(
+        evidence=evidence,
+        problem=SimpleNamespace(model=problem.model, time=time[:200], variances=problem.variances),
+    )
+    judged: Any = None
+    found = tracked_estimate._later(drop, judged)
+    assert [one.bearing for one in found] == ["NDE", "DE"]
+    noise = math.sqrt((1.0 + 4.0 + 9.0 + 16.0) / 4.0) * 1e-7
+    for one in found:
+        assert one.resolved == pytest.approx(RESOLVED * noise)
+        assert one.first_time <= time[199] < one.later_time
+
+
+def test_an_impact_lasts_from_its_first_to_its_last_indented_sample() -> None:
+    time = 5e-5 * np.arange(60)
+    depth = np.full((60, 1), -1e-6)
+    depth[10:16], depth[30:31] = 2e-6, 1e-6
+    force = np.where(depth > 0.0, 100.0, 0.0)
+    force[12], force[30] = 400.0, 300.0
+    forces: Any = SimpleNamespace(
+        time=time,
+        indentation=depth,
+        magnitude=force + 5.0,
+        magnitude_sigma=np.full((60, 1), 4.0),
+        contact_force=force,
+        contact_power=0.01 * force,
+        azimuth=np.arange(60.0)[:, None],
+    )
+    long, short = twin_impacts(forces, 0, 1.0, None)
+    for impact, first, last, strongest in ((long, 10, 15, 12), (short, 30, 30, 30)):
+        assert (impact.start, impact.end) == (time[first], time[last])
+        assert impact.azimuth == strongest
+        total = 5e-5 * float(force[first : last + 1].sum())
+        assert impact.impulse.value == pytest.approx(total)
+        assert impact.dissipated_energy.value == pytest.approx(0.01 * total)
+        assert force[strongest, 0] + 5.0 <= impact.peak_force.value < 1.2 * (force[strongest, 0] + 5.0)
+        assert impact.peak_time == pytest.approx(time[strongest], abs=2.6e-5)
+
+
+def test_a_speed_is_written_in_turns_per_second() -> None:
+    estimate: Any = SimpleNamespace(
+        record=SimpleNamespace(path=None, sha256="ab", metadata={"Date": "2024-05-06"}),
+        method=tracked_estimate.Tracked(quick=True),
+        verdict=Verdict.CONSISTENT,
+        consistent=True,
+        machine=SimpleNamespace(name="machine"),
+        name="drop",
+        simulated_record=False,
+        drop_instant=SimpleNamespace(value=0.25, interval_90=(0.24, 0.26)),
+        speed=2.0 * math.pi * 60.0,
+        until=0.2,
+    )
+    written = _heading(estimate)
+    assert written["speed_Hz"] == pytest.approx(60.0)
+    assert written["drop_instant_interval_90_s"] == [0.24, 0.26]
+    assert (written["method"], written["quick"], written["record"]) == ("tracked", True, "drop")
+    assert written["recorded"] == "2024-05-06"
+
+
+@pytest.mark.parametrize(
+    ("consistent", "checked", "verdict", "widening"),
+    [
+        (True, True, Verdict.CONSISTENT, 1.0),
+        (True, False, Verdict.CONSISTENT, 1.0),
+        (False, True, Verdict.HELD, 2.0),
+    ],
+)
+def test_a_twin_that_fits_stands_whether_it_was_cross_checked_or_not(
+    consistent: bool,
+    checked: bool,
+    verdict: Verdict,
+    widening: float,
+    problem: Any,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    seen: list[tuple[bool, float]] = []
+
+    def parameters(*_: Any, fits: bool, widening: float) -> tuple[Any, ...]:
+        seen.append((fits, widening))
+        return ()
+
+    monkeypatch.setattr(tracked_estimate, "parameters", parameters)
+    monkeypatch.setattr(tracked_estimate, "sensor_errors", lambda *_, **__: ())
+    monkeypatch.setattr(tracked_estimate, "_gives_way", lambda *_: False)
+    drop: Any = SimpleNamespace(problem=problem, smoothed=None, consistent=consistent, drops=1, kept=())
+    check: Any = object() if checked else None
+    judged = tracked_estimate._judge(drop, check)
+    assert judged.verdict is verdict and judged.widening == widening
+    assert seen == [(consistent, widening)] and judged.given_way == (False, False)
+
+
+def test_a_simulated_coast_down_is_seen_where_the_sensors_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At the nodes of the sensors if the file holds all of them, at the bearings otherwise."""
+    machine = example_machine("lp400")
+    nodes = {sensor.bearing: f"node {sensor.node}" for sensor in machine.sensors}
+    assert set(nodes) == {"NDE", "DE"}
+    planes = {name: name for name in (*nodes, *nodes.values())}
+    samples: Any = SimpleNamespace(
+        planes=planes,
+        air_gap={"NDE": 1e-4, "DE": 2e-4},
+        speed=np.linspace(300.0, 200.0, 5000),
+        sampling_rate=1e3,
+    )
+    result: Any = SimpleNamespace(standstill_time=None, maxima=tuple)
+    monkeypatch.setattr(simulated_coast_down, "load_coast_down", lambda path: result)
+    monkeypatch.setattr(simulated_coast_down, "open_samples", lambda path: samples)
+    seen = simulated_coast_down.simulated_coast_down(Path("c.h5"), machine)
+    assert dict(seen.planes) == nodes and seen.air_gap == samples.air_gap
+    assert dict(simulated_coast_down.simulated_coast_down(Path("c.h5")).planes) == {n: n for n in nodes}
+    del planes[nodes["DE"]]
+    assert set(simulated_coast_down.simulated_coast_down(Path("c.h5"), machine).planes) == set(nodes)
+    assert seen.profile.speed_at([0.0])[0] == pytest.approx(300.0) and not seen.recorded
+
+
+def test_the_equivalent_stiffness_is_as_unsure_as_what_holds_the_balls() -> None:
+    """The bearing at the preload that was found, not that of the file; both widths of both parts."""
+    machine = example_machine("lp400")
+    support = IdentifiedValue(value=80e6, interval_90=(78e6, 82e6), unit="N/m")
+    preload = IdentifiedValue(value=700.0, interval_90=(500.0, 900.0), unit="N")
+    found = equivalent_stiffness(machine, 0, 300.0, support, preload)
+
+    def series(held: float, stiffness: float) -> float:
+        name = machine.touchdown_bearings[0].name
+        bearing = machine.with_values({f"{name}.preload": held}).touchdown_bearings[0]
+        races = numbers_of(bearing).tangent_stiffness(300.0)
+        return 1.0 / (1.0 / races + 1.0 / stiffness)
+
+    value = series(700.0, 80e6)
+    low = value - math.hypot(value - series(500.0, 80e6), value - series(700.0, 78e6))
+    high = value + math.hypot(series(900.0, 80e6) - value, series(700.0, 82e6) - value)
+    assert found.value == pytest.approx(value, rel=1e-12)
+    assert found.interval_90 == pytest.approx((low, high), rel=1e-12)
+    assert high - low > 1.1 * (series(700.0, 82e6) - series(700.0, 78e6))
+
+
+def test_the_verdict_on_a_parameter_goes_by_how_much_of_its_prior_is_left() -> None:
+    shares = (0.0, 0.29, 0.31, 0.69, 0.71, 1.0)
+    said = [determination(share) for share in shares]
+    assert said[:2] == ["determined"] * 2
+    assert said[2:4] == ["weakly determined"] * 2
+    assert said[4:] == ["the record does not determine it"] * 2
+    assert determination(0.9, calibrated=True) == "known from the calibration"
+    assert determination(0.5, calibrated=True) == "weakly determined"
