@@ -244,9 +244,9 @@ CASES: tuple[Case, ...] = (
             "rotordrop_bench synthesize lp400/machine.toml --speed 75Hz --seed 5 -o hidden",
         ),
         files=(
-            "hidden/synthetic_75Hz.csv",
-            "hidden/synthetic_75Hz_tail.csv",
-            "hidden/truth/synthetic_75Hz.json",
+            "hidden/synthetic_075Hz.csv",
+            "hidden/synthetic_075Hz_tail.csv",
+            "hidden/truth/synthetic_075Hz.json",
         ),
         needs=("example-lp400",),
         quick=True,
@@ -282,8 +282,8 @@ CASES: tuple[Case, ...] = (
     Case(
         name="estimate-since",
         commands=(
-            "rotordrop estimate lp400/machine.toml hidden/synthetic_75Hz.csv "
-            "--tail hidden/synthetic_75Hz_tail.csv --since estimate-tracked.json --json {name}.json",
+            "rotordrop estimate lp400/machine.toml hidden/synthetic_075Hz.csv "
+            "--tail hidden/synthetic_075Hz_tail.csv --since estimate-tracked.json --json {name}.json",
         ),
         needs=("example-lp400", "recording-lp400", "estimate-tracked"),
     ),
@@ -506,7 +506,7 @@ def condensed(value: Any) -> Any:
         return {key: condensed(v) for key, v in value.items() if key not in VOLATILE}
     if isinstance(value, list):
         leaves = _leaves(value)
-        if leaves is None and len(value) > MANY:
+        if leaves is None and len(value) > MANY and all(isinstance(v, dict) for v in value):
             whole = [condensed(v) for v in value]
             exact = json.dumps(whole, separators=(",", ":"))
             digest = hashlib.sha256(exact.encode()).hexdigest()
@@ -569,12 +569,12 @@ def internals(states: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
     import numpy as np
 
     from rotordrop.machine import example_machine, load_machine
-    from rotordrop.model.parameters import build_drop_model
-    from rotordrop.simulation._histories import stored_energy
-    from rotordrop.simulation._rhs import drop_derivative
-    from rotordrop.simulation._sensitivity import drop_jacobian
-    from rotordrop.simulation.case import DropCase, LevitatedStart
-    from rotordrop.simulation.levitation import start_of_drop
+    from rotordrop.rotor.parameters import build_drop_model
+    from rotordrop.simulate._histories import stored_energy
+    from rotordrop.simulate._rhs import drop_derivative
+    from rotordrop.simulate._sensitivity import drop_jacobian
+    from rotordrop.simulate.case import DropCase, LevitatedStart
+    from rotordrop.simulate.levitation import start_of_drop
 
     held = LevitatedStart(delay=0.01)
     let_go = LevitatedStart(
@@ -632,7 +632,7 @@ def _drawn(model: Any, speed: float, seed: int) -> Any:
     """A state with everything moving, in flight or in contact."""
     import numpy as np
 
-    from rotordrop.simulation.levitation import rigid_amplitudes
+    from rotordrop.simulate.levitation import rigid_amplitudes
 
     random = np.random.default_rng(seed)
     layout, state = model.layout, model.layout.zeros()
@@ -835,14 +835,14 @@ def timed_actions() -> dict[str, Callable[[], Any]]:
     from naive_drop import NaiveDrop
     from speed import CASE, STRETCH
 
-    from rotordrop.estimation.tracked import FINE_SCHEDULE, WINDOW, twin_problem
-    from rotordrop.identification.evidence import read_evidence
+    from rotordrop.twin.tracked import FINE_SCHEDULE, WINDOW, twin_problem
+    from rotordrop.evidence.evidence import read_evidence
     from rotordrop.machine import example_machine, load_machine
-    from rotordrop.measurement import example_record_path, read_record
-    from rotordrop.model.parameters import build_drop_model
-    from rotordrop.simulation.drop import simulate_drop
-    from rotordrop.tracking.calibration import stage_settings
-    from rotordrop.tracking.smoother import forward, smooth
+    from rotordrop.record import example_record_path, read_record
+    from rotordrop.rotor.parameters import build_drop_model
+    from rotordrop.simulate.drop import simulate_drop
+    from rotordrop.track.calibration import stage_settings
+    from rotordrop.track.smoother import forward, smooth
 
     paper = example_machine("paper")
     quick, accurate = build_drop_model(paper, "quick"), build_drop_model(paper, "accurate")
@@ -882,7 +882,7 @@ def times(rounds: int) -> None:
                 action()
                 spent.append(time.process_time() - began)
             seen[name].append(median(spent))
-    fresh = "from rotordrop.simulation.fingerprint import fingerprint; fingerprint()"
+    fresh = "from rotordrop.simulate.fingerprint import fingerprint; fingerprint()"
     first: list[float] = []
     for _ in range(rounds + 1):
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
