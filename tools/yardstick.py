@@ -835,7 +835,6 @@ def timed_actions() -> dict[str, Callable[[], Any]]:
     from naive_drop import NaiveDrop
     from speed import CASE, STRETCH
 
-    from rotordrop.twin.tracked import FINE_SCHEDULE, WINDOW, twin_problem
     from rotordrop.evidence.evidence import read_evidence
     from rotordrop.machine import example_machine, load_machine
     from rotordrop.record import example_record_path, read_record
@@ -843,6 +842,7 @@ def timed_actions() -> dict[str, Callable[[], Any]]:
     from rotordrop.simulate.drop import simulate_drop
     from rotordrop.track.calibration import stage_settings
     from rotordrop.track.smoother import forward, smooth
+    from rotordrop.twin.tracked import FINE_SCHEDULE, WINDOW, twin_problem
 
     paper = example_machine("paper")
     quick, accurate = build_drop_model(paper, "quick"), build_drop_model(paper, "accurate")
