@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from rotordrop.machine.touchdown_bearing import TouchdownBearing
+from rotordrop.elements.touchdown_bearing import TouchdownBearing
+from rotordrop.physics import columns as L
 from rotordrop.physics.ball_bearing import bearing_constants
-from rotordrop.rotor import layout as L
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.simulate.case import DropCase
 from rotordrop.simulate.levitation import start_of_drop

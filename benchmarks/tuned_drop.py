@@ -10,7 +10,7 @@ import math
 import numpy as np
 from naive_drop import NaiveDrop
 
-from rotordrop.rotor import layout as L
+from rotordrop.physics import columns as L
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.simulate.case import DropCase
 from rotordrop.simulate.levitation import start_of_drop

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rotordrop.rotor.parameter import Parameter
+from rotordrop.elements.parameter import Parameter
 from rotordrop.rotor.parameter_table import LOADS, rows
 from rotordrop.rotor.structure_table import STRUCTURE
 

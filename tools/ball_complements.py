@@ -10,7 +10,7 @@ with the pitch circle half way between bore and outside diameter. Balls are look
 of a catalogue that does publish them (GMN): 0.53 to 0.64 of the section height, 70 to 89 % of the pitch
 circle filled; 0.40 to 0.52 of the section height and 62 to 84 % for the high-speed series with small balls.
 
-    python tools/ball_complements.py src/rotordrop/machine/catalog/complements.json
+    python tools/ball_complements.py src/rotordrop/elements/catalog/complements.json
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from rotordrop.machine.catalog import CatalogueBearing, ball_size, designations, find_bearing
+from rotordrop.elements.catalog import CatalogueBearing, ball_size, designations, find_bearing
 from rotordrop.physics.ball_bearing import row_approach, row_axial_force, row_axial_stiffness
 from rotordrop.physics.hertz import compliance, contacts_in_series, race_contact
 

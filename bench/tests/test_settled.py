@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tests.scaled_machines import scaled_machine
 
-from rotordrop.rotor import layout as L
+from rotordrop.physics import columns as L
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.simulate._rhs import drop_derivative
 from rotordrop_bench import hidden_machine, synthesize_drop

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import SimulationError
-from rotordrop.rotor import layout as L
+from rotordrop.physics import columns as L
 from rotordrop.rotor.modes import free_free_modes
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.simulate.case import CentredStart, DropCase, LevitatedStart, PlacedStart

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rotordrop._version import __version__
 
 if TYPE_CHECKING:
+    from rotordrop.elements.catalog import find_bearing as find_bearing
     from rotordrop.errors import RotordropError as RotordropError
     from rotordrop.estimated import Estimated as Estimated
     from rotordrop.estimated import IdentifiedValue as IdentifiedValue
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
     from rotordrop.machine import load_machine as load_machine
     from rotordrop.machine import machine_schema as machine_schema
     from rotordrop.machine import save_machine as save_machine
-    from rotordrop.machine.catalog import find_bearing as find_bearing
     from rotordrop.record import Record as Record
     from rotordrop.record import example_record_path as example_record_path
     from rotordrop.record import read_record as read_record
@@ -62,7 +62,7 @@ _PUBLIC = {
     "check_record": "rotordrop.evidence",
     "estimate_drop": "rotordrop.estimation",
     "estimate_drops": "rotordrop.estimation",
-    "find_bearing": "rotordrop.machine.catalog",
+    "find_bearing": "rotordrop.elements.catalog",
     "example_machine": "rotordrop.machine",
     "example_record_path": "rotordrop.record",
     "format_quantity": "rotordrop.units",

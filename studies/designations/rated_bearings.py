@@ -29,9 +29,9 @@ from typing import Any
 
 import numpy as np
 
-from rotordrop.machine.catalog import PairRigidity, read_designation
-from rotordrop.machine.catalog.boundary import DIMENSION_SERIES
-from rotordrop.machine.catalog.inference import (
+from rotordrop.elements.catalog import PairRigidity, read_designation
+from rotordrop.elements.catalog.boundary import DIMENSION_SERIES
+from rotordrop.elements.catalog.inference import (
     USUAL_GROOVE,
     InferredBalls,
     dynamic_rating,

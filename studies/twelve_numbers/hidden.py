@@ -26,18 +26,18 @@ from typing import Any
 import numpy as np
 
 from rotordrop import estimate_drop
+from rotordrop.elements.beam import is_beam
+from rotordrop.elements.rotor import Rotor
 from rotordrop.errors import RotordropError
 from rotordrop.estimate.allowances import BEAM_FORCE_SIGMA
 from rotordrop.estimated import NINETY, Estimated
 from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine import Machine
-from rotordrop.machine.rotor import Rotor
 from rotordrop.machine.simple import SimpleMachine, simple_machine
 from rotordrop.record.record import read_record
 from rotordrop.rotor.assembly import rotor_fe
 from rotordrop.rotor.modes import free_free_modes
 from rotordrop.rotor.parameters import build_drop_model
-from rotordrop.rotor.rotor_form import is_beam
 from rotordrop.rotor.unknowns import Unknown, all_unknowns
 from rotordrop.track.input_state import input_state_estimate, lent_by_record
 from rotordrop.track.prior import fall_time

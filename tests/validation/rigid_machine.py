@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rotordrop.machine import loads_machine
-from rotordrop.rotor import layout as L
+from rotordrop.physics import columns as L
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.rotor.reduction import Reduction
 

@@ -19,7 +19,7 @@ from tests.reference.ball_bearing_catalogue import (
     row_of_conformity,
 )
 
-from rotordrop.machine.catalog import CatalogueBearing, designations, find_bearing
+from rotordrop.elements.catalog import CatalogueBearing, designations, find_bearing
 from rotordrop.physics import hertz
 from rotordrop.physics.ball_bearing import (
     BearingConstants,

@@ -12,7 +12,7 @@ import pytest
 from cases import Compute, check, fails_with, load_case
 
 from rotordrop.machine import Machine, example_machine
-from rotordrop.rotor import layout as L
+from rotordrop.physics import columns as L
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.simulate.case import DropCase, PlacedStart
 from rotordrop.simulate.drop import simulate_drop

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from cases import Compute, check, load_case
 
-from rotordrop.machine.sensor import Sensor
+from rotordrop.elements.sensor import Sensor
 from rotordrop.physics.aerodynamics import exponential_deceleration
 from rotordrop.record.axes import planar_of, sensor_planes
 from rotordrop.severity.statistics import stress_statistics

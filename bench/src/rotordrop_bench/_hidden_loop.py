@@ -7,10 +7,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.physics import columns as L
 from rotordrop.physics._compile import kernel
+from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import exp, ln, power
-from rotordrop.rotor import layout as L
-from rotordrop.rotor.layout import KernelParameters
 from rotordrop.simulate._loop import (
     ALPHA,
     BETA,

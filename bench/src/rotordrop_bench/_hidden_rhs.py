@@ -11,14 +11,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel
 from rotordrop.physics.ball_set import ball_set_force, ball_set_load
+from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.contact import contact_force
 from rotordrop.physics.elementary import exp, sine_cosine
 from rotordrop.physics.friction import stribeck_coefficient
 from rotordrop.physics.spin import race_drag_torque, surface_speed
-from rotordrop.rotor import layout as L
-from rotordrop.rotor.layout import KernelParameters
 from rotordrop.simulate._rhs import (
     add_rotor_rates,
     modal_parts,

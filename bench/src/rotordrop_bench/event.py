@@ -8,10 +8,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.bearing_numbers import Spread, numbers_of
 from rotordrop.errors import UsageError
 from rotordrop.estimated import Estimated
 from rotordrop.machine import Machine, TouchdownBearing
-from rotordrop.rotor.bearing_numbers import Spread, numbers_of
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.rotor.reduction import Reduction
 from rotordrop.rotor.structure_table import structure_rows as structure_rows_of

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import SimulationError
-from rotordrop.rotor.layout import KernelParameters
+from rotordrop.physics.columns import KernelParameters
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.rotor_on_race import rotor_on_race
 from rotordrop.simulate import _histories

@@ -7,10 +7,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.physics import columns as L
 from rotordrop.physics.ball_set import ball_set_energy
+from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.contact import contact_energy
-from rotordrop.rotor import layout as L
-from rotordrop.rotor.layout import KernelParameters
 from rotordrop.rotor.parameters import DropModel
 from rotordrop_bench import _hidden_rhs as H
 from rotordrop_bench.settled import coordinate_masses, lowest_energy, settled_coordinates, without_magnets

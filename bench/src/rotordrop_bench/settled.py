@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.errors import SimulationError
+from rotordrop.physics import columns as L
+from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.pendulum import small_frequency
-from rotordrop.rotor import layout as L
-from rotordrop.rotor.bearing_numbers import numbers_of
-from rotordrop.rotor.layout import KernelParameters
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.static_sag import sag_of_model
 from rotordrop.simulate._histories import stored_energy

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.bearing_numbers import numbers_of
+from rotordrop.elements.parameter import Step
 from rotordrop.machine import Machine, TouchdownBearing
-from rotordrop.rotor.bearing_numbers import numbers_of
-from rotordrop.rotor.parameter import Step
 from rotordrop.rotor.parameter_table import rows
 from rotordrop.rotor.statics import bearing_load_shares
 from rotordrop.simulate.certificate import refined_peak

@@ -6,9 +6,8 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from rotordrop.estimated import Estimated
-from rotordrop.machine.description import Description, Misfit, Node
-from rotordrop.machine.values import (
+from rotordrop.elements.description import Description, Misfit, Node
+from rotordrop.elements.values import (
     Angle,
     ContactExponent,
     Force,
@@ -24,6 +23,7 @@ from rotordrop.machine.values import (
     Unbalance,
     default,
 )
+from rotordrop.estimated import Estimated
 
 Share = Annotated[Estimated, Physical("dimensionless", least=0.0, most=1.0)]
 CrossAxis = Annotated[Estimated, Physical("dimensionless", least=-0.5, most=0.5)]

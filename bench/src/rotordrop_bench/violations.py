@@ -8,9 +8,9 @@ from typing import Any
 
 from pydantic import Field
 
+from rotordrop.elements.description import Channel, Name
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
-from rotordrop.machine.description import Channel, Name
 from rotordrop.machine.loading import load_description
 from rotordrop.machine.schema import description_schema
 from rotordrop_bench.violation_parts import (

@@ -80,7 +80,7 @@ def _read_beside(file: Path) -> list[Path]:
         return []
     import tomllib
 
-    from rotordrop.machine.description import LARGEST_FILE
+    from rotordrop.elements.description import LARGEST_FILE
 
     try:
         with file.open(encoding="utf-8-sig") as stream:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from rotordrop.elements.rotor import Element
     from rotordrop.machine import Machine
-    from rotordrop.machine.rotor import Element
 
 WIDTH = 96
 HALF_ROWS = 3

@@ -22,7 +22,7 @@ def bearings(
     json_file: JsonOption = None,
 ) -> None:
     """Search bearings by designation: size, angle, balls listed or inferred, clearance, preload."""
-    from rotordrop.machine.catalog import find_bearing, search_bearings
+    from rotordrop.elements.catalog import find_bearing, search_bearings
     from rotordrop.report.bearing_content import bearing_content, bearing_json
     from rotordrop.report.terminal import print_summary
 

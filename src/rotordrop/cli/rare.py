@@ -33,7 +33,7 @@ def rare(
     json: JsonOption = None,
 ) -> None:
     """Find the probability that a drop exceeds a limit, where that is rare."""
-    from rotordrop.machine.description import unknown_key
+    from rotordrop.elements.description import unknown_key
     from rotordrop.study.plan import load_study
     from rotordrop.study.quantities import columns_of
     from rotordrop.study.rare import rare_drops

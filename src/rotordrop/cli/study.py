@@ -120,7 +120,7 @@ def _opened(place: Path, folder: Path | None) -> tuple[Study, Path]:
 
 def _limits(results: StudyResults, written: Sequence[str]) -> dict[str, float]:
     """Limits [SI] by quantity of a bearing, of texts such as ``"peak_stress=1.8 GPa"``."""
-    from rotordrop.machine.description import unknown_key
+    from rotordrop.elements.description import unknown_key
     from rotordrop.study.quantities import BEARING_QUANTITIES
     from rotordrop.units import parse_quantity
 

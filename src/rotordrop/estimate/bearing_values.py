@@ -6,10 +6,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.estimate.estimate import FittedParameter
 from rotordrop.estimated import NINETY, IdentifiedValue
 from rotordrop.machine import Machine
-from rotordrop.rotor.bearing_numbers import numbers_of
 from rotordrop.rotor.parameter_table import published
 
 

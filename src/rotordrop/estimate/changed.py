@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
+from rotordrop.elements.parameter import Parameter
 from rotordrop.errors import UsageError
 from rotordrop.estimated import NINETY
 from rotordrop.physics.linear_algebra import solve, symmetric_eigen
-from rotordrop.rotor.parameter import Parameter
 from rotordrop.rotor.parameter_table import fitted_row, row_of
 from rotordrop.units import format_chance
 

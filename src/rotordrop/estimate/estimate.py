@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.atomic_file import write_json
+from rotordrop.elements.parameter import Parameter
 from rotordrop.estimate.advice import Advice
 from rotordrop.estimate.agreement import Agreement
 from rotordrop.estimate.bearing_drop import BearingDrop
@@ -34,7 +35,6 @@ from rotordrop.evidence.speed import SpeedFit
 from rotordrop.identification.friction import FrictionSweep as FrictionSweep
 from rotordrop.machine import Machine
 from rotordrop.record.record import Record
-from rotordrop.rotor.parameter import Parameter
 from rotordrop.track.consistency import Check
 from rotordrop.units import format_quantity
 

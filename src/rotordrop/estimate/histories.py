@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.atomic_file import atomic_path, new_hdf5
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.errors import OutputError, UsageError
 from rotordrop.estimate.bearing_drop import BearingDrop
-from rotordrop.rotor.bearing_numbers import numbers_of
 
 if TYPE_CHECKING:
     import pandas

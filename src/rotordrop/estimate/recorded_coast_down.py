@@ -7,17 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.bearing_numbers import numbers_of
+from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import IdentificationError, RecordError
 from rotordrop.estimated import NINETY, Estimated
 from rotordrop.evidence.air_gap import AirGap, identify_air_gap, rest_at_end
 from rotordrop.evidence.evidence import Evidence, Missing, known, read_evidence
 from rotordrop.evidence.sensing import Sensing
 from rotordrop.machine import Machine
-from rotordrop.machine.sensor import Sensor
 from rotordrop.record.axes import along_sensors
 from rotordrop.record.record import Record
 from rotordrop.rotor.assembly import build_rotor_fe
-from rotordrop.rotor.bearing_numbers import numbers_of
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.statics import bearing_load_shares
 from rotordrop.spectrum.coast_down import RACES_SPUN_UP, SHORTEST_LAW, CoastDownSignal

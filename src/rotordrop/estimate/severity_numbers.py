@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.bearing_numbers import Ratings, numbers_of
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.estimate.estimate import Estimate
 from rotordrop.estimated import IdentifiedValue
 from rotordrop.evidence.look import INDEX_WINDOW
-from rotordrop.rotor.bearing_numbers import Ratings, numbers_of
 from rotordrop.severity.numbers import fatigue_shares, static_safety_of_load, static_safety_of_stress
 
 Array = NDArray[np.float64]

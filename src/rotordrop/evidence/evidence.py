@@ -12,6 +12,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import IdentificationError, RecordError
 from rotordrop.evidence.air_gap import AirGap, SettledRest, find_rest, identify_air_gap
 from rotordrop.evidence.contacts import first_forces
@@ -23,7 +24,6 @@ from rotordrop.evidence.power_off import PowerOff, find_power_off
 from rotordrop.evidence.sensing import Sensing, build_sensing
 from rotordrop.evidence.settled import resting_record
 from rotordrop.evidence.speed import SpeedFit, identify_speed
-from rotordrop.machine.sensor import Sensor
 from rotordrop.record.axes import along_sensors, sensor_polarity
 from rotordrop.record.record import Record
 from rotordrop.record.speed import RotorAngle, rotor_angle

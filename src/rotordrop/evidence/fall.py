@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.magnet import REMANENCE_TIME
 from rotordrop.evidence.levitated import LevitatedModel
 from rotordrop.evidence.release import (
     ComplexArray,
@@ -16,14 +17,13 @@ from rotordrop.evidence.release import (
     FreeRotor,
     response_at,
 )
-from rotordrop.machine.amb import REMANENCE_TIME
 from rotordrop.record.axes import Plane, sensor_directions
 from rotordrop.record.recording import Array
 from rotordrop.rotor.parameter_table import parameter
 from rotordrop.rotor.unknowns import sensor_prior
 
 if TYPE_CHECKING:
-    from rotordrop.machine.sensor import Sensor
+    from rotordrop.elements.sensor import Sensor
     from rotordrop.record.record import Record
 
 REMANENT_SHARE = (0.2, 0.2)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import IdentificationError
 from rotordrop.estimated import NINETY
 from rotordrop.evidence.air_gap import AirGap, SettledRest
@@ -23,7 +24,6 @@ from rotordrop.evidence.fall_fit import FallFit, FallReadings, Unknowns, unbalan
 from rotordrop.evidence.free_fall import FreeFall, build_free_fall
 from rotordrop.evidence.levitated import LevitatedModel
 from rotordrop.evidence.sensing import Sensing, displacements_along
-from rotordrop.machine.sensor import Sensor
 from rotordrop.record.axes import along_sensors
 from rotordrop.record.record import Record
 from rotordrop.record.speed import RotorAngle

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import IdentificationError
-from rotordrop.machine.sensor import Sensor
 from rotordrop.record.axes import along_sensors, sensor_directions
 from rotordrop.record.record import Record
 from rotordrop.rotor.parameter_table import parameter

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.rotor import layout as L
-from rotordrop.rotor.layout import KernelParameters
-from rotordrop.rotor.parameter import Role, Step
+from rotordrop.elements.parameter import Role, Step
+from rotordrop.physics import columns as L
+from rotordrop.physics.columns import KernelParameters
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.unknowns import Unknown, bearing_unknowns
 

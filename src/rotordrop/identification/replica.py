@@ -14,8 +14,8 @@ from rotordrop.evidence.initial_state import InitialState
 from rotordrop.evidence.sensing import Sensing, build_sensing
 from rotordrop.identification.parameter_vector import ParameterVector, with_bearing
 from rotordrop.physics import aerodynamics
-from rotordrop.rotor import layout as L
-from rotordrop.rotor.layout import KernelParameters
+from rotordrop.physics import columns as L
+from rotordrop.physics.columns import KernelParameters
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.static_sag import sag_of_model, static_sag
 from rotordrop.simulate import _loop

@@ -17,6 +17,7 @@ from os import cpu_count
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.parameter import Role
 from rotordrop.estimated import NINETY, Correlation, IdentifiedValue, Verdict
 from rotordrop.identification.directions import DIRECTIONS, influential_directions
 from rotordrop.identification.fit import Fit, completed, considered_covariance
@@ -28,7 +29,6 @@ from rotordrop.identification.parameter_vector import (
 )
 from rotordrop.identification.replica import Replica
 from rotordrop.identification.search import Progress, Schedule, Search, search, sobol_starts
-from rotordrop.rotor.parameter import Role
 
 Array = NDArray[np.float64]
 

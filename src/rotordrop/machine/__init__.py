@@ -1,21 +1,21 @@
 """What a machine is: frozen descriptions, read from and written to a TOML file with units."""
 
-from rotordrop.machine.amb import ActiveMagneticBearing
-from rotordrop.machine.ball_bearing import BallBearing
+from rotordrop.elements.air import SpeedDescription
+from rotordrop.elements.ball_bearing import BallBearing
+from rotordrop.elements.magnet import ActiveMagneticBearing
+from rotordrop.elements.material import Material
+from rotordrop.elements.rotor import Disc, Element, Rotor, Section, SectionByLength, SectionByNodes
+from rotordrop.elements.sensor import Sensor
+from rotordrop.elements.touchdown_bearing import Contact, Friction, Race, Support, TouchdownBearing
+from rotordrop.elements.unbalance import BalanceGrade, Unbalance
 from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin, JointSpread, RecordedLift
 from rotordrop.machine.examples import example_machine, example_names, example_path
 from rotordrop.machine.loading import load_machine, loads_machine
 from rotordrop.machine.machine import Machine
-from rotordrop.machine.material import Material
 from rotordrop.machine.plausibility import doubts
-from rotordrop.machine.rotor import Disc, Element, Rotor, Section, SectionByLength, SectionByNodes
 from rotordrop.machine.saving import machine_text, save_machine
 from rotordrop.machine.schema import machine_schema
-from rotordrop.machine.sensor import Sensor
-from rotordrop.machine.speed import SpeedDescription
 from rotordrop.machine.template import template_text
-from rotordrop.machine.touchdown_bearing import Contact, Friction, Race, Support, TouchdownBearing
-from rotordrop.machine.unbalance import BalanceGrade, Unbalance
 from rotordrop.machine.usual_values import Doubt
 
 __all__ = [

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, StrictBool
 
-from rotordrop.machine.description import Description, Misfit, Text
+from rotordrop.elements.description import Description, Misfit, Text
 
 
 class RecordedLift(Description):

@@ -10,8 +10,8 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
+from rotordrop.elements.description import LARGEST_FILE, Description, Misfit, UnknownKey
 from rotordrop.errors import MachineFileError, UsageError
-from rotordrop.machine.description import LARGEST_FILE, Description, Misfit, UnknownKey
 from rotordrop.machine.machine import Machine
 from rotordrop.machine.provenance import kind_of
 from rotordrop.machine.shaft_table import SECTION_LINE, read_shaft_table

@@ -9,19 +9,19 @@ from typing import Any
 
 from pydantic import Field, PrivateAttr
 
+from rotordrop.elements.air import SpeedDescription
+from rotordrop.elements.description import Description, Misfit, Text, place_on_nodes
+from rotordrop.elements.magnet import ActiveMagneticBearing
+from rotordrop.elements.rotor import Rotor
+from rotordrop.elements.sensor import Sensor, check_sensors_resolve_motion
+from rotordrop.elements.touchdown_bearing import TouchdownBearing
+from rotordrop.elements.unbalance import BalanceGrade, Unbalance, from_grade
+from rotordrop.elements.values import Acceleration, PositiveTime, default
 from rotordrop.errors import UsageError
 from rotordrop.estimated import Estimated
-from rotordrop.machine.amb import ActiveMagneticBearing
 from rotordrop.machine.calibration import CalibrationOrigin
-from rotordrop.machine.description import Description, Misfit, Text, place_on_nodes
 from rotordrop.machine.parameter_paths import changed_machine_parts, reasons_of
 from rotordrop.machine.provenance import Mention, mentions
-from rotordrop.machine.rotor import Rotor
-from rotordrop.machine.sensor import Sensor, check_sensors_resolve_motion
-from rotordrop.machine.speed import SpeedDescription
-from rotordrop.machine.touchdown_bearing import TouchdownBearing
-from rotordrop.machine.unbalance import BalanceGrade, Unbalance, from_grade
-from rotordrop.machine.values import Acceleration, PositiveTime, default
 
 RESERVED_NAMES = ("speed", "unbalance", "rotor", "gravity", "sensors", "ambs", "machine", "calibration")
 

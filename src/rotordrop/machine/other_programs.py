@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from rotordrop.elements.rotor import Rotor
 from rotordrop.errors import MachineFileError
 from rotordrop.machine.ross_files import ImportedRotor, read_ross
-from rotordrop.machine.rotor import Rotor
 from rotordrop.machine.shaft_table import SECTION_LINE, read_shaft_table
 
 TABLES = (".csv", ".txt", ".tsv", ".xlsx", ".xlsm")

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
+from rotordrop.elements.description import Description
 from rotordrop.errors import UsageError
 from rotordrop.estimated import Estimated
-from rotordrop.machine.description import Description
 from rotordrop.machine.provenance import kind_of, physical_of
 from rotordrop.units import in_si
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.machine.machine import Machine
-from rotordrop.machine.touchdown_bearing import TouchdownBearing
 from rotordrop.machine.usual_values import Doubt, unusual_values
 from rotordrop.units import format_quantity
 

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from rotordrop.elements.description import Description
+from rotordrop.elements.values import Physical
 from rotordrop.estimated import Estimated, Status
-from rotordrop.machine.description import Description
-from rotordrop.machine.values import Physical
 from rotordrop.units import format_quantity
 
 

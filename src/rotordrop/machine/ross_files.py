@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from rotordrop.atomic_file import write_text
+from rotordrop.elements.rotor import Rotor
 from rotordrop.errors import MachineFileError, UsageError
-from rotordrop.machine.rotor import Rotor
 from rotordrop.machine.source_bearing import Spring as Spring
 
 _FORMAT_VERSION = "2.3.0"

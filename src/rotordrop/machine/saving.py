@@ -9,13 +9,13 @@ from functools import lru_cache
 from typing import Any
 
 from rotordrop.atomic_file import write_text
+from rotordrop.elements.ball_bearing import BallBearing
+from rotordrop.elements.description import Description
+from rotordrop.elements.rotor import Rotor
+from rotordrop.elements.unbalance import BalanceGrade
 from rotordrop.estimated import Estimated
-from rotordrop.machine.ball_bearing import BallBearing
-from rotordrop.machine.description import Description
 from rotordrop.machine.machine import Machine
 from rotordrop.machine.provenance import kind_of
-from rotordrop.machine.rotor import Rotor
-from rotordrop.machine.unbalance import BalanceGrade
 from rotordrop.units import KINDS, parse_quantity, si_unit
 
 _FILE_UNITS = {

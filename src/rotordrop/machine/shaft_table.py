@@ -7,9 +7,9 @@ import re
 from pathlib import Path
 from typing import Any, NoReturn
 
+from rotordrop.elements.description import LARGEST_FILE, unknown_key
 from rotordrop.errors import MachineFileError, UsageError
 from rotordrop.estimated import Estimated
-from rotordrop.machine.description import LARGEST_FILE, unknown_key
 from rotordrop.units import parse_quantity
 
 _COLUMNS = {

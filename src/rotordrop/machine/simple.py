@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from rotordrop.elements.catalog import find_bearing
+from rotordrop.elements.rotor import Rotor
 from rotordrop.errors import UsageError
-from rotordrop.machine.catalog import find_bearing
 from rotordrop.machine.machine import Machine
-from rotordrop.machine.rotor import Rotor
 from rotordrop.machine.schema import attribute_meanings
 from rotordrop.units import InSI, format_quantity, in_si
 

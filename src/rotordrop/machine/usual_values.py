@@ -12,17 +12,17 @@ from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
 
+from rotordrop.elements.ball_bearing import BallBearing
+from rotordrop.elements.description import Description
+from rotordrop.elements.magnet import ActiveMagneticBearing
+from rotordrop.elements.material import Material
+from rotordrop.elements.rotor import Rotor, Section
+from rotordrop.elements.sensor import Sensor
+from rotordrop.elements.touchdown_bearing import Contact, Friction, TouchdownBearing
+from rotordrop.elements.unbalance import BalanceGrade
+from rotordrop.elements.values import LEFT_OUT
 from rotordrop.estimated import Estimated
-from rotordrop.machine.amb import ActiveMagneticBearing
-from rotordrop.machine.ball_bearing import BallBearing
-from rotordrop.machine.description import Description
 from rotordrop.machine.machine import Machine
-from rotordrop.machine.material import Material
-from rotordrop.machine.rotor import Rotor, Section
-from rotordrop.machine.sensor import Sensor
-from rotordrop.machine.touchdown_bearing import Contact, Friction, TouchdownBearing
-from rotordrop.machine.unbalance import BalanceGrade
-from rotordrop.machine.values import LEFT_OUT
 from rotordrop.units import format_quantity
 
 

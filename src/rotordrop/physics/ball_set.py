@@ -2,7 +2,7 @@
 
 Whoever needs one of these hands over the bearing's numbers and its balls and does not know what stands behind
 the race. The numbers are a short array that only this module reads: `ball_set_entries` makes it and the
-columns of `rotordrop.rotor.layout` hold it.
+columns of `rotordrop.physics.columns` hold it.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """Contact of rotor and inner race: the one place that knows its law (Neisi 2020, eqs. 8–10).
 
-A law is a short array of numbers that only this module reads: `contact_law` makes it, the columns of
-`rotordrop.rotor.layout` hold it, and whoever needs force, derivative, energy, depth or tangent hands it back.
+A law is a short array of numbers that only this module reads: `contact_law` makes it, a row of
+`rotordrop.physics.columns` holds it, and whoever needs force, derivative, energy, depth or tangent hands it
+back.
 """
 
 from __future__ import annotations

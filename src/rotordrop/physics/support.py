@@ -1,6 +1,6 @@
 """A support beyond mass on two springs: turned axes, a cubic term, a foundation that gives way.
 
-A form is a short array of numbers that only this module reads; the columns of `rotordrop.rotor.layout` hold
+A form is a short array of numbers that only this module reads; a row of `rotordrop.physics.columns` holds
 it. It says how the force of a support differs from the plain one, ``k_x x + c_x ẋ`` and ``k_y y + c_y ẏ``.
 """
 

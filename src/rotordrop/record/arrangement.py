@@ -7,9 +7,9 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import RecordError, UsageError
 from rotordrop.estimated import Estimated
-from rotordrop.machine.sensor import Sensor
 from rotordrop.record.recording import Channel, Recording
 from rotordrop.units import parse_quantity
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import RecordError
-from rotordrop.machine.sensor import Sensor
 from rotordrop.record.recording import Array
 
 if TYPE_CHECKING:

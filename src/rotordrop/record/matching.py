@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from difflib import get_close_matches
 
+from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import RecordError, UsageError
-from rotordrop.machine.sensor import Sensor
 from rotordrop.record.profile import Profile
 from rotordrop.record.recording import Array, Channel, Recording
 from rotordrop.units import format_quantity, parse_quantity

@@ -6,8 +6,8 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import RecordError
-from rotordrop.machine.sensor import Sensor
 from rotordrop.record.matching import find_speed
 from rotordrop.record.profile import Profile
 from rotordrop.record.recording import Channel, Recording

@@ -11,9 +11,9 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import RecordError
 from rotordrop.machine import Machine
-from rotordrop.machine.sensor import Sensor
 from rotordrop.record.matching import displacement, find_pulses, find_speed, match_sensors, speed_factor
 from rotordrop.record.profile import Profile, load_profile
 from rotordrop.record.readers import read_recording

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.parameter import Step
 from rotordrop.estimate.agreement import Agreement, compare_orbits, spread_horizon
 from rotordrop.estimate.assumptions import evidence_assumptions
 from rotordrop.estimate.estimate import Estimate, ReplaySteps, Verdict
@@ -55,7 +56,6 @@ from rotordrop.replay.uncertainty import (
     seen_at_bearings,
     whole_drop,
 )
-from rotordrop.rotor.parameter import Step
 from rotordrop.rotor.parameters import build_drop_model
 
 Array = NDArray[np.float64]

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.bearing_numbers import numbers_of
+from rotordrop.elements.parameter import Step
 from rotordrop.estimate.allowances import MODEL_FORCE_SIGMA, MODEL_MEAN_FORCE_SIGMA, MODEL_STRESS_SIGMA
 from rotordrop.estimate.bearing_drop import (
     AirGap,
@@ -30,8 +32,6 @@ from rotordrop.identification.modal_expansion import expand_initial_state
 from rotordrop.identification.support import SupportFit
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.replay.uncertainty import FEWEST_DRAWS, Draws, interval
-from rotordrop.rotor.bearing_numbers import numbers_of
-from rotordrop.rotor.parameter import Step
 from rotordrop.rotor.parameter_table import parameter, rows
 from rotordrop.simulate.result import DropResult
 

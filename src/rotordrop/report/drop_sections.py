@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from rotordrop.elements.ball_bearing import STATIC_STRESS
 from rotordrop.estimate.bearing_drop import BearingDrop, BearingMotions, History
-from rotordrop.machine.ball_bearing import STATIC_STRESS
 from rotordrop.report.content import Figure, Section, Statement, Table
 from rotordrop.report.first_contact import first_contact_figure
 from rotordrop.report.impacts import impact_figure, impact_table

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from rotordrop.elements.parameter import Role
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.estimated import IdentifiedValue
 from rotordrop.report.content import Card, Cell, KeyFigure, Table
 from rotordrop.report.quantity import Quantity
-from rotordrop.rotor.parameter import Role
 from rotordrop.rotor.parameter_table import LOADS, published
 
 MEANS = (

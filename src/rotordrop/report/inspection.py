@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from rotordrop.elements.ball_bearing import STATIC_STRESS
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.estimate.estimate import Estimate
-from rotordrop.machine.ball_bearing import STATIC_STRESS
 from rotordrop.report.content import Section, Statement, Table
 from rotordrop.report.quantity import Quantity
 

@@ -12,8 +12,8 @@ from rotordrop.report.machine_sections import defaults_section, drawing_section
 from rotordrop.report.quantity import Quantity
 
 if TYPE_CHECKING:
+    from rotordrop.elements.bearing_numbers import BearingFigure
     from rotordrop.machine import Machine
-    from rotordrop.rotor.bearing_numbers import BearingFigure
     from rotordrop.rotor.machine_summary import BearingSummary, MachineSummary
     from rotordrop.rotor.machine_warnings import MachineWarning
 

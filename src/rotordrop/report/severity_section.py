@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.estimate.estimate import Estimate
 from rotordrop.estimate.severity_numbers import severity_values
 from rotordrop.report.content import Cell, Section, Table
 from rotordrop.report.quantity import Quantity
-from rotordrop.rotor.bearing_numbers import numbers_of
 from rotordrop.severity.numbers import SEVERITY
 
 NOTE = (

@@ -11,8 +11,8 @@ import numpy as np
 import plotly.graph_objects as go
 
 from rotordrop._version import __version__
+from rotordrop.elements.description import unknown_key
 from rotordrop.errors import UsageError
-from rotordrop.machine.description import unknown_key
 from rotordrop.machine.parameter_paths import kind_of_path
 from rotordrop.report.content import Cell, Figure, ReportContent, Section, Statement, Table
 from rotordrop.report.quantity import display_unit

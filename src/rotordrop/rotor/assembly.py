@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.beam import element_factors, is_beam
 from rotordrop.errors import UsageError
 from rotordrop.physics import timoshenko
 from rotordrop.physics.linear_algebra import product
 from rotordrop.physics.timoshenko import Section
-from rotordrop.rotor.rotor_form import element_factors, is_beam
 
 if TYPE_CHECKING:
+    from rotordrop.elements.rotor import Rotor
     from rotordrop.machine import Machine
-    from rotordrop.machine.rotor import Rotor
 
 Array = NDArray[np.float64]
 

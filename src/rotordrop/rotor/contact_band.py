@@ -11,10 +11,10 @@ import math
 
 import numpy as np
 
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.machine import Machine
 from rotordrop.physics.contact import contact_tangent
 from rotordrop.rotor.assembly import RotorFE, build_rotor_fe
-from rotordrop.rotor.bearing_numbers import numbers_of
 from rotordrop.rotor.modes import free_free_modes, rigid_modes
 from rotordrop.rotor.parameters import contact_law_of
 from rotordrop.rotor.reduction import Reduction

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.bearing_numbers import BearingFigure, numbers_of
 from rotordrop.rotor.assembly import RotorFE, build_rotor_fe
-from rotordrop.rotor.bearing_numbers import BearingFigure, numbers_of
 from rotordrop.rotor.modes import N_RIGID, free_free_modes, modes_on_springs
 from rotordrop.rotor.rotor_on_race import rotor_on_race
 from rotordrop.rotor.statics import bearing_load_shares, levitated_sag

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.machine.plausibility import doubts
 from rotordrop.physics.thermal import friction_heat, growth_of_race
-from rotordrop.rotor.bearing_numbers import numbers_of
 from rotordrop.rotor.machine_summary import BearingSummary, MachineSummary
 from rotordrop.rotor.parameter_table import rows
 from rotordrop.rotor.unknowns import prior

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rotordrop.rotor import layout as L
-from rotordrop.rotor.parameter import Entry, Load, Owner, Parameter, Role, Rule, Step
-from rotordrop.rotor.rotor_form import FORM
+from rotordrop.elements.beam import FORM
+from rotordrop.elements.parameter import Entry, Load, Owner, Parameter, Role, Rule, Step
+from rotordrop.physics import columns as L
 from rotordrop.rotor.structure_table import STRUCTURE
 
 

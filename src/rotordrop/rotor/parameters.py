@@ -9,17 +9,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.bearing_numbers import numbers_of, places_of
+from rotordrop.elements.touchdown_bearing import Contact
 from rotordrop.machine import Machine, TouchdownBearing
-from rotordrop.machine.touchdown_bearing import Contact
 from rotordrop.physics import aerodynamics
+from rotordrop.physics import columns as L
+from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.contact import contact_law
 from rotordrop.physics.elementary import sine_cosine
 from rotordrop.physics.linear_algebra import product
 from rotordrop.physics.support import PRESENT
-from rotordrop.rotor import layout as L
 from rotordrop.rotor.assembly import RotorFE, build_rotor_fe
-from rotordrop.rotor.bearing_numbers import numbers_of, places_of
-from rotordrop.rotor.layout import KernelParameters
+from rotordrop.rotor.layout import StateLayout
 from rotordrop.rotor.reduction import Reduction, RotorBasis, reduce_rotor
 from rotordrop.rotor.statics import bearing_load_shares
 
@@ -34,7 +35,7 @@ class DropModel:
     fe: RotorFE
     basis: RotorBasis
     parameters: KernelParameters
-    layout: L.StateLayout
+    layout: StateLayout
     load_shares: Array
 
     def with_values(self, values: Mapping[str, float]) -> DropModel:
@@ -81,7 +82,7 @@ def build_drop_model(machine: Machine, reduction: str | Reduction = "accurate") 
     nodes = tuple(bearing.node for bearing in machine.touchdown_bearings)
     basis = reduce_rotor(fe, reduction, nodes)
     shares = np.asarray(bearing_load_shares(machine), dtype=np.float64)
-    layout = L.StateLayout(
+    layout = StateLayout(
         n_modes=basis.shapes.shape[1],
         n_bearings=len(nodes),
         bearing_own=_foundation_states(machine),
@@ -109,7 +110,7 @@ def _rows(basis: RotorBasis, nodes: list[int]) -> Array:
 
 
 def _kernel_parameters(
-    machine: Machine, fe: RotorFE, basis: RotorBasis, shares: Array, layout: L.StateLayout
+    machine: Machine, fe: RotorFE, basis: RotorBasis, shares: Array, layout: StateLayout
 ) -> KernelParameters:
     m = basis.shapes.shape[1]
     bearings = machine.touchdown_bearings

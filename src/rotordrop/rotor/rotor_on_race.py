@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.physics.hertz import LineContact, compliance, cylinder_in_bore
-from rotordrop.rotor.bearing_numbers import numbers_of
 
 
 def rotor_on_race(machine: Machine, bearing: TouchdownBearing) -> LineContact:

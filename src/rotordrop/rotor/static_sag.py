@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.machine import TouchdownBearing
+from rotordrop.physics import columns as L
 from rotordrop.physics.contact import depth_at
 from rotordrop.physics.support import PRESENT
-from rotordrop.rotor import layout as L
-from rotordrop.rotor.bearing_numbers import numbers_of
 from rotordrop.rotor.parameters import DropModel
 
 Array = NDArray[np.float64]
@@ -58,7 +58,7 @@ def static_sag(rows: Array, race: Array, loads: Array) -> StaticSag:
     Parameters
     ----------
     rows : ndarray, shape (B, columns)
-        Bearing parameters, columns of `rotordrop.rotor.layout`.
+        Bearing parameters, columns of `rotordrop.physics.columns`.
     race : ndarray, shape (B,)
         From `race_sag` [m].
     loads : ndarray, shape (B,)

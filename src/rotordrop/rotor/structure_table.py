@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rotordrop.rotor import layout as L
-from rotordrop.rotor.parameter import Entry, Owner, Parameter, Rule
+from rotordrop.elements.parameter import Entry, Owner, Parameter, Rule
+from rotordrop.physics import columns as L
 
 
 def _bearing(column: int) -> tuple[Entry, ...]:

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.physics.contact import contact_tangent
-from rotordrop.rotor.bearing_numbers import numbers_of
 from rotordrop.rotor.parameters import contact_law_of
 from rotordrop.rotor.statics import bearing_load_shares
 from rotordrop.rotor.supports import Support, in_series, link, spring

@@ -9,14 +9,14 @@ from typing import Literal
 
 import numpy as np
 
+from rotordrop.elements.bearing_numbers import Measure, numbers_of
+from rotordrop.elements.magnet import REMANENCE_TIME
+from rotordrop.elements.parameter import Entry, Parameter, Rule
+from rotordrop.elements.sensor import Sensor
 from rotordrop.estimated import NINETY, Estimated
 from rotordrop.machine import Machine, TouchdownBearing
-from rotordrop.machine.amb import REMANENCE_TIME
-from rotordrop.machine.sensor import Sensor
+from rotordrop.physics import columns as L
 from rotordrop.physics.contact import depth_at
-from rotordrop.rotor import layout as L
-from rotordrop.rotor.bearing_numbers import Measure, numbers_of
-from rotordrop.rotor.parameter import Entry, Parameter, Rule
 from rotordrop.rotor.parameter_table import parameter, rows
 from rotordrop.rotor.parameters import DropModel, contact_law_of
 from rotordrop.rotor.structure_table import structure_rows

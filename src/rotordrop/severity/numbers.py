@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.machine.ball_bearing import STATIC_STRESS
-from rotordrop.rotor.bearing_numbers import Ratings
+from rotordrop.elements.ball_bearing import STATIC_STRESS
+from rotordrop.elements.bearing_numbers import Ratings
 from rotordrop.severity.fatigue import (
     ball_row,
     joined,

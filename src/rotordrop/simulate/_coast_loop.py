@@ -12,11 +12,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.physics import columns as L
 from rotordrop.physics._compile import kernel
 from rotordrop.physics.ball_set import ball_set_force, ball_set_load
+from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import atan2, power
-from rotordrop.rotor import layout as L
-from rotordrop.rotor.layout import KernelParameters
 from rotordrop.simulate._loop import (
     BETA,
     FINISHED,

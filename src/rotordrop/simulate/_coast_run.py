@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import SimulationError
 from rotordrop.physics import aerodynamics
+from rotordrop.physics import columns as L
+from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import atan2, magnitude
-from rotordrop.rotor import layout as L
-from rotordrop.rotor.layout import KernelParameters
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.suspension import equivalent_stiffness
 from rotordrop.simulate import _coast_loop as C

@@ -7,12 +7,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.physics import columns as L
 from rotordrop.physics import support
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
 from rotordrop.physics.ball_set import ball_set_energy, ball_set_force, ball_set_load
+from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.contact import contact_energy
-from rotordrop.rotor import layout as L
-from rotordrop.rotor.layout import KernelParameters
 from rotordrop.simulate._loop import contact_at
 from rotordrop.simulate._rhs import (
     modal_parts,

@@ -7,10 +7,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
+from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import atan2, exp, ln, power
-from rotordrop.rotor import layout as L
-from rotordrop.rotor.layout import KernelParameters
 from rotordrop.simulate._rhs import contact_state, drop_derivative, relative_motion
 from rotordrop.simulate._tableau import Tableau
 

@@ -12,16 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.physics import aerodynamics, support
+from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, lean_kernel
 from rotordrop.physics.aerodynamics import exponential_deceleration, speed_dependent_deceleration
 from rotordrop.physics.ball_set import ball_set_force
+from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.contact import contact_force
 from rotordrop.physics.elementary import sine_cosine
 from rotordrop.physics.friction import stribeck_coefficient
 from rotordrop.physics.remanence import remanent_fraction
 from rotordrop.physics.spin import race_drag_torque, surface_speed
-from rotordrop.rotor import layout as L
-from rotordrop.rotor.layout import KernelParameters
 
 Array = NDArray[np.float64]
 PRESCRIBED = aerodynamics.PRESCRIBED_SPEED

@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.physics import aerodynamics, contact, support
+from rotordrop.physics import columns as L
 from rotordrop.physics._compile import kernel, lean_kernel
 from rotordrop.physics.ball_set import ball_set_gradient
+from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import sine_cosine, tanh
 from rotordrop.physics.friction import stribeck_gradient
 from rotordrop.physics.spin import surface_speed
-from rotordrop.rotor import layout as L
-from rotordrop.rotor.layout import KernelParameters
 from rotordrop.simulate._rhs import (
     aerodynamic_deceleration,
     race_deflection,

@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.physics import columns as L
 from rotordrop.physics._compile import kernel
-from rotordrop.rotor import layout as L
-from rotordrop.rotor.layout import KernelParameters
+from rotordrop.physics.columns import KernelParameters
 from rotordrop.simulate._rhs import drop_derivative
 
 Array = NDArray[np.float64]

@@ -8,8 +8,8 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.magnet import REMANENCE_TIME
 from rotordrop.errors import SimulationError
-from rotordrop.machine.amb import REMANENCE_TIME
 from rotordrop.rotor.reduction import Reduction
 from rotordrop.units import InSI
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import OutputError
 from rotordrop.machine import Machine
-from rotordrop.rotor import layout as L
+from rotordrop.physics import columns as L
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.simulate import _coast_loop as C
 from rotordrop.simulate._coast_run import (

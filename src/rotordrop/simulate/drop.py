@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.machine import Machine
+from rotordrop.physics import columns as L
+from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import magnitude
-from rotordrop.rotor import layout as L
-from rotordrop.rotor.layout import KernelParameters
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.rotor.reduction import Reduction
 from rotordrop.rotor.rotor_on_race import rotor_on_race

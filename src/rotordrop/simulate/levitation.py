@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import SimulationError
 from rotordrop.physics import aerodynamics
+from rotordrop.physics import columns as L
+from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import sine_cosine
 from rotordrop.physics.linear_algebra import least_squares, product, solve
-from rotordrop.rotor import layout as L
-from rotordrop.rotor.layout import KernelParameters
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.simulate.case import CentredStart, DropCase, LevitatedStart, PlacedStart, StateStart
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.physics import columns as L
 from rotordrop.physics import support
-from rotordrop.rotor import layout as L
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.simulate.result import DropResult
 

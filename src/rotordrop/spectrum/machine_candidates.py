@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.physics.contact import depth_at
 from rotordrop.physics.pendulum import effective_length, period_ratio, small_frequency, spin_participation
 from rotordrop.rotor.assembly import build_rotor_fe
-from rotordrop.rotor.bearing_numbers import numbers_of
 from rotordrop.rotor.parameters import contact_law_of
 from rotordrop.rotor.reduction import Reduction, reduce_rotor
 from rotordrop.rotor.suspension import EquivalentStiffness, equivalent_stiffness, touchdown_supports

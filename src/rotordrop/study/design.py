@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.description import unknown_key
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
-from rotordrop.machine.description import unknown_key
 from rotordrop.study.chosen_bearings import AS_DESCRIBED
 from rotordrop.study.distributions import Distribution
 from rotordrop.study.plan import Study, read_file, read_study

@@ -15,10 +15,10 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.description import unknown_key
+from rotordrop.elements.magnet import REMANENCE_TIME
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine, load_machine
-from rotordrop.machine.amb import REMANENCE_TIME
-from rotordrop.machine.description import unknown_key
 from rotordrop.machine.parameter_paths import kind_of_path, value_of_path
 from rotordrop.machine.saving import machine_text
 from rotordrop.rotor.parameter_table import fitted_row, parameter

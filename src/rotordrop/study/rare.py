@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 from scipy.stats import t as student
 
+from rotordrop.elements.description import unknown_key
 from rotordrop.errors import UsageError
-from rotordrop.machine.description import unknown_key
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.study.plan import Study
 from rotordrop.study.quantities import columns_of

@@ -17,10 +17,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtr
 from scipy.stats import beta
 
+from rotordrop.elements.magnet import REMANENCE_TIME
 from rotordrop.errors import UsageError
 from rotordrop.estimated import NINETY
 from rotordrop.machine import Machine
-from rotordrop.machine.amb import REMANENCE_TIME
 from rotordrop.rotor.parameter_table import parameter
 from rotordrop.rotor.unknowns import smallest_gap
 from rotordrop.study.between_drops import next_draw

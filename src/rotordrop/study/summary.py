@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import beta, binom
 
+from rotordrop.elements.description import unknown_key
 from rotordrop.errors import OutputError, UsageError
-from rotordrop.machine.description import unknown_key
 from rotordrop.study.folder import StudyFolder, read_shard, study_of
 from rotordrop.study.plan import Study
 from rotordrop.study.quantities import Quantity, columns_of

@@ -15,10 +15,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.physics import columns as L
 from rotordrop.physics._compile import kernel, lean_kernel
+from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import exp, sine_cosine
-from rotordrop.rotor import layout as L
-from rotordrop.rotor.layout import KernelParameters
 from rotordrop.track._covariance import is_covariance, pack, symmetrise, unpack
 from rotordrop.track._propagation import (
     FilterSettings,

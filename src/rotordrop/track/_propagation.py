@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.physics import columns as L
 from rotordrop.physics._compile import kernel, lean_kernel
 from rotordrop.physics.aerodynamics import PRESCRIBED_SPEED
+from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import exp, power
-from rotordrop.rotor import layout as L
-from rotordrop.rotor.layout import KernelParameters
 from rotordrop.simulate._loop import contact_at
 from rotordrop.simulate._rhs import (
     add_rotor_rates,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.rotor.rotor_form import is_beam
+from rotordrop.elements.beam import is_beam
 from rotordrop.rotor.structure_table import STRUCTURE
 from rotordrop.track.calibration import FITTING_NIS
 from rotordrop.track.problem import DropProblem

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError
+from rotordrop.physics import columns as L
 from rotordrop.physics._compile import kernel
 from rotordrop.physics.ball_set import ball_set_force, ball_set_load
-from rotordrop.rotor import layout as L
-from rotordrop.rotor.layout import KernelParameters
+from rotordrop.physics.columns import KernelParameters
 from rotordrop.simulate._loop import contact_at
 from rotordrop.simulate._rhs import race_deflection
 from rotordrop.track import _propagation as P

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError
 from rotordrop.physics import aerodynamics
-from rotordrop.rotor import layout as L
+from rotordrop.physics import columns as L
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.static_sag import race_sag, static_sag
 from rotordrop.rotor.statics import settled_sag

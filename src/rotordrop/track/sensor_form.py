@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import UsageError
-from rotordrop.rotor import layout as L
+from rotordrop.rotor.layout import StateLayout
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.static_sag import support_sag
 from rotordrop.rotor.unknowns import Unknown
@@ -75,7 +75,7 @@ def share_in_groups(model: DropModel, unknowns: tuple[Unknown, ...], block: Arra
                 block[i, k] = one.common_variance
 
 
-def begin_caught_up(layout: L.StateLayout, rows: Array, mean: Array, covariance: Array) -> None:
+def begin_caught_up(layout: StateLayout, rows: Array, mean: Array, covariance: Array) -> None:
     """Let the sensors begin at what they see: a levitated rotor moves little within a time constant.
 
     Raises

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.rotor import layout as L
+from rotordrop.physics import columns as L
 from rotordrop.track import _filter as F
 from rotordrop.track import _propagation as P
 from rotordrop.track._covariance import unpack

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.rotor.parameter import Rule
+from rotordrop.elements.parameter import Rule
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.unknowns import Target, Unknown
 from rotordrop.track import _propagation as P

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.parameter import Parameter
 from rotordrop.errors import IdentificationError, UsageError
 from rotordrop.estimate.document import structure_json
 from rotordrop.estimate.estimate import Structure
@@ -16,7 +17,6 @@ from rotordrop.estimated import NINETY, Estimated, IdentifiedValue, Verdict
 from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine import CalibrationDrop, CalibrationOrigin, Machine, RecordedLift
 from rotordrop.record.record import Record
-from rotordrop.rotor.parameter import Parameter
 from rotordrop.rotor.parameter_table import parameter, row_of, rows, separating_measurement
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.statics import bearing_load_shares

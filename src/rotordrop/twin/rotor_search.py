@@ -15,15 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from rotordrop.elements.beam import FORM, is_beam
+from rotordrop.elements.parameter import Parameter
 from rotordrop.errors import RotordropError
 from rotordrop.estimated import NINETY, Estimated
 from rotordrop.evidence.evidence import Evidence
 from rotordrop.machine import Machine
-from rotordrop.rotor.parameter import Parameter
 from rotordrop.rotor.parameter_table import parameter
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.reduction import Reduction
-from rotordrop.rotor.rotor_form import FORM, is_beam
 from rotordrop.rotor.unknowns import prior
 from rotordrop.track.problem import RecordedDrop, build_problem
 from rotordrop.track.rotor_likelihood import Readings, improbability_of, readings_of

@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from rotordrop.elements.magnet import REMANENCE_TIME
 from rotordrop.estimated import NINETY, Estimated
 from rotordrop.machine import Machine
-from rotordrop.machine.amb import REMANENCE_TIME
 
 Values = dict[str, Estimated]
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 
+from rotordrop.elements.magnet import REMANENCE_TIME
 from rotordrop.estimate.estimate import Structure
 from rotordrop.estimated import IdentifiedValue
 from rotordrop.machine import Machine
-from rotordrop.machine.amb import REMANENCE_TIME
 from rotordrop.rotor.statics import bearing_load_shares
 from rotordrop.rotor.unknowns import PEAK_LOADS
 from rotordrop.twin.structure_search import Kept

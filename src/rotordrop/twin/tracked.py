@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.beam import is_beam
 from rotordrop.errors import IdentificationError
 from rotordrop.evidence.evidence import Evidence, Missing
 from rotordrop.machine import Machine
@@ -18,7 +19,6 @@ from rotordrop.record.axes import sees_both_directions
 from rotordrop.rotor.contact_band import reduction_for_contact
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.rotor.reduction import Reduction
-from rotordrop.rotor.rotor_form import is_beam
 from rotordrop.track.calibration import (
     BLIND_SCHEDULE,
     CALIBRATED_SCHEDULE,

@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.beam import is_beam
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.errors import IdentificationError
 from rotordrop.estimate.advice import Advice
 from rotordrop.estimate.assumptions import twin_assumptions
@@ -25,8 +27,6 @@ from rotordrop.estimate.methods import Tracked
 from rotordrop.estimate.record_facts import RecordFacts
 from rotordrop.estimate.unbalance import PlaneUnbalance, unbalance_notes
 from rotordrop.estimated import IdentifiedValue
-from rotordrop.rotor.bearing_numbers import numbers_of
-from rotordrop.rotor.rotor_form import is_beam
 from rotordrop.track.consistency import NIS_RANGE, Check
 from rotordrop.track.input_state import InputEstimate, at_bearings
 from rotordrop.twin.narrowing import DRAWING, narrowing

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.beam import is_beam
 from rotordrop.estimate.allowances import (
     BEAM_FORCE_SIGMA,
     MODEL_FORCE_SIGMA,
@@ -32,7 +33,6 @@ from rotordrop.estimate.bearing_drop import (
 )
 from rotordrop.estimate.estimate import CrossCheck
 from rotordrop.estimated import NINETY, IdentifiedValue, Verdict
-from rotordrop.rotor.rotor_form import is_beam
 from rotordrop.simulate.certificate import refined_peak
 from rotordrop.track.calibration import TrackedDrops
 from rotordrop.track.consistency import direction_check

@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.parameter import Parameter
 from rotordrop.estimate.bearing_values import equivalent_stiffness, published_values, static_friction
 from rotordrop.estimate.estimate import FittedParameter, JointEstimate, SensorErrors
 from rotordrop.estimated import NINETY, IdentifiedValue, Verdict
-from rotordrop.rotor.parameter import Parameter
 from rotordrop.rotor.parameter_table import parameter
 from rotordrop.rotor.unknowns import Unknown, sensor_prior, smallest_gap
 from rotordrop.track.consistency import PARAMETER_LIMIT

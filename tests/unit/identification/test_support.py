@@ -21,7 +21,7 @@ from rotordrop.identification.support import (
     refit_with_friction,
     widened_covariance,
 )
-from rotordrop.rotor import layout as L
+from rotordrop.physics import columns as L
 from rotordrop.rotor.parameters import DropModel
 
 

@@ -4,9 +4,9 @@ import math
 
 import pytest
 
+from rotordrop.elements.catalog import designations, find_bearing
+from rotordrop.elements.catalog.lookup import ball_size
 from rotordrop.machine import loads_machine
-from rotordrop.machine.catalog import designations, find_bearing
-from rotordrop.machine.catalog.lookup import ball_size
 from rotordrop.physics.ball_bearing import axial_rigidity, bearing_constants, lift_off_force
 from rotordrop.physics.ball_bearing_geometry import BallBearingGeometry
 

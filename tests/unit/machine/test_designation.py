@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from rotordrop.machine.catalog import find_bearing, read_designation, search_bearings
+from rotordrop.elements.catalog import find_bearing, read_designation, search_bearings
 
 # written; series and bore; contact angle [°] (D: deep groove, ?: not said); h: hybrid, s: small balls;
 # clearance class, preload or arrangement

@@ -4,9 +4,9 @@ import math
 
 import pytest
 
+from rotordrop.elements.touchdown_bearing import palmgren_stiffness
 from rotordrop.errors import UsageError
 from rotordrop.machine import BalanceGrade, example_machine, loads_machine
-from rotordrop.machine.touchdown_bearing import palmgren_stiffness
 
 
 def test_mass_and_centre_of_gravity_of_a_simple_rotor(small_text):

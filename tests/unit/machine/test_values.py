@@ -4,9 +4,9 @@ import math
 
 import pytest
 
+from rotordrop.elements.values import LEFT_OUT, Physical
 from rotordrop.errors import UsageError
 from rotordrop.estimated import Estimated
-from rotordrop.machine.values import LEFT_OUT, Physical
 
 STIFFNESS = Physical("stiffness", above=0.0)
 ANGLE = Physical("angle", least=0.0, most=math.pi)

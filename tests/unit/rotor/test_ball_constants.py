@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.machine import example_machine
-from rotordrop.rotor.bearing_numbers import numbers_of
 
 
 def test_equal_bearings_share_their_constants_and_others_do_not():

@@ -7,10 +7,10 @@ import math
 import pytest
 from tests.scaled_machines import scaled_machine
 
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.estimated import Estimated
 from rotordrop.machine import Machine, example_machine
 from rotordrop.physics.ball_bearing import bearing_constants
-from rotordrop.rotor.bearing_numbers import numbers_of
 from rotordrop.rotor.machine_summary import summarise_machine
 from rotordrop.rotor.machine_warnings import machine_warnings
 

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from rotordrop.elements.parameter import Role, Step
 from rotordrop.machine import Machine
 from rotordrop.machine.examples import example_machine
-from rotordrop.rotor.parameter import Role, Step
 from rotordrop.rotor.parameter_table import TABLE, parameter, published, row_of, rows, separating_measurement
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from rotordrop.elements.rotor import Rotor
 from rotordrop.machine import example_machine
-from rotordrop.machine.rotor import Rotor
 from rotordrop.rotor.assembly import rotor_fe
 from rotordrop.rotor.stability import stability_map, stability_of
 from rotordrop.rotor.supports import spring

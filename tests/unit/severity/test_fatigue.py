@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rotordrop.machine.catalog.inference import dynamic_rating
+from rotordrop.elements.catalog.inference import dynamic_rating
 from rotordrop.severity.fatigue import (
     LIFE,
     ball_row,

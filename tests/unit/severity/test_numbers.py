@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.machine import example_machine
-from rotordrop.rotor.bearing_numbers import numbers_of
 from rotordrop.severity.numbers import (
     SEVERITY,
     fatigue_shares,

@@ -12,7 +12,7 @@ import pytest
 
 from rotordrop.errors import OutputError, SimulationError
 from rotordrop.machine import example_machine
-from rotordrop.rotor import layout as L
+from rotordrop.physics import columns as L
 from rotordrop.rotor.assembly import build_rotor_fe
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.reduction import Reduction

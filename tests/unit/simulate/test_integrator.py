@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rotordrop.rotor import layout as L
+from rotordrop.physics import columns as L
 from rotordrop.simulate import _loop
 from rotordrop.simulate._rhs import drop_derivative
 from rotordrop.simulate._tableau import dp5, tsit5

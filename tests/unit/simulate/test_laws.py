@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rotordrop.rotor import layout as L
+from rotordrop.physics import columns as L
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.simulate._rhs import drop_derivative
 from rotordrop.simulate.case import CentredStart, DropCase, PlacedStart, StateStart

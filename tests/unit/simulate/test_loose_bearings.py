@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from tests.scaled_machines import scaled_machine
 
+from rotordrop.physics import columns as L
 from rotordrop.physics.ball_bearing import bearing_constants
 from rotordrop.report.simulation_numbers import simulation_numbers
-from rotordrop.rotor import layout as L
 from rotordrop.rotor.machine_summary import summarise_machine
 from rotordrop.rotor.machine_warnings import machine_warnings
 from rotordrop.rotor.parameters import build_drop_model

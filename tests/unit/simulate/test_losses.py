@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rotordrop.machine import example_machine
-from rotordrop.rotor.layout import RACE_INERTIA
+from rotordrop.physics.columns import RACE_INERTIA
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.simulate.case import DropCase, LevitatedStart
 from rotordrop.simulate.drop import simulate_drop

@@ -8,7 +8,7 @@ from tests.unit.simulate.short_drop import START
 from tests.unit.simulate.test_right_hand_side import DEPTHS, SPEED, a_state
 
 from rotordrop.machine import example_machine
-from rotordrop.rotor.layout import POLAR_INERTIA
+from rotordrop.physics.columns import POLAR_INERTIA
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.simulate._histories import stored_energy
 from rotordrop.simulate._rhs import add_magnet_forces, bearing_accelerations, drop_derivative

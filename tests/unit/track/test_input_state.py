@@ -9,7 +9,7 @@ import pytest
 
 from rotordrop.errors import IdentificationError
 from rotordrop.estimated import Estimated
-from rotordrop.rotor import layout as L
+from rotordrop.physics import columns as L
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.track import _propagation as P
 from rotordrop.track.forces import bearing_values, stress_at_force

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.special import erf
 
-from rotordrop.rotor import layout as L
+from rotordrop.physics import columns as L
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.simulate._rhs import drop_derivative
 from rotordrop.track import _propagation as P

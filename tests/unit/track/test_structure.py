@@ -20,8 +20,8 @@ from rotordrop.estimated import Estimated
 from rotordrop.evidence.evidence import Evidence
 from rotordrop.machine import Machine, loads_machine
 from rotordrop.machine.saving import machine_text
+from rotordrop.physics import columns as L
 from rotordrop.physics import support
-from rotordrop.rotor import layout as L
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns
 from rotordrop.simulate.case import DropCase

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.estimate import simulated_coast_down
 from rotordrop.estimate.bearing_drop import Motion, deepest
 from rotordrop.estimate.bearing_values import equivalent_stiffness
@@ -18,7 +19,6 @@ from rotordrop.estimate.estimate import Verdict
 from rotordrop.estimate.later_motion import RESOLVED, later_motion
 from rotordrop.estimated import IdentifiedValue
 from rotordrop.machine import example_machine
-from rotordrop.rotor.bearing_numbers import numbers_of
 from rotordrop.rotor.parameter_table import parameter
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import rotordrop
+from rotordrop.elements.beam import FORM
 from rotordrop.estimate.advice import Advice
 from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine import example_machine
@@ -19,7 +20,6 @@ from rotordrop.record.record import read_record
 from rotordrop.rotor.assembly import rotor_fe
 from rotordrop.rotor.modes import free_free_modes
 from rotordrop.rotor.parameters import build_drop_model
-from rotordrop.rotor.rotor_form import FORM
 from rotordrop.track.forces import ForceHistory
 from rotordrop.track.input_state import InputEstimate
 from rotordrop.twin.narrowing import explained

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 from tests.unit.report.conftest import estimate as estimate
 
+from rotordrop.elements.ball_bearing import STATIC_STRESS
 from rotordrop.estimate.estimate import Estimate
 from rotordrop.estimate.severity_numbers import severity_values
-from rotordrop.machine.ball_bearing import STATIC_STRESS
 from rotordrop.report.quantity import IN_OTHER_UNITS
 from rotordrop.rotor.parameter_table import LOADS, published
 from rotordrop.web.drawn import write_estimate, write_look

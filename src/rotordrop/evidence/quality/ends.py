@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotordrop.elements.beam import is_beam
 from rotordrop.estimated import NINETY, Estimated
 from rotordrop.evidence.events import CoarseDrop, find_fall
 from rotordrop.evidence.levitated import LevitatedModel
@@ -21,7 +22,6 @@ from rotordrop.evidence.quality.finding import Finding
 from rotordrop.evidence.quality.sensing import TURNED, WRONG_GAIN, read_otherwise
 from rotordrop.record.axes import Plane
 from rotordrop.record.recording import Array
-from rotordrop.rotor.rotor_form import is_beam
 
 if TYPE_CHECKING:
     from rotordrop.evidence.fall import Fall

@@ -1,8 +1,8 @@
 """Bearings by designation: catalogue values, and ball complements where the maker does not publish them."""
 
-from rotordrop.machine.catalog.designation import Designation, read_designation
-from rotordrop.machine.catalog.inference import PairRigidity
-from rotordrop.machine.catalog.lookup import (
+from rotordrop.elements.catalog.designation import Designation, read_designation
+from rotordrop.elements.catalog.inference import PairRigidity
+from rotordrop.elements.catalog.lookup import (
     PRELOAD_FACTOR,
     BallComplement,
     CatalogueBearing,

@@ -11,9 +11,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.parameter import Parameter
+from rotordrop.elements.rotor import Rotor, element_mass
 from rotordrop.errors import UsageError
-from rotordrop.machine.rotor import Rotor, element_mass
-from rotordrop.rotor.parameter import Parameter
 
 Array = NDArray[np.float64]
 

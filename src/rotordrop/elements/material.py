@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from rotordrop.machine.description import Description
-from rotordrop.machine.values import Density, PoissonRatio, Pressure
+from rotordrop.elements.description import Description
+from rotordrop.elements.values import Density, PoissonRatio, Pressure
 
 
 class Material(Description):

@@ -7,11 +7,11 @@ from typing import Any
 
 from pydantic import Field
 
+from rotordrop.elements.description import Description, Placed
+from rotordrop.elements.values import Angle, Positive, PositiveSpeed
+from rotordrop.elements.values import Unbalance as UnbalanceAmount
 from rotordrop.errors import UsageError
 from rotordrop.estimated import Estimated
-from rotordrop.machine.description import Description, Placed
-from rotordrop.machine.values import Angle, Positive, PositiveSpeed
-from rotordrop.machine.values import Unbalance as UnbalanceAmount
 from rotordrop.units import parse_quantity
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterator
 
-from rotordrop.machine.description import Description
+from rotordrop.elements.description import Description
 
 Oddity = tuple[str, float, float, str]
 """Name of an entry, its value and the limit it is compared with [SI], and what to say."""
@@ -14,7 +14,7 @@ Oddity = tuple[str, float, float, str]
 class RaceBearing(Description):
     """The bearing that carries the race of a touchdown bearing, of whatever kind.
 
-    The numbers that follow from it are in `rotordrop.rotor.bearing_numbers`.
+    The numbers that follow from it are in `rotordrop.elements.bearing_numbers`.
     """
 
     @abstractmethod

@@ -9,8 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, Strict
 
-from rotordrop.estimated import Estimated
-from rotordrop.machine.catalog import (
+from rotordrop.elements.catalog import (
     PRELOAD_FACTOR,
     BallComplement,
     CatalogueBearing,
@@ -18,10 +17,10 @@ from rotordrop.machine.catalog import (
     PreloadClass,
     find_bearing,
 )
-from rotordrop.machine.clearance import CLASSES, ClearanceClass, clearance_range
-from rotordrop.machine.description import Misfit, Text
-from rotordrop.machine.race_bearing import Oddity, RaceBearing
-from rotordrop.machine.values import (
+from rotordrop.elements.clearance import CLASSES, ClearanceClass, clearance_range
+from rotordrop.elements.description import Misfit, Text
+from rotordrop.elements.race_bearing import Oddity, RaceBearing
+from rotordrop.elements.values import (
     Angle,
     Conformity,
     ContactAngle,
@@ -38,6 +37,7 @@ from rotordrop.machine.values import (
     default,
     follows,
 )
+from rotordrop.estimated import Estimated
 from rotordrop.units import format_quantity
 
 BallMaterial = Literal["silicon nitride", "steel"]

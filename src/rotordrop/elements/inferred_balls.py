@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from rotordrop.elements.ball_bearing import BallBearing
 from rotordrop.estimated import NINETY, Estimated
-from rotordrop.machine.ball_bearing import BallBearing
 from rotordrop.physics.hertz import race_contact
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rotordrop.estimated import Estimated
 
 if TYPE_CHECKING:
-    from rotordrop.machine import TouchdownBearing
+    from rotordrop.elements.touchdown_bearing import TouchdownBearing
 
 Array = NDArray[np.float64]
 
@@ -232,7 +232,7 @@ class BearingNumbers(ABC):
 
 def numbers_of(bearing: TouchdownBearing) -> BearingNumbers:
     """The numbers of a touchdown bearing, whatever its kind."""
-    from rotordrop.rotor.ball_numbers import BallNumbers
+    from rotordrop.elements.ball_numbers import BallNumbers
 
     return BallNumbers(bearing.bearing)
 

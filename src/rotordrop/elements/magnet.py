@@ -8,9 +8,9 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field, Strict
 
+from rotordrop.elements.description import Name, Placed
+from rotordrop.elements.values import Damping, Stiffness, follows
 from rotordrop.estimated import Estimated
-from rotordrop.machine.description import Name, Placed
-from rotordrop.machine.values import Damping, Stiffness, follows
 
 RIGID_FREQUENCY = 40.0
 """Rigid-body frequency [Hz] that the AMBs are taken to give the rotor when their stiffness is left out."""

@@ -11,9 +11,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.ball_bearing import STATIC_STRESS
+from rotordrop.elements.bearing_numbers import (
+    BearingFigure,
+    BearingNumbers,
+    Excess,
+    Measure,
+    Ratings,
+    RollingElements,
+    Spread,
+)
+from rotordrop.elements.catalog.inference import dynamic_rating, static_rating
+from rotordrop.elements.inferred_balls import inferred_stress_sigma
 from rotordrop.estimated import Estimated
-from rotordrop.machine.ball_bearing import STATIC_STRESS
-from rotordrop.machine.catalog.inference import dynamic_rating, static_rating
 from rotordrop.physics.ball_bearing import (
     BearingConstants,
     ball_centrifugal_force,
@@ -24,20 +34,10 @@ from rotordrop.physics.ball_bearing_response import bearing_response, simple_rad
 from rotordrop.physics.ball_loads import ball_loads, displacement_under
 from rotordrop.physics.ball_set import ball_set_entries, balls_of, loose_race_seat, static_deflection
 from rotordrop.physics.hertz import compliance
-from rotordrop.rotor.bearing_numbers import (
-    BearingFigure,
-    BearingNumbers,
-    Excess,
-    Measure,
-    Ratings,
-    RollingElements,
-    Spread,
-)
-from rotordrop.rotor.inferred_balls import inferred_stress_sigma
 from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
-    from rotordrop.machine import BallBearing
+    from rotordrop.elements.ball_bearing import BallBearing
 
 Array = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, Strict, model_validator
 
+from rotordrop.elements.values import Length, Physical
 from rotordrop.estimated import Estimated
-from rotordrop.machine.values import Length, Physical
 
 LARGEST_FILE = 16 * 2**20
 """Bytes that a machine file or a table of it can need."""

@@ -11,10 +11,17 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag
 
-from rotordrop.errors import UsageError
-from rotordrop.machine.description import Description, Misfit, Name, Placed, Text, place_on_nodes, unknown_key
-from rotordrop.machine.material import STEEL, Material
-from rotordrop.machine.values import (
+from rotordrop.elements.description import (
+    Description,
+    Misfit,
+    Name,
+    Placed,
+    Text,
+    place_on_nodes,
+    unknown_key,
+)
+from rotordrop.elements.material import STEEL, Material
+from rotordrop.elements.values import (
     Density,
     Inertia,
     NonNegative,
@@ -26,6 +33,7 @@ from rotordrop.machine.values import (
     PositiveMass,
     default,
 )
+from rotordrop.errors import UsageError
 
 THINNEST, THICKEST = 1e-4, 100.0
 """Diameters [m] beyond which a section is a mistake: stiffness goes with the fourth power, and beside a usual

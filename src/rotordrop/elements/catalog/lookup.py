@@ -11,10 +11,10 @@ from functools import lru_cache
 from importlib.resources import files
 from typing import Any, Literal
 
+from rotordrop.elements.catalog.boundary import DIMENSION_SERIES, boundary_dimensions, known_bores
+from rotordrop.elements.catalog.designation import Designation, Kind, read_designation
+from rotordrop.elements.catalog.inference import PairRigidity, infer_balls
 from rotordrop.estimated import NINETY
-from rotordrop.machine.catalog.boundary import DIMENSION_SERIES, boundary_dimensions, known_bores
-from rotordrop.machine.catalog.designation import Designation, Kind, read_designation
-from rotordrop.machine.catalog.inference import PairRigidity, infer_balls
 
 PreloadClass = Literal["light", "medium", "heavy"]
 _CLASSES: tuple[PreloadClass, ...] = ("light", "medium", "heavy")
@@ -298,7 +298,7 @@ def _index() -> dict[str, CatalogueBearing]:
 
 
 def _read(name: str) -> Any:
-    return json.loads((files("rotordrop.machine.catalog") / name).read_text(encoding="utf-8"))
+    return json.loads((files("rotordrop.elements.catalog") / name).read_text(encoding="utf-8"))
 
 
 @lru_cache(maxsize=1)

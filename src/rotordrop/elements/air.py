@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from rotordrop.machine.description import Description
-from rotordrop.machine.values import Drag, PositiveSpeed, PositiveTime, QuadraticDrag
+from rotordrop.elements.description import Description
+from rotordrop.elements.values import Drag, PositiveSpeed, PositiveTime, QuadraticDrag
 
 
 class SpeedDescription(Description):

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Literal
 
+from rotordrop.elements.rotor import Rotor
+from rotordrop.elements.sensor import Sensor
+from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.estimated import Estimated
-from rotordrop.machine import Rotor, TouchdownBearing
-from rotordrop.machine.sensor import Sensor
 from rotordrop.units import si_unit
 
 Owner = Literal["bearing", "sensor", "unbalance", "magnet", "drop", "rotor"]

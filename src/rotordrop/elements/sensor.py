@@ -7,8 +7,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from rotordrop.machine.description import Channel, Misfit, Name, Placed
-from rotordrop.machine.values import (
+from rotordrop.elements.description import Channel, Misfit, Name, Placed
+from rotordrop.elements.values import (
     Angle,
     Length,
     NonNegativeLength,

@@ -10,10 +10,9 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
-from rotordrop.estimated import Estimated
-from rotordrop.machine.ball_bearing import BallBearing
-from rotordrop.machine.description import Description, Misfit, Name, Placed
-from rotordrop.machine.values import (
+from rotordrop.elements.ball_bearing import BallBearing
+from rotordrop.elements.description import Description, Misfit, Name, Placed
+from rotordrop.elements.values import (
     ContactDamping,
     ContactExponent,
     ContactStiffness,
@@ -32,6 +31,7 @@ from rotordrop.machine.values import (
     default,
     follows,
 )
+from rotordrop.estimated import Estimated
 
 LINE_CONTACT = 10.0 / 9.0
 """Exponent of a line contact (Palmgren)."""

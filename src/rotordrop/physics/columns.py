@@ -1,0 +1,141 @@
+"""The flat arrays the compiled drop model reads: which column holds what, and where each state stands."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.physics import ball_set, contact, support
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+# Columns of `KernelParameters.bearing`, one row per touchdown bearing; SI units. The contact law and the ball
+# set are blocks of columns that only their own modules read.
+AIR_GAP = 0
+ROTOR_RADIUS = 1
+BORE_RADIUS = 2
+FRICTION_STATIC = 3
+FRICTION_DYNAMIC = 4
+STRIBECK_SPEED = 5
+SMOOTHING_SPEED = 6
+RACE_MASS = 7
+RACE_INERTIA = 8
+DRAG_COEFFICIENT = 9
+DRAG_SPEED = 10
+PITCH_DIAMETER = 11
+BEARING_DAMPING = 12
+SUPPORT_MASS_X = 13
+SUPPORT_MASS_Y = 14
+SUPPORT_STIFFNESS_X = 15
+SUPPORT_STIFFNESS_Y = 16
+SUPPORT_DAMPING_X = 17
+SUPPORT_DAMPING_Y = 18
+RACE_WEIGHT = 19
+CONTACT = 20
+CONTACT_END = CONTACT + contact.N_ENTRIES
+CONTACT_STIFFNESS = CONTACT + contact.STIFFNESS
+CONTACT_EXPONENT = CONTACT + contact.EXPONENT
+CONTACT_DAMPING = CONTACT + contact.DAMPING
+BALL_SET = CONTACT_END
+BALL_SET_END = BALL_SET + ball_set.N_ENTRIES
+BALL_STIFFNESS = BALL_SET + ball_set.BALL_STIFFNESS
+GROOVE_DISTANCE = BALL_SET + ball_set.GROOVE_DISTANCE
+RADIAL_OFFSET = BALL_SET + ball_set.RADIAL_OFFSET
+AXIAL_OFFSET = BALL_SET + ball_set.AXIAL_OFFSET
+STRESS_COEFFICIENT = BALL_SET + ball_set.STRESS_COEFFICIENT
+SUPPORT_FORM = BALL_SET_END
+SUPPORT_FORM_END = SUPPORT_FORM + support.N_ENTRIES
+SUPPORT_COUPLING = SUPPORT_FORM + support.COUPLING
+SUPPORT_CUBIC = SUPPORT_FORM + support.CUBIC
+FOUNDATION_SHARE = SUPPORT_FORM + support.FOUNDATION_SHARE
+FOUNDATION_SPEED = SUPPORT_FORM + support.FOUNDATION_SPEED
+FOUNDATION_DAMPING = SUPPORT_FORM + support.FOUNDATION_DAMPING
+N_BEARING_COLUMNS = SUPPORT_FORM_END
+FOUNDATION_STATES = 4
+
+# Entries of `KernelParameters.spin`.
+POLAR_INERTIA = 0
+INITIAL_SPEED = 1
+AERO_TIME_CONSTANT = 2
+AERO_LINEAR = 3
+AERO_QUADRATIC = 4
+POWER_OFF_DELAY = 5
+REMANENCE_TIME_CONSTANT = 6
+N_SPIN_ENTRIES = 7
+
+# Entries of `KernelParameters.flags`.
+SPIN_MODE = 0
+MAGNETS_ACT = 1
+N_FLAGS = 2
+
+# Columns of `KernelParameters.magnet`, one row per AMB: remanent force, holding force [N], spring, damper,
+# reference.
+REMANENT_X = 0
+REMANENT_Y = 1
+HOLDING_X = 2
+HOLDING_Y = 3
+AMB_STIFFNESS = 4
+AMB_DAMPING = 5
+AMB_REFERENCE_X = 6
+AMB_REFERENCE_Y = 7
+N_MAGNET_COLUMNS = 8
+
+# Entries of `KernelParameters.rotor_at`: where the states of the rotor, its books and the whole vector stand.
+# The velocity of a coordinate stands N_COORDINATES behind it. The step control looks at the first
+# N_CONTROLLED states, the filter estimates the first N_DYNAMIC.
+MODES_X = 0
+MODES_Y = 1
+ROTOR_SPEED = 2
+ROTOR_ANGLE = 3
+DISSIPATED = 4
+WORK_IN = 5
+N_COORDINATES = 6
+N_CONTROLLED = 7
+N_DYNAMIC = 8
+N_STATES = 9
+N_ROTOR_PLACES = 10
+
+# Columns of `KernelParameters.bearing_at`, one row per touchdown bearing: place of its race and of its
+# support (x, then y), of the spin of its race and of the first of its further states; -1 where it has none.
+RACE = 0
+SUPPORT = 1
+RACE_SPIN = 2
+BEARING_OWN = 3
+N_BEARING_PLACES = 4
+
+# Columns of `KernelParameters.magnet_at`, one row per AMB: place of the first of its states; -1 without any.
+MAGNET_OWN = 0
+N_MAGNET_PLACES = 1
+
+# Kinds of states: they set error scale, process noise and prior.
+POSITION, VELOCITY, SPIN, INTERNAL, ANGLE, AUDIT = range(6)
+
+
+class KernelParameters(NamedTuple):
+    """Everything the right-hand side reads, as flat arrays in SI units; m modes, B bearings, A magnets, Z
+    balls.
+
+    Columns and entries are named in this module. ``balls`` (B, 3, Z8) are the balls of `physics.ball_set`;
+    ``rotor_at``, ``bearing_at`` (B, ·) and ``magnet_at`` (A, ·) say where the states of each owner stand, so
+    that no kernel computes a place from the numbers of modes and bearings.
+    """
+
+    eigenvalue: Array
+    damping: Array
+    polar: Array
+    gravity: Array
+    unbalance_cos: Array
+    unbalance_sin: Array
+    bearing_shape: Array
+    bearing: Array
+    balls: Array
+    magnet_shape: Array
+    magnet: Array
+    spin: Array
+    flags: Integers
+    rotor_at: Integers
+    bearing_at: Integers
+    magnet_at: Integers
