@@ -46,7 +46,7 @@ def test_every_package_has_its_place_in_the_layers():
     ("where", "imports"),
     [
         ("physics", "simulate"),
-        ("machine", "physics"),
+        ("elements", "machine"),
         ("evidence", "spectrum"),
         ("estimate", "twin"),
         ("twin", "replay"),
