@@ -13,14 +13,13 @@ from rotordrop._version import __version__
 if TYPE_CHECKING:
     from rotordrop.elements.catalog import find_bearing as find_bearing
     from rotordrop.errors import RotordropError as RotordropError
-    from rotordrop.estimated import Estimated as Estimated
-    from rotordrop.estimated import IdentifiedValue as IdentifiedValue
     from rotordrop.estimation import Replay as Replay
     from rotordrop.estimation import Tracked as Tracked
     from rotordrop.estimation import estimate_drop as estimate_drop
     from rotordrop.estimation import estimate_drops as estimate_drops
     from rotordrop.evidence import check_record as check_record
     from rotordrop.evidence.look import look as look
+    from rotordrop.known import Known as Known
     from rotordrop.machine import Machine as Machine
     from rotordrop.machine import example_machine as example_machine
     from rotordrop.machine import load_machine as load_machine
@@ -48,8 +47,7 @@ _PUBLIC = {
     "DropCase": "rotordrop.simulate.case",
     "DropModel": "rotordrop.rotor.parameters",
     "DropResult": "rotordrop.simulate.result",
-    "Estimated": "rotordrop.estimated",
-    "IdentifiedValue": "rotordrop.estimated",
+    "Known": "rotordrop.known",
     "LevitatedStart": "rotordrop.simulate.case",
     "Machine": "rotordrop.machine",
     "PlacedStart": "rotordrop.simulate.case",

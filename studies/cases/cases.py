@@ -18,7 +18,7 @@ from typing import Any
 
 from tests.scaled_machines import scaled_machine
 
-from rotordrop.estimated import Estimated
+from rotordrop.known import Known
 from rotordrop.machine import Machine, example_path, save_machine
 
 HERE = Path(__file__).parent
@@ -90,7 +90,7 @@ def machine_file(name: str, folder: Path) -> Path:
 
 def guessed(machine: Machine) -> Machine:
     """A plain machine of which its owner knows ranges only."""
-    values: dict[str, float | Estimated] = {}
+    values: dict[str, float | Known] = {}
     for bearing in machine.touchdown_bearings:
         ranges = dict(GUESSES)
         if float(bearing.bearing.preload) > 0.0:
@@ -100,7 +100,7 @@ def guessed(machine: Machine) -> Machine:
             for step in path.split("."):
                 part = getattr(part, step)
             value = float(part)
-            values[f"{bearing.name}.{path}"] = Estimated(
+            values[f"{bearing.name}.{path}"] = Known(
                 value=value, status="guess", range=(low * value, high * value)
             )
     return machine.with_values(values)

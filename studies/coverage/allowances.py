@@ -26,7 +26,7 @@ from rotordrop.estimate.allowances import (
     MODEL_MEAN_STRESS_SIGMA,
     MODEL_STRESS_SIGMA,
 )
-from rotordrop.estimated import NINETY
+from rotordrop.known import NINETY
 from rotordrop.twin.tracked_parameters import MODEL_GAP_SIGMA
 
 STUDIES = Path(__file__).parent.parent

@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 
 from rotordrop.errors import RotordropError
-from rotordrop.estimated import Estimated
 from rotordrop.estimation import estimate_drop
 from rotordrop.evidence import check_record
+from rotordrop.known import Known
 from rotordrop.machine import example_machine
 from rotordrop.record import read_record
 from rotordrop.record.examples import example_record_path
@@ -35,7 +35,7 @@ def one(factor: float, tolerance: float) -> dict[str, Any]:
     """Estimate with readings times a factor."""
     machine = example_machine("lp400")
     if tolerance:
-        stated = Estimated(value=1.0, status="guess", range=(1.0 - tolerance, 1.0 + tolerance))
+        stated = Known(value=1.0, status="guess", range=(1.0 - tolerance, 1.0 + tolerance))
         machine = machine.with_values({f"sensors.{sensor.name}.gain": stated for sensor in machine.sensors})
 
     def read(name: str) -> Record:

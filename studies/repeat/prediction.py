@@ -19,10 +19,11 @@ from typing import Any
 
 import numpy as np
 
+from rotordrop.known import Known
 from rotordrop.machine import Machine, example_machine, load_machine, save_machine
 from rotordrop.simulate.case import DropCase
 from rotordrop.simulate.drop import simulate_drop
-from rotordrop.study.repeat import Recorded, place_among, repeat_study
+from rotordrop.study.repeat import place_among, repeat_study
 from rotordrop.study.run import run_study
 from rotordrop.twin.calibrated import calibrate_machine
 from rotordrop_bench.event import HiddenMachine, drop_conditions, hidden_machine
@@ -69,7 +70,7 @@ def predicted(seed: int, folder: Path) -> dict[str, Any]:
     true = [true_peaks(hidden, seed, k) for k in range(TRUE_DROPS)]
     values = {name: [one[name] for one in true] for name in true[0]}
     places = {
-        name: [place_among(results.column(name), Recorded(value=x)).value for x in found]
+        name: [place_among(results.column(name), Known(value=x)).value for x in found]
         for name, found in values.items()
     }
     return {

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from rotordrop.estimated import Estimated
+from rotordrop.known import Known
 from rotordrop.machine import Machine, TouchdownBearing, example_machine
 from rotordrop_bench import HiddenMachine, SensorChain
 
@@ -65,7 +65,7 @@ def informed(known: Machine, hidden: HiddenMachine, *, supports: bool = False) -
 
     With ``supports``, the supports and the air gap are the true ones too.
     """
-    true, values = hidden.machine, dict[str, Estimated | float]()
+    true, values = hidden.machine, dict[str, Known | float]()
     paths = (*NUISANCE, *SUPPORT, "air_gap") if supports else NUISANCE
     for bearing in true.touchdown_bearings:
         values |= {f"{bearing.name}.{path}": exactly(value_of(bearing, path)) for path in paths}
@@ -75,17 +75,17 @@ def informed(known: Machine, hidden: HiddenMachine, *, supports: bool = False) -
 
 def with_right_sensors(machine: Machine) -> Machine:
     """The same machine, whose owner knows that zeros and gains of the sensors are right."""
-    values: dict[str, Estimated] = {}
+    values: dict[str, Known] = {}
     for sensor in machine.sensors:
         values[f"sensors.{sensor.name}.gain"] = exactly(1.0, 1e-5)
         values[f"sensors.{sensor.name}.offset"] = exactly(0.0, 1e-8)
     return machine.with_values(values)
 
 
-def exactly(value: float, error: float | None = None) -> Estimated:
+def exactly(value: float, error: float | None = None) -> Known:
     """A value known to a thousandth, or to an error in its own unit."""
     own = max(1e-3 * abs(value), 1e-15) if error is None else error
-    return Estimated(value=value, status="estimated", standard_error=own)
+    return Known(value=value, status="estimated", standard_error=own)
 
 
 def size_of(errors: Any) -> dict[str, float]:

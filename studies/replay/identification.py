@@ -28,7 +28,6 @@ from common import (
 )
 from numpy.typing import NDArray
 
-from rotordrop.estimated import IdentifiedValue
 from rotordrop.evidence.air_gap import identify_air_gap
 from rotordrop.evidence.evidence import Evidence, read_evidence
 from rotordrop.evidence.evidence import known as present
@@ -42,6 +41,7 @@ from rotordrop.identification.support import (
     impact_problem,
     refit_with_friction,
 )
+from rotordrop.known import Known
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop_bench import hidden_machine, synthesize_drop
 
@@ -50,7 +50,7 @@ Array = NDArray[np.float64]
 UNTIL = 0.06
 
 
-def supports_of(evidence: Evidence) -> tuple[SupportFit, dict[str, IdentifiedValue], ImpactFit, Array]:
+def supports_of(evidence: Evidence) -> tuple[SupportFit, dict[str, Known], ImpactFit, Array]:
     """Supports as the replay finds them, but for the sweep of the friction, which is known here."""
     quick = build_drop_model(evidence.model.machine, "quick")
     coarse, fine = (

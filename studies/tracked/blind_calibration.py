@@ -24,8 +24,8 @@ for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
 import numpy as np
 
 from rotordrop.estimate.estimate import Estimate
-from rotordrop.estimated import NINETY
 from rotordrop.estimation import estimate_drop
+from rotordrop.known import NINETY
 from rotordrop.machine import example_machine
 from rotordrop.twin.calibrated import calibrate_machine, calibration_json
 from rotordrop_bench.event import hidden_machine

@@ -23,8 +23,8 @@ import numpy as np
 from blind_calibration import HERE, drop_scores, half_width, holds
 
 from rotordrop.errors import RotordropError
-from rotordrop.estimated import Estimated
 from rotordrop.estimation import estimate_drop
+from rotordrop.known import Known
 from rotordrop.machine import Machine, example_machine
 from rotordrop.record.record import Record
 from rotordrop.twin.calibrated import calibrate_machine
@@ -78,7 +78,7 @@ def degraded_machine(known: Machine, hidden: Machine, case: Degradation) -> Mach
                 (gap + d for d in case.gap_range) if math.isfinite(case.gap_range[0]) else (1e-4, 5e-4)
             )
             middle = gap if math.isfinite(case.gap_range[0]) else 2.5e-4
-            values[f"{bearing.name}.air_gap"] = Estimated(value=middle, status="guess", range=(low, high))
+            values[f"{bearing.name}.air_gap"] = Known(value=middle, status="guess", range=(low, high))
         machine = machine.with_values(values)
     return machine
 

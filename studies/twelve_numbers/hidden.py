@@ -30,8 +30,8 @@ from rotordrop.elements.beam import is_beam
 from rotordrop.elements.rotor import Rotor
 from rotordrop.errors import RotordropError
 from rotordrop.estimate.allowances import BEAM_FORCE_SIGMA
-from rotordrop.estimated import NINETY, Estimated
 from rotordrop.evidence.evidence import read_evidence
+from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
 from rotordrop.machine.simple import SimpleMachine, simple_machine
 from rotordrop.record.record import read_record
@@ -143,12 +143,12 @@ def drawn(known: Machine, true: Machine) -> Machine:
     return known.changed(rotor=true.rotor, **moved)
 
 
-def measured(unknown: Unknown) -> Estimated:
+def measured(unknown: Unknown) -> Known:
     """A number of the true machine as somebody measures it, to a percent."""
     mean = math.exp(unknown.mean) if unknown.logarithmic else unknown.mean
     value = float(unknown.published(unknown.mean) if unknown.published else mean)
     reach = NINETY * MEASURED * abs(value)
-    return Estimated(
+    return Known(
         value=value, status="estimated", interval_90=(value - reach, value + reach), source="measured"
     )
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rotordrop.elements.bearing_numbers import Spread, numbers_of
 from rotordrop.errors import UsageError
-from rotordrop.estimated import Estimated
+from rotordrop.known import Known
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.rotor.reduction import Reduction
@@ -241,7 +241,7 @@ def _log_uniform(random: np.random.Generator, low: float, high: float) -> float:
     return math.exp(float(random.uniform(math.log(low), math.log(high))))
 
 
-def _within(value: Estimated, factor: float) -> float:
+def _within(value: Known, factor: float) -> float:
     """A value times a factor, kept inside the range its owner states."""
     drawn = float(value) * factor
     return drawn if value.range is None else min(max(drawn, value.range[0]), value.range[1])

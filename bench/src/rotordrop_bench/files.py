@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.atomic_file import atomic_path, make_folder, write_json
+from rotordrop.files import atomic_path, make_folder, write_json
 from rotordrop.record.record import Record, sha256_of
 from rotordrop.record.writers import recording_of, write_delimited, write_hdf5
 from rotordrop_bench.recording import SyntheticDrop

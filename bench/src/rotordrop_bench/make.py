@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from rotordrop.atomic_file import make_folder, write_json
 from rotordrop.errors import UsageError
+from rotordrop.files import make_folder, write_json
 from rotordrop.machine.saving import save_machine
 from rotordrop.record.record import sha256_of
 from rotordrop_bench.departures import departures

@@ -23,14 +23,14 @@ from rotordrop.elements.values import (
     Unbalance,
     default,
 )
-from rotordrop.estimated import Estimated
+from rotordrop.known import Known
 
-Share = Annotated[Estimated, Physical("dimensionless", least=0.0, most=1.0)]
-CrossAxis = Annotated[Estimated, Physical("dimensionless", least=-0.5, most=0.5)]
-Lift = Annotated[Estimated, Physical("dimensionless", least=0.0, most=0.95)]
-Frequency = Annotated[Estimated, Physical("frequency", above=0.0)]
-Energy = Annotated[Estimated, Physical("energy", above=0.0)]
-NonNegativeNumber = Annotated[Estimated, Physical("dimensionless", least=0.0)]
+Share = Annotated[Known, Physical("dimensionless", least=0.0, most=1.0)]
+CrossAxis = Annotated[Known, Physical("dimensionless", least=-0.5, most=0.5)]
+Lift = Annotated[Known, Physical("dimensionless", least=0.0, most=0.95)]
+Frequency = Annotated[Known, Physical("frequency", above=0.0)]
+Energy = Annotated[Known, Physical("energy", above=0.0)]
+NonNegativeNumber = Annotated[Known, Physical("dimensionless", least=0.0)]
 MOST_POINTS = 9
 NO_CHANGE = "as the machine has it"
 
@@ -65,7 +65,7 @@ def _plain(value: Any) -> Any:
         return {key: _plain(entry) for key, entry in value.items()}
     if isinstance(value, tuple):
         return [_plain(entry) for entry in value]
-    return float(value) if isinstance(value, Estimated) else value
+    return float(value) if isinstance(value, Known) else value
 
 
 class SupportViolation(Violation):
@@ -73,21 +73,21 @@ class SupportViolation(Violation):
 
     Attributes
     ----------
-    axes_angle : Estimated
+    axes_angle : Known
         Angle from horizontal to the first principal axis of stiffness and damping [rad], from x towards y.
-    stiffness_ratio, damping_ratio : Estimated
+    stiffness_ratio, damping_ratio : Known
         Factors on stiffness and damping along the first axis, which at angle zero is horizontal [1].
-    damping : Estimated
+    damping : Known
         Factor on the damping along both axes [1].
-    hardening : Estimated
+    hardening : Known
         How much the spring force exceeds that of the linear spring, at the force below [1].
-    hardening_force : Estimated
+    hardening_force : Known
         Force of the linear spring at which that holds [N].
     hardening_radial : bool
         Whether the whole deflection hardens both axes, instead of each axis its own.
-    slip_force : Estimated
+    slip_force : Known
         Friction that slips in the support [N]; it makes its force lag the deflection by a hysteresis.
-    slip_travel : Estimated
+    slip_travel : Known
         Deflection over which that friction builds up [m].
     """
 
@@ -109,11 +109,11 @@ class FoundationViolation(Violation):
 
     Attributes
     ----------
-    mass : Estimated
+    mass : Known
         Modal mass at the support [kg].
-    frequency, frequency_horizontal : Estimated
+    frequency, frequency_horizontal : Known
         Natural frequency without support, vertical and horizontal [Hz].
-    damping_ratio : Estimated
+    damping_ratio : Known
         Damping ratio of the mode [1].
     """
 
@@ -138,9 +138,9 @@ class LawPoint(Violation):
 
     Attributes
     ----------
-    depth : Estimated
+    depth : Known
         Indentation [m].
-    force : Estimated
+    force : Known
         Normal force at rest [N].
     """
 
@@ -153,9 +153,9 @@ class ContactViolation(Violation):
 
     Attributes
     ----------
-    stiffness, damping : Estimated
+    stiffness, damping : Known
         Factors on contact stiffness and contact damping [1].
-    exponent : Estimated, optional
+    exponent : Known, optional
         Another exponent [1]; equally deep at five times the mean load of a bearing.
     law : tuple of LawPoint
         A law through these points, straight between them where both scales are logarithmic.
@@ -191,13 +191,13 @@ class RaceViolation(Violation):
 
     Attributes
     ----------
-    inertia : Estimated
+    inertia : Known
         Factor on its polar moment of inertia [1].
-    tilt_stiffness : Estimated, optional
+    tilt_stiffness : Known, optional
         Stiffness of the tilt where the rotor touches, in series with the contact [N/m].
-    tilt_frequency : Estimated, optional
+    tilt_frequency : Known, optional
         Natural frequency of the tilt [Hz].
-    tilt_damping_ratio : Estimated
+    tilt_damping_ratio : Known
         Damping ratio of the tilt [1].
     """
 
@@ -214,9 +214,9 @@ class FrictionViolation(Violation):
 
     Attributes
     ----------
-    dynamic : Estimated, optional
+    dynamic : Known, optional
         Dynamic coefficient [1]; the static one keeps its ratio to it.
-    static, stribeck_speed : Estimated
+    static, stribeck_speed : Known
         Factors on static coefficient and Stribeck speed [1].
     """
 
@@ -230,13 +230,13 @@ class GapViolation(Violation):
 
     Attributes
     ----------
-    drift : Estimated
+    drift : Known
         Change of the gap that stays [m], at an even rate within the time below.
-    drift_time : Estimated
+    drift_time : Known
         Time it takes [s].
-    closing : Estimated
+    closing : Known
         Largest closing by the heat of friction [m]; gone when all is cold again.
-    heat : Estimated
+    heat : Known
         Heat of friction that closes 63 % of it [J].
     """
 
@@ -253,7 +253,7 @@ class BallsViolation(Violation):
 
     Attributes
     ----------
-    first_ball_angle : Estimated, optional
+    first_ball_angle : Known, optional
         Where the first ball stands [rad].
     turn : bool
         Whether the balls turn with the cage as the race spins up.
@@ -268,7 +268,7 @@ class CentreViolation(Violation):
 
     Attributes
     ----------
-    x, y : Estimated
+    x, y : Known
         Its centre in the axes of magnets and sensors [m].
     """
 
@@ -314,14 +314,14 @@ class SensorViolation(Violation):
 
     Attributes
     ----------
-    time_constant : Estimated
+    time_constant : Known
         Time constant of first order with which the reading follows the shaft [s].
-    cross_axis : Estimated
+    cross_axis : Known
         Reading per motion across the sensor, a quarter turn ahead of its direction [1]. For all sensors at
         once: its size, drawn between half and all of it with either sign.
-    plane_shift : Estimated
+    plane_shift : Known
         How much nearer to the middle of the rotor the sensor stands than stated [m].
-    follows_housing : Estimated
+    follows_housing : Known
         Share of the motion of the bearing's housing that the bracket of the sensor follows [1].
     """
 
@@ -336,9 +336,9 @@ class ChainViolation(SensorViolation):
 
     Attributes
     ----------
-    time_constant, cross_axis, plane_shift, follows_housing : Estimated
+    time_constant, cross_axis, plane_shift, follows_housing : Known
         As of one sensor.
-    anti_alias_frequency : Estimated, optional
+    anti_alias_frequency : Known, optional
         Corner of a filter before the sampling that nobody mentions [Hz].
     """
 
@@ -350,9 +350,9 @@ class MagnetViolation(Violation):
 
     Attributes
     ----------
-    remanence_time : Estimated, optional
+    remanence_time : Known, optional
         Time constant of the remanent lift [s].
-    remanent_lift : Estimated, optional
+    remanent_lift : Known, optional
         Vertical remanent lift of every magnet over its share of the weight [1].
     """
 
@@ -365,9 +365,9 @@ class RotorViolation(Violation):
 
     Attributes
     ----------
-    youngs_modulus : Estimated
+    youngs_modulus : Known
         Factor on Young's modulus of every section [1].
-    unbalance : Estimated
+    unbalance : Known
         Factor on the drawn unbalances, which may leave the grade [1].
     """
 
@@ -382,11 +382,11 @@ class UnbalanceJump(Violation):
     ----------
     node : int
         Node of the new unbalance, counted from 1.
-    amount : Estimated
+    amount : Known
         Amount [kg m].
-    phase : Estimated
+    phase : Known
         Phase, counted from +y at rotor angle zero [rad].
-    time : Estimated, optional
+    time : Known, optional
         When, from power-off [s]; at the first contact when left out.
     """
 

@@ -10,8 +10,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
-from rotordrop.atomic_file import require_place, write_json, write_text
 from rotordrop.errors import OutputError, UsageError
+from rotordrop.files import require_place, write_json, write_text
 
 if TYPE_CHECKING:
     from rich.console import Console

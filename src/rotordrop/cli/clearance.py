@@ -71,11 +71,11 @@ def _described(machine: Path | None, output: Path | None) -> Machine | None:
 
 
 def _save(machine: Machine, found: tuple[Clearance, ...], source: str, output: Path) -> None:
-    from rotordrop.estimated import Estimated
+    from rotordrop.known import Known
     from rotordrop.machine import save_machine
 
     values = {
-        f"{clearance.bearing}.air_gap": Estimated(
+        f"{clearance.bearing}.air_gap": Known(
             value=clearance.gap,
             status="estimated",
             interval_90=clearance.interval_90,

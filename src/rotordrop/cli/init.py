@@ -134,7 +134,7 @@ def _copy_example(name: str, folder: Path, *, overwrite: bool) -> None:
     standing = [folder / file for file in contents if (folder / file).exists()]
     if standing and not overwrite:
         raise OutputError(f"{standing[0]} exists already; name another folder or add --force")
-    from rotordrop.atomic_file import atomic_path, make_folder
+    from rotordrop.files import atomic_path, make_folder
 
     make_folder(folder)
     for file, content in contents.items():

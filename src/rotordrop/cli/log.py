@@ -106,7 +106,7 @@ def log(
 
 
 def _export(table: str, file: str | None) -> None:
-    from rotordrop.atomic_file import write_text
+    from rotordrop.files import write_text
 
     if file is None:
         typer.echo(table, nl=False)

@@ -26,8 +26,8 @@ def split(
     profile: ProfileOption = None,
 ) -> None:
     """Cut a recording with several drops into one record for each; no sample is changed."""
-    from rotordrop.atomic_file import make_folder
     from rotordrop.evidence.splitting import split_drops
+    from rotordrop.files import make_folder
     from rotordrop.machine import load_machine
     from rotordrop.record.record import read_record, save_record
 

@@ -13,11 +13,11 @@ class SpeedDescription(Description):
 
     Attributes
     ----------
-    nominal : Estimated
+    nominal : Known
         Nominal speed [rad/s].
-    aero_time_constant : Estimated, optional
+    aero_time_constant : Known, optional
         Time constant [s] of the exponential fall of speed by aerodynamic drag alone.
-    aero_linear, aero_quadratic : Estimated, optional
+    aero_linear, aero_quadratic : Known, optional
         Aerodynamic torque as a function of speed: linear [N m s] and quadratic [N m s²] coefficients.
     """
 

@@ -37,7 +37,7 @@ from rotordrop.elements.values import (
     default,
     follows,
 )
-from rotordrop.estimated import Estimated
+from rotordrop.known import Known
 from rotordrop.units import format_quantity
 
 BallMaterial = Literal["silicon nitride", "steel"]
@@ -76,41 +76,41 @@ class BallBearing(RaceBearing):
     designation : str, optional
         Designation, for example "XCB71914-E"; where no maker's list in the catalogue has it, the balls are
         inferred from its size.
-    ball_diameter, pitch_diameter : Estimated
+    ball_diameter, pitch_diameter : Known
         Ball diameter D_w and pitch diameter D_pw [m].
     ball_count : int
         Balls per row.
-    contact_angle : Estimated
+    contact_angle : Known
         Nominal contact angle [rad].
-    conformity_inner, conformity_outer : Estimated
+    conformity_inner, conformity_outer : Known
         Groove radius over ball diameter [1].
-    ring_youngs_modulus, ring_poisson_ratio : Estimated
+    ring_youngs_modulus, ring_poisson_ratio : Known
         Ring material [Pa], [1].
-    ball_youngs_modulus, ball_poisson_ratio, ball_density : Estimated
+    ball_youngs_modulus, ball_poisson_ratio, ball_density : Known
         Ball material [Pa], [1], [kg/m³].
-    preload : Estimated
+    preload : Known
         Axial preload force F_V of each row [N].
     preload_class : {"light", "medium", "heavy"}, optional
         Preload class of the catalogue, where the preload was given so.
-    clearance : Estimated, optional
+    clearance : Known, optional
         Radial internal clearance, from one extreme position of the inner ring to the opposite one [m].
     clearance_class : {"C2", "CN", "C3", "C4", "C5"}, optional
         Clearance class of ISO 5753, where the clearance was given so.
-    bore_diameter : Estimated, optional
+    bore_diameter : Known, optional
         Bore of the inner ring [m], which a clearance class counts from.
     arrangement : {"X", "O", "tandem", "single"}
         Arrangement of the rows; ``rows = 1`` writes "single", ``rows = 2`` "X".
-    first_ball_angle : Estimated
+    first_ball_angle : Known
         Angle of the first ball from +y, positive with the spin [rad].
-    second_row_offset : Estimated
+    second_row_offset : Known
         Angle by which the second row is turned, as a fraction of the ball pitch [1].
-    width : Estimated, optional
+    width : Known, optional
         Width of one row [m].
-    limiting_speed : Estimated, optional
+    limiting_speed : Known, optional
         Speed up to which the maker allows the bearing [rad/s].
-    static_load_rating, dynamic_load_rating : Estimated, optional
+    static_load_rating, dynamic_load_rating : Known, optional
         Static and dynamic load rating C_0 and C of one row [N]; they narrow balls that are inferred.
-    axial_rigidity : Estimated, optional
+    axial_rigidity : Known, optional
         Axial rigidity of the pair at its preload, as a catalogue states it [N/m]; narrows them further.
     ball_count_range : tuple of int, optional
         90 % interval of the number of balls, where it is inferred.
@@ -286,14 +286,14 @@ class BallBearing(RaceBearing):
         else:
             why = "a usual value for spindle bearings"
             values |= {
-                f"conformity_{race}": Estimated(value=_CONFORMITY, status="default", source=why)
+                f"conformity_{race}": Known(value=_CONFORMITY, status="default", source=why)
                 for race in ("inner", "outer")
             }
         material = values.get("ball_material", self.ball_material)
         if "ball_material" in self.model_fields_set:
             material = self.ball_material
         for name, (value, unit) in _BALL_MATERIALS[material].items():
-            values[name] = Estimated(value=value, status="default", source=f"balls of {material}", unit=unit)
+            values[name] = Known(value=value, status="default", source=f"balls of {material}", unit=unit)
         if self._has_clearance(entry):
             values |= self._of_clearance(entry)
         given = values | {name: getattr(self, name) for name in self.model_fields_set}
@@ -307,10 +307,10 @@ class BallBearing(RaceBearing):
         why = "a bearing with clearance has none unless it is given"
         values: dict[str, Any] = {}
         if "preload" not in self.model_fields_set and self.preload_class is None:
-            values["preload"] = Estimated(value=0.0, status="default", source=why, unit="N")
+            values["preload"] = Known(value=0.0, status="default", source=why, unit="N")
         if entry is None and "contact_angle" not in self.model_fields_set:
             why = "deep grooves: the angle under load follows from the clearance"
-            values["contact_angle"] = Estimated(value=0.0, status="default", source=why, unit="rad")
+            values["contact_angle"] = Known(value=0.0, status="default", source=why, unit="rad")
         preloaded = self.preload_class is not None or "preload" in self.model_fields_set
         if entry is not None and entry.kind == "deep groove" and not preloaded:
             values["arrangement"] = "single"
@@ -318,7 +318,7 @@ class BallBearing(RaceBearing):
             values["clearance"] = self._clearance_of_class(entry)
         return values
 
-    def _clearance_of_class(self, entry: CatalogueBearing | None) -> Estimated:
+    def _clearance_of_class(self, entry: CatalogueBearing | None) -> Known:
         said = entry.read.clearance_class if entry is not None and entry.read is not None else None
         group = self.clearance_class or said or "CN"
         if "clearance" in self.model_fields_set:
@@ -339,7 +339,7 @@ class BallBearing(RaceBearing):
             )
         why = f"middle of {group} for a bore of {1e3 * bore:.4g} mm, ISO 5753-1"
         middle = 0.5 * (bounds[0] + bounds[1])
-        return Estimated(value=middle, status="inferred", range=bounds, source=why, unit="m")
+        return Known(value=middle, status="inferred", range=bounds, source=why, unit="m")
 
     def _from_catalogue(self, entry: CatalogueBearing) -> dict[str, Any]:
         complement = entry.complement
@@ -356,7 +356,7 @@ class BallBearing(RaceBearing):
         if entry.preload_basis:
             why = f"{preload_class} preload {entry.preload_basis}"
             bounds = (force / PRELOAD_FACTOR, PRELOAD_FACTOR * force)
-        values["preload"] = Estimated(value=force, status=status, range=bounds, source=why, unit="N")
+        values["preload"] = Known(value=force, status=status, range=bounds, source=why, unit="N")
         return values
 
     @staticmethod
@@ -477,12 +477,12 @@ def _inferred(entry: CatalogueBearing, complement: BallComplement) -> dict[str, 
         ("width", entry.width, None, listed),
     )
     values: dict[str, Any] = {
-        name: Estimated(value=value, status="inferred", range=bounds, source=why, unit="m")
+        name: Known(value=value, status="inferred", range=bounds, source=why, unit="m")
         for name, value, bounds, why in lengths
         if value is not None
     }
     for race in ("inner", "outer"):
-        values[f"conformity_{race}"] = Estimated(
+        values[f"conformity_{race}"] = Known(
             value=complement.conformity,
             status="inferred",
             range=complement.conformity_range,
@@ -490,7 +490,7 @@ def _inferred(entry: CatalogueBearing, complement: BallComplement) -> dict[str, 
         )
     angle, angles = entry.contact_angle, entry.contact_angle_range
     why = f"{listed}; the designation does not say it" if angles else f"{listed}, the designation"
-    values["contact_angle"] = Estimated(value=angle, status="inferred", range=angles, source=why, unit="rad")
+    values["contact_angle"] = Known(value=angle, status="inferred", range=angles, source=why, unit="rad")
     if complement.count_range is not None:
         values["ball_count_range"] = complement.count_range
     return values | {"ball_count": complement.ball_count, "ball_material": entry.ball_material}

@@ -23,7 +23,7 @@ from rotordrop.elements.bearing_numbers import (
 )
 from rotordrop.elements.catalog.inference import dynamic_rating, static_rating
 from rotordrop.elements.inferred_balls import inferred_stress_sigma
-from rotordrop.estimated import Estimated
+from rotordrop.known import Known
 from rotordrop.physics.ball_bearing import (
     BearingConstants,
     ball_centrifugal_force,
@@ -232,7 +232,7 @@ class BallNumbers(BearingNumbers):
             return None
 
         def offset(preload: float) -> float:
-            return bearing_constants(self.balls.changed(preload=Estimated(value=preload))).axial_offset
+            return bearing_constants(self.balls.changed(preload=Known(value=preload))).axial_offset
 
         published = partial(preload_of_offset, self.constants)
         return Measure(start=self.constants.axial_offset, of_value=offset, value_of=published)
@@ -262,7 +262,5 @@ class BallNumbers(BearingNumbers):
         }
 
 
-def _figure(
-    field: str, label: str, kind: str, value: float, described: Estimated | None = None
-) -> BearingFigure:
+def _figure(field: str, label: str, kind: str, value: float, described: Known | None = None) -> BearingFigure:
     return BearingFigure(field=field, label=label, kind=kind, value=value, described=described)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.estimated import Estimated
+from rotordrop.known import Known
 
 if TYPE_CHECKING:
     from rotordrop.elements.touchdown_bearing import TouchdownBearing
@@ -37,7 +37,7 @@ class BearingFigure:
         Kind of quantity, which sets the unit it is shown in.
     value : float
         Its value [SI].
-    described : Estimated, optional
+    described : Known, optional
         The same as the machine file describes it, with its range.
     note : str
         What to add when it is shown.
@@ -47,7 +47,7 @@ class BearingFigure:
     label: str
     kind: str
     value: float
-    described: Estimated | None = None
+    described: Known | None = None
     note: str = ""
 
 
@@ -99,7 +99,7 @@ class Spread:
     path: str
     low: float
     high: float
-    described: Estimated | None = None
+    described: Known | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

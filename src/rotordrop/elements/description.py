@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar, Self, TypeVar
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, Strict, model_validator
 
 from rotordrop.elements.values import Length, Physical
-from rotordrop.estimated import Estimated
+from rotordrop.known import Known
 
 LARGEST_FILE = 16 * 2**20
 """Bytes that a machine file or a table of it can need."""
@@ -120,7 +120,7 @@ class Description(BaseModel):
     def reason(self, name: str) -> str:
         """Say why a value that was left out is what it is."""
         value = getattr(self, name)
-        stated = value.source if isinstance(value, Estimated) else None
+        stated = value.source if isinstance(value, Known) else None
         return stated or type(self).model_fields[name].description or "the usual case"
 
 
@@ -166,7 +166,7 @@ def _refuse_outside(node: int, nodes: tuple[float, ...], place: tuple[str | int,
         raise Misfit(f"node {node} is outside the rotor, whose nodes are 1 to {len(nodes)}", place)
 
 
-def _node_at(position: Estimated, nodes: tuple[float, ...], place: tuple[str | int, ...]) -> int:
+def _node_at(position: Known, nodes: tuple[float, ...], place: tuple[str | int, ...]) -> int:
     text = Physical("length").text
     if not nodes[0] - NODE_TOLERANCE <= position.value <= nodes[-1] + NODE_TOLERANCE:
         raise Misfit(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from rotordrop.elements.ball_bearing import BallBearing
-from rotordrop.estimated import NINETY, Estimated
+from rotordrop.known import NINETY, Known
 from rotordrop.physics.hertz import race_contact
 
 
@@ -26,7 +26,7 @@ def inferred_stress_sigma(bearing: BallBearing) -> float:
     return math.hypot(*parts) / (2.0 * NINETY)
 
 
-def _ends(value: Estimated) -> tuple[float, float]:
+def _ends(value: Known) -> tuple[float, float]:
     """Ends of the range of an inferred value; a value twice where it is not inferred."""
     inferred = value.status == "inferred" and value.range is not None
     return value.range if inferred and value.range else (value.value, value.value)

@@ -10,7 +10,7 @@ from pydantic import Field, Strict
 
 from rotordrop.elements.description import Name, Placed
 from rotordrop.elements.values import Damping, Stiffness, follows
-from rotordrop.estimated import Estimated
+from rotordrop.known import Known
 
 RIGID_FREQUENCY = 40.0
 """Rigid-body frequency [Hz] that the AMBs are taken to give the rotor when their stiffness is left out."""
@@ -29,9 +29,9 @@ class ActiveMagneticBearing(Placed):
     ----------
     node : int
         Node number, counted from 1.
-    stiffness : Estimated
+    stiffness : Known
         Stiffness of the closed loop [N/m].
-    damping : Estimated
+    damping : Known
         Damping of the closed loop [N s/m].
     integral_action : bool
         Whether the controller holds the rotor centred against gravity.
@@ -46,19 +46,19 @@ class ActiveMagneticBearing(Placed):
 
     reserved: ClassVar[Mapping[str, str]] = {"controller": "the controller of a closed loop"}
 
-    def completed(self, carried_mass: float) -> dict[str, Estimated]:
+    def completed(self, carried_mass: float) -> dict[str, Known]:
         """Values for a stiffness and damping that were left out, from the mass carried [kg]."""
-        values: dict[str, Estimated] = {}
+        values: dict[str, Known] = {}
         stiffness = self.stiffness
         if "stiffness" not in self.model_fields_set:
             value = carried_mass * (2.0 * math.pi * RIGID_FREQUENCY) ** 2
             why = (
                 f"gives the {carried_mass:.3g} kg it carries a rigid-body frequency of {RIGID_FREQUENCY:g} Hz"
             )
-            stiffness = Estimated(value=value, status="default", source=why, unit="N/m")
+            stiffness = Known(value=value, status="default", source=why, unit="N/m")
             values["stiffness"] = stiffness
         if "damping" not in self.model_fields_set:
             value = 2.0 * DAMPING_RATIO * math.sqrt(stiffness.value * carried_mass)
             why = f"{DAMPING_RATIO:.0%} of critical for the {carried_mass:.3g} kg it carries"
-            values["damping"] = Estimated(value=value, status="default", source=why, unit="N s/m")
+            values["damping"] = Known(value=value, status="default", source=why, unit="N s/m")
         return values

@@ -11,11 +11,11 @@ class Material(Description):
 
     Attributes
     ----------
-    youngs_modulus : Estimated
+    youngs_modulus : Known
         Young's modulus [Pa].
-    poisson_ratio : Estimated
+    poisson_ratio : Known
         Poisson ratio [1].
-    density : Estimated
+    density : Known
         Density [kg/m³].
     """
 

@@ -11,7 +11,7 @@ from typing import Literal
 from rotordrop.elements.rotor import Rotor
 from rotordrop.elements.sensor import Sensor
 from rotordrop.elements.touchdown_bearing import TouchdownBearing
-from rotordrop.estimated import Estimated
+from rotordrop.known import Known
 from rotordrop.units import si_unit
 
 Owner = Literal["bearing", "sensor", "unbalance", "magnet", "drop", "rotor"]
@@ -172,31 +172,31 @@ class Parameter:
         lowest = -math.inf if self.lower is None else self.lower
         return min(max(value, lowest), math.inf if self.upper is None else self.upper)
 
-    def stated(self, part: TouchdownBearing | Sensor | Rotor) -> Estimated | None:
+    def stated(self, part: TouchdownBearing | Sensor | Rotor) -> Known | None:
         """The value as the description has it; None where it leaves it out."""
         value: object = part
         for name in self.path.split("."):
             value = getattr(value, name)
-        return value if isinstance(value, Estimated) else None
+        return value if isinstance(value, Known) else None
 
-    def described(self, part: TouchdownBearing | Sensor) -> Estimated:
+    def described(self, part: TouchdownBearing | Sensor) -> Known:
         """The value as the machine description has it, of a bearing or a sensor."""
         if self.path == "support.anisotropy":
             assert isinstance(part, TouchdownBearing)
             support = part.support
             ratio = float(support.stiffness_horizontal) / float(support.stiffness)
-            return Estimated(value=ratio, status="default")
+            return Known(value=ratio, status="default")
         value: object = part
         if self.path == "preload":
             assert isinstance(part, TouchdownBearing)
             return getattr(part.bearing, "preload", NO_PRELOAD)
         for name in self.path.split("."):
             value = getattr(value, name)
-        assert isinstance(value, Estimated)
+        assert isinstance(value, Known)
         return value
 
 
-NO_PRELOAD = Estimated(value=0.0, status="default", source="this kind of bearing has none", unit="N")
+NO_PRELOAD = Known(value=0.0, status="default", source="this kind of bearing has none", unit="N")
 """What a bearing without rows to press against each other has: no unknown."""
 
 

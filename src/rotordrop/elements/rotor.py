@@ -164,9 +164,9 @@ class Disc(Placed):
     ----------
     node : int
         Node number, counted from 1.
-    mass : Estimated
+    mass : Known
         Mass [kg].
-    polar_inertia, diametral_inertia : Estimated
+    polar_inertia, diametral_inertia : Known
         Moments of inertia [kg m²] about the shaft axis and about a diameter.
     """
 
@@ -220,14 +220,14 @@ class Rotor(Description):
         Shaft sections, as lengths one after the other or from node to node.
     discs : tuple of Disc
         Discs and point masses.
-    modal_damping : Estimated
+    modal_damping : Known
         Damping ratio of the free-free flexible modes [1].
-    stiffness_factor : Estimated, optional
+    stiffness_factor : Known, optional
         Bending stiffness over the one that sections and materials give [1].
-    mass_to_ends, mass_to_de : Estimated, optional
+    mass_to_ends, mass_to_de : Known, optional
         Of a beam in place of a rotor: part of its mass moved from the middle to the ends, and towards the DE,
         such that mass and centre of mass stay [1].
-    stiffness_to_de, stiffness_to_ends : Estimated, optional
+    stiffness_to_de, stiffness_to_ends : Known, optional
         The same of the logarithm of its bending stiffness [1].
     """
 

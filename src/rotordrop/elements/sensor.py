@@ -32,27 +32,27 @@ class Sensor(Placed):
         Name of its channel in the recording.
     node : int
         Node number, counted from 1.
-    angle : Estimated
+    angle : Known
         Direction of positive reading [rad], counter-clockwise from +x (horizontal), y up, seen from the DE.
     polarity : {1, -1}
         -1 when a motion in the direction of the angle makes the reading fall.
-    gain : Estimated
+    gain : Known
         True displacement over reading [1].
-    offset : Estimated
+    offset : Known
         Reading [m] when the rotor is centred.
-    sensitivity : Estimated, optional
+    sensitivity : Known, optional
         Volts per metre [V/m], for recordings in volts.
     bearing : str
         Name of the touchdown bearing at this end; the nearest when left out.
-    position_error : Estimated
+    position_error : Known
         Standard uncertainty of the axial position [m].
-    time_constant : Estimated, optional
+    time_constant : Known, optional
         Time by which the reading lags behind, first order [s].
-    cross_axis : Estimated, optional
+    cross_axis : Known, optional
         Reading per displacement across, in the direction turned by +90° [1].
-    follows_housing : Estimated, optional
+    follows_housing : Known, optional
         Part of the motion of the bearing housing that the bracket of the sensor makes too [1].
-    plane_offset : Estimated, optional
+    plane_offset : Known, optional
         How far the sensor stands from its node, towards higher nodes [m].
     lost : bool
         Whether the sensor gave no readings; the machine then goes without it.

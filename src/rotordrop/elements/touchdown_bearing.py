@@ -31,7 +31,7 @@ from rotordrop.elements.values import (
     default,
     follows,
 )
-from rotordrop.estimated import Estimated
+from rotordrop.known import Known
 
 LINE_CONTACT = 10.0 / 9.0
 """Exponent of a line contact (Palmgren)."""
@@ -50,13 +50,13 @@ class Contact(Description):
 
     Attributes
     ----------
-    stiffness : Estimated
+    stiffness : Known
         Contact stiffness K [N/m^n].
-    exponent : Estimated
+    exponent : Known
         Exponent n [1].
-    damping : Estimated
+    damping : Known
         Contact damping λ [s/m].
-    length : Estimated, optional
+    length : Known, optional
         Length of the line contact [m], from which Palmgren's formula gives the stiffness.
     """
 
@@ -103,10 +103,10 @@ class Contact(Description):
         if self.length is not None:
             value = palmgren_stiffness(self.length.value)
             why = f"Palmgren line contact over {self.length.value * 1e3:.4g} mm"
-            return {"stiffness": Estimated(value=value, status="inferred", source=why, unit="N/m^n")}
+            return {"stiffness": Known(value=value, status="inferred", source=why, unit="N/m^n")}
         why = "about a fifth of Palmgren's value for 32 mm: edges and waviness leave part of the length"
         bounds = (2e8, 4e9)
-        return {"stiffness": Estimated(value=8e8, status="default", range=bounds, source=why, unit="N/m^n")}
+        return {"stiffness": Known(value=8e8, status="default", range=bounds, source=why, unit="N/m^n")}
 
 
 def palmgren_stiffness(length: float) -> float:
@@ -120,11 +120,11 @@ class Friction(Description):
 
     Attributes
     ----------
-    static, dynamic : Estimated
+    static, dynamic : Known
         Friction coefficients at rest and when sliding fast [1].
-    stribeck_speed : Estimated
+    stribeck_speed : Known
         Sliding speed over which static falls to dynamic [m/s].
-    smoothing_speed : Estimated
+    smoothing_speed : Known
         Sliding speed below which the friction is smoothed [m/s].
     """
 
@@ -146,15 +146,15 @@ class Race(Description):
 
     Attributes
     ----------
-    mass : Estimated
+    mass : Known
         Mass [kg].
-    inertia : Estimated
+    inertia : Known
         Polar moment of inertia [kg m²].
-    width : Estimated
+    width : Known
         Width over which the rotor lies in the race [m]; the pressure between them follows from it.
-    drag_coefficient : Estimated
+    drag_coefficient : Known
         Drag torque over bearing force and half the pitch diameter [1].
-    drag_speed : Estimated
+    drag_speed : Known
         Race speed over which the drag builds up [rad/s].
     """
 
@@ -172,22 +172,22 @@ class Support(Description):
 
     Attributes
     ----------
-    mass, stiffness, damping : Estimated
+    mass, stiffness, damping : Known
         Vertical support mass [kg], stiffness [N/m] and damping [N s/m].
-    damping_ratio : Estimated, optional
+    damping_ratio : Known, optional
         In place of the damping: C = 2 ζ √(K m).
-    mass_horizontal, stiffness_horizontal, damping_horizontal : Estimated
+    mass_horizontal, stiffness_horizontal, damping_horizontal : Known
         The same in the horizontal direction; equal to the vertical ones when left out.
-    damping_ratio_horizontal : Estimated, optional
+    damping_ratio_horizontal : Known, optional
         In place of the horizontal damping.
-    coupling : Estimated, optional
+    coupling : Known, optional
         Coupling of x and y over the geometric mean of horizontal and vertical stiffness [1]: principal axes
         that are turned.
-    cubic : Estimated, optional
+    cubic : Known, optional
         Cubic term k₃ of the spring, F = K h (1 + k₃ h²) along x and along y [1/m²].
-    foundation_share : Estimated, optional
+    foundation_share : Known, optional
         Support mass over modal mass of a foundation that gives way under the support [1].
-    foundation_frequency, foundation_damping_ratio : Estimated, optional
+    foundation_frequency, foundation_damping_ratio : Known, optional
         Natural frequency [rad/s] and damping ratio [1] of that foundation.
     """
 
@@ -255,7 +255,7 @@ class Support(Description):
             values["damping_horizontal"] = self._horizontal_damping(values)
         return values
 
-    def _horizontal_damping(self, values: dict[str, Any]) -> Estimated:
+    def _horizontal_damping(self, values: dict[str, Any]) -> Known:
         mass = values.get("mass_horizontal", self.mass_horizontal)
         stiffness = values.get("stiffness_horizontal", self.stiffness_horizontal)
         if self.damping_ratio_horizontal is not None:
@@ -266,21 +266,21 @@ class Support(Description):
         return replace(_from_ratio(self.damping_ratio, mass, stiffness), status="default", source=why)
 
 
-def _from_ratio(ratio: Estimated | None, mass: Estimated, stiffness: Estimated) -> Estimated:
+def _from_ratio(ratio: Known | None, mass: Known, stiffness: Known) -> Known:
     critical = 2.0 * math.sqrt(stiffness.value * mass.value)
     if ratio is None:
         why = f"{_DAMPING_RATIO:.1%} of critical"
         value = _DAMPING_RATIO * critical
         bounds = (0.1 * value, 10.0 * value)
-        return Estimated(value=value, status="default", range=bounds, source=why, unit="N s/m")
+        return Known(value=value, status="default", range=bounds, source=why, unit="N s/m")
     scaled = _scaled(ratio, critical, f"damping ratio {ratio.value:g}", "N s/m")
     return replace(scaled, status=ratio.status)
 
 
-def _scaled(value: Estimated, factor: float, why: str, unit: str) -> Estimated:
+def _scaled(value: Known, factor: float, why: str, unit: str) -> Known:
     """Another value that follows from one by a factor, with its range."""
     bounds = None if value.range is None else (value.range[0] * factor, value.range[1] * factor)
-    return Estimated(value=value.value * factor, status="default", range=bounds, source=why, unit=unit)
+    return Known(value=value.value * factor, status="default", range=bounds, source=why, unit=unit)
 
 
 class TouchdownBearing(Placed):
@@ -292,11 +292,11 @@ class TouchdownBearing(Placed):
         Name, such as "NDE" or "DE".
     node : int
         Node number, counted from 1.
-    air_gap : Estimated
+    air_gap : Known
         Radial clearance between rotor and inner race [m].
-    bore_radius : Estimated
+    bore_radius : Known
         Radius of the bore of the inner race [m]; the rotor's radius is smaller by the air gap.
-    damping_time : Estimated
+    damping_time : Known
         Bearing damping over tangent stiffness, C_b/K_b [s].
     """
 
@@ -352,24 +352,24 @@ class TouchdownBearing(Placed):
         width = self.race.width if "width" in given else self._race_width()
         mass, inertia = self._race_from_size(width.value)
         why = self.bearing.race_radius()[1]
-        values: dict[str, Estimated] = {"width": width}
+        values: dict[str, Known] = {"width": width}
         if "mass" not in given:
             bounds = (0.5 * mass, 2.0 * mass)
-            values["mass"] = Estimated(value=mass, status="inferred", range=bounds, source=why, unit="kg")
+            values["mass"] = Known(value=mass, status="inferred", range=bounds, source=why, unit="kg")
         else:
             inertia *= self.race.mass.value / mass
         if "inertia" not in given:
             bounds = (0.5 * inertia, 2.0 * inertia)
-            values["inertia"] = Estimated(
+            values["inertia"] = Known(
                 value=inertia, status="inferred", range=bounds, source=why, unit="kg m^2"
             )
         return {"race": self.race.completed_with(values)}
 
-    def _race_width(self) -> Estimated:
+    def _race_width(self) -> Known:
         if self.contact.length is not None:
             return replace(self.contact.length, status="inferred", source="the length of the line contact")
         value, why = self.bearing.usual_race_width()
-        return Estimated(value=value, status="default", source=f"{why}; a sleeve differs", unit="m")
+        return Known(value=value, status="default", source=f"{why}; a sleeve differs", unit="m")
 
     def _race_from_size(self, width: float) -> tuple[float, float]:
         inner = self.bore_radius.value

@@ -11,7 +11,7 @@ from rotordrop.elements.description import Description, Placed
 from rotordrop.elements.values import Angle, Positive, PositiveSpeed
 from rotordrop.elements.values import Unbalance as UnbalanceAmount
 from rotordrop.errors import UsageError
-from rotordrop.estimated import Estimated
+from rotordrop.known import Known
 from rotordrop.units import parse_quantity
 
 
@@ -22,11 +22,11 @@ class Unbalance(Placed):
     ----------
     node : int
         Node number, counted from 1.
-    amount : Estimated
+    amount : Known
         Mass times radius [kg m].
-    phase : Estimated
+    phase : Known
         Angle from +y, positive with the spin [rad], when the rotor angle is zero.
-    beyond_described : Estimated, optional
+    beyond_described : Known, optional
         Factor by which the amount stands above what was described, where a record asked for more [1].
     """
 
@@ -44,9 +44,9 @@ class BalanceGrade(Description):
     ----------
     grade_mm_s : float
         The grade G: permissible speed of the centre of gravity [mm/s].
-    at_speed : Estimated
+    at_speed : Known
         Speed for which the grade holds [rad/s].
-    permissible : Estimated, optional
+    permissible : Known, optional
         Permissible unbalance of the whole rotor [kg m], where it is given beside the grade.
     """
 
@@ -106,8 +106,8 @@ def from_grade(
     return tuple(
         Unbalance(
             node=node,
-            amount=Estimated(value=share * total, status="inferred", range=(0.0, total), source=why),
-            phase=Estimated(
+            amount=Known(value=share * total, status="inferred", range=(0.0, total), source=why),
+            phase=Known(
                 value=0.0,
                 status="inferred",
                 range=(-math.pi, math.pi),

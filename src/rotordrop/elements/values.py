@@ -11,10 +11,10 @@ from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
 from rotordrop.errors import UsageError
-from rotordrop.estimated import Estimated, Status
+from rotordrop.known import Known, Status
 from rotordrop.units import KINDS, format_quantity, parse_quantity, si_unit
 
-LEFT_OUT = Estimated(value=math.nan, status="default", source="follows from other values")
+LEFT_OUT = Known(value=math.nan, status="default", source="follows from other values")
 """Stands for a value that was left out and follows from its neighbours."""
 
 SMALLEST, LARGEST = 1e-20, 1e20
@@ -59,16 +59,16 @@ class Physical:
         """Name the kind; `rotordrop.machine.schema` describes the ways of writing it once for all values."""
         return {KIND_MARK: self.kind}
 
-    def read(self, raw: Any) -> Estimated:
+    def read(self, raw: Any) -> Known:
         """Read a number with unit, a guess with range, or an estimate with interval and source."""
-        if isinstance(raw, Estimated):
+        if isinstance(raw, Known):
             if raw is LEFT_OUT:
                 return raw
             unit = si_unit(self.kind)
             return self._admissible(raw if raw.unit == unit else replace(raw, unit=unit), raw)
         if isinstance(raw, Mapping):
             return self._admissible(self._from_table(raw), raw)
-        return self._admissible(Estimated(value=self.number(raw), unit=si_unit(self.kind)), raw)
+        return self._admissible(Known(value=self.number(raw), unit=si_unit(self.kind)), raw)
 
     def number(self, raw: Any) -> float:
         """Read one number [SI unit of the kind]."""
@@ -81,7 +81,7 @@ class Physical:
             return exact
         return parse_quantity(raw, self.kind)
 
-    def _from_table(self, table: Mapping[str, Any]) -> Estimated:
+    def _from_table(self, table: Mapping[str, Any]) -> Known:
         unknown = [key for key in table if key not in _TABLE_KEYS]
         if unknown:
             raise UsageError(
@@ -96,7 +96,7 @@ class Physical:
                 f"a guess has a range, not {misplaced[0]!r}; write {{guess = …, range = […]}} or "
                 f"{{value = …, {misplaced[0]} = …}}"
             )
-        return Estimated(
+        return Known(
             value=self.number(table["guess" if guessed else "value"]),
             status="guess" if guessed else _status(table),
             range=self._pair(table, "range"),
@@ -128,7 +128,7 @@ class Physical:
             self._check(number, text, key)
         return low, high
 
-    def _admissible(self, value: Estimated, raw: Any) -> Estimated:
+    def _admissible(self, value: Known, raw: Any) -> Known:
         self._check(value.value, raw)
         for name, pair in (("range", value.range), ("interval", value.interval_90)):
             if pair is not None and not pair[0] <= value.value <= pair[1]:
@@ -180,7 +180,7 @@ def spoken(kind: str) -> str:
 
 def default(value: float, why: str, bounds: tuple[float, float] | None = None) -> Any:
     """Give a field a documented default [SI], with the range thought possible."""
-    return Field(default=Estimated(value=value, status="default", range=bounds, source=why), description=why)
+    return Field(default=Known(value=value, status="default", range=bounds, source=why), description=why)
 
 
 def follows(why: str) -> Any:
@@ -216,38 +216,38 @@ def _exact_si(text: str, kind: str) -> float | None:
     return number if math.isfinite(number) and "_" not in head else None
 
 
-Length = Annotated[Estimated, Physical("length")]
-PositiveLength = Annotated[Estimated, Physical("length", above=0.0)]
-NonNegativeLength = Annotated[Estimated, Physical("length", least=0.0)]
-Mass = Annotated[Estimated, Physical("mass", least=0.0)]
-PositiveMass = Annotated[Estimated, Physical("mass", above=0.0)]
-Inertia = Annotated[Estimated, Physical("inertia", least=0.0)]
-PositiveInertia = Annotated[Estimated, Physical("inertia", above=0.0)]
-Angle = Annotated[Estimated, Physical("angle", least=-MOST_TURNS, most=MOST_TURNS)]
-ContactAngle = Annotated[Estimated, Physical("angle", least=0.0, most=math.radians(60.0))]
-Time = Annotated[Estimated, Physical("time", least=0.0)]
-PositiveTime = Annotated[Estimated, Physical("time", above=0.0)]
-Speed = Annotated[Estimated, Physical("speed", least=0.0)]
-PositiveSpeed = Annotated[Estimated, Physical("speed", above=0.0)]
-Velocity = Annotated[Estimated, Physical("velocity", above=0.0)]
-Force = Annotated[Estimated, Physical("force", least=0.0)]
-PositiveForce = Annotated[Estimated, Physical("force", above=0.0)]
-Stiffness = Annotated[Estimated, Physical("stiffness", above=0.0)]
-Damping = Annotated[Estimated, Physical("damping", least=0.0)]
-Pressure = Annotated[Estimated, Physical("pressure", above=0.0)]
-Density = Annotated[Estimated, Physical("density", above=0.0)]
-Acceleration = Annotated[Estimated, Physical("acceleration", least=0.0)]
-Unbalance = Annotated[Estimated, Physical("unbalance", least=0.0)]
-CubicTerm = Annotated[Estimated, Physical("cubic_term")]
-Coupling = Annotated[Estimated, Physical("dimensionless", least=-0.9, most=0.9)]
-ContactStiffness = Annotated[Estimated, Physical("contact_stiffness", above=0.0)]
-ContactDamping = Annotated[Estimated, Physical("contact_damping", least=0.0)]
-Drag = Annotated[Estimated, Physical("rotational_drag", least=0.0)]
-QuadraticDrag = Annotated[Estimated, Physical("quadratic_drag", least=0.0)]
-Sensitivity = Annotated[Estimated, Physical("voltage_sensitivity", above=0.0)]
-Number = Annotated[Estimated, Physical("dimensionless")]
-NonNegative = Annotated[Estimated, Physical("dimensionless", least=0.0)]
-Positive = Annotated[Estimated, Physical("dimensionless", above=0.0)]
-PoissonRatio = Annotated[Estimated, Physical("dimensionless", above=-1.0, most=0.5)]
-Conformity = Annotated[Estimated, Physical("dimensionless", above=0.5, most=1.0)]
-ContactExponent = Annotated[Estimated, Physical("dimensionless", least=1.0, most=2.0)]
+Length = Annotated[Known, Physical("length")]
+PositiveLength = Annotated[Known, Physical("length", above=0.0)]
+NonNegativeLength = Annotated[Known, Physical("length", least=0.0)]
+Mass = Annotated[Known, Physical("mass", least=0.0)]
+PositiveMass = Annotated[Known, Physical("mass", above=0.0)]
+Inertia = Annotated[Known, Physical("inertia", least=0.0)]
+PositiveInertia = Annotated[Known, Physical("inertia", above=0.0)]
+Angle = Annotated[Known, Physical("angle", least=-MOST_TURNS, most=MOST_TURNS)]
+ContactAngle = Annotated[Known, Physical("angle", least=0.0, most=math.radians(60.0))]
+Time = Annotated[Known, Physical("time", least=0.0)]
+PositiveTime = Annotated[Known, Physical("time", above=0.0)]
+Speed = Annotated[Known, Physical("speed", least=0.0)]
+PositiveSpeed = Annotated[Known, Physical("speed", above=0.0)]
+Velocity = Annotated[Known, Physical("velocity", above=0.0)]
+Force = Annotated[Known, Physical("force", least=0.0)]
+PositiveForce = Annotated[Known, Physical("force", above=0.0)]
+Stiffness = Annotated[Known, Physical("stiffness", above=0.0)]
+Damping = Annotated[Known, Physical("damping", least=0.0)]
+Pressure = Annotated[Known, Physical("pressure", above=0.0)]
+Density = Annotated[Known, Physical("density", above=0.0)]
+Acceleration = Annotated[Known, Physical("acceleration", least=0.0)]
+Unbalance = Annotated[Known, Physical("unbalance", least=0.0)]
+CubicTerm = Annotated[Known, Physical("cubic_term")]
+Coupling = Annotated[Known, Physical("dimensionless", least=-0.9, most=0.9)]
+ContactStiffness = Annotated[Known, Physical("contact_stiffness", above=0.0)]
+ContactDamping = Annotated[Known, Physical("contact_damping", least=0.0)]
+Drag = Annotated[Known, Physical("rotational_drag", least=0.0)]
+QuadraticDrag = Annotated[Known, Physical("quadratic_drag", least=0.0)]
+Sensitivity = Annotated[Known, Physical("voltage_sensitivity", above=0.0)]
+Number = Annotated[Known, Physical("dimensionless")]
+NonNegative = Annotated[Known, Physical("dimensionless", least=0.0)]
+Positive = Annotated[Known, Physical("dimensionless", above=0.0)]
+PoissonRatio = Annotated[Known, Physical("dimensionless", above=-1.0, most=0.5)]
+Conformity = Annotated[Known, Physical("dimensionless", above=0.5, most=1.0)]
+ContactExponent = Annotated[Known, Physical("dimensionless", least=1.0, most=2.0)]

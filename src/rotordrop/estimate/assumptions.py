@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from rotordrop.estimated import NINETY
 from rotordrop.evidence.evidence import Evidence, Missing, strongest_slowing
+from rotordrop.known import NINETY
 from rotordrop.rotor.contact_band import contact_frequency
 from rotordrop.rotor.parameter_table import parameter
 from rotordrop.rotor.unknowns import sensor_prior, smallest_gap

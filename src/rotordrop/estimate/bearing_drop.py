@@ -13,7 +13,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.estimated import IdentifiedValue
+from rotordrop.known import Known
 from rotordrop.severity.statistics import StressStatistics, stress_statistics
 from rotordrop.simulate.certificate import refined_peak
 from rotordrop.simulate.result import DropResult
@@ -133,7 +133,7 @@ class AirGap:
 class Peak:
     """Highest point of a history: the number with its interval, when it was [s], and who found it."""
 
-    known: IdentifiedValue
+    known: Known
     time: float
     origin: Origin
 
@@ -158,7 +158,7 @@ class Impact:
         Times [s] from power-off; the end is NaN where the contact still lasts.
     azimuth : float
         Direction of the contact normal at the peak [rad ccw from +x], between −π and π.
-    peak_force, impulse, dissipated_energy : IdentifiedValue
+    peak_force, impulse, dissipated_energy : Known
         Peak force [N], normal impulse [N s], energy lost in the contact [J].
     """
 
@@ -166,9 +166,9 @@ class Impact:
     end: float
     azimuth: float
     peak_time: float
-    peak_force: IdentifiedValue
-    impulse: IdentifiedValue
-    dissipated_energy: IdentifiedValue
+    peak_force: Known
+    impulse: Known
+    dissipated_energy: Known
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -249,7 +249,7 @@ class BearingDrop:
     stress_band: Band | None = None
     force_vector: Array | None = None
     preload_stress: float | None = None
-    values: Mapping[str, IdentifiedValue] = field(default_factory=dict)
+    values: Mapping[str, Known] = field(default_factory=dict)
     missing: Mapping[str, str] = field(default_factory=dict)
     impacts: tuple[Impact, ...] = ()
     impact_force: str = "contact force"
@@ -310,9 +310,9 @@ def _simulated_bearing(result: DropResult, b: int) -> BearingDrop:
                 end=float(log.end[i]),
                 azimuth=float(np.angle(np.exp(1j * log.azimuth[i]))),
                 peak_time=float(log.peak_time[i]),
-                peak_force=IdentifiedValue(value=float(log.peak_force[i]), unit="N"),
-                impulse=IdentifiedValue(value=float(log.impulse[i]), unit="N s"),
-                dissipated_energy=IdentifiedValue(value=float(log.dissipated_energy[i]), unit="J"),
+                peak_force=Known(value=float(log.peak_force[i]), status="determined", unit="N"),
+                impulse=Known(value=float(log.impulse[i]), status="determined", unit="N s"),
+                dissipated_energy=Known(value=float(log.dissipated_energy[i]), status="determined", unit="J"),
             )
             for i in range(len(log))
         ),
@@ -329,14 +329,14 @@ def simulated_gap(result: DropResult, b: int) -> float:
 def highest(history: History, unit: str, origin: Origin) -> Peak:
     """Highest point of a history between its samples, without an interval."""
     value, time = refined_peak(history.time, history.values)
-    return Peak(known=IdentifiedValue(value=value, unit=unit), time=time, origin=origin)
+    return Peak(known=Known(value=value, status="determined", unit=unit), time=time, origin=origin)
 
 
-def mean_values(force: History, stress: History) -> dict[str, IdentifiedValue]:
+def mean_values(force: History, stress: History) -> dict[str, Known]:
     """Mean stress over the drop, and the late mean force where the history reaches its end."""
-    values = {"mean_stress_Pa": IdentifiedValue(value=float(np.mean(stress.values)), unit="Pa")}
+    values = {"mean_stress_Pa": Known(value=float(np.mean(stress.values)), status="determined", unit="Pa")}
     if late_mean := mean_late(force):
-        values["mean_force_0p15_0p2_N"] = IdentifiedValue(value=late_mean, unit="N")
+        values["mean_force_0p15_0p2_N"] = Known(value=late_mean, status="determined", unit="N")
     return values
 
 

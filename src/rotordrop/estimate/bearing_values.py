@@ -8,21 +8,21 @@ from dataclasses import replace
 
 from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.estimate.estimate import FittedParameter
-from rotordrop.estimated import NINETY, IdentifiedValue
+from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
 from rotordrop.rotor.parameter_table import published
 
 
-def published_values(name: str, found: Sequence[FittedParameter]) -> dict[str, IdentifiedValue]:
+def published_values(name: str, found: Sequence[FittedParameter]) -> dict[str, Known]:
     """Parameters of the bearing of a name by the field names of the published document, in its order."""
     own = {one.row.field: one.estimate for one in found if one.row.owner == "bearing" and one.owner == name}
     return {field: own[field] for field in published() if field in own}
 
 
-def static_friction(ratio: float, dynamic: IdentifiedValue) -> IdentifiedValue:
+def static_friction(ratio: float, dynamic: Known) -> Known:
     """Static coefficient at its prior ratio to the dynamic one: sliding drops say little about it."""
     low, high = dynamic.interval_90 or (dynamic.value, dynamic.value)
-    return IdentifiedValue(
+    return Known(
         value=ratio * dynamic.value,
         status="the record does not determine it",
         standard_error=None if dynamic.standard_error is None else ratio * dynamic.standard_error,
@@ -32,8 +32,8 @@ def static_friction(ratio: float, dynamic: IdentifiedValue) -> IdentifiedValue:
 
 
 def equivalent_stiffness(
-    machine: Machine, b: int, load: float, support: IdentifiedValue, preload: IdentifiedValue | None
-) -> IdentifiedValue:
+    machine: Machine, b: int, load: float, support: Known, preload: Known | None
+) -> Known:
     """Support and bearing in series [N/m], the bearing by its tangent at its static load [N].
 
     What holds the balls is not well known, the preload from the record or a clearance from the machine file,

@@ -16,8 +16,8 @@ from rotordrop.estimate.bearing_drop import BearingDrop, Impact, Peak
 from rotordrop.estimate.estimate import Estimate, JointEstimate, ReplaySteps, Structure
 from rotordrop.estimate.methods import Replay
 from rotordrop.estimate.severity_numbers import severity_values
-from rotordrop.estimated import IdentifiedValue
 from rotordrop.evidence.first_contact import TimedContact
+from rotordrop.known import Known
 from rotordrop.record.event_date import event_date
 from rotordrop.simulate.fingerprint import fingerprint
 
@@ -175,7 +175,7 @@ def _peak(peak: Peak) -> dict[str, Any]:
     return {**peak.known.as_json(), "time_s": peak.time}
 
 
-def nested(values: Mapping[str, IdentifiedValue]) -> dict[str, Any]:
+def nested(values: Mapping[str, Known]) -> dict[str, Any]:
     """Identified values as nested objects: ``support.mass_kg`` becomes ``support: {mass_kg: …}``."""
     tree: dict[str, Any] = {}
     for path, value in values.items():

@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.atomic_file import write_json
 from rotordrop.elements.parameter import Parameter
 from rotordrop.estimate.advice import Advice
 from rotordrop.estimate.agreement import Agreement
@@ -26,13 +25,14 @@ from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.estimate.later_motion import LaterMotion
 from rotordrop.estimate.methods import Method
 from rotordrop.estimate.unbalance import PlaneUnbalance
-from rotordrop.estimated import Correlation, IdentifiedValue
 from rotordrop.evidence.events import DropInstant
 from rotordrop.evidence.first_contact import TimedContact as TimedContact
 from rotordrop.evidence.power_off import PowerOff
 from rotordrop.evidence.quality.finding import Finding
 from rotordrop.evidence.speed import SpeedFit
+from rotordrop.files import write_json
 from rotordrop.identification.friction import FrictionSweep as FrictionSweep
+from rotordrop.known import Correlation, Known
 from rotordrop.machine import Machine
 from rotordrop.record.record import Record
 from rotordrop.track.consistency import Check
@@ -81,7 +81,7 @@ class CrossCheck:
     ----------
     name : str
         What is compared, for example ``"NDE peak force"``.
-    estimate : IdentifiedValue
+    estimate : Known
         The number of the tracked twin.
     check : float
         The number of the estimate without contact law, in the same unit.
@@ -92,7 +92,7 @@ class CrossCheck:
     """
 
     name: str
-    estimate: IdentifiedValue
+    estimate: Known
     check: float
     accuracy: float
     replaced: bool = False
@@ -117,8 +117,8 @@ class FittedParameter:
 
     row: Parameter
     owner: str
-    prior: IdentifiedValue | None
-    estimate: IdentifiedValue
+    prior: Known | None
+    estimate: Known
 
     @property
     def path(self) -> str:
@@ -177,8 +177,8 @@ class SensorErrors:
     """Gain error [1] and offset [m] of one sensor as estimated, and its noise (standard deviation) [m]."""
 
     sensor: str
-    gain_error: IdentifiedValue
-    offset: IdentifiedValue
+    gain_error: Known
+    offset: Known
     noise: float
 
 
@@ -459,7 +459,7 @@ def summary_html(estimates: Iterable[Estimate]) -> str:
     return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
 
 
-def _peak_text(known: IdentifiedValue, kind: str = "force") -> str:
+def _peak_text(known: Known, kind: str = "force") -> str:
     text = format_quantity(known.value, kind)
     if known.interval_90 is None:
         return text

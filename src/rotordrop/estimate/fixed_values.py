@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rotordrop.errors import UsageError
-from rotordrop.estimated import Correlation, Estimated
+from rotordrop.known import Correlation, Known
 from rotordrop.machine import Machine
 from rotordrop.rotor.parameter_table import rows
 
@@ -61,7 +61,7 @@ def machine_with_fixed(machine: Machine, document: Document, place: str) -> Mach
     UsageError
         If the estimate lacks a bearing of the machine, or its support or friction.
     """
-    values: dict[str, Estimated] = {}
+    values: dict[str, Known] = {}
     for bearing in machine.touchdown_bearings:
         entry = document["bearings"].get(bearing.name)
         if not isinstance(entry, Mapping):
@@ -88,9 +88,9 @@ def _at(entry: Mapping[str, Any], field: str) -> Mapping[str, Any] | None:
     return at if isinstance(at, Mapping) and "value" in at else None
 
 
-def _estimated(found: Mapping[str, Any], source: str) -> Estimated:
+def _estimated(found: Mapping[str, Any], source: str) -> Known:
     interval = found.get("interval_90")
-    return Estimated(
+    return Known(
         value=float(found["value"]),
         status="estimated",
         interval_90=None if interval is None else (float(interval[0]), float(interval[1])),

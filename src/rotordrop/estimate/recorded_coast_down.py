@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import IdentificationError, RecordError
-from rotordrop.estimated import NINETY, Estimated
 from rotordrop.evidence.air_gap import AirGap, identify_air_gap, rest_at_end
 from rotordrop.evidence.evidence import Evidence, Missing, known, read_evidence
 from rotordrop.evidence.sensing import Sensing
+from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
 from rotordrop.record.axes import along_sensors
 from rotordrop.record.record import Record
@@ -126,7 +126,7 @@ def with_found_air_gaps(machine: Machine, signal: CoastDownSignal) -> Machine:
     if signal.air_gap_error is None:
         return machine
     found = {
-        f"{name}.air_gap": Estimated(
+        f"{name}.air_gap": Known(
             value=gap,
             status="estimated",
             interval_90=(

@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 from rotordrop.elements.bearing_numbers import Ratings, numbers_of
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.estimate.estimate import Estimate
-from rotordrop.estimated import IdentifiedValue
 from rotordrop.evidence.look import INDEX_WINDOW
+from rotordrop.known import Known
 from rotordrop.severity.numbers import fatigue_shares, static_safety_of_load, static_safety_of_stress
 
 Array = NDArray[np.float64]
 Factor = Callable[[float], float]
 
 
-def severity_values(estimate: Estimate, bearing: BearingDrop) -> dict[str, IdentifiedValue]:
+def severity_values(estimate: Estimate, bearing: BearingDrop) -> dict[str, Known]:
     """Severity of one bearing by the fields of `severity.numbers.SEVERITY`; what is not known is left out.
 
     Intervals follow from those of the peaks and impacts. Impulse and energy add the errors of all impacts as
@@ -27,7 +27,7 @@ def severity_values(estimate: Estimate, bearing: BearingDrop) -> dict[str, Ident
     return dict(_values(estimate, bearing))
 
 
-def _values(estimate: Estimate, bearing: BearingDrop) -> Iterator[tuple[str, IdentifiedValue]]:
+def _values(estimate: Estimate, bearing: BearingDrop) -> Iterator[tuple[str, Known]]:
     stress, force = bearing.peak_stress, bearing.peak_force
     if stress.value > 0.0:
         yield "severity.static_safety", _falling(stress.known, static_safety_of_stress)
@@ -46,22 +46,24 @@ def _values(estimate: Estimate, bearing: BearingDrop) -> Iterator[tuple[str, Ide
         yield from _fatigue(bearing, ratings, loads, estimate.speed)
 
 
-def _falling(known: IdentifiedValue, factor: Factor) -> IdentifiedValue:
+def _falling(known: Known, factor: Factor) -> Known:
     """A safety factor, which falls where the load rises."""
     interval = None
     if known.interval_90 is not None and known.interval_90[0] > 0.0:
         interval = (factor(known.interval_90[1]), factor(known.interval_90[0]))
-    return IdentifiedValue(value=factor(known.value), status=known.status, interval_90=interval, unit="1")
+    return Known(value=factor(known.value), status=known.status, interval_90=interval, unit="1")
 
 
-def _sum(parts: list[IdentifiedValue], unit: str) -> IdentifiedValue:
+def _sum(parts: list[Known], unit: str) -> Known:
     if any(one.interval_90 is None for one in parts):
-        return IdentifiedValue(value=sum(one.value for one in parts), unit=unit)
+        return Known(value=sum(one.value for one in parts), status="determined", unit=unit)
     low, high = (sum(one.interval_90[k] for one in parts if one.interval_90) for k in (0, 1))
-    return IdentifiedValue(value=sum(one.value for one in parts), interval_90=(low, high), unit=unit)
+    return Known(
+        value=sum(one.value for one in parts), status="determined", interval_90=(low, high), unit=unit
+    )
 
 
-def _indices(estimate: Estimate, bearing: BearingDrop) -> Iterator[tuple[str, IdentifiedValue]]:
+def _indices(estimate: Estimate, bearing: BearingDrop) -> Iterator[tuple[str, Known]]:
     """Position and velocity index of the motion, as `rotordrop.look` has them; intervals from the air gap."""
     motion, gap = bearing.motions[-1], bearing.values.get("air_gap_m")
     if gap is None or not gap.value > 0.0 or len(motion.time) < 3:
@@ -75,16 +77,16 @@ def _indices(estimate: Estimate, bearing: BearingDrop) -> Iterator[tuple[str, Id
         yield "severity.velocity_index", _over_gap(rms / estimate.speed, gap)
 
 
-def _over_gap(length: float, gap: IdentifiedValue) -> IdentifiedValue:
+def _over_gap(length: float, gap: Known) -> Known:
     interval = None
     if gap.interval_90 is not None and gap.interval_90[0] > 0.0:
         interval = (length / gap.interval_90[1], length / gap.interval_90[0])
-    return IdentifiedValue(value=length / gap.value, status=gap.status, interval_90=interval, unit="1")
+    return Known(value=length / gap.value, status=gap.status, interval_90=interval, unit="1")
 
 
 def _fatigue(
     bearing: BearingDrop, ratings: Ratings, loads: Array, speed: float
-) -> Iterator[tuple[str, IdentifiedValue]]:
+) -> Iterator[tuple[str, Known]]:
     """Shares of the rating life as if the race turned with the rotor from the first impact on.
 
     It turns slower, so that the number is an upper end; the lower one is nothing.
@@ -97,4 +99,4 @@ def _fatigue(
     for name, share in zip(names, fatigue_shares(ratings, time, loads, spin), strict=True):
         least = 0.0 if name != "fatigue_by_rainflow" else (low / bearing.peak_force.value) ** 3 * share
         interval = (least, factor * share)
-        yield f"severity.{name}", IdentifiedValue(value=share, interval_90=interval, unit="1")
+        yield f"severity.{name}", Known(value=share, status="determined", interval_90=interval, unit="1")

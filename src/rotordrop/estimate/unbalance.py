@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rotordrop.estimated import IdentifiedValue
+from rotordrop.known import Known
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,9 +17,9 @@ class PlaneUnbalance:
     ----------
     node : int
         Where it sits, counted from 1.
-    amount : IdentifiedValue
+    amount : Known
         Mass times radius [kg m].
-    phase : IdentifiedValue or None
+    phase : Known or None
         Direction of the heavy spot when the mark passes, from +y, positive with the spin [rad]; None where
         the record has no mark, or does not tell a direction.
     reason : str
@@ -27,8 +27,8 @@ class PlaneUnbalance:
     """
 
     node: int
-    amount: IdentifiedValue
-    phase: IdentifiedValue | None
+    amount: Known
+    phase: Known | None
     reason: str = ""
 
     def sentence(self) -> str:

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotordrop.errors import RecordError
-from rotordrop.estimated import NINETY
 from rotordrop.evidence.quality.channels import check_channels
 from rotordrop.evidence.quality.clock import check_clock
 from rotordrop.evidence.quality.finding import refuse_unusable
+from rotordrop.known import NINETY
 from rotordrop.record.arrangement import arrangement_of
 from rotordrop.record.axes import along_sensors, planar_of, sensor_planes
 from rotordrop.record.profile import Profile, load_profile

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import NoDropError, RecordError
-from rotordrop.estimated import NINETY
 from rotordrop.evidence.levitated import LevitatedModel, fit_levitated
 from rotordrop.evidence.preprocess import acceleration
+from rotordrop.known import NINETY
 from rotordrop.record.axes import Plane, along_sensors, planar_of, sensor_planes
 from rotordrop.record.recording import Array
 from rotordrop.record.speed import require_speed

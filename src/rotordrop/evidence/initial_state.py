@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import IdentificationError
-from rotordrop.estimated import NINETY
 from rotordrop.evidence.air_gap import AirGap, SettledRest
 from rotordrop.evidence.events import DropInstant
 from rotordrop.evidence.fall_fit import FallFit, FallReadings, Unknowns, unbalance_nodes
 from rotordrop.evidence.free_fall import FreeFall, build_free_fall
 from rotordrop.evidence.levitated import LevitatedModel
 from rotordrop.evidence.sensing import Sensing, displacements_along
+from rotordrop.known import NINETY
 from rotordrop.record.axes import along_sensors
 from rotordrop.record.record import Record
 from rotordrop.record.speed import RotorAngle

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotordrop.errors import RecordError
-from rotordrop.estimated import NINETY
 from rotordrop.evidence.events import (
     FALLEN_SHARE,
     DropInstant,
@@ -20,6 +19,7 @@ from rotordrop.evidence.events import (
     with_whole_planes,
 )
 from rotordrop.evidence.fall import REMANENT_SHARE, REMANENT_TIME
+from rotordrop.known import NINETY
 from rotordrop.record.axes import along_sensors, planar_of
 from rotordrop.record.recording import Array
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.estimated import NINETY, IdentifiedValue
+from rotordrop.known import NINETY, Known
 from rotordrop.record.record import Record
 from rotordrop.record.speed import SpeedAtDrop, require_speed, speed_at_drop
 
@@ -38,7 +38,7 @@ class SpeedFit:
         Its standard error [rad/s].
     profile_time_constant : float
         Time constant of a plain exponential through the record [s], friction included (the paper's profile).
-    aero_time_constant : IdentifiedValue
+    aero_time_constant : Known
         Time constant of the aerodynamic part [s].
     friction_loss : float
         Speed that friction took at the touchdown bearings [rad/s].
@@ -51,7 +51,7 @@ class SpeedFit:
     initial: float
     initial_error: float
     profile_time_constant: float
-    aero_time_constant: IdentifiedValue
+    aero_time_constant: Known
     friction_loss: float
     residual: float
     note: str = ""
@@ -94,7 +94,7 @@ def identify_speed(record: Record, power_off: float, *, turning: float | None = 
             initial=initial,
             initial_error=error,
             profile_time_constant=plain,
-            aero_time_constant=IdentifiedValue(
+            aero_time_constant=Known(
                 value=plain, status="the record does not determine it", lower=plain, unit="s"
             ),
             friction_loss=0.0,
@@ -117,7 +117,7 @@ def _without_fit(speed: float, error: float, why: str) -> SpeedFit:
         initial=speed,
         initial_error=error,
         profile_time_constant=np.inf,
-        aero_time_constant=IdentifiedValue(value=np.inf, status="the record does not determine it", unit="s"),
+        aero_time_constant=Known(value=np.inf, status="the record does not determine it", unit="s"),
         friction_loss=0.0,
         residual=0.0,
         note=f"{why}; it is taken as constant",
@@ -157,7 +157,7 @@ def _separated(t: Array, n: Array, initial: float, error: float, plain: float) -
         initial=initial,
         initial_error=error,
         profile_time_constant=plain,
-        aero_time_constant=IdentifiedValue(
+        aero_time_constant=Known(
             value=1.0 / mid,
             status="determined" if sigma < 0.3 * mid else "the record does not determine it",
             standard_error=sigma / mid**2,

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.estimated import NINETY, IdentifiedValue
 from rotordrop.identification.support import ImpactFit
+from rotordrop.known import NINETY, Known
 
 Array = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ class FrictionSweep:
         Distance of simulated and measured orbit [m rms], each moment weighted by how well it can be known.
     best : ndarray, shape (D + 1,)
         Best coefficient with the best parameters, then with each draw of them [1].
-    value : IdentifiedValue
+    value : Known
         The dynamic coefficient.
     window : tuple of float
         Compared part of the drop [s from power-off].
@@ -52,7 +52,7 @@ class FrictionSweep:
     coefficients: Array
     disagreement: Array
     best: Array
-    value: IdentifiedValue
+    value: Known
     window: tuple[float, float]
 
 
@@ -154,7 +154,7 @@ def _lowest(coefficients: Array, values: Array) -> float:
     return float(coefficients[k] + step * (coefficients[k + 1] - coefficients[k]))
 
 
-def _value(problem: ImpactFit, best: Array, coefficients: Array) -> IdentifiedValue:
+def _value(problem: ImpactFit, best: Array, coefficients: Array) -> Known:
     value = float(best[0])
     grid = float(coefficients[1] - coefficients[0]) / np.sqrt(12.0)
     error = SCATTER_WIDENING * float(np.hypot(np.std(best, ddof=1), 0.1 * grid)) if len(best) > 2 else grid
@@ -162,7 +162,7 @@ def _value(problem: ImpactFit, best: Array, coefficients: Array) -> IdentifiedVa
     unknown = problem.vector.unknowns[problem.vector.friction]
     at_bound = value in (low, high)
     wide = error > 0.7 * (high - low) / np.sqrt(12.0)
-    return IdentifiedValue(
+    return Known(
         value=value,
         status="at its bound" if at_bound else "the record does not determine it" if wide else "determined",
         standard_error=error,

@@ -18,17 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.elements.parameter import Role
-from rotordrop.estimated import NINETY, Correlation, IdentifiedValue, Verdict
 from rotordrop.identification.directions import DIRECTIONS, influential_directions
 from rotordrop.identification.fit import Fit, completed, considered_covariance
-from rotordrop.identification.parameter_vector import (
-    ParameterVector,
-    joined,
-    nuisance_vector,
-    support_vector,
-)
+from rotordrop.identification.parameter_vector import ParameterVector, joined, nuisance_vector, support_vector
 from rotordrop.identification.replica import Replica
 from rotordrop.identification.search import Progress, Schedule, Search, search, sobol_starts
+from rotordrop.known import NINETY, Correlation, Known, Status
 
 Array = NDArray[np.float64]
 
@@ -208,7 +203,7 @@ class SupportFit:
     coarse: Search
     search: Search
     covariance: Array
-    values: dict[str, IdentifiedValue]
+    values: dict[str, Known]
     correlations: tuple[Correlation, ...]
 
 
@@ -304,7 +299,7 @@ def widened_covariance(problem: ImpactFit, fit: Fit, widening: float = WIDENING)
 def refit_with_friction(
     problem: ImpactFit,
     fit: Fit,
-    friction: IdentifiedValue,
+    friction: Known,
     *,
     longest: float | None = None,
     threads: int | None = None,
@@ -315,7 +310,7 @@ def refit_with_friction(
     ----------
     problem, fit
         The problem and its best fit.
-    friction : IdentifiedValue
+    friction : Known
         Friction coefficient of the sweep.
     longest : float, optional
         End of a longer window [s from power-off]; left out where the model does not follow the record so far.
@@ -367,7 +362,7 @@ def identified_values(
     *,
     active: tuple[bool, ...] = (),
     given: bool = False,
-) -> dict[str, IdentifiedValue]:
+) -> dict[str, Known]:
     """Values of the parameters by path, each with error, interval, start, bounds and verdict.
 
     Parameters
@@ -387,7 +382,7 @@ def identified_values(
         mean, error = float(x[k]), float(np.sqrt(covariance[k, k]))
         at_bound = bool(active[k]) if active else False
         value = unknown.value_of(mean)
-        values[unknown.path] = IdentifiedValue(
+        values[unknown.path] = Known(
             value=value,
             status="taken over" if given else _verdict(at_bound, error, unknown.sigma),
             standard_error=unknown.standard_error(mean, error),
@@ -399,7 +394,7 @@ def identified_values(
     return values
 
 
-def _verdict(at_bound: bool, error: float, prior: float) -> Verdict:
+def _verdict(at_bound: bool, error: float, prior: float) -> Status:
     if at_bound:
         return "at its bound"
     return "the record does not determine it" if error > UNDETERMINED * prior else "determined"

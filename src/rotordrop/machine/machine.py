@@ -18,7 +18,7 @@ from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.elements.unbalance import BalanceGrade, Unbalance, from_grade
 from rotordrop.elements.values import Acceleration, PositiveTime, default
 from rotordrop.errors import UsageError
-from rotordrop.estimated import Estimated
+from rotordrop.known import Known
 from rotordrop.machine.calibration import CalibrationOrigin
 from rotordrop.machine.parameter_paths import changed_machine_parts, reasons_of
 from rotordrop.machine.provenance import Mention, mentions
@@ -33,7 +33,7 @@ class Machine(Description):
     ----------
     name : str
         Name of the machine.
-    gravity : Estimated
+    gravity : Known
         Acceleration of gravity, acting towards -y [m/s²].
     rotor : Rotor
         Shaft, discs, materials.
@@ -45,7 +45,7 @@ class Machine(Description):
         Touchdown bearings, any number, NDE first.
     ambs : tuple of ActiveMagneticBearing
         Radial active magnetic bearings.
-    remanence_time_constant : Estimated, optional
+    remanence_time_constant : Known, optional
         Time in which the remanent force of the magnets decays [s]; 2 ms, to a factor of two, when left out.
     sensors : tuple of Sensor
         Displacement sensors.
@@ -192,7 +192,7 @@ class Machine(Description):
         names = ", ".join(bearing.name for bearing in self.touchdown_bearings)
         raise UsageError(f"the machine has no touchdown bearing {name!r}; there are {names}")
 
-    def with_values(self, values: Mapping[str, float | str | Estimated]) -> Machine:
+    def with_values(self, values: Mapping[str, float | str | Known]) -> Machine:
         """Give the same machine with other values, by path such as ``"NDE.support.stiffness"``.
 
         A number is in SI units, a text has its own: ``{"NDE.air_gap": "350 um"}``.

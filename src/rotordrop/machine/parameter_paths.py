@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotordrop.elements.description import Description
 from rotordrop.errors import UsageError
-from rotordrop.estimated import Estimated
+from rotordrop.known import Known
 from rotordrop.machine.provenance import kind_of, physical_of
 from rotordrop.units import in_si
 
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 _Changes = dict[str, Any]
 
 
-def changed_machine_parts(machine: Machine, values: Mapping[str, float | str | Estimated]) -> dict[str, Any]:
+def changed_machine_parts(machine: Machine, values: Mapping[str, float | str | Known]) -> dict[str, Any]:
     """Give the top-level parts of a machine that change with the given values."""
     tree: _Changes = {}
     for path, value in values.items():
         _graft(
             tree,
             _resolved(machine, path),
-            value if isinstance(value, Estimated) else Estimated(value=_number(machine, path, value)),
+            value if isinstance(value, Known) else Known(value=_number(machine, path, value)),
         )
     parts: dict[str, Any] = {}
     for key, branch in tree.items():
@@ -76,7 +76,7 @@ def value_of_path(machine: Machine, path: str) -> float:
     return float(part)
 
 
-def _refusal(error: ValueError, values: Mapping[str, float | str | Estimated]) -> str:
+def _refusal(error: ValueError, values: Mapping[str, float | str | Known]) -> str:
     stated = ", ".join(f"{path} = {_shown(value)}" for path, value in values.items())
     return f"cannot set {stated} (SI units): {reasons_of(error)}"
 
@@ -90,18 +90,18 @@ def reasons_of(error: ValueError) -> str:
     return "; ".join(str(e["msg"]).removeprefix("Value error, ") for e in error.errors())
 
 
-def _shown(value: float | str | Estimated) -> str:
+def _shown(value: float | str | Known) -> str:
     return value if isinstance(value, str) else f"{float(value):g}"
 
 
-def _graft(tree: _Changes, keys: tuple[Any, ...], value: Estimated) -> None:
+def _graft(tree: _Changes, keys: tuple[Any, ...], value: Known) -> None:
     for key in keys[:-1]:
         tree = tree.setdefault(key, {})
     tree[keys[-1]] = value
 
 
 def _changed(part: Any, branch: Any) -> Any:
-    if isinstance(branch, Estimated):
+    if isinstance(branch, Known):
         return branch
     if isinstance(part, tuple):
         return tuple(_changed(item, branch[i]) if i in branch else item for i, item in enumerate(part))
@@ -116,7 +116,7 @@ def _resolved(machine: Machine, path: str) -> tuple[Any, ...]:
     part: Any = machine
     for key in keys:
         part = _step(part, key, path)
-    if not (isinstance(part, Estimated) or part is None):
+    if not (isinstance(part, Known) or part is None):
         raise UsageError(f"{path!r} is not a single physical value; {_suggestion(machine, path)}")
     return keys
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from rotordrop.elements.description import Description
 from rotordrop.elements.values import Physical
-from rotordrop.estimated import Estimated, Status
+from rotordrop.known import Known, Status
 from rotordrop.units import format_quantity
 
 
@@ -46,7 +46,7 @@ def _walk(part: Description, path: str = "") -> Iterator[Mention]:
     for name, field in type(part).model_fields.items():
         value = getattr(part, name)
         here = f"{path}.{name}" if path else name
-        if isinstance(value, Estimated):
+        if isinstance(value, Known):
             if value.status in ("default", "inferred"):
                 physical = next(m for m in _physicals(field))
                 yield Mention(

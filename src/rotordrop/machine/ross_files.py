@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rotordrop.atomic_file import write_text
 from rotordrop.elements.rotor import Rotor
 from rotordrop.errors import MachineFileError, UsageError
+from rotordrop.files import write_text
 from rotordrop.machine.source_bearing import Spring as Spring
 
 _FORMAT_VERSION = "2.3.0"

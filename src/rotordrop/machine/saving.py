@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-from rotordrop.atomic_file import write_text
 from rotordrop.elements.ball_bearing import BallBearing
 from rotordrop.elements.description import Description
 from rotordrop.elements.rotor import Rotor
 from rotordrop.elements.unbalance import BalanceGrade
-from rotordrop.estimated import Estimated
+from rotordrop.files import write_text
+from rotordrop.known import Known
 from rotordrop.machine.machine import Machine
 from rotordrop.machine.provenance import kind_of
 from rotordrop.units import KINDS, parse_quantity, si_unit
@@ -62,7 +62,7 @@ def _content(part: Description) -> dict[str, Any]:
 
 
 def _item(owner: type[Description], name: str, value: Any) -> Any:
-    if isinstance(value, Estimated):
+    if isinstance(value, Known):
         return _Written(_value_text(value, kind_of(owner, name) or "dimensionless"))
     if isinstance(value, Description):
         return _content(value)
@@ -124,7 +124,7 @@ def _plain_text(value: Any) -> str:
     return text
 
 
-def _value_text(value: Estimated, kind: str) -> str:
+def _value_text(value: Known, kind: str) -> str:
     entries = {"guess" if _is_plain_guess(value) else "value": _quoted(value.value, kind)}
     for key, pair in (("range", value.range), ("interval", value.interval_90)):
         if pair is not None:
@@ -141,11 +141,11 @@ def _value_text(value: Estimated, kind: str) -> str:
     return "{ " + ", ".join(f"{key} = {text}" for key, text in entries.items()) + " }"
 
 
-def _is_plain_guess(value: Estimated) -> bool:
+def _is_plain_guess(value: Known) -> bool:
     return value.status == "guess" and value.interval_90 is None and value.standard_error is None
 
 
-def _status_read_back(value: Estimated) -> str:
+def _status_read_back(value: Known) -> str:
     known = (value.interval_90, value.standard_error, value.lower, value.upper)
     return "given" if all(number is None for number in known) else "estimated"
 

@@ -8,7 +8,7 @@ from typing import Any
 from rotordrop.elements.clearance import CLASSES
 from rotordrop.elements.description import Description
 from rotordrop.elements.values import KIND_MARK, STATUSES
-from rotordrop.estimated import Estimated
+from rotordrop.known import Known
 from rotordrop.machine.machine import Machine
 from rotordrop.machine.provenance import kind_of
 from rotordrop.units import KINDS, format_quantity
@@ -74,7 +74,7 @@ def _describe(schema: dict[str, Any], description: type[Description]) -> None:
         field = description.model_fields[name]
         meaning = meanings.get(name, "")
         words = _words(meaning, shared.count(meaning) > 1, field.description or "")
-        if isinstance(field.default, Estimated) and field.default.value == field.default.value:
+        if isinstance(field.default, Known) and field.default.value == field.default.value:
             value = format_quantity(field.default.value, kind_of(description, name) or "dimensionless")
             words = [meanings.get(name, ""), f"Default {value}: {field.default.source}"]
         elif isinstance(standing, str | int | float | bool) and standing not in ("", "-", 0):

@@ -9,7 +9,7 @@ from typing import Any, NoReturn
 
 from rotordrop.elements.description import LARGEST_FILE, unknown_key
 from rotordrop.errors import MachineFileError, UsageError
-from rotordrop.estimated import Estimated
+from rotordrop.known import Known
 from rotordrop.units import parse_quantity
 
 _COLUMNS = {
@@ -105,7 +105,7 @@ def _with_layer(row: dict[str, Any]) -> dict[str, Any]:
         return row
     if abs(layer.value - outer.value) < 1e-9 or layer.value == 0.0:
         return {key: value for key, value in row.items() if key not in ("layer_diameter", "layer_density")}
-    return {"layer_density": Estimated(value=_MASS_DENSITY)} | row
+    return {"layer_density": Known(value=_MASS_DENSITY)} | row
 
 
 def _sheet(path: Path) -> str:
@@ -175,7 +175,7 @@ class _Table:
         kind = _COLUMNS[name]
         try:
             if kind is not None:
-                return Estimated(value=parse_quantity(f"{cell} {unit}", kind))
+                return Known(value=parse_quantity(f"{cell} {unit}", kind))
             return int(cell) if name == "elements" else cell
         except (UsageError, ValueError) as error:
             raise self.error(f"{name.replace('_', ' ')}: {error}", line, column) from error

@@ -21,7 +21,7 @@ from rotordrop.elements.sensor import Sensor
 from rotordrop.elements.touchdown_bearing import Contact, Friction, TouchdownBearing
 from rotordrop.elements.unbalance import BalanceGrade
 from rotordrop.elements.values import LEFT_OUT
-from rotordrop.estimated import Estimated
+from rotordrop.known import Known
 from rotordrop.machine.machine import Machine
 from rotordrop.units import format_quantity
 
@@ -136,7 +136,7 @@ def _walk(part: Description, name: str) -> Iterator[Doubt]:
     name = own if isinstance(own, str) and own and not isinstance(part, Machine) else name
     for field in type(part).model_fields:
         value = getattr(part, field)
-        if isinstance(value, Estimated):
+        if isinstance(value, Known):
             yield from _bounded(part, field, value, name)
         for item, called in _inside(value, f"{name} {field}" if name == "machine" else name):
             yield from _walk(item, called)
@@ -151,7 +151,7 @@ def _inside(value: Any, name: str) -> Iterator[tuple[Description, str]]:
         yield from ((item, str(key)) for key, item in value.items() if isinstance(item, Description))
 
 
-def _bounded(part: Description, field: str, value: Estimated, name: str) -> Iterator[Doubt]:
+def _bounded(part: Description, field: str, value: Known, name: str) -> Iterator[Doubt]:
     usual = next((USUAL[base, field] for base in type(part).__mro__ if (base, field) in USUAL), None)
     if usual is None or value is LEFT_OUT:
         return

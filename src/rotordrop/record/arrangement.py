@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import RecordError, UsageError
-from rotordrop.estimated import Estimated
+from rotordrop.known import Known
 from rotordrop.record.recording import Channel, Recording
 from rotordrop.units import parse_quantity
 
@@ -88,13 +88,13 @@ def _sensor(channel: Channel, plane: str, number: int, angle: float) -> Sensor:
         name=channel.name,
         node=number,
         position=None,
-        angle=Estimated(value=angle, unit="rad"),
+        angle=Known(value=angle, unit="rad"),
         polarity=1,
-        gain=Estimated(value=1.0),
-        offset=Estimated(value=0.0, unit="m"),
+        gain=Known(value=1.0),
+        offset=Known(value=0.0, unit="m"),
         sensitivity=None,
         bearing=plane,
-        position_error=Estimated(value=0.0, unit="m"),
+        position_error=Known(value=0.0, unit="m"),
     )
 
 

@@ -9,8 +9,8 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
-from rotordrop.atomic_file import write_text
 from rotordrop.errors import RecordError, UsageError
+from rotordrop.files import write_text
 from rotordrop.record.tacho import Edge
 from rotordrop.units import parse_quantity
 

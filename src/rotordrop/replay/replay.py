@@ -16,16 +16,10 @@ from rotordrop.elements.parameter import Step
 from rotordrop.estimate.agreement import Agreement, compare_orbits, spread_horizon
 from rotordrop.estimate.assumptions import evidence_assumptions
 from rotordrop.estimate.estimate import Estimate, ReplaySteps, Verdict
-from rotordrop.estimate.fixed_values import (
-    Document,
-    fixed_correlations,
-    machine_with_fixed,
-    read_fixed,
-)
+from rotordrop.estimate.fixed_values import Document, fixed_correlations, machine_with_fixed, read_fixed
 from rotordrop.estimate.later_motion import later_motion
 from rotordrop.estimate.methods import Replay
 from rotordrop.estimate.record_facts import RecordFacts
-from rotordrop.estimated import Estimated, IdentifiedValue
 from rotordrop.evidence.air_gap import AirGap, identify_air_gap
 from rotordrop.evidence.evidence import Evidence, known, read_evidence
 from rotordrop.evidence.initial_state import InitialState
@@ -40,14 +34,10 @@ from rotordrop.identification.support import (
     impact_problem,
     refit_with_friction,
 )
+from rotordrop.known import Known
 from rotordrop.machine import Machine
 from rotordrop.record.record import Record
-from rotordrop.replay.replay_estimate import (
-    Replayed,
-    replay_bearings,
-    replay_parameters,
-    steps_document,
-)
+from rotordrop.replay.replay_estimate import Replayed, replay_bearings, replay_parameters, steps_document
 from rotordrop.replay.uncertainty import (
     FEWEST_DRAWS,
     Draws,
@@ -95,7 +85,7 @@ class Impacts:
     covariance: Array
     support: SupportFit | None
     friction: FrictionSweep | None
-    values: dict[str, IdentifiedValue]
+    values: dict[str, Known]
 
 
 def replay_drop(
@@ -318,24 +308,24 @@ def _agreement(replayed: Replayed, gap: AirGap) -> Agreement:
 
 def _identified_machine(machine: Machine, impacts: Impacts, gap: AirGap) -> Machine:
     """The machine with air gaps, supports, friction and contact as identified."""
-    values: dict[str, Estimated] = {}
+    values: dict[str, Known] = {}
     vector = impacts.problem.vector
     for unknown in vector.unknowns:
         if unknown.parameter.path == "preload" or unknown.parameter.step is Step.SWEEP:
             continue
         value = impacts.values[unknown.path]
-        values[unknown.path] = Estimated(value=value.value, status="estimated", interval_90=value.interval_90)
+        values[unknown.path] = Known(value=value.value, status="estimated", interval_90=value.interval_90)
     for b, bearing in enumerate(machine.touchdown_bearings):
-        values[f"{bearing.name}.air_gap"] = Estimated(
+        values[f"{bearing.name}.air_gap"] = Known(
             value=float(gap.value[b]), status="estimated", standard_error=float(gap.standard_error[b])
         )
         if impacts.friction is not None:
             dynamic = impacts.friction.value
             ratio = float(bearing.friction.static) / float(bearing.friction.dynamic)
-            values[f"{bearing.name}.friction.dynamic"] = Estimated(
+            values[f"{bearing.name}.friction.dynamic"] = Known(
                 value=dynamic.value, status="estimated", interval_90=dynamic.interval_90
             )
-            values[f"{bearing.name}.friction.static"] = Estimated(value=ratio * dynamic.value)
+            values[f"{bearing.name}.friction.static"] = Known(value=ratio * dynamic.value)
     return machine.with_values(values)
 
 

@@ -24,19 +24,19 @@ from rotordrop.estimate.bearing_drop import (
 )
 from rotordrop.estimate.bearing_values import equivalent_stiffness, published_values, static_friction
 from rotordrop.estimate.estimate import FittedParameter
-from rotordrop.estimated import NINETY, IdentifiedValue, Verdict
 from rotordrop.evidence.air_gap import AirGap as IdentifiedGap
 from rotordrop.evidence.evidence import Evidence, known
 from rotordrop.identification.friction import FrictionSweep
 from rotordrop.identification.modal_expansion import expand_initial_state
 from rotordrop.identification.support import SupportFit
+from rotordrop.known import NINETY, Known, Status
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.replay.uncertainty import FEWEST_DRAWS, Draws, interval
 from rotordrop.rotor.parameter_table import parameter, rows
 from rotordrop.simulate.result import DropResult
 
 Array = NDArray[np.float64]
-NO_INTERVAL: Verdict = "the record does not determine it"
+NO_INTERVAL: Status = "the record does not determine it"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -162,14 +162,14 @@ def _peak(peak: Peak, sample: Array | None, model: float) -> Peak:
     return replace(peak, known=with_draws(peak.known, sample, model), origin=Origin.REPLAY)
 
 
-def _mean(value: IdentifiedValue, sample: Array | None, model: float) -> IdentifiedValue:
+def _mean(value: Known, sample: Array | None, model: float) -> Known:
     """A mean over chaotic motion: the middle of the draws, of which the replay is only one."""
     if sample is None:
         return replace(value, status=NO_INTERVAL)
     return with_draws(replace(value, value=float(np.median(sample))), sample, model)
 
 
-def with_draws(value: IdentifiedValue, sample: Array | None, model: float) -> IdentifiedValue:
+def with_draws(value: Known, sample: Array | None, model: float) -> Known:
     """A number with the interval of its draws, widened by what every model leaves out, and holding itself."""
     if sample is None:
         return replace(value, status=NO_INTERVAL)
@@ -186,7 +186,7 @@ def with_draws(value: IdentifiedValue, sample: Array | None, model: float) -> Id
 
 def replay_parameters(
     machine: Machine,
-    fitted: Mapping[str, IdentifiedValue],
+    fitted: Mapping[str, Known],
     gap: IdentifiedGap,
     friction: FrictionSweep | None,
 ) -> tuple[FittedParameter, ...]:
@@ -205,16 +205,17 @@ def replay_parameters(
     return tuple(found)
 
 
-def _start(value: IdentifiedValue) -> IdentifiedValue | None:
+def _start(value: Known) -> Known | None:
     if value.start is None:
         return None
-    return IdentifiedValue(value=value.start, unit=value.unit, interval_90=value.bounds)
+    return Known(value=value.start, status="determined", unit=value.unit, interval_90=value.bounds)
 
 
-def _air_gap(gap: IdentifiedGap, b: int) -> IdentifiedValue:
+def _air_gap(gap: IdentifiedGap, b: int) -> Known:
     value, error = float(gap.value[b]), float(gap.standard_error[b])
-    return IdentifiedValue(
+    return Known(
         value=value,
+        status="determined",
         standard_error=error,
         interval_90=(value - NINETY * error, value + NINETY * error),
         lower=float(gap.lower[b]),
@@ -223,11 +224,11 @@ def _air_gap(gap: IdentifiedGap, b: int) -> IdentifiedValue:
     )
 
 
-def _friction(bearing: TouchdownBearing, sweep: FrictionSweep | None) -> IdentifiedValue:
+def _friction(bearing: TouchdownBearing, sweep: FrictionSweep | None) -> Known:
     if sweep is not None:
         return sweep.value
     law = bearing.friction
-    return IdentifiedValue(
+    return Known(
         value=float(law.dynamic),
         status="taken over",
         standard_error=law.dynamic.standard_error,

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from rotordrop.atomic_file import make_folder, write_text
+from rotordrop.files import make_folder, write_text
 from rotordrop.report.content import Cell, ReportContent, Table
 from rotordrop.report.quantity import Quantity
 

@@ -8,6 +8,7 @@ from typing import Any
 import plotly.graph_objects as go
 
 from rotordrop._version import __version__
+from rotordrop.known import Known
 from rotordrop.machine import Machine
 from rotordrop.machine.parameter_paths import kind_of_path
 from rotordrop.report.content import Cell, Figure, ReportContent, Section, Statement, Table
@@ -17,7 +18,6 @@ from rotordrop.report.style import SERIES, axis_title, fit_legend, panels, plain
 from rotordrop.simulate.fingerprint import fingerprint
 from rotordrop.study.design import Aim, Candidate, DesignPlan, DesignResult
 from rotordrop.study.quantities import columns_of
-from rotordrop.study.summary import Known
 from rotordrop.units import format_quantity
 
 
@@ -59,7 +59,7 @@ def _verdict(plan: DesignPlan, result: DesignResult) -> tuple[Statement, ...]:
     for number, aim in enumerate(result.aims):
         best = min(result.front, key=lambda one: one.aims[number].value)
         now = result.described.aims[number]
-        clear = best.aims[number].upper < now.lower
+        clear = best.aims[number].high < now.low
         said.append(
             Statement(
                 text=f"{aim.name}: {_text(plan, aim, best.aims[number])} at best, "
@@ -84,8 +84,8 @@ def _kind(machine: Machine, aim: Aim) -> str:
 def _text(plan: DesignPlan, aim: Aim, known: Known) -> str:
     kind = _kind(plan.study.machine, aim)
     if kind == "probability":
-        return f"{100 * known.value:.3g} % ({100 * known.lower:.3g} to {100 * known.upper:.3g} %)"
-    ends = [format_quantity(e, kind) if math.isfinite(e) else "open" for e in (known.lower, known.upper)]
+        return f"{100 * known.value:.3g} % ({100 * known.low:.3g} to {100 * known.high:.3g} %)"
+    ends = [format_quantity(e, kind) if math.isfinite(e) else "open" for e in (known.low, known.high)]
     return f"{format_quantity(known.value, kind)} ({ends[0]} to {ends[1]})"
 
 
@@ -151,8 +151,8 @@ def _bars(known: list[Known], size: float) -> dict[str, Any]:
         return length / size if math.isfinite(length) else 0.0
 
     return {
-        "array": [reach(one.upper - one.value) for one in known],
-        "arrayminus": [reach(one.value - one.lower) for one in known],
+        "array": [reach(one.high - one.value) for one in known],
+        "arrayminus": [reach(one.value - one.low) for one in known],
     }
 
 
@@ -178,7 +178,7 @@ def _candidate(plan: DesignPlan, one: Candidate) -> dict[str, Any]:
         "values": one.chosen(plan.study),
         "on_front": one.on_front,
         "aims": [
-            {"value": finite(k.value), "interval_90": [finite(k.lower), finite(k.upper)], "drops": k.drops}
+            {"value": finite(k.value), "interval_90": [finite(k.low), finite(k.high)], "drops": k.drops}
             for k in one.aims
         ],
     }

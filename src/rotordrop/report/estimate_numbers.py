@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rotordrop.elements.parameter import Role
 from rotordrop.estimate.bearing_drop import BearingDrop
-from rotordrop.estimated import IdentifiedValue
+from rotordrop.known import Known
 from rotordrop.report.content import Card, Cell, KeyFigure, Table
 from rotordrop.report.quantity import Quantity
 from rotordrop.rotor.parameter_table import LOADS, published
@@ -29,7 +29,7 @@ def headline_card(bearing: BearingDrop, *, certain: bool = True) -> Card:
     certain : bool
         Whether single numbers hold; else only ranges are shown.
     """
-    known: dict[str, IdentifiedValue] = {
+    known: dict[str, Known] = {
         **bearing.values,
         "peak_force_N": bearing.peak_force.known,
         "peak_stress_Pa": bearing.peak_stress.known,
@@ -82,7 +82,7 @@ def identified_table(bearings: Sequence[BearingDrop], *, taken_over: str = "", c
     )
 
 
-def _status(value: IdentifiedValue | None, taken_over: str) -> str:
+def _status(value: Known | None, taken_over: str) -> str:
     if value is None:
         return "not estimated"
     if taken_over and value.status == "taken over":

@@ -9,7 +9,7 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 
 from rotordrop.estimate.bearing_drop import History
-from rotordrop.estimated import NINETY
+from rotordrop.known import NINETY
 from rotordrop.report.style import (
     LIMIT,
     MICRO,

@@ -9,7 +9,7 @@ from scipy.special import ndtr
 
 from rotordrop.elements.description import unknown_key
 from rotordrop.errors import UsageError
-from rotordrop.estimated import NINETY
+from rotordrop.known import NINETY
 from rotordrop.report.compared_drop import LESS_IS_WORSE, NUMBERS, ComparedDrop
 from rotordrop.report.content import Level, Statement
 from rotordrop.report.quantity import Quantity

@@ -10,7 +10,7 @@ from functools import lru_cache
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
-from rotordrop.atomic_file import write_text
+from rotordrop.files import write_text
 from rotordrop.report.content import ReportContent
 from rotordrop.report.quantity import Quantity
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from rotordrop.estimated import Estimated, IdentifiedValue
+from rotordrop.known import Known
 from rotordrop.units import KINDS, si_unit
 
 System: TypeAlias = Literal["SI", "US"]
@@ -104,7 +104,7 @@ class Quantity:
     @classmethod
     def of(
         cls,
-        known: Estimated | IdentifiedValue | float | None,
+        known: Known | float | None,
         kind: str,
         digits: int = 4,
         *,
@@ -117,7 +117,7 @@ class Quantity:
             value=known.value,
             kind=kind,
             interval_90=known.interval_90,
-            allowance_90=known.allowance_90 if isinstance(known, IdentifiedValue) else None,
+            allowance_90=known.allowance_90,
             standard_error=known.standard_error,
             lower=known.lower,
             upper=known.upper,

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict
 from typing import Any
 
 import plotly.graph_objects as go
 
 from rotordrop._version import __version__
+from rotordrop.known import Known
 from rotordrop.report.content import Cell, Figure, ReportContent, Section, Statement, Table
 from rotordrop.report.origin import study_facts
 from rotordrop.report.quantity import display_unit
 from rotordrop.report.style import SERIES, axis_title, fit_legend, panels
 from rotordrop.simulate.fingerprint import fingerprint
-from rotordrop.study.repeat import Recorded, Repeat
-from rotordrop.study.summary import Known, StudyResults
+from rotordrop.study.repeat import Repeat
+from rotordrop.study.summary import StudyResults
 from rotordrop.units import format_quantity
 
 FEW = 0.05
@@ -64,7 +64,7 @@ def _verdict(results: StudyResults, found: Sequence[Repeat]) -> tuple[Statement,
     for one in found:
         if one.recorded is None or one.place is None:
             continue
-        odd = one.place.upper < FEW or one.place.lower > 1.0 - FEW
+        odd = one.place.high < FEW or one.place.low > 1.0 - FEW
         said.append(
             Statement(
                 text=f"{one.column.replace('_', ' ')}: {_share(one.place)} of the drops that could "
@@ -91,18 +91,18 @@ def _value(results: StudyResults, one: Repeat, value: float) -> str:
 
 
 def _known(results: StudyResults, one: Repeat, known: Known) -> str:
-    low, high = (_value(results, one, end) for end in (known.lower, known.upper))
+    low, high = (_value(results, one, end) for end in (known.low, known.high))
     return f"{_value(results, one, known.value)} ({low} to {high})"
 
 
 def _share(known: Known) -> str:
-    return f"{100 * known.value:.3g} % (90 %: {100 * known.lower:.3g} to {100 * known.upper:.3g} %)"
+    return f"{100 * known.value:.3g} % (90 %: {100 * known.low:.3g} to {100 * known.high:.3g} %)"
 
 
-def _recorded(results: StudyResults, one: Repeat, recorded: Recorded | None) -> str:
+def _recorded(results: StudyResults, one: Repeat, recorded: Known | None) -> str:
     if recorded is None:
         return "–"
-    ends = recorded.interval or (recorded.value, recorded.value)
+    ends = (recorded.low, recorded.high)
     value, low, high = (_value(results, one, number) for number in (recorded.value, *ends))
     return f"{value} ({low} to {high})"
 
@@ -172,7 +172,20 @@ def repeat_numbers(results: StudyResults, found: Sequence[Repeat]) -> dict[str, 
         "fingerprint": fingerprint(),
         "drops": len(results),
         "failed": dict(results.failed),
-        "quantities": [finite(asdict(one)) for one in found],
+        "quantities": [finite(_quantity(one)) for one in found],
+    }
+
+
+def _quantity(one: Repeat) -> dict[str, Any]:
+    def counted(known: Known) -> dict[str, Any]:
+        return {"value": known.value, "lower": known.low, "upper": known.high, "drops": known.drops}
+
+    return {
+        "column": one.column,
+        **{name: counted(getattr(one, name)) for name in ("median", "low", "high", "worst")},
+        "of": one.of,
+        "recorded": one.recorded and {"value": one.recorded.value, "interval": one.recorded.interval_90},
+        "place": one.place and counted(one.place),
     }
 
 

@@ -9,7 +9,7 @@ import plotly.graph_objects as go
 
 from rotordrop.estimate.agreement import Agreement
 from rotordrop.estimate.estimate import FrictionSweep, TimedContact
-from rotordrop.estimated import Correlation
+from rotordrop.known import Correlation
 from rotordrop.report.content import Cell, Table
 from rotordrop.report.quantity import Quantity
 from rotordrop.report.style import BAND_FILL, MICRO, SERIES, axis_title, fit_legend, panels, single

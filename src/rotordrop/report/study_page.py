@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ import plotly.graph_objects as go
 from rotordrop._version import __version__
 from rotordrop.elements.description import unknown_key
 from rotordrop.errors import UsageError
+from rotordrop.known import Known
 from rotordrop.machine.parameter_paths import kind_of_path
 from rotordrop.report.content import Cell, Figure, ReportContent, Section, Statement, Table
 from rotordrop.report.quantity import display_unit
@@ -20,8 +20,8 @@ from rotordrop.report.style import SERIES, axis_title, fit_legend, panels, plain
 from rotordrop.simulate.fingerprint import fingerprint
 from rotordrop.study.plan import case_kind
 from rotordrop.study.quantities import Quantity
-from rotordrop.study.sensitivity import Share, influences
-from rotordrop.study.summary import Known, StudyResults
+from rotordrop.study.sensitivity import influences
+from rotordrop.study.summary import StudyResults
 from rotordrop.units import format_quantity
 
 SHARES = (0.5, 0.9, 0.99)
@@ -73,7 +73,7 @@ def _what_is_missing(results: StudyResults) -> str:
         return f"{missing}."
     found = results.quantile(until.column, until.quantile)
     wanted = f"the {100 * until.quantile:g} % quantile of {until.column} is known within ± {until.within:.3g}"
-    reach = 0.5 * (found.upper - found.lower) / abs(found.value)
+    reach = 0.5 * (found.high - found.low) / abs(found.value)
     if reach <= until.within:
         return f"{missing}: {wanted} of itself (± {reach:.2g} now), which ends the study."
     return f"{missing}; it goes on until {wanted} of itself (± {reach:.2g} now)."
@@ -105,7 +105,7 @@ def _verdict(results: StudyResults, limits: Mapping[str, float]) -> list[Stateme
                 Statement(
                     text=f"{bearing.name}: {_share(over)} of the drops exceed "
                     f"{quantity.replace('_', ' ')} {shown}.",
-                    level="notice" if over.upper < 0.5 else "warning",
+                    level="notice" if over.high < 0.5 else "warning",
                 )
             )
     said.append(
@@ -118,7 +118,7 @@ def _verdict(results: StudyResults, limits: Mapping[str, float]) -> list[Stateme
 
 
 def _share(known: Known) -> str:
-    return f"{100 * known.value:.3g} % (90 %: {100 * known.lower:.3g} to {100 * known.upper:.3g} %)"
+    return f"{100 * known.value:.3g} % (90 %: {100 * known.low:.3g} to {100 * known.high:.3g} %)"
 
 
 def _spread_section(results: StudyResults) -> Section:
@@ -150,9 +150,7 @@ def _table(results: StudyResults, shares: Sequence[float], only: Sequence[str] =
 
 
 def _text(known: Known, kind: str) -> str:
-    ends = [
-        format_quantity(end, kind) if math.isfinite(end) else "open" for end in (known.lower, known.upper)
-    ]
+    ends = [format_quantity(end, kind) if math.isfinite(end) else "open" for end in (known.low, known.high)]
     return f"{format_quantity(known.value, kind)} ({ends[0]} to {ends[1]})"
 
 
@@ -195,10 +193,10 @@ def _influence_section(results: StudyResults) -> tuple[Section, ...]:
     return (Section(heading="What matters", text=(text,), tables=tuple(tables)),)
 
 
-def _part(share: Share | None) -> str:
+def _part(share: Known | None) -> str:
     if share is None:
         return "–"
-    return f"{100 * share.value:.0f} % ({100 * share.lower:.0f} to {100 * share.upper:.0f} %)"
+    return f"{100 * share.value:.0f} % ({100 * share.low:.0f} to {100 * share.high:.0f} %)"
 
 
 def _map_section(results: StudyResults, name: str, limits: Mapping[str, float]) -> Section:
@@ -238,8 +236,8 @@ def _map_figure(
                     x=[0.5 * (cell["from"] + cell["to"]) / factor for cell in cells],
                     y=[one.value / size for one in known],
                     error_y={
-                        "array": [_reach(one.upper - one.value, size) for one in known],
-                        "arrayminus": [_reach(one.value - one.lower, size) for one in known],
+                        "array": [_reach(one.high - one.value, size) for one in known],
+                        "arrayminus": [_reach(one.value - one.low, size) for one in known],
                     },
                     mode="lines+markers",
                     line={"color": SERIES[k], "width": 1.6},
@@ -319,10 +317,17 @@ def _influences(results: StudyResults) -> dict[str, Any]:
         for quantity in MATTERS:
             column = f"{bearing.name}.{quantity}"
             try:
-                found[column] = [asdict(one) for one in influences(results, column)]
+                found[column] = [
+                    {"name": one.name, "alone": _ends(one.alone), "total": one.total and _ends(one.total)}
+                    for one in influences(results, column)
+                ]
             except UsageError:
                 return {}  # too few drops
     return found
+
+
+def _ends(known: Known) -> dict[str, float]:
+    return {"value": known.value, "lower": known.low, "upper": known.high}
 
 
 def _numbers(known: Known) -> dict[str, Any]:
@@ -331,6 +336,6 @@ def _numbers(known: Known) -> dict[str, Any]:
 
     return {
         "value": finite(known.value),
-        "interval_90": [finite(known.lower), finite(known.upper)],
+        "interval_90": [finite(known.low), finite(known.high)],
         "drops": known.drops,
     }

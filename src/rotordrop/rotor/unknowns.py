@@ -13,7 +13,7 @@ from rotordrop.elements.bearing_numbers import Measure, numbers_of
 from rotordrop.elements.magnet import REMANENCE_TIME
 from rotordrop.elements.parameter import Entry, Parameter, Rule
 from rotordrop.elements.sensor import Sensor
-from rotordrop.estimated import NINETY, Estimated
+from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.physics import columns as L
 from rotordrop.physics.contact import depth_at
@@ -162,9 +162,7 @@ class Prior:
     start: float
 
 
-def prior(
-    row: Parameter, quantity: Estimated, scale: float = 1.0, *, logarithmic: bool | None = None
-) -> Prior:
+def prior(row: Parameter, quantity: Known, scale: float = 1.0, *, logarithmic: bool | None = None) -> Prior:
     """Prior of a parameter from what the machine file says of it.
 
     A range, or the interval of an estimate, is the 90 % interval of the prior: its centre is the middle of
@@ -174,7 +172,7 @@ def prior(
     ----------
     row : Parameter
         Row of the parameter.
-    quantity : Estimated
+    quantity : Known
         The value with what is known about it.
     scale : float
         What the standard deviations of the row are shares of, where it is not logarithmic.
@@ -300,14 +298,14 @@ def _measured_otherwise(row: Parameter, bearing: TouchdownBearing, index: int, m
     )
 
 
-def sensor_prior(row: Parameter, quantity: Estimated, smallest_gap: float) -> Prior:
+def sensor_prior(row: Parameter, quantity: Known, smallest_gap: float) -> Prior:
     """Prior of gain or offset of a sensor.
 
     Parameters
     ----------
     row : Parameter
         Row of the gain or the offset.
-    quantity : Estimated
+    quantity : Known
         The value with what is known about it; the range of a default says what is thinkable, not usual.
     smallest_gap : float
         Smallest air gap of the machine [m], of which an unknown offset is a share.
@@ -386,7 +384,7 @@ def structure_unknowns(model: DropModel) -> Iterator[Unknown]:
 def _of_structure(
     row: Parameter,
     owner: str,
-    quantity: Estimated,
+    quantity: Known,
     index: int,
     scale: float = 1.0,
     limits: tuple[float, float] | None = None,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from rotordrop.errors import UsageError
-from rotordrop.estimated import NINETY
+from rotordrop.known import NINETY
 from rotordrop.units import format_chance
 
 Array = NDArray[np.float64]

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop._version import __version__
-from rotordrop.atomic_file import atomic_path
 from rotordrop.errors import OutputError, SimulationError
+from rotordrop.files import atomic_path
 from rotordrop.rotor.parameters import DropModel
 
 Arrays = dict[str, NDArray[np.float64]]

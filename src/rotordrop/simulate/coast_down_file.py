@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.atomic_file import new_hdf5
 from rotordrop.errors import SimulationError
+from rotordrop.files import new_hdf5
 from rotordrop.simulate.checkpoint import part_path
 from rotordrop.simulate.coast_down_result import CoastDownResult, WindowStatistics
 from rotordrop.simulate.fingerprint import fingerprint

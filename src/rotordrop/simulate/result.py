@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.atomic_file import new_hdf5
 from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.errors import SimulationError, UsageError
+from rotordrop.files import new_hdf5
 from rotordrop.physics.hertz import LineContact
 from rotordrop.simulate.certificate import Certificate, refined_peak
 from rotordrop.units import format_quantity

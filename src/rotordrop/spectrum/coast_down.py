@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import RecordError
-from rotordrop.estimated import IdentifiedValue
+from rotordrop.known import Known
 from rotordrop.spectrum.candidates import Candidate
 from rotordrop.spectrum.coast_down_law import (
     DragFit,
@@ -143,13 +143,13 @@ class SpeedLaw:
         One time constant, as in the paper.
     drag : DragFit
         Dry, linear and quadratic drag.
-    standstill : IdentifiedValue
+    standstill : Known
         When it stopped [s].
     """
 
     exponential: ExponentialFit
     drag: DragFit
-    standstill: IdentifiedValue
+    standstill: Known
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -316,7 +316,7 @@ def _speed_law(signal: CoastDownSignal) -> SpeedLaw | None:
         drag=fit_drag(time, speed, start=RACES_SPUN_UP),
         standstill=find_standstill(time, speed)
         if stopped is None
-        else IdentifiedValue(value=stopped, lower=stopped, upper=stopped, unit="s"),
+        else Known(value=stopped, status="determined", lower=stopped, upper=stopped, unit="s"),
     )
 
 

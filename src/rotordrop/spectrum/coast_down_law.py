@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 from scipy.special import ndtr
 
 from rotordrop.errors import RecordError
-from rotordrop.estimated import NINETY, IdentifiedValue, Verdict
+from rotordrop.known import NINETY, Known, Status
 from rotordrop.series import noise_by_differences
 from rotordrop.units import format_moment
 
@@ -32,9 +32,9 @@ class ExponentialFit:
 
     Attributes
     ----------
-    initial_speed : IdentifiedValue
+    initial_speed : Known
         ω_0 [rad/s] at ``start``.
-    time_constant : IdentifiedValue
+    time_constant : Known
         τ [s].
     start, end : float
         Window of the fit [s].
@@ -47,8 +47,8 @@ class ExponentialFit:
     statement : str
     """
 
-    initial_speed: IdentifiedValue
-    time_constant: IdentifiedValue
+    initial_speed: Known
+    time_constant: Known
     start: float
     end: float
     time: Array
@@ -70,15 +70,15 @@ class DragFit:
 
     Attributes
     ----------
-    constant : IdentifiedValue
+    constant : Known
         Dry part [rad/s²]: friction of balls and races, which a recorded speed always contains.
-    linear : IdentifiedValue
+    linear : Known
         Laminar drag per polar inertia of rotor and races [1/s]; times that inertia it is the machine file's
         ``aero_linear``.
-    quadratic : IdentifiedValue
+    quadratic : Known
         Turbulent drag per polar inertia of rotor and races [1/rad]; times that inertia it is the machine
         file's ``aero_quadratic``.
-    initial_speed : IdentifiedValue
+    initial_speed : Known
         [rad/s] at ``start``.
     correlation : shape (4, 4)
         Of initial speed, constant, linear, quadratic, in this order [1].
@@ -89,10 +89,10 @@ class DragFit:
     statement : str
     """
 
-    constant: IdentifiedValue
-    linear: IdentifiedValue
-    quadratic: IdentifiedValue
-    initial_speed: IdentifiedValue
+    constant: Known
+    linear: Known
+    quadratic: Known
+    initial_speed: Known
     correlation: Array
     start: float
     end: float
@@ -223,7 +223,7 @@ def fit_drag(time: ArrayLike, speed: ArrayLike, *, start: float, end: float | No
     )
 
 
-def find_standstill(time: ArrayLike, speed: ArrayLike, *, share: float = 0.05) -> IdentifiedValue:
+def find_standstill(time: ArrayLike, speed: ArrayLike, *, share: float = 0.05) -> Known:
     """Find when the rotor stops [s], by carrying its last slow turning to zero speed.
 
     Dry and linear drag bring the rotor to rest at a definite time, which is fitted to the recorded speed from
@@ -243,7 +243,7 @@ def find_standstill(time: ArrayLike, speed: ArrayLike, *, share: float = 0.05) -
 
     Returns
     -------
-    IdentifiedValue
+    Known
         Time of standstill [s] on the clock of ``time``.
     """
     t, omega = _window(time, speed, -math.inf, None)
@@ -252,9 +252,7 @@ def find_standstill(time: ArrayLike, speed: ArrayLike, *, share: float = 0.05) -
     noise = max(neighbour_noise(omega), 1e-9 * float(omega.max()))
     last_seen = float(t[np.flatnonzero(omega > 5.0 * noise)[-1]])
     if t.size < 8:
-        return IdentifiedValue(
-            value=float(t[-1]), status="the record does not determine it", lower=last_seen, unit="s"
-        )
+        return Known(value=float(t[-1]), status="the record does not determine it", lower=last_seen, unit="s")
     expected = _reading(t, omega)
     span = float(t[-1] - t[0])
     scale = np.array([max(last_seen - float(t[0]), 1e-3 * span), 3.0 / span, float(omega[0])])
@@ -268,8 +266,8 @@ def find_standstill(time: ArrayLike, speed: ArrayLike, *, share: float = 0.05) -
     error = float(fit.error[0])
     value = float(t[0]) + float(fit.parameters[0])
     determined = value + NINETY * error < t[-1] and error < 0.2 * fit.parameters[0]
-    status: Verdict = "determined" if determined else "the record does not determine it"
-    return IdentifiedValue(
+    status: Status = "determined" if determined else "the record does not determine it"
+    return Known(
         value=value if determined else float(t[-1]),
         status=status,
         standard_error=error if determined else None,
@@ -330,17 +328,17 @@ def _inflation(residual: Array) -> float:
     return (1.0 + likeness) / (1.0 - likeness)
 
 
-def _values(fit: _Fit, start: Array, units: tuple[str, ...], bound: Array) -> list[IdentifiedValue]:
+def _values(fit: _Fit, start: Array, units: tuple[str, ...], bound: Array) -> list[Known]:
     found = []
     for k, unit in enumerate(units):
         value, error = float(fit.parameters[k]), float(fit.error[k])
-        status: Verdict = "determined"
+        status: Status = "determined"
         if value <= bound[k] + 0.01 * error:
             status = "at its bound"
         elif error > 0.5 * abs(value):
             status = "the record does not determine it"
         found.append(
-            IdentifiedValue(
+            Known(
                 value=value,
                 status=status,
                 standard_error=error,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotordrop.atomic_file import new_hdf5
+from rotordrop.files import new_hdf5
 
 if TYPE_CHECKING:
     from rotordrop.spectrum.coast_down import CoastDownAnalysis, PlaneAnalysis, SpeedLaw

@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 
 from rotordrop.elements.description import unknown_key
 from rotordrop.errors import UsageError
+from rotordrop.known import Known
 from rotordrop.machine import Machine
 from rotordrop.study.chosen_bearings import AS_DESCRIBED
 from rotordrop.study.distributions import Distribution
 from rotordrop.study.plan import Study, read_file, read_study
 from rotordrop.study.quantities import columns_of
 from rotordrop.study.run import Report, run_study
-from rotordrop.study.summary import Known, StudyResults, exceedance, quantile
+from rotordrop.study.summary import StudyResults, exceedance, quantile
 
 Array = NDArray[np.float64]
 

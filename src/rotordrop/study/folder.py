@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop._version import __version__
-from rotordrop.atomic_file import atomic_path, write_json, write_text
 from rotordrop.errors import OutputError, UsageError
+from rotordrop.files import atomic_path, write_json, write_text
 from rotordrop.machine import load_machine
 from rotordrop.machine.saving import machine_text
 from rotordrop.study.plan import Study, planned_study

@@ -15,18 +15,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtr
-from scipy.stats import beta
 
 from rotordrop.elements.magnet import REMANENCE_TIME
 from rotordrop.errors import UsageError
-from rotordrop.estimated import NINETY
+from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
 from rotordrop.rotor.parameter_table import parameter
 from rotordrop.rotor.unknowns import smallest_gap
 from rotordrop.study.between_drops import next_draw
 from rotordrop.study.distributions import Distribution
 from rotordrop.study.plan import Study
-from rotordrop.study.summary import COVER, Known, StudyResults, quantile
+from rotordrop.study.summary import COVER, StudyResults, quantile, share_of
 
 Array = NDArray[np.float64]
 
@@ -45,14 +44,6 @@ smallest air gap [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Recorded:
-    """A number of a recorded drop with its 90 % interval, where one is known [SI]."""
-
-    value: float
-    interval: tuple[float, float] | None = None
-
-
-@dataclass(frozen=True, kw_only=True)
 class Repeat:
     """One quantity among the drops that could have happened.
 
@@ -68,7 +59,7 @@ class Repeat:
         Half of all sets of `of` drops have a worst one below this.
     of : int
         Drops of such a set.
-    recorded : Recorded or None
+    recorded : Known or None
         The number of the recorded drop.
     place : Known or None
         Share of the drops that were milder than the recorded one [1].
@@ -80,7 +71,7 @@ class Repeat:
     high: Known
     worst: Known
     of: int
-    recorded: Recorded | None = None
+    recorded: Known | None = None
     place: Known | None = None
 
 
@@ -131,7 +122,7 @@ def repeat_study(
 
 
 def repeats(
-    results: StudyResults, recorded: Mapping[str, Recorded] | None = None, *, worst_of: int = 100
+    results: StudyResults, recorded: Mapping[str, Known] | None = None, *, worst_of: int = 100
 ) -> tuple[Repeat, ...]:
     """Every compared quantity of every bearing among the drops of a study.
 
@@ -169,7 +160,7 @@ def repeats(
     return tuple(found)
 
 
-def place_among(values: ArrayLike, recorded: Recorded) -> Known:
+def place_among(values: ArrayLike, recorded: Known) -> Known:
     """Share of simulated drops below a recorded number [1], with the interval of their number and its error.
 
     Each simulated drop counts with the probability that it was milder, by the interval of the recorded one;
@@ -179,20 +170,14 @@ def place_among(values: ArrayLike, recorded: Recorded) -> Known:
     x = x[np.isfinite(x)]
     n = len(x)
     if n == 0:
-        return Known(value=math.nan, lower=0.0, upper=1.0, drops=0)
-    low, high = recorded.interval or (recorded.value, recorded.value)
+        return share_of(math.nan, 0, 0, 0)
+    low, high = recorded.low, recorded.high
     sigma = max((high - low) / (2.0 * NINETY), 1e-12 * max(abs(recorded.value), 1e-300))
-    tail = 0.5 * (1.0 - COVER)
     least, most = int(np.count_nonzero(x < low)), int(np.count_nonzero(x < high))
-    return Known(
-        value=float(np.mean(ndtr((recorded.value - x) / sigma))),
-        lower=float(beta.ppf(tail, least, n - least + 1)) if least else 0.0,
-        upper=float(beta.isf(tail, most + 1, n - most)) if most < n else 1.0,
-        drops=n,
-    )
+    return share_of(float(np.mean(ndtr((recorded.value - x) / sigma))), least, most, n)
 
 
-def recorded_numbers(document: Mapping[str, Any]) -> dict[str, Recorded]:
+def recorded_numbers(document: Mapping[str, Any]) -> dict[str, Known]:
     """Numbers of a recorded drop by column of a study, from the document of its estimate.
 
     Raises
@@ -212,8 +197,8 @@ def recorded_numbers(document: Mapping[str, Any]) -> dict[str, Recorded]:
                 entry = entry.get(part) if isinstance(entry, Mapping) else None
             if entry is not None and entry.get("value") is not None:
                 interval = entry.get("interval_90")
-                found[f"{bearing}.{column}"] = Recorded(
+                found[f"{bearing}.{column}"] = Known(
                     value=float(entry["value"]),
-                    interval=None if interval is None else (float(interval[0]), float(interval[1])),
+                    interval_90=None if interval is None else (float(interval[0]), float(interval[1])),
                 )
     return found

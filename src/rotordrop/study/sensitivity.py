@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import UsageError
+from rotordrop.known import Known
 from rotordrop.study.summary import COVER, StudyResults
 
 Array = NDArray[np.float64]
@@ -21,15 +22,6 @@ MOST_CELLS = 20
 
 
 @dataclass(frozen=True, kw_only=True)
-class Share:
-    """Share of the variance of a quantity that a varied value brings [1], with its 90 % interval."""
-
-    value: float
-    lower: float
-    upper: float
-
-
-@dataclass(frozen=True, kw_only=True)
 class Influence:
     """What one varied value does to a quantity.
 
@@ -37,16 +29,16 @@ class Influence:
     ----------
     name : str
         The varied value.
-    alone : Share
-        Share of the variance that would be gone if the value were known (first-order Sobol index).
-    total : Share or None
-        Share that would be left if all others were known; None unless the study has the design
+    alone : Known
+        Known of the variance that would be gone if the value were known (first-order Sobol index).
+    total : Known or None
+        Known that would be left if all others were known; None unless the study has the design
         ``"sensitivity"``.
     """
 
     name: str
-    alone: Share
-    total: Share | None
+    alone: Known
+    total: Known | None
 
 
 def influences(results: StudyResults, column: str) -> tuple[Influence, ...]:
@@ -132,7 +124,7 @@ def _cells(x: Array) -> Array:
 
 
 def _explained(pairs: Array) -> Array:
-    """Share of the variance between cells (first column), less what chance alone would give, shape (1,)."""
+    """Known of the variance between cells (first column), less what chance alone would give, shape (1,)."""
     cell, y = pairs[:, 0].astype(np.int64), pairs[:, 1]
     n, cells = len(y), int(cell.max()) + 1
     count = np.bincount(cell, minlength=cells)
@@ -143,14 +135,14 @@ def _explained(pairs: Array) -> Array:
     return np.array([1.0 - (1.0 - share) * (n - 1) / max(n - cells, 1)])
 
 
-def _with_intervals(rows: Array, shares: Callable[[Array], Array]) -> list[Share]:
-    """Shares with bootstrap intervals, centred on the estimate: a row that is drawn twice explains itself."""
+def _with_intervals(rows: Array, shares: Callable[[Array], Array]) -> list[Known]:
+    """Knowns with bootstrap intervals, centred on the estimate: a row that is drawn twice explains itself."""
     value = shares(rows)
     random = np.random.Generator(np.random.Philox(np.random.SeedSequence(len(rows))))
     again = np.array([shares(rows[random.integers(0, len(rows), len(rows))]) for _ in range(RESAMPLED)])
     tail = 0.5 * (1.0 - COVER)
     low, high = np.quantile(again - again.mean(axis=0), (tail, 1.0 - tail), axis=0) + value
     return [
-        Share(value=v, lower=a, upper=b)
+        Known(value=v, status="estimated", interval_90=(a, b))
         for v, a, b in zip(value.tolist(), low.tolist(), high.tolist(), strict=True)
     ]

@@ -15,6 +15,7 @@ from scipy.stats import beta, binom
 
 from rotordrop.elements.description import unknown_key
 from rotordrop.errors import OutputError, UsageError
+from rotordrop.known import Known
 from rotordrop.study.folder import StudyFolder, read_shard, study_of
 from rotordrop.study.plan import Study
 from rotordrop.study.quantities import Quantity, columns_of
@@ -26,16 +27,6 @@ Array = NDArray[np.float64]
 
 COVER = 0.90
 """Probability with which every interval here holds [1]."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Known:
-    """A number with its 90 % interval and the drops behind it; an open end is infinite."""
-
-    value: float
-    lower: float
-    upper: float
-    drops: int
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -167,18 +158,15 @@ def quantile(values: ArrayLike, share: float) -> Known:
     x = x[np.isfinite(x)]
     n = len(x)
     if n == 0:
-        return Known(value=math.nan, lower=-math.inf, upper=math.inf, drops=0)
+        return _counted(math.nan, (-math.inf, math.inf), 0)
     tail = 0.5 * (1.0 - COVER)
     low = int(binom.ppf(tail, n, share))  # at least so many lie below the quantile, but for `tail`
     if binom.cdf(low - 1, n, share) > tail:
         low -= 1
     high = int(binom.isf(tail, n, share)) + 1
-    return Known(
-        value=float(np.quantile(x, share, method="hazen")),
-        lower=float(x[low - 1]) if low >= 1 else -math.inf,
-        upper=float(x[high - 1]) if high <= n else math.inf,
-        drops=n,
-    )
+    lower = float(x[low - 1]) if low >= 1 else -math.inf
+    upper = float(x[high - 1]) if high <= n else math.inf
+    return _counted(float(np.quantile(x, share, method="hazen")), (lower, upper), n)
 
 
 def exceedance(values: ArrayLike, limit: float) -> Known:
@@ -189,14 +177,20 @@ def exceedance(values: ArrayLike, limit: float) -> Known:
     x = np.asarray(values, dtype=np.float64)
     n, k = len(x), int(np.count_nonzero(x > limit))
     if n == 0:
-        return Known(value=math.nan, lower=0.0, upper=1.0, drops=0)
+        return share_of(math.nan, 0, 0, 0)
+    return share_of(k / n, k, k, n)
+
+
+def share_of(value: float, least: int, most: int, drops: int) -> Known:
+    """A share of drops with the interval of Clopper and Pearson, for a count between two ends."""
     tail = 0.5 * (1.0 - COVER)
-    return Known(
-        value=k / n,
-        lower=float(beta.ppf(tail, k, n - k + 1)) if k else 0.0,
-        upper=float(beta.isf(tail, k + 1, n - k)) if k < n else 1.0,
-        drops=n,
-    )
+    lower = float(beta.ppf(tail, least, drops - least + 1)) if least else 0.0
+    upper = float(beta.isf(tail, most + 1, drops - most)) if most < drops else 1.0
+    return _counted(value, (lower, upper), drops)
+
+
+def _counted(value: float, interval: tuple[float, float], drops: int) -> Known:
+    return Known(value=value, status="estimated", interval_90=interval, drops=drops)
 
 
 def load_results(folder: str | Path) -> StudyResults:
@@ -250,7 +244,7 @@ class EarlyEnd:
                 continue
             self._next_look = max(self._next_look + 1, self._next_look * 9 // 8)
             found = quantile(np.concatenate(self._values), until.quantile)
-            if 0.5 * (found.upper - found.lower) <= until.within * abs(found.value):
+            if 0.5 * (found.high - found.low) <= until.within * abs(found.value):
                 self._needed = k + 1
                 break
         return self._needed
@@ -266,7 +260,7 @@ def save_results(results: StudyResults, path: str | Path) -> None:
     """
     import h5py
 
-    from rotordrop.atomic_file import atomic_path
+    from rotordrop.files import atomic_path
 
     if not len(results):
         raise OutputError(f"{path}: the study has no finished drops yet; run it first")
@@ -293,7 +287,7 @@ def _save_parquet(results: StudyResults, path: Path) -> None:
     """One column a value; units and digest in the metadata of the file."""
     from importlib.util import find_spec
 
-    from rotordrop.atomic_file import atomic_path
+    from rotordrop.files import atomic_path
 
     if find_spec("pyarrow") is None:
         raise OutputError(

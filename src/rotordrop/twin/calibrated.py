@@ -13,8 +13,8 @@ from rotordrop.elements.parameter import Parameter
 from rotordrop.errors import IdentificationError, UsageError
 from rotordrop.estimate.document import structure_json
 from rotordrop.estimate.estimate import Structure
-from rotordrop.estimated import NINETY, Estimated, IdentifiedValue, Verdict
 from rotordrop.evidence.evidence import read_evidence
+from rotordrop.known import NINETY, Known, Status
 from rotordrop.machine import CalibrationDrop, CalibrationOrigin, Machine, RecordedLift
 from rotordrop.record.record import Record
 from rotordrop.rotor.parameter_table import parameter, row_of, rows, separating_measurement
@@ -29,12 +29,7 @@ from rotordrop.twin.joint_spread import joint_spread
 from rotordrop.twin.structure_sentence import structure_of
 from rotordrop.twin.tracked import CALIBRATION_SCHEDULE, track_drops
 from rotordrop.twin.tracked_loads import INCONSISTENT_WIDENING
-from rotordrop.twin.tracked_parameters import (
-    NOT_DETERMINED,
-    identified,
-    model_error,
-    parameter_widening,
-)
+from rotordrop.twin.tracked_parameters import NOT_DETERMINED, identified, model_error, parameter_widening
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -53,7 +48,7 @@ class Identifiability:
     path: str
     prior_sigma: float
     posterior_sigma: float
-    verdict: Verdict
+    verdict: Status
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,7 +84,7 @@ class Calibration:
     """
 
     machine: Machine
-    values: dict[str, IdentifiedValue]
+    values: dict[str, Known]
     identifiability: tuple[Identifiability, ...]
     confounded: tuple[Confounded, ...]
     checks: dict[str, tuple[Check, ...]]
@@ -191,7 +186,7 @@ def calibrate_machine(
     )
 
 
-def _of_drop(problem: DropProblem, mean: Array, covariance: Array) -> dict[str, IdentifiedValue]:
+def _of_drop(problem: DropProblem, mean: Array, covariance: Array) -> dict[str, Known]:
     """What was found of the last drop alone: unbalance, remanent lift, drag of the air."""
     sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     first = problem.n_dynamic
@@ -228,7 +223,7 @@ def _lift(problem: DropProblem, smoothed: Smoothed) -> tuple[RecordedLift, ...]:
     )
 
 
-def _with_unbalance(machine: Machine, said: Mapping[str, IdentifiedValue]) -> Machine:
+def _with_unbalance(machine: Machine, said: Mapping[str, Known]) -> Machine:
     """The machine with an unbalance as large as the one found where that is beyond the described one.
 
     What was described then is the width of a prior, and no amount that a simulation could use.
@@ -239,12 +234,12 @@ def _with_unbalance(machine: Machine, said: Mapping[str, IdentifiedValue]) -> Ma
             along = [said[f"unbalance.{i}.{part}"].value for part in ("cosine", "sine")]
             found = math.hypot(*along)
             factor = float(unbalance.beyond_described) * found / float(unbalance.amount)
-            values[f"unbalance.{i}.amount"] = Estimated(value=found, status="guess")
-            values[f"unbalance.{i}.beyond_described"] = Estimated(value=factor, status="guess")
+            values[f"unbalance.{i}.amount"] = Known(value=found, status="guess")
+            values[f"unbalance.{i}.beyond_described"] = Known(value=factor, status="guess")
     return machine.with_values(values) if values else machine
 
 
-def _possible(machine: Machine, fitted: dict[str, Estimated], drops: Sequence[str]) -> Machine:
+def _possible(machine: Machine, fitted: dict[str, Known], drops: Sequence[str]) -> Machine:
     """The machine with the fitted values, if there can be such a machine."""
     try:
         return machine.with_values(fitted)
@@ -256,11 +251,9 @@ def _possible(machine: Machine, fitted: dict[str, Estimated], drops: Sequence[st
         ) from error
 
 
-def _values(
-    problem: DropProblem, mean: Array, covariance: Array, widening: float
-) -> dict[str, IdentifiedValue]:
+def _values(problem: DropProblem, mean: Array, covariance: Array, widening: float) -> dict[str, Known]:
     sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    values: dict[str, IdentifiedValue] = {}
+    values: dict[str, Known] = {}
     for k, unknown in enumerate(problem.unknowns):
         if unknown.scope != "machine":
             continue
@@ -281,14 +274,18 @@ def _values(
     return values
 
 
-def _plain(value: float, sigma: float, widening: float, unit: str) -> IdentifiedValue:
+def _plain(value: float, sigma: float, widening: float, unit: str) -> Known:
     half = NINETY * sigma * widening
-    return IdentifiedValue(
-        value=value, standard_error=sigma * widening, interval_90=(value - half, value + half), unit=unit
+    return Known(
+        value=value,
+        status="determined",
+        standard_error=sigma * widening,
+        interval_90=(value - half, value + half),
+        unit=unit,
     )
 
 
-def at_fitted_exponents(machine: Machine, values: dict[str, IdentifiedValue]) -> dict[str, IdentifiedValue]:
+def at_fitted_exponents(machine: Machine, values: dict[str, Known]) -> dict[str, Known]:
     """Values whose contact stiffness belongs to the fitted contact exponent.
 
     The fit, and what is reported, gives the stiffness [N/m^n] of the exponent in the machine description, to
@@ -311,15 +308,13 @@ def at_fitted_exponents(machine: Machine, values: dict[str, IdentifiedValue]) ->
     return found
 
 
-def _within_limits(value: IdentifiedValue, row: Parameter) -> IdentifiedValue:
+def _within_limits(value: Known, row: Parameter) -> Known:
     interval = value.interval_90 or (value.value, value.value)
     low, middle, high = (row.within(number) for number in (interval[0], value.value, interval[1]))
     return replace(value, value=middle, interval_90=(low, high))
 
 
-def _as_known(
-    values: dict[str, IdentifiedValue], identifiability: tuple[Identifiability, ...]
-) -> dict[str, IdentifiedValue]:
+def _as_known(values: dict[str, Known], identifiability: tuple[Identifiability, ...]) -> dict[str, Known]:
     """Values of which a parameter that the records do not determine has the interval of its prior.
 
     What the fit leaves of its uncertainty rests on a random walk of the filter; an estimate with the
@@ -335,9 +330,7 @@ def _as_known(
     return found
 
 
-def machine_values(
-    bearings: Sequence[str], values: dict[str, IdentifiedValue], source: str
-) -> dict[str, Estimated]:
+def machine_values(bearings: Sequence[str], values: dict[str, Known], source: str) -> dict[str, Known]:
     """Calibrated values as entries of a machine description, the horizontal support with them.
 
     What the records do not determine stays a guess, so that no later estimate calls it known.
@@ -345,7 +338,7 @@ def machine_values(
     entries = {}
     for path, value in values.items():
         known = value.status not in NOT_DETERMINED
-        entries[path] = Estimated(
+        entries[path] = Known(
             value=value.value,
             status="estimated" if known else "guess",
             interval_90=value.interval_90 if known else None,
@@ -370,7 +363,7 @@ def machine_values(
 
 
 def _identifiability(
-    problem: DropProblem, covariance: Array, values: dict[str, IdentifiedValue]
+    problem: DropProblem, covariance: Array, values: dict[str, Known]
 ) -> tuple[Identifiability, ...]:
     sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     return tuple(

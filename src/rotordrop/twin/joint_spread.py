@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.estimated import NINETY, IdentifiedValue
+from rotordrop.known import NINETY, Known
 from rotordrop.machine import JointSpread
 from rotordrop.rotor.joint_values import (
     file_of_fitted,
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 def joint_spread(
-    problem: DropProblem, mean: Array, covariance: Array, known: Mapping[str, IdentifiedValue]
+    problem: DropProblem, mean: Array, covariance: Array, known: Mapping[str, Known]
 ) -> JointSpread:
     """Joint distribution of the calibrated values of the touchdown bearings.
 
@@ -62,7 +62,7 @@ def joint_spread(
     )
 
 
-def _spread(value: IdentifiedValue, logarithmic: bool) -> float:
+def _spread(value: Known, logarithmic: bool) -> float:
     """Standard deviation that belongs to a stated 90 % interval, of the logarithm where that is normal."""
     low, high = value.interval_90 or (value.value, value.value)
     if not logarithmic:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rotordrop.elements.beam import is_beam
 from rotordrop.estimate.advice import WORTH_SAYING, Advice
 from rotordrop.estimate.allowances import BEAM_FORCE_SIGMA, MODEL_FORCE_SIGMA
-from rotordrop.estimated import NINETY
+from rotordrop.known import NINETY
 from rotordrop.track.forces import ForceHistory, force_gradient
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Smoothed, smooth

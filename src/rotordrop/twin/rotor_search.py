@@ -18,8 +18,8 @@ from scipy.optimize import minimize
 from rotordrop.elements.beam import FORM, is_beam
 from rotordrop.elements.parameter import Parameter
 from rotordrop.errors import RotordropError
-from rotordrop.estimated import NINETY, Estimated
 from rotordrop.evidence.evidence import Evidence
+from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
 from rotordrop.rotor.parameter_table import parameter
 from rotordrop.rotor.parameters import build_drop_model
@@ -112,13 +112,13 @@ def _sought(machine: Machine) -> list[_Unknown]:
     return sought
 
 
-def _known(unknown: _Unknown, value: float) -> Estimated:
+def _known(unknown: _Unknown, value: float) -> Known:
     if unknown.row.logarithmic:
         reach = math.exp(NINETY * REMAINING)
         interval = (value / reach, value * reach)
     else:
         interval = (value - NINETY * REMAINING_FORM, value + NINETY * REMAINING_FORM)
-    return Estimated(
+    return Known(
         value=value,
         status="estimated",
         interval_90=interval,

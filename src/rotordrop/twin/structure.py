@@ -7,14 +7,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from rotordrop.elements.magnet import REMANENCE_TIME
-from rotordrop.estimated import NINETY, Estimated
+from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
 
-Values = dict[str, Estimated]
+Values = dict[str, Known]
 
 
-def _guess(value: float) -> Estimated:
-    return Estimated(value=value, status="guess")
+def _guess(value: float) -> Known:
+    return Known(value=value, status="guess")
 
 
 def _of_bearings(**values: float) -> Callable[[Machine], Values]:
@@ -58,7 +58,7 @@ def _remanence(machine: Machine) -> Values:
         return {}
     reach = math.exp(NINETY * REMANENCE_SIGMA)
     long = (REMANENCE_TIME / reach, REMANENCE_TIME * reach)
-    return {"remanence_time_constant": Estimated(value=REMANENCE_TIME, status="guess", range=long)}
+    return {"remanence_time_constant": Known(value=REMANENCE_TIME, status="guess", range=long)}
 
 
 BEYOND_GRADE = 3.0

@@ -7,13 +7,13 @@ from collections.abc import Callable, Mapping
 
 from rotordrop.elements.magnet import REMANENCE_TIME
 from rotordrop.estimate.estimate import Structure
-from rotordrop.estimated import IdentifiedValue
+from rotordrop.known import Known
 from rotordrop.machine import Machine
 from rotordrop.rotor.statics import bearing_load_shares
 from rotordrop.rotor.unknowns import PEAK_LOADS
 from rotordrop.twin.structure_search import Kept
 
-Values = Mapping[str, IdentifiedValue]
+Values = Mapping[str, Known]
 """Values found, by path."""
 
 
@@ -23,7 +23,7 @@ def structure_of(kept: Kept, machine: Machine, values: Values) -> Structure:
     return Structure(name=name, gain=kept.gain, sentence=f"Found: {_SENTENCES[name](machine, values)}.")
 
 
-def derived(function: Callable[..., float], *known: IdentifiedValue) -> tuple[float, float, float]:
+def derived(function: Callable[..., float], *known: Known) -> tuple[float, float, float]:
     """A number that follows from values, with its 90 % interval; their errors count as independent."""
     middle = [one.value for one in known]
     square = 0.0

@@ -26,7 +26,7 @@ from rotordrop.estimate.later_motion import LaterMotion, later_motion
 from rotordrop.estimate.methods import Tracked
 from rotordrop.estimate.record_facts import RecordFacts
 from rotordrop.estimate.unbalance import PlaneUnbalance, unbalance_notes
-from rotordrop.estimated import IdentifiedValue
+from rotordrop.known import Known
 from rotordrop.track.consistency import NIS_RANGE, Check
 from rotordrop.track.input_state import InputEstimate, at_bearings
 from rotordrop.twin.narrowing import DRAWING, narrowing
@@ -271,7 +271,7 @@ def _bearings(drop: TrackedDrop, judged: _Judgement) -> tuple[BearingDrop, ...]:
     measured = _measured(drop, judged, drop.problem.readings)
     found = []
     for b in range(len(drop.problem.model.bearing_names)):
-        values: dict[str, IdentifiedValue] = bearing_values(drop.problem, judged.parameters, b)
+        values: dict[str, Known] = bearing_values(drop.problem, judged.parameters, b)
         held = None if judged.fits else judged.check
         found.append(
             bearing_drop(drop.problem, drop.forces, b, _loads(drop, judged, b), measured[:, b], values, held)

@@ -32,17 +32,12 @@ from rotordrop.estimate.bearing_drop import (
     mean_late,
 )
 from rotordrop.estimate.estimate import CrossCheck
-from rotordrop.estimated import NINETY, IdentifiedValue, Verdict
+from rotordrop.known import NINETY, Known, Status
 from rotordrop.simulate.certificate import refined_peak
 from rotordrop.track.calibration import TrackedDrops
 from rotordrop.track.consistency import direction_check
 from rotordrop.track.forces import ForceHistory
-from rotordrop.track.input_state import (
-    MEAN_ERROR,
-    InputEstimate,
-    input_state_estimate,
-    lent_by_record,
-)
+from rotordrop.track.input_state import MEAN_ERROR, InputEstimate, input_state_estimate, lent_by_record
 from rotordrop.track.problem import DropProblem
 
 Array = NDArray[np.float64]
@@ -55,9 +50,9 @@ FACTOR_APART = 2.0
 MEAN_STRESS_ERROR = 0.10
 """Relative error of a mean stress that rests on the preload of the machine file [1]: by its third root."""
 
-INCONSISTENT: Verdict = "the model does not fit the record"
+INCONSISTENT: Status = "the model does not fit the record"
 """Status of a number whose interval had to be widened to hold the cross-check."""
-OF_CROSS_CHECK: Verdict = "of the cross-check: the model does not fit the record"
+OF_CROSS_CHECK: Status = "of the cross-check: the model does not fit the record"
 """Status of a number that does not rest on the twin, because the twin lost the record."""
 NO_LATE_MEAN = f"the estimated part ends before {1e3 * LATE[1]:.0f} ms"
 
@@ -72,7 +67,7 @@ class Loads:
     stress_band: Band
     peak_force: Peak
     peak_stress: Peak
-    means: Mapping[str, IdentifiedValue]
+    means: Mapping[str, Known]
     missing: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -135,15 +130,16 @@ def _without(sigma: Array, part: Array | float) -> Array:
 
 def with_interval(
     value: float, sigma: float, widening: float = 1.0, unit: str = "", left_out: float = 0.0
-) -> IdentifiedValue:
+) -> Known:
     """A magnitude with a symmetric 90 % interval, which does not go below zero.
 
     ``left_out`` is the standard deviation by what the model leaves out alone, independent of the rest.
     """
     half = NINETY * sigma * widening
     low = max(value - half, 0.0) if value >= 0.0 else value - half
-    return IdentifiedValue(
+    return Known(
         value=value,
+        status="determined",
         standard_error=sigma * widening,
         interval_90=(low, value + half),
         allowance_90=NINETY * left_out * widening if left_out > 0.0 else None,
@@ -199,7 +195,7 @@ def _peak(history: History, sigma: Array, widening: float, unit: str, model_shar
     return Peak(known=known, time=moment, origin=Origin.TWIN)
 
 
-def holding(value: IdentifiedValue, ratio: float, accuracy: float) -> IdentifiedValue:
+def holding(value: Known, ratio: float, accuracy: float) -> Known:
     """The value with an interval that also holds ``ratio`` times it, within a relative accuracy [1]."""
     low, high = value.interval_90 or (value.value, value.value)
     other = value.value * ratio if math.isfinite(ratio) else value.value
@@ -305,8 +301,8 @@ def _checked_peak(history: History, error: float, unit: str) -> Peak:
     )
 
 
-def _doubled(value: float, error: float, unit: str) -> IdentifiedValue:
-    return IdentifiedValue(
+def _doubled(value: float, error: float, unit: str) -> Known:
+    return Known(
         value=value,
         status=OF_CROSS_CHECK,
         interval_90=(max(1.0 - 2.0 * error, 0.0) * value, (1.0 + 2.0 * error) * value),
@@ -321,7 +317,7 @@ def bearing_drop(
     b: int,
     loads: Loads,
     measured: Array,
-    values: Mapping[str, IdentifiedValue],
+    values: Mapping[str, Known],
     cross_check: InputEstimate | None,
 ) -> BearingDrop:
     """Everything about one bearing; ``measured`` (N, 2) is the motion that its sensors show [m]."""
@@ -418,7 +414,7 @@ def cross_checks(
     if np.isfinite(check.mean_late[b]):
         late = (forces.time >= LATE[0]) & (forces.time <= LATE[1])
         mean = float(np.hypot(*forces.force[late, b].mean(axis=0)))
-        vector = IdentifiedValue(value=mean, unit="N")
+        vector = Known(value=mean, status="determined", unit="N")
         pairs.append(("force of the mean, 150 to 200 ms", vector, check.mean_late[b], MEAN_ERROR))
     return tuple(
         CrossCheck(

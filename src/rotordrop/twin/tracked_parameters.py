@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rotordrop.elements.parameter import Parameter
 from rotordrop.estimate.bearing_values import equivalent_stiffness, published_values, static_friction
 from rotordrop.estimate.estimate import FittedParameter, JointEstimate, SensorErrors
-from rotordrop.estimated import NINETY, IdentifiedValue, Verdict
+from rotordrop.known import NINETY, Known, Status
 from rotordrop.rotor.parameter_table import parameter
 from rotordrop.rotor.unknowns import Unknown, sensor_prior, smallest_gap
 from rotordrop.track.consistency import PARAMETER_LIMIT
@@ -31,16 +31,16 @@ UNSURE_GAP = 0.05
 """Relative prior standard deviation from which an air gap counts as guessed [1]."""
 PARAMETER_WIDENING = 1.5
 """Factor on standard errors of parameters for what the linearised fit leaves out [1]."""
-UNDETERMINED: Verdict = "the record does not determine it"
-KNOWN: Verdict = "known from the calibration"
-NOT_DETERMINED: tuple[Verdict, ...] = (UNDETERMINED, KNOWN)
+UNDETERMINED: Status = "the record does not determine it"
+KNOWN: Status = "known from the calibration"
+NOT_DETERMINED: tuple[Status, ...] = (UNDETERMINED, KNOWN)
 """Verdicts on a parameter that the record says little about; the second where it was calibrated before."""
 DETERMINED_SHARE, WEAKLY_DETERMINED_SHARE = 0.3, 0.7
 """Standard error over that of the prior up to which a parameter is determined, and weakly determined [1]."""
 
 
-def determination(share: float, *, calibrated: bool = False) -> Verdict:
-    """Verdict on a parameter whose standard error is this share of its prior's [1]."""
+def determination(share: float, *, calibrated: bool = False) -> Status:
+    """Status on a parameter whose standard error is this share of its prior's [1]."""
     if share < DETERMINED_SHARE:
         return "determined"
     if share < WEAKLY_DETERMINED_SHARE:
@@ -48,11 +48,11 @@ def determination(share: float, *, calibrated: bool = False) -> Verdict:
     return KNOWN if calibrated else UNDETERMINED
 
 
-def identified(unknown: Unknown, theta: float, sigma: float, widening: float = 1.0) -> IdentifiedValue:
+def identified(unknown: Unknown, theta: float, sigma: float, widening: float = 1.0) -> Known:
     """An estimated parameter as a value with interval, start and verdict."""
     half = NINETY * sigma * widening
     interval = (unknown.value_of(theta - half), unknown.value_of(theta + half))
-    return IdentifiedValue(
+    return Known(
         value=unknown.value_of(theta),
         status=determination(sigma / unknown.sigma, calibrated=unknown.calibrated),
         standard_error=unknown.standard_error(theta, sigma * widening),
@@ -140,12 +140,12 @@ def prior_of(problem: DropProblem) -> tuple[Array, Array]:
     return mean, sigma
 
 
-def _hull(one: IdentifiedValue, other: IdentifiedValue) -> tuple[float, float]:
+def _hull(one: Known, other: Known) -> tuple[float, float]:
     (a, b), (c, d) = (v.interval_90 or (v.value, v.value) for v in (one, other))
     return min(a, c), max(b, d)
 
 
-def gap_of_record(problem: DropProblem, b: int) -> IdentifiedValue:
+def gap_of_record(problem: DropProblem, b: int) -> Known:
     """Air gap [m] by settled tail and machine file alone, for a twin that lost the record."""
     entry = problem.gap_entries[b]
     value = float(problem.mean[entry])
@@ -158,16 +158,14 @@ def gap_of_record(problem: DropProblem, b: int) -> IdentifiedValue:
     )
 
 
-def is_lost(problem: DropProblem, gap: IdentifiedValue, b: int) -> bool:
+def is_lost(problem: DropProblem, gap: Known, b: int) -> bool:
     """Whether an estimated air gap is none that the machine can have, by settled tail and machine file."""
     entry = problem.gap_entries[b]
     sigma = math.sqrt(problem.covariance[entry, entry])
     return gap.value <= 0.0 or abs(gap.value - float(problem.mean[entry])) > PARAMETER_LIMIT * sigma
 
 
-def bearing_values(
-    problem: DropProblem, found: Sequence[FittedParameter], b: int
-) -> dict[str, IdentifiedValue]:
+def bearing_values(problem: DropProblem, found: Sequence[FittedParameter], b: int) -> dict[str, Known]:
     """Identified values of one bearing by the field names of the published document."""
     bearing = problem.model.machine.touchdown_bearings[b]
     values = published_values(bearing.name, found)
@@ -192,11 +190,11 @@ def sensor_errors(
     sigma = np.sqrt(np.maximum(np.diag(smoothed.covariance(last)), 0.0))
     gain, offset = problem.sensor_errors(smoothed.means[last])
     gain_sigma, offset_sigma = problem.sensor_errors(sigma)
-    status: Verdict = "determined" if fits else INCONSISTENT
+    status: Status = "determined" if fits else INCONSISTENT
 
-    def known(value: float, error: float, unit: str) -> IdentifiedValue:
+    def known(value: float, error: float, unit: str) -> Known:
         half = NINETY * widening * error
-        return IdentifiedValue(
+        return Known(
             value=value,
             standard_error=widening * error,
             interval_90=(value - half, value + half),

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.estimate.unbalance import PlaneUnbalance
-from rotordrop.estimated import NINETY, IdentifiedValue
 from rotordrop.evidence.synchronous import MarkAngle, angle_since_mark
+from rotordrop.known import NINETY, Known
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Smoothed, parameter_sample
 from rotordrop.twin.tracked_loads import INCONSISTENT
@@ -80,7 +80,7 @@ def _largest(covariance: Array, entries: NDArray[np.intp]) -> float:
 
 def _polar(
     vector: complex, covariance: Array, prior: float, turned: MarkAngle | None, fits: bool
-) -> tuple[IdentifiedValue, IdentifiedValue | None]:
+) -> tuple[Known, Known | None]:
     """Amount and phase of a vector: its error along itself is that of the amount, the other of the phase."""
     size, direction = abs(vector), math.atan2(vector.imag, vector.real)
     along = np.array([math.cos(direction), math.sin(direction)])
@@ -88,7 +88,7 @@ def _polar(
     error = math.sqrt(max(float(along @ covariance @ along), 0.0))
     sideways = NINETY * math.sqrt(max(float(across @ covariance @ across), 0.0))
     highest = size + NINETY * error
-    amount = IdentifiedValue(
+    amount = Known(
         value=size,
         status=determination(error / prior) if fits else INCONSISTENT,
         standard_error=error,
@@ -99,7 +99,7 @@ def _polar(
         return amount, None
     half = min(math.hypot(math.asin(sideways / size), NINETY * turned.error), math.pi)
     phase = math.remainder(direction - turned.angle - 0.5 * math.pi, 2.0 * math.pi)
-    return amount, IdentifiedValue(
+    return amount, Known(
         value=phase,
         status=determination(2.0 * half / math.pi),
         standard_error=half / NINETY,

@@ -17,8 +17,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotordrop.atomic_file import write_json
 from rotordrop.errors import MachineFileError, RotordropError, UsageError
+from rotordrop.files import write_json
 from rotordrop.web.running import Verb, clear, publish, result_folder, state_file, state_of
 from rotordrop.web.workspace import Job, Workspace, is_path
 

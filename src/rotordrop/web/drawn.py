@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop._version import __version__
-from rotordrop.atomic_file import write_json
+from rotordrop.files import write_json
 from rotordrop.report.content import Card, Cell, ReportContent, Statement, Table
 from rotordrop.report.origin import Origin, UsedFile, command_line, now
 from rotordrop.report.quantity import Quantity, System, display_unit

@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
-from rotordrop.atomic_file import write_json
+from rotordrop.files import write_json
 from rotordrop.web.workspace import Job, Workspace
 
 Verb: TypeAlias = Literal["channels", "look", "estimate", "waterfall"]

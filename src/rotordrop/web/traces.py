@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.atomic_file import atomic_path
 from rotordrop.errors import UsageError
+from rotordrop.files import atomic_path
 from rotordrop.report.decimation import block_extremes
 
 Array = NDArray[np.float64]

@@ -19,8 +19,8 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any, Literal, TypeAlias
 
-from rotordrop.atomic_file import atomic_path, write_json, write_text
 from rotordrop.errors import OutputError, UsageError
+from rotordrop.files import atomic_path, write_json, write_text
 
 Role: TypeAlias = Literal["machine", "profile", "record", "tail", "beside"]
 ROLES: tuple[Role, ...] = ("machine", "profile", "record", "tail", "beside")

@@ -17,7 +17,7 @@ from rotordrop.cli.app import INTERRUPTED, run
 from rotordrop.errors import ConsistencyError, UsageError
 from rotordrop.estimate.record_facts import BESIDE, COUNTED_TWICE, facts_of
 from rotordrop.estimate.schema import estimate_schema
-from rotordrop.estimated import Estimated
+from rotordrop.known import Known
 from rotordrop.machine import CalibrationDrop, CalibrationOrigin, Machine, example_path, load_machine
 from rotordrop.record.examples import example_record_path
 from rotordrop.record.record import read_record
@@ -310,7 +310,7 @@ def told_of(machine: Machine, name: str) -> set[str]:
 
 def test_what_a_user_writes_as_a_source_is_not_taken_for_a_calibration() -> None:
     text = "calibrated on drop_060 (not consistent with them)"
-    written = Estimated(value=1e8, status="estimated", interval_90=(9e7, 1.1e8), source=text)
+    written = Known(value=1e8, status="estimated", interval_90=(9e7, 1.1e8), source=text)
     machine = load_machine(LP400).with_values({f"{end}.support.stiffness": written for end in ("NDE", "DE")})
     assert told_of(machine, "drop_060") == set()
 

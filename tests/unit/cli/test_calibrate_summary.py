@@ -10,14 +10,14 @@ from typing import Any
 from rich.console import Console
 
 from rotordrop.cli.calibrate import _summary
-from rotordrop.estimated import IdentifiedValue
+from rotordrop.known import Known
 
 
 def test_a_calibrated_gap_and_stiffness_are_shown_in_display_units() -> None:
     result: Any = SimpleNamespace(
         values={
-            "DE.air_gap": IdentifiedValue(value=281e-6, interval_90=(270e-6, 292e-6), unit="m"),
-            "DE.support.stiffness": IdentifiedValue(value=2.5e7, interval_90=(2.0e7, 3.0e7), unit="N/m"),
+            "DE.air_gap": Known(value=281e-6, interval_90=(270e-6, 292e-6), unit="m"),
+            "DE.support.stiffness": Known(value=2.5e7, interval_90=(2.0e7, 3.0e7), unit="N/m"),
         },
         confounded=(),
         checks={},

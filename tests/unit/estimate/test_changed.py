@@ -9,7 +9,7 @@ import pytest
 
 from rotordrop.errors import UsageError
 from rotordrop.estimate.changed import WATCHED, changes
-from rotordrop.estimated import NINETY
+from rotordrop.known import NINETY
 
 TRUTH = {
     "air_gap": 275e-6,

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import RecordError
-from rotordrop.estimated import Estimated
 from rotordrop.evidence import EarlyForces, find_drop_instant, first_forces
 from rotordrop.evidence.events import coarse_drop
 from rotordrop.evidence.release import GRID, free_rotor, response_at, tabulate_response
+from rotordrop.known import Known
 from rotordrop.machine import example_machine
 from rotordrop.record.axes import sensor_planes
 from rotordrop_bench import hidden_machine, synthesize_drop
@@ -67,7 +67,7 @@ def test_the_standard_error_of_the_power_off_is_its_scatter(drop, machine):
 
 def test_a_sensor_that_reads_more_is_told_by_the_fall(drop, machine):
     """Five per cent more on one of four channels whose gains are hardly known, against the same record."""
-    loose = Estimated(value=1.0, status="guess", range=(0.7, 1.3))
+    loose = Known(value=1.0, status="guess", range=(0.7, 1.3))
     sensors = tuple(sensor.model_copy(update={"gain": loose}) for sensor in machine.sensors)
     unsure = machine.model_copy(update={"sensors": sensors})
     record = replace(drop.window(-0.25, 0.03), sensors=sensors)

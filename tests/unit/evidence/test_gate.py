@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import RecordError
-from rotordrop.estimated import Estimated
 from rotordrop.evidence import check_record, refuse_unusable
 from rotordrop.evidence.events import drop_and_levitated
 from rotordrop.evidence.levitated import fit_levitated
@@ -16,6 +15,7 @@ from rotordrop.evidence.quality.arrangement import LEANING, check_planes
 from rotordrop.evidence.quality.clock import check_clock
 from rotordrop.evidence.quality.ends import fell_as_described
 from rotordrop.evidence.quality.motion import check_rotation_line, first_motion
+from rotordrop.known import Known
 from rotordrop.record.axes import sensor_planes
 from rotordrop_bench import hidden_machine, synthesize_drop
 
@@ -532,7 +532,7 @@ def test_unusable_records_are_refused_with_all_faults(drop, machine, edited):
 
 def test_an_estimated_air_gap_that_cannot_be_is_named_before_the_unit(drop, machine):
     """A calibration that went astray: it is not the recorder that is wrong."""
-    gap = Estimated(
+    gap = Known(
         value=34e-6, status="estimated", interval_90=(0.0, 73e-6), source="calibrated on drop_060", unit="m"
     )
     values = {f"{bearing.name}.air_gap": gap for bearing in machine.touchdown_bearings}

@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rotordrop.estimated import Estimated
 from rotordrop.evidence.air_gap import SettledRest
 from rotordrop.evidence.evidence import Evidence, known, read_evidence
 from rotordrop.evidence.initial_state import InitialState
 from rotordrop.evidence.sensing import Sensing, build_sensing
 from rotordrop.identification.replica import Replica, build_replica
 from rotordrop.identification.support import ImpactFit, impact_problem
+from rotordrop.known import Known
 from rotordrop.machine import Machine, example_machine
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.rotor.reduction import Reduction
@@ -29,10 +29,10 @@ BASIS = Reduction(modes=6, attachment=True)
 def truth() -> Machine:
     """The machine of the records with its sensors known to be exact."""
     machine = example_machine("lp400")
-    values: dict[str, Estimated | float] = {}
+    values: dict[str, Known | float] = {}
     for sensor in machine.sensors:
-        values[f"sensors.{sensor.name}.gain"] = Estimated(value=1.0, standard_error=1e-5)
-        values[f"sensors.{sensor.name}.offset"] = Estimated(value=0.0, standard_error=1e-8)
+        values[f"sensors.{sensor.name}.gain"] = Known(value=1.0, standard_error=1e-5)
+        values[f"sensors.{sensor.name}.offset"] = Known(value=0.0, standard_error=1e-8)
     return machine.with_values(values)
 
 

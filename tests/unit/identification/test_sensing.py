@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import IdentificationError
-from rotordrop.estimated import Estimated
 from rotordrop.evidence.sensing import Sensing, build_sensing
 from rotordrop.identification.modal_expansion import expansion_matrix
+from rotordrop.known import Known
 from rotordrop.machine import Machine, Sensor
 from rotordrop.rotor.parameters import DropModel
 
@@ -59,10 +59,10 @@ def test_what_the_file_says_of_a_sensor_is_its_uncertainty(model: DropModel, tru
     """A guess lies in its range, an estimate in its interval; the range of a default is what is thinkable."""
     half = 1.6448536269514722
     gains = (
-        Estimated(value=1.0, status="guess", range=(0.94, 1.06)),
-        Estimated(value=1.0, status="estimated", interval_90=(0.97, 1.03)),
-        Estimated(value=1.0, status="estimated", standard_error=0.004),
-        Estimated(value=1.0, status="default", range=(0.94, 1.06)),
+        Known(value=1.0, status="guess", range=(0.94, 1.06)),
+        Known(value=1.0, status="estimated", interval_90=(0.97, 1.03)),
+        Known(value=1.0, status="estimated", standard_error=0.004),
+        Known(value=1.0, status="default", range=(0.94, 1.06)),
     )
     sensors = tuple(
         sensor.model_copy(update={"gain": gain, "offset": replace(gain, value=0.0)})

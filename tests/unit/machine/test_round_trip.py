@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from tests.scaled_machines import scaled_machine
 
 from rotordrop.errors import OutputError
-from rotordrop.estimated import Estimated
+from rotordrop.known import Known
 from rotordrop.machine import (
     Machine,
     example_machine,
@@ -50,7 +50,7 @@ def known(draw, limits):
     """A value with any of what can be known about it."""
     numbers = st.floats(*limits, allow_nan=False).filter(lambda number: number == 0.0 or abs(number) > 1e-18)
     low, value, high = sorted(draw(st.tuples(numbers, numbers, numbers)))
-    return Estimated(
+    return Known(
         value=value,
         status=draw(st.sampled_from(["given", "guess", "estimated", "default", "inferred"])),
         range=draw(st.sampled_from([None, (low, high) if low < high else None])),
@@ -88,7 +88,7 @@ lengths = st.floats(1e-3, 2.0)
 )
 def test_any_shaft_comes_back(sections, name, mass):
     def metres(value):
-        return Estimated(value=value)
+        return Known(value=value)
 
     machine = Machine.model_validate(
         {
@@ -106,7 +106,7 @@ def test_any_shaft_comes_back(sections, name, mass):
                     }
                     for length, count, outer, layer in sections
                 ],
-                "discs": [{"node": 1, "mass": Estimated(value=mass)}],
+                "discs": [{"node": 1, "mass": Known(value=mass)}],
             },
             "touchdown_bearings": [
                 {
@@ -126,9 +126,7 @@ def test_any_shaft_comes_back(sections, name, mass):
 
 
 def test_an_estimate_is_written_with_interval_and_source(tmp_path):
-    estimate = Estimated(
-        value=1.21e8, status="estimated", interval_90=(1.17e8, 1.25e8), source="drop of 12 May"
-    )
+    estimate = Known(value=1.21e8, status="estimated", interval_90=(1.17e8, 1.25e8), source="drop of 12 May")
     machine = example_machine("lp400").with_values({"NDE.support.stiffness": estimate})
     save_machine(machine, tmp_path / "calibrated.toml")
     raw = tomllib.loads((tmp_path / "calibrated.toml").read_text(encoding="utf-8"))

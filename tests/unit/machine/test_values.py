@@ -6,19 +6,19 @@ import pytest
 
 from rotordrop.elements.values import LEFT_OUT, Physical
 from rotordrop.errors import UsageError
-from rotordrop.estimated import Estimated
+from rotordrop.known import Known
 
 STIFFNESS = Physical("stiffness", above=0.0)
 ANGLE = Physical("angle", least=0.0, most=math.pi)
 
 
 def test_a_number_with_unit_is_given():
-    assert STIFFNESS.read("100 kN/mm") == Estimated(value=1e8, status="given", unit="N/m")
+    assert STIFFNESS.read("100 kN/mm") == Known(value=1e8, status="given", unit="N/m")
 
 
 def test_a_guess_has_a_range():
     read = STIFFNESS.read({"guess": "1e8 N/m", "range": ["5e7 N/m", "2e8 N/m"], "source": "drawing"})
-    assert read == Estimated(value=1e8, status="guess", range=(5e7, 2e8), source="drawing", unit="N/m")
+    assert read == Known(value=1e8, status="guess", range=(5e7, 2e8), source="drawing", unit="N/m")
 
 
 def test_an_estimate_has_interval_error_and_source():
@@ -81,8 +81,8 @@ def test_saved_numbers_in_si_come_back_exactly():
         ({"value": "1e8 N/m", "source": 3}, "source = 3 is not a text"),
         ({"value": "1e8 N/m", "status": "sure"}, "status = 'sure' is not known; it is one of given, guess"),
         (True, "True is not a stiffness"),
-        (Estimated(value=math.inf), "is not a finite number"),
-        (Estimated(value=math.nan), "is not a finite number"),
+        (Known(value=math.inf), "is not a finite number"),
+        (Known(value=math.nan), "is not a finite number"),
     ],
 )
 def test_refusals_name_the_value_and_the_way_out(written, told):

@@ -7,7 +7,7 @@ import pytest
 from tests.scaled_machines import TWELVE_NUMBERS
 
 from rotordrop.errors import UsageError
-from rotordrop.estimated import Estimated
+from rotordrop.known import Known
 from rotordrop.machine import example_machine, loads_machine
 from rotordrop.machine.simple import SimpleMachine, simple_machine
 
@@ -112,7 +112,7 @@ def test_an_unbalance_by_grade_becomes_one_of_its_own(machine):
 
 
 def test_an_estimate_keeps_what_is_known_about_it(machine):
-    estimate = Estimated(value=2e8, status="estimated", interval_90=(1e8, 3e8), source="drop 1")
+    estimate = Known(value=2e8, status="estimated", interval_90=(1e8, 3e8), source="drop 1")
     read = machine.with_values({"NDE.support.stiffness": estimate}).touchdown_bearings[0].support.stiffness
     assert (read.interval_90, read.source, read.unit) == ((1e8, 3e8), "drop 1", "N/m")
 

@@ -20,9 +20,9 @@ from rotordrop.estimate.document import estimate_document
 from rotordrop.estimate.estimate import Estimate, Verdict
 from rotordrop.estimate.fixed_values import fixed_correlations, read_fixed
 from rotordrop.estimate.schema import estimate_schema
-from rotordrop.estimated import IdentifiedValue
 from rotordrop.estimation import Replay, estimate_drop
 from rotordrop.evidence.speed import SpeedFit
+from rotordrop.known import Known
 from rotordrop.machine import Machine, example_path
 from rotordrop.replay import replay_estimate, uncertainty
 from rotordrop.replay.replay_estimate import _speed
@@ -158,7 +158,7 @@ def test_every_number_of_the_document_is_that_of_its_source(
 
 
 def test_the_speed_that_friction_took_is_shown_in_hertz() -> None:
-    air = IdentifiedValue(value=9.0)
+    air = Known(value=9.0, status="determined")
     fit = SpeedFit(
         initial=377.0,
         initial_error=0.1,
@@ -291,9 +291,9 @@ def test_fixed_belongs_to_the_replay(tmp_path: Path, capsys: pytest.CaptureFixtu
 def test_no_number_lies_outside_its_own_interval() -> None:
     """The replay is one of many possible drops: its late mean may lie beyond nine of ten draws."""
     sample = np.linspace(400.0, 430.0, 64)
-    mean = replay_estimate._mean(IdentifiedValue(value=415.0, unit="N"), sample, 0.01)
+    mean = replay_estimate._mean(Known(value=415.0, status="determined", unit="N"), sample, 0.01)
     assert mean.value == np.median(sample)
-    peak = replay_estimate.with_draws(IdentifiedValue(value=470.0, unit="N"), sample, 0.01)
+    peak = replay_estimate.with_draws(Known(value=470.0, status="determined", unit="N"), sample, 0.01)
     for value in (mean, peak):
         low, high = value.interval_90 or (math.nan, math.nan)
         assert low < value.value < high

@@ -21,7 +21,7 @@ from rotordrop.estimate.bearing_drop import (
     Peak,
     highest,
 )
-from rotordrop.estimated import IdentifiedValue
+from rotordrop.known import Known
 from rotordrop.report.drop_sections import displacement_figure, drop_sections, speed_figure
 from rotordrop.report.first_contact import first_contact_figure
 from rotordrop.report.friction_curve import FrictionLaw, friction_curve_figure
@@ -165,7 +165,7 @@ def test_radial_displacement_is_the_distance_from_the_centre() -> None:
 def test_a_long_record_counts_seconds() -> None:
     time = np.linspace(-0.25, 57.0, 20_001)
     long = History(label="measured", time=time, values=np.sin(time), role="measured")
-    peak = Peak(known=IdentifiedValue(value=1.0), time=12.5, origin=Origin.TWIN)
+    peak = Peak(known=Known(value=1.0, status="determined"), time=12.5, origin=Origin.TWIN)
     drawn = time_panels([[Panel(title="NDE", axis="force", histories=(long,), peak=peak)]], 1.0, "N")
     assert drawn.layout.xaxis.title.text == "time from power-off [s]"
     assert_allclose(drawn.data[0].x[[0, -1]], (-0.25, 57.0), rtol=SINGLE)
@@ -208,7 +208,7 @@ def test_the_first_contact_is_marked_with_its_times_and_depth() -> None:
 
 
 def test_the_force_has_its_band_its_peak_and_the_weight() -> None:
-    known = IdentifiedValue(value=3333.1, interval_90=(3180.0, 3490.0), unit="N")
+    known = Known(value=3333.1, status="determined", interval_90=(3180.0, 3490.0), unit="N")
     peak = Peak(known=known, time=0.00818, origin=Origin.TWIN)
     drawn = charts(drop("NDE", peak_force=peak), drop("DE"), loads={"NDE": 174.6, "DE": 409.1})["ball force"]
     values = history().values
@@ -223,7 +223,7 @@ def test_the_force_has_its_band_its_peak_and_the_weight() -> None:
 
 
 def test_a_window_cuts_history_and_band_and_hides_a_later_peak() -> None:
-    late = Peak(known=IdentifiedValue(value=2000.0), time=0.05, origin=Origin.TWIN)
+    late = Peak(known=Known(value=2000.0, status="determined"), time=0.05, origin=Origin.TWIN)
     panel = Panel(title="NDE", axis="force", histories=(history(),), band=band(history()), peak=late)
     drawn = time_panels([[panel.until(0.02)]], 1.0, "N")
     assert all(max(item.x) <= 20.0 for item in drawn.data)

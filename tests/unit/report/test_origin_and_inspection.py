@@ -12,7 +12,7 @@ import pytest
 
 from rotordrop.estimate.bearing_drop import BearingDrop, simulated_bearings
 from rotordrop.estimate.later_motion import LaterMotion
-from rotordrop.estimated import IdentifiedValue
+from rotordrop.known import Known
 from rotordrop.record.event_date import event_date
 from rotordrop.report.content import ReportContent
 from rotordrop.report.inspection import inspection_section, limits_section
@@ -78,7 +78,7 @@ def estimate(drop_result: DropResult, **changes: Any) -> Any:
 
 
 def stressed(bearing: BearingDrop, value: float, high: float) -> BearingDrop:
-    known = IdentifiedValue(value=value, interval_90=(0.9 * value, high), unit="Pa")
+    known = Known(value=value, status="determined", interval_90=(0.9 * value, high), unit="Pa")
     return replace(bearing, peak_stress=replace(bearing.peak_stress, known=known))
 
 

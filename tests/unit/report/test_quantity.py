@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from rotordrop.estimated import IdentifiedValue
+from rotordrop.known import Known
 from rotordrop.report.quantity import Quantity, with_error, written
 
 THIN = "\u202f"
@@ -49,9 +49,7 @@ def test_limits_of_the_record_are_shown_as_limits() -> None:
 
 
 def test_an_identified_value_brings_its_interval_along() -> None:
-    known = IdentifiedValue(
-        value=1e8, interval_90=(0.9e8, 1.1e8), standard_error=0.06e8, status="at its bound"
-    )
+    known = Known(value=1e8, interval_90=(0.9e8, 1.1e8), standard_error=0.06e8, status="at its bound")
     quantity = Quantity.of(known, "stiffness")
     assert quantity.interval_text == "90 to 110 N/µm"
     assert quantity.status == "at its bound"
@@ -85,7 +83,7 @@ def test_a_number_has_the_digits_of_its_error(value: float, error: float | None,
 
 def test_what_the_record_leaves_open_stands_apart_from_the_allowance():
     """Independent parts: 30 and 40 of a half width of 50."""
-    known = IdentifiedValue(value=1000.0, interval_90=(950.0, 1050.0), allowance_90=40.0, unit="N")
+    known = Known(value=1000.0, status="determined", interval_90=(950.0, 1050.0), allowance_90=40.0, unit="N")
     shown = Quantity.of(known, "force")
     assert shown.parts_text == "record ± 30, allowance ± 40 N"
     assert Quantity.of(known, "force", range_only=True).parts_text == ""

@@ -14,9 +14,9 @@ from rotordrop.estimate.agreement import Agreement, compare_orbits
 from rotordrop.estimate.bearing_drop import BearingDrop, Motion, Origin, Peak, simulated_bearings
 from rotordrop.estimate.estimate import Estimate, FittedParameter, ReplaySteps, Verdict
 from rotordrop.estimate.methods import Replay
-from rotordrop.estimated import Correlation, IdentifiedValue
 from rotordrop.evidence.first_contact import TimedContact
 from rotordrop.identification.friction import FrictionSweep
+from rotordrop.known import Correlation, Known
 from rotordrop.machine import example_machine
 from rotordrop.report.content import Section
 from rotordrop.report.estimate_numbers import identified_table
@@ -49,16 +49,16 @@ SWEEP = FrictionSweep(
     coefficients=np.array([0.05, 0.1, 0.15]),
     disagreement=np.array([9e-6, 3e-6, 7e-6]),
     best=np.array([0.11, 0.112]),
-    value=IdentifiedValue(value=0.11, interval_90=(0.107, 0.114), standard_error=0.002, unit="1"),
+    value=Known(value=0.11, status="determined", interval_90=(0.107, 0.114), standard_error=0.002, unit="1"),
     window=(0.0075, 0.0405),
 )
 
 
-STIFFNESS = IdentifiedValue(value=7.8e7, interval_90=(7.7e7, 7.9e7), start=1e8, unit="N/m")
+STIFFNESS = Known(value=7.8e7, status="determined", interval_90=(7.7e7, 7.9e7), start=1e8, unit="N/m")
 
 
 def peak(value: float, interval: tuple[float, float] | None) -> Peak:
-    known = IdentifiedValue(value=value, interval_90=interval, unit="N")
+    known = Known(value=value, status="determined", interval_90=interval, unit="N")
     return Peak(known=known, time=0.009, origin=Origin.REPLAY)
 
 
@@ -79,7 +79,7 @@ def as_replayed(bearing: BearingDrop, gap: float) -> BearingDrop:
         peak_force=peak(3333.0, (3000.0, 3700.0)),
         peak_stress=peak(1.8e9, None),
         values={
-            "air_gap_m": IdentifiedValue(value=gap, lower=gap - 5e-6, upper=gap, unit="m"),
+            "air_gap_m": Known(value=gap, status="determined", lower=gap - 5e-6, upper=gap, unit="m"),
             "support.stiffness_N_per_m": STIFFNESS,
         },
         missing={"peak_stress_Pa": "no interval: 2 draws, at least 64 are needed"},
@@ -109,7 +109,7 @@ def drop(drop_result: DropResult, agreement: Agreement) -> Estimate:
     speed = SimpleNamespace(
         initial=2 * np.pi * 60.0,
         profile_time_constant=5.9,
-        aero_time_constant=IdentifiedValue(value=7.5, interval_90=(7.0, 8.0), unit="s"),
+        aero_time_constant=Known(value=7.5, status="determined", interval_90=(7.0, 8.0), unit="s"),
     )
     steps = ReplaySteps(
         speed=cast(Any, speed),
@@ -139,7 +139,7 @@ def drop(drop_result: DropResult, agreement: Agreement) -> Estimate:
             FittedParameter(
                 row=parameter("support.stiffness"),
                 owner="NDE",
-                prior=IdentifiedValue(value=1e8, unit="N/m"),
+                prior=Known(value=1e8, status="determined", unit="N/m"),
                 estimate=STIFFNESS,
             ),
         ),
@@ -262,7 +262,7 @@ def test_the_page_is_complete(drop: Estimate) -> None:
 
 
 def test_values_of_an_earlier_estimate_are_called_so(drop: Estimate) -> None:
-    taken = IdentifiedValue(value=2e7, status="taken over", unit="N/m")
+    taken = Known(value=2e7, status="taken over", unit="N/m")
     undetermined = replace(taken, status="the record does not determine it")
     values = {"support.stiffness_N_per_m": taken, "equivalent_stiffness_N_per_m": undetermined}
     bearing = replace(drop.bearings[1], values=values)

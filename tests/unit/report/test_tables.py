@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 
 from rotordrop.estimate.bearing_drop import simulated_bearings
 from rotordrop.estimate.estimate import CrossCheck
-from rotordrop.estimated import IdentifiedValue
+from rotordrop.known import Known
 from rotordrop.report.content import Table
 from rotordrop.report.estimate_page import cross_check_statements, cross_check_table
 from rotordrop.report.impacts import impact_figure, impact_table, ring_forces
@@ -56,7 +56,7 @@ def test_the_weakest_impacts_are_left_out_and_counted(drop_result: DropResult) -
 
 def test_impacts_are_drawn_round_the_race_with_their_interval(drop_result: DropResult) -> None:
     nde, de = simulated_bearings(drop_result)
-    force = IdentifiedValue(value=2644.0, interval_90=(2600.0, 2750.0), unit="N")
+    force = Known(value=2644.0, interval_90=(2600.0, 2750.0), unit="N")
     known = replace(nde, impacts=(replace(nde.impacts[0], peak_force=force),))
     drawn = impact_figure([known, de], force="contact force")
     bar, first, second = drawn.data
@@ -89,13 +89,13 @@ def test_a_drag_is_shown_as_the_slowing_it_causes_in_hertz_per_second() -> None:
     """At 60 Hz: dry 2π rad/s² is 1 Hz/s, linear 0.1 /s is 6 Hz/s, quadratic 1e-3 /rad is 2π·3.6 Hz/s."""
     turn = 2.0 * np.pi
     drag = SimpleNamespace(
-        initial_speed=IdentifiedValue(value=60.0 * turn),
-        constant=IdentifiedValue(value=turn, interval_90=(0.9 * turn, 1.1 * turn)),
-        linear=IdentifiedValue(value=0.1, interval_90=(0.09, 0.11)),
-        quadratic=IdentifiedValue(value=1e-3, interval_90=(0.9e-3, 1.1e-3)),
+        initial_speed=Known(value=60.0 * turn),
+        constant=Known(value=turn, interval_90=(0.9 * turn, 1.1 * turn)),
+        linear=Known(value=0.1, interval_90=(0.09, 0.11)),
+        quadratic=Known(value=1e-3, interval_90=(0.9e-3, 1.1e-3)),
     )
-    exponential = SimpleNamespace(time_constant=IdentifiedValue(value=9.0))
-    law: Any = SimpleNamespace(exponential=exponential, drag=drag, standstill=IdentifiedValue(value=50.0))
+    exponential = SimpleNamespace(time_constant=Known(value=9.0))
+    law: Any = SimpleNamespace(exponential=exponential, drag=drag, standstill=Known(value=50.0))
     found = [row[1:3] for row in _law_rows(law)[1:4]]
     assert found == [
         ("1.00 Hz/s", "0.90 to 1.10 Hz/s"),
@@ -134,7 +134,7 @@ def test_parameters_are_drawn_relative_to_their_prior() -> None:
 def check(estimate: float, other: float) -> CrossCheck:
     return CrossCheck(
         name="NDE peak force",
-        estimate=IdentifiedValue(value=estimate, unit="N"),
+        estimate=Known(value=estimate, unit="N"),
         check=other,
         accuracy=0.15,
     )

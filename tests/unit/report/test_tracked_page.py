@@ -14,8 +14,8 @@ from rotordrop.estimate.bearing_drop import Origin
 from rotordrop.estimate.document import estimate_document
 from rotordrop.estimate.estimate import CrossCheck, Estimate, Verdict
 from rotordrop.estimate.later_motion import LaterMotion
-from rotordrop.estimated import IdentifiedValue
 from rotordrop.evidence.quality.finding import Finding
+from rotordrop.known import Known
 from rotordrop.record.simulated import is_simulated
 from rotordrop.report.content import Table
 from rotordrop.report.drop_sections import drop_sections
@@ -187,7 +187,7 @@ def test_loads_of_the_cross_check_are_called_so(estimate: Estimate) -> None:
 def compared(value: float, other: float, *, replaced: bool = False) -> CrossCheck:
     return CrossCheck(
         name="NDE peak force",
-        estimate=IdentifiedValue(value=value, unit="N"),
+        estimate=Known(value=value, status="determined", unit="N"),
         check=other,
         accuracy=0.15,
         replaced=replaced,

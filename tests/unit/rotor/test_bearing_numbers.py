@@ -8,7 +8,7 @@ import pytest
 from tests.scaled_machines import scaled_machine
 
 from rotordrop.elements.bearing_numbers import numbers_of
-from rotordrop.estimated import Estimated
+from rotordrop.known import Known
 from rotordrop.machine import Machine, example_machine
 from rotordrop.physics.ball_bearing import bearing_constants
 from rotordrop.rotor.machine_summary import summarise_machine
@@ -55,7 +55,7 @@ def test_a_loose_row_states_its_play_along_and_across():
 
 def test_a_preload_beyond_the_static_stress_is_doubted(paper):
     bearing = paper.touchdown_bearings[0]
-    pressed = bearing.changed(bearing=bearing.bearing.changed(preload=Estimated(value=2e5)))
+    pressed = bearing.changed(bearing=bearing.bearing.changed(preload=Known(value=2e5)))
     machine = paper.model_copy(update={"touchdown_bearings": (pressed, paper.touchdown_bearings[1])})
     found = machine_warnings(machine, summarise_machine(machine))
     (told,) = (warning for warning in found if warning.kind == "preload" and warning.limit == 4.2e9)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rotordrop.estimated import NINETY, Estimated
+from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
 from rotordrop.machine.examples import example_machine
 from rotordrop.rotor.parameter_table import parameter, rows
@@ -43,26 +43,26 @@ def test_a_range_is_the_prior_interval_wherever_the_guess_lies(lp400):
 def test_a_range_of_a_positive_quantity_too(lp400, path):
     value = float(parameter(path).described(lp400.bearing("DE")))
     limits = 0.9 * value, 3.0 * value
-    guess = Estimated(value=value, status="guess", range=limits)
+    guess = Known(value=value, status="guess", range=limits)
     found = unknown_of(lp400.with_values({f"DE.{path}": guess}), f"DE.{path}")
     assert ninety(found) == pytest.approx(limits, rel=1e-6)
     assert found.value_of(found.begin) == pytest.approx(value, rel=1e-6)
 
 
 def test_an_interval_that_is_not_centred_on_its_value_is_kept_as_well():
-    found = prior(GAP, Estimated(value=2.6e-4, status="estimated", interval_90=(2.5e-4, 3.0e-4)))
+    found = prior(GAP, Known(value=2.6e-4, status="estimated", interval_90=(2.5e-4, 3.0e-4)))
     assert found.mean - NINETY * found.sigma == pytest.approx(2.5e-4)
     assert found.mean + NINETY * found.sigma == pytest.approx(3.0e-4)
     assert found.start == 2.6e-4
 
 
 def test_a_centred_interval_leaves_the_value_as_it_is():
-    value = Estimated(value=1e8, status="estimated", interval_90=(1e8 / 1.3, 1.3e8))
+    value = Known(value=1e8, status="estimated", interval_90=(1e8 / 1.3, 1.3e8))
     assert prior(STIFFNESS, value).mean == prior(STIFFNESS, value).start == math.log(1e8)
 
 
 def test_a_range_from_zero_on_is_left_above_by_one_in_twenty():
-    found = prior(parameter("contact.damping"), Estimated(value=0.08, status="guess", range=(0.0, 0.5)))
+    found = prior(parameter("contact.damping"), Known(value=0.08, status="guess", range=(0.0, 0.5)))
     assert found.mean == found.start == math.log(0.08)
     assert math.exp(found.mean + NINETY * found.sigma) == pytest.approx(0.5)
 
@@ -73,20 +73,20 @@ def test_only_an_estimate_counts_as_calibrated(lp400, status):
     for row in rows("bearing"):
         if not row.entries or row.path == "support.anisotropy":
             continue
-        value = Estimated(value=float(row.described(lp400.bearing("NDE"))), status=status)
+        value = Known(value=float(row.described(lp400.bearing("NDE"))), status=status)
         found = unknown_of(lp400.with_values({row.path_of("NDE"): value}), row.path_of("NDE"))
         assert found.calibrated == (status == "estimated"), row.path
 
 
 def test_the_range_of_a_guessed_sensor_counts_and_that_of_a_default_does_not():
-    guess = Estimated(value=1.01, status="guess", range=(0.97, 1.03))
+    guess = Known(value=1.01, status="guess", range=(0.97, 1.03))
     assert sensor_prior(GAIN, guess, 250e-6).sigma == pytest.approx(0.06 / (2.0 * NINETY))
     assert sensor_prior(GAIN, guess, 250e-6).mean == pytest.approx(1.0)
-    default = Estimated(value=1.0, status="default", range=(0.97, 1.03))
+    default = Known(value=1.0, status="default", range=(0.97, 1.03))
     assert sensor_prior(GAIN, default, 250e-6).sigma == pytest.approx(0.01)
-    zero = Estimated(value=0.0, status="default", range=(-50e-6, 50e-6))
+    zero = Known(value=0.0, status="default", range=(-50e-6, 50e-6))
     assert sensor_prior(OFFSET, zero, 250e-6).sigma == pytest.approx(10e-6)
-    known = Estimated(value=2e-6, status="estimated", standard_error=1e-6)
+    known = Known(value=2e-6, status="estimated", standard_error=1e-6)
     assert sensor_prior(OFFSET, known, 250e-6).sigma == 1e-6
 
 

@@ -12,8 +12,9 @@ from scipy.stats import kstest
 from rotordrop import example_machine, save_machine
 from rotordrop.cli.app import run
 from rotordrop.errors import UsageError
+from rotordrop.known import Known
 from rotordrop.study.plan import read_study
-from rotordrop.study.repeat import Recorded, place_among, recorded_numbers, repeat_study, repeats
+from rotordrop.study.repeat import place_among, recorded_numbers, repeat_study, repeats
 from rotordrop.study.summary import StudyResults
 
 MACHINE = example_machine("lp400")
@@ -33,7 +34,7 @@ DOCUMENT = {
 def test_a_further_draw_lies_anywhere_with_equal_probability():
     random = np.random.default_rng(2)
     places = [
-        place_among(random.gamma(3.0, 1.0, 400), Recorded(value=random.gamma(3.0, 1.0))).value
+        place_among(random.gamma(3.0, 1.0, 400), Known(value=random.gamma(3.0, 1.0))).value
         for _ in range(300)
     ]
     assert kstest(places, "uniform").pvalue > 0.01
@@ -43,17 +44,17 @@ def test_the_interval_of_a_place_holds_the_true_share():
     random, held = np.random.default_rng(3), 0
     for _ in range(300):
         share = random.uniform(0.02, 0.98)
-        found = place_among(random.uniform(0.0, 1.0, 200), Recorded(value=share))
-        held += found.lower <= share <= found.upper
+        found = place_among(random.uniform(0.0, 1.0, 200), Known(value=share))
+        held += found.low <= share <= found.high
     assert held >= 0.88 * 300
 
 
 def test_an_uncertain_number_has_an_uncertain_place():
     values = np.linspace(0.0, 1.0, 1001)
-    sharp = place_among(values, Recorded(value=0.5, interval=(0.5, 0.5)))
-    vague = place_among(values, Recorded(value=0.5, interval=(0.3, 0.7)))
+    sharp = place_among(values, Known(value=0.5, interval_90=(0.5, 0.5)))
+    vague = place_among(values, Known(value=0.5, interval_90=(0.3, 0.7)))
     assert sharp.value == pytest.approx(vague.value, abs=1e-3)
-    assert vague.upper - vague.lower > 0.35 > 0.1 > sharp.upper - sharp.lower
+    assert vague.high - vague.low > 0.35 > 0.1 > sharp.high - sharp.low
 
 
 def test_the_worst_of_a_hundred():
@@ -72,7 +73,7 @@ def test_the_worst_of_a_hundred():
     )
     one = repeats(results, worst_of=100)[0]
     assert one.worst.value == pytest.approx(0.5**0.01, abs=3e-3)
-    assert one.worst.lower < 0.5**0.01 < one.worst.upper
+    assert one.worst.low < 0.5**0.01 < one.worst.high
     assert (one.low.value, one.high.value) == pytest.approx((0.05, 0.95), abs=0.015)
     with pytest.raises(UsageError, match="worst of 1; expected two drops or more"):
         repeats(results, worst_of=1)
@@ -80,8 +81,8 @@ def test_the_worst_of_a_hundred():
 
 def test_numbers_of_an_estimate_are_found_by_their_column():
     found = recorded_numbers(DOCUMENT)
-    assert found["NDE.peak_force"] == Recorded(value=2500.0, interval=(2450.0, 2550.0))
-    assert found["NDE.impulse"] == Recorded(value=2.0)
+    assert found["NDE.peak_force"] == Known(value=2500.0, interval_90=(2450.0, 2550.0))
+    assert found["NDE.impulse"] == Known(value=2.0)
     assert set(found) == {"NDE.peak_force", "NDE.impulse"}
     with pytest.raises(UsageError, match="is no estimate of one drop"):
         recorded_numbers({"drops": {}})

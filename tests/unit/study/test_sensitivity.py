@@ -54,7 +54,7 @@ def test_indices_of_the_ishigami_function():
         one = found[PLACES[letter]]
         assert one.alone.value == pytest.approx(alone, abs=0.03)
         assert one.total.value == pytest.approx(total, abs=0.03)
-        assert one.total.lower < total < one.total.upper or abs(one.total.value - total) < 0.01
+        assert one.total.low < total < one.total.high or abs(one.total.value - total) < 0.01
 
 
 @pytest.mark.parametrize("design", ["random", "sobol"])

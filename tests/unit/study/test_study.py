@@ -294,12 +294,12 @@ def test_a_study_ends_when_its_quantile_is_known_whatever_was_finished_first(tmp
     assert needed is not None and needed < study.shards
     assert len(results) == 3 * needed
     found = results.quantile("DE.peak_stress", 0.5)
-    assert 0.5 * (found.upper - found.lower) <= 0.01 * found.value
+    assert 0.5 * (found.high - found.low) <= 0.01 * found.value
     fewer = results.numbers["DE.peak_stress"][: 3 * (needed - 1)]
     from rotordrop.study.summary import quantile
 
     before = quantile(fewer, 0.5)
-    assert not 0.5 * (before.upper - before.lower) <= 0.01 * before.value
+    assert not 0.5 * (before.high - before.low) <= 0.01 * before.value
 
 
 def test_the_end_is_looked_for_without_reading_a_shard_twice(tmp_path, monkeypatch):

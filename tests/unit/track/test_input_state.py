@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import IdentificationError
-from rotordrop.estimated import Estimated
+from rotordrop.known import Known
 from rotordrop.physics import columns as L
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.track import _propagation as P
@@ -205,9 +205,7 @@ def test_a_loose_race_opens_the_gate_by_its_play(flight):
     tight = lent_by_record(flight)
     machine = flight.model.machine
     bearing = machine.touchdown_bearings[0]
-    ball = bearing.bearing.model_copy(
-        update={"clearance": Estimated(value=40e-6), "preload": Estimated(value=0.0)}
-    )
+    ball = bearing.bearing.model_copy(update={"clearance": Known(value=40e-6), "preload": Known(value=0.0)})
     loose = bearing.model_copy(update={"bearing": ball})
     changed = machine.model_copy(update={"touchdown_bearings": (loose, *machine.touchdown_bearings[1:])})
     reach = lent_by_record(replace(flight, model=replace(flight.model, machine=changed))).reach

@@ -16,8 +16,8 @@ from tests.unit.track.test_propagation import (
 )
 
 from rotordrop.errors import UsageError
-from rotordrop.estimated import Estimated
 from rotordrop.evidence.evidence import Evidence
+from rotordrop.known import Known
 from rotordrop.machine import Machine, loads_machine
 from rotordrop.machine.saving import machine_text
 from rotordrop.physics import columns as L
@@ -43,11 +43,11 @@ STRUCTURE = {
 def structured(machine: Machine, status: str = "guess") -> Machine:
     """The machine on turned, cubic supports whose foundations give way, with a stiffer rotor."""
     values = {
-        f"{bearing.name}.{path}": Estimated(value=value, status=status)
+        f"{bearing.name}.{path}": Known(value=value, status=status)
         for bearing in machine.touchdown_bearings
         for path, value in STRUCTURE.items()
     }
-    return machine.with_values(values | {"rotor.stiffness_factor": Estimated(value=1.02, status=status)})
+    return machine.with_values(values | {"rotor.stiffness_factor": Known(value=1.02, status=status)})
 
 
 def sensing(machine: Machine) -> Machine:
@@ -55,7 +55,7 @@ def sensing(machine: Machine) -> Machine:
     values = {"time_constant": 8e-5, "cross_axis": 0.02, "follows_housing": 0.3, "plane_offset": 4e-3}
     return machine.with_values(
         {
-            f"sensors.{sensor.name}.{path}": Estimated(value=value, status="guess")
+            f"sensors.{sensor.name}.{path}": Known(value=value, status="guess")
             for sensor in machine.sensors
             for path, value in values.items()
         }

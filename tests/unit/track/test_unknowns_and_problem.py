@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import IdentificationError, RecordError
-from rotordrop.estimated import NINETY, Estimated
 from rotordrop.evidence.evidence import Missing, read_evidence
+from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine, example_machine
 from rotordrop.physics.ball_bearing import bearing_constants, preload_of_offset
 from rotordrop.record.record import read_record
@@ -43,20 +43,20 @@ def unknown_of(machine: Machine, path: str):
 @pytest.mark.parametrize(
     ("quantity", "expected"),
     [
-        (Estimated(value=1e8, status="guess", range=(0.5e8, 2e8)), math.log(4.0) / (2 * NINETY)),
+        (Known(value=1e8, status="guess", range=(0.5e8, 2e8)), math.log(4.0) / (2 * NINETY)),
         (
-            Estimated(value=1e8, status="estimated", interval_90=(0.9e8, 1.1e8)),
+            Known(value=1e8, status="estimated", interval_90=(0.9e8, 1.1e8)),
             math.log(11 / 9) / (2 * NINETY),
         ),
         (
-            Estimated(value=1e8, status="estimated", interval_90=(0.99e8, 1.01e8), range=(0.5e8, 2e8)),
+            Known(value=1e8, status="estimated", interval_90=(0.99e8, 1.01e8), range=(0.5e8, 2e8)),
             math.log(101 / 99) / (2 * NINETY),
         ),
-        (Estimated(value=1e8, status="estimated", standard_error=2e6), 0.02),
-        (Estimated(value=1e8, status="guess"), 0.5),
-        (Estimated(value=1e8, status="default"), 0.5),
-        (Estimated(value=1e8, status="given"), 0.05),
-        (Estimated(value=1e8, status="estimated", interval_90=(1e8, 1e8)), 1e-4),
+        (Known(value=1e8, status="estimated", standard_error=2e6), 0.02),
+        (Known(value=1e8, status="guess"), 0.5),
+        (Known(value=1e8, status="default"), 0.5),
+        (Known(value=1e8, status="given"), 0.05),
+        (Known(value=1e8, status="estimated", interval_90=(1e8, 1e8)), 1e-4),
     ],
 )
 def test_the_prior_comes_from_interval_range_error_or_status(quantity, expected):
@@ -126,7 +126,7 @@ def test_the_aerodynamic_constant_has_a_start_even_when_nobody_knows_it(lp400):
     assert lp400.speed.aero_time_constant is None
     assert aero_time_constant(lp400) == 10.0
     known = lp400.model_copy(
-        update={"speed": lp400.speed.model_copy(update={"aero_time_constant": Estimated(value=7.0)})}
+        update={"speed": lp400.speed.model_copy(update={"aero_time_constant": Known(value=7.0)})}
     )
     assert aero_time_constant(known) == 7.0
 
@@ -137,8 +137,8 @@ def test_the_aerodynamic_constant_has_a_start_even_when_nobody_knows_it(lp400):
 def test_sensors_start_from_what_the_machine_says(lp400, prepared):
     known = lp400.with_values(
         {
-            "sensors.S_NDE_A.gain": Estimated(value=1.02, status="estimated", interval_90=(1.019, 1.021)),
-            "sensors.S_NDE_A.offset": Estimated(value=4e-6, status="estimated", interval_90=(3e-6, 5e-6)),
+            "sensors.S_NDE_A.gain": Known(value=1.02, status="estimated", interval_90=(1.019, 1.021)),
+            "sensors.S_NDE_A.offset": Known(value=4e-6, status="estimated", interval_90=(3e-6, 5e-6)),
         }
     )
     problem = drop_problem(
@@ -354,7 +354,7 @@ def test_a_trajectory_carried_to_the_same_basis_is_the_same(flight, random):
 
 
 def test_an_exponent_calibrated_at_its_bound_is_not_taken_for_exact(lp400: Machine) -> None:
-    bound = Estimated(value=1.0, status="estimated", interval_90=(1.0, 1.0))
+    bound = Known(value=1.0, status="estimated", interval_90=(1.0, 1.0))
     unknowns = all_unknowns(
         build_drop_model(lp400.with_values({"NDE.contact.exponent": bound}), Reduction(modes=4))
     )

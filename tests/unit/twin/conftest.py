@@ -10,9 +10,9 @@ import pytest
 from rotordrop.estimate.estimate import Estimate
 from rotordrop.estimate.methods import Tracked
 from rotordrop.estimate.record_facts import facts_of
-from rotordrop.estimated import Estimated
 from rotordrop.estimation import estimate_drop
 from rotordrop.evidence.evidence import read_evidence
+from rotordrop.known import Known
 from rotordrop.machine import Machine
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.twin.tracked import TrackedDrop, followed_drops
@@ -39,7 +39,7 @@ NINETY = 1.6448536269514722
 def calibrated_about(known: Machine, hidden: HiddenMachine, seed: int, share: float) -> Machine:
     """The owner's machine with estimates near the truth, off by a share of their standard error."""
     random = np.random.default_rng(seed)
-    values: dict[str, Estimated] = {}
+    values: dict[str, Known] = {}
     for bearing in hidden.machine.touchdown_bearings:
         for path, sigma in CALIBRATED.items():
             part = bearing.bearing if path == "preload" else bearing
@@ -47,14 +47,14 @@ def calibrated_about(known: Machine, hidden: HiddenMachine, seed: int, share: fl
                 part = getattr(part, name)
             value = float(part) * math.exp(share * sigma * random.standard_normal())
             half = math.exp(NINETY * sigma)
-            values[f"{bearing.name}.{path}"] = Estimated(
+            values[f"{bearing.name}.{path}"] = Known(
                 value=value,
                 status="estimated",
                 interval_90=(value / half, value * half),
                 source="calibration",
             )
         gap = float(bearing.air_gap) + share * GAP_SIGMA * random.standard_normal()
-        values[f"{bearing.name}.air_gap"] = Estimated(
+        values[f"{bearing.name}.air_gap"] = Known(
             value=gap,
             status="estimated",
             interval_90=(gap - NINETY * GAP_SIGMA, gap + NINETY * GAP_SIGMA),
@@ -72,7 +72,7 @@ def calibrated(known: Machine, hidden: HiddenMachine) -> Machine:
 @pytest.fixture(scope="session")
 def informed(known: Machine, hidden: HiddenMachine) -> Machine:
     """The machine with the true parameters of the hidden one, known to half a per cent, friction to five."""
-    values: dict[str, Estimated] = {}
+    values: dict[str, Known] = {}
     for bearing in hidden.machine.touchdown_bearings:
         for path in (*CALIBRATED, "air_gap", "contact.exponent"):
             part = bearing.bearing if path == "preload" else bearing
@@ -80,7 +80,7 @@ def informed(known: Machine, hidden: HiddenMachine) -> Machine:
                 part = getattr(part, name)
             value = float(part)
             share = 0.05 if path.startswith("friction") else 0.005
-            values[f"{bearing.name}.{path}"] = Estimated(
+            values[f"{bearing.name}.{path}"] = Known(
                 value=value,
                 status="estimated",
                 interval_90=(value * (1.0 - share), value * (1.0 + share)),

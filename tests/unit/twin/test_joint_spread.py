@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rotordrop.estimated import NINETY
+from rotordrop.known import NINETY
 from rotordrop.machine import example_machine
 from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin
 from rotordrop.rotor.joint_values import correlate

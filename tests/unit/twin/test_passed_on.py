@@ -17,7 +17,7 @@ from rotordrop.estimate.bearing_values import equivalent_stiffness
 from rotordrop.estimate.document import _heading
 from rotordrop.estimate.estimate import Verdict
 from rotordrop.estimate.later_motion import RESOLVED, later_motion
-from rotordrop.estimated import IdentifiedValue
+from rotordrop.known import Known
 from rotordrop.machine import example_machine
 from rotordrop.rotor.parameter_table import parameter
 from rotordrop.rotor.parameters import build_drop_model
@@ -303,8 +303,8 @@ def test_a_simulated_coast_down_is_seen_where_the_sensors_are(monkeypatch: pytes
 def test_the_equivalent_stiffness_is_as_unsure_as_what_holds_the_balls() -> None:
     """The bearing at the preload that was found, not that of the file; both widths of both parts."""
     machine = example_machine("lp400")
-    support = IdentifiedValue(value=80e6, interval_90=(78e6, 82e6), unit="N/m")
-    preload = IdentifiedValue(value=700.0, interval_90=(500.0, 900.0), unit="N")
+    support = Known(value=80e6, status="determined", interval_90=(78e6, 82e6), unit="N/m")
+    preload = Known(value=700.0, status="determined", interval_90=(500.0, 900.0), unit="N")
     found = equivalent_stiffness(machine, 0, 300.0, support, preload)
 
     def series(held: float, stiffness: float) -> float:

@@ -14,7 +14,7 @@ import pytest
 from rotordrop.errors import IdentificationError
 from rotordrop.estimate.document import structure_json
 from rotordrop.estimate.estimate import Verdict
-from rotordrop.estimated import IdentifiedValue
+from rotordrop.known import Known
 from rotordrop.machine import Machine, example_machine, load_machine, save_machine
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns
@@ -220,9 +220,7 @@ def test_the_soft_axis_is_that_of_the_stiffness_matrix(turn, ratio):
 
 
 def test_a_derived_number_has_the_interval_of_what_it_follows_from():
-    one, two = (
-        IdentifiedValue(value=v, interval_90=(v - half, v + half)) for v, half in ((3.0, 0.3), (4.0, 0.4))
-    )
+    one, two = (Known(value=v, interval_90=(v - half, v + half)) for v, half in ((3.0, 0.3), (4.0, 0.4)))
     assert derived(lambda a, b: a + b, one, two) == pytest.approx((7.0, 6.5, 7.5))
 
 
@@ -230,7 +228,7 @@ def test_a_derived_number_has_the_interval_of_what_it_follows_from():
 def test_every_extension_says_what_was_found_with_its_interval(lp400, extension):
     machine = extension.added_to(lp400)
     values = {
-        u.path: IdentifiedValue(value=u.value_of(u.begin), interval_90=(0.9 * u.begin, 1.1 * u.begin + 1e-6))
+        u.path: Known(value=u.value_of(u.begin), interval_90=(0.9 * u.begin, 1.1 * u.begin + 1e-6))
         for u in all_unknowns(build_drop_model(machine, "quick"))
     }
     said = structure_of(Kept(extension=extension, gain=math.inf), machine, values)
@@ -254,7 +252,7 @@ def test_an_unbalance_beyond_its_grade_is_known_by_its_field_and_outlives_the_fi
     back = load_machine(tmp_path / "machine.toml")
     assert float(back.unbalances[0].beyond_described) == 3.0
     assert extension.values(back) == {}
-    said = {f"unbalance.{i}.{p}": IdentifiedValue(value=2e-5) for i in range(2) for p in ("cosine", "sine")}
+    said = {f"unbalance.{i}.{p}": Known(value=2e-5) for i in range(2) for p in ("cosine", "sine")}
     found = _with_unbalance(back, said).unbalances[0]
     assert float(found.amount) == pytest.approx(np.hypot(2e-5, 2e-5))
     assert float(found.beyond_described) == pytest.approx(
@@ -270,6 +268,6 @@ def test_an_unbalance_beyond_its_grade_is_known_by_its_field_and_outlives_the_fi
 def test_the_lift_of_the_magnets_is_longer_or_shorter_and_not_both(lp400, low, high, words):
     extension = next(one for one in EXTENSIONS if one.name == "long remanence")
     middle = 0.5 * (low + high)
-    value = IdentifiedValue(value=middle, interval_90=(low, high))
+    value = Known(value=middle, interval_90=(low, high))
     kept = Kept(extension=extension, gain=50.0)
     assert words in structure_of(kept, lp400, {"remanence.time_constant": value}).sentence

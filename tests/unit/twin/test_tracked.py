@@ -23,20 +23,17 @@ from rotordrop.estimate.document import combined, estimate_document
 from rotordrop.estimate.estimate import Estimate, Verdict
 from rotordrop.estimate.record_facts import RecordFacts, facts_of
 from rotordrop.estimate.schema import estimate_schema
-from rotordrop.estimated import Estimated, IdentifiedValue
 from rotordrop.estimation import Tracked, estimate_drop, estimate_drops
 from rotordrop.evidence.evidence import Evidence, Missing, read_evidence
 from rotordrop.evidence.power_off import PowerOff
+from rotordrop.known import Known
 from rotordrop.machine import Machine, example_machine, load_machine
 from rotordrop.record.examples import example_record_path
 from rotordrop.record.record import Record, read_record
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.track.calibration import TrackedDrops, beside_the_record
 from rotordrop.track.consistency import Check
-from rotordrop.track.input_state import (
-    input_state_estimate,
-    lent_by_record,
-)
+from rotordrop.track.input_state import input_state_estimate, lent_by_record
 from rotordrop.track.smoother import parameter_sample
 from rotordrop.twin.tracked import (
     TrackedDrop,
@@ -73,7 +70,7 @@ def document(drop: Estimate) -> dict[str, Any]:
     return written
 
 
-def number(drop: Estimate, name: str, field: str) -> IdentifiedValue:
+def number(drop: Estimate, name: str, field: str) -> Known:
     bearing = drop.bearing(name)
     peaks = {"peak_force_N": bearing.peak_force.known, "peak_stress_Pa": bearing.peak_stress.known}
     return peaks[field] if field in peaks else bearing.values[field]
@@ -390,7 +387,7 @@ def test_a_peak_far_from_the_cross_check_is_not_called_consistent(workshop: Trac
 def test_a_bearing_with_play_is_cross_checked_however_quick(workshop: TrackedDrop) -> None:
     model = workshop.problem.model
     first, *others = model.machine.touchdown_bearings
-    play = {"clearance": Estimated(value=20e-6), "preload": Estimated(value=0.0)}
+    play = {"clearance": Known(value=20e-6), "preload": Known(value=0.0)}
     ball = first.bearing.model_copy(update=play)
     loose = (first.model_copy(update={"bearing": ball}), *others)
     machine = model.machine.model_copy(update={"touchdown_bearings": loose})

@@ -12,7 +12,7 @@ import pytest
 from rotordrop.estimate.document import estimate_document
 from rotordrop.estimate.estimate import Estimate
 from rotordrop.estimate.later_motion import RESOLVED
-from rotordrop.estimated import IdentifiedValue
+from rotordrop.known import Known
 from rotordrop.report.estimate_page import estimate_page
 from rotordrop.report.page import render_page
 from rotordrop.report.quantity import Quantity
@@ -29,7 +29,7 @@ def document(tracked: Estimate) -> dict[str, Any]:
     return written
 
 
-def same(written: dict[str, Any], known: IdentifiedValue) -> bool:
+def same(written: dict[str, Any], known: Known) -> bool:
     error, interval = written.get("standard_error"), written.get("interval_90")
     return (
         written["value"] == known.value

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rotordrop.estimated import NINETY
+from rotordrop.known import NINETY
 from rotordrop.twin.tracked_loads import holding, with_interval
 
 

@@ -10,8 +10,8 @@ import pytest
 from rotordrop.estimate.document import estimate_document
 from rotordrop.estimate.estimate import Estimate
 from rotordrop.estimate.unbalance import PlaneUnbalance, unbalance_notes
-from rotordrop.estimated import NINETY
 from rotordrop.evidence.synchronous import MarkAngle
+from rotordrop.known import NINETY
 from rotordrop.twin.tracked import TrackedDrop
 from rotordrop.twin.tracked_unbalance import _polar, plane_unbalances
 from rotordrop_bench import HiddenMachine

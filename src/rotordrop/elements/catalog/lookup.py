@@ -14,7 +14,7 @@ from typing import Any, Literal
 from rotordrop.elements.catalog.boundary import DIMENSION_SERIES, boundary_dimensions, known_bores
 from rotordrop.elements.catalog.designation import Designation, Kind, read_designation
 from rotordrop.elements.catalog.inference import PairRigidity, infer_balls
-from rotordrop.estimated import NINETY
+from rotordrop.known import NINETY
 
 PreloadClass = Literal["light", "medium", "heavy"]
 _CLASSES: tuple[PreloadClass, ...] = ("light", "medium", "heavy")

@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotordrop.elements.beam import is_beam
-from rotordrop.estimated import NINETY, Estimated
 from rotordrop.evidence.events import CoarseDrop, find_fall
 from rotordrop.evidence.levitated import LevitatedModel
 from rotordrop.evidence.quality.finding import Finding
 from rotordrop.evidence.quality.sensing import TURNED, WRONG_GAIN, read_otherwise
+from rotordrop.known import NINETY, Known
 from rotordrop.record.axes import Plane
 from rotordrop.record.recording import Array
 
@@ -232,7 +232,7 @@ def _any_gain(record: Record, levitated: LevitatedModel) -> _Case:
     does, and gains would take that up: a good channel of a machine of 60 kg then read -2.3 ×.
     """
     free = tuple(
-        sensor.model_copy(update={"gain": Estimated(value=float(sensor.gain), range=_ANY_GAIN)})
+        sensor.model_copy(update={"gain": Known(value=float(sensor.gain), range=_ANY_GAIN)})
         for sensor in record.sensors
     )
     loose = replace(record, sensors=free)

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotordrop.elements.magnet import REMANENCE_TIME
-from rotordrop.estimated import NINETY
 from rotordrop.evidence.levitated import LevitatedModel
 from rotordrop.evidence.quality.finding import Finding
 from rotordrop.evidence.quality.sensing import TURNED, WRONG_GAIN
+from rotordrop.known import NINETY
 from rotordrop.record.axes import Plane, planar_of, sensor_directions
 from rotordrop.record.recording import Array
 from rotordrop.series import runs_of

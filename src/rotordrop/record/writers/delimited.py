@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rotordrop.atomic_file import write_text
 from rotordrop.errors import OutputError
+from rotordrop.files import write_text
 from rotordrop.record.recording import Array, Channel, Recording
 
 _SPEED_UNITS = ("Hz", "rpm", "rad/s")

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from rotordrop.atomic_file import new_hdf5
 from rotordrop.errors import OutputError
+from rotordrop.files import new_hdf5
 from rotordrop.record.recording import Channel, Recording
 
 _SPEED_UNITS = ("Hz", "rpm", "rad/s")

@@ -12,8 +12,8 @@ import time
 
 import pytest
 
-from rotordrop.atomic_file import atomic_path, make_folder, write_json, write_text
 from rotordrop.errors import OutputError
+from rotordrop.files import atomic_path, make_folder, write_json, write_text
 
 
 def test_the_file_appears_when_the_block_ends(tmp_path):
@@ -49,7 +49,7 @@ def test_an_exception_leaves_nothing_where_nothing_was(tmp_path):
 def test_ctrl_c_in_a_real_program_leaves_nothing(tmp_path):
     program = (
         "import sys, time\n"
-        "from rotordrop.atomic_file import atomic_path\n"
+        "from rotordrop.files import atomic_path\n"
         "with atomic_path(sys.argv[1]) as temporary:\n"
         "    temporary.write_text('half wri')\n"
         "    print('writing', flush=True)\n"
@@ -185,7 +185,7 @@ class TestWhatStandsThereIsKept:
 def test_what_a_killed_run_left_is_removed_and_a_running_one_is_left_alone(tmp_path):
     program = (
         "import sys, time\n"
-        "from rotordrop.atomic_file import atomic_path\n"
+        "from rotordrop.files import atomic_path\n"
         "with atomic_path(sys.argv[1]) as temporary:\n"
         "    temporary.write_text('half wri')\n"
         "    print(temporary.name, flush=True)\n"
@@ -216,7 +216,7 @@ def test_what_a_killed_run_left_is_removed_and_a_running_one_is_left_alone(tmp_p
 def test_a_full_disk_under_hdf5_ends_with_a_sentence(tmp_path):
     program = (
         "import resource, signal, sys, numpy\n"
-        "from rotordrop.atomic_file import new_hdf5\n"
+        "from rotordrop.files import new_hdf5\n"
         "from rotordrop.errors import OutputError\n"
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))\n"

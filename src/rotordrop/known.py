@@ -1,0 +1,88 @@
+"""A number and what is known about it: how it is known, its error, its 90 % interval, its limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+NINETY = 1.6448536269514722
+"""Half width of a 90 % interval in standard deviations of a normal distribution [1]."""
+
+Status = Literal[
+    "given",
+    "guess",
+    "estimated",
+    "default",
+    "inferred",
+    "determined",
+    "weakly determined",
+    "at its bound",
+    "the record does not determine it",
+    "known from the calibration",
+    "the model does not fit the record",
+    "of the cross-check: the model does not fit the record",
+    "taken over",
+]
+"""How a value of a machine is known, or the verdict on one that a record was asked for."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Known:
+    """A physical value with what is known about it; an identified one never travels without its error.
+
+    ``float(x)`` gives the value.
+    """
+
+    value: float
+    """In SI units."""
+    status: Status = "given"
+    """How it is known, or what the record says about it."""
+    standard_error: float | None = None
+    """Standard error, in the unit of the value."""
+    interval_90: tuple[float, float] | None = None
+    """Interval that holds the true value with 90 % probability."""
+    allowance_90: float | None = None
+    """Half width by what the model leaves out alone; independent of what the record leaves open."""
+    range: tuple[float, float] | None = None
+    """Lowest and highest value thought possible, for a guess."""
+    lower: float | None = None
+    """Lower limit that the record itself sets, for example of the air gap."""
+    upper: float | None = None
+    """Upper limit that the record itself sets."""
+    start: float | None = None
+    """Where the search began."""
+    bounds: tuple[float, float] | None = None
+    """Limits of the search."""
+    drops: int | None = None
+    """Drops behind it, where it was counted."""
+    source: str | None = None
+    """Where the value comes from."""
+    unit: str = ""
+    """SI unit, for display."""
+
+    def __float__(self) -> float:
+        return self.value
+
+    @property
+    def low(self) -> float:
+        """Lower end of the interval; the value itself where there is none."""
+        return self.value if self.interval_90 is None else self.interval_90[0]
+
+    @property
+    def high(self) -> float:
+        """Upper end of the interval; the value itself where there is none."""
+        return self.value if self.interval_90 is None else self.interval_90[1]
+
+    def as_json(self) -> dict[str, Any]:
+        """Give the fields that are known, ready for JSON."""
+        known = {name: value for name, value in vars(self).items() if value is not None and value != ""}
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in known.items()}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Correlation:
+    """Two parameters by their paths, and how their errors correlate [1]."""
+
+    first: str
+    second: str
+    value: float
