@@ -8,7 +8,7 @@ from tests.scaled_machines import scaled_machine
 
 from rotordrop.physics import columns as L
 from rotordrop.rotor.parameters import build_drop_model
-from rotordrop.simulate._rhs import drop_derivative
+from rotordrop.simulate._rhs import drop_derivative, scratch_of
 from rotordrop_bench import hidden_machine, synthesize_drop
 from rotordrop_bench.settled import settled_coordinates
 
@@ -23,7 +23,7 @@ def test_a_rotor_of_any_mass_finds_its_rest(mass, slenderness):
     layout, p = model.layout, model.parameters
     state = layout.zeros()
     state[: layout.n_coordinates] = settled_coordinates(model)
-    change, work = layout.zeros(), np.empty((2, p.balls.shape[2]))
+    change, work = layout.zeros(), scratch_of(p)
     drop_derivative(0.0, state, p, change, work)
     left = change[layout.velocity_of(layout.modal_y)]
     assert np.max(np.abs(left)) < 1e-8 * np.max(np.abs(p.gravity))

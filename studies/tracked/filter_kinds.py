@@ -107,7 +107,7 @@ def sigma_point_pass(
     n = mean.shape[0]
     s = rows.shape[1]
     k = np.empty((6, s + 2))
-    work = np.empty((2, p.balls.shape[2]))
+    work = P.scratch_of(p)
     contact = np.empty(6)
     impulses = np.zeros(p.bearing.shape[0])
     spare = np.zeros(p.bearing.shape[0])
@@ -208,7 +208,7 @@ def ensemble_pass(
     """Stochastic ensemble filter with perturbed readings, without localisation."""
     n, s, n_c = mean.shape[0], rows.shape[1], rows.shape[0]
     k = np.empty((6, s + 2))
-    work = np.empty((2, p.balls.shape[2]))
+    work = P.scratch_of(p)
     contact = np.empty(6)
     row = np.zeros(n)
     seen = np.empty(members)

@@ -16,7 +16,7 @@ from rotordrop.physics.pendulum import small_frequency
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.static_sag import sag_of_model
 from rotordrop.simulate._histories import stored_energy
-from rotordrop.simulate._rhs import drop_derivative
+from rotordrop.simulate._rhs import drop_derivative, scratch_of
 from rotordrop.simulate._sensitivity import drop_jacobian
 from rotordrop.simulate.levitation import rigid_amplitudes
 
@@ -142,7 +142,7 @@ def _force_and_stiffness(
     """Force left over (n_q,) and tangent stiffness (n_q, n_q) of a state at standstill."""
     layout = model.layout
     n_q, size = layout.n_coordinates, layout.n_dynamic
-    change, work = layout.zeros(), np.empty((2, parameters.balls.shape[2]))
+    change, work = layout.zeros(), scratch_of(parameters)
     jacobian = np.zeros((size, size))
     drop_derivative(0.0, state, parameters, change, work)
     drop_jacobian(0.0, state, parameters, jacobian)

@@ -29,3 +29,9 @@ def speed_dependent_deceleration(omega: float, linear: float, quadratic: float) 
     Source: drag laws behind Neisi 2020, eq. (13). Differs from the paper: a function of speed, not of time.
     """
     return -(linear + quadratic * abs(omega)) * omega
+
+
+@kernel
+def speed_dependent_slope(omega: float, linear: float, quadratic: float) -> float:
+    """Derivative of `speed_dependent_deceleration` by the spin [1/s]. Source: differentiated."""
+    return -(linear + 2.0 * quadratic * abs(omega))

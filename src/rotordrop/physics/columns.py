@@ -7,39 +7,41 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.physics import ball_set, contact, support
+from rotordrop.physics import ball_set, contact, support, touch
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 # Columns of `KernelParameters.bearing`, one row per touchdown bearing; SI units. The contact law and the ball
 # set are blocks of columns that only their own modules read.
-AIR_GAP = 0
-ROTOR_RADIUS = 1
-BORE_RADIUS = 2
-FRICTION_STATIC = 3
-FRICTION_DYNAMIC = 4
-STRIBECK_SPEED = 5
-SMOOTHING_SPEED = 6
-RACE_MASS = 7
-RACE_INERTIA = 8
-DRAG_COEFFICIENT = 9
-DRAG_SPEED = 10
-PITCH_DIAMETER = 11
-BEARING_DAMPING = 12
-SUPPORT_MASS_X = 13
-SUPPORT_MASS_Y = 14
-SUPPORT_STIFFNESS_X = 15
-SUPPORT_STIFFNESS_Y = 16
-SUPPORT_DAMPING_X = 17
-SUPPORT_DAMPING_Y = 18
-RACE_WEIGHT = 19
-CONTACT = 20
+TOUCH = 0
+TOUCH_END = TOUCH + touch.N_ENTRIES
+AIR_GAP = TOUCH + touch.AIR_GAP
+ROTOR_RADIUS = TOUCH + touch.ROTOR_RADIUS
+BORE_RADIUS = TOUCH + touch.BORE_RADIUS
+FRICTION_STATIC = TOUCH + touch.FRICTION_STATIC
+FRICTION_DYNAMIC = TOUCH + touch.FRICTION_DYNAMIC
+STRIBECK_SPEED = TOUCH + touch.STRIBECK_SPEED
+SMOOTHING_SPEED = TOUCH + touch.SMOOTHING_SPEED
+CONTACT = TOUCH + touch.LAW
 CONTACT_END = CONTACT + contact.N_ENTRIES
 CONTACT_STIFFNESS = CONTACT + contact.STIFFNESS
 CONTACT_EXPONENT = CONTACT + contact.EXPONENT
 CONTACT_DAMPING = CONTACT + contact.DAMPING
-BALL_SET = CONTACT_END
+RACE_MASS = TOUCH_END
+RACE_INERTIA = TOUCH_END + 1
+DRAG_COEFFICIENT = TOUCH_END + 2
+DRAG_SPEED = TOUCH_END + 3
+PITCH_DIAMETER = TOUCH_END + 4
+BEARING_DAMPING = TOUCH_END + 5
+SUPPORT_MASS_X = TOUCH_END + 6
+SUPPORT_MASS_Y = TOUCH_END + 7
+SUPPORT_STIFFNESS_X = TOUCH_END + 8
+SUPPORT_STIFFNESS_Y = TOUCH_END + 9
+SUPPORT_DAMPING_X = TOUCH_END + 10
+SUPPORT_DAMPING_Y = TOUCH_END + 11
+RACE_WEIGHT = TOUCH_END + 12
+BALL_SET = TOUCH_END + 13
 BALL_SET_END = BALL_SET + ball_set.N_ENTRIES
 BALL_STIFFNESS = BALL_SET + ball_set.BALL_STIFFNESS
 GROOVE_DISTANCE = BALL_SET + ball_set.GROOVE_DISTANCE
@@ -100,11 +102,22 @@ N_ROTOR_PLACES = 10
 
 # Columns of `KernelParameters.bearing_at`, one row per touchdown bearing: place of its race and of its
 # support (x, then y), of the spin of its race and of the first of its further states; -1 where it has none.
+# Then its first contact and the one behind its last.
 RACE = 0
 SUPPORT = 1
 RACE_SPIN = 2
 BEARING_OWN = 3
-N_BEARING_PLACES = 4
+CONTACTS = 4
+CONTACTS_END = 5
+N_BEARING_PLACES = 6
+
+# Columns of `KernelParameters.contact_at`, one row per contact, those of a bearing side by side: the bearing
+# whose row holds its numbers, place of the body that the rotor touches (x, then y), place of the spin of that
+# body; -1 where it does not turn.
+CONTACT_BEARING = 0
+CONTACT_BODY = 1
+CONTACT_SPIN = 2
+N_CONTACT_PLACES = 3
 
 # Columns of `KernelParameters.magnet_at`, one row per AMB: place of the first of its states; -1 without any.
 MAGNET_OWN = 0
@@ -119,8 +132,10 @@ class KernelParameters(NamedTuple):
     balls.
 
     Columns and entries are named in this module. ``balls`` (B, 3, Z8) are the balls of `physics.ball_set`;
-    ``rotor_at``, ``bearing_at`` (B, ·) and ``magnet_at`` (A, ·) say where the states of each owner stand, so
-    that no kernel computes a place from the numbers of modes and bearings.
+    ``rotor_at``, ``bearing_at`` (B, ·), ``contact_at`` (C, ·) and ``magnet_at`` (A, ·) say where the states
+    of each owner stand, so that no kernel computes a place from numbers of modes and bearings. ``memory`` is
+    what is remembered beside the state: a right-hand side reads it, an accepted step alone writes it
+    (`simulate._loop.remember`). No element of today has any; its length is zero.
     """
 
     eigenvalue: Array
@@ -138,4 +153,6 @@ class KernelParameters(NamedTuple):
     flags: Integers
     rotor_at: Integers
     bearing_at: Integers
+    contact_at: Integers
     magnet_at: Integers
+    memory: Array

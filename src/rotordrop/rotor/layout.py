@@ -11,6 +11,8 @@ from rotordrop.physics.columns import (
     ANGLE,
     AUDIT,
     BEARING_OWN,
+    CONTACTS,
+    CONTACTS_END,
     DISSIPATED,
     INTERNAL,
     MODES_X,
@@ -170,14 +172,20 @@ class StateLayout:
         return places
 
     def bearing_at(self) -> Integers:
-        """Places of the states of each bearing, shape (B, 4), see ``RACE`` and the names beside it."""
+        """Places of the states of each bearing, shape (B, 6), see ``RACE`` and the names beside it."""
         places = np.empty((self.n_bearings, N_BEARING_PLACES), dtype=np.int64)
         count = np.arange(self.n_bearings)
         places[:, RACE] = self.race.start + 2 * count
         places[:, SUPPORT] = self.support.start + 2 * count
         places[:, RACE_SPIN] = self.race_spin.start + count
         places[:, BEARING_OWN] = _first_of(self.bearing_own, self.own.start, self.n_bearings)
+        places[:, CONTACTS], places[:, CONTACTS_END] = count, count + 1
         return places
+
+    def contact_at(self) -> Integers:
+        """Bodies of each contact, shape (C, 3), see ``CONTACT_BODY``: the rotor touches each race."""
+        bodies = self.bearing_at()[:, [RACE, RACE_SPIN]]
+        return np.column_stack([np.arange(self.n_bearings), bodies]).astype(np.int64)
 
     def magnet_at(self, n_magnets: int) -> Integers:
         """Places of the states of each AMB, shape (A, 1), see ``MAGNET_OWN``."""

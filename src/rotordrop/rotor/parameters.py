@@ -137,7 +137,9 @@ def _kernel_parameters(
         flags=np.array([aerodynamics.OFF, 0], dtype=np.int64),
         rotor_at=layout.rotor_at(),
         bearing_at=layout.bearing_at(),
+        contact_at=layout.contact_at(),
         magnet_at=layout.magnet_at(len(machine.ambs)),
+        memory=np.zeros(0),
     )
 
 

@@ -19,6 +19,7 @@ from rotordrop.simulate import _coast_loop as C
 from rotordrop.simulate import _histories as H
 from rotordrop.simulate import _loop
 from rotordrop.simulate import _settled_loop as S
+from rotordrop.simulate._rhs import N_PLACES
 from rotordrop.simulate.coast_down_case import CoastDownCase
 from rotordrop.simulate.coast_down_result import QUANTILES
 from rotordrop.simulate.drop import FIRST_STEP, LOG_ROWS_PER_SECOND, error_scale, tableau_of
@@ -71,6 +72,7 @@ class Run:
     whirl: Array
     totals: Array
     status: Array
+    memory: Array
     windows: dict[str, list[Array]]
 
     def arrays(self) -> dict[str, Array]:
@@ -128,12 +130,12 @@ def _with_drag(parameters: KernelParameters, model: DropModel, case: CoastDownCa
 def begin(setup: Setup) -> Run:
     start, _ = start_of_drop(setup.model, setup.case.as_drop())
     n_b = setup.model.layout.n_bearings
-    progress = np.zeros(C.N_PROGRESS)
-    progress[C.STEP] = FIRST_STEP
-    progress[C.PREVIOUS_ERROR] = 1.0
+    progress = np.zeros(_loop.N_PROGRESS)
+    progress[_loop.STEP] = FIRST_STEP
+    progress[_loop.PREVIOUS_ERROR] = 1.0
     running = np.zeros((n_b, _loop.N_RUN_COLUMNS))
     log = np.zeros((n_b, _loop.N_LOG_COLUMNS))
-    progress[C.LOGGED] = C.start_window(start, 0.0, setup.parameters, running, log)
+    progress[_loop.LOGGED] = _loop.start_running(start, 0.0, setup.parameters, running, log)
     whirl = np.zeros((n_b, C.N_WHIRL))
     relative = relative_displacement(setup, start[None, :])[0]
     for b in range(n_b):
@@ -147,10 +149,11 @@ def begin(setup: Setup) -> Run:
         progress=progress,
         running=running,
         open_log=log,
-        peaks=np.zeros((n_b, C.N_PEAKS)),
+        peaks=np.zeros((n_b, _loop.N_PEAKS)),
         whirl=whirl,
         totals=np.zeros((n_b, 2)),
         status=status,
+        memory=setup.parameters.memory.copy(),
         windows={name: [] for name in WINDOW_ROWS},
     )
 
@@ -179,8 +182,8 @@ def advance(setup: Setup, run: Run) -> tuple[dict[str, Single], Array]:
     histories = np.empty((rows, len(run.running), H.N_HISTORIES))
     states[0] = run.state
     H.bearing_histories(states[:1], setup.parameters, histories[:1])
-    before = (float(run.progress[C.TIME]), float(run.state[setup.model.layout.dissipated]))
-    log, already_open = _log_of_window(run, rows * case.output_step), int(run.progress[C.LOGGED])
+    before = (float(run.progress[_loop.TIME]), float(run.state[setup.model.layout.dissipated]))
+    log, already_open = _log_of_window(run, rows * case.output_step), int(run.progress[_loop.LOGGED])
     method, filled, try_settled = np.zeros(3), 1, case.settled_scheme and may_be_settled(run)
     while status[PHASE] == RUNNING:
         last = min(window_end, int(status[LAST_SAMPLE]))
@@ -193,7 +196,7 @@ def advance(setup: Setup, run: Run) -> tuple[dict[str, Single], Array]:
         else:
             times = _grid(first + filled, last + 1, case.output_step)
             outcome = integrate(setup, run, times, states[wanted], log)
-            got = int(run.progress[C.SAMPLES])
+            got = int(run.progress[_loop.SAMPLES])
             fresh = slice(filled, filled + got)
             H.bearing_histories(states[fresh], setup.parameters, histories[fresh])
         filled += got
@@ -222,20 +225,28 @@ def _log_of_window(run: Run, length: float) -> Array:
 def integrate(setup: Setup, run: Run, times: Array, states: Array, log: Array) -> int:
     """One call of the compiled loop: until the last of the times, or until the rotor stands."""
     spinning, parameters = present_drive(setup, run)
+    case = setup.case
+    control = _loop.Control(
+        scale=setup.scale,
+        tolerance=float(case.tolerance),
+        largest_step=float(case.largest_step),
+        most_steps=MOST_STEPS_PER_WINDOW,
+        stop_speed=float(case.stop_speed) if spinning else -1.0,
+        end=float(times[-1]),
+        snap=1e-9,
+        logarithmic=False,
+    )
     return int(
-        C.integrate_window(
+        _loop.integrate(
             run.state,
             times,
-            parameters,
-            tableau_of(setup.case.as_drop()),
-            setup.scale,
-            setup.case.tolerance,
-            setup.case.largest_step,
-            MOST_STEPS_PER_WINDOW,
-            setup.case.stop_speed if spinning else -1.0,
+            parameters._replace(memory=run.memory),
+            tableau_of(case.as_drop()),
+            control,
             states[: len(times)],
             log,
             run.running,
+            np.zeros((len(run.running) + 1, N_PLACES)),
             run.peaks,
             run.progress,
         )
@@ -261,12 +272,12 @@ def _after(setup: Setup, run: Run, outcome: int, sample: int) -> None:
     """Decide how the run goes on after a call of the loop that ended at a sample."""
     status, layout = run.status, setup.model.layout
     if outcome == _loop.STANDSTILL:
-        status[STOPPED_AT] = run.progress[C.TIME]
+        status[STOPPED_AT] = run.progress[_loop.TIME]
         turning = 0.5 * setup.parameters.spin[L.POLAR_INERTIA] * run.state[layout.rotor_speed] ** 2
         run.state[layout.rotor_speed] = 0.0
         run.state[layout.dissipated] += turning
         if setup.case.duration is None:
-            end = run.progress[C.TIME] + setup.case.rest
+            end = run.progress[_loop.TIME] + setup.case.rest
             status[LAST_SAMPLE] = math.ceil(end / setup.case.output_step - 1e-9)
             if setup.case.rest == 0.0:
                 status[PHASE] = ENDED
@@ -281,22 +292,22 @@ def _ended_contacts(run: Run, log: Array, already_open: int) -> tuple[Array, Arr
     """Contacts that ended in this window, with those still open at the end of the run; and how many began at
     each bearing.
     """
-    count = min(int(run.progress[C.LOGGED]), len(log))
+    count = min(int(run.progress[_loop.LOGGED]), len(log))
     entries = log[:count]
     n_b = len(run.running)
-    began = np.bincount(entries[already_open:, _loop.LOG_BEARING].astype(int), minlength=n_b)
+    began = np.bincount(entries[already_open:, _loop.LOG_CONTACT].astype(int), minlength=n_b)
     if not run.windows["window_rows"]:
-        began = np.bincount(entries[:, _loop.LOG_BEARING].astype(int), minlength=n_b)
+        began = np.bincount(entries[:, _loop.LOG_CONTACT].astype(int), minlength=n_b)
     ended = entries if run.status[PHASE] != RUNNING else entries[~np.isnan(entries[:, _loop.LOG_END])]
     ended = ended.copy()
     for b in range(n_b):
-        mine = ended[ended[:, _loop.LOG_BEARING] == b]
+        mine = ended[ended[:, _loop.LOG_CONTACT] == b]
         run.totals[b, 1] += float(np.sum(mine[:, _loop.LOG_DISSIPATED]))
         run.totals[b, 0] += float(began[b])
     kept = C.carry_open_contacts(log, count, run.running)
     run.open_log[:] = 0.0
     run.open_log[:kept] = log[:kept]
-    run.progress[C.LOGGED] = kept
+    run.progress[_loop.LOGGED] = kept
     return ended, began.astype(np.float64)
 
 
@@ -312,7 +323,7 @@ def keep_statistics(
     run.status[WORST_BALANCE] = max(run.status[WORST_BALANCE], abs(residual))
     speed = float(run.state[layout.rotor_speed])
     lost = float(run.state[layout.dissipated]) - before[1]
-    windows["window_rows"].append(np.array([before[0], run.progress[C.TIME], speed, lost, residual]))
+    windows["window_rows"].append(np.array([before[0], run.progress[_loop.TIME], speed, lost, residual]))
     windows["window_peak"].append(values.max(axis=0))
     windows["window_quantile"].append(np.moveaxis(np.quantile(values, QUANTILES, axis=0), 0, -1))
     windows["window_contacts"].append(began)
@@ -351,7 +362,7 @@ def settled_piece(setup: Setup, run: Run, states: Array, histories: Array, log: 
     """
     case = setup.case
     spinning, parameters = present_drive(setup, run)
-    start, begun = run.state.copy(), float(run.progress[C.TIME])
+    start, begun = run.state.copy(), float(run.progress[_loop.TIME])
     reference = _reference(setup, run, begun, len(states))
     got = S.integrate_settled(
         run.state,
@@ -369,7 +380,7 @@ def settled_piece(setup: Setup, run: Run, states: Array, histories: Array, log: 
     if got == 0 or lost or not error[0] <= case.settled_error:
         run.state[:] = start
         return 0, np.zeros(3)
-    run.progress[C.TIME] = (round(begun / case.output_step) + got) * case.output_step
+    run.progress[_loop.TIME] = (round(begun / case.output_step) + got) * case.output_step
     _carry_contacts(run, done, begun, case.output_step, log)
     return got, np.array([got / len(states), *error])
 
@@ -419,7 +430,9 @@ def _carry_contacts(run: Run, histories: Array, begun: float, step: float, log: 
         run.running[b, _loop.RUN_FORCE] = normal[-1]
         run.running[b, _loop.RUN_POWER] = run.running[b, _loop.RUN_SLIDING] = power[-1]
         run.running[b, _loop.RUN_DELTA] = histories[-1, b, H.H_DELTA]
-        for column, quantity in zip((C.PEAK_INDENTATION, C.PEAK_FORCE, C.PEAK_STRESS), values, strict=True):
+        for column, quantity in zip(
+            (_loop.PEAK_INDENTATION, _loop.PEAK_FORCE, _loop.PEAK_STRESS), values, strict=True
+        ):
             best = int(np.argmax(quantity[:, b]))
             if quantity[best, b] > run.peaks[b, column]:
                 run.peaks[b, column] = quantity[best, b]

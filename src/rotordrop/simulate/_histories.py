@@ -41,7 +41,7 @@ N_HISTORIES = 10
 @inner_kernel
 def fill_history(b: int, y: Array, p: KernelParameters, work: Array, out: Array) -> None:
     """Fill ``out`` (10,) with what one bearing does in a state."""
-    contact_at(b, y, p, out)
+    contact_at(p.bearing_at[b, L.CONTACTS], y, p, out)
     entries, balls = p.bearing[b, L.BALL_SET : L.BALL_SET_END], p.balls[b]
     dx, dy = race_deflection(b, y, p)
     F_x, F_y = ball_set_force(entries, balls, dx, dy, work)
@@ -103,10 +103,11 @@ def stored_energy(y: Array, p: KernelParameters, with_rotor_spin: bool) -> float
     for b in range(p.bearing.shape[0]):
         row = p.bearing[b]
         r, h = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT]
-        ux, uy, _vx, _vy = relative_motion(b, y, p)
-        delta = math.sqrt(ux * ux + uy * uy) - row[L.AIR_GAP]
-        if delta > 0.0:
-            energy += contact_energy(row[L.CONTACT : L.CONTACT_END], delta)
+        for c in range(p.bearing_at[b, L.CONTACTS], p.bearing_at[b, L.CONTACTS_END]):
+            ux, uy, _vx, _vy = relative_motion(c, y, p)
+            delta = math.sqrt(ux * ux + uy * uy) - row[L.AIR_GAP]
+            if delta > 0.0:
+                energy += contact_energy(row[L.CONTACT : L.CONTACT_END], delta)
         dx, dy = race_deflection(b, y, p)
         energy += ball_set_energy(row[L.BALL_SET : L.BALL_SET_END], p.balls[b], dx, dy)
         energy += row[L.RACE_WEIGHT] * y[r + 1]

@@ -1,17 +1,32 @@
-"""The compiled time loop: one explicit adaptive Runge–Kutta integration of a drop, crossed once per drop."""
+"""The compiled time loop: one explicit adaptive Runge–Kutta integration of a window of time.
+
+A drop is one window, a coast-down many. Everything the loop carries from one window to the next stands in the
+arrays it is given (state, progress, running contacts, open log entries), so a run that is stopped between two
+windows and taken up again takes the very same steps.
+"""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
+from rotordrop.physics.ball_set import ball_set_force, ball_set_load
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import atan2, exp, ln, power
-from rotordrop.simulate._rhs import contact_state, drop_derivative, relative_motion
+from rotordrop.simulate._rhs import (
+    N_PLACES,
+    Scratch,
+    contact_values,
+    drop_derivative,
+    race_deflection,
+    relative_motion,
+    scratch_of,
+)
 from rotordrop.simulate._tableau import Tableau
 
 Array = NDArray[np.float64]
@@ -24,7 +39,7 @@ NOT_FINITE = 3
 STANDSTILL = 4
 
 # Columns of the contact log.
-LOG_BEARING = 0
+LOG_CONTACT = 0
 LOG_START = 1
 LOG_END = 2
 LOG_PEAK_FORCE = 3
@@ -35,7 +50,7 @@ LOG_DISSIPATED = 7
 LOG_SLIDING = 8
 N_LOG_COLUMNS = 9
 
-# Columns of the running contact of each bearing.
+# Columns of the running state of each contact.
 RUN_IN_CONTACT = 0
 RUN_FORCE = 1
 RUN_POWER = 2
@@ -43,12 +58,48 @@ RUN_DELTA = 3
 RUN_SLIDING = 4
 N_RUN_COLUMNS = 5
 
+# Entries of the progress array.
+TIME = 0
+STEP = 1
+PREVIOUS_ERROR = 2
+ACCEPTED = 3
+REJECTED = 4
+SAMPLES = 5
+LOGGED = 6
+N_PROGRESS = 7
+
+# Columns of the peaks of each bearing: value and time of each quantity, then the largest travel of the race
+# [m²].
+PEAK_INDENTATION = 0
+PEAK_FORCE = 2
+PEAK_STRESS = 4
+PEAK_TRAVEL = 6
+N_PEAKS = 7
+
 SAFETY = 0.9
 SHRINK = 0.2
 GROW = 5.0
 BETA = 0.04
 ALPHA = 0.2 - 0.75 * BETA
 LOG_SMALLEST_ERROR = -9.210340371976182  # ln 1e-4, written out: a library may round it otherwise
+
+
+class Control(NamedTuple):
+    """How a window is stepped through; ``scale`` (s,) is the size of each state that error control looks at.
+
+    ``largest_step`` and ``end`` [s]. The loop ends when the rotor turns no faster than ``stop_speed``
+    [rad/s]; negative: never. A step that ends within ``snap`` of itself before the end lands on the end.
+    ``logarithmic`` carries the error of the step before as a logarithm; the same control, rounded otherwise.
+    """
+
+    scale: Array
+    tolerance: float
+    largest_step: float
+    most_steps: int
+    stop_speed: float
+    end: float
+    snap: float
+    logarithmic: bool
 
 
 @inner_kernel
@@ -68,12 +119,46 @@ def combine(y: Array, h: float, weights: Array, k: Array, count: int, out: Array
 
 @lean_kernel
 def runge_kutta_stages(
-    t: float, h: float, y: Array, p: KernelParameters, tab: Tableau, k: Array, y_new: Array, work: Array
+    t: float,
+    h: float,
+    y: Array,
+    p: KernelParameters,
+    tab: Tableau,
+    k: Array,
+    y_new: Array,
+    work: Scratch,
+    powers: Array,
 ) -> None:
-    """Fill stages 2 to 7 (stage 1 is ``k[0]``) and the new state."""
+    """Fill stages 2 to 7 (stage 1 is ``k[0]``), their ``powers`` (7, B + 1, 5) by place and the new state."""
     for stage in range(1, 7):
         combine(y, h, tab.a[stage], k, stage, y_new)
         drop_derivative(t + tab.c[stage] * h, y_new, p, k[stage], work)
+        note_powers(work.power, powers[stage])
+
+
+@inner_kernel
+def note_powers(power: Array, out: Array) -> None:
+    """Keep the power lost by place of one stage."""
+    for b in range(out.shape[0]):
+        for place in range(out.shape[1]):
+            out[b, place] = power[b, place]
+
+
+@inner_kernel
+def book_losses(h: float, powers: Array, tab: Tableau, books: Array) -> None:
+    """Add to ``books`` (B + 1, 5) what an accepted step lost by place [J]; its last stage stays."""
+    for b in range(books.shape[0]):
+        for place in range(books.shape[1]):
+            total = 0.0
+            for stage in range(6):
+                total += tab.a[6, stage] * powers[stage, b, place]
+            books[b, place] += h * total
+            powers[0, b, place] = powers[6, b, place]
+
+
+@inner_kernel
+def remember(t: float, y: Array, p: KernelParameters) -> None:
+    """Write the discrete memory after an accepted step; the one place that does. No element has any yet."""
 
 
 @inner_kernel
@@ -116,29 +201,15 @@ def dense_output(theta: float, h: float, y: Array, k: Array, tab: Tableau, out: 
 
 
 @inner_kernel
-def contact_values(
-    b: int, y: Array, p: KernelParameters
-) -> tuple[float, float, float, float, float, float, float]:
-    """Contact of one bearing in a state: indentation [m], normal force [N], friction force [N], normal
-    x and y [1], power dissipated in the contact [W] and the part of it that sliding takes [W].
-    """
-    ux, uy, vx, vy = relative_motion(b, y, p)
-    omega, omega_i = y[p.rotor_at[L.ROTOR_SPEED]], y[p.bearing_at[b, L.RACE_SPIN]]
-    delta, F_r, mu, nx, ny, v_t, elastic = contact_state(ux, uy, vx, vy, omega, omega_i, p.bearing[b])
-    sliding = mu * F_r * v_t
-    power = sliding + (F_r - elastic) * (vx * nx + vy * ny)
-    return delta, F_r, mu * F_r, nx, ny, power, sliding
-
-
-@inner_kernel
-def contact_at(b: int, y: Array, p: KernelParameters, out: Array) -> None:
-    """Fill ``out`` (6,) with the contact of one bearing in a state, in the order of `contact_values`."""
-    out[0], out[1], out[2], out[3], out[4], out[5], _sliding = contact_values(b, y, p)
+def contact_at(c: int, y: Array, p: KernelParameters, out: Array) -> None:
+    """Fill ``out`` (6,) with one contact in a state: as `contact_values`, the powers as one."""
+    out[0], out[1], out[2], out[3], out[4], sliding, lost = contact_values(c, y, p)
+    out[5] = sliding + lost
 
 
 @lean_kernel
 def crossing_fraction(
-    b: int,
+    c: int,
     h: float,
     y: Array,
     k: Array,
@@ -150,13 +221,14 @@ def crossing_fraction(
     """Fraction of a step at which the indentation changes sign, by bisection on the dense output."""
     # Bisection, not Newton: the normal speed may pass zero within the step, and thirty halvings are few
     # against the right-hand sides of a step.
+    gap = p.bearing[p.contact_at[c, L.CONTACT_BEARING], L.AIR_GAP]
     low = 0.0
     high = 1.0
     for _ in range(30):
         middle = 0.5 * (low + high)
         dense_output(middle, h, y, k, tab, scratch)
-        ux, uy, _vx, _vy = relative_motion(b, scratch, p)
-        if (math.sqrt(ux * ux + uy * uy) > p.bearing[b, L.AIR_GAP]) == (delta_0 > 0.0):
+        ux, uy, _vx, _vy = relative_motion(c, scratch, p)
+        if (math.sqrt(ux * ux + uy * uy) > gap) == (delta_0 > 0.0):
             low = middle
         else:
             high = middle
@@ -188,14 +260,15 @@ def log_contacts(
 ) -> int:
     """Update the contact log with an accepted step; returns the number of entries opened so far."""
     scratch_time = -math.inf
-    for b in range(p.bearing.shape[0]):
-        delta, force, _friction, nx, ny, power, sliding = contact_values(b, y_new, p)
-        was = running[b, RUN_IN_CONTACT] > 0.0
+    for c in range(p.contact_at.shape[0]):
+        delta, force, _friction, nx, ny, sliding, lost = contact_values(c, y_new, p)
+        power = sliding + lost
+        was = running[c, RUN_IN_CONTACT] > 0.0
         touches = delta > 0.0
         begin = t
         end = t + h
         if was != touches:
-            moment = t + h * crossing_fraction(b, h, y, k, tab, p, running[b, RUN_DELTA], scratch)
+            moment = t + h * crossing_fraction(c, h, y, k, tab, p, running[c, RUN_DELTA], scratch)
             scratch_time = -math.inf
             if touches:
                 begin = moment
@@ -203,33 +276,34 @@ def log_contacts(
                 end = moment
         if touches and not was:
             if n_log < log.shape[0]:
-                log[n_log, LOG_BEARING] = b
+                log[n_log, LOG_CONTACT] = c
                 log[n_log, LOG_START] = begin
                 log[n_log, LOG_END] = np.nan
             n_log += 1
-            running[b, RUN_IN_CONTACT] = n_log
-        row = int(running[b, RUN_IN_CONTACT]) - 1
+            running[c, RUN_IN_CONTACT] = n_log
+        row = int(running[c, RUN_IN_CONTACT]) - 1
         if 0 <= row < log.shape[0]:
             # Impulse and loss by Simpson's rule within the step: the output grid is coarser than an impact.
             middle = 0.5 * (begin + end)
             if middle != scratch_time:
                 dense_output((middle - t) / h, h, y, k, tab, scratch)
                 scratch_time = middle
-            _delta, between, _friction, mid_x, mid_y, mid_power, mid_sliding = contact_values(b, scratch, p)
+            _delta, between, _friction, mid_x, mid_y, mid_sliding, mid_lost = contact_values(c, scratch, p)
+            mid_power = mid_sliding + mid_lost
             sixth = (end - begin) / 6.0
-            log[row, LOG_IMPULSE] += sixth * (running[b, RUN_FORCE] + 4.0 * between + force)
-            log[row, LOG_DISSIPATED] += sixth * (running[b, RUN_POWER] + 4.0 * mid_power + power)
-            log[row, LOG_SLIDING] += sixth * (running[b, RUN_SLIDING] + 4.0 * mid_sliding + sliding)
+            log[row, LOG_IMPULSE] += sixth * (running[c, RUN_FORCE] + 4.0 * between + force)
+            log[row, LOG_DISSIPATED] += sixth * (running[c, RUN_POWER] + 4.0 * mid_power + power)
+            log[row, LOG_SLIDING] += sixth * (running[c, RUN_SLIDING] + 4.0 * mid_sliding + sliding)
             note_peak(middle, between, mid_x, mid_y, log[row])
             note_peak(t + h, force, nx, ny, log[row])
             if not touches:
                 log[row, LOG_END] = end
         if not touches:
-            running[b, RUN_IN_CONTACT] = 0.0
-        running[b, RUN_FORCE] = force
-        running[b, RUN_POWER] = power
-        running[b, RUN_DELTA] = delta
-        running[b, RUN_SLIDING] = sliding
+            running[c, RUN_IN_CONTACT] = 0.0
+        running[c, RUN_FORCE] = force
+        running[c, RUN_POWER] = power
+        running[c, RUN_DELTA] = delta
+        running[c, RUN_SLIDING] = sliding
     return n_log
 
 
@@ -237,28 +311,188 @@ def log_contacts(
 def start_running(y: Array, t: float, p: KernelParameters, running: Array, log: Array) -> int:
     """Fill the running contacts from a state that may already touch; returns the number of entries opened."""
     n_log = 0
-    for b in range(p.bearing.shape[0]):
-        delta, force, _friction, nx, ny, power, sliding = contact_values(b, y, p)
-        running[b, RUN_IN_CONTACT] = 0.0
-        running[b, RUN_FORCE] = force
-        running[b, RUN_POWER] = power
-        running[b, RUN_DELTA] = delta
-        running[b, RUN_SLIDING] = sliding
+    for c in range(p.contact_at.shape[0]):
+        delta, force, _friction, nx, ny, sliding, lost = contact_values(c, y, p)
+        power = sliding + lost
+        running[c, RUN_IN_CONTACT] = 0.0
+        running[c, RUN_FORCE] = force
+        running[c, RUN_POWER] = power
+        running[c, RUN_DELTA] = delta
+        running[c, RUN_SLIDING] = sliding
         if delta > 0.0:
             if n_log < log.shape[0]:
-                log[n_log, LOG_BEARING] = b
+                log[n_log, LOG_CONTACT] = c
                 log[n_log, LOG_START] = t
                 log[n_log, LOG_END] = np.nan
                 log[n_log, LOG_PEAK_FORCE] = force
                 log[n_log, LOG_PEAK_TIME] = t
                 log[n_log, LOG_AZIMUTH] = atan2(ny, nx)
             n_log += 1
-            running[b, RUN_IN_CONTACT] = n_log
+            running[c, RUN_IN_CONTACT] = n_log
     return n_log
 
 
+@lean_kernel
+def force_and_stress(b: int, dx: float, dy: float, p: KernelParameters, work: Array) -> tuple[float, float]:
+    """Magnitude of the ball force [N] and largest Hertz stress [Pa] for a race moved by (dx, dy) [m]."""
+    entries, balls = p.bearing[b, L.BALL_SET : L.BALL_SET_END], p.balls[b]
+    F_x, F_y = ball_set_force(entries, balls, dx, dy, work)
+    _load, stress = ball_set_load(entries, balls, dx, dy)
+    return math.sqrt(F_x * F_x + F_y * F_y), stress
+
+
+@lean_kernel
+def update_peaks(t: float, y: Array, p: KernelParameters, running: Array, peaks: Array, work: Array) -> None:
+    """Keep the largest indentation, ball force and stress of each bearing with an accepted state.
+
+    Force and stress are computed only where the race has travelled nearly as far as ever, for they grow with
+    its travel; directions differ by how the balls stand, which the margin of 10 % of the square covers.
+    The peaks stand over the whole coast-down, so this is rare once the rotor has settled.
+    """
+    for b in range(p.bearing.shape[0]):
+        for c in range(p.bearing_at[b, L.CONTACTS], p.bearing_at[b, L.CONTACTS_END]):
+            if running[c, RUN_DELTA] > peaks[b, PEAK_INDENTATION]:
+                peaks[b, PEAK_INDENTATION] = running[c, RUN_DELTA]
+                peaks[b, PEAK_INDENTATION + 1] = t
+        if p.bearing_at[b, L.RACE] < 0:
+            continue
+        dx, dy = race_deflection(b, y, p)
+        travel = dx * dx + dy * dy
+        if travel < 0.9 * peaks[b, PEAK_TRAVEL]:
+            continue
+        peaks[b, PEAK_TRAVEL] = max(travel, peaks[b, PEAK_TRAVEL])
+        force, stress = force_and_stress(b, dx, dy, p, work)
+        if force > peaks[b, PEAK_FORCE]:
+            peaks[b, PEAK_FORCE] = force
+            peaks[b, PEAK_FORCE + 1] = t
+        if stress > peaks[b, PEAK_STRESS]:
+            peaks[b, PEAK_STRESS] = stress
+            peaks[b, PEAK_STRESS + 1] = t
+
+
 @kernel
-def integrate_drop(  # noqa: C901, PLR0915  one compiled loop
+def integrate(  # noqa: C901, PLR0915  one compiled loop
+    y: Array,
+    times: Array,
+    p: KernelParameters,
+    tab: Tableau,
+    control: Control,
+    states: Array,
+    log: Array,
+    running: Array,
+    books: Array,
+    peaks: Array,
+    progress: Array,
+) -> int:
+    """Integrate one window of time; its end is landed on exactly.
+
+    Parameters
+    ----------
+    y : ndarray, shape (n,)
+        State at ``progress[TIME]``; replaced by the state at the end.
+    times : ndarray, shape (T,)
+        Output grid after the present time [s], ascending.
+    states : ndarray, shape (T, n)
+        Filled with the states on the grid, as far as they were reached.
+    log : ndarray, shape (R, 9)
+        Contacts, columns ``LOG_*``; the first entries are those still open.
+    running : ndarray, shape (C, 5)
+        The running contacts, from `start_running`.
+    books : ndarray, shape (B + 1, 5)
+        Energy lost so far by place [J].
+    peaks : ndarray, shape (B, 7) or (0, 7)
+        Peaks so far; none are kept without rows.
+    progress : ndarray, shape (7,)
+        Time [s], next step [s], last error, steps accepted and rejected so far, samples filled, log entries.
+
+    Returns
+    -------
+    int
+        ``FINISHED``, ``STANDSTILL`` or why it ended early.
+    """
+    n = y.shape[0]
+    i_w = p.rotor_at[L.ROTOR_SPEED]
+    y_new = np.empty(n)
+    k = np.empty((7, n))
+    work = scratch_of(p)
+    powers = np.zeros((7, books.shape[0], books.shape[1]))
+    scratch = np.empty(n)
+    t, t_end = progress[TIME], control.end
+    h = progress[STEP]
+    previous = progress[PREVIOUS_ERROR]
+    n_log = int(progress[LOGGED])
+    stop_speed = control.stop_speed
+    sense = 1.0 if y[i_w] >= 0.0 else -1.0
+    landing = t_end - t
+    tried = 0
+    done = 0
+    outcome = FINISHED
+    drop_derivative(t, y, p, k[0], work)
+    note_powers(work.power, powers[0])
+    while t < t_end:
+        if tried >= control.most_steps:
+            outcome = TOO_MANY_STEPS
+            break
+        tried += 1
+        step = min(h, t_end - t, landing)
+        runge_kutta_stages(t, step, y, p, tab, k, y_new, work, powers)
+        error = scaled_error(step, y, y_new, k, tab.e, control.scale, control.tolerance, scratch)
+        if not error <= 1.0:
+            progress[REJECTED] += 1.0
+            h = 0.1 * step if not math.isfinite(error) else step * max(SHRINK, SAFETY * power(error, -0.2))
+            if h < 1e-14:
+                outcome = STEP_TOO_SMALL if math.isfinite(error) else NOT_FINITE
+                break
+            continue
+        if stop_speed >= 0.0 and sense * y_new[i_w] < 0.0:
+            # The rotor would run backwards within this step: land between the stop speed and zero.
+            landing = step * (sense * y[i_w] - 0.5 * stop_speed) / (sense * (y[i_w] - y_new[i_w]))
+            continue
+        landing = t_end - t + 1.0
+        progress[ACCEPTED] += 1.0
+        t_new = t + step
+        if step == t_end - t or t_new > t_end - control.snap * step:
+            t_new = t_end
+        while done < times.shape[0] and times[done] <= t_new:
+            dense_output((times[done] - t) / step, step, y, k, tab, states[done])
+            done += 1
+        n_log = log_contacts(t, step, y, y_new, k, tab, p, running, log, n_log, scratch)
+        book_losses(step, powers, tab, books)
+        if peaks.shape[0] > 0:
+            update_peaks(t_new, y_new, p, running, peaks, work.balls)
+        remember(t_new, y_new, p)
+        # PI control (Gustafsson): the error of the step before damps the swing between steps too long and too
+        # short that every opening of a contact starts.
+        growth = GROW
+        if control.logarithmic:
+            log_error = LOG_SMALLEST_ERROR
+            if error > 0.0:
+                log_error = ln(error)
+                growth = min(GROW, max(SHRINK, SAFETY * exp(BETA * previous - ALPHA * log_error)))
+            previous = max(log_error, LOG_SMALLEST_ERROR)
+        else:
+            if error > 0.0:
+                by_error = power(error, -(0.2 - 0.75 * BETA))
+                growth = min(GROW, max(SHRINK, SAFETY * by_error * power(previous, BETA)))
+            previous = max(error, 1e-4)
+        h = min(step * growth, control.largest_step) if step >= h else h
+        t = t_new
+        # The last stage is the first of the next step, also where a contact opens: forces are continuous.
+        for i in range(n):
+            y[i] = y_new[i]
+            k[0, i] = k[6, i]
+        if stop_speed >= 0.0 and sense * y[i_w] <= stop_speed:
+            outcome = STANDSTILL
+            break
+    progress[TIME] = t
+    progress[STEP] = h
+    progress[PREVIOUS_ERROR] = previous
+    progress[SAMPLES] = done
+    progress[LOGGED] = n_log
+    return outcome
+
+
+def integrate_drop(
     y0: Array,
     times: Array,
     p: KernelParameters,
@@ -271,93 +505,28 @@ def integrate_drop(  # noqa: C901, PLR0915  one compiled loop
     states: Array,
     log: Array,
     counters: Array,
+    books: Array | None = None,
 ) -> int:
-    """Integrate a drop over an ascending output grid.
+    """Integrate a drop as one window; returns ``FINISHED`` or why it ended early.
 
-    Parameters
-    ----------
-    y0 : ndarray, shape (n,)
-        Start state at ``times[0]``.
-    times : ndarray, shape (T,)
-        Output grid [s].
-    scale : ndarray, shape (s,)
-        Size of each state that error control looks at; the states behind (angle, energies) follow.
-    states : ndarray, shape (T, n)
-        Filled with the states on the grid.
-    log : ndarray, shape (R, 9)
-        Filled with the contacts, columns ``LOG_*``.
-    counters : ndarray, shape (5,)
-        Filled with accepted steps, rejected steps, last step [s], contacts, time reached [s].
-
-    Returns
-    -------
-    int
-        ``FINISHED`` or why it ended early.
+    ``states`` (T, n) are filled on the grid ``times`` (T,) from the start state ``y0`` (n,), NaN behind an
+    early end; ``log`` (R, 9) with the contacts, ``counters`` (5,) with accepted steps, rejected steps, last
+    step [s], contacts and time reached [s], ``books`` (B + 1, 5) with the energy lost by place [J].
     """
-    n = y0.shape[0]
-    y = y0.copy()
-    y_new = np.empty(n)
-    k = np.empty((7, n))
-    work = np.empty((2, p.balls.shape[2]))
-    scratch = np.empty(n)
-    running = np.zeros((p.bearing.shape[0], N_RUN_COLUMNS))
-    log[:, :] = 0.0
-    n_log = start_running(y, times[0], p, running, log)
-    t = times[0]
-    t_end = times[-1]
+    p = p._replace(memory=p.memory.copy())
+    y = np.array(y0, dtype=np.float64)
+    running = np.zeros((p.contact_at.shape[0], N_RUN_COLUMNS))
+    log[:] = 0.0
+    progress = np.zeros(N_PROGRESS)
+    progress[[TIME, STEP]] = times[0], min(first_step, largest_step)
+    progress[LOGGED] = start_running(y, times[0], p, running, log)
     states[0] = y
-    done = 1
-    h = min(first_step, largest_step)
-    log_previous = 0.0
-    accepted = 0
-    rejected = 0
-    outcome = FINISHED
-    drop_derivative(t, y, p, k[0], work)
-    while t < t_end:
-        if accepted + rejected >= most_steps:
-            outcome = TOO_MANY_STEPS
-            break
-        step = min(h, t_end - t)
-        runge_kutta_stages(t, step, y, p, tab, k, y_new, work)
-        error = scaled_error(step, y, y_new, k, tab.e, scale, tolerance, scratch)
-        if not error <= 1.0:
-            rejected += 1
-            if not math.isfinite(error):
-                h = 0.1 * step
-            else:
-                h = step * max(SHRINK, SAFETY * power(error, -0.2))
-            if h < 1e-14:
-                outcome = STEP_TOO_SMALL if math.isfinite(error) else NOT_FINITE
-                break
-            continue
-        accepted += 1
-        t_new = t + step
-        if step < h:
-            t_new = t_end
-        while done < times.shape[0] and times[done] <= t_new:
-            dense_output((times[done] - t) / step, step, y, k, tab, states[done])
-            done += 1
-        n_log = log_contacts(t, step, y, y_new, k, tab, p, running, log, n_log, scratch)
-        # PI control (Gustafsson): the error of the step before damps the swing between steps too long and too
-        # short that every opening of a contact starts.
-        growth = GROW
-        log_error = LOG_SMALLEST_ERROR
-        if error > 0.0:
-            log_error = ln(error)
-            growth = min(GROW, max(SHRINK, SAFETY * exp(BETA * log_previous - ALPHA * log_error)))
-        log_previous = max(log_error, LOG_SMALLEST_ERROR)
-        h = min(step * growth, largest_step) if step >= h else h
-        t = t_new
-        # The last stage is the first of the next step, also where a contact opens: forces are continuous.
-        for i in range(n):
-            y[i] = y_new[i]
-            k[0, i] = k[6, i]
-    counters[0] = accepted
-    counters[1] = rejected
-    counters[2] = h
-    counters[3] = n_log
-    counters[4] = t
-    while done < times.shape[0]:
-        states[done] = np.nan
-        done += 1
+    states[1:] = np.nan
+    control = Control(
+        scale, float(tolerance), float(largest_step), most_steps, -1.0, float(times[-1]), 0.0, True
+    )
+    books = np.zeros((p.bearing.shape[0] + 1, N_PLACES)) if books is None else books
+    peaks = np.zeros((0, N_PEAKS))
+    outcome = integrate(y, times[1:], p, tab, control, states[1:], log, running, books, peaks, progress)
+    counters[:] = progress[[ACCEPTED, REJECTED, STEP, LOGGED, TIME]]
     return outcome

@@ -7,26 +7,44 @@ Numbers below, names above: everything arrives as the flat arrays of
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.physics import aerodynamics, support
 from rotordrop.physics import columns as L
-from rotordrop.physics._compile import inner_kernel, lean_kernel
+from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
 from rotordrop.physics.aerodynamics import exponential_deceleration, speed_dependent_deceleration
 from rotordrop.physics.ball_set import ball_set_force
 from rotordrop.physics.columns import KernelParameters
-from rotordrop.physics.contact import contact_force
 from rotordrop.physics.elementary import sine_cosine
-from rotordrop.physics.friction import stribeck_coefficient
 from rotordrop.physics.remanence import remanent_fraction
-from rotordrop.physics.spin import race_drag_torque, surface_speed
+from rotordrop.physics.spin import race_drag_torque
+from rotordrop.physics.touch import touch
 
 Array = NDArray[np.float64]
 PRESCRIBED = aerodynamics.PRESCRIBED_SPEED
 IN_TIME = aerodynamics.EXPONENTIAL_IN_TIME
 OF_SPEED = aerodynamics.FUNCTION_OF_SPEED
+
+# Places where power is lost: columns of `Scratch.power`, a row for each bearing; the last row is the rotor's.
+SLIDING, IN_CONTACT, BALL_SET, SUPPORT, DRAG = range(5)
+N_PLACES = 5
+BENDING = 0
+
+
+class Scratch(NamedTuple):
+    """What a right-hand side writes beside the rates: ``balls`` (2, Z8) and ``power`` (B + 1, 5) lost [W]."""
+
+    balls: Array
+    power: Array
+
+
+@kernel
+def scratch_of(p: KernelParameters) -> Scratch:
+    """Scratch for the right-hand sides of a machine."""
+    return Scratch(np.empty((2, p.balls.shape[2])), np.zeros((p.bearing.shape[0] + 1, N_PLACES)))
 
 
 @lean_kernel
@@ -49,10 +67,10 @@ def modal_parts(y: Array, p: KernelParameters) -> tuple[Array, Array, Array, Arr
 
 
 @inner_kernel
-def relative_motion(b: int, y: Array, p: KernelParameters) -> tuple[float, float, float, float]:
-    """Displacement [m] and velocity [m/s] of the rotor relative to the race of one bearing, x and y."""
-    n_q, r = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.RACE]
-    shape = p.bearing_shape[b]
+def relative_motion(c: int, y: Array, p: KernelParameters) -> tuple[float, float, float, float]:
+    """Displacement [m] and velocity [m/s] of the rotor relative to the body of one contact, x and y."""
+    n_q, r = p.rotor_at[L.N_COORDINATES], p.contact_at[c, L.CONTACT_BODY]
+    shape = p.bearing_shape[p.contact_at[c, L.CONTACT_BEARING]]
     qx, qy, sx, sy = modal_parts(y, p)
     ux = uy = vx = vy = 0.0
     for k in range(shape.shape[0]):
@@ -61,6 +79,18 @@ def relative_motion(b: int, y: Array, p: KernelParameters) -> tuple[float, float
         vx += shape[k] * sx[k]
         vy += shape[k] * sy[k]
     return ux - y[r], uy - y[r + 1], vx - y[n_q + r], vy - y[n_q + r + 1]
+
+
+@inner_kernel
+def contact_values(
+    c: int, y: Array, p: KernelParameters
+) -> tuple[float, float, float, float, float, float, float]:
+    """One contact in a state, in the order of `rotordrop.physics.touch.touch`."""
+    ux, uy, vx, vy = relative_motion(c, y, p)
+    spin = p.contact_at[c, L.CONTACT_SPIN]
+    omega_i = y[spin] if spin >= 0 else 0.0
+    numbers = p.bearing[p.contact_at[c, L.CONTACT_BEARING], L.TOUCH : L.TOUCH_END]
+    return touch(numbers, ux, uy, vx, vy, y[p.rotor_at[L.ROTOR_SPEED]], omega_i)
 
 
 @inner_kernel
@@ -78,36 +108,6 @@ def support_deflection(b: int, y: Array, p: KernelParameters) -> tuple[float, fl
     if own < 0:
         return x, z, vx, vz
     return x - y[own], z - y[own + 1], vx - y[own + 2], vz - y[own + 3]
-
-
-@inner_kernel
-def contact_state(
-    ux: float, uy: float, vx: float, vy: float, omega: float, omega_i: float, bearing: Array
-) -> tuple[float, float, float, float, float, float, float]:
-    """Contact of rotor and race from their relative displacement [m] and velocity [m/s].
-
-    Returns indentation [m], normal force [N], signed friction coefficient [1], normal (x, y) [1] from race to
-    rotor, relative surface speed [m/s] and the elastic part of the normal force [N]. The tangent is the
-    normal turned by 90° in the sense of positive spin.
-    """
-    e_r = math.sqrt(ux * ux + uy * uy)
-    delta = e_r - bearing[L.AIR_GAP]
-    if delta <= 0.0:
-        return delta, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    # Unit vectors instead of angles: no branch at an azimuth, no sign to set by hand.
-    nx = ux / e_r
-    ny = uy / e_r
-    delta_dot = vx * nx + vy * ny
-    F_r, elastic = contact_force(bearing[L.CONTACT : L.CONTACT_END], delta, delta_dot)
-    v_t = surface_speed(vy * nx - vx * ny, omega, bearing[L.ROTOR_RADIUS], omega_i, bearing[L.BORE_RADIUS])
-    mu = stribeck_coefficient(
-        v_t,
-        bearing[L.FRICTION_STATIC],
-        bearing[L.FRICTION_DYNAMIC],
-        bearing[L.STRIBECK_SPEED],
-        bearing[L.SMOOTHING_SPEED],
-    )
-    return delta, F_r, mu, nx, ny, v_t, elastic
 
 
 @inner_kernel
@@ -226,21 +226,36 @@ def add_support_form(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
 
 
 @inner_kernel
-def bearing_accelerations(
-    b: int, y: Array, omega: float, p: KernelParameters, dy: Array, work: Array
-) -> tuple[float, float]:
-    """Forces at one touchdown bearing, added to rotor, race, support and spin.
+def add_contact(c: int, y: Array, p: KernelParameters, dy: Array, power: Array) -> float:
+    """Add the force of one contact to the rotor and the body it touches; returns the friction force [N]."""
+    delta, F_r, F_mu, nx, ny, sliding, lost = contact_values(c, y, p)
+    if delta <= 0.0:
+        return 0.0
+    x = F_r * nx - F_mu * ny
+    z = F_r * ny + F_mu * nx
+    shape = p.bearing_shape[p.contact_at[c, L.CONTACT_BEARING]]
+    body = p.rotor_at[L.N_COORDINATES] + p.contact_at[c, L.CONTACT_BODY]
+    _, _, ax, ay = modal_parts(dy, p)
+    for k in range(shape.shape[0]):
+        ax[k] -= shape[k] * x
+        ay[k] -= shape[k] * z
+    dy[body] += x
+    dy[body + 1] += z
+    power[SLIDING] += sliding
+    power[IN_CONTACT] += lost
+    return F_mu
 
-    Returns the friction torque on the rotor [N m] (positive drives it) and the power dissipated [W].
-    """
+
+@inner_kernel
+def add_race(
+    b: int, friction: float, y: Array, p: KernelParameters, dy: Array, work: Scratch
+) -> tuple[float, float]:
+    """Rates of a race under its contacts and its balls; returns the force of the balls on the support [N]."""
     n_q = p.rotor_at[L.N_COORDINATES]
     r, h, spin = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.RACE_SPIN]
     row = p.bearing[b]
-    shape = p.bearing_shape[b]
-    ux, uy, vx, vy = relative_motion(b, y, p)
-    delta, F_r, mu, nx, ny, v_t, elastic = contact_state(ux, uy, vx, vy, omega, y[spin], row)
     race_x, race_y = race_deflection(b, y, p)
-    F_x, F_y = ball_set_force(row[L.BALL_SET : L.BALL_SET_END], p.balls[b], race_x, race_y, work)
+    F_x, F_y = ball_set_force(row[L.BALL_SET : L.BALL_SET_END], p.balls[b], race_x, race_y, work.balls)
     drag = race_drag_torque(
         math.sqrt(F_x * F_x + F_y * F_y),
         y[spin],
@@ -253,25 +268,37 @@ def bearing_accelerations(
     C_b = row[L.BEARING_DAMPING]
     F_x += C_b * wx
     F_y += C_b * wy
+    work.power[b, BALL_SET] = C_b * (wx * wx + wy * wy)
+    work.power[b, DRAG] = drag * y[spin]
+    dy[n_q + r] = (dy[n_q + r] - F_x) / row[L.RACE_MASS]
+    dy[n_q + r + 1] = (dy[n_q + r + 1] - F_y - row[L.RACE_WEIGHT]) / row[L.RACE_MASS]
+    dy[spin] = (friction * row[L.BORE_RADIUS] - drag) / row[L.RACE_INERTIA]
+    return F_x, F_y
+
+
+@inner_kernel
+def bearing_accelerations(b: int, y: Array, p: KernelParameters, dy: Array, work: Scratch) -> float:
+    """Forces at one touchdown bearing, added to rotor, race, support and spin; power lost, in its row.
+
+    Returns the friction torque on the rotor [N m] (positive drives it). A bearing without a race has the
+    rotor touch its support.
+    """
+    n_q, h = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.SUPPORT]
+    row, power = p.bearing[b], work.power[b]
+    for place in range(N_PLACES):
+        power[place] = 0.0
+    friction = 0.0
+    for c in range(p.bearing_at[b, L.CONTACTS], p.bearing_at[b, L.CONTACTS_END]):
+        friction += add_contact(c, y, p, dy, power)
+    F_x = 0.0
+    F_y = 0.0
+    if p.bearing_at[b, L.RACE] >= 0:
+        F_x, F_y = add_race(b, friction, y, p, dy, work)
     sx = y[n_q + h]
     sy = y[n_q + h + 1]
-    contact_x = 0.0
-    contact_y = 0.0
-    torque = 0.0
-    dissipated = C_b * (wx * wx + wy * wy) + drag * y[spin]
-    dissipated += row[L.SUPPORT_DAMPING_X] * sx * sx + row[L.SUPPORT_DAMPING_Y] * sy * sy
-    if delta > 0.0:
-        F_mu = mu * F_r
-        contact_x = F_r * nx - F_mu * ny
-        contact_y = F_r * ny + F_mu * nx
-        torque = F_mu
-        dissipated += F_mu * v_t + (F_r - elastic) * (vx * nx + vy * ny)
-        _, _, ax, ay = modal_parts(dy, p)
-        for k in range(shape.shape[0]):
-            ax[k] -= shape[k] * contact_x
-            ay[k] -= shape[k] * contact_y
-    dy[n_q + r] = (contact_x - F_x) / row[L.RACE_MASS]
-    dy[n_q + r + 1] = (contact_y - F_y - row[L.RACE_WEIGHT]) / row[L.RACE_MASS]
+    power[SUPPORT] = row[L.SUPPORT_DAMPING_X] * sx * sx + row[L.SUPPORT_DAMPING_Y] * sy * sy
+    F_x += dy[n_q + h]
+    F_y += dy[n_q + h + 1]
     dy[n_q + h] = (F_x - row[L.SUPPORT_DAMPING_X] * sx - row[L.SUPPORT_STIFFNESS_X] * y[h]) / row[
         L.SUPPORT_MASS_X
     ]
@@ -279,9 +306,9 @@ def bearing_accelerations(
         L.SUPPORT_MASS_Y
     ]
     if row[L.SUPPORT_FORM + support.PRESENT] != 0.0:
-        dissipated += add_support_form(b, y, p, dy)
-    dy[spin] = (torque * row[L.BORE_RADIUS] - drag) / row[L.RACE_INERTIA]
-    return -torque * row[L.ROTOR_RADIUS], dissipated
+        power[SUPPORT] += add_support_form(b, y, p, dy)
+    torque: float = -friction * row[L.ROTOR_RADIUS]
+    return torque
 
 
 @inner_kernel
@@ -296,33 +323,33 @@ def aerodynamic_deceleration(t: float, omega: float, p: KernelParameters) -> flo
 
 
 @inner_kernel
-def drop_derivative(t: float, y: Array, p: KernelParameters, dy: Array, work: Array) -> None:
-    """Time derivative of the state of a drop.
+def drop_derivative(t: float, y: Array, p: KernelParameters, dy: Array, work: Scratch) -> None:
+    """Time derivative of the state of a drop; the power lost by place stands in ``work.power`` afterwards.
 
     Bearings come first, then the rotor's spin, then its lateral motion, because the ω̇ terms of eq. (1) need
     the angular acceleration that friction causes.
     """
-    n_q, i_w = p.rotor_at[L.N_COORDINATES], p.rotor_at[L.ROTOR_SPEED]
-    omega = y[i_w]
+    n_q = p.rotor_at[L.N_COORDINATES]
     accelerations = dy[n_q : 2 * n_q]
     for i in range(n_q):
         accelerations[i] = 0.0
     contact_torque = 0.0
     dissipated = 0.0
     for b in range(p.bearing.shape[0]):
-        torque, lost = bearing_accelerations(b, y, omega, p, dy, work)
-        contact_torque += torque
-        dissipated += lost
-    add_rotor_rates(t, y, contact_torque, dissipated, p, dy)
+        contact_torque += bearing_accelerations(b, y, p, dy, work)
+        lost = work.power[b]
+        dissipated += lost[BALL_SET] + lost[DRAG] + lost[SUPPORT] + (lost[SLIDING] + lost[IN_CONTACT])
+    work.power[p.bearing.shape[0], BENDING] = add_rotor_rates(t, y, contact_torque, dissipated, p, dy)
 
 
 @inner_kernel
 def add_rotor_rates(
     t: float, y: Array, contact_torque: float, dissipated: float, p: KernelParameters, dy: Array
-) -> None:
+) -> float:
     """Add what is the rotor's own to the forces of the bearings: its spin, its lateral motion, the books.
 
     ``contact_torque`` [N m] is what the bearings drive it with, ``dissipated`` [W] what is lost there.
+    Returns the power that modal damping takes [W].
     """
     n_q, i_w = p.rotor_at[L.N_COORDINATES], p.rotor_at[L.ROTOR_SPEED]
     omega = y[i_w]
@@ -343,3 +370,4 @@ def add_rotor_rates(
     dy[p.rotor_at[L.ROTOR_ANGLE]] = omega
     dy[p.rotor_at[L.DISSIPATED]] = dissipated + lost
     dy[p.rotor_at[L.WORK_IN]] = put_in + gained
+    return lost

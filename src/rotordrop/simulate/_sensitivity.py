@@ -11,14 +11,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.physics import aerodynamics, contact, support
+from rotordrop.physics import aerodynamics, support
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import kernel, lean_kernel
 from rotordrop.physics.ball_set import ball_set_gradient
 from rotordrop.physics.columns import KernelParameters
-from rotordrop.physics.elementary import sine_cosine, tanh
-from rotordrop.physics.friction import stribeck_gradient
-from rotordrop.physics.spin import surface_speed
+from rotordrop.physics.elementary import sine_cosine
+from rotordrop.physics.spin import race_drag_gradient
+from rotordrop.physics.touch import touch_gradient
 from rotordrop.simulate._rhs import (
     aerodynamic_deceleration,
     race_deflection,
@@ -30,60 +30,6 @@ Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 PRESCRIBED = aerodynamics.PRESCRIBED_SPEED
 OF_SPEED = aerodynamics.FUNCTION_OF_SPEED
-
-
-@lean_kernel
-def contact_gradient(
-    ux: float, uy: float, vx: float, vy: float, omega: float, omega_i: float, bearing: Array, g: Array
-) -> bool:
-    """Derivatives of contact force and friction force at one bearing; False and untouched when there is no
-    contact.
-
-    ``g`` (3, 6): rows force on the race in x, in y [N] and friction force [N]; columns by ``ux, uy`` [m],
-    ``vx, vy`` [m/s] (rotor relative to race), rotor spin and race spin [rad/s].
-    """
-    r = math.sqrt(ux * ux + uy * uy)
-    delta = r - bearing[L.AIR_GAP]
-    if delta <= 0.0:
-        return False
-    nx = ux / r
-    ny = uy / r
-    tx = -ny
-    ty = nx
-    v_n = vx * nx + vy * ny
-    v_s = vx * tx + vy * ty
-    F, F_d, F_v = contact.contact_gradient(bearing[L.CONTACT : L.CONTACT_END], delta, v_n)
-    v_t = surface_speed(v_s, omega, bearing[L.ROTOR_RADIUS], omega_i, bearing[L.BORE_RADIUS])
-    mu, mu_v = stribeck_gradient(
-        v_t,
-        bearing[L.FRICTION_STATIC],
-        bearing[L.FRICTION_DYNAMIC],
-        bearing[L.STRIBECK_SPEED],
-        bearing[L.SMOOTHING_SPEED],
-    )
-    for c in range(6):
-        dn = 0.0
-        dt = 0.0
-        d_force = 0.0
-        d_slip = 0.0
-        if c < 2:
-            dn = nx if c == 0 else ny
-            dt = tx if c == 0 else ty
-            d_force = F_d * dn + F_v * v_s / r * dt
-            d_slip = -v_n / r * dt
-        elif c < 4:
-            d_force = F_v * (nx if c == 2 else ny)
-            d_slip = tx if c == 2 else ty
-        elif c == 4:
-            d_slip = bearing[L.ROTOR_RADIUS]
-        else:
-            d_slip = -bearing[L.BORE_RADIUS]
-        d_friction = mu * d_force + F * mu_v * d_slip
-        turn = dt / r
-        g[0, c] = nx * d_force + tx * d_friction + F * turn * (tx - mu * nx)
-        g[1, c] = ny * d_force + ty * d_friction + F * turn * (ty - mu * ny)
-        g[2, c] = d_friction
-    return True
 
 
 @lean_kernel
@@ -118,133 +64,107 @@ def _rotor_jacobian(y: Array, p: KernelParameters, J: Array) -> None:
 
 
 @lean_kernel
-def _contact_jacobian(b: int, g: Array, p: KernelParameters, J: Array) -> None:
+def _contact_jacobian(c: int, g: Array, p: KernelParameters, J: Array) -> None:
+    """Spread the gradient of one contact over the columns of rotor modes, body and spins."""
     x, z, n_q = p.rotor_at[L.MODES_X], p.rotor_at[L.MODES_Y], p.rotor_at[L.N_COORDINATES]
-    r, spin = p.bearing_at[b, L.RACE], p.bearing_at[b, L.RACE_SPIN]
-    row = p.bearing[b]
-    shape = p.bearing_shape[b]
-    prescribed = p.flags[L.SPIN_MODE] == PRESCRIBED
-    for i in range(4):
-        if i < 2:
-            place = n_q + r + i
-            factor = 1.0 / row[L.RACE_MASS]
-            source = i
-        elif i == 2:
-            place = spin
-            factor = row[L.BORE_RADIUS] / row[L.RACE_INERTIA]
-            source = 2
-        else:
-            if prescribed:
-                continue
-            place = p.rotor_at[L.ROTOR_SPEED]
-            factor = -row[L.ROTOR_RADIUS] / p.spin[L.POLAR_INERTIA]
-            source = 2
-        _spread(place, factor, g[source], b, p, J)
-    for k in range(shape.shape[0]):
-        _spread(n_q + x + k, -shape[k], g[0], b, p, J)
-        _spread(n_q + z + k, -shape[k], g[1], b, p, J)
-
-
-@lean_kernel
-def _spread(place: int, factor: float, g: Array, b: int, p: KernelParameters, J: Array) -> None:
-    """Add one row of the contact derivatives to the columns of rotor modes, race and spins."""
-    x, z, n_q = p.rotor_at[L.MODES_X], p.rotor_at[L.MODES_Y], p.rotor_at[L.N_COORDINATES]
-    r = p.bearing_at[b, L.RACE]
-    shape = p.bearing_shape[b]
-    fx = factor * g[0]
-    fy = factor * g[1]
-    gx = factor * g[2]
-    gy = factor * g[3]
-    for k in range(shape.shape[0]):
-        J[place, x + k] += fx * shape[k]
-        J[place, z + k] += fy * shape[k]
-        J[place, n_q + x + k] += gx * shape[k]
-        J[place, n_q + z + k] += gy * shape[k]
-    J[place, r] -= fx
-    J[place, r + 1] -= fy
-    J[place, n_q + r] -= gx
-    J[place, n_q + r + 1] -= gy
-    J[place, p.rotor_at[L.ROTOR_SPEED]] += factor * g[4]
-    J[place, p.bearing_at[b, L.RACE_SPIN]] += factor * g[5]
-
-
-@lean_kernel
-def _support_form_jacobian(b: int, y: Array, p: KernelParameters, J: Array) -> None:
-    """Add the derivative of `add_support_form`."""
-    n_q, h, own = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.BEARING_OWN]
-    row = p.bearing[b]
-    form = row[L.SUPPORT_FORM : L.SUPPORT_FORM_END]
-    x, z, _vx, _vz = support_deflection(b, y, p)
-    k_xx, k_xy, k_yy = support.support_tangent(
-        form, row[L.SUPPORT_STIFFNESS_X], row[L.SUPPORT_STIFFNESS_Y], x, z
+    b, body, spin = (
+        p.contact_at[c, L.CONTACT_BEARING],
+        p.contact_at[c, L.CONTACT_BODY],
+        p.contact_at[c, L.CONTACT_SPIN],
     )
-    mobility = max(form[support.FOUNDATION_SHARE], 0.0) / row[L.SUPPORT_MASS_Y]
-    for i in range(2):
-        m_h = row[L.SUPPORT_MASS_X + i]
-        J[n_q + h + i, h + i] += row[L.SUPPORT_STIFFNESS_X + i] / m_h
-        J[n_q + h + i, n_q + h + i] += row[L.SUPPORT_DAMPING_X + i] / m_h
-        for j in range(2):
-            k, c = k_xy, 0.0
-            if i == j:
-                k = k_xx if i == 0 else k_yy
-                c = row[L.SUPPORT_DAMPING_X + i]
-            J[n_q + h + i, h + j] -= k / m_h
-            J[n_q + h + i, n_q + h + j] -= c / m_h
-            if own >= 0:
-                J[n_q + h + i, own + j] += k / m_h
-                J[n_q + h + i, own + 2 + j] += c / m_h
-                J[own + 2 + i, h + j] += mobility * k
-                J[own + 2 + i, n_q + h + j] += mobility * c
-                J[own + 2 + i, own + j] -= mobility * k
-                J[own + 2 + i, own + 2 + j] -= mobility * c
-        if own >= 0:
-            speed = form[support.FOUNDATION_SPEED]
-            J[own + i, own + 2 + i] = 1.0
-            J[own + 2 + i, own + i] -= speed * speed
-            J[own + 2 + i, own + 2 + i] -= 2.0 * form[support.FOUNDATION_DAMPING] * speed
+    i_w, row, shape = p.rotor_at[L.ROTOR_SPEED], p.bearing[b], p.bearing_shape[b]
+    m = shape.shape[0]
+    for i in range(4 + 2 * m):
+        if i < 2:
+            mass = row[L.RACE_MASS] if body == p.bearing_at[b, L.RACE] else row[L.SUPPORT_MASS_X + i]
+            place, force, factor = n_q + body + i, i, 1.0 / mass
+        elif i == 2:
+            place, force, factor = spin, 2, row[L.BORE_RADIUS] / row[L.RACE_INERTIA]
+        elif i == 3:
+            place, force, factor = i_w, 2, -row[L.ROTOR_RADIUS] / p.spin[L.POLAR_INERTIA]
+        elif i < 4 + m:
+            place, force, factor = n_q + x + i - 4, 0, -shape[i - 4]
+        else:
+            place, force, factor = n_q + z + i - 4 - m, 1, -shape[i - 4 - m]
+        if place < 0 or (i == 3 and p.flags[L.SPIN_MODE] == PRESCRIBED):
+            continue
+        for part in range(4):
+            slope = factor * g[force, part]
+            modes = (x if part % 2 == 0 else z) + (part // 2) * n_q
+            for k in range(m):
+                J[place, modes + k] += slope * shape[k]
+            J[place, body + part % 2 + (part // 2) * n_q] -= slope
+        J[place, i_w] += factor * g[force, 4]
+        if spin >= 0:
+            J[place, spin] += factor * g[force, 5]
 
 
 @lean_kernel
-def _bearing_jacobian(b: int, y: Array, p: KernelParameters, J: Array, g: Array) -> bool:
+def _couple(
+    J: Array, place: int, weight: float, at: int, rate: int, i: int, k: tuple[float, float, float], c: float
+) -> None:
+    """Add to an acceleration along axis ``i`` what springs ``k_xx, k_xy, k_yy`` and a damper make of a body.
+
+    The body's displacement stands at ``at``, its velocity at ``rate``, x before y.
+    """
+    for j in range(2):
+        stiffness = k[1]
+        if i == j:
+            stiffness = k[0] if i == 0 else k[2]
+        J[place, at + j] += weight * stiffness
+    J[place, rate + i] += weight * c
+
+
+@lean_kernel
+def _race_jacobian(b: int, y: Array, p: KernelParameters, J: Array) -> None:
+    """Add balls and drag of a race."""
     n_q = p.rotor_at[L.N_COORDINATES]
     r, h, spin = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.RACE_SPIN]
     row = p.bearing[b]
-    ux, uy, vx, vy = relative_motion(b, y, p)
-    touches = contact_gradient(ux, uy, vx, vy, y[p.rotor_at[L.ROTOR_SPEED]], y[spin], row, g)
     dx, dy = race_deflection(b, y, p)
     F_x, F_y, k_xx, k_xy, k_yy = ball_set_gradient(row[L.BALL_SET : L.BALL_SET_END], p.balls[b], dx, dy)
-    C_b = row[L.BEARING_DAMPING]
+    k, c = (k_xx, k_xy, k_yy), row[L.BEARING_DAMPING]
     for i in range(2):
-        race = n_q + r + i
-        hold = n_q + h + i
         m_h = row[L.SUPPORT_MASS_X + i]
-        for j in range(2):
-            k = k_xy
-            if i == j:
-                k = k_xx if i == 0 else k_yy
-            J[race, r + j] -= k / row[L.RACE_MASS]
-            J[race, h + j] += k / row[L.RACE_MASS]
-            J[hold, r + j] += k / m_h
-            J[hold, h + j] -= k / m_h
-        J[race, race] -= C_b / row[L.RACE_MASS]
-        J[race, hold] += C_b / row[L.RACE_MASS]
-        J[hold, race] += C_b / m_h
-        J[hold, hold] -= (C_b + row[L.SUPPORT_DAMPING_X + i]) / m_h
-        J[hold, h + i] -= row[L.SUPPORT_STIFFNESS_X + i] / m_h
-    if row[L.SUPPORT_FORM + support.PRESENT] != 0.0:
-        _support_form_jacobian(b, y, p, J)
+        _couple(J, n_q + r + i, -1.0 / row[L.RACE_MASS], r, n_q + r, i, k, c)
+        _couple(J, n_q + r + i, 1.0 / row[L.RACE_MASS], h, n_q + h, i, k, c)
+        _couple(J, n_q + h + i, 1.0 / m_h, r, n_q + r, i, k, c)
+        _couple(J, n_q + h + i, -1.0 / m_h, h, n_q + h, i, k, c)
     F = math.sqrt(F_x * F_x + F_y * F_y)
-    half = 0.5 * row[L.DRAG_COEFFICIENT] * row[L.PITCH_DIAMETER] / row[L.RACE_INERTIA]
-    level = tanh(y[spin] / row[L.DRAG_SPEED])
-    J[spin, spin] -= half * F * (1.0 - level * level) / row[L.DRAG_SPEED]
+    by_force, by_spin = race_drag_gradient(
+        F, y[spin], row[L.DRAG_COEFFICIENT], row[L.PITCH_DIAMETER], row[L.DRAG_SPEED]
+    )
+    J[spin, spin] -= by_spin / row[L.RACE_INERTIA]
     if F > 0.0:
-        by_x = half * level * (F_x * k_xx + F_y * k_xy) / F
-        by_y = half * level * (F_x * k_xy + F_y * k_yy) / F
-        J[spin, r] -= by_x
-        J[spin, r + 1] -= by_y
-        J[spin, h] += by_x
-        J[spin, h + 1] += by_y
-    return touches
+        for j in range(2):
+            along = F_x * k_xx + F_y * k_xy if j == 0 else F_x * k_xy + F_y * k_yy
+            J[spin, r + j] -= by_force / row[L.RACE_INERTIA] * along / F
+            J[spin, h + j] += by_force / row[L.RACE_INERTIA] * along / F
+
+
+@lean_kernel
+def _support_jacobian(b: int, y: Array, p: KernelParameters, J: Array) -> None:
+    """Add a support with what its form changes, and its foundation."""
+    n_q, h, own = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.BEARING_OWN]
+    row = p.bearing[b]
+    form = row[L.SUPPORT_FORM : L.SUPPORT_FORM_END]
+    k = (row[L.SUPPORT_STIFFNESS_X], 0.0, row[L.SUPPORT_STIFFNESS_Y])
+    if form[support.PRESENT] != 0.0:
+        x, z, _vx, _vz = support_deflection(b, y, p)
+        k = support.support_tangent(form, row[L.SUPPORT_STIFFNESS_X], row[L.SUPPORT_STIFFNESS_Y], x, z)
+    for i in range(2):
+        m_h, c = row[L.SUPPORT_MASS_X + i], row[L.SUPPORT_DAMPING_X + i]
+        _couple(J, n_q + h + i, -1.0 / m_h, h, n_q + h, i, k, c)
+        if own < 0:
+            continue
+        mobility = max(form[support.FOUNDATION_SHARE], 0.0) / row[L.SUPPORT_MASS_Y]
+        speed = form[support.FOUNDATION_SPEED]
+        _couple(J, n_q + h + i, 1.0 / m_h, own, own + 2, i, k, c)
+        _couple(J, own + 2 + i, mobility, h, n_q + h, i, k, c)
+        _couple(J, own + 2 + i, -mobility, own, own + 2, i, k, c)
+        J[own + i, own + 2 + i] = 1.0
+        J[own + 2 + i, own + i] -= speed * speed
+        J[own + 2 + i, own + 2 + i] -= 2.0 * form[support.FOUNDATION_DAMPING] * speed
 
 
 @kernel
@@ -253,13 +173,13 @@ def drop_jacobian(t: float, y: Array, p: KernelParameters, J: Array) -> None:
 
     The energies behind the rotor angle are left out.
     """
-    n_b = p.bearing.shape[0]
-    g = np.zeros((n_b, 3, 6))
-    touching = np.zeros(n_b, dtype=np.int64)
+    n_c = p.contact_at.shape[0]
+    g = np.zeros((n_c, 3, 6))
+    touching = np.zeros(n_c, dtype=np.int64)
     drop_jacobian_parts(t, y, p, J, g, touching)
-    for b in range(n_b):
-        if touching[b] != 0:
-            _contact_jacobian(b, g[b], p, J)
+    for c in range(n_c):
+        if touching[c] != 0:
+            _contact_jacobian(c, g[c], p, J)
     _deceleration_jacobian(t, y, p, J)
 
 
@@ -281,19 +201,29 @@ def drop_jacobian_parts(
     """`drop_jacobian` with the contacts apart, because a contact fills the rows and columns of all modes.
 
     ``J`` (s, s) is filled with everything but the contacts and the ω̇ terms of eq. (1), which are some
-    hundred thousand times smaller than gyroscopics; ``g`` (B, 3, 6) with the gradients of each contact (see
-    `contact_gradient`), valid where ``touching`` (B,) is not zero.
+    hundred thousand times smaller than gyroscopics; ``g`` (C, 3, 6) with the gradients of each contact (see
+    `touch_gradient`), valid where ``touching`` (C,) is not zero.
     """
     n_q, i_w = p.rotor_at[L.N_COORDINATES], p.rotor_at[L.ROTOR_SPEED]
     J[:, :] = 0.0
     for i in range(n_q):
         J[i, n_q + i] = 1.0
     for b in range(p.bearing.shape[0]):
-        touching[b] = 1 if _bearing_jacobian(b, y, p, J, g[b]) else 0
+        if p.bearing_at[b, L.RACE] >= 0:
+            _race_jacobian(b, y, p, J)
+        _support_jacobian(b, y, p, J)
+    for c in range(p.contact_at.shape[0]):
+        ux, uy, vx, vy = relative_motion(c, y, p)
+        spin = p.contact_at[c, L.CONTACT_SPIN]
+        omega_i = y[spin] if spin >= 0 else 0.0
+        numbers = p.bearing[p.contact_at[c, L.CONTACT_BEARING], L.TOUCH : L.TOUCH_END]
+        touching[c] = 1 if touch_gradient(numbers, ux, uy, vx, vy, y[i_w], omega_i, g[c]) else 0
     _rotor_jacobian(y, p, J)
     J[p.rotor_at[L.ROTOR_ANGLE], i_w] = 1.0
     if p.flags[L.SPIN_MODE] == OF_SPEED:
-        J[i_w, i_w] -= p.spin[L.AERO_LINEAR] + 2.0 * p.spin[L.AERO_QUADRATIC] * abs(y[i_w])
+        J[i_w, i_w] += aerodynamics.speed_dependent_slope(
+            y[i_w], p.spin[L.AERO_LINEAR], p.spin[L.AERO_QUADRATIC]
+        )
     if p.flags[L.MAGNETS_ACT] != 0 and t < p.spin[L.POWER_OFF_DELAY]:
         _magnet_jacobian(p, J)
 

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import kernel
 from rotordrop.physics.columns import KernelParameters
-from rotordrop.simulate._rhs import drop_derivative
+from rotordrop.simulate._loop import remember
+from rotordrop.simulate._rhs import Scratch, drop_derivative, scratch_of
 
 Array = NDArray[np.float64]
 
@@ -33,7 +34,7 @@ def race_damping_rates(p: KernelParameters, n: int) -> Array:
 
 @kernel
 def settled_step(
-    t: float, h: float, y: Array, d: Array, y_new: Array, d_new: Array, p: KernelParameters, work: Array
+    t: float, h: float, y: Array, d: Array, y_new: Array, d_new: Array, p: KernelParameters, work: Scratch
 ) -> None:
     """One step of velocity Verlet from (y, d) to (y_new, d_new), d being the derivative of the state.
 
@@ -93,7 +94,7 @@ def integrate_settled(
     n = y.shape[0]
     i_w = p.rotor_at[L.ROTOR_SPEED]
     rates = race_damping_rates(p, n)
-    work = np.empty((2, p.balls.shape[2]))
+    work = scratch_of(p)
     state = y.copy()
     y_new = np.empty(n)
     d = np.empty(n)
@@ -110,6 +111,7 @@ def integrate_settled(
             d, d_new = d_new, d
         if stop_speed >= 0.0 and sense * state[i_w] <= stop_speed:
             return sample
+        remember(t + (sample + 1) * output_step, state, p)
         for i in range(n):
             y[i] = state[i]
             states[sample, i] = state[i]

@@ -15,6 +15,7 @@ from rotordrop.machine import Machine
 from rotordrop.physics import columns as L
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.simulate import _coast_loop as C
+from rotordrop.simulate import _loop
 from rotordrop.simulate._coast_run import (
     BROKEN,
     ENDED,
@@ -136,7 +137,7 @@ def _folder(output: Path, *, resume: bool) -> Path:
 def _fraction(setup: Setup, run: Run) -> float:
     """Share of the run that is done; until standstill it is judged by the speed that is lost."""
     if setup.case.duration is not None:
-        return float(run.progress[C.TIME] / setup.case.duration)
+        return float(run.progress[_loop.TIME] / setup.case.duration)
     speed = abs(float(run.state[setup.model.layout.rotor_speed]))
     begun, stop = abs(setup.case.speed), setup.case.stop_speed
     return 1.0 - math.log(max(speed, stop) / stop) / math.log(begun / stop)
@@ -144,7 +145,7 @@ def _fraction(setup: Setup, run: Run) -> float:
 
 def _stage(setup: Setup, run: Run) -> str:
     speed = abs(float(run.state[setup.model.layout.rotor_speed])) / (2.0 * math.pi)
-    return f"{run.progress[C.TIME]:.0f} s, {speed:.2f} Hz"
+    return f"{run.progress[_loop.TIME]:.0f} s, {speed:.2f} Hz"
 
 
 def _result(setup: Setup, run: Run, output: Path | None) -> CoastDownResult:
@@ -162,7 +163,7 @@ def _result(setup: Setup, run: Run, output: Path | None) -> CoastDownResult:
         tolerance=case.tolerance,
         reduction=model.basis.description,
         output_step=case.output_step,
-        end_time=float(run.progress[C.TIME]),
+        end_time=float(run.progress[_loop.TIME]),
         standstill_time=None if math.isnan(stopped) else stopped,
         finished=run.status[PHASE] == ENDED and (case.duration is not None or not math.isnan(stopped)),
         outcome="",
@@ -188,8 +189,8 @@ def _result(setup: Setup, run: Run, output: Path | None) -> CoastDownResult:
         air_work=float(run.state[layout.work_in]),
         energy_residual=float(run.status[WORST_BALANCE]),
         energy_scale=float(run.status[ENERGY_AT_START] - stored_energy_of(setup, run.state)),
-        steps=int(run.progress[C.ACCEPTED]),
-        rejected_steps=int(run.progress[C.REJECTED]),
+        steps=int(run.progress[_loop.ACCEPTED]),
+        rejected_steps=int(run.progress[_loop.REJECTED]),
         path=output,
     )
     return replace(result, outcome=_sentence(setup, run, result))

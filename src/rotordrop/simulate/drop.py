@@ -16,6 +16,7 @@ from rotordrop.rotor.reduction import Reduction
 from rotordrop.rotor.rotor_on_race import rotor_on_race
 from rotordrop.simulate import _histories as H
 from rotordrop.simulate import _loop
+from rotordrop.simulate._rhs import N_PLACES
 from rotordrop.simulate._tableau import Tableau, dp5, tsit5
 from rotordrop.simulate.case import DropCase
 from rotordrop.simulate.certificate import COMPARABLE_WINDOW, Certificate, peaks_of
@@ -87,7 +88,7 @@ def _simulate(model: DropModel, case: DropCase) -> DropResult:
     times = case.output_times
     states = np.empty((len(times), model.layout.size))
     log = np.zeros((100 + int(LOG_ROWS_PER_SECOND * case.duration), _loop.N_LOG_COLUMNS))
-    counters = np.zeros(5)
+    counters, books = np.zeros(5), np.zeros((model.layout.n_bearings + 1, N_PLACES))
     outcome = _loop.integrate_drop(
         start,
         times,
@@ -101,8 +102,10 @@ def _simulate(model: DropModel, case: DropCase) -> DropResult:
         states,
         log,
         counters,
+        books,
     )
-    return _result(model, case, parameters, times, states, log[: int(counters[3])], counters, outcome)
+    result = _result(model, case, parameters, times, states, log[: int(counters[3])], counters, outcome)
+    return replace(result, lost=books)
 
 
 def _result(
@@ -137,7 +140,7 @@ def _result(
         speed=states[:, layout.rotor_speed],
         race_speed=states[:, layout.race_spin],
         state=states,
-        contacts=_contact_log(log),
+        contacts=_contact_log(parameters, log),
         bearing_names=model.bearing_names,
         state_names=layout.names(model.bearing_names),
         shapes=model.basis.shapes,
@@ -153,9 +156,9 @@ def _result(
     )
 
 
-def _contact_log(log: Array) -> ContactLog:
+def _contact_log(parameters: KernelParameters, log: Array) -> ContactLog:
     return ContactLog(
-        bearing=log[:, _loop.LOG_BEARING].astype(np.int64),
+        bearing=parameters.contact_at[log[:, _loop.LOG_CONTACT].astype(np.int64), L.CONTACT_BEARING],
         start=log[:, _loop.LOG_START].copy(),
         end=log[:, _loop.LOG_END].copy(),
         peak_force=log[:, _loop.LOG_PEAK_FORCE].copy(),

@@ -99,6 +99,8 @@ class DropResult:
         Whether the whole duration was reached.
     line_contacts : tuple of LineContact
         Rotor in each race, which gives the pressure there; one per bearing.
+    lost : ndarray, shape (B + 1, 5), optional
+        Energy lost by place [J], for `rotordrop.simulate.losses`; None for a drop that was read from a file.
     """
 
     time: Array
@@ -128,6 +130,7 @@ class DropResult:
     finished: bool
     certificate: Certificate
     line_contacts: tuple[LineContact, ...]
+    lost: Array | None = field(default=None, repr=False)
 
     def index_of(self, bearing: int | str) -> int:
         """Place of a bearing, given by name or by number from 0.

@@ -19,6 +19,7 @@ from rotordrop.physics import columns as L
 from rotordrop.physics._compile import kernel, lean_kernel
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import exp, sine_cosine
+from rotordrop.simulate._loop import remember
 from rotordrop.track._covariance import is_covariance, pack, symmetrise, unpack
 from rotordrop.track._propagation import (
     FilterSettings,
@@ -299,6 +300,7 @@ def forward_pass(
             y[:] = 0.0
             y[:s] = at[:s]
             propagate(times[i - 1], y, theta, targets, p, settings, F, impulses)
+            remember(times[i], y, p)
             if form.lag.shape[0] > 0:
                 moved[:s] = y[:s]
                 moved[s:] = theta

@@ -14,9 +14,11 @@ from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import exp, power
 from rotordrop.simulate._loop import contact_at
 from rotordrop.simulate._rhs import (
+    Scratch,
     add_rotor_rates,
     bearing_accelerations,
     drop_derivative,
+    scratch_of,
 )
 from rotordrop.simulate._sensitivity import drop_jacobian_parts
 
@@ -153,7 +155,7 @@ def write_values(
 
 @lean_kernel
 def rates_by_owner(
-    t: float, owner: int, y: Array, p: KernelParameters, torque: float, out: Array, work: Array
+    t: float, owner: int, y: Array, p: KernelParameters, torque: float, out: Array, work: Scratch
 ) -> float:
     """The part of the right-hand side that one bearing gives, or the rotor's own behind the last, in ``out``.
 
@@ -164,7 +166,7 @@ def rates_by_owner(
     if owner == p.bearing.shape[0]:
         add_rotor_rates(t, y, torque, 0.0, p, out)
         return 0.0
-    driven, _lost = bearing_accelerations(owner, y, y[p.rotor_at[L.ROTOR_SPEED]], p, out, work)
+    driven: float = bearing_accelerations(owner, y, p, out, work)
     return driven
 
 
@@ -177,7 +179,7 @@ def parameter_jacobian(
     p: KernelParameters,
     base: Array,
     other: Array,
-    work: Array,
+    work: Scratch,
     B: Array,
 ) -> None:
     """Derivative of the right-hand side by the parameters, shape (s, P), by one-sided differences.
@@ -249,34 +251,38 @@ def sparse_product(entries: Array, columns: IntArray, starts: IntArray, V: Array
 
 
 @lean_kernel
-def add_contact_product(b: int, g: Array, p: KernelParameters, V: Array, moved: Array, out: Array) -> None:
-    """Add to ``out`` the product of one contact's part of the Jacobian with ``V``, both (s, c).
+def add_contact_product(c: int, g: Array, p: KernelParameters, V: Array, moved: Array, out: Array) -> None:
+    """Add to ``out`` the product of one contact's part of the Jacobian with ``V``, both (s, columns).
 
     A contact couples all modes, but only through the six motions it sees and the three forces it gives:
-    in two steps it takes a fraction of the operations of the full rows. ``moved`` (7, c) is scratch.
+    in two steps it takes a fraction of the operations of the full rows. ``moved`` (7, columns) is scratch.
     """
     n_q, i_w = p.rotor_at[L.N_COORDINATES], p.rotor_at[L.ROTOR_SPEED]
-    r, spin = p.bearing_at[b, L.RACE], p.bearing_at[b, L.RACE_SPIN]
+    b, r, spin = (
+        p.contact_at[c, L.CONTACT_BEARING],
+        p.contact_at[c, L.CONTACT_BODY],
+        p.contact_at[c, L.CONTACT_SPIN],
+    )
     shape = p.bearing_shape[b]
     row = p.bearing[b]
-    c = V.shape[1]
+    columns = V.shape[1]
     for part in range(4):
         base = (part // 2) * n_q
         axis = part % 2
         modes = base + p.rotor_at[L.MODES_X + axis]
-        for j in range(c):
+        for j in range(columns):
             moved[part, j] = -V[base + r + axis, j]
         for k in range(shape.shape[0]):
             weight = shape[k]
             source = modes + k
-            for j in range(c):
+            for j in range(columns):
                 moved[part, j] += weight * V[source, j]
     for force in range(3):
-        for j in range(c):
+        for j in range(columns):
             moved[4 + force, j] = g[force, 4] * V[i_w, j] + g[force, 5] * V[spin, j]
         for part in range(4):
             weight = g[force, part]
-            for j in range(c):
+            for j in range(columns):
                 moved[4 + force, j] += weight * moved[part, j]
     for axis in range(2):
         add_row(1.0 / row[L.RACE_MASS], moved[4 + axis], out[n_q + r + axis])
@@ -309,13 +315,15 @@ def jacobian_product(
 ) -> None:
     """Product of the whole Jacobian, listed part and contacts, with a full matrix."""
     sparse_product(entries, columns, starts, V, out)
-    for b in range(touching.shape[0]):
-        if touching[b] != 0:
-            add_contact_product(b, g[b], p, V, moved, out)
+    for c in range(touching.shape[0]):
+        if touching[c] != 0:
+            add_contact_product(c, g[c], p, V, moved, out)
 
 
 @lean_kernel
-def rk4_step(t: float, h: float, y: Array, p: KernelParameters, k: Array, trial: Array, work: Array) -> None:
+def rk4_step(
+    t: float, h: float, y: Array, p: KernelParameters, k: Array, trial: Array, work: Scratch
+) -> None:
     """One classical Runge–Kutta step in place; ``k`` (5, n) and ``trial`` (n,) are scratch."""
     n = y.shape[0]
     drop_derivative(t, y, p, k[0], work)
@@ -359,11 +367,11 @@ def propagate(
     starts = np.empty(s + 1, dtype=np.int64)
     k = np.zeros((5, n))  # what a sensor has got to stays: `lag_step` moves it
     trial = np.empty(n)
-    work = np.empty((2, p.balls.shape[2]))
+    work = scratch_of(p)
     base, other = np.zeros((p.bearing.shape[0] + 1, n)), np.zeros(n)
     contact = np.empty(6)
-    g = np.zeros((p.bearing.shape[0], 3, 6))
-    touching = np.zeros(p.bearing.shape[0], dtype=np.int64)
+    g = np.zeros((p.contact_at.shape[0], 3, 6))
+    touching = np.zeros(p.contact_at.shape[0], dtype=np.int64)
     moved = np.empty((7, columns))
     h = settings.dt / settings.substeps
     F[:, :] = 0.0
@@ -381,9 +389,9 @@ def propagate(
         if columns > s:
             parameter_jacobian(now + 0.5 * h, middle, theta, targets, p, base, other, work, B)
         # What the contact law gets wrong is a share of what it gives; process noise is scaled by the impulse.
-        for b in range(p.bearing.shape[0]):
-            contact_at(b, middle, p, contact)
-            impulses[b] += h * contact[1]
+        for c in range(p.contact_at.shape[0]):
+            contact_at(c, middle, p, contact)
+            impulses[p.contact_at[c, L.CONTACT_BEARING]] += h * contact[1]
         # F <- exp(hJ) F + what the parameters add, to third order: at second order light modes would grow
         jacobian_product(entries, places, starts, touching, g, p, F, moved, first)
         for i in range(s):

@@ -70,7 +70,7 @@ def force_values(
         for b in range(p.bearing.shape[0]):
             dx, dy = race_deflection(b, y, p)
             axial = p.bearing[b, L.AXIAL_OFFSET]
-            contact_at(b, y, p, contacts[i, b])
+            contact_at(p.bearing_at[b, L.CONTACTS], y, p, contacts[i, b])
             bearing_values(dx, dy, axial, b, p, work, values[i, b])
             for c in range(3):
                 ex = step_d if c == 0 else 0.0

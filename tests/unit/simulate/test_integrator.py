@@ -9,7 +9,7 @@ import pytest
 
 from rotordrop.physics import columns as L
 from rotordrop.simulate import _loop
-from rotordrop.simulate._rhs import drop_derivative
+from rotordrop.simulate._rhs import drop_derivative, scratch_of
 from rotordrop.simulate._tableau import dp5, tsit5
 from rotordrop.simulate.batch import simulate_drops
 from rotordrop.simulate.case import DropCase, PlacedStart
@@ -195,6 +195,6 @@ def test_loop_can_be_called_with_a_state_that_touches_already(quick):
     running, log = np.zeros((2, _loop.N_RUN_COLUMNS)), np.zeros((4, _loop.N_LOG_COLUMNS))
     assert _loop.start_running(state, 0.0, parameters, running, log) == 2
     assert np.all(log[:2, _loop.LOG_PEAK_FORCE] > 0.0)
-    rate, work = np.zeros(quick.layout.size), np.empty((2, parameters.balls.shape[2]))
+    rate, work = np.zeros(quick.layout.size), scratch_of(parameters)
     drop_derivative(0.0, state, parameters, rate, work)
     assert np.all(np.isfinite(rate))

@@ -9,7 +9,7 @@ import pytest
 
 from rotordrop.physics import columns as L
 from rotordrop.rotor.parameters import DropModel, build_drop_model
-from rotordrop.simulate._rhs import drop_derivative
+from rotordrop.simulate._rhs import drop_derivative, scratch_of
 from rotordrop.simulate.case import CentredStart, DropCase, PlacedStart, StateStart
 from rotordrop.simulate.drop import simulate_drop
 from rotordrop.simulate.levitation import rigid_amplitudes, start_of_drop
@@ -243,7 +243,7 @@ def contact_on_race(model: DropModel, azimuth: float, speed: float, velocity=(0.
         moving[:, 1],
     )
     state[layout.rotor_speed] = speed
-    rate, work = layout.zeros(), np.empty((2, p.balls.shape[2]))
+    rate, work = layout.zeros(), scratch_of(p)
     drop_derivative(0.0, state, p, rate, work)
     force = rate[layout.velocity_of(layout.race)].reshape(-1, 2) * p.bearing[:, [L.RACE_MASS]]
     return force, rate, p

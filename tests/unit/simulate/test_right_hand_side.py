@@ -7,7 +7,7 @@ import pytest
 from tests.unit.simulate import plain_equations
 
 from rotordrop.rotor.parameters import build_drop_model
-from rotordrop.simulate._rhs import drop_derivative
+from rotordrop.simulate._rhs import drop_derivative, scratch_of
 from rotordrop.simulate._sensitivity import drop_jacobian
 from rotordrop.simulate.case import DropCase
 from rotordrop.simulate.levitation import rigid_amplitudes, start_of_drop
@@ -45,7 +45,7 @@ def a_state(model, depths, slip, seed=4):
 
 def kernel_derivative(model, state, case=CASE):
     _, parameters = start_of_drop(model, case)
-    rate, work = np.zeros(model.layout.size), np.empty((2, parameters.balls.shape[2]))
+    rate, work = np.zeros(model.layout.size), scratch_of(parameters)
     drop_derivative(0.003, state, parameters, rate, work)
     return rate
 

@@ -11,7 +11,7 @@ from scipy.special import erf
 
 from rotordrop.physics import columns as L
 from rotordrop.rotor.parameters import DropModel
-from rotordrop.simulate._rhs import drop_derivative
+from rotordrop.simulate._rhs import drop_derivative, scratch_of
 from rotordrop.track import _propagation as P
 from rotordrop.track._filter import soften_friction
 from rotordrop.track.problem import DropProblem, private_copy
@@ -121,7 +121,7 @@ def test_a_parameter_moves_its_owners_part_and_leaves_the_others_as_they_were(fl
     """The derivative taken owner by owner is that of the whole right-hand side, written anew each time."""
     y, theta = start_of(flight.model, indentation), theta_of(flight)
     targets, p = flight.targets, private_copy(flight.model.parameters)
-    work, n_p = np.empty((2, p.balls.shape[2])), len(theta)
+    work, n_p = scratch_of(p), len(theta)
     P.apply_parameters(theta, targets, p)
     before = private_copy(p)
     base, other = np.zeros((len(p.bearing) + 1, len(y))), np.zeros(len(y))

@@ -1,0 +1,130 @@
+"""Rotor in a round bore: normal force, friction and their derivatives from the motion against the bore.
+
+The numbers of a contact are a short array that only this module reads; its last entries are the law of
+`rotordrop.physics.contact`, the columns of `rotordrop.rotor.layout` hold it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.physics import contact
+from rotordrop.physics._compile import inner_kernel, lean_kernel
+from rotordrop.physics.friction import stribeck_coefficient, stribeck_gradient
+from rotordrop.physics.spin import surface_speed
+
+Array = NDArray[np.float64]
+
+# Entries of a contact; SI units.
+AIR_GAP = 0
+ROTOR_RADIUS = 1
+BORE_RADIUS = 2
+FRICTION_STATIC = 3
+FRICTION_DYNAMIC = 4
+STRIBECK_SPEED = 5
+SMOOTHING_SPEED = 6
+LAW = 7
+N_ENTRIES = LAW + contact.N_ENTRIES
+
+
+@inner_kernel
+def touch(
+    numbers: Array, ux: float, uy: float, vx: float, vy: float, omega: float, omega_i: float
+) -> tuple[float, float, float, float, float, float, float]:
+    """Contact of a rotor with the bore around it.
+
+    Parameters
+    ----------
+    numbers : ndarray, shape (N_ENTRIES,)
+        Gap and radii [m], friction, law.
+    ux, uy, vx, vy : float
+        Displacement [m] and velocity [m/s] of the rotor against the bore.
+    omega, omega_i : float
+        Spin of rotor and bore [rad/s].
+
+    Returns
+    -------
+    tuple of float
+        Indentation [m], normal and signed friction force [N], normal (x, y) [1] from bore to rotor, power
+        that sliding takes and power that the law takes in the normal direction [W]. The tangent is the normal
+        turned by 90° in the sense of positive spin.
+
+    Notes
+    -----
+    Source: Neisi 2020, eqs. (8)–(12).
+    """
+    e_r = math.sqrt(ux * ux + uy * uy)
+    delta = e_r - numbers[AIR_GAP]
+    if delta <= 0.0:
+        return delta, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    # Unit vectors instead of angles: no branch at an azimuth, no sign to set by hand.
+    nx = ux / e_r
+    ny = uy / e_r
+    delta_dot = vx * nx + vy * ny
+    F_r, elastic = contact.contact_force(numbers[LAW:N_ENTRIES], delta, delta_dot)
+    v_t = surface_speed(vy * nx - vx * ny, omega, numbers[ROTOR_RADIUS], omega_i, numbers[BORE_RADIUS])
+    F_mu = F_r * stribeck_coefficient(
+        v_t,
+        numbers[FRICTION_STATIC],
+        numbers[FRICTION_DYNAMIC],
+        numbers[STRIBECK_SPEED],
+        numbers[SMOOTHING_SPEED],
+    )
+    return delta, F_r, F_mu, nx, ny, F_mu * v_t, (F_r - elastic) * delta_dot
+
+
+@lean_kernel
+def touch_gradient(
+    numbers: Array, ux: float, uy: float, vx: float, vy: float, omega: float, omega_i: float, g: Array
+) -> bool:
+    """Derivatives of contact and friction force; False and ``g`` untouched when there is no contact.
+
+    ``g`` (3, 6): rows force on the bore in x, in y [N] and friction force [N]; columns by ``ux, uy`` [m],
+    ``vx, vy`` [m/s], rotor spin and bore spin [rad/s]; arguments as in `touch`.
+    Source: `touch`, differentiated.
+    """
+    r = math.sqrt(ux * ux + uy * uy)
+    delta = r - numbers[AIR_GAP]
+    if delta <= 0.0:
+        return False
+    nx = ux / r
+    ny = uy / r
+    tx = -ny
+    ty = nx
+    v_n = vx * nx + vy * ny
+    v_s = vx * tx + vy * ty
+    F, F_d, F_v = contact.contact_gradient(numbers[LAW:N_ENTRIES], delta, v_n)
+    v_t = surface_speed(v_s, omega, numbers[ROTOR_RADIUS], omega_i, numbers[BORE_RADIUS])
+    mu, mu_v = stribeck_gradient(
+        v_t,
+        numbers[FRICTION_STATIC],
+        numbers[FRICTION_DYNAMIC],
+        numbers[STRIBECK_SPEED],
+        numbers[SMOOTHING_SPEED],
+    )
+    for c in range(6):
+        dn = 0.0
+        dt = 0.0
+        d_force = 0.0
+        d_slip = 0.0
+        if c < 2:
+            dn = nx if c == 0 else ny
+            dt = tx if c == 0 else ty
+            d_force = F_d * dn + F_v * v_s / r * dt
+            d_slip = -v_n / r * dt
+        elif c < 4:
+            d_force = F_v * (nx if c == 2 else ny)
+            d_slip = tx if c == 2 else ty
+        elif c == 4:
+            d_slip = numbers[ROTOR_RADIUS]
+        else:
+            d_slip = -numbers[BORE_RADIUS]
+        d_friction = mu * d_force + F * mu_v * d_slip
+        turn = dt / r
+        g[0, c] = nx * d_force + tx * d_friction + F * turn * (tx - mu * nx)
+        g[1, c] = ny * d_force + ty * d_friction + F * turn * (ty - mu * ny)
+        g[2, c] = d_friction
+    return True
