@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from rotordrop.elements.parameter import Parameter
-from rotordrop.rotor.parameter_table import LOADS, rows
-from rotordrop.rotor.structure_table import STRUCTURE
+from rotordrop.elements.table import LOADS, STRUCTURE, rows
+from rotordrop.machine import example_machine
 
 INTRODUCTION = """\
 # Parameters
 
 Every unknown of a drop, as the estimators know it before they read a record. This page is written from the
-table `rotordrop.rotor.parameter_table`, which priors, schema, report and score read too.
+table `rotordrop.elements.table`, which priors, schema, report and score read too.
 
 **What the machine file says of a value.** A `range` of a guess, and an `interval` of a value, is the
 interval that holds the value with 90 % probability: one in twenty lies below it and one in twenty above.
@@ -34,6 +34,8 @@ Unknowns only of a machine whose description names them; the estimate adds them 
 ([extensions](../tracked_twin.md#beyond-the-usual-model)). Of those of a sensor, the column of a guess is the
 share of one sensor; what the sensors of a plane, or all of them, have in common has a prior of its own.
 """
+
+BEARING = example_machine("paper").touchdown_bearings[0]
 
 OWNERS = {
     "bearing": "Of a touchdown bearing",
@@ -72,8 +74,8 @@ def _priors(owned: tuple[Parameter, ...]) -> list[str]:
 
 
 def _measure(row: Parameter) -> str:
-    if row.path == "preload":
-        return "axial offset of the ball rows"
+    if row.estimated_by is not None:
+        return row.estimated_by(BEARING).name
     if row.logarithmic:
         return "logarithm"
     return "value" if row.scale == "one" else f"value, as a share of the {row.scale}"

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rotordrop.elements.table import rows
 from rotordrop.errors import UsageError
 from rotordrop.machine import example_machine
-from rotordrop.rotor.parameter_table import rows
 from rotordrop_bench import VIOLATIONS, Violations, hidden_machine
 from rotordrop_bench.event import LARGEST_JITTER, LARGEST_ORBIT, drop_conditions
 from rotordrop_bench.random_streams import stream

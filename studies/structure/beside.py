@@ -16,11 +16,11 @@ from pathlib import Path
 
 from extensions import CASES, SPEED_HZ, recorded
 
+from rotordrop.elements.table import EXTENSIONS
 from rotordrop.errors import RotordropError
 from rotordrop.estimation import estimate_drop
 from rotordrop.machine.examples import example_machine
 from rotordrop.twin import structure_search, tracked
-from rotordrop.twin.structure import EXTENSIONS
 from rotordrop.twin.structure_search import BACK_PASSES, Candidate, Search, gain_of
 
 FOUND = Path(__file__).parent / "beside.json"

@@ -27,13 +27,13 @@ for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.table import EXTENSIONS
 from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine import example_machine
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.track.calibration import BLIND_SCHEDULE, Stage, shifted, stage_settings, track
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import PassSettings, forward
-from rotordrop.twin.structure import EXTENSIONS
 from rotordrop.twin.tracked import COARSE_BASIS, _first_contact, drop_problem
 from rotordrop_bench import hidden_machine, synthesize_drop
 from rotordrop_bench.violations import Violations

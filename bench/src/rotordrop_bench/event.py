@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.elements.bearing_numbers import Spread, numbers_of
+from rotordrop.elements.table import structure_rows as structure_rows_of
 from rotordrop.errors import UsageError
 from rotordrop.known import Known
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.rotor.reduction import Reduction
-from rotordrop.rotor.structure_table import structure_rows as structure_rows_of
 from rotordrop.simulate.case import LevitatedStart
 from rotordrop_bench.random_streams import stream
 from rotordrop_bench.structure import structure_rows, violated, without_structure

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.elements.parameter import Step
+from rotordrop.elements.table import rows
 from rotordrop.machine import Machine, TouchdownBearing
-from rotordrop.rotor.parameter_table import rows
 from rotordrop.rotor.statics import bearing_load_shares
 from rotordrop.simulate.certificate import refined_peak
 from rotordrop.simulate.result import DropResult

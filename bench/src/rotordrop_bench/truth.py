@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.table import LOADS, published
 from rotordrop.errors import UsageError
-from rotordrop.rotor.parameter_table import LOADS, published
 
 Array = NDArray[np.float64]
 

@@ -83,8 +83,8 @@ def calibrate(
 def _summary(result: Calibration, output: Path | None, out: Console) -> None:
     from rich.table import Table
 
+    from rotordrop.elements.table import row_of
     from rotordrop.report.quantity import Quantity
-    from rotordrop.rotor.parameter_table import row_of
 
     table = Table("parameter", "estimate", "90 % interval", "verdict", box=None)
     for path, value in result.values.items():

@@ -45,9 +45,9 @@ def _finite(content: dict[str, object]) -> dict[str, object]:
 def _summary(out: Console, found: Changes) -> None:
     from rich.table import Table
 
+    from rotordrop.elements.table import row_of
     from rotordrop.estimate.changed import asked_for
     from rotordrop.report.quantity import Quantity
-    from rotordrop.rotor.parameter_table import row_of
     from rotordrop.units import format_chance
 
     columns = ("parameter", "before", "after", "change (90 %)", "changed that much", "found from")

@@ -22,7 +22,7 @@ _OF_THE_DROP = {"drop_instant_s": ("drop instant", "time"), "speed_Hz": ("speed"
 
 def _words_and_kind(path: str) -> tuple[str, str]:
     """Name for people and kind of quantity of a scored field."""
-    from rotordrop.rotor.parameter_table import LOADS, published
+    from rotordrop.elements.table import LOADS, published
 
     scored = {field: (row.label, row.kind) for field, row in published().items()}
     scored |= {load.field: (load.label, load.kind) for load in LOADS}

@@ -5,7 +5,9 @@ from __future__ import annotations
 from pydantic import Field
 
 from rotordrop.elements.description import Description
+from rotordrop.elements.parameter import Entry, Parameter
 from rotordrop.elements.values import Drag, PositiveSpeed, PositiveTime, QuadraticDrag
+from rotordrop.physics import columns as L
 
 
 class SpeedDescription(Description):
@@ -29,3 +31,18 @@ class SpeedDescription(Description):
     aero_quadratic: QuadraticDrag | None = Field(
         default=None, description="Aerodynamic torque per speed squared"
     )
+
+
+PARAMETERS: tuple[Parameter, ...] = (
+    Parameter(
+        path="speed.aero_time_constant",
+        owner="drop",
+        label="aerodynamic time constant",
+        kind="time",
+        shown_as="duration",
+        guess_sigma=0.7,
+        entries=(Entry(array="spin", column=L.AERO_TIME_CONSTANT),),
+        truth=("tau_aero",),
+    ),
+)
+"""Unknowns of the drag of the air, in every drop anew."""

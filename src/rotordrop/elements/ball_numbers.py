@@ -16,14 +16,15 @@ from rotordrop.elements.bearing_numbers import (
     BearingFigure,
     BearingNumbers,
     Excess,
-    Measure,
     Ratings,
     RollingElements,
     Spread,
 )
 from rotordrop.elements.catalog.inference import dynamic_rating, static_rating
 from rotordrop.elements.inferred_balls import inferred_stress_sigma
+from rotordrop.elements.parameter import Measure, Parameter, Role, Step, bearing_entries
 from rotordrop.known import Known
+from rotordrop.physics import columns as L
 from rotordrop.physics.ball_bearing import (
     BearingConstants,
     ball_centrifugal_force,
@@ -38,6 +39,7 @@ from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
     from rotordrop.elements.ball_bearing import BallBearing
+    from rotordrop.elements.touchdown_bearing import TouchdownBearing
 
 Array = NDArray[np.float64]
 
@@ -226,17 +228,6 @@ class BallNumbers(BearingNumbers):
             contact_angle=float(self.balls.contact_angle),
         )
 
-    def measure(self, path: str) -> Measure | None:
-        """The preload by the axial offset of the rows, which is what the ball forces depend on."""
-        if path != "preload":
-            return None
-
-        def offset(preload: float) -> float:
-            return bearing_constants(self.balls.changed(preload=Known(value=preload))).axial_offset
-
-        published = partial(preload_of_offset, self.constants)
-        return Measure(start=self.constants.axial_offset, of_value=offset, value_of=published)
-
     def spreads(self) -> Iterator[Spread]:
         """Preload and angle of the first ball."""
         yield Spread(path="preload", low=0.8, high=1.25, described=self.balls.preload)
@@ -264,3 +255,49 @@ class BallNumbers(BearingNumbers):
 
 def _figure(field: str, label: str, kind: str, value: float, described: Known | None = None) -> BearingFigure:
     return BearingFigure(field=field, label=label, kind=kind, value=value, described=described)
+
+
+NO_PRELOAD = Known(value=0.0, status="default", source="this kind of bearing has none", unit="N")
+"""What a bearing without rows to press against each other has: no unknown."""
+
+
+def _preload(bearing: TouchdownBearing) -> Known:
+    return getattr(bearing.bearing, "preload", NO_PRELOAD)
+
+
+def _by_offset(bearing: TouchdownBearing) -> Measure:
+    """The preload by the axial offset of the rows, which is what the ball forces depend on."""
+    balls = bearing.bearing
+    constants = _constants(balls)
+
+    def offset(preload: float) -> float:
+        return bearing_constants(balls.changed(preload=Known(value=preload))).axial_offset
+
+    return Measure(
+        name="axial offset of the ball rows",
+        start=constants.axial_offset,
+        of_value=offset,
+        value_of=partial(preload_of_offset, constants),
+    )
+
+
+PARAMETERS: tuple[Parameter, ...] = (
+    Parameter(
+        path="preload",
+        label="preload",
+        kind="force",
+        measured_by="the preload of the bearing at {owner}, from its drawing",
+        logarithmic=False,  # by the axial offset of the ball rows, which is what the ball forces depend on
+        role=Role.CONSIDERED,
+        guess_sigma=0.15,
+        given_sigma=0.15,
+        entries=bearing_entries(L.AXIAL_OFFSET),
+        step=Step.IMPACTS,
+        field="preload_N",
+        truth=("preload_N",),
+        read=_preload,
+        estimated_by=_by_offset,
+        taken_over="welcome",
+    ),
+)
+"""Unknowns of a ball bearing."""

@@ -8,7 +8,7 @@ ask this port and do not know what carries the race.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -73,23 +73,6 @@ class RollingElements:
     ball_diameter: float
     pitch_diameter: float
     contact_angle: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class Measure:
-    """Another number by which a parameter is estimated, because the forces depend on it more simply.
-
-    Attributes
-    ----------
-    start : float
-        The number for the bearing described.
-    of_value, value_of : callable
-        The number for a value of the parameter [SI], and back.
-    """
-
-    start: float
-    of_value: Callable[[float], float]
-    value_of: Callable[[float], float]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -215,10 +198,6 @@ class BearingNumbers(ABC):
 
     def rolling_elements(self) -> RollingElements | None:
         """What defects may show in a spectrum; None without rolling elements."""
-        return None
-
-    def measure(self, path: str) -> Measure | None:
-        """Another number by which the parameter of a path is estimated; None if by itself."""
         return None
 
     def spreads(self) -> Iterator[Spread]:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from pydantic import Field, Strict
 
 from rotordrop.elements.description import Name, Placed
+from rotordrop.elements.extension import Extension, Values, guess, in_words, itself
+from rotordrop.elements.parameter import Entry, Parameter
 from rotordrop.elements.values import Damping, Stiffness, follows
-from rotordrop.known import Known
+from rotordrop.known import NINETY, Known
+from rotordrop.physics import columns as L
 
 RIGID_FREQUENCY = 40.0
 """Rigid-body frequency [Hz] that the AMBs are taken to give the rotor when their stiffness is left out."""
@@ -62,3 +65,68 @@ class ActiveMagneticBearing(Placed):
             why = f"{DAMPING_RATIO:.0%} of critical for the {carried_mass:.3g} kg it carries"
             values["damping"] = Known(value=value, status="default", source=why, unit="N s/m")
         return values
+
+
+REMANENCE_SIGMA = 1.2
+"""Standard deviation of the logarithm of the time in which a remanent force decays [1]."""
+
+FORCES: tuple[Parameter, ...] = (
+    *(
+        Parameter(
+            path=f"remanent_force.{axis}",
+            owner="magnet",
+            label=f"remanent force, {axis}",
+            kind="force",
+            logarithmic=False,
+            guess_sigma=0.2,
+            scale="weight a magnet carries",
+            entries=(Entry(array="magnet", column=column),),
+        )
+        for column, axis in ((L.REMANENT_X, "x"), (L.REMANENT_Y, "y"))
+    ),
+)
+"""Unknowns of a magnet, in every drop anew."""
+
+REMANENCE = Parameter(
+    path="remanence.time_constant",
+    owner="drop",
+    label="time constant of the remanent force",
+    kind="time",
+    shown_as="duration",
+    guess_sigma=0.4,
+    entries=(Entry(array="spin", column=L.REMANENCE_TIME_CONSTANT),),
+)
+"""Unknown of all magnets together, in every drop anew."""
+
+
+def _long(machine: Any) -> dict[str, Known]:
+    if not machine.ambs:
+        return {}
+    reach = math.exp(NINETY * REMANENCE_SIGMA)
+    long = (REMANENCE_TIME / reach, REMANENCE_TIME * reach)
+    return {"remanence_time_constant": Known(value=REMANENCE_TIME, status="guess", range=long)}
+
+
+def _as_in_the_base_model(machine: Any) -> dict[str, Known]:
+    return {"remanence_time_constant": guess(REMANENCE_TIME)} if machine.ambs else {}
+
+
+def _decay(_machine: Any, found: Values, _load: float) -> str:
+    time = itself(found["remanence.time_constant"])
+    usual = f"the usual {1e3 * REMANENCE_TIME:g} ms"
+    side = f"longer than {usual}" if time[1] > REMANENCE_TIME else f"shorter than {usual}"
+    if time[1] <= REMANENCE_TIME <= time[2]:
+        side = f"not to be told from {usual}"
+    return f"the lift of the magnets decays in {in_words(time, 'ms', 1e-3)}, {side}"
+
+
+EXTENSIONS: tuple[Extension, ...] = (
+    Extension(
+        name="long remanence",
+        owner="drop",
+        names=("remanence_time_constant",),
+        neutral=_long,
+        sentence=_decay,
+        base=_as_in_the_base_model,
+    ),
+)

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from rotordrop.elements.rotor import Rotor
-from rotordrop.elements.sensor import Sensor
-from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.known import Known
 from rotordrop.units import si_unit
+
+if TYPE_CHECKING:
+    from rotordrop.elements.sensor import Seen
 
 Owner = Literal["bearing", "sensor", "unbalance", "magnet", "drop", "rotor"]
 
@@ -56,6 +57,37 @@ class Entry:
     array: Literal["bearing", "unbalance", "magnet", "spin", "modes"]
     column: int
     rule: Rule = Rule.VALUE
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measure:
+    """Another number by which a parameter is estimated, because the forces depend on it more simply."""
+
+    name: str
+    """What it is."""
+    start: float
+    """The number for the part described."""
+    of_value: Callable[[float], float]
+    """The number for a value of the parameter [SI]."""
+    value_of: Callable[[float], float]
+    """And back."""
+
+
+def bearing_entries(*columns: int) -> tuple[Entry, ...]:
+    """Entries of a bearing: the first column takes the value, the others follow at their ratio."""
+    first, *others = columns
+    return (
+        Entry(array="bearing", column=first),
+        *(Entry(array="bearing", column=column, rule=Rule.RATIO) for column in others),
+    )
+
+
+def path_of(owner: Owner, name: str, path: str) -> str:
+    """Path in the machine of a path below an owner of a name."""
+    if owner == "rotor":
+        return f"rotor.{path}"
+    group = {"sensor": "sensors.", "unbalance": "unbalance."}.get(owner, "")
+    return f"{group}{name}.{path}" if name else path
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -149,6 +181,24 @@ class Parameter:
     group: Literal["plane", "machine"] = "machine"
     measured_by: str = ""
     separated_by: dict[str, str] = dataclasses.field(default_factory=dict)
+    read: Callable[[Any], Known] | None = None
+    """The described value of a part, where it does not stand at the path."""
+    estimated_by: Callable[[Any], Measure] | None = None
+    """Another number of a part by which the parameter is estimated."""
+    ratio: tuple[str, str] | None = None
+    """Two values of the description whose ratio it is; estimated by its factor on the described ratio. A
+    machine file has the first of the two in its place."""
+    wider: Callable[[Any], float | None] | None = None
+    """Prior standard deviation of a part that may be anything; None where that of the row holds."""
+    scaled: Callable[[Any, float], tuple[float, tuple[float, float]]] | None = None
+    """Scale of the prior of a part and its limits [SI], for the mean load of a bearing [N]."""
+    changes: Mapping[str, Callable[[Any, float, float], float]] = dataclasses.field(default_factory=dict)
+    """What it changes of another value in the machine file, by its path: from part, mean load [N] and slope
+    of the value over the number that is estimated."""
+    seen: Callable[[Any], Seen] | None = None
+    """What a sensor reads per unit of it."""
+    lag: bool = False
+    """Whether it is the time by which a sensor lags behind."""
 
     @property
     def unit(self) -> str:
@@ -162,42 +212,39 @@ class Parameter:
 
     def path_of(self, owner: str) -> str:
         """Path in the machine: ``"NDE.support.stiffness"``, ``"sensors.X1.gain"``, ``"unbalance.0.sine"``."""
-        if self.owner == "rotor":
-            return f"rotor.{self.path}"
-        group = {"sensor": "sensors.", "unbalance": "unbalance."}.get(self.owner, "")
-        return f"{group}{owner}.{self.path}" if owner else self.path
+        return path_of(self.owner, owner, self.path)
+
+    @property
+    def file_path(self) -> str:
+        """Where a machine file has it, below its owner."""
+        return self.path if self.ratio is None else self.ratio[0]
 
     def within(self, value: float) -> float:
         """The value, or the limit of the model it lies beyond."""
         lowest = -math.inf if self.lower is None else self.lower
         return min(max(value, lowest), math.inf if self.upper is None else self.upper)
 
-    def stated(self, part: TouchdownBearing | Sensor | Rotor) -> Known | None:
+    def stated(self, part: Any) -> Known | None:
         """The value as the description has it; None where it leaves it out."""
-        value: object = part
-        for name in self.path.split("."):
-            value = getattr(value, name)
+        value = _at(part, self.path)
         return value if isinstance(value, Known) else None
 
-    def described(self, part: TouchdownBearing | Sensor) -> Known:
-        """The value as the machine description has it, of a bearing or a sensor."""
-        if self.path == "support.anisotropy":
-            assert isinstance(part, TouchdownBearing)
-            support = part.support
-            ratio = float(support.stiffness_horizontal) / float(support.stiffness)
-            return Known(value=ratio, status="default")
-        value: object = part
-        if self.path == "preload":
-            assert isinstance(part, TouchdownBearing)
-            return getattr(part.bearing, "preload", NO_PRELOAD)
-        for name in self.path.split("."):
-            value = getattr(value, name)
+    def described(self, part: Any) -> Known:
+        """The value as the machine description has it."""
+        if self.read is not None:
+            return self.read(part)
+        if self.ratio is not None:
+            above, below = (float(_at(part, path)) for path in self.ratio)
+            return Known(value=above / below, status="default")
+        value = _at(part, self.path)
         assert isinstance(value, Known)
         return value
 
 
-NO_PRELOAD = Known(value=0.0, status="default", source="this kind of bearing has none", unit="N")
-"""What a bearing without rows to press against each other has: no unknown."""
+def _at(part: Any, path: str) -> Any:
+    for name in path.split("."):
+        part = getattr(part, name)
+    return part
 
 
 @dataclass(frozen=True, kw_only=True)

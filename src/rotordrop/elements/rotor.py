@@ -20,7 +20,9 @@ from rotordrop.elements.description import (
     place_on_nodes,
     unknown_key,
 )
+from rotordrop.elements.extension import Extension, Values, guess, in_words, itself
 from rotordrop.elements.material import STEEL, Material
+from rotordrop.elements.parameter import Entry, Parameter, Rule
 from rotordrop.elements.values import (
     Density,
     Inertia,
@@ -404,3 +406,32 @@ def _builtin_steel() -> Material:
 def _unknown_material(name: str, known: tuple[str, ...]) -> str:
     told = unknown_key(name, known).replace("key", "material", 1).removesuffix("?")
     return f"{told}{'?' if 'did you mean' in told else ''} Else describe it under [rotor.materials.{name}]"
+
+
+def _bends(_rotor: Rotor, found: Values, _load: float) -> str:
+    factor = in_words(itself(found["stiffness_factor"]), "")
+    return f"the rotor bends as if its stiffness were {factor} × the described one"
+
+
+EXTENSIONS: tuple[Extension, ...] = (
+    Extension(
+        name="rotor stiffness",
+        owner="rotor",
+        names=("stiffness_factor",),
+        neutral=lambda _: {"stiffness_factor": guess(1.0)},
+        sentence=_bends,
+        rows=(
+            Parameter(
+                path="stiffness_factor",
+                owner="rotor",
+                label="bending stiffness of the rotor over the described one",
+                kind="dimensionless",
+                measured_by="the first bending frequency of the free rotor, from a hammer test",
+                guess_sigma=0.03,
+                given_sigma=0.01,
+                reach=1.3,
+                entries=(Entry(array="modes", column=0, rule=Rule.RATIO),),
+            ),
+        ),
+    ),
+)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Literal
 
 from pydantic import Field
 
 from rotordrop.elements.description import Channel, Misfit, Name, Placed
+from rotordrop.elements.extension import Extension, Values, guess, in_words, itself
+from rotordrop.elements.parameter import Parameter
 from rotordrop.elements.values import (
     Angle,
     Length,
@@ -134,3 +137,163 @@ def _sensor_text(sensor: Sensor) -> str:
 
 def _plane_text(planes: dict[float, list[Sensor]]) -> str:
     return ", ".join(f"{z * 1e3:.4g} mm" for z in planes)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Seen:
+    """What a sensor reads per unit of one of its unknowns, besides gain and offset."""
+
+    of_rotor: tuple[float, float] | None = None
+    """Per displacement (x, y) of the rotor at its node [1]."""
+    of_slope: tuple[float, float] | None = None
+    """Per slope (x, y) of the rotor there [m]."""
+    of_housing: tuple[float, float] | None = None
+    """Per displacement (x, y) of the housing of its bearing [1]."""
+
+
+def _direction(sensor: Sensor) -> tuple[float, float]:
+    return math.cos(float(sensor.angle)), math.sin(float(sensor.angle))
+
+
+def _across(sensor: Sensor) -> Seen:
+    cosine, sine = _direction(sensor)
+    return Seen(of_rotor=(-sine, cosine))
+
+
+def _with_housing(sensor: Sensor) -> Seen:
+    cosine, sine = _direction(sensor)
+    return Seen(of_housing=(-cosine, -sine))
+
+
+def _along_rotor(sensor: Sensor) -> Seen:
+    return Seen(of_slope=_direction(sensor))
+
+
+def _extension(
+    row: Parameter, name: str, neutral: float, words: tuple[str, float, str], *, shows_beside: bool = True
+) -> Extension:
+    """An extension with one unknown of each sensor; words are unit, its size [SI] and text."""
+    unit, size, text = words
+
+    def sentence(sensor: Sensor, found: Values, _load: float) -> str:
+        known = found.get(row.path)
+        return "" if known is None else f"{sensor.name} {in_words(itself(known), unit, size)}"
+
+    return Extension(
+        name=name,
+        owner="sensor",
+        names=(row.path,),
+        neutral=lambda _: {row.path: guess(neutral)},
+        sentence=sentence,
+        joined=", ",
+        frame=text,
+        rows=(row,),
+        shows_beside=shows_beside,
+    )
+
+
+PARAMETERS: tuple[Parameter, ...] = (
+    Parameter(
+        path="gain",
+        owner="sensor",
+        label="gain",
+        kind="dimensionless",
+        logarithmic=False,
+        guess_sigma=0.01,
+        given_sigma=0.01,
+        scale="one",
+        least_sigma=1e-12,
+    ),
+    Parameter(
+        path="offset",
+        owner="sensor",
+        label="offset",
+        kind="length",
+        logarithmic=False,
+        guess_sigma=0.04,
+        given_sigma=0.04,
+        scale="smallest air gap",
+        least_sigma=1e-12,
+    ),
+)
+"""Unknowns of every sensor."""
+
+EXTENSIONS: tuple[Extension, ...] = (
+    # Stiffness and mass of the supports take a lag up: the likelihood rose by 5 to 16 without one (eight
+    # drops of 60 kg rotors), and by 10 at most with one of 2 kHz.
+    _extension(
+        Parameter(
+            path="time_constant",
+            owner="sensor",
+            lag=True,
+            label="time constant of the sensor",
+            kind="time",
+            shown_as="short_time",
+            guess_sigma=0.1,
+            given_sigma=0.1,
+            reach=300.0,
+            common_sigma=1.2,
+        ),
+        "sensor lag",
+        1e-5,
+        ("µs", 1e-6, "sensors that lag behind by {}"),
+        shows_beside=False,
+    ),
+    _extension(
+        Parameter(
+            path="cross_axis",
+            owner="sensor",
+            seen=_across,
+            label="cross-axis sensitivity",
+            kind="dimensionless",
+            logarithmic=False,
+            guess_sigma=0.03,
+            given_sigma=0.003,
+            lower=-0.3,
+            upper=0.3,
+            # what both sensors of a plane have in common is a turn of the plane, which friction looks like
+            common_sigma=0.003,
+            group="plane",
+        ),
+        "cross-axis sensitivity",
+        0.0,
+        ("%", 0.01, "sensors that read part of the motion across: {}"),
+    ),
+    _extension(
+        Parameter(
+            path="follows_housing",
+            owner="sensor",
+            seen=_with_housing,
+            label="part of the motion of the housing that the bracket makes",
+            kind="dimensionless",
+            logarithmic=False,
+            guess_sigma=0.03,
+            given_sigma=0.03,
+            lower=-0.5,
+            upper=1.5,
+            common_sigma=0.3,
+            group="plane",
+        ),
+        "brackets that follow the housing",
+        0.0,
+        ("%", 0.01, "brackets that make part of the motion of the housing: {}"),
+    ),
+    _extension(
+        Parameter(
+            path="plane_offset",
+            owner="sensor",
+            seen=_along_rotor,
+            label="distance of the sensor from its node",
+            kind="length",
+            logarithmic=False,
+            guess_sigma=0.001,
+            given_sigma=0.001,
+            scale="one",
+            common_sigma=0.015,
+            group="plane",
+        ),
+        "sensor planes elsewhere",
+        0.0,
+        ("mm", 1e-3, "sensors that stand beside their node: {}"),
+    ),
+)

@@ -8,6 +8,8 @@ from typing import Any
 from pydantic import Field
 
 from rotordrop.elements.description import Description, Placed
+from rotordrop.elements.extension import Extension, Values, derived, guess, in_words
+from rotordrop.elements.parameter import Entry, Parameter
 from rotordrop.elements.values import Angle, Positive, PositiveSpeed
 from rotordrop.elements.values import Unbalance as UnbalanceAmount
 from rotordrop.errors import UsageError
@@ -125,3 +127,47 @@ def _shares(centre: float, positions: list[float]) -> list[float]:
     first, last = positions[0], positions[-1]
     far = min(1.0, max(0.0, (centre - first) / (last - first)))
     return [1.0 - far, *[0.0] * (len(positions) - 2), far]
+
+
+PARAMETERS: tuple[Parameter, ...] = (
+    *(
+        Parameter(
+            path=part,
+            owner="unbalance",
+            label=f"unbalance, {part} part",
+            kind="unbalance",
+            logarithmic=False,
+            guess_sigma=1.0,
+            scale="amount described",
+            entries=(Entry(array="unbalance", column=column),),
+        )
+        for column, part in enumerate(("cosine", "sine"))
+    ),
+)
+"""Unknowns of an unbalance, in every drop anew."""
+
+BEYOND_GRADE = 3.0
+"""Factor on the unbalance that the grade permits [1]."""
+
+
+def _neutral(unbalance: Unbalance) -> dict[str, Known]:
+    amount = guess(BEYOND_GRADE * float(unbalance.amount))
+    return {"amount": amount, "beyond_described": guess(BEYOND_GRADE)}
+
+
+def _amount(unbalance: Unbalance, found: Values, _load: float) -> str:
+    amount = derived(math.hypot, found["cosine"], found["sine"])
+    return f"{in_words(amount, 'g mm', 1e-6)} at node {unbalance.node}"
+
+
+EXTENSIONS: tuple[Extension, ...] = (
+    Extension(
+        name="unbalance beyond its grade",
+        owner="unbalance",
+        names=("beyond_described",),
+        neutral=_neutral,
+        sentence=_amount,
+        joined=", ",
+        frame="an unbalance beyond the described one: {}",
+    ),
+)

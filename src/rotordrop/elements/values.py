@@ -188,6 +188,12 @@ def follows(why: str) -> Any:
     return Field(default=LEFT_OUT, description=f"When left out: {why}")
 
 
+def scaled(value: Known, factor: float, why: str, unit: str) -> Known:
+    """Another value that follows from one by a factor, with its range."""
+    bounds = None if value.range is None else (value.range[0] * factor, value.range[1] * factor)
+    return Known(value=value.value * factor, status="default", range=bounds, source=why, unit=unit)
+
+
 def _status(table: Mapping[str, Any]) -> Status:
     stated = table.get("status")
     if stated is None:

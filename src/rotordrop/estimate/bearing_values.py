@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from rotordrop.elements.bearing_numbers import numbers_of
+from rotordrop.elements.table import published
 from rotordrop.estimate.estimate import FittedParameter
 from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
-from rotordrop.rotor.parameter_table import published
 
 
 def published_values(name: str, found: Sequence[FittedParameter]) -> dict[str, Known]:

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
 from rotordrop.elements.parameter import Parameter
+from rotordrop.elements.table import fitted_row, row_of
 from rotordrop.errors import UsageError
 from rotordrop.known import NINETY
 from rotordrop.physics.linear_algebra import solve, symmetric_eigen
-from rotordrop.rotor.parameter_table import fitted_row, row_of
 from rotordrop.units import format_chance
 
 Array = NDArray[np.float64]

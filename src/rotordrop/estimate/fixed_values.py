@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from rotordrop.elements.table import rows
 from rotordrop.errors import UsageError
 from rotordrop.known import Correlation, Known
 from rotordrop.machine import Machine
-from rotordrop.rotor.parameter_table import rows
 
 Document = Mapping[str, Any]
 

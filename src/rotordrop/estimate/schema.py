@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from rotordrop.elements.table import LOADS, published
 from rotordrop.json_schema import (
     COUNT,
     DIALECT,
@@ -19,7 +20,6 @@ from rotordrop.json_schema import (
     closed,
     numbers,
 )
-from rotordrop.rotor.parameter_table import LOADS, published
 from rotordrop.severity.numbers import SEVERITY
 from rotordrop.units import si_unit
 

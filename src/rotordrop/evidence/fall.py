@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.elements.magnet import REMANENCE_TIME
+from rotordrop.elements.table import parameter
 from rotordrop.evidence.levitated import LevitatedModel
 from rotordrop.evidence.release import (
     ComplexArray,
@@ -19,7 +20,6 @@ from rotordrop.evidence.release import (
 )
 from rotordrop.record.axes import Plane, sensor_directions
 from rotordrop.record.recording import Array
-from rotordrop.rotor.parameter_table import parameter
 from rotordrop.rotor.unknowns import sensor_prior
 
 if TYPE_CHECKING:

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.elements.sensor import Sensor
+from rotordrop.elements.table import parameter
 from rotordrop.errors import IdentificationError
 from rotordrop.record.axes import along_sensors, sensor_directions
 from rotordrop.record.record import Record
-from rotordrop.rotor.parameter_table import parameter
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.statics import settled_sag
 from rotordrop.rotor.unknowns import sensor_prior, smallest_gap

@@ -2,11 +2,15 @@
 
 from rotordrop.elements.air import SpeedDescription
 from rotordrop.elements.ball_bearing import BallBearing
+from rotordrop.elements.contact import Contact
+from rotordrop.elements.friction import Friction
 from rotordrop.elements.magnet import ActiveMagneticBearing
 from rotordrop.elements.material import Material
+from rotordrop.elements.race import Race
 from rotordrop.elements.rotor import Disc, Element, Rotor, Section, SectionByLength, SectionByNodes
 from rotordrop.elements.sensor import Sensor
-from rotordrop.elements.touchdown_bearing import Contact, Friction, Race, Support, TouchdownBearing
+from rotordrop.elements.support import Support
+from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.elements.unbalance import BalanceGrade, Unbalance
 from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin, JointSpread, RecordedLift
 from rotordrop.machine.examples import example_machine, example_names, example_path

@@ -13,12 +13,14 @@ from itertools import combinations
 from typing import Any
 
 from rotordrop.elements.ball_bearing import BallBearing
+from rotordrop.elements.contact import Contact
 from rotordrop.elements.description import Description
+from rotordrop.elements.friction import Friction
 from rotordrop.elements.magnet import ActiveMagneticBearing
 from rotordrop.elements.material import Material
 from rotordrop.elements.rotor import Rotor, Section
 from rotordrop.elements.sensor import Sensor
-from rotordrop.elements.touchdown_bearing import Contact, Friction, TouchdownBearing
+from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.elements.unbalance import BalanceGrade
 from rotordrop.elements.values import LEFT_OUT
 from rotordrop.known import Known

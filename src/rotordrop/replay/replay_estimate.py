@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.elements.parameter import Step
+from rotordrop.elements.table import parameter, rows
 from rotordrop.estimate.allowances import MODEL_FORCE_SIGMA, MODEL_MEAN_FORCE_SIGMA, MODEL_STRESS_SIGMA
 from rotordrop.estimate.bearing_drop import (
     AirGap,
@@ -32,7 +33,6 @@ from rotordrop.identification.support import SupportFit
 from rotordrop.known import NINETY, Known, Status
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.replay.uncertainty import FEWEST_DRAWS, Draws, interval
-from rotordrop.rotor.parameter_table import parameter, rows
 from rotordrop.simulate.result import DropResult
 
 Array = NDArray[np.float64]

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from rotordrop.elements.table import row_of
 from rotordrop.errors import UsageError
 from rotordrop.estimate.changed import Change, asked_for, changes
 from rotordrop.estimate.document import estimate_document
 from rotordrop.estimate.estimate import Estimate
 from rotordrop.report.content import Cell, Section, Statement, Table
 from rotordrop.report.quantity import Quantity, written
-from rotordrop.rotor.parameter_table import row_of
 from rotordrop.units import format_chance
 
 HEADING = "Since the last drop"

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rotordrop.elements.parameter import Role
+from rotordrop.elements.table import LOADS, published
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.known import Known
 from rotordrop.report.content import Card, Cell, KeyFigure, Table
 from rotordrop.report.quantity import Quantity
-from rotordrop.rotor.parameter_table import LOADS, published
 
 MEANS = (
     "A mean force is the mean of the magnitude; the magnitude of the mean force would be smaller where its "

@@ -16,7 +16,6 @@ from rotordrop.machine import Machine
 from rotordrop.physics.contact import contact_tangent
 from rotordrop.rotor.assembly import RotorFE, build_rotor_fe
 from rotordrop.rotor.modes import free_free_modes, rigid_modes
-from rotordrop.rotor.parameters import contact_law_of
 from rotordrop.rotor.reduction import Reduction
 from rotordrop.rotor.statics import bearing_load_shares
 
@@ -31,7 +30,7 @@ def contact_frequency(machine: Machine, fe: RotorFE | None = None) -> float:
     found = []
     for bearing, share in zip(machine.touchdown_bearings, bearing_load_shares(machine, fe), strict=True):
         force = PEAK_OVER_WEIGHT * float(share)
-        contact = contact_tangent(contact_law_of(bearing.contact), force)
+        contact = contact_tangent(bearing.contact.law, force)
         stiffness = 1.0 / (1.0 / contact + 1.0 / numbers_of(bearing).tangent_stiffness(force))
         rotor = float(np.sum(rigid[2 * (bearing.node - 1)] ** 2))
         found.append(math.sqrt(stiffness * (rotor + 1.0 / float(bearing.support.mass))) / (2.0 * math.pi))

@@ -8,21 +8,18 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.table import row_of
 from rotordrop.physics.linear_algebra import solve
-from rotordrop.rotor.parameter_table import parameter, row_of
 from rotordrop.rotor.parameters import DropModel
-from rotordrop.rotor.unknowns import Unknown, typical_depth
+from rotordrop.rotor.unknowns import Unknown
 
 Array = NDArray[np.float64]
-
-_COUPLED = ("contact.stiffness", "contact.exponent", "support.stiffness", "support.anisotropy")
 
 
 def file_path(path: str) -> str:
     """Where a file has a value: the horizontal support in place of its ratio to the vertical one."""
-    if row_of(path) is parameter("support.anisotropy"):
-        return path.removesuffix("support.anisotropy") + "support.stiffness_horizontal"
-    return path
+    row = row_of(path)
+    return path.removesuffix(row.path) + row.file_path
 
 
 def is_logarithmic(unknown: Unknown) -> bool:
@@ -57,18 +54,17 @@ def file_of_fitted(model: DropModel, unknowns: Sequence[Unknown], exponents: Seq
     exponents : sequence of float
         Their values [SI], of which only those of contact exponents are read.
     """
-    paths = [unknown.path for unknown in unknowns]
-    through = np.eye(len(paths))
-    for bearing in model.machine.touchdown_bearings:
-        at = {row: paths.index(p) for row in _COUPLED if (p := parameter(row).path_of(bearing.name)) in paths}
-        if {"contact.stiffness", "contact.exponent"} <= at.keys():
-            # the file's stiffness belongs to the fitted exponent: equal force at the typical indentation
-            depth = typical_depth(bearing, float(np.mean(model.load_shares)))
-            n = at["contact.exponent"]
-            slope = exponents[n] if is_logarithmic(unknowns[n]) else 1.0
-            through[at["contact.stiffness"], n] = -slope * math.log(depth)
-        if {"support.stiffness", "support.anisotropy"} <= at.keys():
-            through[at["support.anisotropy"], at["support.stiffness"]] = 1.0
+    places = {(unknown.owner, unknown.parameter.path): k for k, unknown in enumerate(unknowns)}
+    bearings = {bearing.name: bearing for bearing in model.machine.touchdown_bearings}
+    through, load = np.eye(len(unknowns)), float(np.mean(model.load_shares))
+    for (owner, _), k in places.items():
+        row = unknowns[k].parameter
+        slope = exponents[k] if is_logarithmic(unknowns[k]) else 1.0
+        for path, change in row.changes.items():
+            if (owner, path) in places:
+                through[places[owner, path], k] = change(bearings[owner], load, slope)
+        if row.ratio is not None and (owner, row.ratio[1]) in places:
+            through[k, places[owner, row.ratio[1]]] = 1.0
     return through
 
 

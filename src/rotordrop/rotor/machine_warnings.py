@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from rotordrop.elements.bearing_numbers import numbers_of
+from rotordrop.elements.table import rows
 from rotordrop.machine.plausibility import doubts
 from rotordrop.physics.thermal import friction_heat, growth_of_race
 from rotordrop.rotor.machine_summary import BearingSummary, MachineSummary
-from rotordrop.rotor.parameter_table import rows
 from rotordrop.rotor.unknowns import prior
 from rotordrop.units import format_quantity
 
@@ -132,7 +132,7 @@ def _heat(bearing: TouchdownBearing, rest: BearingSummary, omega: float) -> Iter
 def _guesses_aside(bearing: TouchdownBearing) -> Iterator[MachineWarning]:
     """Guesses that do not lie in the middle of their range, which an estimate takes for its centre."""
     for row in rows("bearing"):
-        if not row.entries or row.path == "support.anisotropy":
+        if not row.entries or row.ratio is not None:
             continue
         quantity = row.described(bearing)
         if quantity.status != "guess" or quantity.range is None:

@@ -10,15 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.elements.bearing_numbers import numbers_of, places_of
-from rotordrop.elements.touchdown_bearing import Contact
+from rotordrop.elements.foundation import foundation_states
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.physics import aerodynamics
 from rotordrop.physics import columns as L
 from rotordrop.physics.columns import KernelParameters
-from rotordrop.physics.contact import contact_law
 from rotordrop.physics.elementary import sine_cosine
 from rotordrop.physics.linear_algebra import product
-from rotordrop.physics.support import PRESENT
 from rotordrop.rotor.assembly import RotorFE, build_rotor_fe
 from rotordrop.rotor.layout import StateLayout
 from rotordrop.rotor.reduction import Reduction, RotorBasis, reduce_rotor
@@ -82,10 +80,11 @@ def build_drop_model(machine: Machine, reduction: str | Reduction = "accurate") 
     nodes = tuple(bearing.node for bearing in machine.touchdown_bearings)
     basis = reduce_rotor(fe, reduction, nodes)
     shares = np.asarray(bearing_load_shares(machine), dtype=np.float64)
+    further = tuple(foundation_states(bearing) for bearing in machine.touchdown_bearings)
     layout = StateLayout(
         n_modes=basis.shapes.shape[1],
         n_bearings=len(nodes),
-        bearing_own=_foundation_states(machine),
+        bearing_own=further if any(further) else (),
         sensor_own=sum(sensor.time_constant is not None for sensor in machine.sensors),
     )
     return DropModel(
@@ -96,11 +95,6 @@ def build_drop_model(machine: Machine, reduction: str | Reduction = "accurate") 
         layout=layout,
         load_shares=shares,
     )
-
-
-def _foundation_states(machine: Machine) -> tuple[int, ...]:
-    gives_way = [b.support.foundation_share is not None for b in machine.touchdown_bearings]
-    return tuple(L.FOUNDATION_STATES * int(one) for one in gives_way) if any(gives_way) else ()
 
 
 def _rows(basis: RotorBasis, nodes: list[int]) -> Array:
@@ -182,11 +176,6 @@ def _unbalance(machine: Machine, basis: RotorBasis) -> tuple[Array, Array]:
     return cosine, sine
 
 
-def contact_law_of(contact: Contact) -> Array:
-    """Law of a contact as its machine file describes it, for the functions of `physics.contact`."""
-    return contact_law(float(contact.stiffness), float(contact.exponent), float(contact.damping))
-
-
 def _bearing_rows(machine: Machine, shares: Array) -> Array:
     rows = np.array([bearing_row(b, w) for b, w in zip(machine.touchdown_bearings, shares, strict=True)])
     for row, bearing in zip(rows, machine.touchdown_bearings, strict=True):
@@ -206,33 +195,9 @@ def bearing_row(bearing: TouchdownBearing, static_load: float) -> Array:
     row[L.AIR_GAP] = gap
     row[L.BORE_RADIUS] = float(bearing.bore_radius)
     row[L.ROTOR_RADIUS] = float(bearing.bore_radius) - gap
-    row[L.CONTACT : L.CONTACT_END] = contact_law_of(bearing.contact)
     row[L.BALL_SET : L.BALL_SET_END] = numbers.entries()
-    row[L.FRICTION_STATIC] = float(bearing.friction.static)
-    row[L.FRICTION_DYNAMIC] = float(bearing.friction.dynamic)
-    row[L.STRIBECK_SPEED] = float(bearing.friction.stribeck_speed)
-    row[L.SMOOTHING_SPEED] = float(bearing.friction.smoothing_speed)
-    row[L.RACE_MASS] = float(bearing.race.mass)
-    row[L.RACE_INERTIA] = float(bearing.race.inertia)
-    row[L.DRAG_COEFFICIENT] = float(bearing.race.drag_coefficient)
-    row[L.DRAG_SPEED] = float(bearing.race.drag_speed)
     row[L.PITCH_DIAMETER] = numbers.drag_diameter
     row[L.BEARING_DAMPING] = float(bearing.damping_time) * numbers.tangent_stiffness(static_load)
-    support = bearing.support
-    row[L.SUPPORT_MASS_X] = float(support.mass_horizontal)
-    row[L.SUPPORT_MASS_Y] = float(support.mass)
-    row[L.SUPPORT_STIFFNESS_X] = float(support.stiffness_horizontal)
-    row[L.SUPPORT_STIFFNESS_Y] = float(support.stiffness)
-    row[L.SUPPORT_DAMPING_X] = float(support.damping_horizontal)
-    row[L.SUPPORT_DAMPING_Y] = float(support.damping)
-    form = {
-        L.SUPPORT_COUPLING: support.coupling,
-        L.SUPPORT_CUBIC: support.cubic,
-        L.FOUNDATION_SHARE: support.foundation_share,
-        L.FOUNDATION_SPEED: support.foundation_frequency,
-        L.FOUNDATION_DAMPING: support.foundation_damping_ratio,
-    }
-    for column, value in form.items():
-        row[column] = 0.0 if value is None else float(value)
-    row[L.SUPPORT_FORM + PRESENT] = float(any(value is not None for value in form.values()))
+    for part in (bearing.contact, bearing.friction, bearing.race, bearing.support):
+        part.fill(row)
     return row

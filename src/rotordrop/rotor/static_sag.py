@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.elements.bearing_numbers import numbers_of
+from rotordrop.elements.support import support_sag
 from rotordrop.machine import TouchdownBearing
 from rotordrop.physics import columns as L
 from rotordrop.physics.contact import depth_at
-from rotordrop.physics.support import PRESENT
 from rotordrop.rotor.parameters import DropModel
 
 Array = NDArray[np.float64]
@@ -68,20 +68,6 @@ def static_sag(rows: Array, race: Array, loads: Array) -> StaticSag:
     indentation = np.array([depth_at(law, float(load)) for law, load in zip(laws, loads, strict=True)])
     support = np.array([support_sag(row, float(load)) for row, load in zip(rows, loads, strict=True)])
     return StaticSag(indentation=indentation, race=race, support=support)
-
-
-def support_sag(row: Array, load: float) -> float:
-    """Deflection [m] of a support under a static load [N], its foundation included."""
-    sag = load / float(row[L.SUPPORT_STIFFNESS_Y])
-    if row[L.SUPPORT_FORM + PRESENT] == 0.0:
-        return sag
-    cubic = float(row[L.SUPPORT_CUBIC])
-    coupled = sag / (1.0 - float(row[L.SUPPORT_COUPLING]) ** 2)
-    deflection = coupled / (1.0 + cubic * sag**2)  # next order: a few parts in ten thousand of 3 µm
-    speed, share = float(row[L.FOUNDATION_SPEED]), max(float(row[L.FOUNDATION_SHARE]), 0.0)
-    if share == 0.0:
-        return deflection
-    return deflection + load * share / (float(row[L.SUPPORT_MASS_Y]) * speed**2)
 
 
 def sag_of_model(model: DropModel) -> StaticSag:

@@ -12,7 +12,6 @@ from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.physics.contact import contact_tangent
-from rotordrop.rotor.parameters import contact_law_of
 from rotordrop.rotor.statics import bearing_load_shares
 from rotordrop.rotor.supports import Support, in_series, link, spring
 
@@ -90,7 +89,7 @@ def _of_bearing(bearing: TouchdownBearing, load: float) -> EquivalentStiffness:
         tangent=numbers.tangent_stiffness(load),
         simple=numbers.simple_stiffness(load),
         support=float(bearing.support.stiffness),
-        contact=contact_tangent(contact_law_of(bearing.contact), load),
+        contact=contact_tangent(bearing.contact.law, load),
     )
 
 

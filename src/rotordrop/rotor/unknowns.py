@@ -9,29 +9,16 @@ from typing import Literal
 
 import numpy as np
 
-from rotordrop.elements.bearing_numbers import Measure, numbers_of
-from rotordrop.elements.magnet import REMANENCE_TIME
-from rotordrop.elements.parameter import Entry, Parameter, Rule
+from rotordrop.elements.air import PARAMETERS as AERO
+from rotordrop.elements.magnet import REMANENCE, REMANENCE_TIME
+from rotordrop.elements.parameter import Entry, Measure, Parameter, Rule
 from rotordrop.elements.sensor import Sensor
+from rotordrop.elements.table import rows, structure_rows
 from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine, TouchdownBearing
-from rotordrop.physics import columns as L
-from rotordrop.physics.contact import depth_at
-from rotordrop.rotor.parameter_table import parameter, rows
-from rotordrop.rotor.parameters import DropModel, contact_law_of
-from rotordrop.rotor.structure_table import structure_rows
+from rotordrop.rotor.parameters import DropModel
 
 Scope = Literal["machine", "drop"]
-
-TYPICAL_LOADS = 5.0
-"""Contact force at whose indentation the stiffness keeps its meaning when the exponent differs, over the mean
-static load of a bearing [1]: impacts that say something of the contact have it and more."""
-
-TURNED_ANISOTROPY = 0.4
-"""Prior standard deviation of the logarithm of horizontal over vertical stiffness of turned axes."""
-
-PEAK_LOADS = 10.0
-"""Force of a hard impact over the mean static load of a bearing [1]: where a cubic term counts."""
 
 CENTRED = 1e-6
 """Distance of value and middle of its range, in standard deviations, below which they are one [1]."""
@@ -208,11 +195,10 @@ def bearing_unknowns(model: DropModel, index: int) -> Iterator[Unknown]:
     for row in rows("bearing"):
         if not row.entries or float(row.described(bearing)) == 0.0:
             continue  # for a loose bearing, the air gap takes up an error of the play
-        measure = numbers_of(bearing).measure(row.path)
-        if measure is not None:
-            yield _measured_otherwise(row, bearing, index, measure)
-        elif row.path == "support.anisotropy":
-            yield _anisotropy(row, bearing, index)
+        if row.estimated_by is not None:
+            yield _measured_otherwise(row, bearing, index, row.estimated_by(bearing))
+        elif row.ratio is not None:
+            yield _by_ratio(row, bearing, index)
         else:
             yield _unknown(model, row, index)
 
@@ -239,27 +225,15 @@ def _factor(model: DropModel, entry: Entry, index: int, value: float) -> float:
     if entry.rule is Rule.RATIO:
         return float(model.parameters.bearing[index, entry.column]) / value
     if entry.rule is Rule.AT_TYPICAL_DEPTH:
-        return typical_depth(model.machine.touchdown_bearings[index], float(np.mean(model.load_shares)))
+        bearing = model.machine.touchdown_bearings[index]
+        return bearing.contact.typical_depth(float(np.mean(model.load_shares)))
     return 1.0
 
 
-def typical_depth(bearing: TouchdownBearing, load: float) -> float:
-    """Indentation [m] by which the contact stiffness keeps its meaning when the exponent differs.
-
-    Parameters
-    ----------
-    bearing : TouchdownBearing
-        Gives the contact law.
-    load : float
-        Share of the weight of one bearing, in the mean [N].
-    """
-    return depth_at(contact_law_of(bearing.contact), TYPICAL_LOADS * load)
-
-
-def _anisotropy(row: Parameter, bearing: TouchdownBearing, index: int) -> Unknown:
-    """Horizontal over vertical stiffness, estimated by its ratio to the one described."""
+def _by_ratio(row: Parameter, bearing: TouchdownBearing, index: int) -> Unknown:
+    """A ratio of two values, estimated by its factor on the described one."""
     described = row.described(bearing)
-    turned = bearing.support.coupling is not None and bearing.support.coupling.status != "estimated"
+    wider = None if row.wider is None else row.wider(bearing)
 
     def ratio(theta: float) -> float:
         return float(described) * math.exp(theta)
@@ -268,7 +242,7 @@ def _anisotropy(row: Parameter, bearing: TouchdownBearing, index: int) -> Unknow
         parameter=row,
         owner=bearing.name,
         mean=0.0,
-        sigma=TURNED_ANISOTROPY if turned else prior(row, described).sigma,
+        sigma=prior(row, described).sigma if wider is None else wider,
         targets=tuple(Target(entry=entry, row=index) for entry in row.entries),
         published=ratio,
     )
@@ -337,11 +311,12 @@ def drop_unknowns(model: DropModel) -> Iterator[Unknown]:
             yield _of_drop(row, amb.name, 0.0, row.guess_sigma * share, a)
     if machine.ambs:
         yield _remanence_time(machine)
-    yield _of_drop(parameter("speed.aero_time_constant", "drop"), "", math.log(aero_time_constant(machine)))
+    for row in AERO:
+        yield _of_drop(row, "", math.log(aero_time_constant(machine)))
 
 
 def _remanence_time(machine: Machine) -> Unknown:
-    row, described = parameter("remanence.time_constant", "drop"), machine.remanence_time_constant
+    row, described = REMANENCE, machine.remanence_time_constant
     if described is None:
         return _of_drop(row, "", math.log(REMANENCE_TIME))
     known = prior(row, described)
@@ -370,7 +345,7 @@ def structure_unknowns(model: DropModel) -> Iterator[Unknown]:
     for index, bearing in enumerate(machine.touchdown_bearings):
         for row in structure_rows("bearing"):
             if (quantity := row.stated(bearing)) is not None:
-                yield _of_structure(row, bearing.name, quantity, index, *_cubic_scale(model, row, index))
+                yield _of_structure(row, bearing.name, quantity, index, *_scale(model, row, index))
     for index, sensor in enumerate(machine.sensors):
         for row in structure_rows("sensor"):
             if (quantity := row.stated(sensor)) is not None:
@@ -405,15 +380,10 @@ def _of_structure(
     )
 
 
-def _cubic_scale(
-    model: DropModel, row: Parameter, index: int
-) -> tuple[float] | tuple[float, tuple[float, float]]:
-    """Scale of a cubic term, and its limits: hard impacts at most double the stiffness, or take a fifth."""
-    if row.path != "support.cubic":
-        return (1.0,)
-    load = PEAK_LOADS * float(np.mean(model.load_shares))
-    scale = (float(model.parameters.bearing[index, L.SUPPORT_STIFFNESS_Y]) / load) ** 2
-    return scale, (-0.2 * scale, 2.0 * scale)
+def _scale(model: DropModel, row: Parameter, index: int) -> tuple[float, tuple[float, float] | None]:
+    if row.scaled is None:
+        return 1.0, None
+    return row.scaled(model.machine.touchdown_bearings[index], float(np.mean(model.load_shares)))
 
 
 def _in_common(one: Unknown, machine: Machine, sensor: Sensor) -> Unknown:

@@ -11,7 +11,6 @@ from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.physics.contact import depth_at
 from rotordrop.physics.pendulum import effective_length, period_ratio, small_frequency, spin_participation
 from rotordrop.rotor.assembly import build_rotor_fe
-from rotordrop.rotor.parameters import contact_law_of
 from rotordrop.rotor.reduction import Reduction, reduce_rotor
 from rotordrop.rotor.suspension import EquivalentStiffness, equivalent_stiffness, touchdown_supports
 from rotordrop.rotor.whirl import matrices_of, whirl_modes
@@ -98,7 +97,7 @@ def swing_ranges(machine: Machine) -> tuple[SwingRange, ...]:
 
 
 def _swing(bearing: TouchdownBearing, part: EquivalentStiffness, inertia: float, g: float) -> SwingRange:
-    indentation = depth_at(contact_law_of(bearing.contact), part.load)
+    indentation = depth_at(bearing.contact.law, part.load)
     race_sag = numbers_of(bearing).deflection(part.load)[0]
     sags = (indentation, race_sag, part.load / part.support)
     gap = bearing.air_gap

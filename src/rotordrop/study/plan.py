@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from rotordrop.elements.description import unknown_key
 from rotordrop.elements.magnet import REMANENCE_TIME
+from rotordrop.elements.table import fitted_row, parameter
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine, load_machine
 from rotordrop.machine.parameter_paths import kind_of_path, value_of_path
 from rotordrop.machine.saving import machine_text
-from rotordrop.rotor.parameter_table import fitted_row, parameter
 from rotordrop.simulate.case import DropCase, LevitatedStart
 from rotordrop.study import sampling
 from rotordrop.study.chosen_bearings import bearings_of, is_bearing, read_bearings, with_chosen

@@ -17,10 +17,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtr
 
 from rotordrop.elements.magnet import REMANENCE_TIME
+from rotordrop.elements.table import parameter
 from rotordrop.errors import UsageError
 from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
-from rotordrop.rotor.parameter_table import parameter
 from rotordrop.rotor.unknowns import smallest_gap
 from rotordrop.study.between_drops import next_draw
 from rotordrop.study.distributions import Distribution

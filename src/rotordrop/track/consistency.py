@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.elements.beam import is_beam
-from rotordrop.rotor.structure_table import STRUCTURE
+from rotordrop.elements.magnet import REMANENCE
+from rotordrop.elements.table import STRUCTURE
 from rotordrop.track.calibration import FITTING_NIS
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Forward, Smoothed, parameter_sample
@@ -196,7 +197,7 @@ def _remanence_check(problem: DropProblem, smoothed: Smoothed) -> Check:
     lasting = [
         unknown.value_of(float(t))
         for t, unknown in zip(theta, problem.unknowns, strict=True)
-        if unknown.path == "remanence.time_constant"
+        if unknown.parameter is REMANENCE
     ]
     longest = max(lasting, default=0.0)
     return Check(

@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.table import parameter
 from rotordrop.machine import Machine
 from rotordrop.rotor.joint_values import correlate
-from rotordrop.rotor.parameter_table import parameter
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.statics import levitated_sag
 from rotordrop.rotor.unknowns import Unknown, sensor_prior, smallest_gap

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.support import support_sag
 from rotordrop.errors import UsageError
 from rotordrop.rotor.layout import StateLayout
 from rotordrop.rotor.parameters import DropModel
-from rotordrop.rotor.static_sag import support_sag
 from rotordrop.rotor.unknowns import Unknown
 from rotordrop.track._filter import SensorForm
 
@@ -24,14 +23,14 @@ CATCHING_UP_SIGMA = 1e-6
 def sensor_form(model: DropModel, unknowns: tuple[Unknown, ...], rows: Array) -> SensorForm:
     """What the sensors of a machine do beyond gain, offset and runout, as the filter takes it."""
     names = [sensor.name for sensor in model.machine.sensors]
-    own = {(u.parameter.path, u.owner): k for k, u in enumerate(unknowns) if u.parameter.owner == "sensor"}
-    terms = [(path, names.index(name), k) for (path, name), k in own.items() if path != "time_constant"]
-    lagging = [own["time_constant", name] for name in names if ("time_constant", name) in own]
+    own = [k for k, unknown in enumerate(unknowns) if unknown.parameter.owner == "sensor"]
+    terms = [(names.index(unknowns[k].owner), k) for k in own if unknowns[k].parameter.seen is not None]
+    lagging = [k for name in names for k in own if unknowns[k].parameter.lag and unknowns[k].owner == name]
     first = model.layout.sensors.start
     s = rows.shape[1]
     return SensorForm(
-        term=np.array([(c, k) for _, c, k in terms], dtype=np.int64).reshape(-1, 2),
-        term_row=np.array([_term_row(model, path, c) for path, c, _ in terms]).reshape(-1, s),
+        term=np.array(terms, dtype=np.int64).reshape(-1, 2),
+        term_row=np.array([_term_row(model, unknowns[k], c) for c, k in terms]).reshape(-1, s),
         lag=np.array([(first + c, k) for c, k in enumerate(lagging)], dtype=np.int64).reshape(-1, 2),
         lag_row=rows[: len(lagging)],
         shortest=np.array([unknowns[k].bounds[0] for k in lagging]),
@@ -39,21 +38,20 @@ def sensor_form(model: DropModel, unknowns: tuple[Unknown, ...], rows: Array) ->
     )
 
 
-def _term_row(model: DropModel, path: str, c: int) -> Array:
+def _term_row(model: DropModel, unknown: Unknown, c: int) -> Array:
     """What a sensor sees per unit of one of its unknowns, shape (s,) [m per state]."""
     layout, sensor = model.layout, model.machine.sensors[c]
-    row = np.zeros(layout.n_dynamic)
-    sine, cosine = math.sin(float(sensor.angle)), math.cos(float(sensor.angle))
-    if path == "follows_housing":
+    assert unknown.parameter.seen is not None
+    row, seen = np.zeros(layout.n_dynamic), unknown.parameter.seen(sensor)
+    if seen.of_housing is not None:
         support = layout.support.start + 2 * model.bearing_names.index(sensor.bearing)
-        row[support : support + 2] = -cosine, -sine
-        return row
-    if path == "cross_axis":
-        shape = model.basis.node_row(sensor.node)
-        cosine, sine = -sine, cosine
-    else:
-        shape = _slope(model, sensor.node)
-    row[layout.modal_x], row[layout.modal_y] = cosine * shape, sine * shape
+        row[support : support + 2] = seen.of_housing
+    for along, shape in (
+        (seen.of_rotor, model.basis.node_row(sensor.node)),
+        (seen.of_slope, _slope(model, sensor.node)),
+    ):
+        if along is not None:
+            row[layout.modal_x], row[layout.modal_y] = along[0] * shape, along[1] * shape
     return row
 
 
@@ -103,11 +101,12 @@ def rest_terms(
     """Unknowns of sensor ``c`` and what it sees per unit of each of the rotor at rest [m]; it lies level."""
     sensor = model.machine.sensors[c]
     for k, unknown in enumerate(unknowns):
-        if unknown.parameter.owner != "sensor" or unknown.owner != sensor.name:
+        if unknown.parameter.seen is None or unknown.owner != sensor.name:
             continue
-        if unknown.parameter.path == "cross_axis":
-            yield k, math.cos(float(sensor.angle)) * height
-        elif unknown.parameter.path == "follows_housing":
+        seen = unknown.parameter.seen(sensor)
+        if seen.of_rotor is not None:
+            yield k, seen.of_rotor[1] * height
+        if seen.of_housing is not None:
             b = model.bearing_names.index(sensor.bearing)
             sag = support_sag(model.parameters.bearing[b], float(model.load_shares[b]))
-            yield k, math.sin(float(sensor.angle)) * sag
+            yield k, -seen.of_housing[1] * sag

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.elements.parameter import Parameter
+from rotordrop.elements.table import parameter, row_of, rows, separating_measurement
 from rotordrop.errors import IdentificationError, UsageError
 from rotordrop.estimate.document import structure_json
 from rotordrop.estimate.estimate import Structure
@@ -17,10 +18,9 @@ from rotordrop.evidence.evidence import read_evidence
 from rotordrop.known import NINETY, Known, Status
 from rotordrop.machine import CalibrationDrop, CalibrationOrigin, Machine, RecordedLift
 from rotordrop.record.record import Record
-from rotordrop.rotor.parameter_table import parameter, row_of, rows, separating_measurement
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.statics import bearing_load_shares
-from rotordrop.rotor.unknowns import typical_depth, weight_per_magnet
+from rotordrop.rotor.unknowns import weight_per_magnet
 from rotordrop.track.consistency import Check, consistency_checks, judged_by
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Smoothed, parameter_sample
@@ -299,7 +299,7 @@ def at_fitted_exponents(machine: Machine, values: dict[str, Known]) -> dict[str,
             continue
         exponent = _within_limits(exponent, parameter("contact.exponent"))
         found[f"{bearing.name}.contact.exponent"] = exponent
-        depth = typical_depth(bearing, float(np.mean(bearing_load_shares(machine))))
+        depth = bearing.contact.typical_depth(float(np.mean(bearing_load_shares(machine))))
         factor = depth ** (float(bearing.contact.exponent) - exponent.value)
         low, high = stiffness.interval_90
         found[f"{bearing.name}.contact.stiffness"] = replace(
@@ -346,14 +346,14 @@ def machine_values(bearings: Sequence[str], values: dict[str, Known], source: st
             source=source if known else f"{source}; {value.status}",
             unit=value.unit,
         )
-    for name in bearings:
-        ratio = entries.pop(parameter("support.anisotropy").path_of(name), None)
-        if ratio is None:
+    for name, row in ((name, row) for name in bearings for row in rows("bearing")):
+        ratio = entries.pop(row.path_of(name), None) if row.ratio is not None else None
+        if ratio is None or row.ratio is None:
             continue
-        vertical = entries[parameter("support.stiffness").path_of(name)]
+        vertical = entries[f"{name}.{row.ratio[1]}"]
         low, high = vertical.interval_90 or vertical.range or (vertical.value, vertical.value)
         scaled = (low * ratio.value, high * ratio.value)
-        entries[f"{name}.support.stiffness_horizontal"] = replace(
+        entries[f"{name}.{row.file_path}"] = replace(
             vertical,
             value=vertical.value * ratio.value,
             interval_90=None if vertical.interval_90 is None else scaled,

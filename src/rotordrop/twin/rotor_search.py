@@ -17,11 +17,11 @@ from scipy.optimize import minimize
 
 from rotordrop.elements.beam import FORM, is_beam
 from rotordrop.elements.parameter import Parameter
+from rotordrop.elements.table import parameter
 from rotordrop.errors import RotordropError
 from rotordrop.evidence.evidence import Evidence
 from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
-from rotordrop.rotor.parameter_table import parameter
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.reduction import Reduction
 from rotordrop.rotor.unknowns import prior

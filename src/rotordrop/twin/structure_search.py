@@ -12,11 +12,12 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.extension import Extension
+from rotordrop.elements.table import EXTENSIONS
 from rotordrop.errors import IdentificationError
 from rotordrop.machine import Machine
 from rotordrop.track.calibration import THREADS, TrackedDrops, beside_the_record
 from rotordrop.track.problem import DropProblem
-from rotordrop.twin.structure import EXTENSIONS, Extension
 
 Array = NDArray[np.float64]
 

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.elements.parameter import Parameter
+from rotordrop.elements.table import parameter
 from rotordrop.estimate.bearing_values import equivalent_stiffness, published_values, static_friction
 from rotordrop.estimate.estimate import FittedParameter, JointEstimate, SensorErrors
 from rotordrop.known import NINETY, Known, Status
-from rotordrop.rotor.parameter_table import parameter
 from rotordrop.rotor.unknowns import Unknown, sensor_prior, smallest_gap
 from rotordrop.track.consistency import PARAMETER_LIMIT
 from rotordrop.track.problem import DropProblem

@@ -8,10 +8,10 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from rotordrop.elements.table import LOADS
 from rotordrop.errors import UsageError
 from rotordrop.ledger.book import LoggedDrop, drop_of_estimate, logged_drops
 from rotordrop.report.quantity import Quantity
-from rotordrop.rotor.parameter_table import LOADS
 from rotordrop.web.drawn import quantity_json
 from rotordrop.web.running import result_folder
 from rotordrop.web.workspace import Job, Workspace

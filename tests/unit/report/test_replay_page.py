@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from rotordrop.elements.table import parameter
 from rotordrop.estimate.agreement import Agreement, compare_orbits
 from rotordrop.estimate.bearing_drop import BearingDrop, Motion, Origin, Peak, simulated_bearings
 from rotordrop.estimate.estimate import Estimate, FittedParameter, ReplaySteps, Verdict
@@ -30,7 +31,6 @@ from rotordrop.report.replay_tables import (
     friction_sweep_figure,
     window_table,
 )
-from rotordrop.rotor.parameter_table import parameter
 from rotordrop.simulate.result import DropResult
 
 GAPS = np.array([275e-6, 285e-6])

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from rotordrop.elements.parameter import Role, Step
+from rotordrop.elements.table import TABLE, parameter, published, row_of, rows, separating_measurement
 from rotordrop.machine import Machine
 from rotordrop.machine.examples import example_machine
-from rotordrop.rotor.parameter_table import TABLE, parameter, published, row_of, rows, separating_measurement
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns
 from rotordrop.units import KINDS

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
+from rotordrop.elements.table import parameter, rows
 from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
 from rotordrop.machine.examples import example_machine
-from rotordrop.rotor.parameter_table import parameter, rows
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import Unknown, all_unknowns, prior, sensor_prior
 

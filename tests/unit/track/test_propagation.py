@@ -275,7 +275,7 @@ def test_every_parameter_of_a_bearing_sets_its_own_entries_and_no_others(flight)
 
 def test_another_exponent_keeps_the_force_at_a_typical_indentation(flight):
     """Whatever stiffness is estimated beside it; below that indentation a higher exponent is softer."""
-    from rotordrop.rotor.unknowns import TYPICAL_LOADS, typical_depth
+    from rotordrop.elements.contact import TYPICAL_LOADS
     from rotordrop.track.unknowns import parameter_targets
 
     by_path = {unknown.path: unknown for unknown in flight.unknowns}
@@ -283,7 +283,7 @@ def test_another_exponent_keeps_the_force_at_a_typical_indentation(flight):
     targets = parameter_targets(flight.model, chosen)
     p = private_copy(flight.model.parameters)
     load = float(np.mean(flight.model.load_shares))
-    depth = typical_depth(flight.model.machine.bearing("DE"), load)
+    depth = flight.model.machine.bearing("DE").contact.typical_depth(load)
     for exponent in (1.0, 10.0 / 9.0, 1.5):
         stiffness = 1.2 * float(flight.model.machine.bearing("DE").contact.stiffness)
         P.apply_parameters(np.log([exponent, stiffness]), targets, p)

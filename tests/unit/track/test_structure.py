@@ -15,6 +15,7 @@ from tests.unit.track.test_propagation import (
     theta_of,
 )
 
+from rotordrop.elements.table import EXTENSIONS
 from rotordrop.errors import UsageError
 from rotordrop.evidence.evidence import Evidence
 from rotordrop.known import Known
@@ -28,7 +29,6 @@ from rotordrop.simulate.case import DropCase
 from rotordrop.simulate.drop import simulate_drop
 from rotordrop.track._filter import lag_step
 from rotordrop.track.problem import DropProblem
-from rotordrop.twin.structure import EXTENSIONS
 from rotordrop.twin.tracked import COARSE_BASIS, drop_problem
 
 STRUCTURE = {

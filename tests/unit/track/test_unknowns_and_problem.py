@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rotordrop.elements.table import parameter
 from rotordrop.errors import IdentificationError, RecordError
 from rotordrop.evidence.evidence import Missing, read_evidence
 from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine, example_machine
 from rotordrop.physics.ball_bearing import bearing_constants, preload_of_offset
 from rotordrop.record.record import read_record
-from rotordrop.rotor.parameter_table import parameter
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.reduction import Reduction
 from rotordrop.rotor.unknowns import aero_time_constant, all_unknowns, prior

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from rotordrop.elements.table import parameter, row_of
 from rotordrop.machine import Machine, load_machine, save_machine
-from rotordrop.rotor.parameter_table import parameter, row_of
 from rotordrop.rotor.unknowns import prior
 from rotordrop.twin.calibrated import Calibration, calibrate_machine, calibration_json
 from rotordrop.twin.tracked import is_calibrated

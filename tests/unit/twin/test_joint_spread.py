@@ -90,11 +90,10 @@ def test_the_horizontal_support_follows_the_vertical_one(problem, covariance):
 
 def test_contact_stiffness_is_that_of_the_fitted_exponent(problem, covariance):
     """The force at the typical indentation varies as fitted, whatever exponent is drawn."""
-    from rotordrop.rotor.unknowns import typical_depth
 
     spread = joint_spread(problem, middle(problem), covariance, stated(problem, covariance, 1.0))
     machine = problem.model.machine
-    depth = typical_depth(machine.touchdown_bearings[0], float(np.mean(problem.model.load_shares)))
+    depth = machine.touchdown_bearings[0].contact.typical_depth(float(np.mean(problem.model.load_shares)))
     k, n = (spread.paths.index(f"NDE.contact.{name}") for name in ("stiffness", "exponent"))
     along = np.zeros(len(spread.paths))
     along[k], along[n] = 1.0, float(machine.touchdown_bearings[0].contact.exponent) * np.log(depth)

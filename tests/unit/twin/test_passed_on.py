@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from rotordrop.elements.bearing_numbers import numbers_of
+from rotordrop.elements.table import parameter
 from rotordrop.estimate import simulated_coast_down
 from rotordrop.estimate.bearing_drop import Motion, deepest
 from rotordrop.estimate.bearing_values import equivalent_stiffness
@@ -19,7 +20,6 @@ from rotordrop.estimate.estimate import Verdict
 from rotordrop.estimate.later_motion import RESOLVED, later_motion
 from rotordrop.known import Known
 from rotordrop.machine import example_machine
-from rotordrop.rotor.parameter_table import parameter
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns
 from rotordrop.twin import tracked_estimate

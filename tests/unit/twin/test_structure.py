@@ -11,6 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rotordrop.elements.extension import derived
+from rotordrop.elements.support import soft_axis, soft_over_stiff
+from rotordrop.elements.table import EXTENSIONS
 from rotordrop.errors import IdentificationError
 from rotordrop.estimate.document import structure_json
 from rotordrop.estimate.estimate import Verdict
@@ -19,7 +22,6 @@ from rotordrop.machine import Machine, example_machine, load_machine, save_machi
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns
 from rotordrop.twin.calibrated import _with_unbalance
-from rotordrop.twin.structure import EXTENSIONS
 from rotordrop.twin.structure_search import (
     FIRST_OTHER_START,
     PAYS_BESIDE,
@@ -31,7 +33,7 @@ from rotordrop.twin.structure_search import (
     found_structure,
     rank_of,
 )
-from rotordrop.twin.structure_sentence import derived, soft_axis, soft_over_stiff, structure_of
+from rotordrop.twin.structure_sentence import structure_of
 
 
 @pytest.fixture(scope="module")

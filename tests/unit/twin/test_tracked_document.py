@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rotordrop.elements.table import published, rows
 from rotordrop.estimate.document import estimate_document
 from rotordrop.estimate.estimate import Estimate
 from rotordrop.estimate.later_motion import RESOLVED
@@ -16,7 +17,6 @@ from rotordrop.known import Known
 from rotordrop.report.estimate_page import estimate_page
 from rotordrop.report.page import render_page
 from rotordrop.report.quantity import Quantity
-from rotordrop.rotor.parameter_table import published, rows
 from rotordrop.twin.tracked import TrackedDrop
 from rotordrop_bench import SyntheticDrop
 

@@ -1,0 +1,177 @@
+"""The contact between rotor and inner race."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from rotordrop.elements.description import Description, Misfit
+from rotordrop.elements.parameter import Entry, Parameter, Role, Rule, Step, bearing_entries
+from rotordrop.elements.values import (
+    ContactDamping,
+    ContactExponent,
+    ContactStiffness,
+    PositiveLength,
+    default,
+    follows,
+)
+from rotordrop.known import Known
+from rotordrop.physics import columns as L
+from rotordrop.physics.contact import contact_law, depth_at
+
+Array = NDArray[np.float64]
+
+LINE_CONTACT = 10.0 / 9.0
+"""Exponent of a line contact (Palmgren)."""
+
+TYPICAL_LOADS = 5.0
+"""Contact force at whose indentation the stiffness keeps its meaning when the exponent differs, over the mean
+static load of a bearing [1]: impacts that say something of the contact have it and more."""
+
+_UNIT_EXPONENT = re.compile(r"m\s*(?:\^|\*\*)\s*([\d.]+)\s*$")
+
+
+class Contact(Description):
+    """Contact between rotor and inner race, F = K δⁿ (1 + 1.5 λ δ̇).
+
+    Attributes
+    ----------
+    stiffness : Known
+        Contact stiffness K [N/m^n].
+    exponent : Known
+        Exponent n [1].
+    damping : Known
+        Contact damping λ [s/m].
+    length : Known, optional
+        Length of the line contact [m], from which Palmgren's formula gives the stiffness.
+    """
+
+    stiffness: ContactStiffness = follows("8e8 N/m^1.11, or Palmgren's line contact where 'length' is given")
+    exponent: ContactExponent = default(LINE_CONTACT, "line contact (Palmgren), as in Neisi 2020")
+    damping: ContactDamping = default(0.08, "contact damping of steel at low speed", (0.0, 0.5))
+    length: PositiveLength | None = Field(default=None, description="Length of the line contact")
+
+    displaces: ClassVar[Mapping[str, tuple[str, ...]]] = {"stiffness": ("length",)}
+
+    @classmethod
+    def rewritten(cls, raw: dict[str, Any]) -> dict[str, Any]:
+        """Refuse a stiffness whose unit holds another exponent than the contact."""
+        exponent = raw.get("exponent", LINE_CONTACT)
+        written = raw.get("stiffness")
+        if isinstance(written, Mapping):
+            written = written.get("value", written.get("guess"))
+        found = _UNIT_EXPONENT.search(written) if isinstance(written, str) else None
+        if found and isinstance(exponent, int | float) and abs(float(found.group(1)) - exponent) > 0.01:
+            raise Misfit(
+                f"{written!r} belongs to the exponent {found.group(1)}, but the contact has the exponent "
+                f"{exponent:.4g}; change the unit or give 'exponent'",
+                ("stiffness",),
+            )
+        return raw
+
+    @property
+    def law(self) -> Array:
+        """The law for the functions of `physics.contact`."""
+        return contact_law(float(self.stiffness), float(self.exponent), float(self.damping))
+
+    def typical_depth(self, load: float) -> float:
+        """Indentation [m] by which the stiffness keeps its meaning, for the mean load of a bearing [N]."""
+        return depth_at(self.law, TYPICAL_LOADS * load)
+
+    def fill(self, row: Array) -> None:
+        """Write the columns of the contact."""
+        row[L.CONTACT : L.CONTACT_END] = self.law
+
+    def check(self) -> None:
+        """Refuse a stiffness given twice."""
+        if self.length is None:
+            return
+        if "stiffness" in self.model_fields_set:
+            raise Misfit("the contact has both 'stiffness' and 'length'; keep one of them", ("length",))
+        if abs(self.exponent.value - LINE_CONTACT) > 1e-3:
+            raise Misfit(
+                f"the stiffness of a line contact goes with the exponent 10/9, not {self.exponent.value:g}; "
+                "leave out 'exponent' or give the 'stiffness'",
+                ("exponent",),
+            )
+
+    def left_out(self) -> dict[str, Any]:
+        """Give a stiffness that was left out."""
+        if "stiffness" in self.model_fields_set:
+            return {}
+        if self.length is not None:
+            value = palmgren_stiffness(self.length.value)
+            why = f"Palmgren line contact over {self.length.value * 1e3:.4g} mm"
+            return {"stiffness": Known(value=value, status="inferred", source=why, unit="N/m^n")}
+        why = "about a fifth of Palmgren's value for 32 mm: edges and waviness leave part of the length"
+        bounds = (2e8, 4e9)
+        return {"stiffness": Known(value=8e8, status="default", range=bounds, source=why, unit="N/m^n")}
+
+
+def palmgren_stiffness(length: float) -> float:
+    """Contact stiffness [N/m^(10/9)] of a line contact [m]: δ = 3.84e-5 Q^0.9 / l^0.8 in mm and N."""
+    per_mm = math.pow(3.84e-5, -LINE_CONTACT) * math.pow(1e3 * length, 0.8 * LINE_CONTACT)
+    return per_mm * math.pow(1e3, LINE_CONTACT)
+
+
+def _of_the_file(bearing: Any, load: float, slope: float) -> float:
+    # the file's stiffness belongs to the fitted exponent: equal force at the typical indentation
+    return -slope * math.log(bearing.contact.typical_depth(load))
+
+
+PARAMETERS: tuple[Parameter, ...] = (
+    Parameter(
+        path="contact.stiffness",
+        label="contact stiffness",
+        kind="contact_stiffness",
+        measured_by="a static push with a known force at {owner}",
+        guess_sigma=0.3,
+        given_sigma=0.3,
+        drift=0.2,
+        entries=bearing_entries(L.CONTACT_STIFFNESS),
+        step=Step.IMPACTS,
+        leading=True,
+        field="contact.stiffness_N_per_m_n",
+        truth=("contact_K",),
+        taken_over="welcome",
+        separated_by={"air_gap": "a static push with a known force gives the contact stiffness"},
+    ),
+    Parameter(
+        path="contact.exponent",
+        label="contact exponent",
+        kind="dimensionless",
+        measured_by="a static push with a known force at {owner}",
+        guess_sigma=0.1,  # from 10/9 of a line to 3/2 of a point
+        given_sigma=0.1,
+        least_sigma=0.01,  # an interval that ends at a limit may have no width, and no drop says more
+        lower=1.0,
+        upper=2.0,
+        entries=(
+            Entry(array="bearing", column=L.CONTACT_EXPONENT),
+            Entry(array="bearing", column=L.CONTACT_STIFFNESS, rule=Rule.AT_TYPICAL_DEPTH),
+        ),
+        field="contact.exponent",
+        truth=("contact", "n"),
+        changes={"contact.stiffness": _of_the_file},
+    ),
+    Parameter(
+        path="contact.damping",
+        label="contact damping",
+        kind="contact_damping",
+        role=Role.CONSIDERED,
+        guess_sigma=0.6,
+        given_sigma=0.6,
+        entries=bearing_entries(L.CONTACT_DAMPING),
+        step=Step.IMPACTS,
+        field="contact.damping_s_per_m",
+        truth=("contact", "lam"),
+        taken_over="welcome",
+    ),
+)
+"""Unknowns of a contact."""

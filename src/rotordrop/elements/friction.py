@@ -1,0 +1,97 @@
+"""The friction between rotor and inner race."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.elements.description import Description
+from rotordrop.elements.parameter import Parameter, Role, Step, bearing_entries
+from rotordrop.elements.values import NonNegative, Velocity, default, follows, scaled
+from rotordrop.physics import columns as L
+
+Array = NDArray[np.float64]
+
+_STATIC_OVER_DYNAMIC = 1.3
+
+
+class Friction(Description):
+    """Stribeck friction between rotor and inner race.
+
+    Attributes
+    ----------
+    static, dynamic : Known
+        Friction coefficients at rest and when sliding fast [1].
+    stribeck_speed : Known
+        Sliding speed over which static falls to dynamic [m/s].
+    smoothing_speed : Known
+        Sliding speed below which the friction is smoothed [m/s].
+    """
+
+    static: NonNegative = follows("1.3 times the dynamic coefficient")
+    dynamic: NonNegative = default(0.1, "the range swept in Neisi 2020 lies around it", (0.05, 0.2))
+    stribeck_speed: Velocity = default(0.5, "as in the reference machine", (0.1, 2.0))
+    smoothing_speed: Velocity = default(0.02, "small against any sliding speed that matters in a drop")
+
+    def left_out(self) -> dict[str, Any]:
+        """Let the static coefficient follow the dynamic one."""
+        if "static" in self.model_fields_set:
+            return {}
+        why = f"{_STATIC_OVER_DYNAMIC:g} times the dynamic coefficient, the ratio of Neisi 2020"
+        return {"static": scaled(self.dynamic, _STATIC_OVER_DYNAMIC, why, "")}
+
+    def fill(self, row: Array) -> None:
+        """Write the columns of the friction."""
+        row[L.FRICTION_STATIC] = float(self.static)
+        row[L.FRICTION_DYNAMIC] = float(self.dynamic)
+        row[L.STRIBECK_SPEED] = float(self.stribeck_speed)
+        row[L.SMOOTHING_SPEED] = float(self.smoothing_speed)
+
+
+PARAMETERS: tuple[Parameter, ...] = (
+    Parameter(
+        path="friction.static",
+        label="static friction coefficient",
+        kind="dimensionless",
+        role=Role.DERIVED,
+        step=Step.SWEEP,
+        field="friction.static",
+        truth=("friction_static",),
+        taken_over="welcome",
+    ),
+    Parameter(
+        path="friction.dynamic",
+        label="dynamic friction coefficient",
+        kind="dimensionless",
+        measured_by="a speed sensor on the inner race of {owner}",
+        role=Role.SOUGHT,
+        guess_sigma=0.4,
+        given_sigma=0.4,
+        reach=3.0,
+        drift=1.0,
+        late_drift_factor=5.0,
+        entries=bearing_entries(L.FRICTION_DYNAMIC, L.FRICTION_STATIC),
+        step=Step.SWEEP,
+        field="friction.dynamic",
+        truth=("friction_dynamic",),
+        taken_over="needed",
+        separated_by={"race.inertia": "a speed sensor on the inner race gives its spin-up"},
+    ),
+    Parameter(
+        path="friction.stribeck_speed",
+        label="Stribeck speed of the friction",
+        kind="velocity",
+        guess_sigma=0.4,
+        given_sigma=0.4,
+        reach=5.0,
+        drift=1.0,
+        late_drift_factor=5.0,
+        entries=bearing_entries(L.STRIBECK_SPEED),
+        spin_up_only=True,
+        field="friction.stribeck_speed_m_per_s",
+        truth=("contact", "v_stribeck"),
+    ),
+)
+"""Unknowns of the friction."""

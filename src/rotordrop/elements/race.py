@@ -1,0 +1,90 @@
+"""The inner race of a touchdown bearing."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.elements.description import Description
+from rotordrop.elements.parameter import Parameter, Role, Step, bearing_entries
+from rotordrop.elements.values import (
+    NonNegative,
+    PositiveInertia,
+    PositiveLength,
+    PositiveMass,
+    PositiveSpeed,
+    default,
+    follows,
+)
+from rotordrop.physics import columns as L
+
+Array = NDArray[np.float64]
+
+
+class Race(Description):
+    """The inner race with everything that spins with it.
+
+    Attributes
+    ----------
+    mass : Known
+        Mass [kg].
+    inertia : Known
+        Polar moment of inertia [kg m²].
+    width : Known
+        Width over which the rotor lies in the race [m]; the pressure between them follows from it.
+    drag_coefficient : Known
+        Drag torque over bearing force and half the pitch diameter [1].
+    drag_speed : Known
+        Race speed over which the drag builds up [rad/s].
+    """
+
+    mass: PositiveMass = follows("from the size of the bearing")
+    inertia: PositiveInertia = follows("from the size of the bearing")
+    width: PositiveLength = follows("the length of the contact, or from the size of the bearing")
+    drag_coefficient: NonNegative = default(
+        0.002, "rolling friction of angular-contact bearings", (0.001, 0.005)
+    )
+    drag_speed: PositiveSpeed = default(1.0, "small against any race speed that matters in a drop")
+
+    def fill(self, row: Array) -> None:
+        """Write the columns of the race."""
+        row[L.RACE_MASS] = float(self.mass)
+        row[L.RACE_INERTIA] = float(self.inertia)
+        row[L.DRAG_COEFFICIENT] = float(self.drag_coefficient)
+        row[L.DRAG_SPEED] = float(self.drag_speed)
+
+
+PARAMETERS: tuple[Parameter, ...] = (
+    Parameter(
+        path="race.inertia",
+        label="race inertia",
+        kind="inertia",
+        measured_by="a speed sensor on the inner race of {owner}",
+        role=Role.CONSIDERED,
+        guess_sigma=0.12,
+        given_sigma=0.12,
+        reach=2.0,
+        drift=0.1,
+        late_drift_factor=5.0,
+        entries=bearing_entries(L.RACE_INERTIA),
+        step=Step.IMPACTS,
+        spin_up_only=True,
+        field="race.inertia_kg_m2",
+        truth=("ring_Ip",),
+        taken_over="welcome",
+    ),
+    Parameter(
+        path="race.drag_coefficient",
+        label="drag coefficient of the race",
+        kind="dimensionless",
+        guess_sigma=0.5,
+        given_sigma=0.5,
+        reach=6.0,
+        drift=0.2,
+        entries=bearing_entries(L.DRAG_COEFFICIENT),
+        spin_up_only=True,
+        field="race.drag_coefficient",
+        truth=("bearing", "drag_mu"),
+    ),
+)
+"""Unknowns of a race."""

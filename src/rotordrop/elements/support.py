@@ -1,0 +1,351 @@
+"""What carries the outer ring of a touchdown bearing, with the axes and the spring that it may have."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from rotordrop.elements.description import Description, Misfit
+from rotordrop.elements.extension import Extension, Values, derived, guess, in_words
+from rotordrop.elements.foundation import foundation_sag
+from rotordrop.elements.parameter import Entry, Parameter, Role, Rule, Step, bearing_entries
+from rotordrop.elements.values import (
+    Coupling,
+    CubicTerm,
+    Damping,
+    NonNegative,
+    Positive,
+    PositiveMass,
+    PositiveSpeed,
+    Stiffness,
+    default,
+    follows,
+    scaled,
+)
+from rotordrop.known import Known
+from rotordrop.physics import columns as L
+from rotordrop.physics.support import PRESENT
+
+Array = NDArray[np.float64]
+
+_DAMPING_RATIO = 0.025
+
+TURNED_ANISOTROPY = 0.4
+"""Prior standard deviation of the logarithm of horizontal over vertical stiffness of turned axes."""
+
+PEAK_LOADS = 10.0
+"""Force of a hard impact over the mean static load of a bearing [1]: where a cubic term counts."""
+
+
+class Support(Description):
+    """What carries the outer ring: mass on a spring and a damper, vertical (y) and horizontal (x).
+
+    Attributes
+    ----------
+    mass, stiffness, damping : Known
+        Vertical support mass [kg], stiffness [N/m] and damping [N s/m].
+    damping_ratio : Known, optional
+        In place of the damping: C = 2 ζ √(K m).
+    mass_horizontal, stiffness_horizontal, damping_horizontal : Known
+        The same in the horizontal direction; equal to the vertical ones when left out.
+    damping_ratio_horizontal : Known, optional
+        In place of the horizontal damping.
+    coupling : Known, optional
+        Coupling of x and y over the geometric mean of horizontal and vertical stiffness [1]: principal axes
+        that are turned.
+    cubic : Known, optional
+        Cubic term k₃ of the spring, F = K h (1 + k₃ h²) along x and along y [1/m²].
+    foundation_share : Known, optional
+        Support mass over modal mass of a foundation that gives way under the support [1].
+    foundation_frequency, foundation_damping_ratio : Known, optional
+        Natural frequency [rad/s] and damping ratio [1] of that foundation.
+    """
+
+    mass: PositiveMass = default(
+        40.0, "the housing parts around the bearing of the reference machine", (4.0, 400.0)
+    )
+    stiffness: Stiffness = default(1e8, "a first guess for a bearing housing", (1e7, 2e9))
+    damping: Damping = follows("2.5 % of critical, or from the damping ratio")
+    damping_ratio: NonNegative | None = Field(default=None, description="")
+    mass_horizontal: PositiveMass = follows("equal to the vertical one")
+    stiffness_horizontal: Stiffness = follows("equal to the vertical one")
+    damping_horizontal: Damping = follows("from the damping ratio, or equal to the vertical one")
+    damping_ratio_horizontal: NonNegative | None = Field(default=None, description="")
+    coupling: Coupling | None = Field(
+        default=None, description="Coupling of x and y over the geometric mean of both stiffnesses"
+    )
+    cubic: CubicTerm | None = Field(default=None, description="Cubic term k3 of F = K h (1 + k3 h^2)")
+    foundation_share: NonNegative | None = Field(
+        default=None, description="Support mass over modal mass of a foundation that gives way"
+    )
+    foundation_frequency: PositiveSpeed | None = Field(
+        default=None, description="Natural frequency of that foundation"
+    )
+    foundation_damping_ratio: Positive | None = Field(
+        default=None, description="Damping ratio of that foundation"
+    )
+
+    displaces: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "damping": ("damping_ratio",),
+        "damping_ratio": ("damping",),
+        "damping_horizontal": ("damping_ratio_horizontal",),
+        "damping_ratio_horizontal": ("damping_horizontal",),
+    }
+
+    def check(self) -> None:
+        """Refuse damping given twice."""
+        for end in ("", "_horizontal"):
+            if {f"damping{end}", f"damping_ratio{end}"} <= self.model_fields_set:
+                raise Misfit(
+                    f"the support has both 'damping{end}' and 'damping_ratio{end}'; keep one of them",
+                    (f"damping_ratio{end}",),
+                )
+        parts = ("foundation_share", "foundation_frequency", "foundation_damping_ratio")
+        given = [name for name in parts if getattr(self, name) is not None]
+        if given and len(given) < len(parts):
+            missing = next(name for name in parts if name not in given)
+            raise Misfit(
+                f"the support has {given[0]!r} but no {missing!r}; a foundation needs {', '.join(parts)}",
+                (given[0],),
+            )
+
+    def left_out(self) -> dict[str, Any]:
+        """Let damping follow its ratio and the horizontal values follow the vertical ones."""
+        values: dict[str, Any] = {}
+        given = self.model_fields_set
+        for name in ("mass", "stiffness"):
+            if f"{name}_horizontal" not in given:
+                vertical = getattr(self, name)
+                values[f"{name}_horizontal"] = scaled(
+                    vertical, 1.0, "equal to the vertical one", vertical.unit
+                )
+        if "damping" not in given:
+            values["damping"] = _from_ratio(self.damping_ratio, self.mass, self.stiffness)
+        if "damping_horizontal" not in given:
+            values["damping_horizontal"] = self._horizontal_damping(values)
+        return values
+
+    def _horizontal_damping(self, values: dict[str, Any]) -> Known:
+        mass = values.get("mass_horizontal", self.mass_horizontal)
+        stiffness = values.get("stiffness_horizontal", self.stiffness_horizontal)
+        if self.damping_ratio_horizontal is not None:
+            return _from_ratio(self.damping_ratio_horizontal, mass, stiffness)
+        if "damping" in self.model_fields_set:
+            return scaled(self.damping, 1.0, "equal to the vertical one", "N s/m")
+        why = "the damping ratio of the vertical direction"
+        return replace(_from_ratio(self.damping_ratio, mass, stiffness), status="default", source=why)
+
+    def fill(self, row: Array) -> None:
+        """Write the columns of the support."""
+        row[L.SUPPORT_MASS_X] = float(self.mass_horizontal)
+        row[L.SUPPORT_MASS_Y] = float(self.mass)
+        row[L.SUPPORT_STIFFNESS_X] = float(self.stiffness_horizontal)
+        row[L.SUPPORT_STIFFNESS_Y] = float(self.stiffness)
+        row[L.SUPPORT_DAMPING_X] = float(self.damping_horizontal)
+        row[L.SUPPORT_DAMPING_Y] = float(self.damping)
+        form = {
+            L.SUPPORT_COUPLING: self.coupling,
+            L.SUPPORT_CUBIC: self.cubic,
+            L.FOUNDATION_SHARE: self.foundation_share,
+            L.FOUNDATION_SPEED: self.foundation_frequency,
+            L.FOUNDATION_DAMPING: self.foundation_damping_ratio,
+        }
+        for column, value in form.items():
+            row[column] = 0.0 if value is None else float(value)
+        row[L.SUPPORT_FORM + PRESENT] = float(any(value is not None for value in form.values()))
+
+
+def _from_ratio(ratio: Known | None, mass: Known, stiffness: Known) -> Known:
+    critical = 2.0 * math.sqrt(stiffness.value * mass.value)
+    if ratio is None:
+        why = f"{_DAMPING_RATIO:.1%} of critical"
+        value = _DAMPING_RATIO * critical
+        bounds = (0.1 * value, 10.0 * value)
+        return Known(value=value, status="default", range=bounds, source=why, unit="N s/m")
+    known = scaled(ratio, critical, f"damping ratio {ratio.value:g}", "N s/m")
+    return replace(known, status=ratio.status)
+
+
+def support_sag(row: Array, load: float) -> float:
+    """Deflection [m] of a support under a static load [N], its foundation included."""
+    sag = load / float(row[L.SUPPORT_STIFFNESS_Y])
+    if row[L.SUPPORT_FORM + PRESENT] == 0.0:
+        return sag
+    cubic = float(row[L.SUPPORT_CUBIC])
+    coupled = sag / (1.0 - float(row[L.SUPPORT_COUPLING]) ** 2)
+    deflection = coupled / (1.0 + cubic * sag**2)  # next order: a few parts in ten thousand of 3 µm
+    return deflection + foundation_sag(row, load)
+
+
+def _of_turned_axes(bearing: Any) -> float | None:
+    coupling = bearing.support.coupling
+    return TURNED_ANISOTROPY if coupling is not None and coupling.status != "estimated" else None
+
+
+def _cubic_scale(bearing: Any, load: float) -> tuple[float, tuple[float, float]]:
+    """Scale of a cubic term, and its limits: hard impacts at most double the stiffness, or take a fifth."""
+    scale = (float(bearing.support.stiffness) / (PEAK_LOADS * load)) ** 2
+    return scale, (-0.2 * scale, 2.0 * scale)
+
+
+def soft_axis(ratio: float, coupling: float) -> float:
+    """Angle of the soft axis from horizontal [°], between -90 and 90, of a support with turned axes.
+
+    Parameters
+    ----------
+    ratio : float
+        Horizontal over vertical stiffness [1].
+    coupling : float
+        Coupling over the geometric mean of both [1].
+    """
+    # The stiff axis stands at half the angle of (k_x - k_y, 2 k_xy); the soft one across.
+    stiff = 0.5 * math.atan2(2.0 * coupling * math.sqrt(ratio), ratio - 1.0)
+    turned = math.degrees(stiff) + 90.0
+    return turned - 180.0 if turned > 90.0 else turned
+
+
+def soft_over_stiff(ratio: float, coupling: float) -> float:
+    """Stiffness along the soft axis over that along the stiff one [1]; arguments as of `soft_axis`."""
+    middle, apart = 0.5 * (ratio + 1.0), math.hypot(0.5 * (ratio - 1.0), coupling * math.sqrt(ratio))
+    return (middle - apart) / (middle + apart)
+
+
+def _axes(bearing: Any, found: Values, _load: float) -> str:
+    both = found["support.anisotropy"], found["support.coupling"]
+    angle, ratio = derived(soft_axis, *both), derived(soft_over_stiff, *both)
+    return (
+        f"the soft axis of the {bearing.name} support stands {in_words(angle, '°')} from horizontal, with "
+        f"{in_words(ratio, '')} × the stiffness across"
+    )
+
+
+def _growth(bearing: Any, found: Values, load: float) -> str:
+    deflection = PEAK_LOADS * load / found["support.stiffness"].value
+    growth = derived(lambda k_3: k_3 * deflection * deflection, found["support.cubic"])
+    return f"{bearing.name} {in_words(growth, '%', 0.01)}"
+
+
+PARAMETERS: tuple[Parameter, ...] = (
+    Parameter(
+        path="support.stiffness",
+        label="support stiffness",
+        kind="stiffness",
+        measured_by="a hammer test of the touchdown-bearing housing at {owner}",
+        role=Role.SOUGHT,
+        guess_sigma=0.5,
+        given_sigma=0.05,
+        drift=0.02,
+        entries=bearing_entries(L.SUPPORT_STIFFNESS_Y, L.SUPPORT_STIFFNESS_X),
+        step=Step.IMPACTS,
+        decisive=True,
+        leading=True,
+        field="support.stiffness_N_per_m",
+        truth=("support_stiffness",),
+        taken_over="needed",
+        separated_by={
+            "support.mass": (
+                "a hammer test of the touchdown-bearing housing gives support frequency and stiffness"
+            )
+        },
+    ),
+    Parameter(
+        path="support.anisotropy",
+        label="horizontal over vertical support stiffness",
+        kind="dimensionless",
+        guess_sigma=0.03,
+        given_sigma=0.03,
+        entries=(Entry(array="bearing", column=L.SUPPORT_STIFFNESS_X, rule=Rule.SCALE),),
+        field="support.anisotropy",
+        truth=("support_anisotropy",),
+        ratio=("support.stiffness_horizontal", "support.stiffness"),
+        wider=_of_turned_axes,
+    ),
+    Parameter(
+        path="support.mass",
+        label="support mass",
+        kind="mass",
+        measured_by="a hammer test of the touchdown-bearing housing at {owner}",
+        role=Role.SOUGHT,
+        guess_sigma=0.4,
+        given_sigma=0.05,
+        drift=0.02,
+        entries=bearing_entries(L.SUPPORT_MASS_Y, L.SUPPORT_MASS_X),
+        step=Step.IMPACTS,
+        decisive=True,
+        leading=True,
+        field="support.mass_kg",
+        truth=("support_mass",),
+        taken_over="needed",
+    ),
+    Parameter(
+        path="support.damping",
+        label="support damping",
+        kind="damping",
+        measured_by="a hammer test of the touchdown-bearing housing at {owner}",
+        role=Role.SOUGHT,
+        guess_sigma=0.7,
+        given_sigma=0.3,
+        drift=0.1,
+        entries=bearing_entries(L.SUPPORT_DAMPING_Y, L.SUPPORT_DAMPING_X),
+        step=Step.IMPACTS,
+        leading=True,
+        field="support.damping_N_s_per_m",
+        truth=("support_damping",),
+        taken_over="needed",
+    ),
+)
+"""Unknowns of a support."""
+
+EXTENSIONS: tuple[Extension, ...] = (
+    Extension(
+        name="turned support axes",
+        owner="bearing",
+        names=("support.coupling",),
+        neutral=lambda _: {"support.coupling": guess(0.0)},
+        sentence=_axes,
+        rows=(
+            Parameter(
+                path="support.coupling",
+                label="coupling of horizontal and vertical support stiffness",
+                kind="dimensionless",
+                logarithmic=False,
+                guess_sigma=0.25,
+                given_sigma=0.05,
+                lower=-0.85,
+                upper=0.85,
+                entries=bearing_entries(L.SUPPORT_COUPLING),
+            ),
+        ),
+    ),
+    Extension(
+        name="cubic support",
+        owner="bearing",
+        names=("support.cubic",),
+        neutral=lambda _: {"support.cubic": guess(0.0)},
+        sentence=_growth,
+        joined=", ",
+        frame=(
+            "supports whose stiffness changes with load, at the deflection of "
+            f"{PEAK_LOADS:g} mean loads by {{}}"
+        ),
+        rows=(
+            Parameter(
+                path="support.cubic",
+                label="cubic term of the support stiffness",
+                kind="cubic_term",
+                logarithmic=False,
+                guess_sigma=0.4,
+                given_sigma=0.1,
+                scale="one over the deflection under ten mean loads, squared",
+                scaled=_cubic_scale,
+                entries=bearing_entries(L.SUPPORT_CUBIC),
+            ),
+        ),
+    ),
+)

@@ -1,0 +1,129 @@
+"""Every unknown parameter of a drop, one row each; whatever lists parameters is a query of this table.
+
+A row says what a parameter is called, what it is measured in, what is known of it before a record is read,
+which entries of the kernel it sets, what the estimators do with it and where its value is published. The rows
+stand in the files of the elements that own them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rotordrop.elements import (
+    air,
+    ball_numbers,
+    contact,
+    foundation,
+    friction,
+    magnet,
+    race,
+    rotor,
+    sensor,
+    support,
+    touchdown_bearing,
+    unbalance,
+)
+from rotordrop.elements.beam import FORM
+from rotordrop.elements.extension import Extension
+from rotordrop.elements.parameter import Load, Owner, Parameter
+
+TABLE: tuple[Parameter, ...] = (
+    *touchdown_bearing.PARAMETERS,
+    *support.PARAMETERS,
+    *contact.PARAMETERS,
+    *friction.PARAMETERS,
+    *race.PARAMETERS,
+    *touchdown_bearing.DAMPING,
+    *ball_numbers.PARAMETERS,
+    *sensor.PARAMETERS,
+    *unbalance.PARAMETERS,
+    *magnet.FORCES,
+    magnet.REMANENCE,
+    *air.PARAMETERS,
+)
+"""The rows; those of a bearing in the order in which the estimators hold them."""
+
+EXTENSIONS: tuple[Extension, ...] = (
+    *support.EXTENSIONS,
+    *foundation.EXTENSIONS,
+    *sensor.EXTENSIONS,
+    *magnet.EXTENSIONS,
+    *unbalance.EXTENSIONS,
+    *rotor.EXTENSIONS,
+)
+"""What a machine may have beyond the base model, in the order in which a search tries it."""
+
+STRUCTURE: tuple[Parameter, ...] = tuple(row for extension in EXTENSIONS for row in extension.rows)
+"""Unknowns of extensions: of a machine only where its description names them."""
+
+_BY_PATH = {(row.owner, row.path): row for row in (*TABLE, *STRUCTURE, *FORM)}
+
+
+def parameter(path: str, owner: Owner = "bearing") -> Parameter:
+    """Row of a path below its owner."""
+    return _BY_PATH[owner, path]
+
+
+def rows(owner: Owner | None = None) -> Iterator[Parameter]:
+    """Rows of one kind of owner, or all."""
+    return (row for row in TABLE if owner in (None, row.owner))
+
+
+def structure_rows(owner: Owner) -> Iterator[Parameter]:
+    """Rows of one kind of owner that a machine may have beyond the base model."""
+    return (row for row in STRUCTURE if row.owner == owner)
+
+
+def row_of(path: str) -> Parameter:
+    """Row of a path in the machine, such as ``"NDE.support.stiffness"`` or ``"sensors.X1.gain"``."""
+    owner, _, rest = path.partition(".")
+    if owner == "sensors":
+        return _BY_PATH["sensor", rest.rpartition(".")[2]]
+    if owner == "rotor":
+        return _BY_PATH["rotor", rest]
+    return _BY_PATH.get(("bearing", path)) or _BY_PATH["bearing", rest]
+
+
+def fitted_row(path: str) -> Parameter | None:
+    """Row of a path of the machine file; none for what is fitted by its ratio to another value there."""
+    owner, _, rest = path.partition(".")
+    return None if owner in ("sensors", "rotor") else _BY_PATH.get(("bearing", rest))
+
+
+def published() -> dict[str, Parameter]:
+    """Rows of bearings by their field in the JSON document."""
+    return {row.field: row for row in rows("bearing") if row.field}
+
+
+LOADS: tuple[Load, ...] = (
+    Load(field="peak_force_N", label="peak bearing force", kind="force", truth="peak_force_N"),
+    Load(
+        field="peak_stress_Pa",
+        label="peak Hertz stress",
+        kind="pressure",
+        truth="max_stress_MPa",
+        truth_unit=1e6,
+    ),
+    Load(
+        field="mean_force_0p15_0p2_N",
+        label="mean force, 150 to 200 ms",
+        kind="force",
+        truth="mean_force_0p15_0p2_N",
+    ),
+    Load(
+        field="mean_stress_Pa",
+        label="mean Hertz stress",
+        kind="pressure",
+        truth="mean_stress_MPa",
+        truth_unit=1e6,
+    ),
+)
+"""What a drop did to a bearing, in the order in which it is shown."""
+
+
+def separating_measurement(first: Parameter, second: Parameter) -> str:
+    """What would tell two parameters apart that a record confounds."""
+    for one, other in ((first, second), (second, first)):
+        if other.path in one.separated_by:
+            return one.separated_by[other.path]
+    return "more drops at other speeds, or a measurement of one of the two"
