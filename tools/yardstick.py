@@ -167,7 +167,7 @@ CASES: tuple[Case, ...] = (
     *(
         Case(
             name=f"schema-{document}",
-            commands=(f"rotordrop schema {document}",),
+            commands=(f"rotordrop schema {document}", "rotordrop_bench schema"),
             files=("stdout",),
             quick=True,
         )
@@ -299,7 +299,7 @@ CASES: tuple[Case, ...] = (
         name="changed",
         commands=(
             "rotordrop changed estimate-tracked.json estimate-since.json --json {name}.json",
-            "rotordrop compare --changed estimate-tracked.json estimate-since.json --json {name}.json",
+            "rotordrop compare estimate-tracked.json estimate-since.json --changes --json {name}.json",
         ),
         needs=("estimate-tracked", "estimate-since"),
     ),

@@ -108,8 +108,18 @@ def guessed(machine: Machine) -> Machine:
 
 def rotordrop(*arguments: object) -> subprocess.CompletedProcess[str]:
     """Run a verb."""
-    command = [sys.executable, "-m", "rotordrop", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+    return command("rotordrop", *arguments)
+
+
+def bench(*arguments: object) -> subprocess.CompletedProcess[str]:
+    """Run a verb of the bench."""
+    return command("rotordrop_bench", *arguments)
+
+
+def command(module: str, *arguments: object) -> subprocess.CompletedProcess[str]:
+    """Run a command line."""
+    line = [sys.executable, "-m", module, *map(str, arguments)]
+    return subprocess.run(line, capture_output=True, text=True, check=False)
 
 
 def study(case: Case) -> dict[str, Any]:
@@ -119,7 +129,7 @@ def study(case: Case) -> dict[str, Any]:
         machine = machine_file(case.machine, folder)
         made = folder / "made"
         made_with = ("--speed", f"{case.speed} Hz", "--seed", case.seed, "--first-drop", case.drop)
-        done = rotordrop("synthesize", machine, *made_with, "--output", made)
+        done = bench("synthesize", machine, *made_with, "--output", made)
         if done.returncode:
             return {"exit": done.returncode, "said": done.stderr.strip()}
         record = next(file for file in made.glob("*.csv") if "tail" not in file.name)
@@ -129,7 +139,7 @@ def study(case: Case) -> dict[str, Any]:
         done = rotordrop("estimate", told, record, *tail, "--json", written)
         if not written.exists():
             return {"exit": done.returncode, "said": done.stderr.strip()}
-        scored = rotordrop("score", written, made / "truth" / f"{record.stem}.json", "--json", "-")
+        scored = bench("score", written, made / "truth" / f"{record.stem}.json", "--json", "-")
         return {"exit": done.returncode, "score": json.loads(scored.stdout)}
 
 

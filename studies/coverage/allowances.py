@@ -2,7 +2,7 @@
 
 Usage: python studies/coverage/allowances.py BENCH ESTIMATES
 
-BENCH is a folder of ``rotordrop bench make``, ESTIMATES what ``studies/dropbench/estimates.py`` made of it.
+BENCH is a folder of ``rotordrop-bench make``, ESTIMATES what ``studies/dropbench/estimates.py`` made of it.
 An interval is made of what the record leaves open and of an allowance, as independent errors; for every
 number the script gives half width and coverage with the allowance of the estimates and with the one chosen,
 and the standard deviations left out that would have held 85, 90 and 95 % of the truths. The ensemble to

@@ -2,7 +2,7 @@
 
 Usage: python studies/dropbench/estimates.py BENCH ESTIMATES [--only NAME ...] [--limit SECONDS]
 
-BENCH is a folder of 'rotordrop bench make'. Estimates that are there already stay; a drop that the estimator
+BENCH is a folder of 'rotordrop-bench make'. Estimates that are there already stay; a drop that the estimator
 refuses leaves NAME.txt with its reason. Stops by itself after the limit; call it again to go on. Writes
 ``results/scores.json`` and ``results/table.md`` over all estimates there are.
 """

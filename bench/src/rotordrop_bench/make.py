@@ -101,7 +101,8 @@ def _make(drop: BenchDrop, folder: Path) -> None:
     if not happened(made):
         raise UsageError(
             f"{drop.name} of version {VERSION} is no drop here: a bearing was not reached within "
-            f"{LATEST_CONTACT:g} s. Your computer rounds differently ('rotordrop fingerprint'); leave it out"
+            f"{LATEST_CONTACT:g} s. Your computer rounds differently (rotordrop doctor --fingerprint); "
+            "leave it out"
         )
     place = folder / DROPS_FOLDER / drop.name
     make_folder(place)

@@ -121,7 +121,7 @@ def score_bench(folder: str | Path, estimates: str | Path, only: Iterable[str] =
     made = [drop for drop in chosen_drops(wanted) if truth_path(folder, drop.name).is_file()]
     if not made:
         raise UsageError(
-            f"{folder} holds no drop of the bench; make some with 'rotordrop bench make {folder}'"
+            f"{folder} holds no drop of the bench; make some with 'rotordrop-bench make {folder}'"
         )
     if not estimates.is_dir():
         raise UsageError(f"{estimates} is no folder; give the one with the estimates, NAME.json each")

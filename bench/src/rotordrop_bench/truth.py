@@ -106,7 +106,7 @@ def truth_of(values: Any, *, path: Path | None = None, histories: Mapping[str, A
         raise UsageError(
             f"{path or 'the given object'} is no truth file: it has no "
             f"{' and no '.join(map(repr, missing))}; "
-            "give the .json that 'rotordrop synthesize' wrote, or a supplied truth file"
+            "give the .json that 'rotordrop-bench synthesize' wrote, or a supplied truth file"
         )
     return Truth(values=values, histories=histories or {}, path=path)
 

@@ -44,38 +44,33 @@ _NEITHER = ("target", "folder", "data")
 
 _NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO, errno.EBADF)
 
-_ORDER = (
-    "init",
-    "schema",
-    "bearings",
-    "import-rotor",
-    "export-rotor",
-    "check",
-    "simulate",
-    "critical-speeds",
-    "unbalance-response",
-    "coast-down",
-    "profile",
-    "look",
-    "split",
-    "clearance",
-    "estimate",
-    "serve",
-    "calibrate",
-    "compare",
-    "changed",
-    "waterfall",
-    "study",
-    "repeat",
-    "rare",
-    "design",
-    "log",
-    "synthesize",
-    "score",
-    "bench",
-    "fingerprint",
-    "doctor",
-)
+GROUPS = {
+    "See a record": ("look", "profile", "clearance", "waterfall"),
+    "Estimate": ("estimate", "calibrate"),
+    "Judge": ("compare", "log", "study run", "study show", "study repeat", "study rare", "study design"),
+    "Simulate": ("simulate", "coast-down", "critical-speeds", "unbalance-response"),
+    "Describe a machine": ("init", "check", "bearings", "convert", "schema"),
+    "Serve": ("serve", "doctor"),
+}
+"""The verbs by what one wants to do, as the help page shows them."""
+
+OF_TWO_WORDS = ("study",)
+"""First words of verbs that have a second one: ``study_run.py`` is ``rotordrop study run``."""
+
+NOW = {
+    "fingerprint": "rotordrop doctor --fingerprint",
+    "changed": "rotordrop compare BEFORE AFTER --changes",
+    "split": "rotordrop look RECORD MACHINE --split FOLDER",
+    "rare": "rotordrop study rare",
+    "design": "rotordrop study design",
+    "repeat": "rotordrop study repeat",
+    "import-rotor": "rotordrop convert",
+    "export-rotor": "rotordrop convert --to ross",
+    "synthesize": "rotordrop-bench synthesize",
+    "score": "rotordrop-bench score",
+    "bench": "rotordrop-bench list, make or score-all",
+}
+"""What has another name now."""
 
 # Typer carries its own copy of click in new versions and uses the installed one in old versions.
 _CallError: type[Exception] = next(c for c in typer.BadParameter.__mro__ if c.__name__ == "ClickException")
@@ -84,23 +79,29 @@ _CallError: type[Exception] = next(c for c in typer.BadParameter.__mro__ if c.__
 def verbs() -> dict[str, str]:
     """List the verbs with their one-line descriptions, in the order of the work, without importing them."""
     files = [file for file in Path(__file__).parent.glob("[a-z]*.py") if file.stem != "app"]
-    found = {file.stem.replace("_", "-"): _first_line(file) for file in files}
-    ordered = [name for name in _ORDER if name in found]
+    found = {_spelled(file.stem): _first_line(file) for file in files}
+    ordered = [name for names in GROUPS.values() for name in names if name in found]
     return {name: found[name] for name in [*ordered, *sorted(found.keys() - set(ordered))]}
+
+
+def _spelled(stem: str) -> str:
+    first, _, rest = stem.partition("_")
+    return f"{first} {rest.replace('_', '-')}" if first in OF_TWO_WORDS and rest else stem.replace("_", "-")
 
 
 def load_verb(name: str) -> TyperCommand:
     """Import the file of a verb and make its function a command."""
-    module = import_module(f"rotordrop.cli.{name.replace('-', '_')}")
+    stem = name.replace("-", "_").replace(" ", "_")
+    module = import_module(f"rotordrop.cli.{stem}")
     single = typer.Typer(add_completion=False, rich_markup_mode=None)
     example = f"Example: {EXAMPLES[name]}" if name in EXAMPLES else None
-    single.command(name, epilog=example)(_with_files_apart(getattr(module, name.replace("-", "_"))))
+    single.command(name, epilog=example)(with_files_apart(getattr(module, stem)))
     command = typer.main.get_command(single)
     assert isinstance(command, TyperCommand)
     return command
 
 
-def _with_files_apart(verb: Callable[..., None]) -> Callable[..., None]:
+def with_files_apart(verb: Callable[..., None]) -> Callable[..., None]:
     """Make a verb refuse to write over what it reads, and two outputs of one name, before it begins."""
 
     @wraps(verb)
@@ -133,11 +134,26 @@ class VerbTable(TyperGroup):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> tuple[str | None, Any, list[str]]:
         """Load the verb that was called."""
-        if args and args[0] in verbs():
-            return args[0], load_verb(args[0]), args[1:]
-        wrong = args[0] if args else ""
-        close = get_close_matches(wrong, verbs(), 1) or ["--help"]
+        known = verbs()
+        for words in (2, 1):
+            name = " ".join(args[:words])
+            if name in known:
+                return name, load_verb(name), args[words:]
+        wrong = " ".join(args[:2]) if args[:1] and args[0] in OF_TWO_WORDS else "".join(args[:1])
+        if wrong in NOW:
+            raise UsageError(f"there is no command {wrong!r}; it is {NOW[wrong]} now")
+        close = get_close_matches(wrong, known, 1) or ["--help"]
         raise UsageError(f"there is no command {wrong!r}; try 'rotordrop {close[0]}'")
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the verbs under what one wants to do."""
+        known = verbs()
+        grouped = {title: [name for name in names if name in known] for title, names in GROUPS.items()}
+        rest = [name for name in known if not any(name in names for names in grouped.values())]
+        for title, names in (*grouped.items(), ("Other", rest)):
+            if names:
+                with formatter.section(title):
+                    formatter.write_dl([(name, known[name]) for name in names], col_max=20)
 
 
 app = typer.Typer(
@@ -163,10 +179,16 @@ def rotordrop(
     """From a recorded rotor drop to touchdown-bearing force and stress."""
 
 
-def run(arguments: Sequence[str]) -> int:
-    """Run one command and give its exit code; errors become one sentence on standard error."""
+def run(arguments: Sequence[str], command: Any = None) -> int:
+    """Run one command and give its exit code; errors become one sentence on standard error.
+
+    Another program with verbs of its own passes its ``command``.
+    """
     try:
-        _invoke(list(arguments) or ["--help"])
+        program = typer.main.get_command(app) if command is None else command
+        name = "rotordrop" if command is None else command.name
+        with program.make_context(name, list(arguments) or ["--help"]) as context:
+            program.invoke(context)
         sys.stdout.flush()
         return 0
     except typer.Exit as stop:
@@ -193,20 +215,14 @@ def _discard_standard_output() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _invoke(arguments: list[str]) -> None:
-    command = typer.main.get_command(app)
-    with command.make_context("rotordrop", arguments) as context:
-        command.invoke(context)
-
-
-def main() -> None:
-    """Entry point of the command ``rotordrop``."""
+def main(command: Any = None) -> None:
+    """Entry point of the command ``rotordrop``, or of another program with its ``command``."""
     for name in ONE_THREAD:
         os.environ.setdefault(name, "1")
     open_streams()
     with interruptions_kept() as was_pressed:
         try:
-            code = run(sys.argv[1:])
+            code = run(sys.argv[1:], command)
         except Exception:
             if not was_pressed():  # the compiler turns an interrupt into an error of its own
                 raise

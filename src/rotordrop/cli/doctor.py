@@ -10,7 +10,9 @@ import platform
 import sys
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
 
 from rotordrop._version import __version__
 from rotordrop.cli._options import JsonOption
@@ -30,8 +32,23 @@ EXTRAS = {
 """What an extra is for, and its packages."""
 
 
-def doctor(json_file: JsonOption = None) -> None:
+def doctor(
+    fingerprint: Annotated[
+        bool,
+        typer.Option(
+            "--fingerprint",
+            help="Print only the hash of a short probe drop: equal where every drop has the same bits.",
+        ),
+    ] = False,
+    json_file: JsonOption = None,
+) -> None:
     """Say what is installed, what is missing, and whether compiled code is cached."""
+    if fingerprint:
+        from rotordrop.simulate.fingerprint import fingerprint as of_this_computer
+
+        bits = of_this_computer()
+        deliver({"fingerprint": bits}, json_file, lambda out: out.print(bits, no_wrap=True, crop=True))
+        return
     found = examined()
 
     def summarise(out: Console) -> None:

@@ -11,7 +11,8 @@ from typing import Annotated
 import typer
 
 from rotordrop.cli._options import JsonOption, PlanesOption, ProfileOption, ReportOption, quantity
-from rotordrop.cli._output import deliver
+from rotordrop.cli._output import console, deliver, require_places
+from rotordrop.errors import UsageError
 
 
 def look(
@@ -29,10 +30,25 @@ def look(
     ] = None,
     mapping: PlanesOption = None,
     profile: ProfileOption = None,
+    split: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Write one record for each of several drops there, as HDF5, and look no further.",
+            file_okay=False,
+        ),
+    ] = None,
     report: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
     """Look at a recorded drop: what was read, its quality, what happened when, impacts, whirl, indices."""
+    if split is not None:
+        if machine is None:
+            raise UsageError(
+                "--split needs the machine file too: rotordrop look both.h5 machine.toml --split parts"
+            )
+        _split(record, machine, split, profile)
+        return
     from rotordrop.evidence.look import look as look_at
     from rotordrop.report.look_page import look_page
     from rotordrop.report.terminal import print_summary
@@ -49,3 +65,22 @@ def look(
         write_page(look_page(seen), report)
     page = look_page(seen, drawn=False)
     deliver(seen.as_json(), json, lambda out: print_summary(page, out))
+
+
+def _split(record: Path, machine: Path, folder: Path, profile: Path | None) -> None:
+    """Cut a recording with several drops into one record for each; no sample is changed."""
+    from rotordrop.evidence.splitting import split_drops
+    from rotordrop.files import make_folder
+    from rotordrop.machine import load_machine
+    from rotordrop.record.record import read_record, save_record
+
+    parts = split_drops(read_record(record, load_machine(machine), profile=profile))
+    places = [folder / f"{part.name}.h5" for part in parts]
+    if len(parts) == 1:
+        console().print(f"{record} holds one drop; nothing to split.")
+        return
+    make_folder(folder)
+    require_places(*places)
+    for part, place in zip(parts, places, strict=True):
+        save_record(part, place)
+        console().print(f"{place}: {part.time[0]:.6g} to {part.time[-1]:.6g} s, {len(part.time)} samples")

@@ -22,7 +22,6 @@ class Document(StrEnum):
 
     machine = "machine"
     numbers = "numbers"
-    violations = "violations"
     estimate = "estimate"
     look = "look"
 
@@ -31,8 +30,7 @@ def schema(
     document: Annotated[
         Document,
         typer.Argument(
-            help="A machine file, the numbers of 'init --simple', violations for 'synthesize', or what "
-            "'rotordrop estimate --json' writes."
+            help="A machine file, the numbers of 'init --simple', or what 'rotordrop estimate --json' writes."
         ),
     ] = Document.machine,
     output: Annotated[
@@ -46,8 +44,6 @@ def schema(
         from rotordrop.machine import machine_schema as schema_of
     elif document is Document.numbers:
         from rotordrop.machine.simple import simple_schema as schema_of
-    elif document is Document.violations:
-        from rotordrop_bench.violations import violations_schema as schema_of
     elif document is Document.look:
         from rotordrop.evidence.look.schema import look_schema as schema_of
     else:

@@ -66,8 +66,8 @@ def test_two_outputs_need_two_files(machine, capsys):
 
 @pytest.mark.parametrize("verb", list(app.verbs()))
 def test_every_path_of_every_command_is_known_as_read_or_written(verb):
-    module = __import__(f"rotordrop.cli.{verb.replace('-', '_')}", fromlist=["_"])
-    function = getattr(module, verb.replace("-", "_"))
+    module = __import__(f"rotordrop.cli.{verb.replace('-', '_').replace(' ', '_')}", fromlist=["_"])
+    function = getattr(module, verb.replace("-", "_").replace(" ", "_"))
     for name, parameter in signature(function, eval_str=True).parameters.items():
         written = str(parameter.default) + str(parameter.annotation)
         if "Path" in str(get_args(parameter.annotation)[:1]) and "rite" in written:
@@ -132,7 +132,7 @@ def _called(
     [
         ("unbalance-response", "machine.toml", "--data"),
         ("estimate", "machine.toml", "record.csv", "--data"),
-        ("split", "machine.toml", "record.h5", "-o"),
+        ("look", "record.h5", "machine.toml", "--split"),
     ],
 )
 def test_a_file_is_no_folder_for_results_and_that_is_said_before_anything_is_computed(

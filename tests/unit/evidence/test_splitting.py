@@ -66,11 +66,14 @@ def test_the_verb_writes_one_record_each_and_estimate_says_so(twice, tmp_path, c
     machine = str(example_path("lp400"))
     save_record(twice, tmp_path / "both.h5")
     assert run(["estimate", machine, str(tmp_path / "both.h5")]) == 3
-    assert "rotordrop split MACHINE RECORD -o FOLDER" in capsys.readouterr().err
-    assert run(["split", machine, str(tmp_path / "both.h5"), "-o", str(tmp_path / "parts")]) == 0
+    assert "rotordrop look RECORD MACHINE --split FOLDER" in capsys.readouterr().err
+    assert run(["look", str(tmp_path / "both.h5"), machine, "--split", str(tmp_path / "parts")]) == 0
     assert sorted(path.name for path in (tmp_path / "parts").iterdir()) == ["both_drop1.h5", "both_drop2.h5"]
     again = read_record(tmp_path / "parts" / "both_drop2.h5", example_machine("lp400"))
     assert np.array_equal(again.signals, split_drops(twice)[1].signals)
-    assert run(["split", machine, str(tmp_path / "parts" / "both_drop1.h5"), "-o", str(tmp_path / "no")]) == 0
+    assert (
+        run(["look", str(tmp_path / "parts" / "both_drop1.h5"), machine, "--split", str(tmp_path / "no")])
+        == 0
+    )
     assert "holds one drop; nothing to split" in capsys.readouterr().out
     assert not (tmp_path / "no").exists()

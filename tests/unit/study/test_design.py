@@ -98,7 +98,7 @@ def test_the_verb(tmp_path, capsys):
         'reduction = "quick"\nspeed = "100 Hz"\n'
         '[choose]\n"*.support.damping" = {log_uniform = ["2e3 N s/m", "5e4 N s/m"]}\n'
     )
-    call = ["design", str(tmp_path / "design.toml"), "--threads", "1"]
+    call = ["study", "design", str(tmp_path / "design.toml"), "--threads", "1"]
     assert run([*call, "--json", str(tmp_path / "d.json"), "--report", str(tmp_path / "d.html")]) == 0
     assert "as described" in capsys.readouterr().out
     content = json.loads((tmp_path / "d.json").read_text())
@@ -107,7 +107,7 @@ def test_the_verb(tmp_path, capsys):
         "P(backward whirl at the worst bearing > 0)",
     ]
     assert len(content["candidates"]) == 2
-    call = ["rare", str(tmp_path / "design.toml"), "--column", "NDE.peak_forc", "--above", "1 kN"]
+    call = ["study", "rare", str(tmp_path / "design.toml"), "--column", "NDE.peak_forc", "--above", "1 kN"]
     assert run(call) == 64
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.stats import binom
-from tests.unit.estimation.conftest import calibrated_about
+from tests.unit.twin.conftest import calibrated_about
 
 from rotordrop.estimate.document import estimate_document
 from rotordrop.estimation import Tracked, estimate_drop

@@ -161,7 +161,7 @@ def check_again(record: Record) -> list[Finding]:
             kind="second drop",
             message=f"the rotor was lifted at {drops[0].end:.6g} s and dropped again at "
             f"{drops[1].release:.6g} s ({len(drops)} drops)",
-            remedy="cut it into a record for each drop with 'rotordrop split MACHINE RECORD -o FOLDER'",
+            remedy="cut it into a record for each drop: rotordrop look RECORD MACHINE --split FOLDER",
             severity="stop",
             time=drops[1].release,
         )

@@ -6,9 +6,9 @@ import json
 
 import pytest
 
-from rotordrop.cli.app import run
-from rotordrop.cli.score import percent
 from rotordrop.machine import example_path
+from rotordrop_bench.cli.app import run
+from rotordrop_bench.cli.score import percent
 
 LP400 = str(example_path("lp400"))
 

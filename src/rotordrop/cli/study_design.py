@@ -14,7 +14,7 @@ from rotordrop.cli._options import JsonOption, ReportOption, ThreadsOption
 from rotordrop.cli._output import deliver, drops_shown, progress_bar, require_places
 
 
-def design(
+def study_design(
     plan: Annotated[Path, typer.Argument(metavar="DESIGN", help="Design file (.toml).")],
     folder: Annotated[
         Path | None,

@@ -6,7 +6,6 @@ file for each drop.
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,7 +13,6 @@ import typer
 
 from rotordrop.cli._options import JsonOption
 from rotordrop.cli._output import deliver, progress_bar
-from rotordrop.errors import UsageError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -22,58 +20,21 @@ if TYPE_CHECKING:
     from rotordrop_bench import BenchScores
 
 
-class Action(StrEnum):
-    """What to do with the bench."""
-
-    list = "list"
-    make = "make"
-    score = "score"
-
-
-def bench(
-    action: Annotated[
-        Action,
-        typer.Argument(
-            metavar="ACTION", help="list: name the drops; make: make what is missing; score: score estimates."
-        ),
-    ],
-    folder: Annotated[
-        Path | None, typer.Argument(metavar="FOLDER", help="Folder of the bench.", show_default=False)
-    ] = None,
-    estimates: Annotated[
-        Path | None,
-        typer.Argument(metavar="ESTIMATES", help="Folder with NAME.json for each drop.", show_default=False),
-    ] = None,
-    only: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME", help="A drop, a family or a rotor; repeatable. All by default."),
-    ] = None,
-    every: Annotated[
-        bool, typer.Option("--all-quantities", help="Also show each parameter by itself.")
-    ] = False,
-    json_file: JsonOption = None,
-) -> None:
-    """Make drops whose truth is hidden, 5 kg to 6 t, and score anybody's estimates of them."""
-    if action is Action.list:
-        _list(only or [], json_file)
-        return
-    if folder is None:
-        raise UsageError(f"'bench {action}' needs the folder of the bench, as in 'bench {action} dropbench'")
-    if action is Action.make:
-        _make(folder, only or [], json_file)
-        return
-    if estimates is None:
-        raise UsageError(
-            f"'bench score' needs the folder of the estimates too, as in 'bench score {folder} estimates'"
-        )
-    _score(folder, estimates, only or [], every, json_file)
+FolderArgument = Annotated[
+    Path, typer.Argument(metavar="FOLDER", help="Folder of the bench.", show_default=False)
+]
+OnlyOption = Annotated[
+    list[str] | None,
+    typer.Option("--only", metavar="NAME", help="A drop, a family or a rotor; repeatable. All by default."),
+]
 
 
-def _list(only: list[str], json_file: Path | None) -> None:
+def list_drops(only: OnlyOption = None, json_file: JsonOption = None) -> None:
+    """Name the drops of the bench: rotor, speed, family, departures."""
     from rotordrop_bench import VERSION
     from rotordrop_bench.make import chosen_drops
 
-    drops = chosen_drops(only)
+    drops = chosen_drops(only or [])
 
     def summarise(out: Console) -> None:
         out.print(f"DropBench, version {VERSION}; drops: {len(drops)}")
@@ -89,13 +50,14 @@ def _list(only: list[str], json_file: Path | None) -> None:
     deliver({"bench_version": VERSION, "drops": [vars(drop) for drop in drops]}, json_file, summarise)
 
 
-def _make(folder: Path, only: list[str], json_file: Path | None) -> None:
+def make(folder: FolderArgument, only: OnlyOption = None, json_file: JsonOption = None) -> None:
+    """Make the drops that are missing in a folder; their truth goes into a folder of its own."""
     from rotordrop_bench import make_bench
     from rotordrop_bench.make import chosen_drops
 
     with progress_bar("making drops") as report:
-        made = make_bench(folder, only, report)
-    asked = len(chosen_drops(only))
+        made = make_bench(folder, only or [], report)
+    asked = len(chosen_drops(only or []))
 
     def summarise(out: Console) -> None:
         out.print(f"drops made: {len(made)}, there already: {asked - len(made)} (simulated, not measured)")
@@ -104,10 +66,22 @@ def _make(folder: Path, only: list[str], json_file: Path | None) -> None:
     deliver({"made": made, "there": asked - len(made)}, json_file, summarise)
 
 
-def _score(folder: Path, estimates: Path, only: list[str], every: bool, json_file: Path | None) -> None:
+def score_all(
+    folder: FolderArgument,
+    estimates: Annotated[
+        Path,
+        typer.Argument(metavar="ESTIMATES", help="Folder with NAME.json for each drop.", show_default=False),
+    ],
+    only: OnlyOption = None,
+    every: Annotated[
+        bool, typer.Option("--all-quantities", help="Also show each parameter by itself.")
+    ] = False,
+    json_file: JsonOption = None,
+) -> None:
+    """Score anybody's estimates of the drops of the bench, family by family."""
     from rotordrop_bench import score_bench
 
-    scores = score_bench(folder, estimates, only)
+    scores = score_bench(folder, estimates, only or [])
 
     def summarise(out: Console) -> None:
         out.print(_table(scores, every))
@@ -154,6 +128,6 @@ def _table(scores: BenchScores, every: bool) -> Any:
 
 
 def _percent(share: float | None) -> str:
-    from rotordrop.cli.score import percent
+    from rotordrop_bench.cli.score import percent
 
     return "" if share is None else percent(share)

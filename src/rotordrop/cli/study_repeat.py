@@ -16,7 +16,7 @@ from rotordrop.cli._output import deliver, drops_shown, progress_bar, require_pl
 from rotordrop.errors import UsageError
 
 
-def repeat(
+def study_repeat(
     machine: MachineArgument,
     folder: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder of the simulated drops.")],
     estimate: Annotated[

@@ -1,6 +1,6 @@
 """Compare an estimate with the truth of a simulated recording.
 
-Reads truth files of 'rotordrop synthesize' and those that come with the supplied records.
+Reads truth files of 'rotordrop-bench synthesize' and those that come with the supplied records.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ def percent(share: float, *, sign: bool = False) -> str:
 
     Examples
     --------
-    >>> from rotordrop.cli.score import percent
+    >>> from rotordrop_bench.cli.score import percent
     >>> percent(1.53), percent(0.0231, sign=True)
     ('153 %', '+2.3 %')
     """

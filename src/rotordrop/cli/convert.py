@@ -1,11 +1,12 @@
-"""Take a rotor over from ROSS or from a shaft table.
+"""Convert rotors between ROSS, shaft tables and machine files.
 
-Makes a machine file of it. Shows mass, inertias and frequencies of what was read, beside the bearings that
-the source has.
+Shows mass, inertias and frequencies of a rotor that was read, beside the bearings of its source, and makes a
+machine file of it. The other way round, writes the rotor of a machine as ROSS loads it.
 """
 
 from __future__ import annotations
 
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -16,13 +17,27 @@ from rotordrop.cli._output import deliver, deliver_text, require_places
 from rotordrop.errors import UsageError
 
 
-def import_rotor(
+class Target(StrEnum):
+    """What a rotor is converted to."""
+
+    machine = "machine"
+    ross = "ross"
+
+
+def convert(
     source: Annotated[
         Path,
-        typer.Argument(metavar="SOURCE", help="ROSS file (.toml, .json), or shaft table (.csv, .xlsx)."),
+        typer.Argument(
+            metavar="SOURCE",
+            help="ROSS file (.toml, .json) or shaft table (.csv, .xlsx); with --to ross a machine file.",
+        ),
     ],
+    to: Annotated[Target, typer.Option("--to", help="What to make of it.")] = Target.machine,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="FILE", help="Machine file to write.")
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="FILE", help="File to write; rotor_ross.toml by default with --to ross."
+        ),
     ] = None,
     designation: Annotated[
         str, typer.Option(metavar="NAME", help="Touchdown bearings of the machine file.")
@@ -36,7 +51,10 @@ def import_rotor(
     force: ForceOption = False,
     json_file: JsonOption = None,
 ) -> None:
-    """Take a rotor over from a file of ROSS or a shaft table; show it, and make a machine file of it."""
+    """Make a machine file of a rotor of ROSS or of a shaft table, or a file for ROSS of a machine."""
+    if to is Target.ross:
+        _written_for_ross(source, output or Path("rotor_ross.toml"), json_file)
+        return
     from rotordrop.machine.other_programs import read_rotor
     from rotordrop.report.rotor_content import imported_content, imported_json
     from rotordrop.report.terminal import print_summary
@@ -76,3 +94,28 @@ def import_rotor(
     notes = [f"rotor from {source.name} ({imported.source})", *imported.notes]
     machine = drafted_machine(rotor=imported.rotor, bearings=planes, sensors=planes, known=known, notes=notes)
     deliver_text(machine_text(machine), output, overwrite=force)
+
+
+def _written_for_ross(machine: Path, output: Path, json_file: Path | None) -> None:
+    """Write the rotor of a machine, with its AMBs as springs and dampers."""
+    from rotordrop.machine import load_machine
+    from rotordrop.machine.ross_files import Spring, write_ross
+
+    require_places(output, json_file)
+    described = load_machine(machine)
+    springs = [
+        Spring(
+            node=amb.node,
+            name=f"AMB {amb.name}",
+            stiffness=(amb.stiffness.value, amb.stiffness.value),
+            damping=(amb.damping.value, amb.damping.value),
+        )
+        for amb in described.ambs
+    ]
+    write_ross(described.rotor, output, springs)
+    content = {
+        "file": str(output),
+        "elements": len(described.rotor.elements),
+        "mass_kg": described.rotor.mass,
+    }
+    deliver(content, json_file, lambda out: out.print(f"written: {output}"))

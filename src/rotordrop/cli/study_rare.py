@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rotordrop.study.rare import RareEvent
 
 
-def rare(
+def study_rare(
     study: Annotated[Path, typer.Argument(metavar="STUDY", help="Study file (.toml).")],
     column: Annotated[
         str, typer.Option(metavar="COLUMN", help='Quantity of a study, such as "NDE.peak_force".')
