@@ -12,9 +12,8 @@ from rotordrop.evidence.air_gap import SettledRest
 from rotordrop.evidence.evidence import Evidence, known
 from rotordrop.evidence.initial_state import InitialState, end_of_fall, fit_initial_state, settled_along
 from rotordrop.evidence.sensing import Sensing, displacements_along
-from rotordrop.identification.modal_expansion import expand_initial_state
-from rotordrop.identification.replica import transferred
-from rotordrop.rotor.parameters import DropModel, build_drop_model
+from rotordrop.replay.start import expand_initial_state
+from rotordrop.rotor.parameters import DropModel
 from rotordrop_bench import SyntheticDrop
 
 
@@ -88,12 +87,6 @@ def test_modal_expansion_misses_the_sag_that_the_fit_finds(
     assert np.abs(expanded.at_bearings - true).max() < 6e-6
     assert by_fit < 1.2e-6
     assert not np.any(expanded.displacement[2:])
-
-
-def test_transferred_state_is_the_same_motion(initial: InitialState, drop: SyntheticDrop) -> None:
-    richer = transferred(initial, build_drop_model(initial.fall.model.machine, "accurate"))
-    assert richer.displacement == pytest.approx(initial.displacement, abs=2e-9)
-    assert richer.velocity == pytest.approx(initial.velocity, abs=2e-5)
 
 
 def test_end_of_fall_is_where_the_gap_is_near() -> None:

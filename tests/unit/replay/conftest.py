@@ -1,0 +1,63 @@
+"""One simulated drop with a known truth, recorded by good sensors, for the tests of the replay."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rotordrop.evidence.evidence import Evidence, read_evidence
+from rotordrop.known import Known
+from rotordrop.machine import Machine, example_machine
+from rotordrop.replay.problem import ReplayProblem, replay_problem
+from rotordrop.rotor.parameters import DropModel, build_drop_model
+from rotordrop.rotor.reduction import Reduction
+from rotordrop_bench import SyntheticDrop, hidden_machine, synthesize_drop
+from rotordrop_bench.sensor_chain import PERFECT
+
+SPEED = 2.0 * math.pi * 100.0
+BASIS = Reduction(modes=6, attachment=True)
+
+
+@pytest.fixture(scope="session")
+def truth() -> Machine:
+    """The machine of the records with its sensors known to be exact."""
+    machine = example_machine("lp400")
+    values: dict[str, Known | float] = {}
+    for sensor in machine.sensors:
+        values[f"sensors.{sensor.name}.gain"] = Known(value=1.0, standard_error=1e-5)
+        values[f"sensors.{sensor.name}.offset"] = Known(value=0.0, standard_error=1e-8)
+    return machine.with_values(values)
+
+
+@pytest.fixture(scope="session")
+def drop(truth: Machine) -> SyntheticDrop:
+    """A drop from 100 Hz of that machine, 60 ms long, with 0.45 µm of noise and nothing else wrong."""
+    hidden = hidden_machine(truth, 5, drawn=False, reduction=BASIS)
+    chain = replace(PERFECT, noise=0.45e-6, speed_noise=0.1)
+    return synthesize_drop(hidden, SPEED, 3, sensor_chain=chain, duration=0.06, tolerance=1e-7)
+
+
+@pytest.fixture(scope="session")
+def model(truth: Machine) -> DropModel:
+    """The drop model of that machine, in the basis the record was made with."""
+    return build_drop_model(truth, BASIS)
+
+
+@pytest.fixture(scope="session")
+def evidence(drop: SyntheticDrop, model: DropModel) -> Evidence:
+    return read_evidence(model, drop.record, drop.tail)
+
+
+@pytest.fixture(scope="session")
+def problem(evidence: Evidence) -> ReplayProblem:
+    return replay_problem(evidence, until=0.045)
+
+
+@pytest.fixture(scope="session")
+def contacts(drop: SyntheticDrop) -> np.ndarray:
+    """True times of the first contact at every bearing [s from power-off]."""
+    log = drop.result.contacts
+    return np.array([log.of_bearing(b).start[0] for b in range(2)])
