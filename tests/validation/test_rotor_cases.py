@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from cases import Compute, check, fails_with, load_case
 from scipy.optimize import minimize_scalar
+from tests.reference.closed_forms import rectangle_shear_coefficient
 
-from rotordrop.physics.timoshenko import Section, rectangle_shear_coefficient, round_section
+from rotordrop.physics.timoshenko import Section, round_section
 from rotordrop.rotor.assembly import PointMass, RotorFE, assemble
 from rotordrop.rotor.critical_speeds import critical_speeds
 from rotordrop.rotor.modes import modes_on_springs

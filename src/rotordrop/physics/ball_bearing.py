@@ -2,7 +2,7 @@
 
 One row under axial load carries everything a catalogue prints: the preload sets the axial offset of the
 grooves, the pair's rigidity is twice the slope of a row, the lift-off force empties the unloaded row.
-Forces of a displaced race are in `ball_bearing_response` (five degrees of freedom) and `ball_bearing_planar`.
+Forces of a displaced race are in `ball_bearing_response` (five degrees of freedom) and `ball_set`.
 """
 
 from __future__ import annotations
@@ -280,16 +280,6 @@ def axial_rigidity(constants: BearingConstants) -> float:
     """
     _require_pair(constants, "axial rigidity")
     return 2.0 * float(row_axial_stiffness(constants.preload_approach, *_row(constants)))
-
-
-def lift_off_force(constants: BearingConstants) -> float:
-    """Axial load [N] on an X or O pair at which the unloaded row has lost its last contact force.
-
-    The loaded row has then twice the approach of the preload.
-    Source: definition in the FAG spindle bearing catalogue.
-    """
-    _require_pair(constants, "lift-off force")
-    return float(row_axial_force(2.0 * constants.preload_approach, *_row(constants)))
 
 
 def ball_centrifugal_force(bearing: BallBearingDescription, omega_i: ArrayLike) -> Any:

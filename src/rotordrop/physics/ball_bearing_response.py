@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rotordrop.errors import SimulationError
 from rotordrop.physics.ball_bearing import BearingConstants
 
 Array = NDArray[np.float64]
@@ -105,71 +104,6 @@ def bearing_response(
         contact_angles=np.arctan2(axial, radial),
         stress_inner=constants.stress_coefficient_inner * root,
         stress_outer=constants.stress_coefficient_outer * root,
-    )
-
-
-def bearing_equilibrium(
-    constants: BearingConstants,
-    load: ArrayLike,
-    *,
-    free: tuple[bool, bool, bool, bool, bool] = (True, True, True, True, True),
-    start: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0),
-    row_spacing: float = 0.0,
-) -> Array:
-    """Displacement of the inner race at which the balls carry an external load.
-
-    Parameters
-    ----------
-    constants : BearingConstants
-        The bearing.
-    load : array_like, shape (5,)
-        External F_x, F_y, F_z [N], M_x, M_y [N m] on the race; entries of held directions are ignored.
-    free : tuple of bool
-        Directions in which the race may move; it stays at `start` in the others.
-    start : array_like, shape (5,)
-        Where to start from [m, rad].
-    row_spacing : float
-        Axial distance of the two rows [m].
-
-    Returns
-    -------
-    ndarray, shape (5,)
-        Displacement (e_x, e_y, e_z [m], ψ_x, ψ_y [rad]).
-
-    Raises
-    ------
-    SimulationError
-        No displacement carries the load.
-
-    Notes
-    -----
-    Source: equilibrium of Neisi 2020, eqs. (2)–(6), by damped Newton steps.
-    """
-    q, wanted = np.array(start, dtype=float), np.asarray(load, dtype=float)
-    arm = constants.pitch_radius
-    units, open_ = np.array([1.0, 1.0, 1.0, arm, arm]), np.array(free)
-    scale = max(float(np.max(np.abs(wanted / units)[open_])), constants.preload, 1e-3)
-    spring = 1.5 * constants.ball_stiffness ** (2.0 / 3.0) * scale ** (1.0 / 3.0) * units[open_] ** 2
-
-    def residual(at: Array) -> tuple[Array, Array]:
-        response = bearing_response(constants, at, row_spacing=row_spacing)
-        return (wanted + response.force)[open_], response.stiffness[np.ix_(open_, open_)]
-
-    damping, (r, H) = 1e-2, residual(q)
-    for _ in range(_MOST_STEPS):
-        if np.max(np.abs(r / units[open_])) <= 1e-11 * scale:
-            return q
-        trial = q.copy()
-        trial[open_] += np.linalg.solve(H + damping * np.diag(spring), r)
-        r_trial, H_trial = residual(trial)
-        if np.linalg.norm(r_trial / units[open_]) < np.linalg.norm(r / units[open_]):
-            q, r, H, damping = trial, r_trial, H_trial, 0.1 * damping
-        else:
-            damping = max(4.0 * damping, 1e-12)
-    raise SimulationError(
-        f"the bearing finds no equilibrium under the load {np.array2string(wanted, precision=4)} [N, N m]: "
-        f"{np.max(np.abs(r / units[open_])):.3g} N are left over after {_MOST_STEPS} steps; "
-        "hold the directions that nothing supports, or start closer to the loaded position"
     )
 
 

@@ -14,12 +14,6 @@ from numpy.typing import NDArray
 
 from rotordrop.physics._compile import inner_kernel, lean_kernel
 from rotordrop.physics.ball_bearing import BearingConstants
-from rotordrop.physics.ball_bearing_planar import (
-    largest_ball_load,
-    planar_ball_energy,
-    planar_ball_force,
-    planar_ball_gradient,
-)
 from rotordrop.physics.elementary import cos_each, cube_root, magnitude, sin_each
 from rotordrop.physics.linear_algebra import solve
 
@@ -84,23 +78,44 @@ def _merged_angles(constants: BearingConstants) -> tuple[Array, Array]:
 
 
 @inner_kernel
+def lane_sum(values: Array) -> float:
+    """Sum of an array whose length is a multiple of eight, in eight partial sums of fixed order.
+
+    Unit of the values; shape (8 k,). Source: explicit partial sums keep strict floating point and vectorise.
+    """
+    s0 = s1 = s2 = s3 = s4 = s5 = s6 = s7 = 0.0
+    for k in range(0, values.shape[0], 8):
+        s0 += values[k]
+        s1 += values[k + 1]
+        s2 += values[k + 2]
+        s3 += values[k + 3]
+        s4 += values[k + 4]
+        s5 += values[k + 5]
+        s6 += values[k + 6]
+        s7 += values[k + 7]
+    return ((s0 + s4) + (s1 + s5)) + ((s2 + s6) + (s3 + s7))
+
+
+@inner_kernel
 def ball_set_force(entries: Array, balls: Array, dx: float, dy: float, work: Array) -> tuple[float, float]:
     """Restoring force [N] of a race moved by (dx, dy) [m], x and y; the force *on* the race is its negative.
 
-    ``work`` (2, Z8) is scratch. Source: Neisi 2020, eqs. (2)–(6).
+    ``entries`` (5,) and ``balls`` (3, Z8) as `ball_set_entries` and `balls_of` make them, ``work`` (2, Z8) is
+    scratch. Source: Neisi 2020, eqs. (2)–(6). Differs from the paper: axial offset of an angular-contact row;
+    algebraic form, the distance of the groove centres instead of contact angles: no ``atan``, no ``cos``.
     """
-    return planar_ball_force(
-        dx,
-        dy,
-        entries[RADIAL_OFFSET],
-        entries[AXIAL_OFFSET],
-        entries[GROOVE_DISTANCE],
-        entries[BALL_STIFFNESS],
-        balls[COSINE],
-        balls[SINE],
-        balls[COUNT],
-        work,
-    )
+    K, A_0 = entries[BALL_STIFFNESS], entries[GROOVE_DISTANCE]
+    radial_offset, axial_offset = entries[RADIAL_OFFSET], entries[AXIAL_OFFSET]
+    cosines, sines, weights = balls[COSINE], balls[SINE], balls[COUNT]
+    axial2 = axial_offset * axial_offset
+    for j in range(cosines.shape[0]):
+        radial = radial_offset + dx * cosines[j] + dy * sines[j]
+        A = math.sqrt(radial * radial + axial2)
+        delta = max(A - A_0, 0.0)
+        q = weights[j] * K * delta * math.sqrt(delta) * radial / A
+        work[0, j] = q * cosines[j]
+        work[1, j] = q * sines[j]
+    return lane_sum(work[0]), lane_sum(work[1])
 
 
 @lean_kernel
@@ -111,33 +126,43 @@ def ball_set_gradient(
 
     Source: Neisi 2020, eqs. (2)–(6), differentiated.
     """
-    return planar_ball_gradient(
-        dx,
-        dy,
-        entries[RADIAL_OFFSET],
-        entries[AXIAL_OFFSET],
-        entries[GROOVE_DISTANCE],
-        entries[BALL_STIFFNESS],
-        balls[COSINE],
-        balls[SINE],
-        balls[COUNT],
-    )
+    K, axial_offset = entries[BALL_STIFFNESS], entries[AXIAL_OFFSET]
+    cosines, sines, weights = balls[COSINE], balls[SINE], balls[COUNT]
+    f_x = f_y = k_xx = k_xy = k_yy = 0.0
+    axial2 = axial_offset * axial_offset
+    for j in range(cosines.shape[0]):
+        radial = entries[RADIAL_OFFSET] + dx * cosines[j] + dy * sines[j]
+        A = math.sqrt(radial * radial + axial2)
+        delta = A - entries[GROOVE_DISTANCE]
+        if delta <= 0.0:
+            continue
+        root = math.sqrt(delta)
+        cos_phi = radial / A
+        q = weights[j] * K * delta * root
+        k = weights[j] * K * 1.5 * root * cos_phi * cos_phi + q * (1.0 - cos_phi * cos_phi) / A
+        q *= cos_phi
+        f_x += q * cosines[j]
+        f_y += q * sines[j]
+        k_xx += k * cosines[j] * cosines[j]
+        k_xy += k * cosines[j] * sines[j]
+        k_yy += k * sines[j] * sines[j]
+    return f_x, f_y, k_xx, k_xy, k_yy
 
 
 @lean_kernel
 def ball_set_energy(entries: Array, balls: Array, dx: float, dy: float) -> float:
-    """Elastic energy [J] of a race moved by (dx, dy) [m]. Source: integral of Neisi 2020, eq. (6)."""
-    return planar_ball_energy(
-        dx,
-        dy,
-        entries[RADIAL_OFFSET],
-        entries[AXIAL_OFFSET],
-        entries[GROOVE_DISTANCE],
-        entries[BALL_STIFFNESS],
-        balls[COSINE],
-        balls[SINE],
-        balls[COUNT],
-    )
+    """Elastic energy [J] of a race moved by (dx, dy) [m]: ``Σ 2/5 K δ^(5/2)``.
+
+    Source: integral of Neisi 2020, eq. (6).
+    """
+    K, axial_offset = entries[BALL_STIFFNESS], entries[AXIAL_OFFSET]
+    energy = 0.0
+    for j in range(balls.shape[1]):
+        radial = entries[RADIAL_OFFSET] + dx * balls[COSINE, j] + dy * balls[SINE, j]
+        delta = math.sqrt(radial * radial + axial_offset * axial_offset) - entries[GROOVE_DISTANCE]
+        if delta > 0.0:
+            energy += balls[COUNT, j] * 0.4 * K * delta * delta * math.sqrt(delta)
+    return energy
 
 
 @inner_kernel
@@ -146,17 +171,14 @@ def ball_set_load(entries: Array, balls: Array, dx: float, dy: float) -> tuple[f
 
     Source: Neisi 2020, eqs. (6) and (7).
     """
-    load = largest_ball_load(
-        dx,
-        dy,
-        entries[RADIAL_OFFSET],
-        entries[AXIAL_OFFSET],
-        entries[GROOVE_DISTANCE],
-        entries[BALL_STIFFNESS],
-        balls[COSINE],
-        balls[SINE],
-        balls[COUNT],
-    )
+    axial_offset = entries[AXIAL_OFFSET]
+    largest = 0.0
+    for j in range(balls.shape[1]):
+        if balls[COUNT, j] > 0.0:
+            radial = entries[RADIAL_OFFSET] + dx * balls[COSINE, j] + dy * balls[SINE, j]
+            largest = max(largest, radial * radial)
+    delta = max(math.sqrt(largest + axial_offset * axial_offset) - entries[GROOVE_DISTANCE], 0.0)
+    load = entries[BALL_STIFFNESS] * delta * math.sqrt(delta)
     return load, entries[STRESS_COEFFICIENT] * cube_root(load)
 
 

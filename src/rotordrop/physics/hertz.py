@@ -13,15 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.physics.elementary import cos_each, cube_root_each, exp_each, ln_each, power
+from rotordrop.physics.elementary import cos_each, cube_root_each, exp_each, ln_each
 from rotordrop.physics.elliptic import carlson_d, complete_second
 
 Array = NDArray[np.float64]
 ArrayLike = float | Array
 
 _SECANT_STEPS = 40
-_PALMGREN = 3.84e-5
-"""Palmgren's line contact ``δ = 3.84e-5 Q^0.9 / l^0.8`` in millimetre and newton."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -196,14 +194,6 @@ def race_contact(
     return point_contact(*race_curvatures(D_w, D_pw, f, alpha, inner=inner), eta)
 
 
-def circular_contact(R_1: float, R_2: float, eta: float) -> Contact:
-    """Contact of two spheres of radius [m] and compliance [1/Pa]; an infinite radius is a plane.
-
-    Source: Johnson, Contact Mechanics, ch. 4.
-    """
-    return point_contact(2.0 * (1.0 / R_1 + 1.0 / R_2), 0.0, eta)
-
-
 def contacts_in_series(K_i: ArrayLike, K_o: ArrayLike) -> Any:
     """Stiffness [N/m^1.5] of two Hertz contacts that carry the same load, inner and outer [N/m^1.5].
 
@@ -259,20 +249,3 @@ def cylinder_in_bore(R_rotor: float, R_bore: float, length: float, eta: float) -
     ``1/R = 1/R_rotor − 1/R_bore``. Source: Johnson, Contact Mechanics, ch. 4.
     """
     return LineContact(radius=R_rotor * R_bore / (R_bore - R_rotor), length=length, compliance=eta)
-
-
-def line_contact_stiffness(length: float) -> float:
-    """Stiffness [N/m^(10/9)] of a line contact of a given length [m], with the exponent 10/9 of Neisi 2020.
-
-    Source: Palmgren, ``δ = 3.84e-5 Q^0.9 / l^0.8`` (mm, N). Differs from the paper: it says "Hertzian model".
-    """
-    per_load = 1e-3 * _PALMGREN / power(1e3 * length, 0.8)
-    return float(power(per_load, -10.0 / 9.0))
-
-
-def line_contact_approach(Q: float, length: float) -> float:
-    """Approach [m] of a line contact under a load [N] and of a given length [m].
-
-    Source: Palmgren, ``δ = 3.84e-5 Q^0.9 / l^0.8`` (mm, N).
-    """
-    return float(1e-3 * _PALMGREN * power(Q, 0.9) / power(1e3 * length, 0.8))

@@ -65,31 +65,3 @@ def period_ratio(amplitude: ArrayLike) -> Any:
     Exact for amplitudes below π. Source: Beléndez et al., cited in Neisi 2020, section 5.4.
     """
     return 2.0 / math.pi * ellipk(np.sin(0.5 * np.asarray(amplitude)) ** 2)
-
-
-def period(length: ArrayLike, amplitude: ArrayLike = 0.0, g: float = 9.81, inertia_ratio: float = 1.0) -> Any:
-    """Period [s] of a swing of any amplitude [rad] below π; other arguments as in `small_frequency`.
-
-    Source: Beléndez et al., cited in Neisi 2020, section 5.4.
-    """
-    return period_ratio(amplitude) / small_frequency(length, g, inertia_ratio)
-
-
-def amplitude_of_frequency(
-    frequency: float, length: float, g: float = 9.81, inertia_ratio: float = 1.0
-) -> float:
-    """Amplitude [rad] at which the swing has a given frequency [Hz]; zero where even a small swing is slower.
-
-    Other arguments as in `small_frequency`. Bisection in the exact period.
-    Source: inverse of Beléndez et al., cited in Neisi 2020, section 5.4.
-    """
-    wanted = float(small_frequency(length, g, inertia_ratio)) / frequency
-    low, high = 0.0, math.pi
-    if wanted <= 1.0:
-        return 0.0
-    while high - low > 4e-16 * math.pi:
-        middle = 0.5 * (low + high)
-        if middle in (low, high):
-            break
-        low, high = (middle, high) if period_ratio(middle) < wanted else (low, middle)
-    return 0.5 * (low + high)

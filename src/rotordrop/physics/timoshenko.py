@@ -62,14 +62,6 @@ def shear_coefficient(nu: float, diameter_ratio: float = 0.0) -> float:
     return 6.0 * (1.0 + nu) * square / ((7.0 + 6.0 * nu) * square + (20.0 + 12.0 * nu) * ratio)
 
 
-def rectangle_shear_coefficient(nu: float) -> float:
-    """Shear coefficient κ [1] of a rectangular section by Cowper, from ν [1].
-
-    Source: Cowper 1966, ``10 (1+ν)/(12+11ν)``.
-    """
-    return 10.0 * (1.0 + nu) / (12.0 + 11.0 * nu)
-
-
 def round_section(D: float, d: float, E: float, nu: float, rho: float) -> Section:
     """Section of a solid or hollow round shaft.
 

@@ -3,24 +3,6 @@
 from __future__ import annotations
 
 
-def rolling_whirl_speed(omega_r: float, R_i: float, c_r: float) -> float:
-    """Backward whirl speed [rad/s] of a rotor that rolls without sliding in a fixed bore, ``ω_r R_i / c_r``.
-
-    Rotor speed [rad/s], bore radius [m], air gap [m]. Never reached in a drop: a real whirl locks to a
-    coupled natural frequency of rotor and support far below.
-    Source: Black 1968; Bartha 1998 (dry friction whirl).
-    """
-    return omega_r * R_i / c_r
-
-
-def whirl_force(m: float, c_r: float, omega_w: float) -> float:
-    """Contact force [N] that keeps a mass [kg] on a circle of radius c_r [m] at a whirl speed [rad/s].
-
-    Source: ``m c ω²``.
-    """
-    return m * c_r * omega_w**2
-
-
 def race_spin_up_time(
     race_inertia: float, mu: float, F_r: float, R_i: float, omega_r: float, r_r: float | None = None
 ) -> float:

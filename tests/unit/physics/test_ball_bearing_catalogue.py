@@ -13,9 +13,10 @@ from tests.reference.ball_bearing_catalogue import (
     row_of_catalogue,
     row_of_conformity,
 )
+from tests.reference.closed_forms import lift_off_force
 
 from rotordrop.machine import example_machine
-from rotordrop.physics.ball_bearing import axial_rigidity, bearing_constants, lift_off_force
+from rotordrop.physics.ball_bearing import axial_rigidity, bearing_constants
 from rotordrop.physics.ball_bearing_geometry import BallBearingGeometry
 from rotordrop.physics.hertz import compliance
 

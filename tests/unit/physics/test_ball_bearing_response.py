@@ -8,16 +8,13 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tests.reference.closed_forms import bearing_equilibrium
 
 from rotordrop.errors import SimulationError
 from rotordrop.physics.ball_bearing import bearing_constants
 from rotordrop.physics.ball_bearing_geometry import BallBearingGeometry
-from rotordrop.physics.ball_bearing_planar import planar_ball_force, planar_ball_gradient
-from rotordrop.physics.ball_bearing_response import (
-    bearing_equilibrium,
-    bearing_response,
-    simple_radial_stiffness,
-)
+from rotordrop.physics.ball_bearing_response import bearing_response, simple_radial_stiffness
+from rotordrop.physics.ball_set import ball_set_entries, ball_set_force, ball_set_gradient
 from rotordrop.physics.hertz import compliance
 
 Array = NDArray[np.float64]
@@ -164,20 +161,12 @@ def test_planar_kernel_agrees_with_the_full_function(touchdown_bearing: Bearing)
     constants = bearing_constants(touchdown_bearing(first_ball_angle=0.05))
     beta = np.append(constants.ball_angles, 0.0)
     weights = np.append(np.full(23, 2.0), 0.0)
-    arguments = (
-        constants.radial_offset,
-        constants.axial_offset,
-        constants.groove_distance,
-        constants.ball_stiffness,
-        np.cos(beta),
-        np.sin(beta),
-        weights,
-    )
+    entries, balls = ball_set_entries(constants), np.array([np.cos(beta), np.sin(beta), weights])
     for dx, dy, *_ in displacements(5):
         full = bearing_response(constants, [dx, dy, 0, 0, 0])
-        force = planar_ball_force(dx, dy, *arguments, np.empty((2, 24)))
+        force = ball_set_force(entries, balls, dx, dy, np.empty((2, 24)))
         assert force == pytest.approx(tuple(-full.force[:2]), rel=1e-9, abs=1e-9)
-        gradient = planar_ball_gradient(dx, dy, *arguments)
+        gradient = ball_set_gradient(entries, balls, dx, dy)
         k = full.stiffness
         assert gradient[2:] == pytest.approx((k[0, 0], k[0, 1], k[1, 1]), rel=1e-9, abs=1.0)
 

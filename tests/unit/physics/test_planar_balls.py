@@ -7,15 +7,16 @@ import math
 import numpy as np
 import pytest
 
-from rotordrop.physics.ball_bearing_planar import (
+from rotordrop.physics.ball_set import (
+    ball_set_energy,
+    ball_set_force,
+    ball_set_gradient,
+    ball_set_load,
     lane_sum,
-    largest_ball_load,
-    planar_ball_energy,
-    planar_ball_force,
-    planar_ball_gradient,
 )
 
 RADIAL, AXIAL, GROOVE, K = 5.18e-4, 2.47e-4, 5.715e-4, 1.06e10
+ENTRIES = np.array([K, GROOVE, RADIAL, AXIAL, 1.0])
 SHIFTS = [(0.0, 0.0), (3e-6, -8e-6), (-11e-6, 2e-6), (0.0, -40e-6)]
 
 
@@ -24,7 +25,7 @@ def balls():
     """23 balls that stand for two each, without symmetry, and one entry of padding that stands for none."""
     angles = np.append(0.6 * math.pi + 2.0 * math.pi * np.arange(23) / 23, 0.0)
     weights = np.append(np.full(23, 2.0), 0.0)
-    return np.cos(angles), np.sin(angles), weights
+    return np.array([np.cos(angles), np.sin(angles), weights])
 
 
 def squeezes(shift, balls):
@@ -33,38 +34,38 @@ def squeezes(shift, balls):
 
 
 def force(shift, balls):
-    return planar_ball_force(*shift, RADIAL, AXIAL, GROOVE, K, *balls, np.empty((2, 24)))
+    return ball_set_force(ENTRIES, balls, *shift, np.empty((2, 24)))
 
 
 @pytest.mark.parametrize("shift", SHIFTS)
 def test_largest_load_is_that_of_the_ball_squeezed_most(balls, shift):
     real = squeezes(shift, balls)[:23]
-    found = largest_ball_load(*shift, RADIAL, AXIAL, GROOVE, K, *balls)
+    found = ball_set_load(ENTRIES, balls, *shift)[0]
     assert found == pytest.approx(K * np.max(real) ** 1.5, rel=1e-9)
 
 
 def test_padding_carries_no_load(balls):
     """Pushed towards the padded entry, away from every ball."""
-    cosines, sines, weights = (values.copy() for values in balls)
-    weights[:23] = 0.0
-    weights[11] = 1.0
-    found = largest_ball_load(20e-6, 0.0, RADIAL, AXIAL, GROOVE, K, cosines, sines, weights)
+    alone = balls.copy()
+    alone[2, :23] = 0.0
+    alone[2, 11] = 1.0
+    found = ball_set_load(ENTRIES, alone, 20e-6, 0.0)[0]
     expected = K * squeezes((20e-6, 0.0), balls)[11] ** 1.5
     assert found == pytest.approx(expected, rel=1e-9)
     assert found < 0.5 * K * squeezes((20e-6, 0.0), balls)[23] ** 1.5
 
 
 def test_balls_out_of_contact_carry_no_load(balls):
-    loose = (RADIAL, AXIAL, GROOVE + 50e-6, K)
-    assert largest_ball_load(1e-6, 2e-6, *loose, *balls) == 0.0
-    assert planar_ball_energy(1e-6, 2e-6, *loose, *balls) == 0.0
-    assert planar_ball_force(1e-6, 2e-6, *loose, *balls, np.empty((2, 24))) == (0.0, 0.0)
-    assert planar_ball_gradient(1e-6, 2e-6, *loose, *balls) == (0.0, 0.0, 0.0, 0.0, 0.0)
+    loose = np.array([K, GROOVE + 50e-6, RADIAL, AXIAL, 1.0])
+    assert ball_set_load(loose, balls, 1e-6, 2e-6) == (0.0, 0.0)
+    assert ball_set_energy(loose, balls, 1e-6, 2e-6) == 0.0
+    assert ball_set_force(loose, balls, 1e-6, 2e-6, np.empty((2, 24))) == (0.0, 0.0)
+    assert ball_set_gradient(loose, balls, 1e-6, 2e-6) == (0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("shift", SHIFTS)
 def test_energy_of_all_balls(balls, shift):
-    found = planar_ball_energy(*shift, RADIAL, AXIAL, GROOVE, K, *balls)
+    found = ball_set_energy(ENTRIES, balls, *shift)
     assert found == pytest.approx(np.sum(balls[2] * 0.4 * K * squeezes(shift, balls) ** 2.5), rel=1e-9)
 
 
@@ -72,12 +73,12 @@ def test_energy_of_all_balls(balls, shift):
 def test_force_is_the_slope_of_the_energy_and_stiffness_that_of_the_force(balls, shift):
     h = 1e-9
     steps = [np.array([h, 0.0]), np.array([0.0, h])]
-    found = planar_ball_gradient(*shift, RADIAL, AXIAL, GROOVE, K, *balls)
+    found = ball_set_gradient(ENTRIES, balls, *shift)
     assert found[:2] == pytest.approx(force(shift, balls), rel=1e-9, abs=1e-6)
     slope = []
     for step in steps:
         upper, lower = np.array(shift) + step, np.array(shift) - step
-        energies = [planar_ball_energy(*s, RADIAL, AXIAL, GROOVE, K, *balls) for s in (upper, lower)]
+        energies = [ball_set_energy(ENTRIES, balls, *s) for s in (upper, lower)]
         slope.append((energies[0] - energies[1]) / (2 * h))
     assert slope == pytest.approx(force(shift, balls), rel=1e-5, abs=1e-2)
     columns = [

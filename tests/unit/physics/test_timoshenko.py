@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 import pytest
+from tests.reference.closed_forms import rectangle_shear_coefficient
 
 from rotordrop.physics.timoshenko import (
     Section,
     element_mass,
     element_polar,
     element_stiffness,
-    rectangle_shear_coefficient,
     round_section,
     shape_functions,
     shear_coefficient,

