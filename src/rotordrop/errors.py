@@ -75,6 +75,14 @@ class NoDropError(RecordError):
         super().__init__(f"{record}: {seen}; {remedy}")
 
 
+class UnsettledError(RecordError):
+    """Readings do not show the rotor at rest on its touchdown bearings."""
+
+    def __init__(self, record: str, seen: str) -> None:
+        self.seen, self.remedy = f"{record} {seen}", "give the readings at standstill as a tail (--tail)"
+        super().__init__(f"{self.seen}; {self.remedy}")
+
+
 class IdentificationError(RotordropError):
     """An unknown parameter cannot be found from the recording."""
 

@@ -97,6 +97,7 @@ def estimate_drops(
     from rotordrop.errors import UsageError
     from rotordrop.estimate.estimate import Estimates
     from rotordrop.estimate.record_facts import facts_of
+    from rotordrop.evidence.evidence import Evidence, insisted
 
     if not isinstance(method, Tracked | Replay):
         raise UsageError(f"the method is {method!r}; expected Tracked(...) or Replay(...).")
@@ -104,10 +105,11 @@ def estimate_drops(
     if len(tails) != len(records):
         raise UsageError(f"{len(tails)} tails for {len(records)} records; expected one, or None, for each.")
     stems = names or [r.path.stem if r.path else f"drop_{i + 1}" for i, r in enumerate(records)]
-    facts = [
-        facts_of(machine, record, tail, stem)
+    evidence = [
+        Evidence(record=record, machine=machine, tail=tail, name=stem)
         for record, tail, stem in zip(records, tails, stems, strict=True)
     ]
+    facts = [facts_of(one) for one in evidence]
     if isinstance(method, Replay):
         from rotordrop.replay.replay import replay_drop
 
@@ -115,12 +117,11 @@ def estimate_drops(
             replay_drop(machine, record, tail, method, one, name=stem, progress=progress)
             for record, tail, stem, one in zip(records, tails, stems, facts, strict=True)
         )
-    from rotordrop.evidence.evidence import read_evidence
     from rotordrop.rotor.parameters import build_drop_model
     from rotordrop.twin.tracked import followed_drops
     from rotordrop.twin.tracked_estimate import estimate_of
 
     model = build_drop_model(machine)
-    evidence = [read_evidence(model, r, t, name=n) for r, t, n in zip(records, tails, stems, strict=True)]
+    evidence = [insisted(one.with_facts(base=model)) for one in evidence]
     drops = followed_drops(machine, evidence, quick=method.quick, progress=progress)
     return Estimates(estimate_of(drop, method, one) for drop, one in zip(drops, facts, strict=True))

@@ -73,7 +73,7 @@ def with_gap(evidence: Evidence, gaps: Array) -> Evidence:
     rest = replace(gap.rest, radius=gaps + gap.sag.total)
     other = replace(gap, value=gaps, rest=rest)
     fall = fit_initial_state(evidence, other, present(evidence.sensing))
-    return replace(evidence, rest=rest, gap=other, fall=fall)
+    return evidence.with_facts(rest=rest, gap=other, fall=fall)
 
 
 def by_expansion(model: DropModel, start: ExpandedState, speed: float, angle: float) -> DropResult:

@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rotordrop.errors import RecordError
-from rotordrop.evidence.quality import Finding, check_record, refuse_unusable
-from rotordrop.evidence.settled import resting_record
-from rotordrop.machine import Machine
-from rotordrop.record.record import Record
+from rotordrop.evidence.evidence import Evidence, Missing
+from rotordrop.evidence.quality import Finding, Kind, checked, refuse_unusable
 from rotordrop.record.simulated import is_simulated
 
 NO_TAIL = "no settled tail: the air gap rests on its prior and on the contacts; give one with --tail"
@@ -37,23 +35,13 @@ class RecordFacts:
         return tuple(dict.fromkeys((*self.warnings, *further)))
 
 
-def _still(machine: Machine, record: Record, tail: Record | None) -> Record | None:
-    """The settled tail given, or that of a record which reaches standstill; None where there is neither."""
-    if tail is not None:
-        return tail
-    try:
-        return resting_record(record, None, machine)
-    except RecordError:
-        return None
-
-
-def _findings(machine: Machine, record: Record, tail: Record | None) -> tuple[Finding, ...]:
+def _findings(evidence: Evidence) -> tuple[Finding, ...]:
     """What the gate finds; a lost sensor keeps it from looking, but not the twin from following."""
     try:
-        return check_record(record, machine, tail)
+        return checked(evidence)
     except RecordError as error:
         unseen = Finding(
-            kind="not looked at",
+            kind=Kind.NOT_LOOKED_AT,
             message=f"the plausibility checks could not look at this record: {error}",
             remedy="look at its channels by eye",
             severity="warning",
@@ -61,7 +49,7 @@ def _findings(machine: Machine, record: Record, tail: Record | None) -> tuple[Fi
         return (unseen,)
 
 
-def facts_of(machine: Machine, record: Record, tail: Record | None, name: str) -> RecordFacts:
+def facts_of(evidence: Evidence) -> RecordFacts:
     """What a record of a machine, with its settled tail, gives every estimate.
 
     Raises
@@ -69,13 +57,13 @@ def facts_of(machine: Machine, record: Record, tail: Record | None, name: str) -
     RecordError
         If the gate finds that results would be wrong.
     """
-    still = _still(machine, record, tail)
-    findings = _findings(machine, record, still)
+    record, name = evidence.record, evidence.name
+    findings = _findings(evidence)
     refuse_unusable(findings, name)
     warnings = [finding.message for finding in findings if finding.severity == "warning"]
-    if still is None:
+    if evidence.tail is None and isinstance(evidence.still, Missing):
         warnings.append(NO_TAIL)
-    origin = machine.calibration
+    origin = evidence.machine.calibration
     if origin is not None:
         same = [d.name for d in origin.drops if d.name == name or (d.sha256 and d.sha256 == record.sha256)]
         warnings += [COUNTED_TWICE.format(one) for one in same]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError
-from rotordrop.evidence.sensing import Sensing, displacements_along
+from rotordrop.evidence.sensing import Sensing
 from rotordrop.record.record import Record
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.static_sag import StaticSag, sag_of_model
@@ -121,7 +121,7 @@ def find_rest(still: Record, sensing: Sensing) -> SettledRest:
             f"{still.name}: {still.duration:.3g} s of settled rotor; at least {SHORTEST_TAIL:g} s are "
             "needed for the air gap. Record longer after standstill."
         )
-    return _rest(still.name, still.time, displacements_along(still), sensing)
+    return _rest(still.name, still.time, still.along, sensing)
 
 
 def rest_at_end(record: Record, sensing: Sensing) -> SettledRest:
@@ -135,7 +135,7 @@ def rest_at_end(record: Record, sensing: Sensing) -> SettledRest:
     late = record.time >= record.time[-1] - END
     if record.time[-1] - record.time[0] < 2.0 * END:
         raise IdentificationError(f"{record.name} is shorter than {2.0 * END:g} s")
-    rest = _rest(record.name, record.time[late], displacements_along(record)[late], sensing, LARGEST_SWING)
+    rest = _rest(record.name, record.time[late], record.along[late], sensing, LARGEST_SWING)
     if np.any(rest.spread > MOST_SPREAD * rest.radius):
         raise IdentificationError(
             f"{record.name}: in its last {END:g} s the rotor still leaves its races: its distance from their "

@@ -17,7 +17,6 @@ from rotordrop.evidence.quality.clock import check_clock
 from rotordrop.evidence.quality.finding import refuse_unusable
 from rotordrop.known import NINETY
 from rotordrop.record.arrangement import arrangement_of
-from rotordrop.record.axes import along_sensors, planar_of, sensor_planes
 from rotordrop.record.profile import Profile, load_profile
 from rotordrop.record.readers import read_recording
 from rotordrop.record.record import Record, record_of, sha256_of
@@ -164,11 +163,10 @@ def measure_clearance(
     """
     read = record if isinstance(record, Record) else _read(Path(record), machine, mapping, profile)
     refuse_unusable([*check_clock(read, drop=False), *check_channels(read)], read.name)
-    planes = sensor_planes(read.sensors)
-    path = _averaged(planar_of(along_sensors(read.signals, read.sensors), planes), read.sampling_rate)
-    names = [plane.bearing for plane in planes]
-    if machine is not None and len(planes) > 1:
-        path = np.einsum("bp,npc->nbc", _carried(machine, [plane.node for plane in planes]), path)
+    path = _averaged(read.motion, read.sampling_rate)
+    names = [plane.bearing for plane in read.planes]
+    if machine is not None and len(names) > 1:
+        path = np.einsum("bp,npc->nbc", _carried(machine, [plane.node for plane in read.planes]), path)
         names = [bearing.name for bearing in machine.touchdown_bearings]
     return tuple(_clearance(path[:, i], name, read.name) for i, name in enumerate(names))
 

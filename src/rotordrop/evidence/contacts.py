@@ -14,7 +14,6 @@ import numpy as np
 
 from rotordrop.errors import RecordError
 from rotordrop.evidence.release import GRID, response_at, rotor_pushed_at_bearings, tabulate_response
-from rotordrop.record.axes import sensor_directions, sensor_planes
 from rotordrop.record.recording import Array
 
 if TYPE_CHECKING:
@@ -112,19 +111,17 @@ def early_forces(record: Record, machine: Machine, drop: DropInstant, *, span: f
             "has "
             f"{len(machine.ambs)} AMB planes; give the AMB nodes in the machine file"
         )
-    planes = sensor_planes(record.sensors)
-    rotor = rotor_pushed_at_bearings(machine, planes)
-    if len(planes) < len(rotor.force_rows):
+    rotor = rotor_pushed_at_bearings(machine, record.planes)
+    if len(record.planes) < len(rotor.force_rows):
         raise RecordError(
-            f"{len(planes)} sensor planes cannot tell the forces of {len(rotor.force_rows)} touchdown "
+            f"{len(record.planes)} sensor planes cannot tell the forces of {len(rotor.force_rows)} touchdown "
             "bearings apart"
         )
     begin = drop.fall.end - 2 * _KNOTS
     keep = (record.time >= begin) & (record.time <= begin + span)
     time = record.time[keep]
     knots = np.arange(begin, min(begin + span, float(time[-1])), _KNOTS)
-    gain = np.array([float(sensor.gain) for sensor in record.sensors])
-    deviation = (record.signals[keep] - drop.fall.predicted(time)) * gain
+    deviation = (record.signals[keep] - drop.fall.predicted(time)) * record.gains
     table = tabulate_response(rotor, 2 * np.pi * drop.levitated.frequency, 0.0, span + 2 * _KNOTS)
     ramp = np.concatenate(
         [np.zeros_like(table[:1]), np.cumsum(0.5 * GRID * (table[1:] + table[:-1]), axis=0)]
@@ -132,7 +129,7 @@ def early_forces(record: Record, machine: Machine, drop: DropInstant, *, span: f
     columns = _columns(ramp, time, knots, record)
     weight = rotor.mass * float(machine.gravity)
     force, error = _regularised(
-        columns, deviation, drop.levitated.noise * gain, weight, (len(knots), len(rotor.force_rows))
+        columns, deviation, drop.levitated.noise * record.gains, weight, (len(knots), len(rotor.force_rows))
     )
     names = tuple(bearing.name for bearing in machine.touchdown_bearings)
     return EarlyForces(time=knots, force=force, error=error, bearings=names)
@@ -140,10 +137,7 @@ def early_forces(record: Record, machine: Machine, drop: DropInstant, *, span: f
 
 def _columns(ramp: np.ndarray, time: Array, knots: Array, record: Record) -> Array:
     """Displacement along the sensors per force at bearing and knot, x then y: shape (T · S, 2 · B · K)."""
-    unit = sensor_directions(record.sensors)
-    seen = unit[:, 0] - 1j * unit[:, 1]
-    nodes = [sensor.node for sensor in record.sensors]
-    plane_of = [list(dict.fromkeys(nodes)).index(node) for node in nodes]
+    seen = record.directions[:, 0] - 1j * record.directions[:, 1]
     parts = []
     for knot in knots:
         since = time - knot
@@ -152,10 +146,10 @@ def _columns(ramp: np.ndarray, time: Array, knots: Array, record: Record) -> Arr
             - 2 * response_at(ramp, since)
             + response_at(ramp, since - _KNOTS)
         )
-        parts.append(hat[:, plane_of, :] * seen[None, :, None] / _KNOTS)
+        parts.append(hat[:, record.plane_of, :] * seen[None, :, None] / _KNOTS)
     stacked = np.stack(parts, axis=-1)
     both = np.concatenate([stacked.real, -stacked.imag], axis=2)
-    return both.reshape(len(time) * len(nodes), -1)
+    return both.reshape(len(time) * len(seen), -1)
 
 
 def _regularised(

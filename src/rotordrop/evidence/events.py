@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.errors import NoDropError, RecordError
+from rotordrop.errors import NoDropError
 from rotordrop.evidence.levitated import LevitatedModel, fit_levitated
 from rotordrop.evidence.preprocess import acceleration
 from rotordrop.known import NINETY
-from rotordrop.record.axes import Plane, along_sensors, planar_of, sensor_planes
+from rotordrop.record.axes import Plane, along_sensors, planar_of
 from rotordrop.record.recording import Array
 from rotordrop.record.speed import require_speed
 from rotordrop.units import format_quantity
@@ -48,33 +48,22 @@ _UNSURE = 3e-3
 
 @dataclass(frozen=True, kw_only=True)
 class DropInstant:
-    """When the magnetic bearings let the rotor go.
-
-    Attributes
-    ----------
-    value : float
-        Power-off, in record time [s].
-    standard_error : float
-        Its standard uncertainty, noise and model together [s].
-    interval_90 : tuple of float
-        Interval that holds it with 90 % probability [s].
-    method : str
-        How it was found.
-    fall : Fall
-        The fit behind it, with remanent lift and misfit.
-    levitated : LevitatedModel
-        Readings of all sensors before the drop.
-    notes : tuple of str
-        What to know about this value.
-    """
+    """When the magnetic bearings let the rotor go."""
 
     value: float
+    """Power-off, in record time [s]."""
     standard_error: float
+    """Its standard uncertainty, noise and model together [s]."""
     interval_90: tuple[float, float]
+    """Interval that holds it with 90 % probability [s]."""
     method: str
+    """How it was found."""
     fall: Fall
+    """The fit behind it, with remanent lift and misfit."""
     levitated: LevitatedModel
+    """Readings of all sensors before the drop."""
     notes: tuple[str, ...] = ()
+    """What to know about this value."""
 
     @property
     def contact(self) -> float:
@@ -87,24 +76,24 @@ class DropInstant:
 
 @dataclass(frozen=True, kw_only=True)
 class CoarseDrop:
-    """Where the rotor sinks, found without any model.
-
-    Attributes
-    ----------
-    instant : float
-        Drop to within some milliseconds [s].
-    sunk : float
-        When the fastest plane had sunk by `FALLEN_SHARE` of its gap [s].
-    contact : float
-        First sudden acceleration after that, or the end of the record [s].
-    speed : float
-        Shaft speed before the drop [rad/s].
-    """
+    """Where the rotor sinks, found without any model."""
 
     instant: float
+    """Drop to within some milliseconds [s]."""
     sunk: float
+    """When the fastest plane had sunk by `FALLEN_SHARE` of its gap [s]."""
     contact: float
+    """First sudden acceleration after that, or the end of the record [s]."""
     speed: float
+    """Shaft speed before the drop [rad/s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Beginning:
+    """First guess of the drop, and what all sensors read before it."""
+
+    coarse: CoarseDrop
+    levitated: LevitatedModel
 
 
 def find_drop_instant(record: Record, machine: Machine) -> DropInstant:
@@ -122,85 +111,55 @@ def find_drop_instant(record: Record, machine: Machine) -> DropInstant:
     RecordError
         When the rotor does not fall in the record, or the record does not begin before the fall.
     """
-    whole, planes = with_whole_planes(record)
-    coarse, levitated = drop_and_levitated(record, machine, whole, planes)
-    fall = find_fall(whole, machine, planes, levitated.of_channels(_columns(whole, record)), coarse)
-    return _instant(fall, levitated, record)
+    begun = beginning_of(record, machine)
+    return instant_of(find_fall(record, machine, begun), begun.levitated, record)
 
 
-def with_whole_planes(record: Record) -> tuple[Record, tuple[Plane, ...]]:
-    """The record with those planes only whose sensors give x and y: a lost sensor takes its plane with it.
-
-    Raises
-    ------
-    RecordError
-        When no plane is whole.
-    """
-    whole = [i for i, sensor in enumerate(record.sensors) if _resolved(sensor.node, record)]
-    if len(whole) in (0, len(record.sensors)):
-        return record, sensor_planes(record.sensors)
-    sensors = tuple(record.sensors[i] for i in whole)
-    return replace(record, signals=record.signals[:, whole], sensors=sensors), sensor_planes(sensors)
-
-
-def _columns(part: Record, record: Record) -> list[int]:
-    """Columns of a record that a record with some of its sensors holds."""
-    return [record.sensors.index(sensor) for sensor in part.sensors]
-
-
-def _resolved(node: int, record: Record) -> bool:
-    try:
-        sensor_planes([sensor for sensor in record.sensors if sensor.node == node])
-    except RecordError:
-        return False
-    return True
-
-
-def find_fall(
-    record: Record,
-    machine: Machine,
-    planes: tuple[Plane, ...],
-    levitated: LevitatedModel,
-    coarse: CoarseDrop,
-    *,
-    until: float | None = None,
-) -> Fall:
-    """Fit the fall by the released rotor of the machine, from a first guess of the drop.
+def find_fall(record: Record, machine: Machine, begun: Beginning, *, until: float | None = None) -> Fall:
+    """Fit the fall by the released rotor of the machine, in the planes whose sensors give x and y.
 
     The window ends where the readings leave the free fall, or at `until` [s] whether they fit or not.
     """
-    window = (coarse.instant, coarse.sunk, coarse.contact)
-    if until is not None:
-        window = (coarse.instant, until, until)
     # The rotor model brings the compiler with it, and a first look at a record needs neither.
     from rotordrop.evidence.fall import fit_fall
     from rotordrop.evidence.release import free_rotor
 
-    return fit_fall(record, planes, free_rotor(machine, planes), levitated, window)
+    coarse, whole = begun.coarse, record.whole
+    window = (coarse.instant, coarse.sunk, coarse.contact)
+    if until is not None:
+        window = (coarse.instant, until, until)
+    return fit_fall(whole, free_rotor(machine, whole.planes), of_whole(begun.levitated, record), window)
 
 
-def _instant(fall: Fall, levitated: LevitatedModel, record: Record) -> DropInstant:
+def of_whole(levitated: LevitatedModel, record: Record) -> LevitatedModel:
+    """The levitated motion of a record in the planes whose sensors give x and y."""
+    whole = record.whole
+    if whole is record:
+        return levitated
+    return levitated.of_channels([record.sensors.index(sensor) for sensor in whole.sensors])
+
+
+def instant_of(fall: Fall, levitated: LevitatedModel, record: Record) -> DropInstant:
+    """Power-off by a fitted fall, with what the release model leaves out."""
     error = float(np.hypot(fall.standard_error, MODEL_ERROR))
     notes = []
     if fall.misfit > 2.0:
         notes.append(
             f"the fall deviates from the released rotor by {fall.misfit**0.5:.1f} × the noise: the drop "
-            "instant is less "
-            "certain than stated"
+            "instant is less certain than stated"
         )
-    step = 1.0 / record.sampling_rate
     return DropInstant(
         value=fall.instant,
         standard_error=error,
         interval_90=(fall.instant - NINETY * error, fall.instant + NINETY * error),
-        method=f"{fall.method}; {error / step:.2g} of a sample",
+        method=f"{fall.method}; {error * record.sampling_rate:.2g} of a sample",
         fall=fall,
         levitated=levitated,
         notes=tuple(notes),
     )
 
 
-def coarse_drop(record: Record, machine: Machine, planes: tuple[Plane, ...]) -> CoarseDrop:
+def coarse_drop(record: Record, machine: Machine) -> CoarseDrop:
     """Find where the rotor sinks by a share of the air gap, and the first sudden acceleration after it.
 
     Raises
@@ -208,17 +167,17 @@ def coarse_drop(record: Record, machine: Machine, planes: tuple[Plane, ...]) -> 
     RecordError
         When it never does, or has done so from the beginning.
     """
-    gaps = np.array([gap_of(machine, plane) for plane in planes])
+    gaps, gravity = nominal_gaps(machine, record), float(machine.gravity)
     turn = 2 * np.pi / max(abs(float(require_speed(record)[1][0])), 1.0)
     first = max(int(min(turn, 0.02) * record.sampling_rate), 8)
-    early = until_fallen(record, planes, gaps, first)
-    found = _coarse_drop(early, machine, planes, gaps, first)
+    early = until_fallen(record, gaps, first)
+    found = _coarse_drop(early, gravity, gaps, first)
     if early is not record and found.contact > early.time[-1] - 2.0 * _CONTACT_FILTER:
-        return _coarse_drop(record, machine, planes, gaps, first)
+        return _coarse_drop(record, gravity, gaps, first)
     return found
 
 
-def until_fallen(record: Record, planes: tuple[Plane, ...], gaps: Array, first: int) -> Record:
+def until_fallen(record: Record, gaps: Array, first: int) -> Record:
     """A record until shortly after all planes are low; all of it where they never are.
 
     A coast-down goes on for a minute after its fall of some milliseconds: what is asked of the fall must not
@@ -226,7 +185,7 @@ def until_fallen(record: Record, planes: tuple[Plane, ...], gaps: Array, first: 
     """
 
     def height(part: slice) -> Array:
-        return planar_of(along_sensors(record.signals[part], record.sensors), planes)[:, :, 1]
+        return planar_of(along_sensors(record.signals[part], record.sensors), record.planes)[:, :, 1]
 
     start = np.mean(height(slice(first)), axis=0)
     for begin in range(0, len(record.time), _BLOCK):
@@ -237,45 +196,30 @@ def until_fallen(record: Record, planes: tuple[Plane, ...], gaps: Array, first: 
     return record
 
 
-def drop_and_levitated(
-    record: Record, machine: Machine, whole: Record, planes: tuple[Plane, ...]
-) -> tuple[CoarseDrop, LevitatedModel]:
+def beginning_of(record: Record, machine: Machine) -> Beginning:
     """First guess of the drop, and what all sensors read before it.
 
     Where one end touches and is thrown up again before the other has sunk, both are low long after the
     release; what the rotor did before shows as soon as the levitated motion is known.
-
-    Parameters
-    ----------
-    record : Record
-        The record.
-    machine : Machine
-        The machine, for its gaps.
-    whole : Record
-        The record with those planes only whose sensors give x and y.
-    planes : tuple of Plane
-        Those planes.
 
     Raises
     ------
     RecordError
         When the rotor does not fall in the record, or the record does not begin before the fall.
     """
-    coarse = coarse_drop(whole, machine, planes)
+    coarse = coarse_drop(record.whole, machine)
     levitated = fit_levitated(record, coarse.instant - _UNSURE, speed=coarse.speed)
-    if levitated.end > coarse.instant - _UNSURE - 2.0 / record.sampling_rate:
-        return coarse, levitated
-    coarse = _sooner(whole, machine, planes, levitated.of_channels(_columns(whole, record)), coarse)
-    return coarse, fit_levitated(record, coarse.instant - _UNSURE, speed=coarse.speed)
+    if levitated.end <= coarse.instant - _UNSURE - 2.0 / record.sampling_rate:
+        coarse = _sooner(record.whole, machine, of_whole(levitated, record), coarse)
+        levitated = fit_levitated(record, coarse.instant - _UNSURE, speed=coarse.speed)
+    return Beginning(coarse=coarse, levitated=levitated)
 
 
-def _sooner(
-    record: Record, machine: Machine, planes: tuple[Plane, ...], levitated: LevitatedModel, coarse: CoarseDrop
-) -> CoarseDrop:
+def _sooner(record: Record, machine: Machine, levitated: LevitatedModel, coarse: CoarseDrop) -> CoarseDrop:
     """The first guess of a drop by the way from the levitated motion, whatever its direction."""
-    gaps, gravity = np.array([gap_of(machine, plane) for plane in planes]), float(machine.gravity)
+    gaps, gravity = nominal_gaps(machine, record), float(machine.gravity)
     near = record.window(-np.inf, coarse.contact)
-    away = planar_of(along_sensors(near.signals - levitated.readings(near.time), record.sensors), planes)
+    away = planar_of(along_sensors(near.signals - levitated.readings(near.time), near.sensors), near.planes)
     way = np.hypot(away[:, :, 0], away[:, :, 1])
     gone = (way > FALLEN_SHARE * gaps).any(axis=1) & (near.time > levitated.end)
     if not gone.any():
@@ -284,25 +228,20 @@ def _sooner(
     # the unbalance throws a widely circling plane further than it falls, but not before it was let go
     fallen = float(near.time[sunk]) - float(np.sqrt(2.0 * np.max(way[sunk]) / gravity))
     instant = max(fallen, levitated.end)
-    shape = planar_of(along_sensors(near.signals, record.sensors), planes)
-    contact = first_sudden(near, shape, gravity, instant, max(sunk, _first(way > NEAREST_CONTACT * gaps)))
+    contact = first_sudden(near, gravity, instant, max(sunk, _first(way > NEAREST_CONTACT * gaps)))
     return replace(coarse, instant=instant, sunk=float(near.time[sunk]), contact=contact)
 
 
-def _coarse_drop(
-    record: Record, machine: Machine, planes: tuple[Plane, ...], gaps: Array, first: int
-) -> CoarseDrop:
+def _coarse_drop(record: Record, gravity: float, gaps: Array, first: int) -> CoarseDrop:
     speed_time, readings = require_speed(record)
-    shape = planar_of(along_sensors(record.signals, record.sensors), planes)
-    height = shape[:, :, 1]
+    height = record.motion[:, :, 1]
     start = np.mean(height[:first], axis=0)
-    deepest = float(np.max((start - np.min(height, axis=0)) / gaps))
     low = start - height > FALLEN_SHARE * gaps
     if not low.all(axis=1).any():
-        _refuse_without_drop(record, shape, start, gaps, deepest)
+        _refuse_without_drop(record, start, gaps)
     sunk = sinking(low)
     fastest = float(np.max(start - height[sunk]))
-    instant = record.time[sunk] - float(np.sqrt(2 * fastest / float(machine.gravity)))
+    instant = record.time[sunk] - float(np.sqrt(2 * fastest / gravity))
     if instant < record.time[0] or record.time[sunk] - record.time[0] < first / record.sampling_rate:
         raise NoDropError(
             record.name,
@@ -313,8 +252,9 @@ def _coarse_drop(
         )
     before = speed_time < instant
     speed = float(np.median(readings[before])) if before.any() else float(readings[0])
-    far = np.hypot(*np.moveaxis(shape - np.mean(shape[:first], axis=0), -1, 0)) > NEAREST_CONTACT * gaps
-    contact = first_sudden(record, shape, float(machine.gravity), instant, max(sunk, _first(far)))
+    away = record.motion - np.mean(record.motion[:first], axis=0)
+    far = np.hypot(*np.moveaxis(away, -1, 0)) > NEAREST_CONTACT * gaps
+    contact = first_sudden(record, gravity, instant, max(sunk, _first(far)))
     return CoarseDrop(instant=float(instant), sunk=float(record.time[sunk]), contact=contact, speed=speed)
 
 
@@ -362,8 +302,12 @@ def _first(far: NDArray[np.bool_]) -> int:
     return int(at[0]) if len(at) else len(far) - 1
 
 
-def gap_of(machine: Machine, plane: Plane) -> float:
-    """Nominal air gap [m] of the touchdown bearing nearest to a sensor plane."""
+def nominal_gaps(machine: Machine, record: Record) -> Array:
+    """Nominal air gaps [m], shape (P,), of the touchdown bearings nearest to the sensor planes."""
+    return np.array([_gap_at(machine, plane) for plane in record.planes])
+
+
+def _gap_at(machine: Machine, plane: Plane) -> float:
     named = [b for b in machine.touchdown_bearings if b.name == plane.bearing]
     position = machine.rotor.node_positions
     nearest = min(
@@ -373,8 +317,9 @@ def gap_of(machine: Machine, plane: Plane) -> float:
     return float(nearest.air_gap)
 
 
-def _refuse_without_drop(record: Record, path: Array, start: Array, gaps: Array, deepest: float) -> None:
-    height = path[:, :, 1]
+def _refuse_without_drop(record: Record, start: Array, gaps: Array) -> None:
+    path, height = record.motion, record.motion[:, :, 1]
+    deepest = float(np.max((start - np.min(height, axis=0)) / gaps))
     ranges = ", ".join(format_quantity(float(r), "length") for r in np.ptp(height, axis=0))
     sunk_now = start < -FALLEN_SHARE * gaps
     thrown = np.ptp(path, axis=0).max() > _THROWN * float(np.min(gaps))
@@ -397,9 +342,9 @@ def _refuse_without_drop(record: Record, path: Array, start: Array, gaps: Array,
     )
 
 
-def first_sudden(record: Record, shape: Array, gravity: float, instant: float, sunk: int) -> float:
+def first_sudden(record: Record, gravity: float, instant: float, sunk: int) -> float:
     """First time after sinking at which the acceleration cannot be that of a free rotor [s]."""
-    curvature = acceleration(shape, record.sampling_rate, width=_CONTACT_FILTER)
+    curvature = acceleration(record.motion, record.sampling_rate, width=_CONTACT_FILTER)
     size = np.max(np.hypot(curvature[:, :, 0], curvature[:, :, 1] + gravity), axis=1)
     levitated = record.time < instant - _UNSURE
     usual = float(np.max(size[levitated])) if levitated.any() else 0.0

@@ -1,33 +1,46 @@
-"""What a record says before the first contact and at rest, found once: both methods start from it.
+"""What a record says of a drop, each fact found when it is first asked for and never again.
 
-The tracked twin and the replay differ only in what they do after the first contact.
+The quality gate, both methods, the first look and the coast-down ask one and the same evidence.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import TypeVar
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.elements.sensor import Sensor
-from rotordrop.errors import IdentificationError, RecordError
-from rotordrop.evidence.air_gap import AirGap, SettledRest, find_rest, identify_air_gap
-from rotordrop.evidence.contacts import first_forces
-from rotordrop.evidence.events import AFTER_FALL, DropInstant
-from rotordrop.evidence.first_contact import TimedContact, identify_first_contacts
-from rotordrop.evidence.initial_state import InitialState, fit_initial_state
+from rotordrop.errors import IdentificationError, RecordError, RotordropError
+from rotordrop.evidence.events import (
+    AFTER_FALL,
+    Beginning,
+    DropInstant,
+    beginning_of,
+    find_fall,
+    instant_of,
+    nominal_gaps,
+    of_whole,
+)
 from rotordrop.evidence.levitated import LevitatedModel
-from rotordrop.evidence.power_off import PowerOff, find_power_off
-from rotordrop.evidence.sensing import Sensing, build_sensing
 from rotordrop.evidence.settled import resting_record
-from rotordrop.evidence.speed import SpeedFit, identify_speed
 from rotordrop.record.axes import along_sensors, sensor_polarity
 from rotordrop.record.record import Record
 from rotordrop.record.speed import RotorAngle, rotor_angle
-from rotordrop.rotor.parameters import DropModel
+
+if TYPE_CHECKING:
+    from rotordrop.evidence.air_gap import AirGap, SettledRest
+    from rotordrop.evidence.fall import Fall
+    from rotordrop.evidence.first_contact import TimedContact
+    from rotordrop.evidence.initial_state import InitialState
+    from rotordrop.evidence.power_off import PowerOff
+    from rotordrop.evidence.quality.flight import Weighed
+    from rotordrop.evidence.sensing import Sensing
+    from rotordrop.evidence.speed import SpeedFit
+    from rotordrop.machine import Machine
+    from rotordrop.rotor.parameters import DropModel
 
 Array = NDArray[np.float64]
 Fact = TypeVar("Fact")
@@ -38,6 +51,9 @@ class Missing:
     """A fact that a record does not give, and why."""
 
     reason: str
+    """Why, in a sentence."""
+    error: RotordropError | None = field(default=None, repr=False, compare=False)
+    """What was raised where it was looked for."""
 
 
 def known(fact: Fact | Missing) -> Fact:
@@ -53,67 +69,243 @@ def known(fact: Fact | Missing) -> Fact:
     return fact
 
 
-def _sought(find: Callable[[], Fact]) -> Fact | Missing:
+def sought(find: Callable[[], Fact]) -> Fact | Missing:
     """A fact, or why there is none; what rests on a missing fact is missing for the same reason."""
     try:
         return find()
     except (IdentificationError, RecordError) as error:
-        return Missing(reason=str(error))
+        return Missing(reason=str(error), error=error)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Evidence:
-    """What a record says of a drop beside the contacts; N samples, S sensors, B bearings.
+    """What a record of a machine says of a drop; N samples, S sensors, B bearings.
 
     Facts that a record need not give are ``Missing`` with a reason; `known` insists on one.
-
-    Attributes
-    ----------
-    name : str
-        Name of the drop.
-    record : Record
-        The record.
-    model : DropModel
-        The machine as described, with the speed law of the record.
-    power_off : DropInstant or PowerOff
-        Power-off in record time, refined by the fit of the fall where there is one.
-    levitated : LevitatedModel or None
-        Readings before power-off; None when the record begins with the fall.
-    speed : SpeedFit
-        Speed at power-off and how it falls.
-    angle : RotorAngle
-        Rotor angle over the whole record.
-    sensing : Sensing
-        The sensors in front of the rotor, with what is known of their zeros and gains.
-    rest : SettledRest
-        Where the rotor rests in the tail.
-    settled_level : ndarray, shape (S,)
-        What the sensors read of the resting rotor, in their positive directions [m]; NaN without readings.
-    gap : AirGap
-        Air gaps with the sag of the machine's supports.
-    fall : InitialState
-        State of the rotor at power-off with its covariance, and the fall up to the first contact.
-    contacts : tuple of TimedContact
-        First contact of every bearing.
-    reach : ndarray, shape (B,)
-        Distance from the bearing centre at which the first force acts [m]; NaN for a bearing that is not
-        touched soon after the fall.
     """
 
-    name: str
     record: Record
-    model: DropModel
-    power_off: DropInstant | PowerOff
-    levitated: LevitatedModel | None
-    speed: SpeedFit
-    angle: RotorAngle
-    sensing: Sensing | Missing
-    rest: SettledRest | Missing
-    settled_level: Array | Missing
-    gap: AirGap | Missing
-    fall: InitialState | Missing
-    contacts: tuple[TimedContact, ...] | Missing
-    reach: Array | Missing
+    """The record."""
+    machine: Machine
+    """The machine, as described."""
+    tail: Record | None = None
+    """The settled tail, where it is a recording of its own."""
+    name: str = ""
+    """Name of the drop."""
+
+    def with_facts(self, **facts: Any) -> Evidence:
+        """The same with some facts taken as given in place of what the record says."""
+        other = replace(self)
+        other.__dict__.update({**self.__dict__, **facts})
+        return other
+
+    @cached_property
+    def beginning(self) -> Beginning | Missing:
+        """First guess of the drop, and the levitated motion of all sensors before it."""
+        return sought(lambda: beginning_of(self.record, self.machine))
+
+    @cached_property
+    def gaps(self) -> Array:
+        """Nominal air gap at every plane whose sensors give x and y [m]."""
+        return nominal_gaps(self.machine, self.record.whole)
+
+    @cached_property
+    def free_fall(self) -> Fall | Missing:
+        """The fall after the levitated motion, fitted by the released rotor without tail or air gap."""
+        return sought(lambda: find_fall(self.record, self.machine, known(self.beginning)))
+
+    @cached_property
+    def floating(self) -> LevitatedModel:
+        """The levitated motion in the planes whose sensors give x and y."""
+        return of_whole(known(self.beginning).levitated, self.record)
+
+    @cached_property
+    def flights(self) -> Weighed | None:
+        """How fast every sensor saw the rotor fall between impacts; None where it never flew."""
+        from rotordrop.evidence.quality.flight import weighed
+
+        drop = known(self.beginning).coarse.instant
+        return weighed(self.record.whole, self.machine, self.floating, drop)
+
+    @cached_property
+    def still(self) -> Record | Missing:
+        """The settled part of the tail, or of a record that reaches standstill."""
+        return sought(lambda: resting_record(self.record, self.tail, self.machine))
+
+    @cached_property
+    def release(self) -> DropInstant | PowerOff:
+        """Power-off by the fall alone.
+
+        Raises
+        ------
+        RecordError
+            When the rotor does not fall in the record, or the record begins in the middle of the fall.
+        """
+        from rotordrop.evidence.power_off import begins_with_fall, power_off_of_fall
+
+        if begins_with_fall(self.record, self.machine):
+            return power_off_of_fall(self.record, self.machine)
+        for fact in (self.beginning, self.free_fall):
+            if isinstance(fact, Missing):
+                raise fact.error or RecordError(fact.reason)
+        return instant_of(known(self.free_fall), known(self.beginning).levitated, self.record)
+
+    @cached_property
+    def levitated(self) -> LevitatedModel | None:
+        """Readings before power-off; None when the record begins with the fall."""
+        return self.release.levitated if isinstance(self.release, DropInstant) else None
+
+    @cached_property
+    def base(self) -> DropModel:
+        """The drop model of the machine as described."""
+        from rotordrop.rotor.parameters import build_drop_model
+
+        return build_drop_model(self.machine)
+
+    @cached_property
+    def model(self) -> DropModel:
+        """The drop model with the speed law of the record."""
+        slowed = min(self.speed.aero_time_constant.value, 1e6)
+        return self.base.with_values({"speed.aero_time_constant": slowed})
+
+    @cached_property
+    def speed(self) -> SpeedFit:
+        """Speed at power-off and how it falls."""
+        from rotordrop.evidence.speed import identify_speed
+
+        return identify_speed(self.record, self.release.value, turning=self._turning)
+
+    @property
+    def _turning(self) -> float | None:
+        return None if self.levitated is None else 2.0 * np.pi * self.levitated.frequency
+
+    @cached_property
+    def angle(self) -> RotorAngle:
+        """Rotor angle over the whole record."""
+        turning = self.speed.initial if self._turning is None else self._turning
+        slowing = strongest_slowing(self.base)
+        return rotor_angle(self.record, self.release.value, turning, strongest_slowing=slowing)
+
+    @cached_property
+    def sensing(self) -> Sensing | Missing:
+        """The sensors in front of the rotor, with what is known of their zeros and gains."""
+        from rotordrop.evidence.sensing import build_sensing
+
+        def found() -> Sensing:
+            silent = [
+                sensor.name
+                for sensor, readings in zip(self.record.sensors, self.record.signals.T, strict=True)
+                if np.isnan(readings).all()
+            ]
+            if silent:
+                raise RecordError(f"{self.record.name} has no readings of {', '.join(silent)}")
+            return build_sensing(self.base, self.record.sensors)
+
+        return sought(found)
+
+    @cached_property
+    def rest(self) -> SettledRest | Missing:
+        """Where the rotor rests in the tail."""
+        from rotordrop.evidence.air_gap import find_rest
+
+        return sought(lambda: find_rest(known(self.still), known(self.sensing)))
+
+    @cached_property
+    def settled_level(self) -> Array | Missing:
+        """What the sensors read of the resting rotor, in their positive directions [m]; NaN where dead."""
+        if isinstance(self.still, Missing):
+            return self.still
+        sensors = self.still.sensors
+        if not isinstance(self.rest, Missing):
+            offset = np.array([float(sensor.offset) for sensor in sensors])
+            return np.asarray((self.rest.along / self.still.gains + offset) * sensor_polarity(sensors))
+        # Without both directions in two planes no lowest point shows: the mean over the swing has to do.
+        live = np.flatnonzero(np.isfinite(self.still.signals).any(axis=0))
+        level = np.full(len(sensors), np.nan)
+        level[live] = np.nanmean(self.still.signals[:, live], axis=0)
+        return level * sensor_polarity(sensors)
+
+    @cached_property
+    def gap(self) -> AirGap | Missing:
+        """Air gaps with the sag of the machine's supports."""
+        from rotordrop.evidence.air_gap import identify_air_gap
+
+        return sought(lambda: identify_air_gap(known(self.rest), self.base, known(self.sensing)))
+
+    @cached_property
+    def _landing(self) -> tuple[InitialState | Missing, tuple[TimedContact, ...] | Missing]:
+        """Fall and first contacts: from the first seconds after the fall, or from all of a record."""
+        from rotordrop.evidence.first_contact import identify_first_contacts
+        from rotordrop.evidence.initial_state import fit_initial_state
+
+        def fall_in(part: Record) -> InitialState:
+            gap, sensing = known(self.gap), known(self.sensing)
+            return fit_initial_state(part, self.model, self.release, self.speed, self.angle, gap, sensing)
+
+        def contacts_in(part: Record, fall: InitialState) -> tuple[TimedContact, ...]:
+            return identify_first_contacts(
+                part.time - fall.drop_instant,
+                fall.sensing.at_bearings(fall.deviation_of(part) + fall.settled),
+                known(self.gap).value,
+                np.asarray(self.model.load_shares),
+                float(self.machine.gravity),
+                float(np.mean(fall.noise)),
+            )
+
+        until = max(self.release.value, float(self.record.time[0])) + AFTER_FALL
+        first = [self.record.window(-np.inf, until)] if self.record.time[-1] > until else []
+        for part in (*first, self.record):
+            fall = sought(partial(fall_in, part))
+            if isinstance(fall, Missing):
+                contacts: tuple[TimedContact, ...] | Missing = fall
+                continue
+            contacts = sought(partial(contacts_in, part, fall))
+            if not isinstance(contacts, Missing):
+                break
+        return fall, contacts
+
+    @cached_property
+    def fall(self) -> InitialState | Missing:
+        """State of the rotor at power-off with its covariance, and the fall up to the first contact."""
+        return self._landing[0]
+
+    @cached_property
+    def contacts(self) -> tuple[TimedContact, ...] | Missing:
+        """First contact of every bearing."""
+        return self._landing[1]
+
+    @cached_property
+    def power_off(self) -> DropInstant | PowerOff:
+        """Power-off in record time, refined by the fit of the initial state where there is one."""
+        if isinstance(self.fall, Missing) or not isinstance(self.release, DropInstant):
+            return self.release
+        return self.fall.refined(self.release)
+
+    @cached_property
+    def reach(self) -> Array | Missing:
+        """Distance from the bearing centre at which the first force acts [m], shape (B,); NaN without one.
+
+        The fitted fall says where the rotor is when a force first makes it leave that fall; no contact law
+        enters. The zeros of the sensors shift the result one to one, so it is a place to start from where no
+        tail tells the gap, and not a measurement of it.
+        """
+        from rotordrop.evidence.contacts import first_forces
+
+        def found() -> Array:
+            instant, sensing, names = self.release, known(self.sensing), self.base.bearing_names
+            if not isinstance(instant, DropInstant):
+                raise IdentificationError(
+                    f"{self.record.name} begins with the fall: where the first forces act shows only with "
+                    "the levitated rotor before it"
+                )
+            reached = np.full(len(names), np.nan)
+            for contact in first_forces(self.record, self.machine, instant):
+                b = names.index(contact.bearing)
+                along = along_sensors(instant.fall.predicted(np.array([contact.start])), self.record.sensors)
+                reached[b] = np.hypot(*sensing.at_bearings(along)[0, b])
+            return reached
+
+        return sought(found)
 
     @property
     def time(self) -> Array:
@@ -142,13 +334,7 @@ class Evidence:
         return np.asarray(np.sqrt(self.levitated.noise**2 + runout))
 
     def readings(self, until: float) -> Array:
-        """Readings in the positive direction of each sensor [m], hum and 2X runout taken off.
-
-        Parameters
-        ----------
-        until : float
-            Readings up to this time from power-off [s].
-        """
+        """Readings in the positive directions [m] until a time [s], hum and 2X runout taken off."""
         near = self.time <= until
         signals = self.record.signals[near]
         if self.levitated is not None:
@@ -157,14 +343,10 @@ class Evidence:
 
     def of_channels(self, columns: Sequence[int]) -> Evidence:
         """The same for some of the sensors; what was found with all of them stays."""
-        chosen, record, level = list(columns), self.record, self.settled_level
-        return replace(
-            self,
-            record=replace(
-                record,
-                signals=np.ascontiguousarray(record.signals[:, chosen]),
-                sensors=tuple(record.sensors[c] for c in chosen),
-            ),
+        chosen, level = list(columns), self.settled_level
+        facts = {name: getattr(self, name) for name in _OF_ALL}
+        return replace(self, record=self.record.of_channels(chosen)).with_facts(
+            **facts,
             levitated=None if self.levitated is None else self.levitated.of_channels(chosen),
             settled_level=level if isinstance(level, Missing) else level[chosen],
         )
@@ -188,6 +370,24 @@ class Evidence:
         return self.time[inside], fall.sensing.at_bearings(along)
 
 
+_OF_ALL = (
+    "base",
+    "model",
+    "release",
+    "power_off",
+    "speed",
+    "angle",
+    "sensing",
+    "rest",
+    "still",
+    "gap",
+    "fall",
+    "contacts",
+    "reach",
+)
+"""Facts found with all sensors, which evidence of some of them keeps."""
+
+
 def read_evidence(
     model: DropModel,
     record: Record,
@@ -196,7 +396,7 @@ def read_evidence(
     name: str = "",
     power_off: DropInstant | PowerOff | None = None,
 ) -> Evidence:
-    """Find what a record says before the first contact and at rest.
+    """Ask a record what it says before the first contact and at rest.
 
     Parameters
     ----------
@@ -216,125 +416,27 @@ def read_evidence(
     RecordError
         When the rotor does not fall in the record, or it has no speed.
     """
-    name = name or record.name
-    if record.speed_readings is None:
-        raise RecordError(
-            f"the record {name} has no rotor speed; expected one. Name its channel in a profile "
-            '([speed] channel = "..."), or give it by hand ([speed] constant = "60 Hz").'
-        )
-    instant = find_power_off(record, model.machine) if power_off is None else power_off
-    levitated = instant.levitated if isinstance(instant, DropInstant) else None
-    turning = None if levitated is None else 2.0 * np.pi * levitated.frequency
-    speed = identify_speed(record, instant.value, turning=turning)
-    angle = rotor_angle(
-        record,
-        instant.value,
-        speed.initial if turning is None else turning,
-        strongest_slowing=strongest_slowing(model),
-    )
-    slowed = {"speed.aero_time_constant": min(speed.aero_time_constant.value, 1e6)}
-    sensing = _sought(lambda: build_sensing(model, heard_sensors(record)))
-    still = _sought(lambda: resting_record(record, tail, model.machine))
-    rest = _sought(lambda: find_rest(known(still), known(sensing)))
-    nothing = Missing(reason="not looked for")
-    found = Evidence(
-        name=name,
-        record=record,
-        model=model.with_values(slowed),
-        power_off=instant,
-        levitated=levitated,
-        speed=speed,
-        angle=angle,
-        sensing=sensing,
-        rest=rest,
-        settled_level=_sought(lambda: _settled_level(known(still), rest)),
-        gap=_sought(lambda: identify_air_gap(known(rest), model, known(sensing))),
-        fall=nothing,
-        contacts=nothing,
-        reach=_sought(lambda: _reach(record, instant, model, known(sensing))),
-    )
-    until = max(instant.value, float(record.time[0])) + AFTER_FALL
-    seen = None
-    if record.time[-1] > until:
-        seen = _with_fall(found, replace(found, record=record.window(-np.inf, until)))
-    return seen or _with_fall(found, found) or found
+    found = Evidence(record=record, machine=model.machine, tail=tail, name=name or record.name)
+    given: dict[str, Any] = {"base": model} if power_off is None else {"base": model, "release": power_off}
+    return insisted(found.with_facts(**given))
 
 
-def _with_fall(found: Evidence, seen: Evidence) -> Evidence | None:
-    """The evidence with the fall that part of its record shows, and power-off as the fit leaves it.
-
-    None where only a part was seen that does not show fall and first contacts: all of it may.
-    """
-    whole = seen is found
-    fall = _sought(lambda: fit_initial_state(seen, known(found.gap), known(found.sensing)))
-    if isinstance(fall, Missing):
-        return replace(found, fall=fall, contacts=fall) if whole else None
-    instant = found.power_off
-    refined = fall.refined(instant) if isinstance(instant, DropInstant) else instant
-    contacts = _sought(lambda: _first_contacts(seen, fall, known(found.gap)))
-    if isinstance(contacts, Missing) and not whole:
-        return None
-    return replace(found, power_off=refined, fall=fall, contacts=contacts)
-
-
-def heard_sensors(record: Record) -> tuple[Sensor, ...]:
-    """The sensors of a record.
+def insisted(evidence: Evidence) -> Evidence:
+    """Evidence of a drop with a speed and a release, without which no method can begin.
 
     Raises
     ------
     RecordError
-        If one of them has no readings at all.
+        When the rotor does not fall in the record, or it has no speed.
     """
-    silent = [s.name for s, c in zip(record.sensors, record.signals.T, strict=True) if np.isnan(c).all()]
-    if silent:
-        raise RecordError(f"{record.name} has no readings of {', '.join(silent)}")
-    return record.sensors
-
-
-def _settled_level(still: Record, rest: SettledRest | Missing) -> Array:
-    """What the sensors read of the resting rotor, in their positive directions [m], shape (S,)."""
-    polarity = sensor_polarity(still.sensors)
-    if not isinstance(rest, Missing):
-        gain = np.array([float(sensor.gain) for sensor in still.sensors])
-        offset = np.array([float(sensor.offset) for sensor in still.sensors])
-        return np.asarray((rest.along / gain + offset) * polarity)
-    # Without both directions in two planes no lowest point can be told: the mean over the swing has to do.
-    heard = np.flatnonzero(np.isfinite(still.signals).any(axis=0))
-    level = np.full(len(polarity), np.nan)
-    level[heard] = np.nanmean(still.signals[:, heard], axis=0)
-    return np.asarray(level * polarity)
-
-
-def _first_contacts(found: Evidence, fall: InitialState, gap: AirGap) -> tuple[TimedContact, ...]:
-    record, model = found.record, found.model
-    return identify_first_contacts(
-        record.time - fall.drop_instant,
-        fall.sensing.at_bearings(fall.deviation_of(record) + fall.settled),
-        gap.value,
-        np.asarray(model.load_shares),
-        float(model.machine.gravity),
-        float(np.mean(fall.noise)),
-    )
-
-
-def _reach(record: Record, instant: DropInstant | PowerOff, model: DropModel, sensing: Sensing) -> Array:
-    """Distance from the bearing centre at which the first force acts on the rotor [m], shape (B,).
-
-    The fitted fall says where the rotor is when a force first makes it leave that fall; no contact law
-    enters. The zeros of the sensors shift the result one to one, so it is a place to start from where no tail
-    tells the gap, and not a measurement of it.
-    """
-    if not isinstance(instant, DropInstant):
-        raise IdentificationError(
-            f"{record.name} begins with the fall: where the first forces act shows only with the levitated "
-            "rotor before it"
+    if evidence.record.speed_readings is None:
+        raise RecordError(
+            f"the record {evidence.name} has no rotor speed; expected one. Name its channel in a profile "
+            '([speed] channel = "..."), or give it by hand ([speed] constant = "60 Hz").'
         )
-    reached = np.full(len(model.bearing_names), np.nan)
-    for contact in first_forces(record, model.machine, instant):
-        b = model.bearing_names.index(contact.bearing)
-        along = along_sensors(instant.fall.predicted(np.array([contact.start])), record.sensors)
-        reached[b] = np.hypot(*sensing.at_bearings(along)[0, b])
-    return reached
+    for fact in (evidence.release, evidence.speed):
+        assert fact is not None
+    return evidence
 
 
 def strongest_slowing(model: DropModel) -> float:

@@ -12,13 +12,7 @@ from numpy.typing import NDArray
 from rotordrop.elements.magnet import REMANENCE_TIME
 from rotordrop.elements.table import parameter
 from rotordrop.evidence.levitated import LevitatedModel
-from rotordrop.evidence.release import (
-    ComplexArray,
-    FallResponses,
-    FreeRotor,
-    response_at,
-)
-from rotordrop.record.axes import Plane, sensor_directions
+from rotordrop.evidence.release import ComplexArray, FallResponses, FreeRotor, response_at
 from rotordrop.record.recording import Array
 from rotordrop.rotor.unknowns import sensor_prior
 
@@ -155,11 +149,7 @@ class _Problem:
 
 
 def fit_fall(
-    record: Record,
-    planes: tuple[Plane, ...],
-    rotor: FreeRotor,
-    levitated: LevitatedModel,
-    window: tuple[float, float, float],
+    record: Record, rotor: FreeRotor, levitated: LevitatedModel, window: tuple[float, float, float]
 ) -> Fall:
     """Find the release from the readings between the levitated part and the first contact.
 
@@ -170,9 +160,7 @@ def fit_fall(
     Parameters
     ----------
     record : Record
-        The record.
-    planes : tuple of Plane
-        Sensor planes, in the order of ``rotor.plane_rows``.
+        The record; its planes are those of ``rotor.plane_rows``.
     rotor : FreeRotor
         The released rotor.
     levitated : LevitatedModel
@@ -181,13 +169,14 @@ def fit_fall(
         First guess of the release, a time that is surely in free fall, and the latest end of it [s].
     """
     origin, surely, latest = window
+    record = record.window(origin - 2.0 * _LEAD, latest + _LEAD)
     tabulated: list[tuple[float, FallResponses]] = []
 
     def until(end: float) -> _Problem:
         if not tabulated or end > tabulated[-1][0]:
             ahead = max(end, min(latest, end + _AHEAD))
             tabulated.append((ahead, _responses(rotor, levitated, ahead - origin)))
-        return _problem(record, rotor, levitated, planes, (origin, end), tabulated[-1][1])
+        return _problem(record, rotor, levitated, (origin, end), tabulated[-1][1])
 
     first = until(min(surely, latest))
     # A short window has several minima: the lost lift begins a little earlier or later, and a turning force
@@ -201,13 +190,10 @@ def fit_fall(
         if grown.is_whole(latest):
             break
     assert grown is not None
-    gain = np.array([float(sensor.gain) for sensor in record.sensors])
-    return _fall(grown.problem, grown.best, levitated, gain)
+    return _fall(grown.problem, grown.best, levitated, record.gains)
 
 
-def linearised(
-    record: Record, planes: tuple[Plane, ...], levitated: LevitatedModel, fall: Fall
-) -> tuple[Array, Array]:
+def linearised(record: Record, levitated: LevitatedModel, fall: Fall) -> tuple[Array, Array]:
     """Residual of a fall over the noise and its derivatives by all that was sought.
 
     Returns
@@ -220,7 +206,7 @@ def linearised(
     """
     origin = fall.start + _LEAD - 1e-9  # the samples of the fit, whatever its first guess was
     responses = _responses(fall.rotor, levitated, fall.end - origin)
-    problem = _problem(record, fall.rotor, levitated, planes, (origin, fall.end), responses)
+    problem = _problem(record, fall.rotor, levitated, (origin, fall.end), responses)
     best = np.array([1e3 * (fall.instant - origin), np.log(fall.remanent_time)])
     unknown, residual = problem.solve(*problem.named(best))
     weight = 1.0 / problem.noise
@@ -327,7 +313,6 @@ def _problem(
     record: Record,
     rotor: FreeRotor,
     levitated: LevitatedModel,
-    planes: tuple[Plane, ...],
     window: tuple[float, float],
     responses: FallResponses,
 ) -> _Problem:
@@ -335,8 +320,7 @@ def _problem(
     keep = (record.time >= origin - _LEAD) & (record.time <= end)
     time = record.time[keep]
     deviation = record.signals[keep] - levitated.readings(time)
-    gain = np.array([float(sensor.gain) for sensor in record.sensors])
-    unit = sensor_directions(record.sensors)
+    gain, unit = record.gains, record.directions
     speed = 2 * np.pi * levitated.frequency
     amplitude = float(np.mean(np.abs(levitated.amplitudes[0])))
     mean, error = _priors(rotor, record.sensors, rotor.mass * amplitude * speed**2)
@@ -345,21 +329,13 @@ def _problem(
         deviation=deviation * gain,
         noise=np.maximum(levitated.noise * gain, 1e-12),
         directions=unit[:, 0] + 1j * unit[:, 1],
-        plane_of=plane_of_sensor(planes, len(record.sensors)),
+        plane_of=record.plane_of,
         rotor=rotor,
         origin=origin,
         responses=responses,
         prior_mean=mean,
         prior_error=error,
     )
-
-
-def plane_of_sensor(planes: tuple[Plane, ...], count: int) -> NDArray[np.int64]:
-    """Index of the plane of every sensor, shape (S,)."""
-    index = np.zeros(count, dtype=np.int64)
-    for number, plane in enumerate(planes):
-        index[list(plane.columns)] = number
-    return index
 
 
 def _priors(rotor: FreeRotor, sensors: tuple[Sensor, ...], turning: float) -> tuple[Array, Array]:

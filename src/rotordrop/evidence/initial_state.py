@@ -10,7 +10,6 @@ it.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,14 +21,14 @@ from rotordrop.evidence.events import DropInstant
 from rotordrop.evidence.fall_fit import FallFit, FallReadings, Unknowns, unbalance_nodes
 from rotordrop.evidence.free_fall import FreeFall, build_free_fall
 from rotordrop.evidence.levitated import LevitatedModel
-from rotordrop.evidence.sensing import Sensing, displacements_along
+from rotordrop.evidence.power_off import PowerOff
+from rotordrop.evidence.sensing import Sensing
+from rotordrop.evidence.speed import SpeedFit
 from rotordrop.known import NINETY
 from rotordrop.record.axes import along_sensors
 from rotordrop.record.record import Record
 from rotordrop.record.speed import RotorAngle
-
-if TYPE_CHECKING:
-    from rotordrop.evidence.evidence import Evidence
+from rotordrop.rotor.parameters import DropModel
 
 Array = NDArray[np.float64]
 
@@ -186,14 +185,27 @@ def end_of_fall(time: Array, place: Array, gaps: Array) -> float:
     return float(time[int(np.argmax(near)) - 1])
 
 
-def fit_initial_state(evidence: Evidence, gap: AirGap, sensing: Sensing) -> InitialState:
+def fit_initial_state(
+    record: Record,
+    model: DropModel,
+    release: DropInstant | PowerOff,
+    speed: SpeedFit,
+    angle: RotorAngle,
+    gap: AirGap,
+    sensing: Sensing,
+) -> InitialState:
     """Initial state by a fit over the fall, with covariance.
 
     Parameters
     ----------
-    evidence : Evidence
-        Readings from before power-off to the first contact at least, power-off, the levitated motion, and the
-        model of the rotor.
+    record : Record
+        Readings from before power-off to the first contact at least.
+    model : DropModel
+        The rotor.
+    release : DropInstant or PowerOff
+        Power-off with the levitated motion before it.
+    speed, angle : SpeedFit, RotorAngle
+        Speed at power-off, and the angle over the record.
     gap : AirGap
         Air gaps, to see where the fall ends, and the rest position, from which displacements count, so that
         zero errors of the sensors drop out.
@@ -211,22 +223,21 @@ def fit_initial_state(evidence: Evidence, gap: AirGap, sensing: Sensing) -> Init
     Source: own method after Neisi 2020, section 3.1. Differs from the paper: the paper expands the state at
     one instant in the rigid modes.
     """
-    record, levitated, model, rest = evidence.record, evidence.levitated, evidence.model, gap.rest
-    if levitated is None:
+    if not isinstance(release, DropInstant):
         raise IdentificationError(
             f"{record.name} begins with the fall; expected the levitated rotor before it. Record with "
             "pre-trigger."
         )
+    levitated, rest, time = release.levitated, gap.rest, record.time - release.value
     settled = settled_along(rest, sensing)
-    shifted = displacements_along(record) - rest.along + settled
-    end = end_of_fall(evidence.time, sensing.at_bearings(shifted), gap.value)
-    inside = (evidence.time > 0.0) & (evidence.time <= end)
+    end = end_of_fall(time, sensing.at_bearings(record.along - rest.along + settled), gap.value)
+    inside = (time > 0.0) & (time <= end)
     _check_samples(record, inside, end)
     # Deviations from rest, not readings, are compared: zeros of the sensors are in both and drop out, and
     # what is left of them is an error of the rest position, which is one of the unknowns.
-    fall = build_free_fall(model, evidence.speed.initial, unbalance_nodes(model.machine))
-    readings = _fall_readings(evidence, levitated, rest, inside)
-    problem = FallFit(fall, sensing, readings, settled, model, evidence.power_off.standard_error)
+    fall = build_free_fall(model, speed.initial, unbalance_nodes(model.machine))
+    readings = _fall_readings(record, release, angle, rest, inside)
+    problem = FallFit(fall, sensing, readings, settled, model, release.standard_error)
     mean, covariance, misfit = problem.solve()
     shift = problem.unknowns.shift
     return InitialState(
@@ -235,12 +246,12 @@ def fit_initial_state(evidence: Evidence, gap: AirGap, sensing: Sensing) -> Init
         sensors=record.sensors,
         rest_along=rest.along,
         levitated=levitated,
-        angle=evidence.angle,
+        angle=angle,
         unknowns=problem.unknowns,
         mean=mean,
         covariance=covariance * max(misfit, 1.0),
         settled=settled,
-        drop_instant=evidence.power_off.value + 1e-3 * float(mean[shift]),
+        drop_instant=release.value + 1e-3 * float(mean[shift]),
         drop_instant_error=float(1e-3 * np.sqrt(covariance[shift, shift])),
         end=end - 1e-3 * float(mean[shift]),
         noise=readings.noise,
@@ -276,24 +287,21 @@ def deviations(record: Record, rest: Array, levitated: LevitatedModel, angle: Ro
     A levitated rotor on its orbit shows no 2X of its own: what is there is runout and turns on with the
     shaft.
     """
-    gain = np.array([float(sensor.gain) for sensor in record.sensors])
-    disturbance = levitated.disturbance(record.time, angle) * gain
-    return np.asarray(displacements_along(record) - disturbance - rest)
+    return record.along - levitated.disturbance(record.time, angle) * record.gains - rest
 
 
 def _fall_readings(
-    evidence: Evidence, levitated: LevitatedModel, rest: SettledRest, inside: NDArray[np.bool_]
+    record: Record, release: DropInstant, angle: RotorAngle, rest: SettledRest, inside: NDArray[np.bool_]
 ) -> FallReadings:
-    record = evidence.record
+    levitated = release.levitated
     turning = 2.0 * np.pi * levitated.tones[0]
-    turned = np.exp(1j * turning * evidence.power_off.value) * levitated.amplitudes[0]
-    gain = np.array([float(sensor.gain) for sensor in record.sensors])
+    turned = np.exp(1j * turning * release.value) * levitated.amplitudes[0]
     orbit = along_sensors((levitated.mean + turned.real)[None, :], record.sensors)[0]
     return FallReadings(
-        time=evidence.time[inside],
-        deviation=deviations(record, rest.along, levitated, evidence.angle)[inside],
-        noise=np.maximum(levitated.noise * gain, 1e-9),
+        time=(record.time - release.value)[inside],
+        deviation=deviations(record, rest.along, levitated, angle)[inside],
+        noise=np.maximum(levitated.noise * record.gains, 1e-9),
         orbit=orbit - rest.along,
-        orbit_velocity=(1j * turning * turned).real * gain,
-        orbit_acceleration=(-(turning**2) * turned).real * gain,
+        orbit_velocity=(1j * turning * turned).real * record.gains,
+        orbit_acceleration=(-(turning**2) * turned).real * record.gains,
     )

@@ -13,14 +13,12 @@ from rotordrop.evidence.events import (
     DropInstant,
     find_drop_instant,
     first_sudden,
-    gap_of,
+    nominal_gaps,
     sinking,
     until_fallen,
-    with_whole_planes,
 )
 from rotordrop.evidence.fall import REMANENT_SHARE, REMANENT_TIME
 from rotordrop.known import NINETY
-from rotordrop.record.axes import along_sensors, planar_of
 from rotordrop.record.recording import Array
 
 if TYPE_CHECKING:
@@ -99,10 +97,8 @@ def find_power_off(record: Record, machine: Machine) -> DropInstant | PowerOff:
 
 def begins_with_fall(record: Record, machine: Machine) -> bool:
     """Whether the rotor has fallen by a share of its gap before it could have levitated for 5 ms."""
-    whole, planes = with_whole_planes(record)
-    gaps = np.array([gap_of(machine, plane) for plane in planes])
-    whole = until_fallen(whole, planes, gaps, first=1)
-    height = planar_of(along_sensors(whole.signals, whole.sensors), planes)[:, :, 1]
+    gaps = nominal_gaps(machine, record.whole)
+    height = until_fallen(record.whole, gaps, first=1).motion[:, :, 1]
     sunk = height[:1] - height > FALLEN_SHARE * gaps
     if not sunk.all(axis=1).any():
         return False
@@ -124,14 +120,10 @@ def power_off_of_fall(record: Record, machine: Machine) -> PowerOff:
     The rotor is taken to be at rest vertically at power-off, so the time at which the fall has no velocity is
     power-off, whether it is in the record or not.
     """
-    whole, planes = with_whole_planes(record)
-    gravity = float(machine.gravity)
-    shape = planar_of(along_sensors(whole.signals, whole.sensors), planes)
-    height = shape[:, :, 1]
-    gaps = np.array([gap_of(machine, plane) for plane in planes])
-    low = height[0] - height > FALLEN_SHARE * gaps
+    gravity, height = float(machine.gravity), record.whole.motion[:, :, 1]
+    low = height[0] - height > FALLEN_SHARE * nominal_gaps(machine, record.whole)
     start = float(record.time[0])
-    contact = first_sudden(record, shape, gravity, start, sinking(low))
+    contact = first_sudden(record.whole, gravity, start, sinking(low))
     chosen = record.time < contact - MARGIN
     count = int(np.count_nonzero(chosen))
     if count < FEWEST:

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from rotordrop.elements.sensor import Sensor
 from rotordrop.elements.table import parameter
 from rotordrop.errors import IdentificationError
-from rotordrop.record.axes import along_sensors, sensor_directions
-from rotordrop.record.record import Record
+from rotordrop.record.axes import sensor_directions
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.statics import settled_sag
 from rotordrop.rotor.unknowns import sensor_prior, smallest_gap
@@ -89,11 +88,6 @@ def build_sensing(model: DropModel, sensors: tuple[Sensor, ...]) -> Sensing:
         gain_sigma=_sigmas("gain", sensors, model),
         offset_sigma=_sigmas("offset", sensors, model),
     )
-
-
-def displacements_along(record: Record) -> Array:
-    """Displacements along the sensors [m], shape (N, S): known zeros taken off, known gains applied."""
-    return np.asarray(along_sensors(record.signals, record.sensors))
 
 
 def _scaled(position: Array, z: Array) -> Array:

@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotordrop.errors import RecordError
-from rotordrop.evidence.events import with_whole_planes
-from rotordrop.record.axes import along_sensors, planar_of
+from rotordrop.errors import UnsettledError
 from rotordrop.record.recording import Array
 from rotordrop.units import format_quantity
 
@@ -64,10 +62,8 @@ def settled_tail(record: Record, machine: Machine) -> SettledTail:
     """
     start = _standstill_begins(record)
     gap = min(float(bearing.air_gap) for bearing in machine.touchdown_bearings)
-    keep = record.time >= start
-    whole, planes = with_whole_planes(record)
-    path = planar_of(along_sensors(whole.signals[keep], whole.sensors), planes)
-    time = record.time[keep]
+    still = record.window(start, np.inf)
+    path, time = still.whole.motion, still.time
     block = max(int(_BLOCK * record.sampling_rate), 4)
     count = len(time) // block
     quiet = 0
@@ -75,18 +71,17 @@ def settled_tail(record: Record, machine: Machine) -> SettledTail:
         quiet += 1
     if quiet * block < _SHORTEST * record.sampling_rate:
         moves = format_quantity(float(_swing(path[-block:]).max()), "length")
-        raise RecordError(
-            f"{record.name} does not reach standstill: the shaft still moves by {moves} peak to peak in the "
-            "last "
+        raise UnsettledError(
+            record.name,
+            f"does not reach standstill: the shaft still moves by {moves} peak to peak in the last "
             f"{_BLOCK:g} s, more than {MOST_SWING:.0%} of the nominal air gap of "
-            f"{format_quantity(gap, 'length')}; give the "
-            "readings at standstill as a tail (--tail)"
+            f"{format_quantity(gap, 'length')}",
         )
     first = len(time) - quiet * block
     return SettledTail(
         start=float(time[first]),
         end=float(time[-1]),
-        mean=np.mean(record.signals[keep][first:], axis=0),
+        mean=np.mean(still.signals[first:], axis=0),
         swing=_swing(path[first:]),
     )
 
@@ -100,9 +95,9 @@ def resting_record(record: Record, tail: Record | None, machine: Machine) -> Rec
         When neither shows a rotor at rest.
     """
     if tail is None and record.measured_speed is None:
-        raise RecordError(
-            f"{record.name} has no measured shaft speed, so it cannot be seen where the rotor stands still; "
-            "give the readings at standstill as a tail (--tail)"
+        raise UnsettledError(
+            record.name,
+            "has no measured shaft speed, so it cannot be seen where the rotor stands still",
         )
     source = record if tail is None else tail
     found = settled_tail(source, machine)
@@ -122,11 +117,10 @@ def _standstill_begins(record: Record) -> float:
     left = float(record.time[-1] - speed_time[last])
     if left < _SHORTEST:
         speed = format_quantity(float(abs(readings[last])), "speed")
-        raise RecordError(
-            f"{record.name} does not reach standstill: the shaft still turns at {speed} at "
-            f"{speed_time[last]:.6g} s and the record ends at {record.time[-1]:.6g} s; give the "
-            "readings at "
-            "standstill as a tail (--tail)"
+        raise UnsettledError(
+            record.name,
+            f"does not reach standstill: the shaft still turns at {speed} at {speed_time[last]:.6g} s and "
+            f"the record ends at {record.time[-1]:.6g} s",
         )
     return float(speed_time[last])
 

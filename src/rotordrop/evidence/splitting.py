@@ -9,7 +9,6 @@ import numpy as np
 from rotordrop.errors import RecordError
 from rotordrop.evidence.look.events import Drop, drops_of
 from rotordrop.evidence.look.motion import Motion, motion_of
-from rotordrop.record.axes import sensor_planes
 from rotordrop.record.record import Record
 from rotordrop.record.recording import Array
 
@@ -38,8 +37,7 @@ def split_drops(record: Record) -> tuple[Record, ...]:
     RecordError
         When nothing falls in the record.
     """
-    gaps = (None,) * len(sensor_planes(record.sensors))
-    motion = motion_of(record, gaps=gaps, angles_known=True)
+    motion = motion_of(record, gaps=(None,) * len(record.planes), angles_known=True)
     drops = drops_of(motion)
     if not drops:
         raise RecordError(f"{record.name}: the rotor does not fall from where it floated; there is no drop")

@@ -6,7 +6,6 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rotordrop.record.axes import planar as planar
     from rotordrop.record.axes import sensor_planes as sensor_planes
     from rotordrop.record.examples import example_record_names as example_record_names
     from rotordrop.record.examples import example_record_path as example_record_path
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
     from rotordrop.record.writers import write_hdf5 as write_hdf5
 
 _PUBLIC = {
-    "axes": ("planar", "sensor_planes"),
+    "axes": ("sensor_planes",),
     "examples": ("example_record_names", "example_record_path"),
     "profile": ("Profile", "load_profile", "save_profile"),
     "record": ("Record", "read_record", "save_record"),

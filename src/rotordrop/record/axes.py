@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,39 +12,24 @@ from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import RecordError
 from rotordrop.record.recording import Array
 
-if TYPE_CHECKING:
-    from rotordrop.record.record import Record
-
 LEAST_RATIO = 0.026
 """Smaller ratios of the singular values of the sensor directions count as singular (about 3° apart)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Plane:
-    """Sensors that share an axial position, and how to get x, y from them.
-
-    Attributes
-    ----------
-    node : int
-        Node number, counted from 1.
-    bearing : str
-        Name of the touchdown bearing at this end.
-    columns : tuple of int
-        Sensors of the plane, as columns of the record's signals.
-    names : tuple of str
-        Their names.
-    to_planar : array, shape (2, S_p)
-        Displacement (x, y) per displacement along the sensors, least squares.
-    directions : array, shape (S_p, 2)
-        Unit vectors of the sensors in x, y.
-    """
+    """Sensors that share an axial position, and how to get x, y from them."""
 
     node: int
+    """Node number, counted from 1."""
     bearing: str
+    """Name of the touchdown bearing at this end."""
     columns: tuple[int, ...]
+    """Sensors of the plane, as columns of the record's signals."""
     names: tuple[str, ...]
+    """Their names."""
     to_planar: Array
-    directions: Array
+    """Displacement (x, y) per displacement along the sensors, least squares, shape (2, S_p)."""
 
 
 def sensor_directions(sensors: Sequence[Sensor]) -> Array:
@@ -89,7 +73,6 @@ def sensor_planes(sensors: Sequence[Sensor]) -> tuple[Plane, ...]:
 def _plane(node: int, sensors: Sequence[Sensor]) -> Plane:
     columns = tuple(i for i, sensor in enumerate(sensors) if sensor.node == node)
     members = [sensors[i] for i in columns]
-    directions = sensor_directions(members)
     if not sees_both_directions(members):
         seen = ", ".join(f"{sensor.name} at {math.degrees(float(sensor.angle)):.4g}°" for sensor in members)
         why = "one sensor" if len(members) < 2 else "sensors along one line"
@@ -103,34 +86,8 @@ def _plane(node: int, sensors: Sequence[Sensor]) -> Plane:
         bearing=members[0].bearing,
         columns=columns,
         names=tuple(sensor.name for sensor in members),
-        to_planar=np.asarray(np.linalg.pinv(directions), dtype=np.float64),
-        directions=directions,
+        to_planar=np.asarray(np.linalg.pinv(sensor_directions(members)), dtype=np.float64),
     )
-
-
-def planar(record: Record) -> tuple[Array, tuple[int, ...]]:
-    """Displacement of the shaft in the planes of the sensors, from any angles, by least squares.
-
-    Parameters
-    ----------
-    record : Record
-        The readings.
-
-    Returns
-    -------
-    displacement : array, shape (N, P, 2)
-        Displacement x, y [m] in each plane, from the origin of the sensors.
-    nodes : tuple of int, length P
-        Node of each plane, counted from 1.
-
-    Raises
-    ------
-    RecordError
-        When the sensors of a plane cannot resolve both directions.
-    """
-    planes = sensor_planes(record.sensors)
-    along = along_sensors(record.signals, record.sensors)
-    return planar_of(along, planes), tuple(plane.node for plane in planes)
 
 
 def planar_of(along: Array, planes: Sequence[Plane]) -> Array:

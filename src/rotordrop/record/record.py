@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import RecordError
 from rotordrop.machine import Machine
+from rotordrop.record.axes import (
+    Plane,
+    along_sensors,
+    planar_of,
+    sees_both_directions,
+    sensor_directions,
+    sensor_planes,
+)
 from rotordrop.record.matching import displacement, find_pulses, find_speed, match_sensors, speed_factor
 from rotordrop.record.profile import Profile, load_profile
 from rotordrop.record.readers import read_recording
@@ -180,6 +189,68 @@ class Record:
     def channel_names(self) -> tuple[str, ...]:
         """Names of the columns of `signals`, as the machine names its sensors."""
         return tuple(sensor.name for sensor in self.sensors)
+
+    @cached_property
+    def planes(self) -> tuple[Plane, ...]:
+        """The sensor planes.
+
+        Raises
+        ------
+        RecordError
+            When the sensors of a plane do not give x and y.
+        """
+        return sensor_planes(self.sensors)
+
+    @cached_property
+    def whole(self) -> Record:
+        """The record with those planes only whose sensors give x and y: a lost sensor takes its plane along.
+
+        Raises
+        ------
+        RecordError
+            When no plane is whole.
+        """
+        there = [node for node in {sensor.node for sensor in self.sensors} if self._resolves(node)]
+        columns = [i for i, sensor in enumerate(self.sensors) if sensor.node in there]
+        return self if len(columns) in (0, len(self.sensors)) else self.of_channels(columns)
+
+    def _resolves(self, node: int) -> bool:
+        return sees_both_directions([sensor for sensor in self.sensors if sensor.node == node])
+
+    @cached_property
+    def directions(self) -> Array:
+        """Unit vectors (x, y) along which the sensors read positive, shape (S, 2)."""
+        return sensor_directions(self.sensors)
+
+    @cached_property
+    def plane_of(self) -> NDArray[np.int64]:
+        """Index of the plane of every sensor, shape (S,)."""
+        of_node = {plane.node: number for number, plane in enumerate(self.planes)}
+        return np.array([of_node[sensor.node] for sensor in self.sensors], dtype=np.int64)
+
+    @cached_property
+    def gains(self) -> Array:
+        """True displacement per reading of every sensor [1], shape (S,)."""
+        return np.array([float(sensor.gain) for sensor in self.sensors])
+
+    @property
+    def along(self) -> Array:
+        """True displacement along every sensor [m], shape (N, S)."""
+        return along_sensors(self.signals, self.sensors)
+
+    @cached_property
+    def motion(self) -> Array:
+        """Displacement (x, y) of the shaft in every plane, from the origin of the sensors [m], (N, P, 2)."""
+        return planar_of(self.along, self.planes)
+
+    def of_channels(self, columns: Sequence[int]) -> Record:
+        """The record of some of its sensors."""
+        chosen = list(columns)
+        return replace(
+            self,
+            signals=np.ascontiguousarray(self.signals[:, chosen]),
+            sensors=tuple(self.sensors[c] for c in chosen),
+        )
 
     @property
     def measured_speed(self) -> tuple[Array, Array] | None:

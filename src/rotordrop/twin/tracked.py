@@ -420,7 +420,7 @@ def _tail_first(evidence: Sequence[Evidence]) -> list[Evidence]:
     first, *others = evidence
     levels = [item.settled_level for item in evidence if not isinstance(item.settled_level, Missing)]
     if levels and isinstance(first.settled_level, Missing):
-        first = replace(first, settled_level=levels[0])
+        first = first.with_facts(settled_level=levels[0])
     return [first, *others]
 
 

@@ -17,6 +17,7 @@ from rotordrop.cli.app import INTERRUPTED, run
 from rotordrop.errors import ConsistencyError, UsageError
 from rotordrop.estimate.record_facts import BESIDE, COUNTED_TWICE, facts_of
 from rotordrop.estimate.schema import estimate_schema
+from rotordrop.evidence.evidence import Evidence
 from rotordrop.known import Known
 from rotordrop.machine import CalibrationDrop, CalibrationOrigin, Machine, example_path, load_machine
 from rotordrop.record.examples import example_record_path
@@ -305,7 +306,11 @@ def test_two_records_of_one_name_are_refused(
 def told_of(machine: Machine, name: str) -> set[str]:
     """Warnings that the bundled record, under a name, gets for the calibration of a machine."""
     known = {BESIDE, *(COUNTED_TWICE.format(drop) for drop in ("drop_060", "first", "first, second"))}
-    return known & set(facts_of(machine, read_record(RECORD, machine), None, name).warnings)
+    return known & set(
+        facts_of(
+            Evidence(record=read_record(RECORD, machine), machine=machine, tail=None, name=name)
+        ).warnings
+    )
 
 
 def test_what_a_user_writes_as_a_source_is_not_taken_for_a_calibration() -> None:

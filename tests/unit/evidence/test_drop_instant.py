@@ -204,7 +204,7 @@ def test_a_record_that_begins_in_the_fall(drop, machine):
 def test_the_coarse_search_needs_the_speed(drop, machine):
     silent = replace(drop, speed=None, speed_time=None, speed_readings=None)
     with pytest.raises(RecordError, match=r"drop_060 has no shaft speed"):
-        coarse_drop(silent, machine, sensor_planes(drop.sensors))
+        coarse_drop(silent, machine)
 
 
 def test_a_rotor_that_rings_strongly_is_released_when_it_was():

@@ -8,10 +8,10 @@ import pytest
 
 from rotordrop.errors import RecordError
 from rotordrop.evidence import check_record, refuse_unusable
-from rotordrop.evidence.events import drop_and_levitated
+from rotordrop.evidence.events import Beginning, beginning_of, find_fall
 from rotordrop.evidence.levitated import fit_levitated
-from rotordrop.evidence.quality import Finding, _not_both, sensing
-from rotordrop.evidence.quality.arrangement import LEANING, check_planes
+from rotordrop.evidence.quality import Finding, Kind, sensing, standing
+from rotordrop.evidence.quality.arrangement import check_planes
 from rotordrop.evidence.quality.clock import check_clock
 from rotordrop.evidence.quality.ends import fell_as_described
 from rotordrop.evidence.quality.motion import check_rotation_line, first_motion
@@ -433,11 +433,11 @@ class TestArrangement:
     def test_the_fall_before_the_first_contact_shows_where_the_sensors_look(
         self, signs, order, told, drop, machine
     ):
-        planes = sensor_planes(drop.sensors)
-        coarse, _ = drop_and_levitated(drop, machine, drop, planes)
+        coarse = beginning_of(drop, machine).coarse
         record = replace(drop, signals=drop.signals[:, list(order)] * np.array(signs))
         levitated = fit_levitated(record, coarse.instant - 3e-3, speed=coarse.speed)
-        assert fell_as_described(record, machine, planes, levitated, coarse) is told
+        fall = find_fall(record, machine, Beginning(coarse=coarse, levitated=levitated))
+        assert fell_as_described(record, machine, levitated, fall) is told
 
     def test_ends_swapped(self, drop, fast_drop, machine, edited):
         for record in (drop, fast_drop):
@@ -545,8 +545,8 @@ def test_an_estimated_air_gap_that_cannot_be_is_named_before_the_unit(drop, mach
 @pytest.mark.parametrize(("kind", "severity"), [("turned sensors", "stop"), ("ends", "warning")])
 def test_a_fall_that_leans_stops_only_where_sensors_look_elsewhere(kind, severity):
     """A free fall that deviates from the rotor model by itself refuses no drop that friction drove aside."""
-    leaning = Finding(kind=LEANING, message="leans 34°", remedy="", severity="warning")
-    other = Finding(kind=kind, message="deviates", remedy="", severity="note")
-    first, second = _not_both([leaning], [other])
-    assert (first.kind, first.severity) == (LEANING, severity)
+    leaning = Finding(kind=Kind.LEANING, message="leans 34°", remedy="", severity="warning")
+    other = Finding(kind=Kind(kind), message="deviates", remedy="", severity="note")
+    first, second = standing({"wiring": [leaning], "fall": [other], "flights": []}, gains_right=False)
+    assert (first.kind, first.severity) == (Kind.LEANING, severity)
     assert second == other

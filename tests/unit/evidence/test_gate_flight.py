@@ -24,11 +24,10 @@ def hopping(machine):
 
 
 def in_flight(record, machine):
-    planes = sensor_planes(record.sensors)
-    coarse = coarse_drop(record, machine, planes)
+    coarse = coarse_drop(record, machine)
     levitated = fit_levitated(record, coarse.instant - 3e-3, speed=coarse.speed)
-    seen = weighed(record, machine, planes, levitated, coarse.instant)
-    return seen, [] if seen is None else check_flights(seen, record, planes)
+    seen = weighed(record, machine, levitated, coarse.instant)
+    return seen, [] if seen is None else check_flights(seen, record)
 
 
 def test_a_good_record_falls_with_gravity(hopping, machine):
@@ -58,7 +57,7 @@ def test_the_gain_of_one_channel_is_weighed(channel, hopping, machine):
     assert (found.kind, found.channel) == ("wrong gain", record.channel_names[channel])
     # a touch that was not seen looks like this in a single flight
     assert (seen.flights, found.severity) == (1, "note")
-    (twice,) = check_flights(replace(seen, flights=2), record, sensor_planes(record.sensors))
+    (twice,) = check_flights(replace(seen, flights=2), record)
     assert twice.severity == "warning"
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import RecordError
-from rotordrop.evidence.events import find_drop_instant, sinking, with_whole_planes
+from rotordrop.evidence.events import find_drop_instant, sinking
 from rotordrop.evidence.power_off import PowerOff, find_power_off
 from rotordrop.machine import example_machine, load_machine
 from rotordrop_bench import hidden_machine, synthesize_drop
@@ -64,13 +64,11 @@ def test_a_plane_that_lost_a_sensor_is_left_out(drop):
         signals=np.ascontiguousarray(record.signals[:, keep]),
         sensors=tuple(record.sensors[i] for i in keep),
     )
-    whole, planes = with_whole_planes(three)
-    assert whole.signals.shape[1] == 2 and len(planes) == 1
-    same, both = with_whole_planes(record)
-    assert same is record and len(both) == 2
+    assert three.whole.signals.shape[1] == 2 and len(three.whole.planes) == 1
+    assert record.whole is record and len(record.planes) == 2
     one = replace(three, signals=three.signals[:, :1], sensors=three.sensors[:1])
     with pytest.raises(RecordError, match="has one sensor"):
-        with_whole_planes(one)
+        _ = one.whole.planes
 
 
 def test_a_plane_that_circles_widely_while_levitated_does_not_begin_the_fall():

@@ -11,7 +11,7 @@ from rotordrop.errors import IdentificationError
 from rotordrop.evidence.air_gap import SettledRest
 from rotordrop.evidence.evidence import Evidence, known
 from rotordrop.evidence.initial_state import InitialState, end_of_fall, fit_initial_state, settled_along
-from rotordrop.evidence.sensing import Sensing, displacements_along
+from rotordrop.evidence.sensing import Sensing
 from rotordrop.replay.start import expand_initial_state
 from rotordrop.rotor.parameters import DropModel
 from rotordrop_bench import SyntheticDrop
@@ -80,7 +80,7 @@ def test_square_root_squares_to_the_covariance(initial: InitialState) -> None:
 def test_modal_expansion_misses_the_sag_that_the_fit_finds(
     drop: SyntheticDrop, initial: InitialState, rest: SettledRest, model: DropModel, sensing: Sensing
 ) -> None:
-    along = displacements_along(drop.record) - rest.along + settled_along(rest, sensing)
+    along = drop.record.along - rest.along + settled_along(rest, sensing)
     expanded = expand_initial_state(drop.record.time, along, initial.drop_instant, model, sensing)
     true = true_state(drop, 1e-5)[0]
     by_fit = np.abs(initial.displacement - true).max()
@@ -109,4 +109,12 @@ def test_fall_with_too_few_samples_is_refused(evidence: Evidence, sensing: Sensi
     record = evidence.record
     coarse = replace(record, time=record.time[::16], signals=record.signals[::16], sampling_rate=1250.0)
     with pytest.raises(IdentificationError, match=r"\d samples between power-off and the first contact"):
-        fit_initial_state(replace(evidence, record=coarse), known(evidence.gap), sensing)
+        fit_initial_state(
+            coarse,
+            evidence.model,
+            evidence.release,
+            evidence.speed,
+            evidence.angle,
+            known(evidence.gap),
+            sensing,
+        )

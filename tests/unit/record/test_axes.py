@@ -7,7 +7,7 @@ import pytest
 
 from rotordrop.errors import RecordError
 from rotordrop.machine import Sensor
-from rotordrop.record import Record, planar, sensor_planes
+from rotordrop.record import Record, sensor_planes
 from rotordrop.record.axes import along_sensors, planar_of, sensor_directions
 
 TIME = np.arange(50) / 1e4
@@ -28,14 +28,14 @@ def seen_by(sensors, motion=MOTION):
 @pytest.mark.parametrize("angles", [(135, 45), (0, 90), (10, 70), (-30, 200, 95), (0, 120, 240), (45, 50)])
 def test_any_angles_give_x_and_y(angles):
     record = seen_by([sensor(f"S{i}", angle) for i, angle in enumerate(angles)])
-    displacement, nodes = planar(record)
+    displacement, nodes = record.motion, tuple(plane.node for plane in record.planes)
     assert nodes == (5,)
     np.testing.assert_allclose(displacement[:, 0], MOTION, rtol=0, atol=1e-15)
 
 
 def test_the_supplied_arrangement_is_that_of_its_description(drop):
     """A at 135° and B at 45°: x = (B − A)/√2, y = (A + B)/√2."""
-    displacement, nodes = planar(drop)
+    displacement, nodes = drop.motion, tuple(plane.node for plane in drop.planes)
     a, b = drop.signals[:, 0], drop.signals[:, 1]
     assert nodes == (5, 25)
     np.testing.assert_allclose(displacement[:, 0, 0], (b - a) / np.sqrt(2), atol=1e-18)
@@ -47,7 +47,7 @@ def test_polarity_gain_and_offset_are_taken_into_account():
         sensor("A", 135, polarity=-1, gain=1.02, offset="8 um"),
         sensor("B", 45, gain=0.98, offset="-3 um"),
     ]
-    displacement, _ = planar(seen_by(sensors))
+    displacement = seen_by(sensors).motion
     np.testing.assert_allclose(displacement[:, 0], MOTION, rtol=0, atol=1e-15)
 
 
@@ -57,7 +57,7 @@ def test_turning_all_sensors_turns_the_motion():
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     plain = seen_by([sensor("A", 135), sensor("B", 45)])
     turned = replace(plain, sensors=(sensor("A", 168), sensor("B", 78)))
-    np.testing.assert_allclose(planar(turned)[0][:, 0], planar(plain)[0][:, 0] @ turn.T, atol=1e-15)
+    np.testing.assert_allclose(turned.motion[:, 0], plain.motion[:, 0] @ turn.T, atol=1e-15)
 
 
 def test_sensors_along_one_line_are_refused():
@@ -80,4 +80,4 @@ def test_a_plane_with_one_sensor_is_refused():
 def test_planes_may_be_taken_one_by_one(drop):
     planes = sensor_planes(drop.sensors)
     along = along_sensors(drop.signals, drop.sensors)
-    np.testing.assert_array_equal(planar_of(along, planes[1:])[:, 0], planar(drop)[0][:, 1])
+    np.testing.assert_array_equal(planar_of(along, planes[1:])[:, 0], drop.motion[:, 1])

@@ -10,7 +10,7 @@ import pytest
 from rotordrop.estimate.estimate import Estimate
 from rotordrop.estimate.methods import Tracked
 from rotordrop.estimate.record_facts import facts_of
-from rotordrop.evidence.evidence import read_evidence
+from rotordrop.evidence.evidence import Evidence, read_evidence
 from rotordrop.machine import example_machine
 from rotordrop.physics.hertz import LineContact
 from rotordrop.record.record import read_record
@@ -95,4 +95,6 @@ def estimate() -> Estimate:
     problem = drop_problem(build_drop_model(machine, COARSE_BASIS), evidence, until=0.02)
     smoothed = track([problem], CALIBRATED_SCHEDULE[:1]).smoothed[0]
     drop = tracked_drop(evidence, problem, smoothed, smoothed.filtered, 1.0)
-    return estimate_of(drop, Tracked(), facts_of(machine, record, tail, "drop_060"))
+    return estimate_of(
+        drop, Tracked(), facts_of(Evidence(record=record, machine=machine, tail=tail, name="drop_060"))
+    )

@@ -11,7 +11,7 @@ from rotordrop.estimate.estimate import Estimate
 from rotordrop.estimate.methods import Tracked
 from rotordrop.estimate.record_facts import facts_of
 from rotordrop.estimation import estimate_drop
-from rotordrop.evidence.evidence import read_evidence
+from rotordrop.evidence.evidence import Evidence, read_evidence
 from rotordrop.known import Known
 from rotordrop.machine import Machine
 from rotordrop.rotor.parameters import build_drop_model
@@ -99,7 +99,9 @@ def workshop(calibrated: Machine, synthetic: SyntheticDrop) -> TrackedDrop:
 @pytest.fixture(scope="session")
 def tracked(workshop: TrackedDrop, calibrated: Machine, synthetic: SyntheticDrop) -> Estimate:
     """What is told of it."""
-    facts = facts_of(calibrated, synthetic.record, synthetic.tail, "hidden_060")
+    facts = facts_of(
+        Evidence(record=synthetic.record, machine=calibrated, tail=synthetic.tail, name="hidden_060")
+    )
     return estimate_of(workshop, Tracked(), facts)
 
 

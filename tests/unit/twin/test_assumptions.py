@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -52,7 +51,7 @@ def test_air_gaps_without_a_tail_say_where_they_begin(machine: Machine, evidence
     for name, found in zip(("NDE", "DE"), reach, strict=True):
         begin = f"{name}: without a tail the air gap begins at {1e6 * found:.0f} µm ± "
         assert begin in said(machine, evidence)
-    unseen = replace(evidence, reach=Missing(reason="the sensors see too little"))
+    unseen = evidence.with_facts(reach=Missing(reason="the sensors see too little"))
     text = said(machine, unseen)
     assert "DE: without a tail the air gap begins at 250 µm ± " in text
     assert "by the machine file (the sensors see too little)" in text
@@ -82,7 +81,7 @@ def test_a_bandwidth_that_nobody_stated_is_said_with_what_it_could_hide(
 
 
 def test_noise_that_nothing_tells_is_said(machine: Machine, evidence: Evidence) -> None:
-    text = said(machine, replace(evidence, levitated=None))
+    text = said(machine, evidence.with_facts(levitated=None))
     for sensor in machine.sensors:
         assert f"{sensor.name}: no levitated readings tell its noise; 0." in text
     assert "no levitated readings" not in said(machine, evidence)

@@ -435,7 +435,7 @@ def test_what_a_lost_twin_says_does_not_enter_the_cross_check(
     check = input_state_estimate(problem, lent)
     failed = Check(name="sensor errors", passed=False, message="gain departs by 30 prior standard deviations")
     drop = replace(workshop, smoothed=lost, checks=(failed,))
-    facts = facts_of(calibrated, synthetic.record, synthetic.tail, "lost")
+    facts = facts_of(Evidence(record=synthetic.record, machine=calibrated, tail=synthetic.tail, name="lost"))
     estimate = estimate_of(drop, Tracked(), facts)
     assert estimate.verdict is Verdict.GIVEN_WAY and not estimate.consistent
     for b, name in enumerate(BEARINGS):
@@ -471,7 +471,7 @@ def test_a_drop_that_nothing_can_check_is_refused(
         Check(name="directions", passed=False, message="one direction"),
         Check(name="innovation size", passed=False, message="innovations 9 × expected"),
     )
-    facts = facts_of(calibrated, synthetic.record, synthetic.tail, "blind")
+    facts = facts_of(Evidence(record=synthetic.record, machine=calibrated, tail=synthetic.tail, name="blind"))
     with pytest.raises(IdentificationError, match=r"record hidden_060 .*nothing can check its force"):
         estimate_of(replace(workshop, checks=failed), Tracked(), facts)
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotordrop.errors import RecordError
+from rotordrop.evidence.events import nominal_gaps
 from rotordrop.evidence.look.events import (
     Drop,
     Impact,
@@ -20,7 +21,7 @@ from rotordrop.evidence.look.events import (
     whirls_of,
 )
 from rotordrop.evidence.look.motion import Motion, motion_of, slope
-from rotordrop.evidence.quality import Finding, check_record, stops
+from rotordrop.evidence.quality import Finding, Kind, check_record, stops
 from rotordrop.evidence.quality.channels import check_channels
 from rotordrop.evidence.quality.clock import check_blocks, check_clock
 from rotordrop.evidence.quality.finding import ranked
@@ -291,7 +292,7 @@ def look(
     )
 
 
-_UNREADABLE = ("missing samples", "non-monotonic time", "wrong sampling rate")
+_UNREADABLE = (Kind.MISSING_SAMPLES, Kind.BACKWARD_TIME, Kind.WRONG_RATE)
 
 
 def _read(
@@ -320,7 +321,7 @@ def _checked(record: Record, machine: Machine | None) -> tuple[Finding, ...]:
     if machine is not None:
         return check_record(record, machine)
     damage = [
-        Finding(kind="damage on reading", message=words, remedy="copy or export it again", severity="warning")
+        Finding(kind=Kind.DAMAGE, message=words, remedy="copy or export it again", severity="warning")
         for words in record.warnings
     ]
     findings = damage + check_clock(record) + check_channels(record)
@@ -328,13 +329,9 @@ def _checked(record: Record, machine: Machine | None) -> tuple[Finding, ...]:
 
 
 def _gaps(record: Record, machine: Machine | None, gap: float | None) -> tuple[float | None, ...]:
-    from rotordrop.evidence.events import gap_of
-    from rotordrop.record.axes import sensor_planes
-
-    planes = sensor_planes(record.sensors)
     if gap is not None or machine is None:
-        return (gap,) * len(planes)
-    return tuple(gap_of(machine, plane) for plane in planes)
+        return (gap,) * len(record.planes)
+    return tuple(map(float, nominal_gaps(machine, record)))
 
 
 def _speed_at(record: Record, release: float) -> float | None:

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import RecordError
 from rotordrop.evidence.events import FALLEN_SHARE, fall_accelerations
-from rotordrop.record.axes import along_sensors, planar_of, sensor_planes
 from rotordrop.record.record import Record
 from rotordrop.record.recording import Array
 from rotordrop.series import noise_by_differences, runs_of
@@ -82,8 +81,7 @@ def motion_of(record: Record, *, gaps: tuple[float | None, ...], angles_known: b
     RecordError
         When nothing falls.
     """
-    planes = sensor_planes(record.sensors)
-    raw = planar_of(along_sensors(record.signals, record.sensors), planes)
+    planes, raw = record.planes, record.motion
     begin, sunk = _first_fall(raw, record.sampling_rate)
     notes: list[str] = []
     rest = np.median(raw[_rest_from(raw, sunk, record) :], axis=0)

@@ -1,26 +1,27 @@
 """The gate every record passes before anything is computed from it.
 
 It looks at the clock, at every channel, and at what a drop must show. What it cannot decide it says (severity
-"note"). Stages build on one another: a later one runs only when the earlier ones found nothing that
-forbids it.
+"note"). The checks stand in a table of stages that ask the evidence: a later stage runs only when the earlier
+ones found nothing that forbids it. One place says which finding overrules which.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rotordrop.errors import NoDropError, RecordError
-from rotordrop.evidence.events import drop_and_levitated, with_whole_planes
+from rotordrop.evidence.evidence import Evidence, Missing, known
 from rotordrop.evidence.levitated import LevitatedModel, fit_levitated
-from rotordrop.evidence.quality.arrangement import LEANING, check_planes, fall_of
+from rotordrop.evidence.quality.arrangement import check_planes, fall_of
 from rotordrop.evidence.quality.channels import check_channels
 from rotordrop.evidence.quality.clock import check_blocks, check_clock
 from rotordrop.evidence.quality.ends import check_ends, fell_as_described
-from rotordrop.evidence.quality.finding import Finding, Severity, ranked, refuse_unusable, stops
-from rotordrop.evidence.quality.flight import weighed, with_flights
+from rotordrop.evidence.quality.finding import Finding, Kind, Severity, ranked, refuse_unusable, stops
+from rotordrop.evidence.quality.flight import check_flights, gains_hold
 from rotordrop.evidence.quality.motion import (
     check_length,
     check_levitated,
@@ -32,10 +33,7 @@ from rotordrop.evidence.quality.motion import (
 )
 from rotordrop.evidence.quality.rail import check_rail
 from rotordrop.evidence.quality.recorder import check_again, check_filters, check_speed_signal
-from rotordrop.evidence.quality.sensing import TURNED
 from rotordrop.evidence.quality.tail import check_tail
-from rotordrop.record.axes import sensor_planes
-from rotordrop.record.recording import Array
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
@@ -65,107 +63,185 @@ def check_record(record: Record, machine: Machine, tail: Record | None = None) -
     tuple of Finding
         The worst first; empty when there is nothing to say.
     """
-    findings = [_damage(words) for words in record.warnings]
-    findings += check_clock(record) + check_channels(record)
-    if tail is not None:
-        findings += [_of_tail(found) for found in check_clock(tail, drop=False) + check_channels(tail)]
-    if stops(findings):
-        return ranked(findings)
-    whole, planes = with_whole_planes(record)
-    findings += check_blocks(record) + check_units(whole, machine, planes)
-    findings += check_speed_signal(record) or check_speed(record, machine)
-    if stops(findings):
-        misread = any(found.kind in ("wrong unit factor", "wrong air gap") for found in findings)
-        return ranked(found for found in findings if not (misread and found.kind == "coarse quantisation"))
-    still = None if tail is None else with_whole_planes(tail)[0]
-    return ranked(findings + _check_motion(whole, machine, still))
+    return checked(Evidence(record=record, machine=machine, tail=tail, name=record.name))
 
 
-def _damage(words: str) -> Finding:
-    return Finding(
-        kind="damage on reading",
-        message=words,
-        remedy="copy or export the file again to be sure",
-        severity="warning",
-    )
+def checked(evidence: Evidence) -> tuple[Finding, ...]:
+    """Pass a record through the gate; the facts it asks for are there for an estimate afterwards."""
+    said: dict[str, list[Finding]] = {}
+    stand: list[Finding] = []
+    for stage in STAGES:
+        for name, ask in stage.items():
+            said[name] = ask(evidence)
+        flown = evidence.flights if "fall" in said else None
+        stand = standing(said, gains_right=flown is not None and gains_hold(flown))
+        if stops(stand):
+            break
+    return ranked(stand)
 
 
-def _of_tail(finding: Finding) -> Finding:
-    return replace(finding, message=f"tail: {finding.message}")
+def _damage(evidence: Evidence) -> list[Finding]:
+    return [
+        Finding(
+            kind=Kind.DAMAGE,
+            message=words,
+            remedy="copy or export the file again to be sure",
+            severity="warning",
+        )
+        for words in evidence.record.warnings
+    ]
 
 
-def _check_motion(record: Record, machine: Machine, tail: Record | None) -> list[Finding]:
-    """Stages that need the fall: speed line, arrangement of the sensors, drop, length, tail."""
-    planes = sensor_planes(record.sensors)
-    sunk_at, level = first_motion(record)
-    before = float(record.time[sunk_at]) - _FALL_TIME
-    levitated = _levitated(record, before)
-    findings: list[Finding] = []
-    assert record.speed_readings is not None
-    findings += check_rotation_line(record, before, float(record.speed_readings[0]))
-    if levitated is not None:
-        level = levitated.mean
-    if levitated is not None and not stops(findings):
-        findings += _arrangement(record, machine, fall_of(record, level, sunk_at), levitated)
-    if stops(findings):
-        return findings
-    try:
-        coarse, levitated = drop_and_levitated(record, machine, record, planes)
-    except NoDropError as error:
-        return [no_drop(error)]
-    # a high-pass bends a rest into what looks like a rail; what a filter explains is none
-    findings += [*check_filters(record, coarse.instant), *check_again(record)] or check_rail(record, sunk_at)
-    if stops(findings):
-        return findings
-    findings += check_levitated(levitated, record)
-    findings += check_length(record, coarse.instant, tail is not None)
-    near = record.window(-np.inf, coarse.instant + _NEAR)
-    of_fall = check_ends(near, machine, planes, levitated, coarse)
-    of_fall = with_flights(
-        of_fall, weighed(record, machine, planes, levitated, coarse.instant), record, planes
-    )
-    findings = _not_both(findings, of_fall)
-    if tail is not None and not stops(findings):
-        findings += check_tail(tail, machine, planes, levitated)
-    return findings
+def _tail_as_read(evidence: Evidence) -> list[Finding]:
+    tail = evidence.tail
+    found = [] if tail is None else check_clock(tail, drop=False) + check_channels(tail)
+    return [replace(one, message=f"tail: {one.message}") for one in found]
 
 
-def _arrangement(record: Record, machine: Machine, sunk: Array, levitated: LevitatedModel) -> list[Finding]:
+def _speed(evidence: Evidence) -> list[Finding]:
+    return check_speed_signal(evidence.record) or check_speed(evidence.record, evidence.machine)
+
+
+def _line(evidence: Evidence) -> list[Finding]:
+    whole = evidence.record.whole
+    assert whole.speed_readings is not None
+    return check_rotation_line(whole, _before_motion(whole), float(whole.speed_readings[0]))
+
+
+def _before_motion(whole: Record) -> float:
+    return float(whole.time[first_motion(whole)[0]]) - _FALL_TIME
+
+
+def _wiring(evidence: Evidence) -> list[Finding]:
     """Check the planes; none is refused for a lean that friction gave the rotor after a fall as described."""
-    planes = sensor_planes(record.sensors)
-    found = check_planes(planes, sunk, levitated.amplitudes[0])
-    if not stops(found):
+    whole, floating = evidence.record.whole, _levitated(evidence.record.whole)
+    if floating is None:
+        return []
+    sunk = fall_of(whole, floating.mean, first_motion(whole)[0])
+    found = check_planes(whole.planes, sunk, floating.amplitudes[0])
+    fall = evidence.free_fall if stops(found) else Missing(reason="not asked")
+    if isinstance(fall, Missing):
         return found
+    straight = fell_as_described(whole, evidence.machine, evidence.floating, fall)
+    return check_planes(whole.planes, sunk, evidence.floating.amplitudes[0], fell_straight=straight)
+
+
+def _levitated(whole: Record) -> LevitatedModel | None:
+    """What the sensors read before any of them moved, whatever their wiring: no drop need be found for it."""
+    assert whole.speed_readings is not None
     try:
-        coarse, levitated = drop_and_levitated(record, machine, record, planes)
-    except RecordError:
-        return found
-    near = record.window(-np.inf, coarse.instant + _NEAR)
-    straight = fell_as_described(near, machine, planes, levitated, coarse)
-    return check_planes(planes, sunk, levitated.amplitudes[0], fell_straight=straight)
-
-
-def _not_both(findings: list[Finding], of_ends: list[Finding]) -> list[Finding]:
-    """A fall that leans stops only when the sensors look in other directions before the first contact too.
-
-    That it deviates there from a free rotor is not enough: two of eight drops of small rotors at 500 Hz did,
-    and leant because of friction. Where the fall before the first contact is that of the rotor as described,
-    gravity has shown which way every sensor looks, and what leans later is the rotor: that is worth a note.
-    """
-    turned = any(found.kind == TURNED for found in of_ends)
-    severity: Severity | None = "stop" if turned else None if of_ends else "note"
-    if severity is not None:
-        findings = [replace(f, severity=severity) if f.kind == LEANING else f for f in findings]
-    return findings + of_ends
-
-
-def _levitated(record: Record, end: float) -> LevitatedModel | None:
-    assert record.speed_readings is not None
-    before = record.speed_readings[:3]
-    try:
-        return fit_levitated(record, end, speed=float(np.median(before)))
+        return fit_levitated(whole, _before_motion(whole), speed=float(np.median(whole.speed_readings[:3])))
     except RecordError:
         return None
 
 
-__all__ = ["Finding", "Severity", "check_record", "ranked", "refuse_unusable", "stops"]
+def _begins(evidence: Evidence) -> list[Finding]:
+    begun = evidence.beginning
+    if not isinstance(begun, Missing):
+        return []
+    if isinstance(begun.error, NoDropError):
+        return [no_drop(begun.error)]
+    raise begun.error or RecordError(begun.reason)
+
+
+def _recorder(evidence: Evidence) -> list[Finding]:
+    # a high-pass bends a rest into what looks like a rail; what a filter explains is none
+    whole = evidence.record.whole
+    found = [*check_filters(whole, known(evidence.beginning).coarse.instant), *check_again(whole)]
+    return found or check_rail(whole, first_motion(whole)[0])
+
+
+def _length(evidence: Evidence) -> list[Finding]:
+    rests = evidence.tail is not None or not isinstance(evidence.still, Missing)
+    return check_length(evidence.record.whole, known(evidence.beginning).coarse.instant, rests)
+
+
+def _fall(evidence: Evidence) -> list[Finding]:
+    coarse = known(evidence.beginning).coarse
+    near = evidence.record.whole.window(-np.inf, coarse.instant + _NEAR)
+    fall = evidence.free_fall
+    own = None if isinstance(fall, Missing) else fall
+    return check_ends(near, evidence.machine, evidence.floating, coarse, own)
+
+
+def _flights(evidence: Evidence) -> list[Finding]:
+    seen = evidence.flights
+    return [] if seen is None else check_flights(seen, evidence.record.whole)
+
+
+def _tail_at_rest(evidence: Evidence) -> list[Finding]:
+    still = evidence.still
+    if isinstance(still, Missing):
+        return [] if evidence.tail is None else check_tail(still, evidence.machine, evidence.floating)
+    return check_tail(still.whole, evidence.machine, evidence.floating)
+
+
+STAGES: tuple[Mapping[str, Callable[[Evidence], list[Finding]]], ...] = (
+    {
+        "damage": _damage,
+        "clock": lambda e: check_clock(e.record),
+        "channels": lambda e: check_channels(e.record),
+        "tail as read": _tail_as_read,
+    },
+    {
+        "blocks": lambda e: check_blocks(e.record),
+        "units": lambda e: check_units(e.record.whole, e.machine),
+        "speed": _speed,
+    },
+    {"line": _line},
+    {"wiring": _wiring},
+    {"beginning": _begins},
+    {"recorder": _recorder},
+    {
+        "levitated": lambda e: check_levitated(e.floating, e.record.whole),
+        "length": _length,
+        "fall": _fall,
+        "flights": _flights,
+    },
+    {"rest": _tail_at_rest},
+)
+"""The checks of the gate by name, stage by stage."""
+
+
+def standing(said: Mapping[str, list[Finding]], *, gains_right: bool) -> list[Finding]:
+    """The findings that stand: the one place that says which of them overrules which.
+
+    They come by the name of their check; `gains_right` says whether flights exclude a gain that is off.
+    """
+    every = {name: list(found) for name, found in said.items()}
+    # A unit that is wrong makes the steps of a converter look coarse.
+    if any(one.kind in (Kind.WRONG_UNIT, Kind.WRONG_AIR_GAP) for one in every.get("units", ())):
+        for name in ("channels", "tail as read"):
+            every[name] = [one for one in every[name] if one.kind != Kind.COARSE]
+    if "fall" in every:
+        fall, flights = every["fall"], every["flights"]
+        # Flights weigh the sensors far sharper than the first fall: they refute gains and angles it suspects.
+        if gains_right:
+            fall = [one for one in fall if one.kind not in (Kind.WRONG_GAIN, Kind.TURNED)]
+        flights = [one for one in flights if one.kind not in {other.kind for other in fall}]
+        every |= {"fall": fall, "flights": flights}
+        # A fall that leans stops only when the sensors look in other directions before the first contact too.
+        # That it deviates there from a free rotor is not enough: two of eight drops of small rotors at 500 Hz
+        # did, and leant because of friction. Where the fall before the first contact is that of the rotor as
+        # described, gravity has shown which way every sensor looks, and what leans later is the rotor.
+        turned = any(one.kind == Kind.TURNED for one in fall + flights)
+        severity: Severity | None = "stop" if turned else None if fall + flights else "note"
+        if severity is not None:
+            every["wiring"] = [
+                replace(one, severity=severity) if one.kind == Kind.LEANING else one
+                for one in every["wiring"]
+            ]
+    return [one for found in every.values() for one in found]
+
+
+__all__ = [
+    "Finding",
+    "Kind",
+    "Severity",
+    "check_record",
+    "checked",
+    "ranked",
+    "refuse_unusable",
+    "standing",
+    "stops",
+]

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotordrop.evidence.quality.finding import Finding
+from rotordrop.evidence.quality.finding import Finding, Kind
 from rotordrop.record.axes import Plane, along_sensors
 from rotordrop.record.recording import Array
 
@@ -27,9 +27,6 @@ MOST_TILT = 30.0
 
 CLEAR_ORBIT = 3.0
 """Forward over backward part of the orbit above which its sense is clear."""
-
-LEANING = "leaning fall"
-"""Kind of the finding of a fall that leans for no reason of wiring."""
 
 _AFTER_FALL = 0.06
 _SMALLEST_ORBIT = 3e-7
@@ -86,7 +83,7 @@ def check_planes(
     if all(verdict == "backward" for verdict in verdicts):
         return [
             Finding(
-                kind="swapped axes",
+                kind=Kind.SWAPPED_AXES,
                 message="the fall points down in all planes but the levitated orbit runs against the spin in "
                 "all of them",
                 remedy="either the shaft turns clockwise seen from the DE (x then points the other way), or "
@@ -149,7 +146,7 @@ def _plane_finding(
     names = ", ".join(plane.names)
     if verdict == "undecided":
         return Finding(
-            kind="sense of the orbit",
+            kind=Kind.SENSE_OF_ORBIT,
             message=f"the levitated orbit at node {plane.node} is too small or flat to show its sense: "
             "whether "
             f"{' and '.join(plane.names)} are exchanged cannot be decided",
@@ -177,7 +174,7 @@ def _plane_finding(
     causes = " or ".join(change.words(plane.names) for change in simplest)
     swapped = all(change.order != tuple(sorted(change.order)) for change in simplest)
     return Finding(
-        kind="swapped axes" if swapped else "inverted polarity",
+        kind=Kind.SWAPPED_AXES if swapped else Kind.INVERTED,
         message=f"{seen}; it fits with {causes}",
         remedy="correct the polarity or the angles in the machine file, or the channel map in the profile",
         severity="stop",
@@ -192,7 +189,7 @@ def _leaning(message: str, names: str) -> Finding:
     the fall before the first contact.
     """
     return Finding(
-        kind=LEANING,
+        kind=Kind.LEANING,
         message=message,
         remedy="strong friction drives a rotor sideways like this; make sure that the angles in the machine "
         "file are right",

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotordrop.evidence.quality.finding import Finding
+from rotordrop.evidence.quality.finding import Finding, Kind
 from rotordrop.evidence.quality.rail import zeroed
 from rotordrop.evidence.quality.recorder import bridged
 from rotordrop.record.recording import Array
@@ -64,7 +64,7 @@ def _missing(record: Record, channel: str, values: Array) -> list[Finding]:
     at = float(record.time[bad[0]])
     return [
         Finding(
-            kind="missing samples",
+            kind=Kind.MISSING_SAMPLES,
             message=f"{len(bad)} of {len(values)} samples are NaN or infinite, the first at {at:.6g} s",
             remedy="export the recording without gaps, or cut it before them",
             severity="stop",
@@ -77,7 +77,7 @@ def _missing(record: Record, channel: str, values: Array) -> list[Finding]:
 def _dead(channel: str, values: Array, moves: float, typical: float) -> Finding:
     reads = format_quantity(float(values[0]), "length")
     return Finding(
-        kind="dead channel",
+        kind=Kind.DEAD_CHANNEL,
         message=f"it moves by {format_quantity(moves, 'length')} around {reads} while the others move by "
         f"{format_quantity(typical, 'length')}",
         remedy="check cable and driver, then record again; this sensor cannot be replaced by the others",
@@ -101,7 +101,7 @@ def _stuck(record: Record, channel: str, values: Array) -> Finding | None:
     at = float(record.time[starts[longest]])
     held = format_quantity(float(values[starts[longest]]), "length")
     return Finding(
-        kind="stuck channel",
+        kind=Kind.STUCK_CHANNEL,
         message=f"{count} samples ({count / record.sampling_rate * 1e3:.3g} ms) read exactly {held} from "
         f"{at:.6g} s on",
         remedy="check the recorder's input, then record again",
@@ -121,7 +121,7 @@ def _clipped(record: Record, channel: str, values: Array) -> Finding | None:
         if len(lengths) and int(np.max(lengths)) >= max(CLIPPED_RUN, 3 * usual):
             first = int(starts[np.argmax(lengths >= CLIPPED_RUN)])
             return Finding(
-                kind="clipping",
+                kind=Kind.CLIPPING,
                 message=f"it stays at its {side} limit {format_quantity(extreme, 'length')} for up to "
                 f"{int(np.max(lengths))} samples, {int(np.sum(lengths))} in all",
                 remedy="widen the input range of the recorder or the range of the sensor, then record again",
@@ -146,7 +146,7 @@ def _spikes(record: Record, channel: str, values: Array) -> Finding | None:
     at = float(record.time[spikes[0] + 1])
     size = format_quantity(float(np.max(np.abs(middle[spikes]))), "length")
     return Finding(
-        kind="spikes",
+        kind=Kind.SPIKES,
         message=f"{len(spikes)} single samples stand out by up to {size}, the first at {at:.6g} s",
         remedy="look for loose contacts or switching noise; single spikes pull every fit",
         severity="warning",
@@ -166,7 +166,7 @@ def _steps(record: Record, channel: str, values: Array) -> Finding | None:
         return None
     at = float(record.time[steps[0] + 1])
     return Finding(
-        kind="spikes",
+        kind=Kind.SPIKES,
         message=f"{len(steps)} steps of up to {format_quantity(float(np.max(step)), 'length')} from one "
         f"sample to the next, the first at {at:.6g} s",
         remedy="look for loose contacts or damaged blocks of the file",
@@ -188,7 +188,7 @@ def _coarse(record: Record, channel: str, values: Array) -> Finding | None:
         return None
     count = len(np.unique(values))
     return Finding(
-        kind="coarse quantisation",
+        kind=Kind.COARSE,
         message=f"readings come in steps of {format_quantity(step, 'length')} ({count} different values)",
         remedy="use more bits or a smaller input range of the recorder",
         severity="warning",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.evidence.quality.finding import Finding
+from rotordrop.evidence.quality.finding import Finding, Kind
 from rotordrop.record.recording import Array
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def check_clock(record: Record, *, drop: bool = True) -> list[Finding]:
     if not 0.0 < record.sampling_rate < np.inf:
         return [
             Finding(
-                kind="wrong sampling rate",
+                kind=Kind.WRONG_RATE,
                 message=f"the sampling rate is {record.sampling_rate:g} Hz",
                 remedy="give the true rate with the record",
                 severity="stop",
@@ -51,7 +51,7 @@ def check_clock(record: Record, *, drop: bool = True) -> list[Finding]:
         worst = int(np.argmax(np.abs(steps - usual)))
         findings.append(
             Finding(
-                kind="jittered clock",
+                kind=Kind.JITTERED_CLOCK,
                 message=f"the sampling interval of {usual * 1e6:.4g} µs scatters by {jitter:.1%}",
                 remedy="export the recording with the recorder's own sample clock",
                 severity="warning",
@@ -62,7 +62,7 @@ def check_clock(record: Record, *, drop: bool = True) -> list[Finding]:
     if drop and record.sampling_rate < SLOWEST:
         findings.append(
             Finding(
-                kind="slow sampling",
+                kind=Kind.SLOW_SAMPLING,
                 message=f"{record.sampling_rate:.6g} Hz leaves {record.sampling_rate * 1e-3:.2g} samples per "
                 "millisecond of "
                 "contact",
@@ -80,7 +80,7 @@ def _backward(record: Record, steps: Array) -> list[Finding]:
     at = int(wrong[0])
     return [
         Finding(
-            kind="non-monotonic time",
+            kind=Kind.BACKWARD_TIME,
             message=f"sample {at + 2} is at {record.time[at + 1]:.7g} s after sample {at + 1} at "
             f"{record.time[at]:.7g} s "
             f"({len(wrong)} such steps)",
@@ -99,7 +99,7 @@ def _gaps(record: Record, steps: Array, usual: float, limit: float) -> list[Find
     missing = round(steps[at] / usual) - 1
     return [
         Finding(
-            kind="dropped block",
+            kind=Kind.DROPPED_BLOCK,
             message=f"{missing} samples are missing after {record.time[at]:.6g} s ({len(gaps)} gaps in the "
             "clock)",
             remedy="export the recording without gaps; do not fill them",
@@ -118,7 +118,7 @@ def _stated_rate(record: Record) -> list[Finding]:
         if stated > 0 and abs(record.sampling_rate / stated - 1.0) > 1e-3:
             return [
                 Finding(
-                    kind="wrong sampling rate",
+                    kind=Kind.WRONG_RATE,
                     message=f"the header says {stated:.6g} Hz, the time column {record.sampling_rate:.6g} Hz",
                     remedy="find out which is right; name the true interval in the profile (time.step)",
                     severity="stop",
@@ -147,7 +147,7 @@ def _copies(record: Record) -> list[Finding]:
         return []
     return [
         Finding(
-            kind="duplicate block",
+            kind=Kind.DUPLICATE_BLOCK,
             message=f"{length} samples from {record.time[start]:.6g} s on repeat those from "
             f"{record.time[start - lag[start]]:.6g} s exactly",
             remedy="export again; the times after the copy are wrong",
@@ -205,7 +205,7 @@ def _jumps(record: Record) -> list[Finding]:
     size = float(np.max(np.abs(step[at])))
     return [
         Finding(
-            kind="dropped block",
+            kind=Kind.DROPPED_BLOCK,
             message=f"{len(alone)} jump(s) of most channels at once, the first by "
             f"{size * 1e6:.3g} µm from one "
             f"sample to the next at {record.time[at]:.6g} s",

@@ -15,12 +15,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotordrop.elements.beam import is_beam
-from rotordrop.evidence.events import CoarseDrop, find_fall
+from rotordrop.evidence.events import Beginning, CoarseDrop, find_fall
 from rotordrop.evidence.levitated import LevitatedModel
-from rotordrop.evidence.quality.finding import Finding
-from rotordrop.evidence.quality.sensing import TURNED, WRONG_GAIN, read_otherwise
+from rotordrop.evidence.quality.finding import Finding, Kind
+from rotordrop.evidence.quality.sensing import WRONG_GAIN, read_otherwise
 from rotordrop.known import NINETY, Known
-from rotordrop.record.axes import Plane
 from rotordrop.record.recording import Array
 
 if TYPE_CHECKING:
@@ -30,9 +29,6 @@ if TYPE_CHECKING:
 
 GOOD_FIT = 2.0
 """Mean square of the residual over the noise up to which the arrangement counts as confirmed."""
-
-UNDECIDED_ENDS = "ends"
-"""Kind of the finding that the fall does not say which end is which."""
 
 _BETTER = 3.0
 _NEAR_CONTACT = 6e-4
@@ -56,64 +52,68 @@ class _Case:
     """The record read another way."""
 
     words: str
-    kind: str
+    kind: Kind
     channels: tuple[str, ...]
     record: Record
     levitated: LevitatedModel
 
 
 def check_ends(
-    record: Record,
-    machine: Machine,
-    planes: tuple[Plane, ...],
-    levitated: LevitatedModel,
-    coarse: CoarseDrop,
+    record: Record, machine: Machine, levitated: LevitatedModel, coarse: CoarseDrop, own: Fall | None = None
 ) -> list[Finding]:
-    """Compare the fall with the rotor model: as described, ends exchanged, channels crossed, gain wrong."""
-    if len({amb.node for amb in machine.ambs}) < 2 or len(planes) < 2:
+    """Compare the fall with the rotor model: as described, ends exchanged, channels crossed, gain wrong.
+
+    `own` is the fall fitted to the record as described, where it is known already.
+    """
+    if len({amb.node for amb in machine.ambs}) < 2 or len(record.planes) < 2:
         return [_undecided("it takes two AMB planes in the machine file and two sensor planes")]
-    own = find_fall(record, machine, planes, levitated, coarse)
+
+    def fitted(read: Record, floats: LevitatedModel, until: float | None = None) -> Fall:
+        return find_fall(read, machine, Beginning(coarse=coarse, levitated=floats), until=until)
+
+    own = own or fitted(record, levitated)
     if own.misfit <= GOOD_FIT and own.end >= coarse.contact - _NEAR_CONTACT:
-        return read_otherwise(record, planes, levitated, own) or _implausible_lift(
-            record, planes, levitated, own, machine
-        )
-    cases = _other_cases(record, planes, levitated)
+        return _as_described(record, levitated, own, machine)
+    cases = _other_cases(record, levitated)
     if not is_beam(machine.rotor):
         cases.append(_any_gain(record, levitated))
-    grown = [find_fall(case.record, machine, planes, case.levitated, coarse) for case in cases]
+    grown = [fitted(case.record, case.levitated) for case in cases]
     until = max([own.end, *(fall.end for fall in grown if fall.misfit <= GOOD_FIT)])
-    mine = find_fall(record, machine, planes, levitated, coarse, until=until).misfit
+    mine = fitted(record, levitated, until).misfit
     if mine <= GOOD_FIT:
-        return read_otherwise(record, planes, levitated, own) or _implausible_lift(
-            record, planes, levitated, own, machine
-        )
+        return _as_described(record, levitated, own, machine)
     finals = [
-        find_fall(case.record, machine, planes, case.levitated, coarse, until=until)
-        if case.kind == "wrong gain" or fall.end >= until - _NEAR_CONTACT
+        fitted(case.record, case.levitated, until)
+        if case.kind == Kind.WRONG_GAIN or fall.end >= until - _NEAR_CONTACT
         else None
         for case, fall in zip(cases, grown, strict=True)
     ]
     decided = _decide(mine, cases, finals)
     if is_beam(machine.rotor) and decided.severity == "stop":
         return [_doubted(decided)]
-    if decided.kind not in (UNDECIDED_ENDS, "wrong gain"):
+    if decided.kind not in (Kind.UNDECIDED_ENDS, Kind.WRONG_GAIN):
         return [decided]
-    named = read_otherwise(record, planes, levitated, own)
+    named = read_otherwise(record, levitated, own)
     stop = decided.severity == "stop"
     return [replace(found, severity="stop") if stop else found for found in named] or [decided]
 
 
+def _as_described(record: Record, levitated: LevitatedModel, fall: Fall, machine: Machine) -> list[Finding]:
+    """What a fall that fits as described still says of gains, delays and angles."""
+    return read_otherwise(record, levitated, fall) or _implausible_lift(record, levitated, fall, machine)
+
+
 def _implausible_lift(
-    record: Record, planes: tuple[Plane, ...], levitated: LevitatedModel, fall: Fall, machine: Machine
+    record: Record, levitated: LevitatedModel, fall: Fall, machine: Machine
 ) -> list[Finding]:
     """A fall that fits only with an impossible remanent lift is too fast or too slow: a gain is wrong."""
     share = fall.remanent_force[:, 1] / fall.rotor.lift
     worst = int(np.argmax(np.abs(share - np.mean(_POSSIBLE_LIFT))))
     if _POSSIBLE_LIFT[0] <= share[worst] <= _POSSIBLE_LIFT[1]:
-        return _implausible_sideways(record, planes, levitated, fall, machine)
+        return _implausible_sideways(record, levitated, fall, machine)
     return [
         Finding(
-            kind="wrong gain",
+            kind=Kind.WRONG_GAIN,
             message=f"the fall fits only with a remanent lift of {fall.remanent_force[worst, 1]:.3g} N at "
             f"AMB {machine.ambs[worst].name}, {share[worst]:.0%} of its static lift: the rotor seems to "
             f"fall too {'fast' if share[worst] < 0 else 'slowly'} there",
@@ -123,52 +123,43 @@ def _implausible_lift(
     ]
 
 
-def fell_as_described(
-    record: Record,
-    machine: Machine,
-    planes: tuple[Plane, ...],
-    levitated: LevitatedModel,
-    coarse: CoarseDrop,
-) -> bool:
+def fell_as_described(record: Record, machine: Machine, levitated: LevitatedModel, fall: Fall) -> bool:
     """Whether gravity has shown, before the first contact, that the sensors look where they are said to.
 
     Sensors that are exchanged or inverted see gravity pull aside or upwards: the free rotor then explains the
     fall only with a force there as large as the lift that was lost. It need not be explained up to the first
     sudden acceleration, which may be the second contact: what counts is how well the force is known.
     """
-    if len({amb.node for amb in machine.ambs}) < 2 or len(planes) < 2:
+    if len({amb.node for amb in machine.ambs}) < 2 or len(record.planes) < 2:
         return False
-    fall = find_fall(record, machine, planes, levitated, coarse)
     if fall.misfit > GOOD_FIT:
         return False
     upwards = fall.remanent_force[:, 1] / fall.rotor.lift
     if np.any(upwards < _POSSIBLE_LIFT[0]) or np.any(upwards > _POSSIBLE_LIFT[1]):
         return False
-    aside, error = _sideways(record, planes, levitated, fall)
+    aside, error = _sideways(record, levitated, fall)
     return bool(np.all(np.abs(aside) + NINETY * error < 0.5 * _AS_FALLING))
 
 
-def _sideways(
-    record: Record, planes: tuple[Plane, ...], levitated: LevitatedModel, fall: Fall
-) -> tuple[Array, Array]:
+def _sideways(record: Record, levitated: LevitatedModel, fall: Fall) -> tuple[Array, Array]:
     """Horizontal force at the release over static lift, per magnetic bearing, and its standard error [1]."""
     from rotordrop.evidence.fall import linearised
 
     share = fall.remanent_force[:, 0] / fall.rotor.lift
-    jacobian = linearised(record, planes, levitated, fall)[1]
+    jacobian = linearised(record, levitated, fall)[1]
     variance = np.diag(np.linalg.inv(jacobian.T @ jacobian))[: len(share)] * max(fall.misfit, 1.0)
     return share, np.sqrt(variance)
 
 
 def _implausible_sideways(
-    record: Record, planes: tuple[Plane, ...], levitated: LevitatedModel, fall: Fall, machine: Machine
+    record: Record, levitated: LevitatedModel, fall: Fall, machine: Machine
 ) -> list[Finding]:
     """A fall that leads aside before anything is touched: the sensors look in other directions.
 
     In a short fall a force aside and the turning force of the unbalance look alike: what counts is by how
     much the force is larger than a magnet's at least.
     """
-    share, error = _sideways(record, planes, levitated, fall)
+    share, error = _sideways(record, levitated, fall)
     worst = int(np.argmax(np.abs(share)))
     if not _POSSIBLE_SIDEWAYS < abs(share[worst]) < _AS_FALLING:
         return []
@@ -176,7 +167,7 @@ def _implausible_sideways(
         return []
     return [
         Finding(
-            kind=TURNED,
+            kind=Kind.TURNED,
             message=f"the fall fits only with {fall.remanent_force[worst, 0]:.3g} N sideways at AMB "
             f"{machine.ambs[worst].name}, {abs(share[worst]):.0%} of its static lift: the rotor seems to "
             "fall aside there before it touches anything",
@@ -196,7 +187,7 @@ def _decide(mine: float, cases: list[_Case], falls: list[Fall | None]) -> Findin
         )
     case, fall = best
     words = case.words
-    if case.kind == "wrong gain":
+    if case.kind == Kind.WRONG_GAIN:
         errors = fall.gain_errors
         index = int(np.argmax(np.abs(errors)))
         if abs(errors[index]) < WRONG_GAIN:
@@ -216,14 +207,14 @@ def _decide(mine: float, cases: list[_Case], falls: list[Fall | None]) -> Findin
     )
 
 
-def _other_cases(record: Record, planes: tuple[Plane, ...], levitated: LevitatedModel) -> list[_Case]:
+def _other_cases(record: Record, levitated: LevitatedModel) -> list[_Case]:
     cases = []
-    for first, second in combinations(planes, 2):
+    for first, second in combinations(record.planes, 2):
         if len(first.columns) == len(second.columns):
             pairs = list(zip(first.columns, second.columns, strict=True))
-            cases.append(_exchanged(record, levitated, pairs, "swapped ends"))
+            cases.append(_exchanged(record, levitated, pairs, Kind.SWAPPED_ENDS))
         for pair in product(first.columns, second.columns):
-            cases.append(_exchanged(record, levitated, [pair], "swapped channels"))
+            cases.append(_exchanged(record, levitated, [pair], Kind.SWAPPED_CHANNELS))
     return cases
 
 
@@ -236,10 +227,10 @@ def _any_gain(record: Record, levitated: LevitatedModel) -> _Case:
         for sensor in record.sensors
     )
     loose = replace(record, sensors=free)
-    return _Case(words="", kind="wrong gain", channels=(), record=loose, levitated=levitated)
+    return _Case(words="", kind=Kind.WRONG_GAIN, channels=(), record=loose, levitated=levitated)
 
 
-def _exchanged(record: Record, levitated: LevitatedModel, pairs: list[tuple[int, int]], kind: str) -> _Case:
+def _exchanged(record: Record, levitated: LevitatedModel, pairs: list[tuple[int, int]], kind: Kind) -> _Case:
     order = list(range(len(record.sensors)))
     for a, b in pairs:
         order[a], order[b] = b, a
@@ -266,7 +257,7 @@ def _doubted(found: Finding) -> Finding:
 
 def _undecided(why: str) -> Finding:
     return Finding(
-        kind=UNDECIDED_ENDS,
+        kind=Kind.UNDECIDED_ENDS,
         message=f"whether the two ends are exchanged cannot be decided: {why}",
         remedy="make sure by moving one end by hand; check rotor model, sensor nodes and AMB nodes",
         severity="note",

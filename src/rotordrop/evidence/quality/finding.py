@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Literal
 
 from rotordrop.errors import RecordError
@@ -13,33 +14,73 @@ Severity = Literal["stop", "warning", "note"]
 _ORDER: tuple[Severity, ...] = ("stop", "warning", "note")
 
 
+class Kind(StrEnum):
+    """What the gate can find, by the names that documents carry."""
+
+    DAMAGE = "damage on reading"
+    MISSING_SAMPLES = "missing samples"
+    DEAD_CHANNEL = "dead channel"
+    STUCK_CHANNEL = "stuck channel"
+    ZEROED = "zeroed block"
+    BRIDGED = "bridged gap"
+    CLIPPING = "clipping"
+    SPIKES = "spikes"
+    COARSE = "coarse quantisation"
+    BACKWARD_TIME = "non-monotonic time"
+    JITTERED_CLOCK = "jittered clock"
+    SLOW_SAMPLING = "slow sampling"
+    WRONG_RATE = "wrong sampling rate"
+    DROPPED_BLOCK = "dropped block"
+    DUPLICATE_BLOCK = "duplicate block"
+    WRONG_UNIT = "wrong unit factor"
+    WRONG_AIR_GAP = "wrong air gap"
+    NO_SPEED = "speed missing"
+    SPEED_READINGS = "speed readings"
+    DEAD_SPEED = "dead speed"
+    NEGATIVE_SPEED = "negative speed"
+    WRONG_SPEED_UNIT = "wrong speed unit"
+    WRONG_SPEED = "wrong speed"
+    SWAPPED_AXES = "swapped axes"
+    SWAPPED_ENDS = "swapped ends"
+    SWAPPED_CHANNELS = "swapped channels"
+    INVERTED = "inverted polarity"
+    SENSE_OF_ORBIT = "sense of the orbit"
+    LEANING = "leaning fall"
+    LEANING_REST = "leaning rest"
+    TURNED = "turned sensors"
+    UNDECIDED_ENDS = "ends"
+    LATE_CHANNEL = "late channel"
+    WRONG_GAIN = "wrong gain"
+    SATURATION = "soft saturation"
+    LOW_PASS = "recorder low-pass"
+    AC_COUPLING = "AC coupling"
+    SECOND_DROP = "second drop"
+    HUM = "hum"
+    NOISE = "noise"
+    SHORT = "short record"
+    ENDS_TURNING = "record ends before standstill"
+    NO_PRETRIGGER = "missing pre-trigger"
+    NO_DROP = "no drop in the record"
+    NOT_SETTLED = "not settled"
+    NOT_LOOKED_AT = "not looked at"
+
+
 @dataclass(frozen=True, kw_only=True)
 class Finding:
-    """A fault of a record, or a fault that cannot be ruled out.
+    """A fault of a record, or a fault that cannot be ruled out."""
 
-    Attributes
-    ----------
-    kind : str
-        Name of the fault.
-    message : str
-        What was seen, with the numbers.
-    remedy : str
-        What to do about it.
-    severity : {"stop", "warning", "note"}
-        "stop": results would be wrong. "warning": results are less certain. "
-        ""note": cannot be decided from the record.
-    channel : str, optional
-        The channel, or several; None for all.
-    time : float, optional
-        When, in record time [s].
-    """
-
-    kind: str
+    kind: Kind
+    """Name of the fault."""
     message: str
+    """What was seen, with the numbers."""
     remedy: str
+    """What to do about it."""
     severity: Severity
+    """Stop: results would be wrong; warning: they are less certain; note: cannot be decided."""
     channel: str | None = None
+    """The channel, or several; None for all."""
     time: float | None = None
+    """When, in record time [s]."""
 
     def __str__(self) -> str:
         where = f" {self.channel}" if self.channel else ""

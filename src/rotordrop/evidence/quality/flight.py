@@ -17,10 +17,10 @@ import numpy as np
 
 from rotordrop.elements.magnet import REMANENCE_TIME
 from rotordrop.evidence.levitated import LevitatedModel
-from rotordrop.evidence.quality.finding import Finding
-from rotordrop.evidence.quality.sensing import TURNED, WRONG_GAIN
+from rotordrop.evidence.quality.finding import Finding, Kind
+from rotordrop.evidence.quality.sensing import WRONG_GAIN
 from rotordrop.known import NINETY
-from rotordrop.record.axes import Plane, planar_of, sensor_directions
+from rotordrop.record.axes import planar_of
 from rotordrop.record.recording import Array
 from rotordrop.series import runs_of
 
@@ -104,23 +104,21 @@ class _Fall:
     time: float
 
 
-def weighed(
-    record: Record, machine: Machine, planes: tuple[Plane, ...], levitated: LevitatedModel, drop: float
-) -> Weighed | None:
+def weighed(record: Record, machine: Machine, levitated: LevitatedModel, drop: float) -> Weighed | None:
     """Weigh the rotor in its flights; None where it never flew."""
     from rotordrop.evidence.release import free_rotor
 
     if len({amb.node for amb in machine.ambs}) < 2 or record.speed is None or float(machine.gravity) <= 0.0:
         return None
-    rotor = free_rotor(machine, planes)
+    rotor = free_rotor(machine, record.planes)
     count = len(record.sensors)
     weight: Array = np.zeros((count, count))
     total: Array = np.zeros(count)
     flights = 0
     gap = min(float(bearing.air_gap) for bearing in machine.touchdown_bearings)
     fall = _Fall(gravity=float(machine.gravity), time=float(np.sqrt(2.0 * gap / float(machine.gravity))))
-    for window in _flights(record, planes, levitated, drop, fall):
-        found = _weighed_in(record, planes, rotor, levitated, window, fall)
+    for window in _flights(record, levitated, drop, fall):
+        found = _weighed_in(record, rotor, levitated, window, fall)
         if found is None:
             continue
         share, covariance = found
@@ -134,25 +132,18 @@ def weighed(
     return Weighed(share=error @ total, covariance=error, flights=flights)
 
 
-def with_flights(
-    of_fall: list[Finding], seen: Weighed | None, record: Record, planes: tuple[Plane, ...]
-) -> list[Finding]:
-    """Findings of the first fall with what the flights say; they refute gains and angles that it suspects."""
-    if seen is None:
-        return of_fall
-    own = check_flights(seen, record, planes)
+def gains_hold(seen: Weighed) -> bool:
+    """Whether the flights exclude a gain that is off, so that a first fall that suspects one is overruled."""
     error = np.sqrt(np.diag(seen.covariance))
-    right = np.all(np.abs(seen.share - 1.0) + 2.0 * error < _REFUTED)
-    kept = [found for found in of_fall if not (right and found.kind in ("wrong gain", TURNED))]
-    return kept + [found for found in own if found.kind not in {other.kind for other in kept}]
+    return bool(np.all(np.abs(seen.share - 1.0) + 2.0 * error < _REFUTED))
 
 
-def check_flights(seen: Weighed, record: Record, planes: tuple[Plane, ...]) -> list[Finding]:
+def check_flights(seen: Weighed, record: Record) -> list[Finding]:
     """Name a gain, or sensors at other angles, by which the rotor falls with something other than g."""
     off = seen.share - 1.0
     precision = np.linalg.inv(seen.covariance)
     tried = []
-    for kind, channels, shape in _ways(record, planes):
+    for kind, channels, shape in _ways(record):
         size = float(shape @ precision @ off) / float(shape @ precision @ shape)
         tried.append((size**2 * float(shape @ precision @ shape), size, kind, channels))
     gained, size, kind, channels = max(tried, key=lambda one: one[0])
@@ -164,7 +155,7 @@ def check_flights(seen: Weighed, record: Record, planes: tuple[Plane, ...]) -> l
     error = abs(size) / gained**0.5
     seen_as = (
         f"{names} turned by about {np.degrees(np.arctan(size)):+.0f}°"
-        if kind == TURNED
+        if kind == Kind.TURNED
         else f"{names} reading {1.0 + size:.3g} ± {NINETY * error:.2g} (90 %) of what it should"
     )
     return [
@@ -174,7 +165,7 @@ def check_flights(seen: Weighed, record: Record, planes: tuple[Plane, ...]) -> l
             f"the rotor falls as it would with {seen_as}"
             + ("; a single flight, and a touch that was not seen looks alike" if sole else ""),
             remedy="check the angles of the sensors at that end"
-            if kind == TURNED
+            if kind == Kind.TURNED
             else "check sensitivity, gain and unit of the channels, and the sampling rate",
             severity="note" if sole else "warning",
             channel=names,
@@ -182,27 +173,24 @@ def check_flights(seen: Weighed, record: Record, planes: tuple[Plane, ...]) -> l
     ]
 
 
-def _ways(record: Record, planes: tuple[Plane, ...]) -> Iterator[tuple[str, tuple[str, ...], Array]]:
+def _ways(record: Record) -> Iterator[tuple[Kind, tuple[str, ...], Array]]:
     """Faults by kind and channels, with what they add to the share of gravity per size."""
     names = record.channel_names
-    yield "wrong gain", names, np.ones(len(names))
+    yield Kind.WRONG_GAIN, names, np.ones(len(names))
     for alone, name in zip(np.eye(len(names)), names, strict=True):
-        yield "wrong gain", (name,), alone
-    unit = sensor_directions(record.sensors)
-    for plane in planes:
+        yield Kind.WRONG_GAIN, (name,), alone
+    unit = record.directions
+    for plane in record.planes:
         turned, columns = np.zeros(len(names)), list(plane.columns)
         upright = unit[columns, 1]
         turned[columns] = unit[columns, 0] / np.where(np.abs(upright) > _LEVEL, upright, np.inf)
         if np.any(turned):
-            yield TURNED, plane.names, turned
+            yield Kind.TURNED, plane.names, turned
 
 
-def _flights(
-    record: Record, planes: tuple[Plane, ...], levitated: LevitatedModel, drop: float, fall: _Fall
-) -> list[tuple[int, int]]:
+def _flights(record: Record, levitated: LevitatedModel, drop: float, fall: _Fall) -> list[tuple[int, int]]:
     """First samples and counts of the longest stretches with the rotor away from all races."""
-    gains = np.array([float(sensor.gain) for sensor in record.sensors])
-    path = planar_of((record.signals - levitated.mean) * gains, planes)
+    path = planar_of((record.signals - levitated.mean) * record.gains, record.planes)
     away = np.hypot(path[..., 0], path[..., 1])
     fallen = record.time > drop
     away = away / np.percentile(away[fallen], _OF_REACH, axis=0)
@@ -223,7 +211,6 @@ def _flights(
 
 def _weighed_in(
     record: Record,
-    planes: tuple[Plane, ...],
     rotor: FreeRotor,
     levitated: LevitatedModel,
     window: tuple[int, int],
@@ -234,7 +221,7 @@ def _weighed_in(
     thin = max(round(record.sampling_rate / _ENOUGH_RATE), 1)
     while count >= SHORTEST * fall.time * record.sampling_rate:
         inside = slice(first, first + count, thin)
-        share, covariance, residual = _fitted(record, planes, rotor, levitated, inside, fall.gravity)
+        share, covariance, residual = _fitted(record, rotor, levitated, inside, fall.gravity)
         if float(np.mean(residual**2)) < _AT_NOISE:
             return share, covariance
         half, cut = len(residual) // 2, max(int(_SHORTENED * count), thin)
@@ -245,7 +232,6 @@ def _weighed_in(
 
 def _fitted(
     record: Record,
-    planes: tuple[Plane, ...],
     rotor: FreeRotor,
     levitated: LevitatedModel,
     inside: slice,
@@ -262,19 +248,16 @@ def _fitted(
     residual : array, shape (T, S)
         Residual over the noise, scaled by the degrees of freedom [1].
     """
-    from rotordrop.evidence.fall import plane_of_sensor
     from rotordrop.evidence.release import response_at, response_to_start
 
     assert record.speed is not None
     since = record.time[inside] - record.time[inside.start]
     speed = float(record.speed[inside.start])
-    unit = sensor_directions(record.sensors)
-    gains = np.array([float(sensor.gain) for sensor in record.sensors])
+    unit, gains, of_plane = record.directions, record.gains, record.plane_of
     noise = np.maximum(levitated.noise * gains, 1e-12)
-    of_plane = plane_of_sensor(planes, len(unit))
     toward = (unit[:, 0] - 1j * unit[:, 1])[None, :, None]
     left = response_at(response_to_start(rotor, speed, float(since[-1])), since)[:, of_plane] * toward
-    turning = np.exp(1j * speed * since)[:, None, None] * np.eye(len(planes))[of_plane] * toward
+    turning = np.exp(1j * speed * since)[:, None, None] * np.eye(len(record.planes))[of_plane] * toward
     parts = [column for seen in (left, turning) for column in (seen.real, -seen.imag)]
     falls = -0.5 * gravity * since[:, None, None] ** 2 * np.diag(unit[:, 1])
     columns = np.concatenate([*parts, falls], axis=-1) / noise[None, :, None]

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotordrop.errors import NoDropError
-from rotordrop.evidence.events import fall_accelerations, gap_of
+from rotordrop.evidence.events import fall_accelerations, nominal_gaps
 from rotordrop.evidence.levitated import MAINS, OTHER_SUPPLIES, LevitatedModel
-from rotordrop.evidence.quality.finding import Finding
-from rotordrop.record.axes import Plane
+from rotordrop.evidence.quality.finding import Finding, Kind
 from rotordrop.record.recording import Array
 from rotordrop.units import format_quantity
 
@@ -52,11 +51,10 @@ _LONG_ENOUGH = 0.2
 _LOUD = 3e-6
 
 
-def check_units(record: Record, machine: Machine, planes: tuple[Plane, ...]) -> list[Finding]:
+def check_units(record: Record, machine: Machine) -> list[Finding]:
     """Compare how far every channel moves with the air gap."""
     suspects: dict[int, list[tuple[str, float]]] = {}
-    for plane in planes:
-        gap = gap_of(machine, plane)
+    for plane, gap in zip(record.planes, nominal_gaps(machine, record).tolist(), strict=True):
         for name in plane.names:
             ratio = float(np.ptp(record.reading(name))) / gap
             if ratio > 0 and not PLAUSIBLE_MOTION[0] <= ratio <= PLAUSIBLE_MOTION[1]:
@@ -94,7 +92,7 @@ def _unit_finding(found: list[tuple[str, float]], machine: Machine) -> Finding:
         sizes = ", ".join(f"{1e6 * float(gap):.0f} µm" for gap in gaps)
         source = next((gap.source for gap in gaps if gap.source), "estimated")
         return Finding(
-            kind="wrong air gap",
+            kind=Kind.WRONG_AIR_GAP,
             message=f"the readings span {ratio:.3g} × the air gap of the machine file ({sizes}; {source}), a "
             f"drop 1 to 2.5 ×; {guess}, and so would a wrong estimate of the gap",
             remedy="use the machine file from before that estimate; if it says the same, correct unit or "
@@ -103,7 +101,7 @@ def _unit_finding(found: list[tuple[str, float]], machine: Machine) -> Finding:
             channel=names,
         )
     return Finding(
-        kind="wrong unit factor",
+        kind=Kind.WRONG_UNIT,
         message=f"the readings span {ratio:.3g} × the nominal air gap, a drop 1 to 2.5 ×; {guess}",
         remedy="correct unit or sensitivity in the profile or the machine file",
         severity="stop",
@@ -116,7 +114,7 @@ def check_speed(record: Record, machine: Machine) -> list[Finding]:
     if record.speed_readings is None or record.speed_time is None:
         return [
             Finding(
-                kind="speed missing",
+                kind=Kind.NO_SPEED,
                 message=f"the record has no shaft speed beside {', '.join(record.channel_names)}",
                 remedy='name its channel in a profile ([speed] channel = "..."), or give it by hand '
                 '([speed] constant = "60 Hz")',
@@ -146,7 +144,7 @@ def check_speed(record: Record, machine: Machine) -> list[Finding]:
 def _speed_finding(record: Record, words: str, at: int, severity: str) -> Finding:
     assert record.speed_time is not None
     return Finding(
-        kind="speed readings",
+        kind=Kind.SPEED_READINGS,
         message=words,
         remedy="check the tacho; the speed at the drop is taken from a robust fit",
         severity="stop" if severity == "stop" else "warning",
@@ -194,7 +192,7 @@ def _other_frequency(record: Record, frequency: float, expected: float) -> Findi
     falls = _POSSIBLE_FALL[0] < share < _POSSIBLE_FALL[1]
     fallen = math.log(share / _USUAL_FALL) if falls else 0.0
     of_clock = not falls or abs(fallen - 2.0 * math.log(ratio)) < abs(fallen)
-    kind = "wrong sampling rate" if of_clock else "wrong speed unit" if why else "wrong speed"
+    kind = Kind.WRONG_RATE if of_clock else Kind.WRONG_SPEED_UNIT if why else Kind.WRONG_SPEED
     guess = f" ({why})" if why else ""
     open_ = "" if falls and abs(math.log(ratio)) > _CLEAR else ", though the fall hardly tells the two apart"
     return Finding(
@@ -257,7 +255,7 @@ def check_levitated(levitated: LevitatedModel, record: Record) -> list[Finding]:
             if size > _LOUD:
                 findings.append(
                     Finding(
-                        kind="hum",
+                        kind=Kind.HUM,
                         message=f"mains hum of {levitated.hum:g} Hz with {format_quantity(size, 'length')} "
                         "zero to peak",
                         remedy="ground the sensor driver; the hum found before the drop can be taken off",
@@ -269,7 +267,7 @@ def check_levitated(levitated: LevitatedModel, record: Record) -> list[Finding]:
         if noise > _LOUD:
             findings.append(
                 Finding(
-                    kind="noise",
+                    kind=Kind.NOISE,
                     message=f"{format_quantity(noise, 'length')} rms remain beside 1X, 2X and hum before the "
                     "drop",
                     remedy="look for other lines in the spectrum, or filter the sensor",
@@ -287,7 +285,7 @@ def check_length(record: Record, drop: float, has_tail: bool) -> list[Finding]:
     if after < _LONG_ENOUGH:
         findings.append(
             Finding(
-                kind="short record",
+                kind=Kind.SHORT,
                 message=f"it ends {after * 1e3:.4g} ms after the drop; the analysis covers "
                 f"{_LONG_ENOUGH * 1e3:.0f} ms",
                 remedy="record longer, or analyse a shorter time",
@@ -299,7 +297,7 @@ def check_length(record: Record, drop: float, has_tail: bool) -> list[Finding]:
     if measured is not None and abs(float(measured[1][-1])) > 2 * np.pi and not has_tail:
         findings.append(
             Finding(
-                kind="record ends before standstill",
+                kind=Kind.ENDS_TURNING,
                 message=f"the shaft still turns at {format_quantity(abs(float(measured[1][-1])), 'speed')} "
                 "at "
                 f"{record.time[-1]:.6g} s",
@@ -314,7 +312,7 @@ def check_length(record: Record, drop: float, has_tail: bool) -> list[Finding]:
 def no_drop(error: NoDropError) -> Finding:
     """What the search for a drop did not find, as a finding."""
     return Finding(
-        kind="missing pre-trigger" if error.begins_late else "no drop in the record",
+        kind=Kind.NO_PRETRIGGER if error.begins_late else Kind.NO_DROP,
         message=error.seen,
         remedy=error.remedy,
         severity="stop",

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotordrop.evidence.quality.finding import Finding
+from rotordrop.evidence.quality.finding import Finding, Kind
 from rotordrop.evidence.quality.motion import first_motion
 from rotordrop.record.recording import Array
 from rotordrop.series import noise_by_differences, runs_of
@@ -65,7 +65,7 @@ def zeroed(record: Record, channel: str, values: Array) -> Finding | None:
     at = float(record.time[found[0][0]])
     count = sum(length for _, length in found)
     return Finding(
-        kind="zeroed block",
+        kind=Kind.ZEROED,
         message=f"{count} samples in {len(found)} block(s) read exactly zero among readings far from it, the "
         f"first at {at:.6g} s",
         remedy="the file is damaged; copy or export it again",
@@ -106,7 +106,7 @@ def _railed(channel: str, time: Array, values: Array, least: int) -> Finding | N
             continue  # the readings go on beyond that level: the rotor does, no rail lets them
         at, total = float(time[spells[0][0]]), sum(length for _, length in spells)
         return Finding(
-            kind="clipping",
+            kind=Kind.CLIPPING,
             message=f"it runs into its {side} limit near {format_quantity(extreme, 'length')} {len(spells)} "
             f"times and stays there, {total} samples in all, with noise on them",
             remedy="widen the input range of the recorder or the range of the sensor, then record again",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotordrop.evidence.quality.finding import Finding
+from rotordrop.evidence.quality.finding import Finding, Kind
 from rotordrop.record.recording import Array
 from rotordrop.series import runs_of
 from rotordrop.units import format_quantity
@@ -63,7 +63,7 @@ def bridged(record: Record, channel: str, values: Array) -> Finding | None:
         return None
     at, count = float(record.time[starts[longest]]), int(lengths[longest]) + 2
     return Finding(
-        kind="bridged gap",
+        kind=Kind.BRIDGED,
         message=f"{count} samples ({(count - 1) / record.sampling_rate * 1e3:.3g} ms) lie on a straight line "
         f"without noise from {at:.6g} s on",
         remedy="export the recording without filling its gaps, or cut it before them",
@@ -88,7 +88,7 @@ def _low_pass(record: Record, drop: float) -> list[Finding]:
         return []
     return [
         Finding(
-            kind="recorder low-pass",
+            kind=Kind.LOW_PASS,
             message=f"after the drop the acceleration above {_HIGH[0]:.0f} Hz is {ratio:.2g} of that below "
             f"{_LOW[1]:.0f} Hz, and the noise before it above {_HIGH[0]:.0f} Hz {noise:.2g} of that below "
             f"{_BEFORE[1]:.0f} Hz: a filter has smoothed both",
@@ -133,7 +133,7 @@ def _coupling(record: Record, drop: float) -> list[Finding]:
         return []
     return [
         Finding(
-            kind="AC coupling",
+            kind=Kind.AC_COUPLING,
             message=f"the readings at rest creep back towards zero, to {float(np.mean(share[-1])):.0%} of "
             "their depth by the end, all alike: a rotor on its bearings cannot rise",
             remedy="record with DC coupling; a high-pass takes away where the rotor lies",
@@ -147,10 +147,9 @@ def check_again(record: Record) -> list[Finding]:
     from rotordrop.errors import RecordError
     from rotordrop.evidence.look.events import drops_of
     from rotordrop.evidence.look.motion import motion_of
-    from rotordrop.record.axes import sensor_planes
 
     try:
-        gaps = (None,) * len(sensor_planes(record.sensors))
+        gaps = (None,) * len(record.planes)
         drops = drops_of(motion_of(record, gaps=gaps, angles_known=True))
     except RecordError:
         return []  # who looks for the drop says why there is none
@@ -158,7 +157,7 @@ def check_again(record: Record) -> list[Finding]:
         return []
     return [
         Finding(
-            kind="second drop",
+            kind=Kind.SECOND_DROP,
             message=f"the rotor was lifted at {drops[0].end:.6g} s and dropped again at "
             f"{drops[1].release:.6g} s ({len(drops)} drops)",
             remedy="cut it into a record for each drop: rotordrop look RECORD MACHINE --split FOLDER",
@@ -178,7 +177,7 @@ def check_speed_signal(record: Record) -> list[Finding]:
     if turning < np.pi:
         return [
             _of_speed(
-                "dead speed", f"it reads {format_quantity(turning, 'speed')} from the beginning", 0, record
+                Kind.DEAD_SPEED, f"it reads {format_quantity(turning, 'speed')} from the beginning", 0, record
             )
         ]
     dead = np.flatnonzero((size[1:] < 0.02 * turning) & (size[:-1] > 0.5 * turning))
@@ -187,14 +186,14 @@ def check_speed_signal(record: Record) -> list[Finding]:
         words = (
             f"it falls from {format_quantity(float(size[at - 1]), 'speed')} to nothing between two readings"
         )
-        return [_of_speed("dead speed", words, at, record)]
+        return [_of_speed(Kind.DEAD_SPEED, words, at, record)]
     if float(np.median(readings)) < 0.0:
         words = "it is negative; the spin is counter-clockwise seen from the DE, the sign is left out"
-        return [_of_speed("negative speed", words, 0, record, "warning")]
+        return [_of_speed(Kind.NEGATIVE_SPEED, words, 0, record, "warning")]
     return []
 
 
-def _of_speed(kind: str, words: str, at: int, record: Record, severity: str = "stop") -> Finding:
+def _of_speed(kind: Kind, words: str, at: int, record: Record, severity: str = "stop") -> Finding:
     assert record.speed_time is not None
     return Finding(
         kind=kind,

@@ -17,17 +17,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotordrop.evidence.levitated import LevitatedModel
-from rotordrop.evidence.quality.finding import Finding
-from rotordrop.record.axes import Plane, planar_of, sensor_directions
+from rotordrop.evidence.quality.finding import Finding, Kind
+from rotordrop.record.axes import planar_of
 from rotordrop.record.recording import Array
 from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
     from rotordrop.evidence.fall import Fall
     from rotordrop.record.record import Record
-
-TURNED = "turned sensors"
-"""Kind of the finding that the rotor falls aside before it touches anything."""
 
 WRONG_GAIN = 0.08
 """Error of a gain from which on it is named [1]; calibrated sensors have 0.05 at most by API 670."""
@@ -48,10 +45,10 @@ _LONG = (7e-4, 1.5e-3, 2.5e-3)
 """Delays that are no longer small against the fall, each tried with its own shape [s]."""
 
 _REMEDIES = {
-    "late channel": "record all channels with one clock and one filter, or give the delay of the sensor",
-    "wrong gain": "check sensitivity, gain and unit of the channels, and the sampling rate",
-    TURNED: "check the angles of the sensors at that end",
-    "soft saturation": "widen the range of the sensors, or linearise them, then record again",
+    Kind.LATE_CHANNEL: "record all channels with one clock and one filter, or give the delay of the sensor",
+    Kind.WRONG_GAIN: "check sensitivity, gain and unit of the channels, and the sampling rate",
+    Kind.TURNED: "check the angles of the sensors at that end",
+    Kind.SATURATION: "widen the range of the sensors, or linearise them, then record again",
 }
 
 
@@ -69,25 +66,20 @@ class _Fault:
         What it adds to the readings per size.
     """
 
-    kind: str
+    kind: Kind
     channels: tuple[str, ...]
     words: Callable[[float], str]
     slope: Array
 
 
-def read_otherwise(
-    record: Record, planes: tuple[Plane, ...], levitated: LevitatedModel, fall: Fall
-) -> list[Finding]:
+def read_otherwise(record: Record, levitated: LevitatedModel, fall: Fall) -> list[Finding]:
     """Name what sensors or recorder did to a fall, if that takes away more chi square than chance would."""
     from rotordrop.evidence.fall import linearised
 
-    residual, jacobian = linearised(record, planes, levitated, fall)
+    residual, jacobian = linearised(record, levitated, fall)
     basis = np.linalg.qr(jacobian)[0]
     found = sorted(
-        (
-            (*_gain(fault, residual, basis, levitated), fault)
-            for fault in _faults(record, planes, levitated, fall)
-        ),
+        ((*_gain(fault, residual, basis, levitated), fault) for fault in _faults(record, levitated, fall)),
         key=lambda one: -one[0],
     )
     gained, size, best = found[0]
@@ -96,7 +88,7 @@ def read_otherwise(
     if trusted * gained < max(SUSPECT, _EXPLAINED * trusted * beyond):
         return []
     alike = [one for one in found if one[0] > gained - 0.5 * SUSPECT]
-    if any(other.kind == "wrong gain" and abs(value) < _WITHIN_TOLERANCE for _, value, other in alike):
+    if any(other.kind == Kind.WRONG_GAIN and abs(value) < _WITHIN_TOLERANCE for _, value, other in alike):
         return []  # a gain that calibrated sensors may have explains as much
     near = [
         other.words(value)
@@ -133,9 +125,7 @@ def _gain(fault: _Fault, residual: Array, basis: Array, levitated: LevitatedMode
     return size * float(added @ residual), size
 
 
-def _faults(
-    record: Record, planes: tuple[Plane, ...], levitated: LevitatedModel, fall: Fall
-) -> Iterator[_Fault]:
+def _faults(record: Record, levitated: LevitatedModel, fall: Fall) -> Iterator[_Fault]:
     time = record.time[(record.time >= fall.start) & (record.time <= fall.end)]
     path = fall.predicted(time) - levitated.readings(time)
     lags = [-np.gradient(path, time, axis=0)]
@@ -143,28 +133,27 @@ def _faults(
     names = record.channel_names
     for alone, name in zip(np.eye(len(names)), names, strict=True):
         for lag, words in zip(lags, (_late_words, *[_long_words] * len(_LONG)), strict=True):
-            yield _Fault(kind="late channel", channels=(name,), words=words(name), slope=lag * alone)
-        yield _Fault(kind="wrong gain", channels=(name,), words=_gain_words(name), slope=path * alone)
-    yield from _turned(record, planes, path)
-    yield _Fault(kind="wrong gain", channels=names, words=_gain_words("all channels"), slope=path)
+            yield _Fault(kind=Kind.LATE_CHANNEL, channels=(name,), words=words(name), slope=lag * alone)
+        yield _Fault(kind=Kind.WRONG_GAIN, channels=(name,), words=_gain_words(name), slope=path * alone)
+    yield from _turned(record, path)
+    yield _Fault(kind=Kind.WRONG_GAIN, channels=names, words=_gain_words("all channels"), slope=path)
     # L tanh(true / L) is less than true by true³ / (3 L²); the size is the square of the largest over L
     largest = float(np.max(np.abs(record.signals)))
     bent = -((path + levitated.mean) ** 3 - levitated.mean**3) / (3.0 * largest**2)
-    yield _Fault(kind="soft saturation", channels=names, words=_bend_words(largest), slope=bent)
+    yield _Fault(kind=Kind.SATURATION, channels=names, words=_bend_words(largest), slope=bent)
 
 
-def _turned(record: Record, planes: tuple[Plane, ...], path: Array) -> Iterator[_Fault]:
+def _turned(record: Record, path: Array) -> Iterator[_Fault]:
     """Sensors of a plane at other angles, all turned alike: they read what goes across their direction."""
-    gains = np.array([float(sensor.gain) for sensor in record.sensors])
-    places = planar_of(path * gains, planes)
-    unit = sensor_directions(record.sensors)
+    gains, unit = record.gains, record.directions
+    places = planar_of(path * gains, record.planes)
     across = np.column_stack([-unit[:, 1], unit[:, 0]])
-    for number, plane in enumerate(planes):
+    for number, plane in enumerate(record.planes):
         slope = np.zeros_like(path)
         columns = list(plane.columns)
         slope[:, columns] = places[:, number] @ across[columns].T / gains[columns]
         yield _Fault(
-            kind=TURNED, channels=plane.names, words=_turn_words(" and ".join(plane.names)), slope=slope
+            kind=Kind.TURNED, channels=plane.names, words=_turn_words(" and ".join(plane.names)), slope=slope
         )
 
 

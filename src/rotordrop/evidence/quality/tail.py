@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotordrop.errors import RecordError
-from rotordrop.evidence.events import gap_of
+from rotordrop.errors import UnsettledError
+from rotordrop.evidence.events import nominal_gaps
+from rotordrop.evidence.evidence import Missing
 from rotordrop.evidence.levitated import MAINS, LevitatedModel
-from rotordrop.evidence.quality.finding import Finding
-from rotordrop.evidence.quality.sensing import TURNED
-from rotordrop.evidence.settled import settled_tail
+from rotordrop.evidence.quality.finding import Finding, Kind
 from rotordrop.record.axes import Plane, along_sensors, planar_of
 from rotordrop.record.recording import Array
 from rotordrop.series import noise_by_differences
@@ -38,42 +37,35 @@ _NO_DEPTH, _SAME_NOISE = 0.2, 0.2
 """A level that is not recorded: distance over the air gap, and noise over that of the record [1]."""
 
 
-def check_tail(
-    tail: Record, machine: Machine, planes: tuple[Plane, ...], levitated: LevitatedModel
-) -> list[Finding]:
+def check_tail(still: Record | Missing, machine: Machine, levitated: LevitatedModel) -> list[Finding]:
     """Check where the rotor came to rest and in which direction it swings.
 
     Parameters
     ----------
-    tail : Record
-        Readings at standstill.
+    still : Record or Missing
+        Readings of the rotor at rest, in the planes whose sensors give x and y.
     machine : Machine
         The machine.
-    planes : tuple of Plane
-        Sensor planes.
     levitated : LevitatedModel
         The readings before the drop.
     """
-    try:
-        settled = settled_tail(tail, machine)
-    except RecordError as error:
-        message, _, remedy = str(error).rpartition("; ")
+    if isinstance(still, Missing):
+        if not isinstance(still.error, UnsettledError):
+            return []
         return [
             Finding(
-                kind="not settled",
-                message=f"tail: {message}",
-                remedy=remedy,
+                kind=Kind.NOT_SETTLED,
+                message=f"tail: {still.error.seen}",
+                remedy=still.error.remedy,
                 severity="stop",
-                time=float(tail.time[-1]),
             )
         ]
-    rest = tail.window(settled.start, settled.end)
-    level = levitated.mean
-    path = planar_of(along_sensors(rest.signals, rest.sensors) - along_sensors(level, rest.sensors), planes)
-    if _without_level(rest, path, [gap_of(machine, plane) for plane in planes], levitated.noise):
+    path = planar_of(still.along - along_sensors(levitated.mean, still.sensors), still.planes)
+    gaps = nominal_gaps(machine, still)
+    if _without_level(still, path, gaps, levitated.noise):
         return [
             Finding(
-                kind="AC coupling",
+                kind=Kind.AC_COUPLING,
                 message="tail: the rotor rests where it levitated in all planes, with the noise that the "
                 "record has too: the level is not recorded",
                 remedy="record with DC coupling; a high-pass takes away where the rotor lies",
@@ -81,18 +73,18 @@ def check_tail(
             )
         ]
     findings = []
-    for number, plane in enumerate(planes):
-        findings += _place(path[:, number], plane, gap_of(machine, plane))
-        findings += _swing(path[:, number], plane, tail.sampling_rate)
+    for number, (plane, gap) in enumerate(zip(still.planes, gaps.tolist(), strict=True)):
+        findings += _place(path[:, number], plane, gap)
+        findings += _swing(path[:, number], plane, still.sampling_rate)
     return findings
 
 
-def _without_level(rest: Record, path: Array, gaps: list[float], noise: Array) -> bool:
+def _without_level(rest: Record, path: Array, gaps: Array, noise: Array) -> bool:
     """Whether a tail shows no rest although its readings are no smaller than those of the record.
 
     A unit that is wrong makes the noise as small as the distance, a high-pass takes the distance alone.
     """
-    still = np.hypot(*np.mean(path, axis=0).T) < _NO_DEPTH * np.array(gaps)
+    still = np.hypot(*np.mean(path, axis=0).T) < _NO_DEPTH * gaps
     own = np.array([noise_by_differences(column, 3) for column in rest.signals.T])
     return bool(np.all(still)) and float(np.nanmedian(own / noise)) > _SAME_NOISE
 
@@ -104,7 +96,7 @@ def _place(path: Array, plane: Plane, gap: float) -> list[Finding]:
     if not DEPTH[0] <= depth / gap <= DEPTH[1]:
         return [
             Finding(
-                kind="wrong unit factor",
+                kind=Kind.WRONG_UNIT,
                 message=f"tail: the rotor rests {format_quantity(depth, 'length')} from its levitated "
                 "position, "
                 f"{depth / gap:.3g} × the nominal air gap of {format_quantity(gap, 'length')}",
@@ -116,7 +108,7 @@ def _place(path: Array, plane: Plane, gap: float) -> list[Finding]:
     if _SOME_LEAN < lean <= MOST_LEAN:
         return [
             Finding(
-                kind="leaning rest",
+                kind=Kind.LEANING_REST,
                 message=f"tail: the rotor rests {lean:.0f}° from straight below its levitated position "
                 f"(x = {x * 1e6:+.4g} µm, y = {y * 1e6:+.4g} µm)",
                 remedy="check gains, angles and offsets of this plane, and whether the race is round",
@@ -127,7 +119,7 @@ def _place(path: Array, plane: Plane, gap: float) -> list[Finding]:
     if lean > MOST_LEAN:
         return [
             Finding(
-                kind="swapped axes" if lean > _TURNED_LEAN else TURNED,
+                kind=Kind.SWAPPED_AXES if lean > _TURNED_LEAN else Kind.TURNED,
                 message=f"tail: the rotor rests at x = {x * 1e6:+.4g} µm, y = {y * 1e6:+.4g} µm from its "
                 "levitated "
                 f"position, {lean:.0f}° from straight below",
@@ -160,7 +152,7 @@ def _swing(path: Array, plane: Plane, rate: float) -> list[Finding]:
         return []
     return [
         Finding(
-            kind="swapped channels",
+            kind=Kind.SWAPPED_CHANNELS,
             message=f"tail: at node {plane.node} the rotor swings by {format_quantity(size, 'length')} at "
             f"{slope:.0f}° to the "
             "level, but it can only swing along the race",
