@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, cast, get_args
+from typing import Annotated, Any, cast
 
 from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, core_schema
@@ -26,7 +26,8 @@ MOST_TURNS = 2e3 * math.pi
 KIND_MARK = "x-quantity"
 """Marks a physical value in the schema of a description, with its kind."""
 
-STATUSES: tuple[Status, ...] = get_args(Status)
+STATUSES: tuple[Status, ...] = ("given", "guess", "estimated", "default", "inferred")
+"""How a machine file may say that a value is known; verdicts on a record are no part of a file."""
 _TABLE_KEYS = ("value", "guess", "range", "interval", "standard_error", "lower", "upper", "source", "status")
 
 
