@@ -18,7 +18,8 @@ from rotordrop.elements.catalog import (
     find_bearing,
 )
 from rotordrop.elements.clearance import CLASSES, ClearanceClass, clearance_range
-from rotordrop.elements.description import Misfit, Text
+from rotordrop.elements.description import Misfit, Text, Usual
+from rotordrop.elements.material import DENSITY, ELASTIC, POISSON
 from rotordrop.elements.race_bearing import Oddity, RaceBearing
 from rotordrop.elements.values import (
     Angle,
@@ -161,6 +162,16 @@ class BallBearing(RaceBearing):
     ball_count_range: tuple[int, int] | None = Field(
         default=None, description="90 % interval of the balls per row where they are inferred"
     )
+
+    usual: ClassVar[Mapping[str, Usual]] = {
+        "ring_youngs_modulus": ELASTIC,
+        "ball_youngs_modulus": ELASTIC,
+        "ring_poisson_ratio": POISSON,
+        "ball_poisson_ratio": POISSON,
+        "ball_density": DENSITY,
+    }
+
+    written_as: ClassVar[Mapping[str, str]] = {"preload_class": "preload", "clearance_class": "clearance"}
 
     displaces: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "preload": ("preload_class",),

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from rotordrop.elements.description import Description, Misfit
+from rotordrop.elements.description import Description, Misfit, Usual
 from rotordrop.elements.parameter import Entry, Parameter, Role, Rule, Step, bearing_entries
 from rotordrop.elements.values import (
     ContactDamping,
@@ -56,6 +56,16 @@ class Contact(Description):
     exponent: ContactExponent = default(LINE_CONTACT, "line contact (Palmgren), as in Neisi 2020")
     damping: ContactDamping = default(0.08, "contact damping of steel at low speed", (0.0, 0.5))
     length: PositiveLength | None = Field(default=None, description="Length of the line contact")
+
+    usual: ClassVar[Mapping[str, Usual]] = {
+        "damping": Usual(
+            least=0.0,
+            most=20.0,
+            kind="contact_damping",
+            look="steel has 0.05 to 0.5 s/m at low speed",
+            label="contact damping",
+        ),
+    }
 
     displaces: ClassVar[Mapping[str, tuple[str, ...]]] = {"stiffness": ("length",)}
 

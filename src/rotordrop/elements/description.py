@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Annotated, Any, ClassVar, Self, TypeVar
 
@@ -36,6 +37,17 @@ def _channel(raw: Any) -> Any:
     return raw
 
 
+@dataclass(frozen=True, kw_only=True)
+class Usual:
+    """Bounds of one entry and what to look at beyond them."""
+
+    least: float
+    most: float
+    kind: str
+    look: str
+    label: str = ""
+
+
 Text = Annotated[str, Strict()]
 Node = Annotated[int, BeforeValidator(_node)]
 Name = Annotated[str, BeforeValidator(_name)]
@@ -65,6 +77,12 @@ class Description(BaseModel):
 
     displaces: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     """Fields that give way when another one is set, because both say the same thing."""
+
+    usual: ClassVar[Mapping[str, Usual]] = {}
+    """Bounds of fields beyond which no machine of the field lies: of constants that do not scale with it."""
+
+    written_as: ClassVar[Mapping[str, str]] = {}
+    """Fields that a file writes under another key."""
 
     reserved: ClassVar[Mapping[str, str]] = {}
     """Keys that a later version will know, with what they will hold."""

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.elements.description import Description
+from rotordrop.elements.description import Description, Usual
 from rotordrop.elements.parameter import Parameter, Role, Step, bearing_entries
 from rotordrop.elements.values import NonNegative, Velocity, default, follows, scaled
 from rotordrop.physics import columns as L
@@ -34,6 +35,23 @@ class Friction(Description):
     dynamic: NonNegative = default(0.1, "the range swept in Neisi 2020 lies around it", (0.05, 0.2))
     stribeck_speed: Velocity = default(0.5, "as in the reference machine", (0.1, 2.0))
     smoothing_speed: Velocity = default(0.02, "small against any sliding speed that matters in a drop")
+
+    usual: ClassVar[Mapping[str, Usual]] = {
+        "dynamic": Usual(
+            least=0.005,
+            most=0.8,
+            kind="dimensionless",
+            look="steel on steel has 0.05 to 0.4; is it in percent?",
+            label="dynamic friction",
+        ),
+        "static": Usual(
+            least=0.005,
+            most=1.2,
+            kind="dimensionless",
+            look="it is 1 to 1.5 times the dynamic coefficient",
+            label="static friction",
+        ),
+    }
 
     def left_out(self) -> dict[str, Any]:
         """Let the static coefficient follow the dynamic one."""

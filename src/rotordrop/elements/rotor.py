@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag
 
@@ -17,11 +17,12 @@ from rotordrop.elements.description import (
     Name,
     Placed,
     Text,
+    Usual,
     place_on_nodes,
     unknown_key,
 )
 from rotordrop.elements.extension import Extension, Values, guess, in_words, itself
-from rotordrop.elements.material import STEEL, Material
+from rotordrop.elements.material import DENSITY, STEEL, Material
 from rotordrop.elements.parameter import Entry, Parameter, Rule
 from rotordrop.elements.values import (
     Density,
@@ -87,6 +88,10 @@ class Section(Description):
     )
     layer_density: Density | None = Field(default=None, description="Density of the layer")
     material: Name | None = Field(default=None, description="Material; that of the rotor when left out")
+
+    usual: ClassVar[Mapping[str, Usual]] = {
+        "layer_density": DENSITY,
+    }
 
     def check(self) -> None:
         """Refuse diameters that do not nest."""
@@ -256,6 +261,12 @@ class Rotor(Description):
     )
     sections: tuple[AnySection, ...] = Field(min_length=1, description="Shaft sections from NDE to DE")
     discs: tuple[Disc, ...] = ()
+
+    usual: ClassVar[Mapping[str, Usual]] = {
+        "modal_damping": Usual(
+            least=0.0, most=0.3, kind="dimensionless", look="a shaft has 0.001 to 0.05; is it in percent?"
+        ),
+    }
 
     @classmethod
     def known_keys(cls) -> tuple[str, ...]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from rotordrop.elements.description import Channel, Misfit, Name, Placed
+from rotordrop.elements.description import Channel, Misfit, Name, Placed, Usual
 from rotordrop.elements.extension import Extension, Values, guess, in_words, itself
 from rotordrop.elements.parameter import Parameter
 from rotordrop.elements.values import (
@@ -86,6 +87,15 @@ class Sensor(Placed):
         default=None, description="How far the sensor stands from its node, towards higher nodes"
     )
     lost: bool = Field(default=False, description="A sensor without readings; left out of everything")
+
+    usual: ClassVar[Mapping[str, Usual]] = {
+        "gain": Usual(
+            least=0.5, most=2.0, kind="dimensionless", look="true displacement over reading is near 1"
+        ),
+        "sensitivity": Usual(
+            least=1e2, most=1e7, kind="voltage_sensitivity", look="eddy-current sensors have 1 to 100 mV/um"
+        ),
+    }
 
 
 def check_sensors_resolve_motion(sensors: tuple[Sensor, ...], nodes: tuple[float, ...]) -> None:

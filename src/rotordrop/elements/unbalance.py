@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 from pydantic import Field
 
-from rotordrop.elements.description import Description, Placed
+from rotordrop.elements.description import Description, Placed, Usual
 from rotordrop.elements.extension import Extension, Values, derived, guess, in_words
 from rotordrop.elements.parameter import Entry, Parameter
 from rotordrop.elements.values import Angle, Positive, PositiveSpeed
@@ -55,6 +56,10 @@ class BalanceGrade(Description):
     grade_mm_s: float = Field(gt=0.0, description='The grade, such as "G 2.5", "2.5 mm/s" or 2.5')
     at_speed: PositiveSpeed
     permissible: UnbalanceAmount | None = None
+
+    usual: ClassVar[Mapping[str, Usual]] = {
+        "at_speed": Usual(least=1.0, most=2e4, kind="speed", look="check the unit"),
+    }
 
     @classmethod
     def rewritten(cls, raw: dict[str, Any]) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
+from rotordrop.elements.ball_bearing import BallBearing
 from rotordrop.elements.description import LARGEST_FILE, Description, Misfit, UnknownKey
 from rotordrop.errors import MachineFileError, UsageError
 from rotordrop.machine.machine import Machine
@@ -22,7 +23,7 @@ D = TypeVar("D", bound=Description)
 
 _UNION_TAGS = {"by_length", "by_nodes"}
 _DECIMAL_COMMA = re.compile(r"=\s*([+-]?\d+),(\d+)(?!\s*\])")
-_ALIASES = {"preload_class": "preload", "clearance_class": "clearance", "grade_mm_s": "grade"}
+_ALIASES = {**BallBearing.written_as, "grade_mm_s": "grade"}
 _EXPECTED = {
     "tuple_type": "expected a list, [[…]] for a list of tables",
     "model_type": "expected a table, {…} or [header]",

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-from rotordrop.elements.ball_bearing import BallBearing
 from rotordrop.elements.description import Description
 from rotordrop.elements.rotor import Rotor
 from rotordrop.elements.unbalance import BalanceGrade
@@ -80,10 +79,9 @@ def _shorthand(part: Description, content: dict[str, Any]) -> dict[str, Any]:
     if isinstance(part, BalanceGrade):
         grade = _Written(_plain_text(f"G {repr(part.grade_mm_s).removesuffix('.0')}"))
         content = {"grade": grade} | {key: value for key, value in content.items() if key != "grade_mm_s"}
-    if isinstance(part, BallBearing) and "preload_class" in content:
-        content["preload"] = content.pop("preload_class")
-    if isinstance(part, BallBearing) and "clearance_class" in content:
-        content["clearance"] = content.pop("clearance_class")
+    for field, key in part.written_as.items():
+        if field in content:
+            content[key] = content.pop(field)
     return content
 
 

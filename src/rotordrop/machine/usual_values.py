@@ -12,16 +12,9 @@ from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
 
-from rotordrop.elements.ball_bearing import BallBearing
-from rotordrop.elements.contact import Contact
 from rotordrop.elements.description import Description
-from rotordrop.elements.friction import Friction
 from rotordrop.elements.magnet import ActiveMagneticBearing
-from rotordrop.elements.material import Material
-from rotordrop.elements.rotor import Rotor, Section
-from rotordrop.elements.sensor import Sensor
 from rotordrop.elements.touchdown_bearing import TouchdownBearing
-from rotordrop.elements.unbalance import BalanceGrade
 from rotordrop.elements.values import LEFT_OUT
 from rotordrop.known import Known
 from rotordrop.machine.machine import Machine
@@ -51,67 +44,6 @@ class Doubt:
     limit: float
     message: str
 
-
-@dataclass(frozen=True, kw_only=True)
-class Usual:
-    """Bounds of one entry and what to look at beyond them."""
-
-    least: float
-    most: float
-    kind: str
-    look: str
-    label: str = ""
-
-
-_UNIT = "check the unit"
-_ELASTIC = Usual(least=20e9, most=700e9, kind="pressure", look="E of steel is 210 GPa; check the unit")
-_DENSITY = Usual(least=800.0, most=2.3e4, kind="density", look="steel has 7850 kg/m^3; check the unit")
-_POISSON = Usual(least=0.05, most=0.499, kind="dimensionless", look="metals have 0.25 to 0.35")
-_FRICTION = Usual(
-    least=0.005,
-    most=0.8,
-    kind="dimensionless",
-    look="steel on steel has 0.05 to 0.4; is it in percent?",
-    label="dynamic friction",
-)
-
-USUAL: dict[tuple[type[Description], str], Usual] = {
-    (Material, "youngs_modulus"): _ELASTIC,
-    (Material, "density"): _DENSITY,
-    (Material, "poisson_ratio"): _POISSON,
-    (Section, "layer_density"): _DENSITY,
-    (Rotor, "modal_damping"): Usual(
-        least=0.0, most=0.3, kind="dimensionless", look="a shaft has 0.001 to 0.05; is it in percent?"
-    ),
-    (BallBearing, "ring_youngs_modulus"): _ELASTIC,
-    (BallBearing, "ball_youngs_modulus"): _ELASTIC,
-    (BallBearing, "ring_poisson_ratio"): _POISSON,
-    (BallBearing, "ball_poisson_ratio"): _POISSON,
-    (BallBearing, "ball_density"): _DENSITY,
-    (Contact, "damping"): Usual(
-        least=0.0,
-        most=20.0,
-        kind="contact_damping",
-        look="steel has 0.05 to 0.5 s/m at low speed",
-        label="contact damping",
-    ),
-    (Friction, "dynamic"): _FRICTION,
-    (Friction, "static"): Usual(
-        least=0.005,
-        most=1.2,
-        kind="dimensionless",
-        look="it is 1 to 1.5 times the dynamic coefficient",
-        label="static friction",
-    ),
-    (Sensor, "gain"): Usual(
-        least=0.5, most=2.0, kind="dimensionless", look="true displacement over reading is near 1"
-    ),
-    (Sensor, "sensitivity"): Usual(
-        least=1e2, most=1e7, kind="voltage_sensitivity", look="eddy-current sensors have 1 to 100 mV/um"
-    ),
-    (BalanceGrade, "at_speed"): Usual(least=1.0, most=2e4, kind="speed", look=_UNIT),
-}
-"""Entries with bounds of their own: constants of materials and of instruments, which do not scale."""
 
 SURFACE_SPEED = 700.0
 """Speed of the surface [m/s] no rotor of steel or titanium withstands: its hoop stress ρ v² is 3.8 GPa."""
@@ -154,7 +86,7 @@ def _inside(value: Any, name: str) -> Iterator[tuple[Description, str]]:
 
 
 def _bounded(part: Description, field: str, value: Known, name: str) -> Iterator[Doubt]:
-    usual = next((USUAL[base, field] for base in type(part).__mro__ if (base, field) in USUAL), None)
+    usual = part.usual.get(field)
     if usual is None or value is LEFT_OUT:
         return
     label = usual.label or field.replace("_", " ")
