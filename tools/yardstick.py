@@ -2,7 +2,7 @@
 
     python tools/yardstick.py make OUTDIR [--quick-set | --all | --only NAME ...] [--work FOLDER]
     python tools/yardstick.py compare EXPECTED ACTUAL [--allow NAME ...] [--within SHARE] [--full]
-    python tools/yardstick.py times [--rounds 5]
+    python tools/yardstick.py times [--rounds 5] [--output FILE]
     python tools/yardstick.py list
 
 What is expected lies in ``tests/yardstick``. Cases run by command line, so that they outlive a move of
@@ -340,7 +340,13 @@ LONG = 24
 WIDTH = 160
 MANY = 16
 """Rows of a table from which on only the first half as many stand there, and a digest of all."""
-UNKNOWN_COMMAND = ("No such command", "No such option", "No module named", "Got unexpected extra argument")
+UNKNOWN_COMMAND = (
+    "there is no command",
+    "is not one of",
+    "No such option",
+    "No module named",
+    "Got unexpected extra argument",
+)
 
 
 # ---------------------------------------------------------------------------------------------- making
@@ -409,6 +415,10 @@ def _run(case: Case, work: Path, known: dict[str, Case]) -> tuple[dict[str, Any]
         for file in _files(case)
         if file == "stdout" or (work / file).is_file()
     }
+    absent = [file for file in _files(case) if file != "stdout" and not (work / file).is_file()]
+    if absent:
+        result["not_written"] = absent
+        print(f"{case.name}: not written: {', '.join(absent)}", file=sys.stderr, flush=True)
     return result, seconds
 
 
@@ -571,7 +581,7 @@ def internals(states: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
     from rotordrop.machine import example_machine, load_machine
     from rotordrop.rotor.parameters import build_drop_model
     from rotordrop.simulate._histories import stored_energy
-    from rotordrop.simulate._rhs import drop_derivative
+    from rotordrop.simulate._rhs import drop_derivative, scratch_of
     from rotordrop.simulate._sensitivity import drop_jacobian
     from rotordrop.simulate.case import DropCase, LevitatedStart
     from rotordrop.simulate.levitation import start_of_drop
@@ -603,7 +613,7 @@ def internals(states: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
         n = len(at)
         rates, jacobians = np.empty((len(given), n)), np.empty((len(given), n, n))
         energy, power = np.empty(len(given)), np.empty((len(given), 2))
-        work, size = np.empty((2, parameters.balls.shape[2])), layout.rotor_angle + 1
+        work, size = scratch_of(parameters), layout.rotor_angle + 1
         for i, values in enumerate(given):
             state, rate, jacobian = layout.zeros(), layout.zeros(), np.zeros((size, size))
             state[at] = values
@@ -695,26 +705,27 @@ def make_internals(out: Path) -> None:
     np.savez_compressed(out / f"{INTERNALS}.npz", **sample)
 
 
-def compare_internals(expected: Path, actual: Path) -> Iterator[str]:
+def compare_internals(expected: Path, actual: Path) -> Iterator[tuple[float, str]]:
     """How far the sampled numbers are apart, relative to the largest of their kind in the sample."""
     import numpy as np
 
     old, new = np.load(expected), np.load(actual)
     for key in old.files:
         if key not in new.files or old[key].shape != new[key].shape:
-            yield f"{key}: missing or of another shape"
+            yield math.inf, f"{key}: missing or of another shape"
             continue
         before, after = old[key], new[key]
         if key.endswith("jacobians"):
-            # an entry counts beside the largest one of its row, each scaled by the size of its column
-            scale = np.max(np.abs(before), axis=2, keepdims=True)
+            # an entry counts beside the largest one of its row, its column scaled to the others
+            rows = np.max(np.abs(before), axis=2, keepdims=True)
+            scale = rows * np.max(np.abs(before) / np.where(rows > 0.0, rows, 1.0), axis=1, keepdims=True)
         else:
             scale = np.max(np.abs(before), axis=0, keepdims=True)
         apart = np.abs(after - before)
         share = np.max(apart / np.where(scale > 0.0, scale, 1.0))
         one = np.max(np.where(apart > 0.0, apart / np.maximum(np.abs(before), 1e-300), 0.0))
         if share > 0.0:
-            yield f"{key}: up to {share:.2e} of the largest, {one:.2e} of the number itself"
+            yield share, f"{key}: up to {share:.2e} of the largest, {one:.2e} of the number itself"
 
 
 # ------------------------------------------------------------------------------------------- comparing
@@ -722,13 +733,17 @@ def compare_internals(expected: Path, actual: Path) -> Iterator[str]:
 
 @dataclass(frozen=True, kw_only=True)
 class Difference:
-    """One place where two documents differ; ``size`` relative, or in half widths of its interval."""
+    """One place where two documents differ; ``size`` relative, or in half widths of its interval.
+
+    A ``sampled`` digest says only that something moved; numbers beside it say how far.
+    """
 
     path: str
     old: Any
     new: Any
     size: float = math.inf
     of_half_width: bool = False
+    sampled: bool = False
 
     def __str__(self) -> str:
         text = f"{self.path}: {_short(self.old)} -> {_short(self.new)}"
@@ -748,29 +763,44 @@ MISSING = "(missing)"
 def differences(old: Any, new: Any, path: str = "", half_width: float = 0.0) -> Iterator[Difference]:
     """All places where two documents differ, in the order of the old one."""
     if isinstance(old, dict) and isinstance(new, dict):
-        half_width = _half_width(old)
-        for key in [*old, *(k for k in new if k not in old)]:
-            place = f"{path}/{key}"
-            if key not in old or key not in new:
-                yield Difference(path=place, old=old.get(key, MISSING), new=new.get(key, MISSING))
-            else:
-                yield from differences(old[key], new[key], place, half_width)
-        if list(old) != list(new) and set(old) == set(new):
-            yield Difference(path=f"{path} (order)", old=list(old), new=list(new))
+        yield from _of_mappings(old, new, path)
     elif isinstance(old, list) and isinstance(new, list):
         if len(old) != len(new):
             yield Difference(path=f"{path} (length)", old=len(old), new=len(new))
         for i, pair in enumerate(zip(old, new, strict=False)):
             yield from differences(*pair, f"{path}/{i}", half_width)
-    elif type(old) is not type(new) or old != new:
-        numbers = all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in (old, new))
-        if not numbers:
-            yield Difference(path=path, old=old, new=new)
-            return
-        # counts, starts and bounds have no interval of their own, so a half width holds for fractions only
-        in_widths = half_width > 0.0 and isinstance(old, float)
-        scale = half_width if in_widths else max(abs(old), abs(new))
-        yield Difference(path=path, old=old, new=new, size=abs(new - old) / scale, of_half_width=in_widths)
+    elif (type(old) is not type(new) or old != new) and not (_is_nan(old) and _is_nan(new)):
+        yield _of_values(old, new, path, half_width)
+
+
+def _of_mappings(old: dict[str, Any], new: dict[str, Any], path: str) -> Iterator[Difference]:
+    half_width = _half_width(old)
+    for key in [*old, *(k for k in new if k not in old)]:
+        place = f"{path}/{key}"
+        if key not in old or key not in new:
+            yield Difference(path=place, old=old.get(key, MISSING), new=new.get(key, MISSING))
+        elif key == "sha256" and ("sample" in old or "first" in old):
+            if old[key] != new[key]:
+                yield Difference(path=place, old=old[key], new=new[key], sampled=True)
+        else:
+            yield from differences(old[key], new[key], place, half_width)
+    if list(old) != list(new) and set(old) == set(new):
+        yield Difference(path=f"{path} (order)", old=list(old), new=list(new))
+
+
+def _of_values(old: Any, new: Any, path: str, half_width: float) -> Difference:
+    numbers = all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in (old, new))
+    if not numbers or _is_nan(old) or _is_nan(new):
+        return Difference(path=path, old=old, new=new)
+    # a count has no interval of its own
+    in_widths = half_width > 0.0 and isinstance(old, float)
+    scale = half_width if in_widths else max(abs(old), abs(new))
+    size = abs(new - old) / scale if scale > 0.0 else 0.0
+    return Difference(path=path, old=old, new=new, size=size, of_half_width=in_widths)
+
+
+def _is_nan(value: Any) -> bool:
+    return isinstance(value, float) and math.isnan(value)
 
 
 def _half_width(entry: dict[str, Any]) -> float:
@@ -792,11 +822,13 @@ def compare(expected: Path, actual: Path, allowed: list[str], within: float, ful
         pair = (json.loads(p.read_text(encoding="utf-8")) for p in (old, new))
         found = list(differences(*pair))
         numbers = [d for d in found if math.isfinite(d.size)]
-        # a digest says only that something moved; beside it stand the numbers that say how far
-        beyond = [d for d in found if d.size > within and not (within > 0.0 and d.path.endswith("/sha256"))]
+        beyond = [d for d in found if d.size > within and not (d.sampled and within > 0.0)]
         extra: list[str] = []
         if name == INTERNALS and found:
-            extra = list(compare_internals(expected / f"{name}.npz", actual / f"{name}.npz"))
+            apart = list(compare_internals(expected / f"{name}.npz", actual / f"{name}.npz"))
+            extra = [line for _, line in apart]
+            if within > 0.0 and all(share <= within for share, _ in apart):
+                beyond = [d for d in beyond if not d.path.endswith("/sha256")]
         if not found:
             print(f"{name}: equal")
             continue
@@ -848,8 +880,8 @@ def timed_actions() -> dict[str, Callable[[], Any]]:
     quick, accurate = build_drop_model(paper, "quick"), build_drop_model(paper, "accurate")
     naive = NaiveDrop(quick, CASE)
     machine = load_machine(GIVEN / "lp400_calibrated.toml")
-    record = read_record(example_record_path("lp400_drop_060"))
-    tail = read_record(example_record_path("lp400_drop_060_tail"))
+    record = read_record(example_record_path("lp400_drop_060"), machine)
+    tail = read_record(example_record_path("lp400_drop_060_tail"), machine)
     problem = twin_problem(machine, read_evidence(build_drop_model(machine), record, tail))
     settings = stage_settings(problem, FINE_SCHEDULE[-1])
     samples = sum(1 for t in problem.time if t <= WINDOW)
@@ -865,10 +897,10 @@ def timed_actions() -> dict[str, Callable[[], Any]]:
     }
 
 
-def times(rounds: int) -> None:
+def times(rounds: int, output: Path | None) -> None:
     """Medians of processor times, and each over the naive reference of the same round."""
-    from statistics import median
-
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ[name] = "1"  # before anything loads numpy
     actions = timed_actions()
     for action in actions.values():
         action()
@@ -881,7 +913,7 @@ def times(rounds: int) -> None:
                 began = time.process_time()
                 action()
                 spent.append(time.process_time() - began)
-            seen[name].append(median(spent))
+            seen[name].append(statistics.median(spent))
     fresh = "from rotordrop.simulate.fingerprint import fingerprint; fingerprint()"
     first: list[float] = []
     for _ in range(rounds + 1):
@@ -891,13 +923,16 @@ def times(rounds: int) -> None:
         first.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
     seen["first result, warm"] = first[1:]
     reference = next(iter(seen.values()))
-    print(f"{'':28}{'median':>12}{'over naive':>14}{'spread':>9}")
+    lines = [f"{'':28}{'median':>12}{'over naive':>14}{'spread':>9}"]
     for name, spent in seen.items():
         ratio = [s / r for s, r in zip(spent, reference, strict=True)]
         spread = (max(ratio) - min(ratio)) / statistics.median(ratio)
-        print(
-            f"{name:28}{1e3 * statistics.median(spent):9.2f} ms{statistics.median(ratio):14.5f}{spread:9.1%}"
-        )
+        time_ms = 1e3 * statistics.median(spent)
+        lines.append(f"{name:28}{time_ms:9.2f} ms{statistics.median(ratio):14.5f}{spread:9.1%}")
+    text = "\n".join(lines)
+    print(text)
+    if output is not None:
+        output.write_text(text + "\n", encoding="utf-8")
 
 
 # ------------------------------------------------------------------------------------------------ main
@@ -933,12 +968,13 @@ def main() -> int:
     verb.add_argument("--full", action="store_true")
     verb = verbs.add_parser("times", help="time the work that counts")
     verb.add_argument("--rounds", type=int, default=5)
+    verb.add_argument("--output", type=Path, help="also write the table to this file")
     verbs.add_parser("list", help="name the cases")
     options = parser.parse_args()
     if options.verb == "compare":
         return compare(options.expected, options.actual, options.allow, options.within, options.full)
     if options.verb == "times":
-        times(options.rounds)
+        times(options.rounds, options.output)
     elif options.verb == "list":
         for case in CASES:
             print(f"{case.name:24}{'quick' if case.quick else '':8}{case.commands[0]}")
