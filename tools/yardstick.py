@@ -342,6 +342,7 @@ MANY = 16
 """Rows of a table from which on only the first half as many stand there, and a digest of all."""
 UNKNOWN_COMMAND = (
     "there is no command",
+    "No such command",
     "is not one of",
     "No such option",
     "No module named",

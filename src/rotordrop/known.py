@@ -8,22 +8,23 @@ from typing import Any, Literal
 NINETY = 1.6448536269514722
 """Half width of a 90 % interval in standard deviations of a normal distribution [1]."""
 
-Status = Literal[
-    "given",
-    "guess",
-    "estimated",
-    "default",
-    "inferred",
-    "determined",
-    "weakly determined",
-    "at its bound",
-    "the record does not determine it",
-    "known from the calibration",
-    "the model does not fit the record",
-    "of the cross-check: the model does not fit the record",
-    "taken over",
-]
-"""How a value of a machine is known, or the verdict on one that a record was asked for."""
+Provenance = Literal["given", "guess", "estimated", "default", "inferred"]
+"""How a value of a machine is known; what a machine file may say."""
+
+Status = (
+    Provenance
+    | Literal[
+        "determined",
+        "weakly determined",
+        "at its bound",
+        "the record does not determine it",
+        "known from the calibration",
+        "the model does not fit the record",
+        "of the cross-check: the model does not fit the record",
+        "taken over",
+    ]
+)
+"""How a value is known, or the verdict on one that a record was asked for."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from rotordrop.elements.touchdown_bearing import palmgren_stiffness
+from rotordrop.elements.contact import palmgren_stiffness
 from rotordrop.errors import UsageError
 from rotordrop.machine import BalanceGrade, example_machine, loads_machine
 
