@@ -181,6 +181,10 @@ class Parameter:
     group: Literal["plane", "machine"] = "machine"
     measured_by: str = ""
     separated_by: dict[str, str] = dataclasses.field(default_factory=dict)
+    floor: float | None = None
+    """Where published intervals end [SI]."""
+    model_error: float = 0.0
+    """Standard error by what a fit leaves out of it, as a share of its value [1]."""
     read: Callable[[Any], Known] | None = None
     """The described value of a part, where it does not stand at the path."""
     estimated_by: Callable[[Any], Measure] | None = None

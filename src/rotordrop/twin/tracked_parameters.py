@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rotordrop.elements.parameter import Parameter
 from rotordrop.elements.table import parameter
+from rotordrop.elements.touchdown_bearing import MODEL_GAP_ERROR
 from rotordrop.estimate.bearing_values import equivalent_stiffness, published_values, static_friction
 from rotordrop.estimate.estimate import FittedParameter, JointEstimate, SensorErrors
 from rotordrop.known import NINETY, Known, Status
@@ -22,11 +23,6 @@ from rotordrop.twin.tracked_loads import INCONSISTENT, OF_CROSS_CHECK, with_inte
 
 Array = NDArray[np.float64]
 
-MODEL_GAP_SIGMA = 0.008
-"""Standard deviation of a gap, over it, by what confounds it with gains and offsets beyond the fit [1].
-
-Sensors that read 1 % of the motion across, as mounted 0.6° aside, moved gaps of lone drops by up to 2 %.
-"""
 UNSURE_GAP = 0.05
 """Relative prior standard deviation from which an air gap counts as guessed [1]."""
 PARAMETER_WIDENING = 1.5
@@ -65,12 +61,12 @@ def identified(unknown: Unknown, theta: float, sigma: float, widening: float = 1
 def within_bounds(row: Parameter, interval: tuple[float, float]) -> tuple[float, float]:
     """An interval that ends where the quantity does: no air gap is below zero."""
     low, high = interval
-    return (max(low, 0.0), max(high, 0.0)) if row is parameter("air_gap") else interval
+    return interval if row.floor is None else (max(low, row.floor), max(high, row.floor))
 
 
 def left_out(unknown: Unknown) -> float:
     """Standard error of a parameter by what the fit leaves out of it."""
-    return MODEL_GAP_SIGMA * unknown.begin if unknown.parameter is parameter("air_gap") else 0.0
+    return unknown.parameter.model_error * unknown.begin
 
 
 def model_error(unknown: Unknown, sigma: float) -> float:
@@ -151,7 +147,7 @@ def gap_of_record(problem: DropProblem, b: int) -> Known:
     value = float(problem.mean[entry])
     return replace(
         with_interval(
-            value, math.hypot(math.sqrt(problem.covariance[entry, entry]), MODEL_GAP_SIGMA * value)
+            value, math.hypot(math.sqrt(problem.covariance[entry, entry]), MODEL_GAP_ERROR * value)
         ),
         status=OF_CROSS_CHECK,
         unit="m",
