@@ -22,9 +22,9 @@ from pathlib import Path
 from typing import Any
 
 from rotordrop.evidence.evidence import Evidence, read_evidence
+from rotordrop.identification.replica import build_replica
+from rotordrop.identification.support import SupportFit, fit_support, impact_problem
 from rotordrop.machine import example_machine
-from rotordrop.replay.problem import replay_problem
-from rotordrop.replay.supports import SupportFit, fit_supports
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop_bench import hidden_machine, synthesize_drop
 
@@ -43,8 +43,11 @@ def fallen() -> Evidence:
 
 def fit(evidence: Evidence, threads: int) -> SupportFit:
     """One fit as the replay makes it."""
-    problem = replay_problem(evidence, until=UNTIL)
-    return fit_supports(problem, evidence.latest_first_contact, starts=STARTS, threads=threads)
+    coarse, fine = (
+        impact_problem(build_replica(evidence, model, until=UNTIL))
+        for model in (build_drop_model(evidence.model.machine, "quick"), evidence.model)
+    )
+    return fit_support(coarse, fine, evidence.latest_first_contact, starts=STARTS, threads=threads)
 
 
 def main() -> None:
@@ -66,8 +69,8 @@ def main() -> None:
     results: dict[str, Any] = {
         "starts": STARTS,
         "threads": options.threads,
-        "simulations": found.simulations,
-        "misfit": found.best.misfit,
+        "simulations": found.coarse.evaluations + found.search.evaluations,
+        "misfit": found.search.best.misfit,
         "wall_s": walls,
         "processor_s": processors,
         "median_wall_s": statistics.median(walls),

@@ -31,15 +31,17 @@ from numpy.typing import NDArray
 from rotordrop.evidence.air_gap import identify_air_gap
 from rotordrop.evidence.evidence import Evidence, read_evidence
 from rotordrop.evidence.evidence import known as present
-from rotordrop.known import Known
-from rotordrop.replay.problem import ReplayProblem, replay_problem
-from rotordrop.replay.supports import (
+from rotordrop.identification.replica import build_replica
+from rotordrop.identification.support import (
     LONGEST_WINDOW,
+    ImpactFit,
     SupportFit,
-    fit_supports,
+    fit_support,
     identified_values,
+    impact_problem,
     refit_with_friction,
 )
+from rotordrop.known import Known
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop_bench import hidden_machine, synthesize_drop
 
@@ -48,16 +50,17 @@ Array = NDArray[np.float64]
 UNTIL = 0.06
 
 
-def supports_of(evidence: Evidence) -> tuple[SupportFit, dict[str, Known], ReplayProblem, Array]:
+def supports_of(evidence: Evidence) -> tuple[SupportFit, dict[str, Known], ImpactFit, Array]:
     """Supports as the replay finds them, but for the sweep of the friction, which is known here."""
-    problem = replay_problem(evidence, until=UNTIL)
-    found = fit_supports(problem, evidence.latest_first_contact)
-    values = identified_values(problem, found.best.z, found.covariance, found.best.at_bound)
+    quick = build_drop_model(evidence.model.machine, "quick")
+    coarse, fine = (
+        impact_problem(build_replica(evidence, model, until=UNTIL)) for model in (quick, evidence.model)
+    )
+    found = fit_support(coarse, fine, evidence.latest_first_contact)
     longest = evidence.latest_first_contact + LONGEST_WINDOW
-    friction = values[problem.paths[problem.friction]]
-    problem, again = refit_with_friction(problem, found, friction, longest)
-    z = again.best.z
-    return found, identified_values(problem, z, again.covariance, again.best.at_bound), problem, z
+    friction = found.values[fine.vector.paths[fine.vector.friction]]
+    problem, x, covariance = refit_with_friction(fine, found.search.best, friction, longest=longest)
+    return found, identified_values(problem, x, covariance), problem, x
 
 
 def one(seed: int, hertz: float) -> dict[str, Any]:
@@ -68,9 +71,9 @@ def one(seed: int, hertz: float) -> dict[str, Any]:
     began, used = time.perf_counter(), time.process_time()
     model = build_drop_model(with_right_sensors(informed(known, hidden)))
     evidence = read_evidence(model, drop.record, drop.tail)
-    found, values, problem, z = supports_of(evidence)
-    best = found.best
-    rows = problem.bearing_rows(z)
+    found, values, problem, x = supports_of(evidence)
+    best = found.search.best
+    rows = problem.replica.bearing_rows(problem.vector, x[: len(problem.vector)])
     settled = replace(evidence.model, parameters=evidence.model.parameters._replace(bearing=rows))
     gap = identify_air_gap(present(evidence.rest), settled, present(evidence.sensing))
     bearings = {}
@@ -95,7 +98,7 @@ def one(seed: int, hertz: float) -> dict[str, Any]:
         "bearings": bearings,
         "misfit": best.misfit,
         "window_after_later_contact_ms": 1e3 * (best.window - evidence.latest_first_contact),
-        "ended_early": found.ended_early,
+        "ended_early": found.search.ended_early or found.coarse.ended_early,
         "wall_s": time.perf_counter() - began,
         "processor_s": time.process_time() - used,
     }

@@ -1,4 +1,4 @@
-"""How far a simulated drop follows the record: windows, contacts, bounces, sweep of the friction."""
+"""How far a simulated drop follows the record: distances in windows, contact times, bounces, horizon."""
 
 from __future__ import annotations
 
@@ -7,54 +7,88 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.known import Known
+from rotordrop.evidence.first_contact import contact_intervals
+from rotordrop.identification.friction import orbit_disagreement
 
 Array = NDArray[np.float64]
+
+AFTER_CONTACT = 2e-3
+"""What of the flight after the first contacts belongs to the first window [s]."""
+
+WINDOWS = (0.02, 0.05, 0.2)
+"""Ends of the other windows [s from power-off]."""
+
+COMPARABLE_SHARE = 0.1
+"""Two orbits are compared point by point until they differ by this share of the air gap [1]."""
+
+RUNNING = 2e-3
+"""Length of the running mean behind the horizon [s]."""
+
+CONTACTS_LISTED = 6
 
 
 @dataclass(frozen=True, kw_only=True)
 class WindowAgreement:
-    """Agreement over one window; B bearings."""
+    """Agreement over one window; B bearings.
+
+    Attributes
+    ----------
+    name : str
+        The window in words.
+    start, end : float
+        From power-off [s].
+    rms : ndarray, shape (B,)
+        Root mean square distance of the orbits [m].
+    """
 
     name: str
-    """The window in words."""
     start: float
-    """From power-off [s]."""
     end: float
-    """From power-off [s]."""
     rms: Array
-    """Root mean square distance of the orbits, shape (B,) [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class BearingAgreement:
-    """Contacts and bounces of one bearing; K contacts."""
+    """Contacts and bounces of one bearing; K contacts.
+
+    Attributes
+    ----------
+    measured_contacts, simulated_contacts : ndarray, shape (K, 2)
+        Begin and end of the first contacts [s from power-off].
+    measured_bounce, simulated_bounce : float
+        Height of the first bounce above the rest position [m]; NaN when it was not seen.
+    horizon : float
+        Time up to which the orbits differ by less than a tenth of the air gap [s from power-off].
+    """
 
     measured_contacts: Array
-    """Begin and end of the first contacts, shape (K, 2) [s from power-off]."""
     simulated_contacts: Array
-    """The same in the simulated drop."""
     measured_bounce: float
-    """Height of the first bounce above the rest position [m]; NaN where none is seen."""
     simulated_bounce: float
-    """The same in the simulated drop [m]."""
     horizon: float
-    """Time up to which the orbits differ by less than a tenth of the air gap [s from power-off]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Agreement:
-    """Agreement of a simulated drop with the record."""
+    """Agreement of a simulated drop with the record.
+
+    Attributes
+    ----------
+    windows : tuple of WindowAgreement
+        First contact, 20, 50 and 200 ms.
+    bearings : tuple of BearingAgreement
+        Contacts, bounces, horizon of every bearing.
+    disagreement : float
+        The one number of the friction sweep for these orbits [m].
+    expected_horizon : float or None
+        Time up to which draws of all uncertain values stay within a tenth of the air gap of each other [s]:
+        beyond it a point-by-point comparison means nothing even with a right model.
+    """
 
     windows: tuple[WindowAgreement, ...]
-    """First contact, 20, 50 and 200 ms."""
     bearings: tuple[BearingAgreement, ...]
-    """Contacts, bounces, horizon of every bearing."""
     disagreement: float
-    """Weighted distance of the orbits, the number that the friction sweep minimises [m]."""
     expected_horizon: float | None = None
-    """Time up to which draws of all uncertain values stay within a tenth of the air gap of each other [s]:
-    beyond it a point-by-point comparison means nothing even with a right model."""
 
     @property
     def horizon(self) -> Array:
@@ -62,17 +96,88 @@ class Agreement:
         return np.array([bearing.horizon for bearing in self.bearings])
 
 
-@dataclass(frozen=True, kw_only=True)
-class FrictionSweep:
-    """Agreement of the orbits over friction coefficients; K coefficients, D draws."""
+def compare_orbits(
+    time: Array, measured: Array, simulated: Array, gaps: Array, *, expected_horizon: float | None = None
+) -> Agreement:
+    """Compare a measured and a simulated orbit on the same times.
 
-    coefficients: Array
-    """Dynamic coefficients, shape (K,) [1]."""
-    disagreement: Array
-    """Weighted distance of simulated and measured orbit, shape (K,) [m rms]."""
-    best: Array
-    """Best coefficient with the best parameters, then with each draw of them, shape (D + 1,) [1]."""
-    value: Known
-    """The dynamic coefficient."""
-    window: tuple[float, float]
-    """Compared part of the drop [s from power-off]."""
+    Parameters
+    ----------
+    time : ndarray, shape (T,)
+        From power-off [s].
+    measured, simulated : ndarray, shape (T, B, 2)
+        Displacements at the bearings [m].
+    gaps : ndarray, shape (B,)
+        Air gaps [m].
+    expected_horizon : float, optional
+        Horizon that the spread of draws leaves [s].
+    """
+    apart = np.hypot(*np.moveaxis(simulated - measured, -1, 0))
+    contacts = [
+        (_contacts(time, measured[:, b], gaps[b]), _contacts(time, simulated[:, b], gaps[b]))
+        for b in range(len(gaps))
+    ]
+    firsts = [seen[0] for seen, _ in contacts if len(seen)]
+    begin = min((first[0] for first in firsts), default=float(time[0]))
+    close = max((first[1] for first in firsts), default=float(time[0]))
+    inside = time >= begin
+    return Agreement(
+        windows=_windows(time, apart, begin, close),
+        bearings=tuple(
+            _bearing(time, measured[:, b], simulated[:, b], float(gaps[b]), apart[:, b], *contacts[b])
+            for b in range(len(gaps))
+        ),
+        disagreement=orbit_disagreement(time[inside], apart[inside], begin),
+        expected_horizon=expected_horizon,
+    )
+
+
+def _windows(time: Array, apart: Array, begin: float, close: float) -> tuple[WindowAgreement, ...]:
+    spans = [("first contact", begin, close + AFTER_CONTACT)]
+    spans += [(f"{1e3 * end:.0f} ms", 0.0, end) for end in WINDOWS]
+    found = []
+    for name, start, end in spans:
+        inside = (time >= start) & (time <= end)
+        if inside.any():
+            rms = np.sqrt(np.mean(apart[inside] ** 2, axis=0))
+            found.append(WindowAgreement(name=name, start=start, end=min(end, float(time[-1])), rms=rms))
+    return tuple(found)
+
+
+def _contacts(time: Array, place: Array, gap: float) -> Array:
+    return contact_intervals(time, np.hypot(place[:, 0], place[:, 1]), float(gap))
+
+
+def _bearing(
+    time: Array, measured: Array, simulated: Array, gap: float, apart: Array, seen: Array, made: Array
+) -> BearingAgreement:
+    return BearingAgreement(
+        measured_contacts=seen[:CONTACTS_LISTED],
+        simulated_contacts=made[:CONTACTS_LISTED],
+        measured_bounce=_bounce(time, measured, seen, gap),
+        simulated_bounce=_bounce(time, simulated, made, gap),
+        horizon=horizon(time, apart, gap),
+    )
+
+
+def _bounce(time: Array, place: Array, contacts: Array, gap: float) -> float:
+    """Largest height above the lowest point of the air gap between first and second contact [m]."""
+    if not len(contacts):
+        return float("nan")
+    until = contacts[1, 0] if len(contacts) > 1 else float(time[-1])
+    flight = (time >= contacts[0, 1]) & (time <= until)
+    return float(place[flight, 1].max() + gap) if flight.any() else float("nan")
+
+
+def horizon(time: Array, apart: Array, gap: float) -> float:
+    """Time up to which orbits stay within a tenth of the air gap of each other [s], by a running mean."""
+    samples = max(1, round(RUNNING / float(time[1] - time[0])))
+    smooth = np.convolve(apart, np.full(samples, 1.0 / samples), mode="same")
+    beyond = np.flatnonzero(smooth > COMPARABLE_SHARE * gap)
+    return float(time[beyond[0]]) if len(beyond) else float(time[-1])
+
+
+def spread_horizon(time: Array, spread: Array, gaps: Array) -> float:
+    """Time up to which draws (T, B) [m] spread by less than a tenth of the air gap (B,) [s]."""
+    beyond = np.flatnonzero(np.any(spread > COMPARABLE_SHARE * gaps, axis=1))
+    return float(time[beyond[0]]) if len(beyond) else float(time[-1])

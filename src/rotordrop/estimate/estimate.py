@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from rotordrop.elements.parameter import Parameter
 from rotordrop.estimate.advice import Advice
 from rotordrop.estimate.agreement import Agreement
-from rotordrop.estimate.agreement import FrictionSweep as FrictionSweep
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.estimate.later_motion import LaterMotion
 from rotordrop.estimate.methods import Method
@@ -32,6 +31,7 @@ from rotordrop.evidence.power_off import PowerOff
 from rotordrop.evidence.quality.finding import Finding
 from rotordrop.evidence.speed import SpeedFit
 from rotordrop.files import write_json
+from rotordrop.identification.friction import FrictionSweep as FrictionSweep
 from rotordrop.known import Correlation, Known
 from rotordrop.machine import Machine
 from rotordrop.record.record import Record

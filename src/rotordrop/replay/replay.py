@@ -1,18 +1,19 @@
 """The paper's route: identify step by step, then replay the drop open loop (Neisi 2020, section 3, Fig. 4).
 
 A replay cannot follow a chaotic drop for long: after some contacts its force is that of *a* drop like the
-recorded one. Its intervals come from draws over everything uncertain; the tracked twin gives narrower ones.
+recorded one. What it can say is said with draws over everything uncertain; the tracked twin says more.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.estimate.agreement import Agreement
+from rotordrop.elements.parameter import Step
+from rotordrop.estimate.agreement import Agreement, compare_orbits, spread_horizon
 from rotordrop.estimate.assumptions import evidence_assumptions
 from rotordrop.estimate.estimate import Estimate, ReplaySteps, Verdict
 from rotordrop.estimate.fixed_values import Document, fixed_correlations, machine_with_fixed, read_fixed
@@ -21,27 +22,29 @@ from rotordrop.estimate.methods import Replay
 from rotordrop.estimate.record_facts import RecordFacts
 from rotordrop.evidence.air_gap import AirGap, identify_air_gap
 from rotordrop.evidence.evidence import Evidence, known, read_evidence
-from rotordrop.evidence.initial_state import covariance_root
+from rotordrop.evidence.initial_state import InitialState
+from rotordrop.identification.friction import FrictionSweep, sweep_friction
+from rotordrop.identification.replica import build_replica
+from rotordrop.identification.support import (
+    LONGEST_WINDOW,
+    ImpactFit,
+    SupportFit,
+    fit_support,
+    identified_values,
+    impact_problem,
+    refit_with_friction,
+)
+from rotordrop.known import Known
 from rotordrop.machine import Machine
 from rotordrop.record.record import Record
-from rotordrop.replay.agreement import compare_orbits, horizon
-from rotordrop.replay.friction import sweep_friction
-from rotordrop.replay.open_loop import FEWEST_DRAWS, Draws, draw_drops, seen_at_bearings, whole_drop
-from rotordrop.replay.problem import replay_problem
-from rotordrop.replay.result import (
-    Impacts,
-    Replayed,
-    identified_machine,
-    replay_bearings,
-    replay_parameters,
-    steps_document,
-)
-from rotordrop.replay.supports import (
-    LONGEST_WINDOW,
-    fit_supports,
-    identified_values,
-    refit_with_friction,
-    support_correlations,
+from rotordrop.replay.replay_estimate import Replayed, replay_bearings, replay_parameters, steps_document
+from rotordrop.replay.uncertainty import (
+    FEWEST_DRAWS,
+    Draws,
+    best_candidate,
+    draw_drops,
+    seen_at_bearings,
+    whole_drop,
 )
 from rotordrop.rotor.parameters import build_drop_model
 
@@ -49,16 +52,40 @@ Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
 DURATION = 0.2
-"""Length of the replay, that of Neisi 2020 [s]."""
-
 IDENTIFIED_UNTIL = 0.06
-"""Part of the drop that supports and friction are identified from at most [s]; longer than all windows."""
+"""Part of the drop that supports and friction are identified from at most [s]."""
 
-FOLLOWED_UNTIL = 7.5e-3
-"""Draws must follow the record this long after the later of the first contacts [s]; chosen, not measured."""
+KEPT_UNTIL = 7.5e-3
+"""Draws must keep to the record this long after the later of the first contacts [s]."""
 
 FRICTION_DRAWS = 6
 STAGES = {"supports": 0.06, "friction": 0.6, "replay": 0.68, "draws": 0.7}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Impacts:
+    """What the first impacts say: best unknowns with covariance, and the steps behind them.
+
+    Attributes
+    ----------
+    problem : ImpactFit
+        The drop with its unknowns.
+    x, covariance : ndarray, shapes (n,), (n, n)
+        Best unknowns and their covariance.
+    support : SupportFit or None
+        Fit of the supports; None when they were taken over.
+    friction : FrictionSweep or None
+        Sweep of the friction; None when it was taken over.
+    values : dict
+        Identified values by path.
+    """
+
+    problem: ImpactFit
+    x: Array
+    covariance: Array
+    support: SupportFit | None
+    friction: FrictionSweep | None
+    values: dict[str, Known]
 
 
 def replay_drop(
@@ -94,21 +121,22 @@ def replay_drop(
     -----
     Source: Neisi 2020, Fig. 4. Differs from the paper: the initial state comes from a fit over the whole
     fall, with gravity sag and remanent lift; the supports from windows that grow, with everything uncertain
-    fitted as well; the friction from a number; the intervals from draws.
+    marginalised; the friction from a number; the intervals from draws.
     """
     say = progress or (lambda text, share: None)
     document, origin = ({}, "") if method.fixed is None else read_fixed(method.fixed)
     start = machine_with_fixed(machine, document, origin) if origin else machine
     say("air gap, speed, initial state, first contact", 0.0)
     evidence = read_evidence(build_drop_model(start), record, tail, name=name)
+    initial = known(evidence.fall)
     impacts = _taken_over(evidence, document) if origin else _first_impacts(evidence, method, say)
-    gap = _gap_with_supports(evidence, impacts)
+    gap = _steady_gap(evidence, impacts)
     say("replay of the whole drop", STAGES["replay"])
-    replayed = _replayed(impacts, evidence, gap, _draws(impacts, evidence, method, say))
-    result, draws = replayed.result, replayed.draws
-    parameters = replay_parameters(start, impacts, gap)
-    noise = float(np.mean(known(evidence.fall).noise))
-    later = later_motion(result.bearing_names, *evidence.measured(np.inf), DURATION, noise)
+    replayed = _replay(impacts, evidence, gap, _draws(impacts, evidence, method, say))
+    found = replay_parameters(start, impacts.values, gap, impacts.friction)
+    later = later_motion(
+        replayed.result.bearing_names, *evidence.measured(np.inf), DURATION, float(np.mean(initial.noise))
+    )
     return Estimate(
         name=name,
         method=method,
@@ -118,90 +146,136 @@ def replay_drop(
         speed=evidence.speed.initial,
         until=DURATION,
         verdict=Verdict.OPEN_LOOP,
-        bearings=replay_bearings(start, evidence, gap, parameters, replayed),
-        parameters=parameters,
+        bearings=replay_bearings(start, evidence, gap, found, replayed),
+        parameters=found,
         agreement=_agreement(replayed, gap),
-        replay=ReplaySteps(
-            speed=evidence.speed,
-            contacts=known(evidence.contacts),
-            friction=impacts.friction,
-            correlations=impacts.correlations,
-            speed_time=result.time,
-            speed_simulated=result.speed,
-            fixed=origin,
-            draws=None if draws is None else len(draws),
-            rejected=None if draws is None else draws.rejected,
-            identified=identified_machine(start, impacts, gap),
-            document=steps_document(evidence, impacts, gap, replayed),
-        ),
+        replay=_steps(start, evidence, impacts, gap, replayed, origin),
         later=later,
         findings=facts.findings,
         warnings=facts.warnings_with(
-            *_warnings(evidence, impacts, draws), *(one.sentence() for one in later if one.larger)
+            *_warnings(evidence, initial, impacts, replayed.draws),
+            *(one.sentence() for one in later if one.larger),
         ),
         notes=_notes(evidence, gap),
         simulated_record=facts.simulated,
     )
 
 
+def _steps(
+    machine: Machine, evidence: Evidence, impacts: Impacts, gap: AirGap, replayed: Replayed, origin: str
+) -> ReplaySteps:
+    result, draws = replayed.result, replayed.draws
+    return ReplaySteps(
+        speed=evidence.speed,
+        contacts=known(evidence.contacts),
+        friction=impacts.friction,
+        correlations=() if impacts.support is None else impacts.support.correlations,
+        speed_time=result.time,
+        speed_simulated=result.speed,
+        fixed=origin,
+        draws=None if draws is None else len(draws),
+        rejected=None if draws is None else draws.rejected,
+        identified=_identified_machine(machine, impacts, gap),
+        document=steps_document(
+            evidence,
+            gap,
+            impacts.support,
+            impacts.friction,
+            draws,
+            result.bearing_names,
+            float(result.speed[-1]),
+        ),
+    )
+
+
 def _taken_over(evidence: Evidence, document: Document) -> Impacts:
-    """Supports and friction of an earlier estimate, with the errors stated there."""
-    problem = replay_problem(evidence, until=IDENTIFIED_UNTIL)
-    z, covariance = np.zeros(problem.size), np.eye(problem.size)
+    """Supports and friction of an earlier estimate, with their own uncertainty."""
+    problem = impact_problem(build_replica(evidence, evidence.model, until=IDENTIFIED_UNTIL))
+    covariance = np.diag(problem.prior_sigma**2)
+    paths = problem.vector.paths
     for pair in fixed_correlations(document):
-        if pair.first in problem.paths and pair.second in problem.paths:
-            i, k = problem.paths.index(pair.first), problem.paths.index(pair.second)
-            covariance[i, k] = covariance[k, i] = pair.value
+        if pair.first in paths and pair.second in paths:
+            i, k = paths.index(pair.first), paths.index(pair.second)
+            covariance[i, k] = covariance[k, i] = pair.value * problem.prior_sigma[i] * problem.prior_sigma[k]
     return Impacts(
         problem=problem,
-        z=z,
+        x=problem.prior_mean,
         covariance=covariance,
         support=None,
         friction=None,
-        values=identified_values(problem, z, covariance),
+        values=identified_values(problem, problem.prior_mean, covariance, given=True),
     )
 
 
 def _first_impacts(evidence: Evidence, method: Replay, say: Progress) -> Impacts:
-    """Supports by least squares on the first impacts, the sweep of the friction, then the supports again."""
-    problem = replay_problem(evidence, until=IDENTIFIED_UNTIL)
+    """Supports by least squares on the first impacts, then the sweep of the friction."""
+    quick = build_drop_model(evidence.model.machine, "quick")
+    coarse, fine = (
+        impact_problem(build_replica(evidence, model, until=IDENTIFIED_UNTIL))
+        for model in (quick, evidence.model)
+    )
     begin, end = STAGES["supports"], STAGES["friction"]
-    support = fit_supports(
-        problem,
+    support = fit_support(
+        coarse,
+        fine,
         evidence.latest_first_contact,
         starts=method.starts,
         threads=method.threads,
         progress=lambda text, share: say(f"supports: {text}", begin + (end - begin) * share),
     )
     say("friction sweep", end)
+    best = support.search.best
+    root = np.linalg.cholesky(support.covariance)
     random = np.random.Generator(np.random.Philox(11))
-    root = covariance_root(support.sweep_covariance)
-    draws = [
-        np.clip(support.best.z + root @ random.standard_normal(problem.size), *problem.bounds)
+    points = [
+        np.clip(best.x + root @ random.standard_normal(len(best.x)), *fine.bounds)
         for _ in range(FRICTION_DRAWS)
     ]
-    friction = sweep_friction(
-        problem, support.best.z, evidence.earliest_contact, draws=draws, threads=method.threads
-    )
+    friction = sweep_friction(fine, best.x, evidence.earliest_contact, draws=points, threads=method.threads)
     longest = evidence.latest_first_contact + LONGEST_WINDOW
-    problem, again = refit_with_friction(problem, support, friction.value, longest, threads=method.threads)
+    problem, x, covariance = refit_with_friction(
+        fine, best, friction.value, longest=longest, threads=method.threads
+    )
     return Impacts(
         problem=problem,
-        z=again.best.z,
-        covariance=again.covariance,
+        x=x,
+        covariance=covariance,
         support=support,
         friction=friction,
-        values=identified_values(problem, again.best.z, again.covariance, again.best.at_bound),
-        correlations=support_correlations(problem, again.covariance),
+        values=identified_values(problem, x, covariance, active=best.active),
     )
 
 
-def _gap_with_supports(evidence: Evidence, impacts: Impacts) -> AirGap:
-    """Air gap with the sag of the identified supports; within the fit it follows the sag of every trial."""
-    model = evidence.model
-    rows = impacts.problem.bearing_rows(impacts.z)
-    identified = replace(model, parameters=model.parameters._replace(bearing=rows))
-    return identify_air_gap(known(evidence.rest), identified, known(evidence.sensing))
+def _steady_gap(evidence: Evidence, impacts: Impacts) -> AirGap:
+    """Air gap with the sag of the identified supports.
+
+    Within the fit the gap follows the sag of every trial, so that it has come to rest with the supports.
+    """
+    model, problem = evidence.model, impacts.problem
+    rows = problem.replica.bearing_rows(problem.vector, impacts.x[: len(problem.vector)])
+    settled = replace(model, parameters=model.parameters._replace(bearing=rows))
+    return identify_air_gap(known(evidence.rest), settled, known(evidence.sensing))
+
+
+def _replay(impacts: Impacts, evidence: Evidence, gap: AirGap, draws: Draws | None) -> Replayed:
+    """The whole drop with the identified values, for the air gap and for its two limits."""
+    problem = impacts.problem
+    central = best_candidate(problem, impacts.x)
+    simulated = whole_drop(problem, central, duration=DURATION)
+    lower, upper = (
+        whole_drop(problem, central, duration=DURATION, gap_change=limit - gap.value)
+        for limit in (gap.lower, gap.upper)
+    )
+    time, measured = evidence.measured(DURATION)
+    return Replayed(
+        result=simulated,
+        middle=seen_at_bearings(problem, central, simulated),
+        lower=seen_at_bearings(problem, central, lower),
+        upper=seen_at_bearings(problem, central, upper),
+        time=time,
+        measured=measured,
+        draws=draws,
+    )
 
 
 def _draws(impacts: Impacts, evidence: Evidence, method: Replay, say: Progress) -> Draws | None:
@@ -210,9 +284,9 @@ def _draws(impacts: Impacts, evidence: Evidence, method: Replay, say: Progress) 
     begin = STAGES["draws"]
     return draw_drops(
         impacts.problem,
-        impacts.z,
+        impacts.x,
         impacts.covariance,
-        window=evidence.latest_first_contact + FOLLOWED_UNTIL if impacts.support is not None else 0.0,
+        window=evidence.latest_first_contact + KEPT_UNTIL if impacts.support is not None else 0.0,
         duration=DURATION,
         count=method.draws,
         threads=method.threads,
@@ -220,37 +294,39 @@ def _draws(impacts: Impacts, evidence: Evidence, method: Replay, say: Progress) 
     )
 
 
-def _replayed(impacts: Impacts, evidence: Evidence, gap: AirGap, draws: Draws | None) -> Replayed:
-    """The whole drop with the identified values, for the air gap and for its two limits."""
-    problem, z = impacts.problem, impacts.z
-    middle, lower, upper = (
-        whole_drop(problem, z, duration=DURATION, gap_change=limit - gap.value)
-        for limit in (gap.value, gap.lower, gap.upper)
-    )
-    time, measured = evidence.measured(DURATION)
-    return Replayed(
-        result=middle,
-        middle=seen_at_bearings(problem, z, middle),
-        lower=seen_at_bearings(problem, z, lower),
-        upper=seen_at_bearings(problem, z, upper),
-        time=time,
-        measured=measured,
-        draws=draws,
-    )
-
-
 def _agreement(replayed: Replayed, gap: AirGap) -> Agreement:
-    """Agreement of replay and record at the times of the record."""
-    flat = replayed.middle.reshape(len(replayed.middle), -1)
-    columns = [np.interp(replayed.time, replayed.result.time, column) for column in flat.T]
+    simulated = np.empty_like(replayed.measured)
+    for b in range(simulated.shape[1]):
+        for axis in range(2):
+            simulated[:, b, axis] = np.interp(
+                replayed.time, replayed.result.time, replayed.middle[:, b, axis]
+            )
     draws = replayed.draws
-    return compare_orbits(
-        replayed.time,
-        replayed.measured,
-        np.column_stack(columns).reshape(replayed.measured.shape),
-        gap.value,
-        expected_horizon=None if draws is None else horizon(draws.spread_time, draws.spread, gap.value),
-    )
+    expected = None if draws is None else spread_horizon(draws.spread_time, draws.spread, gap.value)
+    return compare_orbits(replayed.time, replayed.measured, simulated, gap.value, expected_horizon=expected)
+
+
+def _identified_machine(machine: Machine, impacts: Impacts, gap: AirGap) -> Machine:
+    """The machine with air gaps, supports, friction and contact as identified."""
+    values: dict[str, Known] = {}
+    vector = impacts.problem.vector
+    for unknown in vector.unknowns:
+        if unknown.parameter.path == "preload" or unknown.parameter.step is Step.SWEEP:
+            continue
+        value = impacts.values[unknown.path]
+        values[unknown.path] = Known(value=value.value, status="estimated", interval_90=value.interval_90)
+    for b, bearing in enumerate(machine.touchdown_bearings):
+        values[f"{bearing.name}.air_gap"] = Known(
+            value=float(gap.value[b]), status="estimated", standard_error=float(gap.standard_error[b])
+        )
+        if impacts.friction is not None:
+            dynamic = impacts.friction.value
+            ratio = float(bearing.friction.static) / float(bearing.friction.dynamic)
+            values[f"{bearing.name}.friction.dynamic"] = Known(
+                value=dynamic.value, status="estimated", interval_90=dynamic.interval_90
+            )
+            values[f"{bearing.name}.friction.static"] = Known(value=ratio * dynamic.value)
+    return machine.with_values(values)
 
 
 def _notes(evidence: Evidence, gap: AirGap) -> tuple[str, ...]:
@@ -258,28 +334,31 @@ def _notes(evidence: Evidence, gap: AirGap) -> tuple[str, ...]:
     return (
         *evidence_assumptions(evidence),
         "the settled tail cannot tell air gap from vertical sensor zero: a zero that is 1 µm off reads as 1 "
-        f"µm of air gap (standard error {zero} µm); the fall height, and so the force, is hardly touched "
-        "by it",
+        "µm of "
+        f"air gap (standard error {zero} µm); the fall height, and so the force, is hardly touched by it",
         "an open-loop replay is one drop like the recorded one: after some contacts its force is statistics "
         "only",
     )
 
 
-def _warnings(evidence: Evidence, impacts: Impacts, draws: Draws | None) -> tuple[str, ...]:
-    warnings = [*evidence.power_off.notes, *known(evidence.fall).notes]
+def _warnings(
+    evidence: Evidence, initial: InitialState, impacts: Impacts, draws: Draws | None
+) -> tuple[str, ...]:
+    said = [*evidence.power_off.notes, *initial.notes]
     if impacts.support is not None:
-        if impacts.support.ended_early:
-            warnings.append(f"supports: {impacts.support.ended_early}")
-        if (misfit := impacts.support.best.misfit) > 2.0:
-            warnings.append(
-                f"the first impacts are followed to {misfit**0.5:.2g} times the noise only; expected about "
-                "1: the machine description misses something"
+        search = impacts.support.search
+        if search.ended_early:
+            said.append(f"supports: {search.ended_early}")
+        if search.best.misfit > 2.0:
+            said.append(
+                f"the first impacts are followed to {search.best.misfit**0.5:.2g} times the noise only; "
+                "expected about 1: the machine description misses something"
             )
-        warnings += [
+        said += [
             f"{path}: {value.status}"
             for path, value in impacts.values.items()
             if ".support." in path and value.status != "determined"
         ]
     if draws is not None and len(draws) < FEWEST_DRAWS:
-        warnings.append(f"{len(draws)} draws follow the record; {FEWEST_DRAWS} are needed for intervals")
-    return tuple(warnings)
+        said.append(f"{len(draws)} draws keep to the record; {FEWEST_DRAWS} are needed for intervals")
+    return tuple(said)

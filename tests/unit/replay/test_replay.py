@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -20,10 +21,11 @@ from rotordrop.estimate.estimate import Estimate, Verdict
 from rotordrop.estimate.fixed_values import fixed_correlations, read_fixed
 from rotordrop.estimate.schema import estimate_schema
 from rotordrop.estimation import Replay, estimate_drop
+from rotordrop.evidence.speed import SpeedFit
 from rotordrop.known import Known
 from rotordrop.machine import Machine, example_path
-from rotordrop.replay import open_loop
-from rotordrop.replay.result import mean_of_draws, with_draws
+from rotordrop.replay import replay_estimate, uncertainty
+from rotordrop.replay.replay_estimate import _speed
 from rotordrop_bench import SyntheticDrop
 from rotordrop_bench.files import write_synthetic
 from rotordrop_bench.score import score_estimate
@@ -42,9 +44,9 @@ def fitted() -> dict[str, Any]:
 def replayed(known: Machine, synthetic: SyntheticDrop, fitted: dict[str, Any]) -> Estimate:
     """The recorded drop replayed from its owner's guesses, with few starts and hardly a draw."""
 
-    def drawing(problem: Any, z: Any, covariance: Any, **options: Any) -> Any:
-        fitted.update(problem=problem, z=z)
-        return open_loop.draw_drops(problem, z, covariance, **options)
+    def drawing(problem: Any, x: Any, covariance: Any, **options: Any) -> Any:
+        fitted.update(problem=problem, x=x)
+        return uncertainty.draw_drops(problem, x, covariance, **options)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("rotordrop.replay.replay.FRICTION_DRAWS", 2)
@@ -100,23 +102,18 @@ def test_few_draws_give_no_interval_and_say_why(document: dict[str, Any], replay
     assert any("64 are needed for intervals" in words for words in document["warnings"])
 
 
-def test_draws_of_the_rest_position_fall_on_one_path(fitted: dict[str, Any]) -> None:
+def test_draws_of_the_rest_position_fall_on_one_path(replayed: Estimate, fitted: dict[str, Any]) -> None:
     """A vertical zero that is off moves rest and fall alike: seen from rest, nothing moves before contact."""
-    problem, z = fitted["problem"], fitted["z"]
-    initial, first = problem.initial, len(problem.unknowns)
-
-    def orbit(at: Any) -> Any:
-        return open_loop.whole_drop(problem, at, duration=6e-3).displacement - problem.rest_error(at)
-
-    middle = orbit(z)
+    problem = fitted["problem"]
+    best = uncertainty.best_candidate(problem, fitted["x"])
+    initial = problem.replica.initial
+    _, orbit = uncertainty._numbers(problem, best, 6e-3)
     for height in range(initial.unknowns.rest.start + 1, initial.unknowns.rest.stop, 2):
         column = initial.covariance[:, height]
-        drawn = z.copy()
-        drawn[first:] += np.linalg.lstsq(problem.directions, column / math.sqrt(column[height]), rcond=None)[
-            0
-        ]
-        assert problem.fall(drawn)[height] - problem.fall(z)[height] > 5e-6
-        assert np.max(np.abs(orbit(drawn) - middle)) < 0.05e-6
+        drawn = replace(best, fall=best.fall + column / math.sqrt(column[height]))
+        assert drawn.fall[height] - best.fall[height] > 5e-6
+        _, other = uncertainty._numbers(problem, drawn, 6e-3)
+        assert np.max(np.abs(other - orbit)) < 0.05e-6
 
 
 def test_the_drop_is_simulated_at_both_limits_of_the_air_gap(replayed: Estimate) -> None:
@@ -158,6 +155,22 @@ def test_every_number_of_the_document_is_that_of_its_source(
         assert bounce["measured_bounce_m"] == compared.measured_bounce
         assert bounce["measured_bounce_m"] == pytest.approx(bounce["simulated_bounce_m"], rel=0.3)
         assert 5e-6 < bounce["measured_bounce_m"] < 400e-6
+
+
+def test_the_speed_that_friction_took_is_shown_in_hertz() -> None:
+    air = Known(value=9.0, status="determined")
+    fit = SpeedFit(
+        initial=377.0,
+        initial_error=0.1,
+        profile_time_constant=6.0,
+        aero_time_constant=air,
+        friction_loss=math.pi,
+        residual=0.1,
+    )
+    fall: Any = SimpleNamespace(speed=fit)
+    shown = _speed(fall, 4.0 * math.pi)
+    assert (shown["friction_loss_Hz"], shown["simulated_end_Hz"]) == (0.5, 2.0)
+    assert shown["profile_time_constant_s"] == 6.0
 
 
 def test_the_equivalent_stiffness_is_support_and_bearing_in_series(
@@ -278,25 +291,34 @@ def test_fixed_belongs_to_the_replay(tmp_path: Path, capsys: pytest.CaptureFixtu
 def test_no_number_lies_outside_its_own_interval() -> None:
     """The replay is one of many possible drops: its late mean may lie beyond nine of ten draws."""
     sample = np.linspace(400.0, 430.0, 64)
-    mean = mean_of_draws(Known(value=415.0, status="determined", unit="N"), sample, 0.01)
+    mean = replay_estimate._mean(Known(value=415.0, status="determined", unit="N"), sample, 0.01)
     assert mean.value == np.median(sample)
-    peak = with_draws(Known(value=470.0, status="determined", unit="N"), sample, 0.01)
+    peak = replay_estimate.with_draws(Known(value=470.0, status="determined", unit="N"), sample, 0.01)
     for value in (mean, peak):
         low, high = value.interval_90 or (math.nan, math.nan)
         assert low < value.value < high
     assert high == pytest.approx(470.0 + 1.6448536 * 4.7)
 
 
-def test_a_fit_whose_draws_do_not_follow_the_record_is_no_basis() -> None:
+def test_a_fit_whose_draws_do_not_keep_to_the_record_is_no_basis() -> None:
     best = np.zeros(2)
+
+    def residual(x: np.ndarray, window: float) -> np.ndarray:
+        if np.any(x != best):
+            raise IdentificationError("beside the record")
+        return np.zeros(3)
+
     problem: Any = SimpleNamespace(
-        misfit=lambda z, window: math.inf if np.any(z != best) else 0.0,
+        residual=residual,
         bounds=(np.full(2, -9.0), np.full(2, 9.0)),
+        prior_sigma=np.ones(2),
+        remaining_directions=np.zeros((1, 1)),
+        split=lambda x: (x, np.zeros(1)),
     )
     with ThreadPoolExecutor(1) as pool:
-        message = r"of 64 draws of the uncertain values only 0 follow the record up to 7.5 ms"
+        message = r"of 64 draws of the uncertain values only 0 keep to the record up to 7.5 ms"
         with pytest.raises(IdentificationError, match=message):
-            open_loop.following_draws(problem, best, np.eye(2), 7.5e-3, 16, pool)
-        problem.misfit = lambda z, window: 0.0
-        kept, rejected = open_loop.following_draws(problem, best, np.eye(2), 7.5e-3, 16, pool)
+            uncertainty._keeping(problem, best, np.eye(2), 7.5e-3, 16, pool)
+        problem.residual = lambda x, window: np.zeros(3)
+        kept, rejected = uncertainty._keeping(problem, best, np.eye(2), 7.5e-3, 16, pool)
     assert (len(kept), rejected) == (16, 0)

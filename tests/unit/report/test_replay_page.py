@@ -11,14 +11,14 @@ import pytest
 from numpy.testing import assert_allclose
 
 from rotordrop.elements.table import parameter
-from rotordrop.estimate.agreement import Agreement, FrictionSweep
+from rotordrop.estimate.agreement import Agreement, compare_orbits
 from rotordrop.estimate.bearing_drop import BearingDrop, Motion, Origin, Peak, simulated_bearings
 from rotordrop.estimate.estimate import Estimate, FittedParameter, ReplaySteps, Verdict
 from rotordrop.estimate.methods import Replay
 from rotordrop.evidence.first_contact import TimedContact
+from rotordrop.identification.friction import FrictionSweep
 from rotordrop.known import Correlation, Known
 from rotordrop.machine import example_machine
-from rotordrop.replay.agreement import compare_orbits
 from rotordrop.report.content import Section
 from rotordrop.report.estimate_numbers import identified_table
 from rotordrop.report.estimate_page import estimate_page

@@ -20,16 +20,23 @@ SMOOTHING = 2e-3
 
 @dataclass(frozen=True, kw_only=True)
 class ExpandedState:
-    """Initial state by modal expansion; m modes per plane, B bearings."""
+    """Initial state by modal expansion; m modes per plane, B bearings.
+
+    Attributes
+    ----------
+    displacement, velocity : ndarray, shape (m, 2)
+        Amplitudes (x, y) and their velocities; zero beyond the modes used.
+    at_bearings, velocity_at_bearings : ndarray, shape (B, 2)
+        Displacement [m] and velocity [m/s] at the bearing nodes.
+    modes : int
+        Modes per plane used in the expansion.
+    """
 
     displacement: Array
-    """Modal amplitudes (x, y), zero beyond the modes used, shape (m, 2)."""
     velocity: Array
-    """Their velocities, shape (m, 2)."""
     at_bearings: Array
-    """Displacement at the bearing nodes, shape (B, 2) [m]."""
     velocity_at_bearings: Array
-    """Velocity at the bearing nodes, shape (B, 2) [m/s]."""
+    modes: int
 
 
 def expansion_matrix(rows: Array, modes: int) -> Array:
@@ -101,4 +108,5 @@ def expand_initial_state(
         velocity=velocity,
         at_bearings=shapes @ displacement,
         velocity_at_bearings=shapes @ velocity,
+        modes=modes,
     )

@@ -1,9 +1,9 @@
-"""The estimate of a replay: identified values, loads with the intervals of the draws, published steps."""
+"""From the steps of a replay to its estimate: identified values, loads with the intervals of the draws."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.elements.parameter import Step
 from rotordrop.elements.table import parameter, rows
-from rotordrop.estimate.agreement import FrictionSweep
 from rotordrop.estimate.allowances import MODEL_FORCE_SIGMA, MODEL_MEAN_FORCE_SIGMA, MODEL_STRESS_SIGMA
 from rotordrop.estimate.bearing_drop import (
     AirGap,
@@ -28,12 +27,12 @@ from rotordrop.estimate.bearing_values import equivalent_stiffness, published_va
 from rotordrop.estimate.estimate import FittedParameter
 from rotordrop.evidence.air_gap import AirGap as IdentifiedGap
 from rotordrop.evidence.evidence import Evidence, known
-from rotordrop.known import NINETY, Correlation, Known, Status
+from rotordrop.identification.friction import FrictionSweep
+from rotordrop.identification.modal_expansion import expand_initial_state
+from rotordrop.identification.support import SupportFit
+from rotordrop.known import NINETY, Known, Status
 from rotordrop.machine import Machine, TouchdownBearing
-from rotordrop.replay.open_loop import FEWEST_DRAWS, Draws, interval
-from rotordrop.replay.problem import ReplayProblem
-from rotordrop.replay.start import expand_initial_state
-from rotordrop.replay.supports import SupportFit
+from rotordrop.replay.uncertainty import FEWEST_DRAWS, Draws, interval
 from rotordrop.simulate.result import DropResult
 
 Array = NDArray[np.float64]
@@ -41,40 +40,29 @@ NO_INTERVAL: Status = "the record does not determine it"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Impacts:
-    """Best unknowns by the first impacts with their covariance, and the steps behind them."""
-
-    problem: ReplayProblem
-    z: Array
-    """Whitened unknowns, shape (P + u,)."""
-    covariance: Array
-    """Shape (P + u, P + u)."""
-    support: SupportFit | None
-    """Fit of the supports over the growing windows; None when they were taken over."""
-    friction: FrictionSweep | None
-    """Sweep of the friction; None when it was taken over."""
-    values: dict[str, Known]
-    """Identified values by path."""
-    correlations: tuple[Correlation, ...] = ()
-    """Correlations of support values."""
-
-
-@dataclass(frozen=True, kw_only=True)
 class Replayed:
-    """The whole drop replayed with the identified values, and the record; N samples, B bearings."""
+    """The whole drop replayed with the identified values, beside the record; N samples, B bearings.
+
+    Attributes
+    ----------
+    result : DropResult
+        Simulation from power-off.
+    middle, lower, upper : ndarray, shape (T, B, 2)
+        Rotor at the bearings as the sensors would show it [m], for the air gap and for its two limits.
+    time : ndarray, shape (N,)
+        Samples of the record in the simulated window [s from power-off].
+    measured : ndarray, shape (N, B, 2)
+        Measured displacement at the bearings, along the straight rotor, from the rest position [m].
+    draws : Draws or None
+        Draws behind the intervals.
+    """
 
     result: DropResult
-    """Simulation from power-off."""
     middle: Array
-    """Rotor at the bearings as the sensors would show it, shape (T, B, 2) [m]."""
     lower: Array
-    """The same for the lower limit of the air gap."""
     upper: Array
-    """The same for the upper limit of the air gap."""
     time: Array
-    """Samples of the record in the simulated window, shape (N,) [s from power-off]."""
     measured: Array
-    """Measured displacement at the bearings, along the straight rotor, from rest, shape (N, B, 2) [m]."""
     draws: Draws | None
 
 
@@ -82,12 +70,12 @@ def replay_bearings(
     machine: Machine,
     evidence: Evidence,
     gap: IdentifiedGap,
-    parameters: tuple[FittedParameter, ...],
+    found: tuple[FittedParameter, ...],
     replayed: Replayed,
 ) -> tuple[BearingDrop, ...]:
     """Everything about every bearing: histories of the replay, loads with intervals, identified values."""
     return tuple(
-        _bearing(machine.touchdown_bearings[b], evidence, gap, parameters, replayed, simulated, b)
+        _bearing(machine.touchdown_bearings[b], evidence, gap, found, replayed, simulated, b)
         for b, simulated in enumerate(simulated_bearings(replayed.result))
     )
 
@@ -96,7 +84,7 @@ def _bearing(
     bearing: TouchdownBearing,
     evidence: Evidence,
     gap: IdentifiedGap,
-    parameters: tuple[FittedParameter, ...],
+    found: tuple[FittedParameter, ...],
     replayed: Replayed,
     simulated: BearingDrop,
     b: int,
@@ -110,7 +98,7 @@ def _bearing(
 
     contact, draws = known(evidence.contacts)[b], _enough(replayed.draws)
     seen = deepest(measured, contact.start, contact.end, 0.0)
-    values = published_values(bearing.name, parameters)
+    values = published_values(bearing.name, found)
     values["friction.static"] = static_friction(
         float(bearing.friction.static) / float(bearing.friction.dynamic), values["friction.dynamic"]
     )
@@ -123,7 +111,7 @@ def _bearing(
     )
     inferred = numbers_of(bearing).stress_sigma
     means = {
-        name: mean_of_draws(
+        name: _mean(
             simulated.values[name],
             None if draws is None else sample(draws)[:, b],
             math.hypot(model, inferred) if name == "mean_stress_Pa" else model,
@@ -170,11 +158,11 @@ def _enough(draws: Draws | None) -> Draws | None:
 
 
 def _peak(peak: Peak, sample: Array | None, model: float) -> Peak:
-    """The peak of the replay; the interval of the draws holds it too."""
+    """The replay's own peak; the interval of the draws holds it too."""
     return replace(peak, known=with_draws(peak.known, sample, model), origin=Origin.REPLAY)
 
 
-def mean_of_draws(value: Known, sample: Array | None, model: float) -> Known:
+def _mean(value: Known, sample: Array | None, model: float) -> Known:
     """A mean over chaotic motion: the middle of the draws, of which the replay is only one."""
     if sample is None:
         return replace(value, status=NO_INTERVAL)
@@ -196,37 +184,44 @@ def with_draws(value: Known, sample: Array | None, model: float) -> Known:
     )
 
 
-def replay_parameters(machine: Machine, impacts: Impacts, gap: IdentifiedGap) -> tuple[FittedParameter, ...]:
+def replay_parameters(
+    machine: Machine,
+    fitted: Mapping[str, Known],
+    gap: IdentifiedGap,
+    friction: FrictionSweep | None,
+) -> tuple[FittedParameter, ...]:
     """Every identified value of every bearing; gap and friction from steps of their own."""
-    parameters = []
+    found = []
     for b, bearing in enumerate(machine.touchdown_bearings):
-        value, error = float(gap.value[b]), float(gap.standard_error[b])
-        values = {
-            parameter("air_gap"): Known(
-                value=value,
-                status="determined",
-                standard_error=error,
-                interval_90=(value - NINETY * error, value + NINETY * error),
-                lower=float(gap.lower[b]),
-                upper=float(gap.upper[b]),
-                unit="m",
-            )
+        values = {parameter("air_gap"): _air_gap(gap, b)}
+        values |= {
+            row: fitted[row.path_of(bearing.name)] for row in rows("bearing") if row.step is Step.IMPACTS
         }
-        for row in rows("bearing"):
-            if row.step is Step.IMPACTS:
-                values[row] = impacts.values[row.path_of(bearing.name)]
-        values[parameter("friction.dynamic")] = _friction(bearing, impacts.friction)
-        parameters += [
+        values[parameter("friction.dynamic")] = _friction(bearing, friction)
+        found += [
             FittedParameter(row=row, owner=bearing.name, prior=_start(value), estimate=value)
             for row, value in values.items()
         ]
-    return tuple(parameters)
+    return tuple(found)
 
 
 def _start(value: Known) -> Known | None:
     if value.start is None:
         return None
     return Known(value=value.start, status="determined", unit=value.unit, interval_90=value.bounds)
+
+
+def _air_gap(gap: IdentifiedGap, b: int) -> Known:
+    value, error = float(gap.value[b]), float(gap.standard_error[b])
+    return Known(
+        value=value,
+        status="determined",
+        standard_error=error,
+        interval_90=(value - NINETY * error, value + NINETY * error),
+        lower=float(gap.lower[b]),
+        upper=float(gap.upper[b]),
+        unit="m",
+    )
 
 
 def _friction(bearing: TouchdownBearing, sweep: FrictionSweep | None) -> Known:
@@ -242,69 +237,57 @@ def _friction(bearing: TouchdownBearing, sweep: FrictionSweep | None) -> Known:
     )
 
 
-def identified_machine(machine: Machine, impacts: Impacts, gap: IdentifiedGap) -> Machine:
-    """The machine with air gaps, supports, friction and contact as identified."""
-    values: dict[str, Known] = {}
-    for unknown in impacts.problem.unknowns:
-        if unknown.parameter.path != "preload" and unknown.parameter.step is not Step.SWEEP:
-            values[unknown.path] = _estimated(impacts.values[unknown.path])
-    for b, bearing in enumerate(machine.touchdown_bearings):
-        values[f"{bearing.name}.air_gap"] = Known(
-            value=float(gap.value[b]), status="estimated", standard_error=float(gap.standard_error[b])
-        )
-        if impacts.friction is not None:
-            dynamic = impacts.friction.value
-            ratio = float(bearing.friction.static) / float(bearing.friction.dynamic)
-            values[f"{bearing.name}.friction.dynamic"] = _estimated(dynamic)
-            values[f"{bearing.name}.friction.static"] = Known(value=ratio * dynamic.value)
-    return machine.with_values(values)
-
-
-def _estimated(value: Known) -> Known:
-    return Known(value=value.value, status="estimated", interval_90=value.interval_90)
-
-
 def steps_document(
-    evidence: Evidence, impacts: Impacts, gap: IdentifiedGap, replayed: Replayed
+    evidence: Evidence,
+    gap: IdentifiedGap,
+    support: SupportFit | None,
+    friction: FrictionSweep | None,
+    draws: Draws | None,
+    names: tuple[str, ...],
+    end_speed: float,
 ) -> dict[str, Any]:
     """Initial state, speed law, settled rest and search of a replay, ready for the published document."""
-    names = replayed.result.bearing_names
-    speed, end = evidence.speed, float(replayed.result.speed[-1])
-    profile = speed.profile_time_constant
-    slowing = speed.aero_time_constant
     return {
-        "speed": {
-            "aero_time_constant_s": slowing.as_json() if np.isfinite(slowing.value) else None,
-            "profile_time_constant_s": profile if np.isfinite(profile) else None,
-            "friction_loss_Hz": speed.friction_loss / (2.0 * np.pi),
-            "simulated_end_Hz": end / (2.0 * np.pi),
-        },
+        "speed": _speed(evidence, end_speed),
         "initial_state": _initial(evidence, names),
-        "identification": _identification(impacts, replayed.draws),
-        "settled": {
-            name: {
-                "radius_m": float(gap.rest.radius[b]),
-                "sideways_m": float(gap.rest.sideways[b]),
-                "sway_m": float(gap.rest.sway[b]),
-                "indentation_m": float(gap.sag.indentation[b]),
-                "race_deflection_m": float(gap.sag.race[b]),
-                "support_deflection_m": float(gap.sag.support[b]),
-                "vertical_zero_sigma_m": float(gap.zero_sigma[b]),
-            }
-            for b, name in enumerate(names)
-        },
+        "identification": _identification(support, friction, draws),
+        "settled": {name: _settled(gap, b) for b, name in enumerate(names)},
+    }
+
+
+def _speed(evidence: Evidence, end_speed: float) -> dict[str, Any]:
+    fit = evidence.speed
+    known = np.isfinite(fit.aero_time_constant.value)
+    profile = fit.profile_time_constant
+    return {
+        "aero_time_constant_s": fit.aero_time_constant.as_json() if known else None,
+        "profile_time_constant_s": profile if np.isfinite(profile) else None,
+        "friction_loss_Hz": fit.friction_loss / (2.0 * np.pi),
+        "simulated_end_Hz": end_speed / (2.0 * np.pi),
+    }
+
+
+def _settled(gap: IdentifiedGap, b: int) -> dict[str, float]:
+    return {
+        "radius_m": float(gap.rest.radius[b]),
+        "sideways_m": float(gap.rest.sideways[b]),
+        "sway_m": float(gap.rest.sway[b]),
+        "indentation_m": float(gap.sag.indentation[b]),
+        "race_deflection_m": float(gap.sag.race[b]),
+        "support_deflection_m": float(gap.sag.support[b]),
+        "vertical_zero_sigma_m": float(gap.zero_sigma[b]),
     }
 
 
 def _initial(evidence: Evidence, names: tuple[str, ...]) -> dict[str, Any]:
     initial = known(evidence.fall)
     along = initial.deviation_of(evidence.record) + initial.settled
-    # The paper's start for comparison: two rigid modes from the samples around power-off.
+    # The paper's start, beside ours: two rigid modes from the samples around power-off.
     expanded = expand_initial_state(
         evidence.record.time, along, initial.drop_instant, evidence.model, initial.sensing
     )
 
-    def by_bearing(values: Array) -> dict[str, list[float]]:
+    def by_bearing(values: Any) -> dict[str, list[float]]:
         return {name: [float(v) for v in values[b]] for b, name in enumerate(names)}
 
     return {
@@ -320,18 +303,19 @@ def _initial(evidence: Evidence, names: tuple[str, ...]) -> dict[str, Any]:
     }
 
 
-def _identification(impacts: Impacts, draws: Draws | None) -> dict[str, Any]:
+def _identification(
+    support: SupportFit | None, friction: FrictionSweep | None, draws: Draws | None
+) -> dict[str, Any]:
     entry: dict[str, Any] = {}
-    support, friction = impacts.support, impacts.friction
     if support is not None:
         entry["support"] = {
-            "starts": support.starts,
-            "agreeing": support.agreeing,
-            "windows_s": list(support.windows),
-            "misfit": support.best.misfit,
-            "simulations": support.simulations,
-            "ended_early": support.ended_early or None,
-            "correlations": [asdict(pair) for pair in impacts.correlations],
+            "starts": len(support.coarse.starts),
+            "agreeing": support.coarse.agreeing,
+            "windows_s": [fit.window for fit in (*support.coarse.by_window, *support.search.by_window)],
+            "misfit": support.search.best.misfit,
+            "simulations": support.coarse.evaluations + support.search.evaluations,
+            "ended_early": support.search.ended_early or None,
+            "correlations": [asdict(pair) for pair in support.correlations],
         }
     if friction is not None:
         entry["friction_sweep"] = {
