@@ -132,28 +132,21 @@ def runge_kutta_stages(
     """Fill stages 2 to 7 (stage 1 is ``k[0]``), their ``powers`` (7, B + 1, 5) by place and the new state."""
     for stage in range(1, 7):
         combine(y, h, tab.a[stage], k, stage, y_new)
-        drop_derivative(t + tab.c[stage] * h, y_new, p, k[stage], work)
-        note_powers(work.power, powers[stage])
-
-
-@inner_kernel
-def note_powers(power: Array, out: Array) -> None:
-    """Keep the power lost by place of one stage."""
-    for b in range(out.shape[0]):
-        for place in range(out.shape[1]):
-            out[b, place] = power[b, place]
+        drop_derivative(t + tab.c[stage] * h, y_new, p, k[stage], Scratch(work.balls, powers[stage]))
 
 
 @inner_kernel
 def book_losses(h: float, powers: Array, tab: Tableau, books: Array) -> None:
     """Add to ``books`` (B + 1, 5) what an accepted step lost by place [J]; its last stage stays."""
+    w = tab.a[6]
+    w0, w1, w2, w3, w4, w5 = h * w[0], h * w[1], h * w[2], h * w[3], h * w[4], h * w[5]
     for b in range(books.shape[0]):
-        for place in range(books.shape[1]):
-            total = 0.0
-            for stage in range(6):
-                total += tab.a[6, stage] * powers[stage, b, place]
-            books[b, place] += h * total
-            powers[0, b, place] = powers[6, b, place]
+        # written out: this runs in every step, and a loop over the stages would take as long as a contact
+        k0, k1, k2, k3 = powers[0, b], powers[1, b], powers[2, b], powers[3, b]
+        k4, k5, last, book = powers[4, b], powers[5, b], powers[6, b], books[b]
+        for i in range(N_PLACES):
+            book[i] += w0 * k0[i] + w1 * k1[i] + w2 * k2[i] + w3 * k3[i] + w4 * k4[i] + w5 * k5[i]
+            k0[i] = last[i]
 
 
 @inner_kernel
@@ -427,8 +420,7 @@ def integrate(  # noqa: C901, PLR0915  one compiled loop
     tried = 0
     done = 0
     outcome = FINISHED
-    drop_derivative(t, y, p, k[0], work)
-    note_powers(work.power, powers[0])
+    drop_derivative(t, y, p, k[0], Scratch(work.balls, powers[0]))
     while t < t_end:
         if tried >= control.most_steps:
             outcome = TOO_MANY_STEPS
@@ -521,12 +513,12 @@ def integrate_drop(
     progress[[TIME, STEP]] = times[0], min(first_step, largest_step)
     progress[LOGGED] = start_running(y, times[0], p, running, log)
     states[0] = y
-    states[1:] = np.nan
     control = Control(
         scale, float(tolerance), float(largest_step), most_steps, -1.0, float(times[-1]), 0.0, True
     )
     books = np.zeros((p.bearing.shape[0] + 1, N_PLACES)) if books is None else books
     peaks = np.zeros((0, N_PEAKS))
     outcome = integrate(y, times[1:], p, tab, control, states[1:], log, running, books, peaks, progress)
+    states[1 + int(progress[SAMPLES]) :] = np.nan
     counters[:] = progress[[ACCEPTED, REJECTED, STEP, LOGGED, TIME]]
     return outcome

@@ -226,11 +226,14 @@ def add_support_form(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
 
 
 @inner_kernel
-def add_contact(c: int, y: Array, p: KernelParameters, dy: Array, power: Array) -> float:
-    """Add the force of one contact to the rotor and the body it touches; returns the friction force [N]."""
+def add_contact(c: int, y: Array, p: KernelParameters, dy: Array) -> tuple[float, float, float]:
+    """Add the force of one contact to the rotor and the body it touches.
+
+    Returns the friction force [N] and the power that sliding and law take [W].
+    """
     delta, F_r, F_mu, nx, ny, sliding, lost = contact_values(c, y, p)
     if delta <= 0.0:
-        return 0.0
+        return 0.0, 0.0, 0.0
     x = F_r * nx - F_mu * ny
     z = F_r * ny + F_mu * nx
     shape = p.bearing_shape[p.contact_at[c, L.CONTACT_BEARING]]
@@ -241,9 +244,7 @@ def add_contact(c: int, y: Array, p: KernelParameters, dy: Array, power: Array) 
         ay[k] -= shape[k] * z
     dy[body] += x
     dy[body + 1] += z
-    power[SLIDING] += sliding
-    power[IN_CONTACT] += lost
-    return F_mu
+    return F_mu, sliding, lost
 
 
 @inner_kernel
@@ -285,11 +286,16 @@ def bearing_accelerations(b: int, y: Array, p: KernelParameters, dy: Array, work
     """
     n_q, h = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.SUPPORT]
     row, power = p.bearing[b], work.power[b]
-    for place in range(N_PLACES):
-        power[place] = 0.0
     friction = 0.0
+    sliding = 0.0
+    lost = 0.0
     for c in range(p.bearing_at[b, L.CONTACTS], p.bearing_at[b, L.CONTACTS_END]):
-        friction += add_contact(c, y, p, dy, power)
+        force, by_sliding, by_law = add_contact(c, y, p, dy)
+        friction += force
+        sliding += by_sliding
+        lost += by_law
+    power[SLIDING] = sliding
+    power[IN_CONTACT] = lost
     F_x = 0.0
     F_y = 0.0
     if p.bearing_at[b, L.RACE] >= 0:
