@@ -30,7 +30,7 @@ from rotordrop.elements.values import (
 )
 from rotordrop.known import Known
 from rotordrop.physics import columns as L
-from rotordrop.physics.support import PRESENT
+from rotordrop.physics.blocks import SUPPORT_PRESENT
 
 Array = NDArray[np.float64]
 
@@ -158,7 +158,7 @@ class Support(Description):
         }
         for column, value in form.items():
             row[column] = 0.0 if value is None else float(value)
-        row[L.SUPPORT_FORM + PRESENT] = float(any(value is not None for value in form.values()))
+        row[L.SUPPORT_FORM + SUPPORT_PRESENT] = float(any(value is not None for value in form.values()))
 
 
 def _from_ratio(ratio: Known | None, mass: Known, stiffness: Known) -> Known:
@@ -175,7 +175,7 @@ def _from_ratio(ratio: Known | None, mass: Known, stiffness: Known) -> Known:
 def support_sag(row: Array, load: float) -> float:
     """Deflection [m] of a support under a static load [N], its foundation included."""
     sag = load / float(row[L.SUPPORT_STIFFNESS_Y])
-    if row[L.SUPPORT_FORM + PRESENT] == 0.0:
+    if row[L.SUPPORT_FORM + SUPPORT_PRESENT] == 0.0:
         return sag
     cubic = float(row[L.SUPPORT_CUBIC])
     coupled = sag / (1.0 - float(row[L.SUPPORT_COUPLING]) ** 2)

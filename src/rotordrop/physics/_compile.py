@@ -22,7 +22,9 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _MARK = "rotordrop.physics._compile import"
-_CONSTANTS = (_PACKAGE / "physics" / "columns.py", _PACKAGE / "physics" / "elementary_tables.py")
+_CONSTANTS = tuple(
+    _PACKAGE / "physics" / name for name in ("blocks.py", "columns.py", "elementary_tables.py")
+)
 """Compiled into the kernels as numbers though they have no kernel themselves."""
 
 

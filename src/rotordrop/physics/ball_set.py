@@ -14,6 +14,24 @@ from numpy.typing import NDArray
 
 from rotordrop.physics._compile import inner_kernel, lean_kernel
 from rotordrop.physics.ball_bearing import BearingConstants
+from rotordrop.physics.blocks import (
+    BALLS_AXIAL_OFFSET as AXIAL_OFFSET,
+)
+from rotordrop.physics.blocks import (
+    BALLS_BALL_STIFFNESS as BALL_STIFFNESS,
+)
+from rotordrop.physics.blocks import (
+    BALLS_GROOVE_DISTANCE as GROOVE_DISTANCE,
+)
+from rotordrop.physics.blocks import (
+    BALLS_N_ENTRIES as N_ENTRIES,
+)
+from rotordrop.physics.blocks import (
+    BALLS_RADIAL_OFFSET as RADIAL_OFFSET,
+)
+from rotordrop.physics.blocks import (
+    BALLS_STRESS_COEFFICIENT as STRESS_COEFFICIENT,
+)
 from rotordrop.physics.elementary import cos_each, cube_root, magnitude, sin_each
 from rotordrop.physics.linear_algebra import solve
 
@@ -23,13 +41,6 @@ LANES = 8
 LEAST_DAMPING = 1e-9
 """Share of a loaded ball's stiffness [1] added to what holds a loose race, sideways perhaps nothing."""
 
-# Entries of a ball set; SI units.
-BALL_STIFFNESS = 0
-GROOVE_DISTANCE = 1
-RADIAL_OFFSET = 2
-AXIAL_OFFSET = 3
-STRESS_COEFFICIENT = 4
-N_ENTRIES = 5
 
 # Rows of the array of balls.
 COSINE = 0

@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.physics import blocks, support
 from rotordrop.physics import columns as L
-from rotordrop.physics import support
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
 from rotordrop.physics.ball_set import ball_set_energy, ball_set_force, ball_set_load
 from rotordrop.physics.columns import KernelParameters
@@ -83,11 +83,11 @@ def support_form_energy(b: int, y: Array, p: KernelParameters) -> float:
     x, z, _vx, _vz = support_deflection(b, y, p)
     energy: float = support.support_energy(form, k_x, k_y, x, z)
     energy -= 0.5 * (k_x * y[h] ** 2 + k_y * y[h + 1] ** 2)
-    if own >= 0 and form[support.FOUNDATION_SHARE] > 0.0:
-        mass = row[L.SUPPORT_MASS_Y] / form[support.FOUNDATION_SHARE]
+    if own >= 0 and form[blocks.SUPPORT_FOUNDATION_SHARE] > 0.0:
+        mass = row[L.SUPPORT_MASS_Y] / form[blocks.SUPPORT_FOUNDATION_SHARE]
         for axis in range(2):
             u, v = y[own + axis], y[own + 2 + axis]
-            energy += 0.5 * mass * (v * v + form[support.FOUNDATION_SPEED] ** 2 * u * u)
+            energy += 0.5 * mass * (v * v + form[blocks.SUPPORT_FOUNDATION_SPEED] ** 2 * u * u)
     return energy
 
 
@@ -118,7 +118,7 @@ def stored_energy(y: Array, p: KernelParameters, with_rotor_spin: bool) -> float
         energy += (
             0.5 * row[L.SUPPORT_STIFFNESS_X] * y[h] ** 2 + 0.5 * row[L.SUPPORT_STIFFNESS_Y] * y[h + 1] ** 2
         )
-        if row[L.SUPPORT_FORM + support.PRESENT] != 0.0:
+        if row[L.SUPPORT_FORM + blocks.SUPPORT_PRESENT] != 0.0:
             energy += support_form_energy(b, y, p)
         energy += 0.5 * row[L.RACE_INERTIA] * y[p.bearing_at[b, L.RACE_SPIN]] ** 2
     if with_rotor_spin:

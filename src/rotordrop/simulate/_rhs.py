@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.physics import aerodynamics, support
+from rotordrop.physics import aerodynamics, blocks, support
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
 from rotordrop.physics.aerodynamics import exponential_deceleration, speed_dependent_deceleration
@@ -213,8 +213,8 @@ def add_support_form(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
     dissipated: float = c_x * (vx * vx - sx * sx) + c_y * (vz * vz - sy * sy)
     if own < 0:
         return dissipated
-    speed, share = form[support.FOUNDATION_SPEED], max(form[support.FOUNDATION_SHARE], 0.0)
-    damping, mobility = 2.0 * form[support.FOUNDATION_DAMPING] * speed, share / row[L.SUPPORT_MASS_Y]
+    speed, share = form[blocks.SUPPORT_FOUNDATION_SPEED], max(form[blocks.SUPPORT_FOUNDATION_SHARE], 0.0)
+    damping, mobility = 2.0 * form[blocks.SUPPORT_FOUNDATION_DAMPING] * speed, share / row[L.SUPPORT_MASS_Y]
     for axis in range(2):
         force = F_x if axis == 0 else F_y
         u, v = y[own + axis], y[own + 2 + axis]
@@ -311,7 +311,7 @@ def bearing_accelerations(b: int, y: Array, p: KernelParameters, dy: Array, work
     dy[n_q + h + 1] = (F_y - row[L.SUPPORT_DAMPING_Y] * sy - row[L.SUPPORT_STIFFNESS_Y] * y[h + 1]) / row[
         L.SUPPORT_MASS_Y
     ]
-    if row[L.SUPPORT_FORM + support.PRESENT] != 0.0:
+    if row[L.SUPPORT_FORM + blocks.SUPPORT_PRESENT] != 0.0:
         power[SUPPORT] += add_support_form(b, y, p, dy)
     torque: float = -friction * row[L.ROTOR_RADIUS]
     return torque

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.physics import aerodynamics, support
+from rotordrop.physics import aerodynamics, blocks, support
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import kernel, lean_kernel
 from rotordrop.physics.ball_set import ball_set_gradient
@@ -149,7 +149,7 @@ def _support_jacobian(b: int, y: Array, p: KernelParameters, J: Array) -> None:
     row = p.bearing[b]
     form = row[L.SUPPORT_FORM : L.SUPPORT_FORM_END]
     k = (row[L.SUPPORT_STIFFNESS_X], 0.0, row[L.SUPPORT_STIFFNESS_Y])
-    if form[support.PRESENT] != 0.0:
+    if form[blocks.SUPPORT_PRESENT] != 0.0:
         x, z, _vx, _vz = support_deflection(b, y, p)
         k = support.support_tangent(form, row[L.SUPPORT_STIFFNESS_X], row[L.SUPPORT_STIFFNESS_Y], x, z)
     for i in range(2):
@@ -157,14 +157,14 @@ def _support_jacobian(b: int, y: Array, p: KernelParameters, J: Array) -> None:
         _couple(J, n_q + h + i, -1.0 / m_h, h, n_q + h, i, k, c)
         if own < 0:
             continue
-        mobility = max(form[support.FOUNDATION_SHARE], 0.0) / row[L.SUPPORT_MASS_Y]
-        speed = form[support.FOUNDATION_SPEED]
+        mobility = max(form[blocks.SUPPORT_FOUNDATION_SHARE], 0.0) / row[L.SUPPORT_MASS_Y]
+        speed = form[blocks.SUPPORT_FOUNDATION_SPEED]
         _couple(J, n_q + h + i, 1.0 / m_h, own, own + 2, i, k, c)
         _couple(J, own + 2 + i, mobility, h, n_q + h, i, k, c)
         _couple(J, own + 2 + i, -mobility, own, own + 2, i, k, c)
         J[own + i, own + 2 + i] = 1.0
         J[own + 2 + i, own + i] -= speed * speed
-        J[own + 2 + i, own + 2 + i] -= 2.0 * form[support.FOUNDATION_DAMPING] * speed
+        J[own + 2 + i, own + 2 + i] -= 2.0 * form[blocks.SUPPORT_FOUNDATION_DAMPING] * speed
 
 
 @kernel

@@ -1,0 +1,37 @@
+"""Entries of the blocks of numbers that one law each reads; apart from the laws, which need a compiler."""
+
+from __future__ import annotations
+
+# Entries of a contact law; SI units.
+CONTACT_STIFFNESS = 0
+CONTACT_EXPONENT = 1
+CONTACT_DAMPING = 2
+CONTACT_N_ENTRIES = 3
+
+# Entries of a contact; SI units.
+TOUCH_AIR_GAP = 0
+TOUCH_ROTOR_RADIUS = 1
+TOUCH_BORE_RADIUS = 2
+TOUCH_FRICTION_STATIC = 3
+TOUCH_FRICTION_DYNAMIC = 4
+TOUCH_STRIBECK_SPEED = 5
+TOUCH_SMOOTHING_SPEED = 6
+TOUCH_LAW = 7
+TOUCH_N_ENTRIES = TOUCH_LAW + CONTACT_N_ENTRIES
+
+# Entries of a ball set; SI units.
+BALLS_BALL_STIFFNESS = 0
+BALLS_GROOVE_DISTANCE = 1
+BALLS_RADIAL_OFFSET = 2
+BALLS_AXIAL_OFFSET = 3
+BALLS_STRESS_COEFFICIENT = 4
+BALLS_N_ENTRIES = 5
+
+# Entries of a form; SI units. All at zero is the plain support.
+SUPPORT_PRESENT = 0
+SUPPORT_COUPLING = 1
+SUPPORT_CUBIC = 2
+SUPPORT_FOUNDATION_SHARE = 3
+SUPPORT_FOUNDATION_SPEED = 4
+SUPPORT_FOUNDATION_DAMPING = 5
+SUPPORT_N_ENTRIES = 6
