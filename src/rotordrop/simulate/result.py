@@ -100,7 +100,7 @@ class DropResult:
     line_contacts : tuple of LineContact
         Rotor in each race, which gives the pressure there; one per bearing.
     lost : ndarray, shape (B + 1, 5), optional
-        Energy lost by place [J], for `rotordrop.simulate.losses`; None for a drop that was read from a file.
+        Energy lost by place [J], for `rotordrop.simulate.losses`; None where none were booked.
     """
 
     time: Array
@@ -264,6 +264,11 @@ def _write(result: DropResult, file: Any) -> None:
     for item in fields(LineContact):
         values = np.array([getattr(line, item.name) for line in result.line_contacts])
         _dataset(file, f"line_contact_{item.name}", values, ("bearing",), "", f"rotor on race: {item.name}")
+    if result.lost is not None:
+        _scale(file, "owner", np.array([*result.bearing_names, "rotor"], dtype=text))
+        _scale(file, "loss_column", np.arange(result.lost.shape[1], dtype=np.int64))
+        words = "energy lost by place; columns as in rotordrop.simulate.losses"
+        _dataset(file, "lost", result.lost, ("owner", "loss_column"), "J", words)
     for item in fields(Certificate):
         value = getattr(result.certificate, item.name)
         if value is not None:
@@ -329,4 +334,5 @@ def _read(file: Any) -> DropResult:
         if f"certificate_{f.name}" in file.attrs
     }
     values["certificate"] = Certificate(**certificate)
+    values["lost"] = file["lost"][()] if "lost" in file else None
     return DropResult(**values)

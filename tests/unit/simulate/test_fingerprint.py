@@ -22,7 +22,7 @@ GENERIC = {"NUMBA_CPU_NAME": "generic"}
 
 
 def printed(**settings: str) -> str:
-    command = [sys.executable, "-m", "rotordrop", "fingerprint"]
+    command = [sys.executable, "-m", "rotordrop", "doctor", "--fingerprint"]
     done = subprocess.run(
         command, env={**os.environ, **settings}, capture_output=True, text=True, timeout=600, check=True
     )

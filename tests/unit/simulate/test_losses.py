@@ -14,6 +14,7 @@ from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.simulate.case import DropCase, LevitatedStart
 from rotordrop.simulate.drop import simulate_drop
 from rotordrop.simulate.losses import losses
+from rotordrop.simulate.result import load_result
 
 CASE = DropCase(
     speed=2.0 * np.pi * 60.0, duration=0.03, reduction="quick", start=LevitatedStart(rotor_angle=1.0)
@@ -87,3 +88,10 @@ def test_friction_on_the_race_becomes_spin_and_drag(model, drop):
     bore = np.array([float(b.bore_radius) for b in model.machine.touchdown_bearings])
     work = np.trapezoid(drop.friction_force * bore * drop.race_speed, drop.time, axis=0)
     np.testing.assert_allclose(found.spin_up, work, rtol=2e-2)
+
+
+def test_the_energies_by_place_come_back_from_a_file(model, drop, tmp_path):
+    drop.save(tmp_path / "drop.h5")
+    read = losses(model, load_result(tmp_path / "drop.h5"))
+    assert read.total == losses(model, drop).total
+    assert np.array_equal(read.support, losses(model, drop).support)
