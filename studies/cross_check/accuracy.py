@@ -26,7 +26,7 @@ from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine import Machine, example_machine, load_machine
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.track.input_state import input_state_estimate, lent_by_record
-from rotordrop.twin.tracked import twin_problem
+from rotordrop.twin.problems import twin_problem
 from rotordrop_bench import SensorChain, hidden_machine, synthesize_drop
 
 HERE = Path(__file__).parent

@@ -3,8 +3,8 @@
 Usage: python studies/structure/beside.py MACHINE CASE SEED [SEED ...]
 
 Machines are those of ``extensions.py``. The usual model is fitted by the coarse basis, then every extension
-gets one pass, and those that rise a few more, as ``found_beside_the_usual`` does. Writes ``beside.json``, in
-which a rise of null after more passes means that the first pass brought nothing.
+gets one pass, and those that rise a few more, as ``extension_when_consistent`` does. Writes
+``beside.json``, in which a rise of null after more passes means that the first pass brought nothing.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from rotordrop.elements.table import EXTENSIONS
 from rotordrop.errors import RotordropError
 from rotordrop.estimation import estimate_drop
 from rotordrop.machine.examples import example_machine
-from rotordrop.twin import structure_search, tracked
-from rotordrop.twin.structure_search import BACK_PASSES, Candidate, Search, gain_of
+from rotordrop.twin import search as model_search
+from rotordrop.twin.search import RELINEARISED_PASSES, Candidate, Fits, gain_of
 
 FOUND = Path(__file__).parent / "beside.json"
 CASES["cross-axis 2 %"] = ({"sensors": {"cross_axis": 0.02}}, {}, "cross-axis sensitivity")
@@ -36,19 +36,19 @@ def rises(kind: str, case: str, seed: int) -> dict[str, list[float | None]] | st
     drop = recorded(kind, case, seed)[0]
     found: dict[str, list[float | None]] = {}
 
-    def measure(usual: Candidate, search: Search) -> Candidate:
-        plain = search.judge(usual.fit, usual.machine)
-        again = replace(usual, fit=search.look(usual.fit, usual.machine, BACK_PASSES))
+    def measure(base: Candidate, search: Fits) -> Candidate:
+        plain = search.likelihood(base.fit, base.machine)
+        again = replace(base, fit=search.relinearise(base.fit, base.machine, RELINEARISED_PASSES))
         for one in EXTENSIONS:
-            machine = one.added_to(usual.machine)
-            rise, more = plain - search.judge(usual.fit, machine), None
+            machine = one.added_to(base.machine)
+            rise, more = plain - search.likelihood(base.fit, machine), None
             if rise > 0.0:
-                fit = search.look(usual.fit, machine, BACK_PASSES)
+                fit = search.relinearise(base.fit, machine, RELINEARISED_PASSES)
                 more = round(gain_of(Candidate(machine=machine, fit=fit), again), 1)
             found[one.name] = [round(rise, 1), more]
         raise _Measured
 
-    plain_way, tracked.found_beside_the_usual = structure_search.found_beside_the_usual, measure
+    plain_way, model_search.extension_when_consistent = model_search.extension_when_consistent, measure
     try:
         estimate_drop(example_machine(kind), drop.record, drop.tail, name="drop")
     except _Measured:
@@ -56,7 +56,7 @@ def rises(kind: str, case: str, seed: int) -> dict[str, list[float | None]] | st
     except RotordropError as error:
         return str(error)
     finally:
-        tracked.found_beside_the_usual = plain_way
+        model_search.extension_when_consistent = plain_way
     return "the usual model does not fit"
 
 

@@ -25,7 +25,7 @@ from rotordrop.errors import RotordropError
 from rotordrop.estimation import estimate_drop
 from rotordrop.machine import Machine
 from rotordrop.machine.examples import example_machine
-from rotordrop.twin import structure_search, tracked
+from rotordrop.twin import search as model_search
 from rotordrop.twin.calibrated import calibrate_machine
 from rotordrop_bench import SyntheticDrop, hidden_machine, synthesize_drop
 from rotordrop_bench.departures import LARGE, SLIGHT, departures
@@ -190,7 +190,7 @@ def scored(machine: Machine, drop: SyntheticDrop) -> dict[str, Any]:
 def compared(kind: str, case: str, seed: int, size: str) -> dict[str, Any]:
     """The estimate without extensions and with them; the first fit, which both share, is made once."""
     machine, drop = example_machine(kind), recorded(kind, case, seed, size)[0]
-    extensions, first_fit = structure_search.EXTENSIONS, tracked._Search.first_fit
+    extensions, first_fit = model_search.EXTENSIONS, model_search.Search.fit_base
     made: dict[str, Any] = {}
 
     def once(search: Any, described: Machine) -> Any:
@@ -199,14 +199,14 @@ def compared(kind: str, case: str, seed: int, size: str) -> dict[str, Any]:
             made["fit"], made["seconds"] = first_fit(search, described), time.process_time() - started
         return made["fit"]
 
-    tracked._Search.first_fit = once  # type: ignore[method-assign]
+    model_search.Search.fit_base = once  # type: ignore[method-assign]
     try:
-        structure_search.EXTENSIONS = ()
+        model_search.EXTENSIONS = ()
         before = scored(machine, drop)
-        structure_search.EXTENSIONS = extensions
+        model_search.EXTENSIONS = extensions
         after = scored(machine, drop)
     finally:
-        structure_search.EXTENSIONS, tracked._Search.first_fit = extensions, first_fit  # type: ignore[method-assign]
+        model_search.EXTENSIONS, model_search.Search.fit_base = extensions, first_fit  # type: ignore[method-assign]
     after["seconds"] += made.get("seconds", 0.0)
     return {"before": before, "after": after}
 

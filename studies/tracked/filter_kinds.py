@@ -34,7 +34,7 @@ from rotordrop.track import _propagation as P
 from rotordrop.track import forces
 from rotordrop.track.problem import DropProblem, private_copy
 from rotordrop.track.smoother import PassSettings, fastest_frequency, forward, smooth
-from rotordrop.twin.tracked import FINE_BASIS, drop_problem
+from rotordrop.twin.problems import FINE_BASIS, drop_problem
 from rotordrop_bench import hidden_machine, synthesize_drop
 from rotordrop_bench.recording import SyntheticDrop
 

@@ -42,8 +42,9 @@ from rotordrop.rotor.unknowns import Unknown, all_unknowns
 from rotordrop.track.input_state import input_state_estimate, lent_by_record
 from rotordrop.track.prior import fall_time
 from rotordrop.twin.narrowing import DRAWING
+from rotordrop.twin.problems import COARSE_BASIS, drop_problem, recorded_drop
 from rotordrop.twin.rotor_search import with_found_rotor
-from rotordrop.twin.tracked import COARSE_BASIS, ROTOR_SEEN, drop_problem, recorded_drop
+from rotordrop.twin.search import ROTOR_SEEN
 from rotordrop_bench import SensorChain, hidden_machine, synthesize_drop, write_synthetic
 from rotordrop_bench.drops import SPEEDS
 from rotordrop_bench.rotors import ROTORS

@@ -127,7 +127,7 @@ def _places(named: Path | None, records: Sequence[Path]) -> list[Path]:
 
 
 def _require_calibrated(description: Machine, file: Path) -> None:
-    from rotordrop.twin.tracked import is_calibrated
+    from rotordrop.twin.search import is_calibrated
 
     if not is_calibrated(description):
         raise UsageError(

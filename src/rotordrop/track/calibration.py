@@ -117,7 +117,7 @@ class TrackedDrops:
     noise_factors: tuple[float, ...] = field(default=())
 
     @property
-    def improbability(self) -> float:
+    def negative_log_likelihood(self) -> float:
         """Negative logarithm of the marginal likelihood of all drops, up to a constant [1]."""
         return sum(one.filtered.negative_log_likelihood for one in self.smoothed)
 
@@ -217,8 +217,8 @@ def converged(problems: Sequence[DropProblem], stage: Stage, references: Sequenc
     once = (replace(stage, passes=1),)
     fit = track(problems, once, references=references)
     for _ in range(MOST_REPEATS - 1):
-        before, fit = fit.improbability, track(problems, once, references=fit.trajectories)
-        if fit.improbability > before - SMALL_RISE:
+        before, fit = fit.negative_log_likelihood, track(problems, once, references=fit.trajectories)
+        if fit.negative_log_likelihood > before - SMALL_RISE:
             break
     return fit
 
@@ -247,7 +247,7 @@ def _eased(problem: DropProblem, reference: Array | None, stage: Stage) -> DropP
     )
 
 
-def beside_the_record(tracked: TrackedDrops) -> bool:
+def is_inconsistent(tracked: TrackedDrops) -> bool:
     """Whether innovations or unknown impulses of a drop are larger than a fitting model leaves."""
     return any(tracked.diverged) or max(tracked.noise_factors) > 1.0 or max(tracked.nis) > FITTING_NIS
 

@@ -337,20 +337,20 @@ def _likeliest_turn(
 ) -> float:
     """Angular frequency of the contacts [rad/s] that makes the readings likeliest, by a parabola."""
 
-    def improbability(octave: int) -> float:
+    def cost(octave: int) -> float:
         if octave not in tried:
-            tried[octave] = forward_pass(rotor, readings, closed, local, turn * 2.0**octave).improbability
+            tried[octave] = forward_pass(
+                rotor, readings, closed, local, turn * 2.0**octave
+            ).negative_log_likelihood
         return tried[octave]
 
     tried: dict[int, float] = {}
     best = 0
-    while (
-        improbability(best + 1) < improbability(best) and turn * 2.0 ** (best + 1) * rotor.dt < FASTEST_TURN
-    ):
+    while cost(best + 1) < cost(best) and turn * 2.0 ** (best + 1) * rotor.dt < FASTEST_TURN:
         best += 1
-    while best <= 0 and improbability(best - 1) < improbability(best):
+    while best <= 0 and cost(best - 1) < cost(best):
         best -= 1
-    below, least, above = (improbability(best + step) for step in (-1, 0, 1))
+    below, least, above = (cost(best + step) for step in (-1, 0, 1))
     curvature = below - 2.0 * least + above
     shift = 0.5 * (below - above) / curvature if curvature > 0.0 else 0.0
     return float(turn * 2.0 ** (best + min(max(shift, -0.5), 0.5)))
@@ -377,7 +377,7 @@ class _Passed:
     updates: list[list[_Update]]
     shown: Array
     rows: Array
-    improbability: float
+    negative_log_likelihood: float
 
 
 def forward_pass(
@@ -395,7 +395,7 @@ def forward_pass(
     identity = np.eye(size)
     x, P = rotor.start, rotor.start_covariance
     watched = rotor.watched
-    updates, improbability = [], 0.0
+    updates, negative_log_likelihood = [], 0.0
     shown, rows = np.empty((count, len(watched))), np.empty((count, len(watched), size))
     for i in range(count):
         if i > 0:
@@ -423,10 +423,10 @@ def forward_pass(
             P = left @ P @ left.T + (K * R) @ K.T  # Joseph form: stays positive with a channel missing
             done.append(_Update(K=K, H=H, whitened=inverse @ e, inverse=inverse, channels=channels))
         if len(heard):
-            improbability += 0.5 * float(e @ done[-1].whitened - np.linalg.slogdet(inverse)[1])
+            negative_log_likelihood += 0.5 * float(e @ done[-1].whitened - np.linalg.slogdet(inverse)[1])
         updates.append(done)
         shown[i], rows[i] = watched @ x, watched @ P
-    return _Passed(updates=updates, shown=shown, rows=rows, improbability=improbability)
+    return _Passed(updates=updates, shown=shown, rows=rows, negative_log_likelihood=negative_log_likelihood)
 
 
 def _backward(rotor: _Rotor, passed: _Passed, *, variances: bool = True) -> tuple[Array, Array]:

@@ -39,7 +39,7 @@ def readings_of(problem: DropProblem) -> Readings:
     )
 
 
-def improbability_of(model: DropModel, drop: RecordedDrop, readings: Readings) -> float:
+def rotor_likelihood_of(model: DropModel, drop: RecordedDrop, readings: Readings) -> float:
     """Negative logarithm of the likelihood of readings with a rotor under any forces at its bearings [1].
 
     Parameters
@@ -55,4 +55,4 @@ def improbability_of(model: DropModel, drop: RecordedDrop, readings: Readings) -
     rotor = rotor_of(problem)
     local = np.broadcast_to(USUAL_PEAK * rotor.weight, readings.closed.shape)
     turn = USUAL_PEAK / problem.fall_time
-    return forward_pass(rotor, readings.along, readings.closed, local, turn).improbability
+    return forward_pass(rotor, readings.along, readings.closed, local, turn).negative_log_likelihood

@@ -44,12 +44,12 @@ def likeliest_noise(fit: TrackedDrops, stage: Stage) -> float:
     """
     needed = max(fit.noise_factors, default=1.0)
 
-    def improbability(power: int) -> float:
+    def negative_log_likelihood(power: int) -> float:
         drops = forward_passes(fit, stage, needed * STEP**power)
         lost = any(one.done < len(drop.means) for one, drop in zip(drops, fit.smoothed, strict=True))
         return math.inf if lost else sum(one.negative_log_likelihood for one in drops)
 
-    found: float = needed * STEP ** _lowest(improbability)
+    found: float = needed * STEP ** _lowest(negative_log_likelihood)
     return min(max(found, needed if needed > 1.0 else SMALLEST), LARGEST)
 
 

@@ -26,7 +26,7 @@ from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.reduction import Reduction
 from rotordrop.rotor.unknowns import prior
 from rotordrop.track.problem import RecordedDrop, build_problem
-from rotordrop.track.rotor_likelihood import Readings, improbability_of, readings_of
+from rotordrop.track.rotor_likelihood import Readings, readings_of, rotor_likelihood_of
 
 Array = NDArray[np.float64]
 
@@ -86,7 +86,7 @@ def with_found_rotor(machine: Machine, drops: Sequence[tuple[Evidence, RecordedD
         beyond = 1e3 * float(np.sum((deviations - inside) ** 2))
         try:
             tried = build_drop_model(with_values(inside), BASIS)
-            total = sum(improbability_of(tried, drop, readings) for drop, readings in seen)
+            total = sum(rotor_likelihood_of(tried, drop, readings) for drop, readings in seen)
         except RotordropError:  # no rotor can be so
             return math.inf
         return total + 0.5 * float(np.sum(inside**2)) + beyond

@@ -6,11 +6,11 @@ from rotordrop.elements.extension import Values
 from rotordrop.estimate.estimate import Structure
 from rotordrop.machine import Machine
 from rotordrop.rotor.statics import bearing_load_shares
-from rotordrop.twin.structure_search import Kept
+from rotordrop.twin.search import Accepted
 
 
-def structure_of(kept: Kept, machine: Machine, values: Values) -> Structure:
+def structure_of(accepted: Accepted, machine: Machine, values: Values) -> Structure:
     """What an accepted extension says of the machine, with 90 % intervals in brackets."""
     load = float(sum(bearing_load_shares(machine))) / len(machine.touchdown_bearings)
-    found = kept.extension.found(machine, values, load)
-    return Structure(name=kept.extension.name, gain=kept.gain, sentence=f"Found: {found}.")
+    found = accepted.extension.found(machine, values, load)
+    return Structure(name=accepted.extension.name, gain=accepted.gain, sentence=f"Found: {found}.")

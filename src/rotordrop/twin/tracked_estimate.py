@@ -184,7 +184,7 @@ def _unbalance(drop: TrackedDrop, judged: _Judgement) -> tuple[PlaneUnbalance, .
 def _structure(drop: TrackedDrop, judged: _Judgement) -> tuple[Structure, ...]:
     values = {parameter.path: parameter.estimate for parameter in judged.parameters}
     machine = drop.problem.model.machine
-    return tuple(structure_of(kept, machine, values) for kept in drop.kept)
+    return tuple(structure_of(accepted, machine, values) for accepted in drop.accepted)
 
 
 def _cross_checked(drop: TrackedDrop, method: Tracked) -> tuple[TrackedDrop, InputEstimate | None]:
@@ -227,7 +227,7 @@ def _judge(drop: TrackedDrop, check: InputEstimate | None) -> _Judgement:
     if not fits and check is not None:
         given_way = [_gives_way(drop, found, check, b) for b in range(len(given_way))]
     verdict = Verdict.CONSISTENT if drop.consistent else Verdict.ONE_DIRECTION
-    if drop.consistent and drop.kept:
+    if drop.consistent and drop.accepted:
         verdict = Verdict.EXTENDED
     if not fits:
         verdict = Verdict.GIVEN_WAY if any(given_way) else Verdict.HELD

@@ -24,7 +24,7 @@ from rotordrop.record.examples import example_record_path
 from rotordrop.record.record import read_record
 from rotordrop.track.calibration import BLIND_SCHEDULE, Stage
 from rotordrop.track.consistency import Check
-from rotordrop.twin.tracked import is_calibrated
+from rotordrop.twin.search import is_calibrated
 
 LP400 = str(example_path("lp400"))
 RECORD = str(example_record_path("lp400_drop_060"))
@@ -38,12 +38,13 @@ SHORT = 0.03
 def shortened() -> Iterator[None]:
     """The estimator with a few passes over the first impacts only."""
     with pytest.MonkeyPatch.context() as patch:
-        module = "rotordrop.twin.tracked"
-        patch.setattr(f"{module}.BLIND_SCHEDULE", BLIND_SCHEDULE[:4])
+        module = "rotordrop.twin.search"
+        for room in (module, "rotordrop.twin.problems"):
+            patch.setattr(f"{room}.BLIND_SCHEDULE", BLIND_SCHEDULE[:4])
         patch.setattr(
             f"{module}.CALIBRATION_SCHEDULE", (Stage(until=SHORT, force=0.07, share=0.01, passes=1),)
         )
-        patch.setattr(f"{module}.WINDOW", SHORT)
+        patch.setattr("rotordrop.twin.problems.WINDOW", SHORT)
         yield
 
 

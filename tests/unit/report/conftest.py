@@ -18,7 +18,8 @@ from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.simulate.certificate import Certificate
 from rotordrop.simulate.result import ContactLog, DropResult
 from rotordrop.track.calibration import CALIBRATED_SCHEDULE, track
-from rotordrop.twin.tracked import COARSE_BASIS, drop_problem, tracked_drop
+from rotordrop.twin.problems import COARSE_BASIS, drop_problem
+from rotordrop.twin.tracked import tracked_drop
 from rotordrop.twin.tracked_estimate import estimate_of
 
 GAPS = (275e-6, 285e-6)

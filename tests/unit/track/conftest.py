@@ -12,7 +12,7 @@ from rotordrop.record.record import read_record
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Forward, PassSettings, Smoothed, forward, smooth
-from rotordrop.twin.tracked import COARSE_BASIS, drop_problem
+from rotordrop.twin.problems import COARSE_BASIS, drop_problem
 
 
 @pytest.fixture(scope="session")

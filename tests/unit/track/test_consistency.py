@@ -18,7 +18,7 @@ from rotordrop.track.consistency import (
     normalised_innovations,
 )
 from rotordrop.track.smoother import PassSettings, forward, smooth
-from rotordrop.twin.tracked import COARSE_BASIS, drop_problem
+from rotordrop.twin.problems import COARSE_BASIS, drop_problem
 
 SETTINGS = PassSettings(impulse=3e-3, share=0.03)
 

@@ -15,7 +15,7 @@ from rotordrop.track.calibration import BLIND_SCHEDULE, CALIBRATED_SCHEDULE, shi
 from rotordrop.track.prior import fall_time
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import PassSettings
-from rotordrop.twin.tracked import COARSE_BASIS
+from rotordrop.twin.problems import COARSE_BASIS
 
 LAST = CALIBRATED_SCHEDULE[-1]
 

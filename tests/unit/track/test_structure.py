@@ -29,7 +29,7 @@ from rotordrop.simulate.case import DropCase
 from rotordrop.simulate.drop import simulate_drop
 from rotordrop.track._filter import lag_step
 from rotordrop.track.problem import DropProblem
-from rotordrop.twin.tracked import COARSE_BASIS, drop_problem
+from rotordrop.twin.problems import COARSE_BASIS, drop_problem
 
 STRUCTURE = {
     "support.coupling": 0.2,

@@ -28,7 +28,7 @@ from rotordrop.track.problem import (
     settled_displacement,
 )
 from rotordrop.track.transfer import transferred
-from rotordrop.twin.tracked import COARSE_BASIS, drop_problem, recorded_drop
+from rotordrop.twin.problems import COARSE_BASIS, drop_problem, recorded_drop
 
 NO_TAIL = Missing(reason="none was given")
 

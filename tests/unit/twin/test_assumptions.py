@@ -15,7 +15,7 @@ from rotordrop.machine import Machine, example_machine, load_machine
 from rotordrop.record.examples import example_record_path
 from rotordrop.record.record import read_record
 from rotordrop.rotor.parameters import build_drop_model
-from rotordrop.twin.tracked import COARSE_BASIS, _seen_at_the_ends, _with_sensors_of, drop_problem
+from rotordrop.twin.problems import COARSE_BASIS, drop_problem, with_end_planes, with_sensors_of
 from rotordrop_bench import hidden_machine, synthesize_drop
 
 UNTIL = 3e-3
@@ -92,8 +92,8 @@ def test_a_third_plane_does_not_hide_where_the_first_forces_act() -> None:
     machine = load_machine(Path(__file__).parents[2] / "machines" / "long_rotor.toml")
     made = synthesize_drop(hidden_machine(machine, 11), 2.0 * math.pi * 130.0, 110, duration=0.03)
     evidence = read_evidence(build_drop_model(machine), made.record)
-    model = build_drop_model(_seen_at_the_ends(machine), COARSE_BASIS)
-    problem = drop_problem(model, _with_sensors_of(model, evidence), until=UNTIL)
+    model = build_drop_model(with_end_planes(machine), COARSE_BASIS)
+    problem = drop_problem(model, with_sensors_of(model, evidence), until=UNTIL)
     assert problem.n_channels == 4 < len(machine.sensors)
     for name, entry in zip(model.bearing_names, problem.gap_entries, strict=True):
         assert problem.start[entry] == pytest.approx(made.truth["air_gap_m"][name], abs=20e-6)

@@ -11,7 +11,7 @@ from rotordrop.elements.table import parameter, row_of
 from rotordrop.machine import Machine, load_machine, save_machine
 from rotordrop.rotor.unknowns import prior
 from rotordrop.twin.calibrated import Calibration, calibrate_machine, calibration_json
-from rotordrop.twin.tracked import is_calibrated
+from rotordrop.twin.search import is_calibrated
 from rotordrop.twin.tracked_parameters import NOT_DETERMINED
 from rotordrop_bench import HiddenMachine, SyntheticDrop, synthesize_drop
 

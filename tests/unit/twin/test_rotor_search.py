@@ -23,8 +23,8 @@ from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.track.forces import ForceHistory
 from rotordrop.track.input_state import InputEstimate
 from rotordrop.twin.narrowing import explained
+from rotordrop.twin.problems import recorded_drop
 from rotordrop.twin.rotor_search import with_found_rotor
-from rotordrop.twin.tracked import recorded_drop
 from rotordrop.twin.tracked_loads import (
     check_of_a_beam,
     check_of_the_rotor,

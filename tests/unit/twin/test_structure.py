@@ -22,16 +22,16 @@ from rotordrop.machine import Machine, example_machine, load_machine, save_machi
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns
 from rotordrop.twin.calibrated import _with_unbalance
-from rotordrop.twin.structure_search import (
+from rotordrop.twin.search import (
+    CONSISTENT_RISE,
     FIRST_OTHER_START,
-    PAYS_BESIDE,
-    PENALTY,
+    LEAST_RISE,
+    Accepted,
     Candidate,
-    Kept,
-    Place,
-    found_beside_the_usual,
-    found_structure,
-    rank_of,
+    Checkpoint,
+    best_structure,
+    extension_when_consistent,
+    score_of,
 )
 from rotordrop.twin.structure_sentence import structure_of
 
@@ -41,9 +41,9 @@ def lp400() -> Machine:
     return example_machine("lp400")
 
 
-def fit_of(improbability: float, nis: float, factor: float = 1.0) -> Any:
+def fit_of(negative_log_likelihood: float, nis: float, factor: float = 1.0) -> Any:
     return SimpleNamespace(
-        improbability=improbability,
+        negative_log_likelihood=negative_log_likelihood,
         nis=(nis,),
         noise_factors=(factor,),
         diverged=(False,),
@@ -69,132 +69,132 @@ def has(machine: Machine) -> frozenset[str]:
 
 
 class Record:
-    """A record by the improbability it gives to machines with certain extensions, whatever the window."""
+    """A record by the likelihood it gives to machines with certain extensions, whatever the window."""
 
     windows = 4
 
-    def __init__(self, table: dict[frozenset[str], Any], usual: Any, back: Any = None) -> None:
-        self.table, self.usual, self.back = table, usual, back
+    def __init__(self, table: dict[frozenset[str], Any], base: Any, back: Any = None) -> None:
+        self.table, self.base, self.back = table, base, back
         self.attempts: list[int] = []
         self.passed: Counter[int] = Counter()
 
-    def fit(self, machine: Machine, attempt: int) -> Any:
-        self.attempts.append(attempt)
-        return self.table.get(has(machine), self.usual)
+    def fit(self, machine: Machine, start: int) -> Any:
+        self.attempts.append(start)
+        return self.table.get(has(machine), self.base)
 
-    def window(self, machine: Machine, attempt: int, number: int, before: Place | None) -> Place:
+    def extend(self, machine: Machine, start: int, number: int, before: Checkpoint | None) -> Checkpoint:
         assert (before is None) == (number == 0)
         self.passed[number] += 1
-        fit = self.fit(machine, attempt)
-        return Place(problems=(), trajectories=(fit,), rank=rank_of(fit))
+        fit = self.fit(machine, start)
+        return Checkpoint(problems=(), trajectories=(fit,), score=score_of(fit))
 
-    def settled(self, place: Place) -> Any:
+    def converge(self, place: Checkpoint) -> Any:
         return place.trajectories[0]
 
-    def look(self, _known: Any, machine: Machine, _passes: int) -> Any:
-        found = self.table.get(has(machine), self.usual)
+    def relinearise(self, _known: Any, machine: Machine, _passes: int) -> Any:
+        found = self.table.get(has(machine), self.base)
         return self.back if self.back is not None and not has(machine) else found
 
-    def judge(self, known: Any, machine: Machine) -> float:
-        return float(self.look(known, machine, 1).improbability)
+    def likelihood(self, known: Any, machine: Machine) -> float:
+        return float(self.relinearise(known, machine, 1).negative_log_likelihood)
 
 
 AXES, CUBIC = frozenset({"turned support axes"}), frozenset({"cubic support"})
 
 
 def names(found: Candidate) -> list[str]:
-    return [kept.extension.name for kept in found.kept]
+    return [kept.extension.name for kept in found.accepted]
 
 
 def test_the_extension_that_the_readings_pay_for_is_kept(lp400):
-    usual = fit_of(1000.0, 3.0)
-    record = Record({AXES: fit_of(500.0, 0.9), CUBIC: fit_of(700.0, 1.1)}, usual)
-    found = found_structure(Candidate(machine=lp400, fit=usual), record)
-    assert names(found) == ["turned support axes"] and found.kept[0].gain == pytest.approx(500.0)
+    base = fit_of(1000.0, 3.0)
+    record = Record({AXES: fit_of(500.0, 0.9), CUBIC: fit_of(700.0, 1.1)}, base)
+    found = best_structure(Candidate(machine=lp400, fit=base), record)
+    assert names(found) == ["turned support axes"] and found.accepted[0].gain == pytest.approx(500.0)
     assert has(found.machine) == AXES
 
 
 def test_what_pays_less_than_the_penalty_is_not_named(lp400):
-    usual = fit_of(1000.0, 3.0)
-    record = Record({AXES: fit_of(1000.0 - 0.9 * PENALTY, 3.0)}, usual)
-    found = found_structure(Candidate(machine=lp400, fit=usual), record)
+    base = fit_of(1000.0, 3.0)
+    record = Record({AXES: fit_of(1000.0 - 0.9 * LEAST_RISE, 3.0)}, base)
+    found = best_structure(Candidate(machine=lp400, fit=base), record)
     assert names(found) == [] and found.machine == lp400
 
 
 def test_an_extension_that_only_led_to_a_better_start_is_not_named(lp400):
     """The usual model, given the place that the extension has found, follows the record as well."""
-    usual, better = fit_of(1000.0, 3.0), fit_of(505.0, 0.95)
-    record = Record({AXES: fit_of(500.0, 0.9)}, usual, back=better)
-    found = found_structure(Candidate(machine=lp400, fit=usual), record)
+    base, better = fit_of(1000.0, 3.0), fit_of(505.0, 0.95)
+    record = Record({AXES: fit_of(500.0, 0.9)}, base, back=better)
+    found = best_structure(Candidate(machine=lp400, fit=base), record)
     assert names(found) == [] and found.fit is better
 
 
 def test_a_second_extension_comes_on_top_of_the_first(lp400):
-    usual = fit_of(1000.0, 3.0)
+    base = fit_of(1000.0, 3.0)
     record = Record(
-        {AXES: fit_of(600.0, 1.6), CUBIC: fit_of(800.0, 2.0), AXES | CUBIC: fit_of(300.0, 0.9)}, usual
+        {AXES: fit_of(600.0, 1.6), CUBIC: fit_of(800.0, 2.0), AXES | CUBIC: fit_of(300.0, 0.9)}, base
     )
-    found = found_structure(Candidate(machine=lp400, fit=usual), record)
+    found = best_structure(Candidate(machine=lp400, fit=base), record)
     assert names(found) == ["turned support axes", "cubic support"]
-    assert [kept.gain for kept in found.kept] == pytest.approx([400.0, 300.0])
+    assert [kept.gain for kept in found.accepted] == pytest.approx([400.0, 300.0])
 
 
 def test_likelihoods_compare_at_equal_unknown_impulses_only(lp400):
     """A structure that follows the record with eight times the impulses is no better for its likelihood."""
-    usual = fit_of(1000.0, 3.0)
-    record = Record({AXES: fit_of(100.0, 0.98, factor=8.0), CUBIC: fit_of(700.0, 1.1)}, usual)
-    found = found_structure(Candidate(machine=lp400, fit=usual), record)
+    base = fit_of(1000.0, 3.0)
+    record = Record({AXES: fit_of(100.0, 0.98, factor=8.0), CUBIC: fit_of(700.0, 1.1)}, base)
+    found = best_structure(Candidate(machine=lp400, fit=base), record)
     assert names(found) == ["cubic support"]
 
 
 def test_where_nothing_helps_the_best_of_other_starts_is_taken(lp400):
-    usual = fit_of(1000.0, 3.0)
+    base = fit_of(1000.0, 3.0)
 
     class Elsewhere(Record):
-        def fit(self, machine: Machine, attempt: int) -> Any:
-            if attempt == FIRST_OTHER_START:
+        def fit(self, machine: Machine, start: int) -> Any:
+            if start == FIRST_OTHER_START:
                 raise IdentificationError("lost")
-            return fit_of(400.0, 0.9) if attempt == FIRST_OTHER_START + 1 else super().fit(machine, attempt)
+            return fit_of(400.0, 0.9) if start == FIRST_OTHER_START + 1 else super().fit(machine, start)
 
-    found = found_structure(Candidate(machine=lp400, fit=usual), Elsewhere({}, usual))
+    found = best_structure(Candidate(machine=lp400, fit=base), Elsewhere({}, base))
     assert names(found) == [] and found.fit.nis == (0.9,)
 
 
 def test_the_half_that_follows_the_record_worse_stays_behind_window_by_window(lp400):
-    usual = fit_of(1000.0, 3.0)
-    record = Record({AXES: fit_of(500.0, 0.9)}, usual)
-    found_structure(Candidate(machine=lp400, fit=usual), record)
+    base = fit_of(1000.0, 3.0)
+    record = Record({AXES: fit_of(500.0, 0.9)}, base)
+    best_structure(Candidate(machine=lp400, fit=base), record)
     ways = 2 * len(EXTENSIONS)
     assert [record.passed[k] for k in range(4)] == [ways, ways, ways, ways // 2]
 
 
 def test_an_extension_that_loses_the_record_is_no_candidate(lp400):
-    usual = fit_of(1000.0, 3.0)
+    base = fit_of(1000.0, 3.0)
 
     class Lost(Record):
-        def fit(self, machine: Machine, attempt: int) -> Any:
+        def fit(self, machine: Machine, start: int) -> Any:
             if has(machine):
                 raise IdentificationError("lost")
-            return super().fit(machine, attempt)
+            return super().fit(machine, start)
 
-    found = found_structure(Candidate(machine=lp400, fit=usual), Lost({AXES: fit_of(1.0, 0.9)}, usual))
+    found = best_structure(Candidate(machine=lp400, fit=base), Lost({AXES: fit_of(1.0, 0.9)}, base))
     assert names(found) == [] and found.machine == lp400
 
 
 def test_what_pays_beside_a_model_that_fits_is_kept(lp400):
-    usual = fit_of(1000.0, 0.92)
+    base = fit_of(1000.0, 0.92)
     cross, softer = frozenset({"cross-axis sensitivity"}), frozenset({"rotor stiffness"})
-    record = Record({cross: fit_of(930.0, 0.9), softer: fit_of(880.0, 0.9)}, usual)
-    found = found_beside_the_usual(Candidate(machine=lp400, fit=usual), record)
-    assert names(found) == ["rotor stiffness"] and found.kept[0].gain == pytest.approx(120.0)
+    record = Record({cross: fit_of(930.0, 0.9), softer: fit_of(880.0, 0.9)}, base)
+    found = extension_when_consistent(Candidate(machine=lp400, fit=base), record)
+    assert names(found) == ["rotor stiffness"] and found.accepted[0].gain == pytest.approx(120.0)
 
 
 @pytest.mark.parametrize("plain", [1000.0, math.inf])
 def test_what_pays_less_beside_a_model_that_fits_is_not_kept(lp400, plain):
     """Nor is anything where the usual model itself loses the record in one pass."""
-    usual = fit_of(plain, 0.92)
-    record = Record({AXES: fit_of(1000.0 - 0.9 * PAYS_BESIDE, 0.8)}, usual)
-    assert found_beside_the_usual(Candidate(machine=lp400, fit=usual), record).kept == ()
+    base = fit_of(plain, 0.92)
+    record = Record({AXES: fit_of(1000.0 - 0.9 * CONSISTENT_RISE, 0.8)}, base)
+    assert extension_when_consistent(Candidate(machine=lp400, fit=base), record).accepted == ()
 
 
 @pytest.mark.parametrize("name", ["long remanence", "sensor lag"])
@@ -203,9 +203,9 @@ def test_what_says_nothing_beyond_the_usual_is_not_kept(lp400, name):
 
     Heavy rotors rose by 10 to 30 with a remanence "not to be told from the usual 2 ms".
     """
-    usual = fit_of(1000.0, 0.92)
-    record = Record({frozenset({name}): fit_of(900.0, 0.9)}, usual)
-    assert found_beside_the_usual(Candidate(machine=lp400, fit=usual), record).kept == ()
+    base = fit_of(1000.0, 0.92)
+    record = Record({frozenset({name}): fit_of(900.0, 0.9)}, base)
+    assert extension_when_consistent(Candidate(machine=lp400, fit=base), record).accepted == ()
 
 
 # sentences
@@ -233,7 +233,7 @@ def test_every_extension_says_what_was_found_with_its_interval(lp400, extension)
         u.path: Known(value=u.value_of(u.begin), interval_90=(0.9 * u.begin, 1.1 * u.begin + 1e-6))
         for u in all_unknowns(build_drop_model(machine, "quick"))
     }
-    said = structure_of(Kept(extension=extension, gain=math.inf), machine, values)
+    said = structure_of(Accepted(extension=extension, gain=math.inf), machine, values)
     assert said.sentence.startswith("Found: ") and " to " in said.sentence
     assert structure_json([said]) == [
         {"name": extension.name, "log_likelihood_rise": None, "sentence": said.sentence}
@@ -271,5 +271,5 @@ def test_the_lift_of_the_magnets_is_longer_or_shorter_and_not_both(lp400, low, h
     extension = next(one for one in EXTENSIONS if one.name == "long remanence")
     middle = 0.5 * (low + high)
     value = Known(value=middle, interval_90=(low, high))
-    kept = Kept(extension=extension, gain=50.0)
-    assert words in structure_of(kept, lp400, {"remanence.time_constant": value}).sentence
+    accepted = Accepted(extension=extension, gain=50.0)
+    assert words in structure_of(accepted, lp400, {"remanence.time_constant": value}).sentence

@@ -31,18 +31,13 @@ from rotordrop.machine import Machine, example_machine, load_machine
 from rotordrop.record.examples import example_record_path
 from rotordrop.record.record import Record, read_record
 from rotordrop.rotor.parameters import build_drop_model
-from rotordrop.track.calibration import TrackedDrops, beside_the_record
+from rotordrop.track.calibration import TrackedDrops, is_inconsistent
 from rotordrop.track.consistency import Check
 from rotordrop.track.input_state import input_state_estimate, lent_by_record
 from rotordrop.track.smoother import parameter_sample
-from rotordrop.twin.tracked import (
-    TrackedDrop,
-    _tail_first,
-    drop_problem,
-    followed_drops,
-    track_drops,
-    tracked_drop,
-)
+from rotordrop.twin.problems import drop_problem, tail_first
+from rotordrop.twin.search import track_drops
+from rotordrop.twin.tracked import TrackedDrop, followed_drops, tracked_drop
 from rotordrop.twin.tracked_estimate import _cross_checked, estimate_of
 from rotordrop.twin.tracked_loads import (
     INCONSISTENT,
@@ -347,11 +342,11 @@ def test_a_tail_of_any_drop_serves_the_whole_chain(known: Machine, synthetic: Sy
     model = build_drop_model(known)
     without = read_evidence(model, synthetic.record)
     having = read_evidence(model, synthetic.record, synthetic.tail)
-    first, second = _tail_first([without, having])
+    first, second = tail_first([without, having])
     assert not isinstance(first.settled_level, Missing)
     np.testing.assert_array_equal(first.settled_level, having.settled_level)
     assert second is having
-    assert isinstance(_tail_first([without, without])[0].settled_level, Missing)
+    assert isinstance(tail_first([without, without])[0].settled_level, Missing)
 
 
 @pytest.mark.parametrize(
@@ -362,7 +357,7 @@ def test_a_fit_beside_the_record_is_noticed(nis: float, factor: float, diverged:
     fit = TrackedDrops(
         problems=(), smoothed=(), nis=(0.9, nis), diverged=(False, diverged), noise_factors=(1.0, factor)
     )
-    assert beside_the_record(fit) == beside
+    assert is_inconsistent(fit) == beside
 
 
 def test_a_peak_far_from_the_cross_check_is_not_called_consistent(workshop: TrackedDrop) -> None:
@@ -529,7 +524,7 @@ def test_a_third_sensor_plane_of_a_long_rotor_is_no_loss() -> None:
     made = synthesize_drop(hidden_machine(machine, 1), 2.0 * math.pi * 120.0, 10, duration=0.1, name="long")
     evidence = read_evidence(build_drop_model(machine), made.record, made.tail)
     fit = track_drops(machine, [evidence], calibrate_only=True).fit
-    assert not beside_the_record(fit), (fit.nis, fit.noise_factors)
+    assert not is_inconsistent(fit), (fit.nis, fit.noise_factors)
     problem, smoothed = fit.problems[0], fit.smoothed[0]
     assert problem.n_channels == 6
     theta = smoothed.means[parameter_sample(smoothed)][problem.parameter_slice]

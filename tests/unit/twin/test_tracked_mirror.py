@@ -14,7 +14,7 @@ from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.track.forces import ForceHistory, force_history
 from rotordrop.track.problem import build_problem
 from rotordrop.track.smoother import PassSettings, forward, smooth
-from rotordrop.twin.tracked import COARSE_BASIS, recorded_drop
+from rotordrop.twin.problems import COARSE_BASIS, recorded_drop
 from rotordrop_bench import SyntheticDrop
 
 UNTIL = 0.025

@@ -1,0 +1,510 @@
+"""One search over candidate models of a machine, scored by the marginal likelihood of the readings.
+
+A candidate is a machine with a way to fit it: the base model, one with an extension more, the same from
+another start. A coarse basis extends its fit window by window, the half with the worse score is dropped after
+each, and the fine basis refines what is left.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.elements.beam import is_beam
+from rotordrop.elements.extension import Extension
+from rotordrop.elements.table import EXTENSIONS
+from rotordrop.errors import IdentificationError
+from rotordrop.evidence.evidence import Evidence
+from rotordrop.machine import Machine
+from rotordrop.track.calibration import (
+    BLIND_SCHEDULE,
+    CALIBRATED_SCHEDULE,
+    DAMPED_SCHEDULE,
+    LOOSER,
+    QUICK_SCHEDULE,
+    THREADS,
+    Stage,
+    TrackedDrops,
+    converged,
+    is_inconsistent,
+    stage_settings,
+    track,
+)
+from rotordrop.track.consistency import DIRECTIONS, consistency_checks
+from rotordrop.track.prior import fall_time
+from rotordrop.track.problem import DropProblem
+from rotordrop.track.smoother import forward
+from rotordrop.track.transfer import transferred
+from rotordrop.twin.problems import Drops, recorded_drop, tail_first
+from rotordrop.twin.rotor_search import with_found_rotor
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, float], None]
+
+FINE_SCHEDULE: tuple[Stage, ...] = (
+    Stage(until=0.06, force=0.07, share=0.01, passes=1),
+    Stage(until=0.2, force=0.07, share=0.01, passes=1),
+)
+_WINDOWS = (slice(0, 2), *(slice(k, k + 1) for k in range(2, len(BLIND_SCHEDULE))))
+"""Stages of each window from guesses; of the two of the first, one only finds where to linearise."""
+CALIBRATION_SCHEDULE = (replace(FINE_SCHEDULE[0], passes=2),)
+
+OTHER_START_SPREAD = 0.8
+"""Spread of other starts, in standard deviations of the prior [1]."""
+
+ROTOR_SEEN = 6.0
+"""Part of the drop from which the form of a rotor is found, over the time of a free fall [1]."""
+
+LEAST_RISE = 40.0
+"""Rise of the logarithm of the marginal likelihood from which an extension is kept [1].
+
+Source: one structure each on drops of one machine: without departure all were within 28, the right one was
+172 and more before the next best; an extension has about three unknowns for each bearing.
+"""
+
+CONSISTENT_RISE = 10.0
+"""The same for an extension of a model that fits, from where that one ended [1].
+
+Nothing else changes there, so that less tells: on drops without departure the best of ten extensions rose by
+7 at most, while long remanence brought 24 to 31 and cross-axis sensitivity 11 to 202 (``studies/structure``).
+"""
+
+MOST_EXTENSIONS = 2
+
+UNDAMPED, DAMPED, FIRST_OTHER_START = range(3)
+"""How a fit is attempted: in the usual way, in short steps, and from then on from other starts."""
+OTHER_STARTS = 6
+RELINEARISED_PASSES = 3
+
+FIRST_CHOICE = 2
+"""Window after which the half that follows the record worse stays behind, and after each one from then on.
+
+Before, the windows hold little more than the first contact. After it the right one of ten extensions was in
+the better half, and first from the next window on (three structures, both ways: ``studies/structure``).
+"""
+FEWEST = 2
+
+Score = tuple[bool, float, float]
+"""Lost, process noise over the usual one [1], negative log likelihood: what is smaller fits better, and
+likelihoods compare at equal process noise only."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Accepted:
+    """An accepted extension, and the rise of the log marginal likelihood that it brought [1]."""
+
+    extension: Extension
+    gain: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidate:
+    """A machine, the extensions it has beyond the description, and how it follows the record."""
+
+    machine: Machine
+    fit: TrackedDrops
+    accepted: tuple[Accepted, ...] = ()
+
+    @property
+    def inconsistent(self) -> bool:
+        """Whether it ended inconsistent with the record."""
+        return is_inconsistent(self.fit)
+
+    @property
+    def score(self) -> Score:
+        """How it follows the record."""
+        return score_of(self.fit)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Checkpoint:
+    """Where a fit from guesses is after some windows: less than the fit, of which many are on their way.
+
+    Attributes
+    ----------
+    problems : tuple of DropProblem
+        The drops.
+    trajectories : tuple of ndarray
+        Smoothed means of each drop, shape (M, n).
+    score : tuple
+        How the fit follows the record.
+    """
+
+    problems: tuple[DropProblem, ...]
+    trajectories: tuple[Array, ...]
+    score: Score
+
+
+class Fits(Protocol):
+    """Fits of candidate models to the same drops."""
+
+    @property
+    def windows(self) -> int:
+        """Number of windows from guesses to the first impacts whole."""
+
+    def extend(self, machine: Machine, start: int, number: int, before: Checkpoint | None) -> Checkpoint:
+        """A fit of a machine over one window more; from its guesses where nothing is before."""
+
+    def converge(self, checkpoint: Checkpoint) -> TrackedDrops:
+        """The fit over the last window, repeated while that pays."""
+
+    def likelihood(self, known: TrackedDrops, machine: Machine) -> float:
+        """Negative log likelihood of the readings with a machine, linearised at a fit."""
+
+    def relinearise(self, known: TrackedDrops, machine: Machine, passes: int) -> TrackedDrops:
+        """Passes over the last window with a machine, linearised at a fit."""
+
+
+def is_calibrated(machine: Machine) -> bool:
+    """Whether the supports of all bearings are estimates, not guesses."""
+    return all(
+        quantity.status == "estimated"
+        for bearing in machine.touchdown_bearings
+        for quantity in (bearing.support.stiffness, bearing.support.mass)
+    )
+
+
+def track_drops(
+    machine: Machine,
+    evidence: Sequence[Evidence],
+    *,
+    quick: bool = False,
+    calibrate_only: bool = False,
+    progress: Progress | None = None,
+) -> Candidate:
+    """Follow recorded drops of one machine with the drop model.
+
+    From guesses, a coarse basis finds the parameters in growing windows and a finer one refines them; a
+    calibrated machine needs the finer one only (with ``quick``, a single pass of it). What ends
+    inconsistent is tried with extensions of the base model; the machine that comes back has those that were
+    accepted.
+    """
+    drops = Drops(evidence=tuple(tail_first(evidence)), calibrate_only=calibrate_only)
+    search = Search(drops=drops, progress=progress)
+    machine = search.with_rotor(machine)
+    if is_calibrated(machine) and not calibrate_only:
+        schedule = drops.scaled(machine, QUICK_SCHEDULE if quick else CALIBRATED_SCHEDULE)
+        calibrated = Candidate(machine=machine, fit=track(drops.fine(machine), schedule, progress=progress))
+        if quick or not calibrated.inconsistent:
+            return search.not_lost(calibrated)
+        found: Candidate | None = calibrated
+        base = Candidate(machine=machine, fit=search.fit_base(machine))
+    else:
+        base = Candidate(machine=machine, fit=search.fit_base(machine))
+        if not base.inconsistent:
+            base = extension_when_consistent(base, search)
+        # First: the coarse basis alone may end beside a record that the finer one fits, or lose it there.
+        found = search.refine_if_followed(base)
+    if found is None or not _fits(found):
+        if progress is not None:
+            progress("trying extensions of the usual model, and other starts", 0.0)
+        # Where a beam stands for a rotor, its form is what does not fit: no extension stands for that.
+        other = best_start(base, search) if is_beam(machine.rotor) else best_structure(base, search)
+        again = None if other.fit is base.fit else search.refine_if_followed(other)
+        followed = [one for one in (found, again) if one is not None]
+        if not followed:
+            return search.not_lost(search.refine(other))  # says where it was lost
+        found = min(followed, key=lambda one: one.score)
+    return search.not_lost(found)
+
+
+def score_of(fit: TrackedDrops) -> Score:
+    """How a fit follows the record."""
+    return any(fit.diverged), max(fit.noise_factors), fit.negative_log_likelihood
+
+
+def gain_of(candidate: Candidate, before: Candidate) -> float:
+    """Rise of the log marginal likelihood [1]; without limit where the other needed larger impulses."""
+    if candidate.score[:2] != before.score[:2]:
+        return math.inf if candidate.score < before.score else -math.inf
+    return before.score[2] - candidate.score[2]
+
+
+def best_structure(base: Candidate, search: Fits) -> Candidate:
+    """The best of the usual model and its extensions, one on top of the other while that pays.
+
+    The windows of a search leave it a few passes short, and an extension may have only led to a better start.
+    So the model without it is given what both have found, and the rise of the likelihood counts from there.
+
+    Parameters
+    ----------
+    base : Candidate
+        The usual model, which does not fit the record.
+    search : Fits
+        Fits machines to the record.
+    """
+    best = _base_again(base, base, search)
+    for _ in range(MOST_EXTENSIONS):
+        if (better := _best_extension(best, search)) is None:
+            break
+        best = _base_again(best, better, search)
+        if (gain := gain_of(better, best)) < LEAST_RISE:
+            break
+        accepted = replace(better.accepted[-1], gain=gain)
+        better = replace(better, accepted=(*better.accepted[:-1], accepted))
+        best = _base_again(better, better, search)
+        if not best.inconsistent:
+            break
+    return best_start(best, search)
+
+
+def _best_extension(base: Candidate, search: Fits) -> Candidate | None:
+    """The best candidate with one extension more, by either way from guesses; None where all were lost."""
+    attempts = [
+        _Attempt(
+            machine=extension.added_to(base.machine),
+            start=start,
+            accepted=(*base.accepted, Accepted(extension=extension, gain=math.inf)),
+        )
+        for extension in EXTENSIONS
+        if extension.values(base.machine)
+        for start in (UNDAMPED, DAMPED)
+    ]
+    return _halve(attempts, search)
+
+
+def _base_again(base: Candidate, better: Candidate, search: Fits) -> Candidate:
+    """The base, or what it makes of the checkpoint that an extension has found."""
+    try:
+        back = replace(base, fit=search.relinearise(better.fit, base.machine, RELINEARISED_PASSES))
+    except IdentificationError:
+        return base
+    return min(base, back, key=lambda one: one.score)
+
+
+def best_start(best: Candidate, search: Fits) -> Candidate:
+    """The same machine from other places in its prior, where it ended beside the record.
+
+    The objective has several minima.
+    """
+    if not best.inconsistent:
+        return best
+    starts = range(FIRST_OTHER_START, FIRST_OTHER_START + OTHER_STARTS)
+    attempts = [_Attempt(machine=best.machine, start=start, accepted=best.accepted) for start in starts]
+    found = _halve(attempts, search)
+    return best if found is None else min(best, found, key=lambda one: one.score)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Attempt:
+    """A machine on its way from guesses to the record."""
+
+    machine: Machine
+    start: int
+    accepted: tuple[Accepted, ...]
+    checkpoint: Checkpoint | None = None
+
+    @property
+    def score(self) -> Score:
+        return (True, math.inf, math.inf) if self.checkpoint is None else self.checkpoint.score
+
+
+def _halve(attempts: Sequence[_Attempt], search: Fits) -> Candidate | None:
+    """Who follows the record best of those that many short windows and few long ones leave.
+
+    Successive halving: Jamieson & Talwalkar, AISTATS 2016.
+    """
+
+    def further(one: _Attempt) -> _Attempt | None:
+        try:
+            checkpoint = search.extend(one.machine, one.start, window, one.checkpoint)
+        except IdentificationError:
+            return None
+        return replace(one, checkpoint=checkpoint)
+
+    with ThreadPoolExecutor(max_workers=THREADS) as pool:
+        for window in range(search.windows):
+            there = [one for one in pool.map(further, attempts) if one is not None]
+            attempts = sorted(there, key=lambda one: one.score)
+            if window >= FIRST_CHOICE:
+                attempts = attempts[: max(FEWEST, (len(there) + 1) // 2)]
+    found = []
+    for one in attempts[:FEWEST]:
+        with suppress(IdentificationError):
+            assert one.checkpoint is not None
+            found.append(
+                Candidate(machine=one.machine, fit=search.converge(one.checkpoint), accepted=one.accepted)
+            )
+    return min(found, key=lambda one: one.score, default=None)
+
+
+def extension_when_consistent(base: Candidate, search: Fits) -> Candidate:
+    """The usual model that fits, with the extension that pays all the same, if one does.
+
+    A mild departure may not show in the size of the innovations, which nobody knows to a tenth, and yet move
+    peaks and gaps: a rotor 3 % softer moved a peak by 4.6 %, cross-axis sensitivity a gap by 30 µm.
+
+    Parameters
+    ----------
+    base : Candidate
+        The usual model, which follows the record.
+    search : Fits
+        Fits machines to the record.
+    """
+    able = [one for one in EXTENSIONS if one.shows_beside and one.values(base.machine)]
+    with ThreadPoolExecutor(max_workers=THREADS) as pool:
+        described = pool.submit(search.likelihood, base.fit, base.machine)
+
+        def rise(one: Extension) -> float:
+            with_it = search.likelihood(base.fit, one.added_to(base.machine))
+            if not one.usual(base.machine):
+                return described.result() - with_it
+            return search.likelihood(base.fit, one.saying_the_usual(base.machine)) - with_it
+
+        rises = list(pool.map(rise, able))
+    if not math.isfinite(described.result()):
+        return base
+    promising = [pair for pair in zip(rises, able, strict=True) if pair[0] >= CONSISTENT_RISE]
+    for _, extension in sorted(promising, key=lambda pair: -pair[0]):
+        machine, plain = extension.added_to(base.machine), extension.saying_the_usual(base.machine)
+        found = Candidate(machine=machine, fit=search.relinearise(base.fit, machine, RELINEARISED_PASSES))
+        again = replace(base, fit=search.relinearise(base.fit, plain, RELINEARISED_PASSES))
+        if (gain := gain_of(found, again)) >= CONSISTENT_RISE:
+            return replace(found, accepted=(Accepted(extension=extension, gain=gain),))
+    return base
+
+
+@dataclass(frozen=True, kw_only=True)
+class Search:
+    """Fits of machines to the same drops: a coarse basis finds the parameters, a finer one refines them."""
+
+    drops: Drops
+    progress: Progress | None
+
+    def with_rotor(self, machine: Machine) -> Machine:
+        """The machine with its rotor as the records show it, where a beam stands for it."""
+        if not is_beam(machine.rotor):
+            return machine
+        until = ROTOR_SEEN * fall_time(machine)
+        return with_found_rotor(machine, [(item, recorded_drop(item, until)) for item in self.drops.evidence])
+
+    def fit_base(self, machine: Machine) -> TrackedDrops:
+        """Fit of a machine from its guesses by the coarse basis; beside the record, again in short steps."""
+        problems, found = self.drops.coarse(machine), None
+        with suppress(IdentificationError):
+            found = track(problems, self.drops.scaled(machine, BLIND_SCHEDULE), progress=self.progress)
+            if not is_inconsistent(found):
+                return found
+        try:
+            again = track(problems, self.drops.scaled(machine, DAMPED_SCHEDULE), progress=self.progress)
+            again = self.converge(_checkpoint_of(again))
+        except IdentificationError:
+            if found is None:
+                raise
+            return found
+        return again if found is None else min(found, again, key=score_of)
+
+    @property
+    def windows(self) -> int:
+        """Number of windows from guesses."""
+        return len(_WINDOWS)
+
+    def extend(self, machine: Machine, start: int, number: int, before: Checkpoint | None) -> Checkpoint:
+        """A fit of a machine by the coarse basis over one window more, after what was found before."""
+        stages = (DAMPED_SCHEDULE if start == DAMPED else BLIND_SCHEDULE)[_WINDOWS[number]]
+        problems = self.drops.coarse(machine) if before is None else before.problems
+        if before is None and start >= FIRST_OTHER_START:
+            problems = tuple(_other_start(problem, start) for problem in problems)
+        references = None if before is None else before.trajectories
+        return _checkpoint_of(track(problems, self.drops.scaled(machine, stages), references=references))
+
+    def converge(self, checkpoint: Checkpoint) -> TrackedDrops:
+        """The fit over the last window of the coarse basis, repeated while that pays."""
+        last = self.drops.scaled(checkpoint.problems[0].model.machine, BLIND_SCHEDULE[-1:])[0]
+        return converged(checkpoint.problems, last, checkpoint.trajectories)
+
+    def likelihood(self, known: TrackedDrops, machine: Machine) -> float:
+        """Negative logarithm of the likelihood with another machine, drop by drop, linearised at a fit."""
+        problems = self.drops.coarse(machine)
+        total, settings = 0.0, stage_settings(problems[0], BLIND_SCHEDULE[-1])
+        for problem, reference in zip(problems, _carried(known, problems), strict=True):
+            result = forward(problem, settings, reference=reference, samples=len(reference), smoothing=False)
+            lost = result.done < len(reference)
+            total += math.inf if lost else result.negative_log_likelihood
+        return total
+
+    def relinearise(self, known: TrackedDrops, machine: Machine, passes: int) -> TrackedDrops:
+        """Passes with another machine over the first window whole, linearised at a fit that is known."""
+        problems = self.drops.coarse(machine)
+        last = self.drops.scaled(machine, (replace(BLIND_SCHEDULE[-1], passes=passes),))
+        return track(problems, last, references=_carried(known, problems))
+
+    def refine(self, first: Candidate) -> Candidate:
+        """The same machine with the finer basis, from what the coarse one found."""
+        fine = self.drops.fine(first.machine)
+        schedule = self.drops.scaled(
+            first.machine, CALIBRATION_SCHEDULE if self.drops.calibrate_only else FINE_SCHEDULE
+        )
+        references = _carried(first.fit, fine)
+        if first.accepted:
+            # The finer basis may lie in the valley that the coarse one only came near: turned axes of a
+            # support were found at one bearing by the coarse one and at both by the finer, some passes later.
+            references = converged(fine, schedule[0], references).trajectories
+        fit = track(fine, schedule, references=references, progress=self.progress)
+        return replace(first, fit=fit)
+
+    def refine_if_followed(self, first: Candidate) -> Candidate | None:
+        """The same; None where the finer basis loses a record beside which the coarse one ended."""
+        try:
+            return self.refine(first)
+        except IdentificationError:
+            if not first.inconsistent:
+                raise
+            return None
+
+    def not_lost(self, found: Candidate) -> Candidate:
+        """What was found, if the filter followed all drops to the end."""
+        return replace(found, fit=_not_lost(found.fit, self.drops.evidence))
+
+
+def _checkpoint_of(fit: TrackedDrops) -> Checkpoint:
+    return Checkpoint(problems=fit.problems, trajectories=tuple(fit.trajectories), score=score_of(fit))
+
+
+def _fits(found: Candidate) -> bool:
+    """Whether model and record agree, as far as another model could make them."""
+    return all(
+        check.passed or check.name == DIRECTIONS
+        for problem, smoothed, factor in zip(
+            found.fit.problems, found.fit.smoothed, found.fit.noise_factors, strict=True
+        )
+        for check in consistency_checks(problem, smoothed, factor)
+    )
+
+
+def _other_start(problem: DropProblem, number: int) -> DropProblem:
+    """The problem with its unknowns starting at another checkpoint of their prior, one for each start."""
+    start, chosen = problem.start.copy(), problem.parameter_slice
+    sigma = np.array([unknown.sigma for unknown in problem.unknowns])
+    start[chosen] += OTHER_START_SPREAD * sigma * np.random.default_rng(number).standard_normal(len(sigma))
+    bounds = np.array([unknown.bounds for unknown in problem.unknowns])
+    start[chosen] = np.clip(start[chosen], bounds[:, 0], bounds[:, 1])
+    start[problem.gap_entries] = problem.start[problem.gap_entries]
+    return replace(problem, start=start)
+
+
+def _carried(known: TrackedDrops, problems: Sequence[DropProblem]) -> list[Array]:
+    """Trajectories of a fit in the coordinates of other problems of the same drops."""
+    drops = zip(known.problems, problems, known.trajectories, strict=True)
+    return [transferred(one, two, means) for one, two, means in drops]
+
+
+def _not_lost(tracked: TrackedDrops, evidence: Sequence[Evidence]) -> TrackedDrops:
+    """The drops, if the filter followed all of them to the end: a part of a drop says nothing of its peak."""
+    for item, problem, smoothed in zip(evidence, tracked.problems, tracked.smoothed, strict=True):
+        done, samples = smoothed.filtered.done, len(smoothed.filtered.means)
+        if done < samples:
+            raise IdentificationError(
+                f"the filter lost the drop {item.name} at {1e3 * problem.time[done]:.1f} ms of "
+                f"{1e3 * problem.time[samples - 1]:.0f} ms, even with {LOOSER[-1]:g} × the usual unknown "
+                "impulses; the machine description is too far from the machine that was recorded. Check the "
+                "sensors (planes, angles, signs), or calibrate anew with this drop."
+            )
+    return tracked
