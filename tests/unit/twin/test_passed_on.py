@@ -270,7 +270,7 @@ def test_a_twin_that_fits_stands_whether_it_was_cross_checked_or_not(
     monkeypatch.setattr(tracked_estimate, "parameters", parameters)
     monkeypatch.setattr(tracked_estimate, "sensor_errors", lambda *_, **__: ())
     monkeypatch.setattr(tracked_estimate, "_gives_way", lambda *_: False)
-    drop: Any = SimpleNamespace(problem=problem, smoothed=None, consistent=consistent, drops=1, kept=())
+    drop: Any = SimpleNamespace(problem=problem, smoothed=None, consistent=consistent, drops=1, accepted=())
     check: Any = object() if checked else None
     judged = tracked_estimate._judge(drop, check)
     assert judged.verdict is verdict and judged.widening == widening
