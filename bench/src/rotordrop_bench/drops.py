@@ -14,37 +14,25 @@ VERSION = "1"
 
 @dataclass(frozen=True, kw_only=True)
 class BenchDrop:
-    """One drop of the bench.
-
-    Attributes
-    ----------
-    name : str
-        Name, which says nothing of what is hidden.
-    family : str
-        What is scored together.
-    rotor : str
-        Rotor, by its name in `ROTORS`.
-    speed : float
-        Speed at power-off [Hz].
-    machine_seed, drop_seed : int
-        Seeds of the hidden machine and of the drop.
-    departures : tuple of (str, int)
-        Kinds and sizes of what the description of the machine does not have.
-    tail : bool
-        Whether the settled tail was recorded.
-    sampling_rate : float
-        Samples per second [Hz].
-    """
+    """One drop of the bench."""
 
     name: str
+    """Name, which says nothing of what is hidden."""
     family: str
+    """What is scored together."""
     rotor: str
+    """Rotor, by its name in `ROTORS`."""
     speed: float
+    """Speed at power-off [Hz]."""
     machine_seed: int
     drop_seed: int
+    """Seeds of the hidden machine and of the drop."""
     departures: tuple[tuple[str, int], ...] = ()
+    """Kinds and sizes of what the description of the machine does not have."""
     tail: bool = True
+    """Whether the settled tail was recorded."""
     sampling_rate: float = 20e3
+    """Samples per second [Hz]."""
 
 
 SPEEDS: dict[str, tuple[float, ...]] = {

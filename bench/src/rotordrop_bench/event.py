@@ -34,30 +34,20 @@ LARGEST_JITTER = 1e-3
 
 @dataclass(frozen=True, kw_only=True)
 class HiddenMachine:
-    """A machine as it really is, beside what its owner knows of it.
-
-    Attributes
-    ----------
-    machine : Machine
-        The true machine.
-    known : Machine
-        The description it was drawn around.
-    seed : int
-        Seed it was drawn with.
-    violations : Violations
-        What breaks the estimator's assumptions.
-    model : DropModel
-        The true machine, ready to be simulated.
-    structure : ndarray, shape (B, C), or None
-        Structures of its bearings that no model of a drop has; None without any.
-    """
+    """A machine as it really is, beside what its owner knows of it."""
 
     machine: Machine
+    """The true machine."""
     known: Machine
+    """The description it was drawn around."""
     seed: int
+    """Seed it was drawn with."""
     violations: Violations
+    """What breaks the estimator's assumptions."""
     model: DropModel = field(repr=False)
+    """The true machine, ready to be simulated."""
     structure: Array | None = field(default=None, repr=False)
+    """Structures of its bearings that no model of a drop has; None without any, shape (B, C)."""
 
 
 def _refuse_own_structure(machine: Machine) -> None:
@@ -75,21 +65,14 @@ def _refuse_own_structure(machine: Machine) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class DropConditions:
-    """What differs from drop to drop of one machine.
-
-    Attributes
-    ----------
-    speed : float
-        Speed at power-off [rad/s].
-    start : LevitatedStart
-        Rotor angle, position held, remanent force.
-    jitter : float
-        True power-off in record time [s].
-    """
+    """What differs from drop to drop of one machine."""
 
     speed: float
+    """Speed at power-off [rad/s]."""
     start: LevitatedStart
+    """Rotor angle, position held, remanent force."""
     jitter: float
+    """True power-off in record time [s]."""
 
 
 def hidden_machine(

@@ -41,27 +41,18 @@ TAIL_START = 54.0
 
 @dataclass(frozen=True, kw_only=True)
 class SyntheticDrop:
-    """A simulated recording with everything that is true about it.
-
-    Attributes
-    ----------
-    record : Record
-        The recording, with the sensors as the owner knows them; time 0 is the trigger.
-    tail : Record or None
-        The settled tail at standstill.
-    truth : dict
-        True parameters, sensor errors, forces and stresses, ready for JSON.
-    histories : dict of ndarray
-        True histories, on the clock of the true power-off.
-    result : DropResult
-        The simulated drop itself.
-    """
+    """A simulated recording with everything that is true about it."""
 
     record: Record
+    """The recording, with the sensors as the owner knows them; time 0 is the trigger."""
     tail: Record | None
+    """The settled tail at standstill."""
     truth: dict[str, Any]
+    """True parameters, sensor errors, forces and stresses, ready for JSON."""
     histories: dict[str, Array] = field(repr=False)
+    """True histories, on the clock of the true power-off."""
     result: DropResult = field(repr=False)
+    """The simulated drop itself."""
 
 
 def synthesize_drop(

@@ -27,28 +27,19 @@ SAME_IMPACT = 5e-4
 
 @dataclass(frozen=True, kw_only=True)
 class Score:
-    """How far one estimated value is from the truth.
-
-    Attributes
-    ----------
-    estimate, truth : float
-        The two values (SI).
-    error : float
-        Estimate minus truth.
-    relative_error : float or None
-        Error over truth [1].
-    covered : bool or None
-        Whether the 90 % interval holds the truth; None without an interval.
-    half_width : float or None
-        Half the interval over the truth [1].
-    """
+    """How far one estimated value is from the truth."""
 
     estimate: float
     truth: float
+    """The two values (SI)."""
     error: float
+    """Estimate minus truth."""
     relative_error: float | None
+    """Error over truth [1]."""
     covered: bool | None
+    """Whether the 90 % interval holds the truth; None without an interval."""
     half_width: float | None
+    """Half the interval over the truth [1]."""
 
     def as_json(self) -> dict[str, Any]:
         """The fields that are known."""

@@ -21,57 +21,39 @@ FILTER_ORDER = 4
 
 @dataclass(frozen=True, kw_only=True)
 class SensorChain:
-    """How good the measuring chain is; the defaults are those of an ordinary eddy-current system.
-
-    Attributes
-    ----------
-    sampling_rate : float
-        Samples per second [Hz].
-    gain_error : float
-        Largest deviation of a gain from 1 [1].
-    offset : float
-        Largest offset of a sensor [m].
-    noise : float
-        Noise [m rms].
-    hum, hum_frequency : float
-        Amplitude of the mains hum [m] and its frequency [Hz].
-    runout_1x, runout_2x : float
-        Largest amplitude of electrical runout at once and twice per turn [m].
-    angle_error : float
-        Largest error of a sensor's direction [rad].
-    plane_shift : float
-        Distance by which every sensor plane lies nearer to the middle of the rotor than stated [m].
-    bits : int
-        Bits of the converter; 0 for none.
-    full_scale : float, optional
-        Largest reading [m], in both directions; readings beyond are clipped. By default 0.6 mm, or twice the
-        widest air gap where that is more.
-    anti_alias_frequency : float, optional
-        Corner frequency of a Butterworth filter of fourth order before the sampling [Hz].
-    speed_interval : float
-        Time between two readings of the speed [s].
-    speed_noise : float
-        Noise of a speed reading [rad/s rms].
-    speed_resolution : float
-        Step of the speed readings [rad/s].
-    """
+    """How good the measuring chain is; the defaults are those of an ordinary eddy-current system."""
 
     sampling_rate: float = 20e3
+    """Samples per second [Hz]."""
     gain_error: float = 0.01
+    """Largest deviation of a gain from 1 [1]."""
     offset: float = 10e-6
+    """Largest offset of a sensor [m]."""
     noise: float = 0.45e-6
+    """Noise [m rms]."""
     hum: float = 0.1e-6
     hum_frequency: float = 50.0
+    """Amplitude of the mains hum [m] and its frequency [Hz]."""
     runout_1x: float = 0.3e-6
     runout_2x: float = 0.15e-6
+    """Largest amplitude of electrical runout at once and twice per turn [m]."""
     angle_error: float = 0.0
+    """Largest error of a sensor's direction [rad]."""
     plane_shift: float = 0.0
+    """Distance by which every sensor plane lies nearer to the middle of the rotor than stated [m]."""
     bits: int = 16
+    """Bits of the converter; 0 for none."""
     full_scale: float | None = None
+    """Largest reading [m], in both directions; readings beyond are clipped. By default 0.6 mm, or twice the
+    widest air gap where that is more."""
     anti_alias_frequency: float | None = None
+    """Corner frequency of a Butterworth filter of fourth order before the sampling [Hz]."""
     speed_interval: float = 0.01
+    """Time between two readings of the speed [s]."""
     speed_noise: float = 2.0 * math.pi * 0.02
+    """Noise of a speed reading [rad/s rms]."""
     speed_resolution: float = 2.0 * math.pi * 0.01
+    """Step of the speed readings [rad/s]."""
 
     def __post_init__(self) -> None:
         if not self.sampling_rate > 0.0:
@@ -110,37 +92,25 @@ def fitted_to(chain: SensorChain, machine: Machine) -> SensorChain:
 
 @dataclass(frozen=True, kw_only=True)
 class SensorErrors:
-    """Errors of the sensors of one machine, the same in all its recordings; shape (S,) throughout.
-
-    Attributes
-    ----------
-    gain : ndarray
-        Reading over true displacement [1].
-    offset : ndarray
-        Reading of the centred rotor [m].
-    angle : ndarray
-        True minus stated direction [rad].
-    runout_1x, runout_2x : ndarray
-        Complex amplitude of the runout [m] at rotor angle zero.
-    plane_shift : ndarray
-        How much nearer to the middle of the rotor the sensor stands than stated [m].
-    cross_axis : ndarray
-        Reading per displacement a quarter turn ahead of the sensor's direction [1].
-    follows_housing : ndarray
-        Share of the motion of the bearing's housing that the sensor moves with [1].
-    time_constant : ndarray
-        Time constant of first order with which the reading follows [s].
-    """
+    """Errors of the sensors of one machine, the same in all its recordings; shape (S,) throughout."""
 
     gain: Array
+    """Reading over true displacement [1]."""
     offset: Array
+    """Reading of the centred rotor [m]."""
     angle: Array
+    """True minus stated direction [rad]."""
     runout_1x: NDArray[np.complex128]
     runout_2x: NDArray[np.complex128]
+    """Complex amplitude of the runout [m] at rotor angle zero."""
     plane_shift: Array
+    """How much nearer to the middle of the rotor the sensor stands than stated [m]."""
     cross_axis: Array
+    """Reading per displacement a quarter turn ahead of the sensor's direction [1]."""
     follows_housing: Array
+    """Share of the motion of the bearing's housing that the sensor moves with [1]."""
     time_constant: Array
+    """Time constant of first order with which the reading follows [s]."""
 
 
 def drawn_errors(chain: SensorChain, sensors: int, random: np.random.Generator) -> SensorErrors:

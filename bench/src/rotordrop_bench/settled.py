@@ -30,19 +30,13 @@ LEAST_DAMPING = 1e-6
 
 @dataclass(frozen=True, kw_only=True)
 class Swing:
-    """Remaining swing of the rotor ends in the clearance circles.
-
-    Attributes
-    ----------
-    amplitude, phase : ndarray, shape (B,)
-        Angle of the swing at the first instant and its phase [rad].
-    decay_time : float
-        Time constant of its decay [s].
-    """
+    """Remaining swing of the rotor ends in the clearance circles."""
 
     amplitude: Array
     phase: Array
+    """Angle of the swing at the first instant and its phase [rad], shape (B,)."""
     decay_time: float
+    """Time constant of its decay [s]."""
 
 
 def settled_coordinates(model: DropModel) -> Array:

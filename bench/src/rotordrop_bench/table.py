@@ -26,55 +26,38 @@ PARAMETERS = "parameters"
 
 @dataclass(frozen=True, kw_only=True)
 class BenchRow:
-    """One quantity over the drops of one family; relative errors are those of absolute size [1].
-
-    Attributes
-    ----------
-    family, quantity : str
-        What is pooled; the quantity is a field of an estimate, or ``parameters`` or ``structure`` for all of
-        them together.
-    values, missing : int
-        Values scored, and values that the estimates do not have.
-    median, ninetieth, worst : float or None
-        Of the relative error [1].
-    covered : float or None
-        Share of the 90 % intervals that hold the truth [1].
-    half_width : float or None
-        Median of half the interval over the truth [1].
-    lost : float or None
-        Share of values that are wrong by more than 10 % or missing [1].
-    """
+    """One quantity over the drops of one family; relative errors are those of absolute size [1]."""
 
     family: str
     quantity: str
+    """What is pooled; the quantity is a field of an estimate, or ``parameters`` or ``structure`` for all of
+    them together."""
     values: int
     missing: int
+    """Values scored, and values that the estimates do not have."""
     median: float | None
     ninetieth: float | None
     worst: float | None
+    """Of the relative error [1]."""
     covered: float | None
+    """Share of the 90 % intervals that hold the truth [1]."""
     half_width: float | None
+    """Median of half the interval over the truth [1]."""
     lost: float | None
+    """Share of values that are wrong by more than 10 % or missing [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class BenchScores:
-    """Scores of an estimator over the bench.
-
-    Attributes
-    ----------
-    rows : tuple of BenchRow
-        All families and quantities.
-    drops : tuple of dict
-        What was scored of each drop: name, family, rotor, whether the estimate called itself consistent, what
-        it named and what was there, and the errors of its peaks.
-    unscored : dict of str to str
-        Drops without a usable estimate, with the reason; they count as missing values.
-    """
+    """Scores of an estimator over the bench."""
 
     rows: tuple[BenchRow, ...]
+    """All families and quantities."""
     drops: tuple[dict[str, Any], ...]
+    """What was scored of each drop: name, family, rotor, whether the estimate called itself consistent, what
+    it named and what was there, and the errors of its peaks."""
     unscored: dict[str, str]
+    """Drops without a usable estimate, with the reason; they count as missing values."""
 
     @property
     def named_rightly(self) -> int:

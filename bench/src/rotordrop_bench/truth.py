@@ -21,21 +21,14 @@ _NEEDED = ("air_gap_m", "peak_force_N")
 
 @dataclass(frozen=True, kw_only=True)
 class Truth:
-    """What is true about one simulated recording.
-
-    Attributes
-    ----------
-    values : mapping
-        The fields of the truth file.
-    histories : mapping of str to ndarray
-        True histories, empty when there is no file of them.
-    path : Path, optional
-        Where the truth was read.
-    """
+    """What is true about one simulated recording."""
 
     values: Mapping[str, Any]
+    """The fields of the truth file."""
     histories: Mapping[str, Array] = field(default_factory=dict, repr=False)
+    """True histories, empty when there is no file of them."""
     path: Path | None = None
+    """Where the truth was read."""
 
     @property
     def name(self) -> str:

@@ -25,30 +25,20 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class BearingFigure:
-    """A number that a bearing states of itself at rest.
-
-    Attributes
-    ----------
-    field : str
-        Its field in a document, unit included.
-    label : str
-        What it is called.
-    kind : str
-        Kind of quantity, which sets the unit it is shown in.
-    value : float
-        Its value [SI].
-    described : Known, optional
-        The same as the machine file describes it, with its range.
-    note : str
-        What to add when it is shown.
-    """
+    """A number that a bearing states of itself at rest."""
 
     field: str
+    """Its field in a document, unit included."""
     label: str
+    """What it is called."""
     kind: str
+    """Kind of quantity, which sets the unit it is shown in."""
     value: float
+    """Its value [SI]."""
     described: Known | None = None
+    """The same as the machine file describes it, with its range."""
     note: str = ""
+    """What to add when it is shown."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,33 +77,23 @@ class Spread:
 
 @dataclass(frozen=True, kw_only=True)
 class Ratings:
-    """What a bearing bears by the standards, and what follows from its balls.
-
-    Attributes
-    ----------
-    static : float
-        Static radial load rating C_0 of the whole bearing [N], ISO 76.
-    dynamic : float
-        Basic dynamic radial load rating C of one row [N], ISO 281.
-    rows, balls : int
-        Rows, and balls of each.
-    gamma, cosine : float
-        Ball diameter times cosine of the contact angle over pitch diameter, and that cosine [1].
-    conformity_inner, conformity_outer : float
-        Groove radius over ball diameter [1].
-    source : str
-        Where the load ratings come from.
-    """
+    """What a bearing bears by the standards, and what follows from its balls."""
 
     static: float
+    """Static radial load rating C_0 of the whole bearing [N], ISO 76."""
     dynamic: float
+    """Basic dynamic radial load rating C of one row [N], ISO 281."""
     rows: int
     balls: int
+    """Rows, and balls of each."""
     gamma: float
     cosine: float
+    """Ball diameter times cosine of the contact angle over pitch diameter, and that cosine [1]."""
     conformity_inner: float
     conformity_outer: float
+    """Groove radius over ball diameter [1]."""
     source: str
+    """Where the load ratings come from."""
 
 
 class BearingNumbers(ABC):

@@ -92,95 +92,66 @@ def path_of(owner: Owner, name: str, path: str) -> str:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Parameter:
-    """One row of the table.
-
-    Attributes
-    ----------
-    path : str
-        Path below its owner, such as ``"support.stiffness"`` of a touchdown bearing.
-    owner : {"bearing", "sensor", "unbalance", "magnet", "drop", "rotor"}
-        What has such a parameter; all drops share those of bearings and sensors.
-    label : str
-        Name for people.
-    kind : str
-        Kind of quantity, a key of `rotordrop.units.KINDS`.
-    shown_as : str
-        Kind a report shows it as; the same when empty.
-    logarithmic : bool
-        Whether it is estimated by its logarithm (positive quantities).
-    role : Role
-        What the identification does with it.
-    guess_sigma, given_sigma : float
-        Prior standard deviation of a guess without a range and of a given value: of the logarithm, or as a
-        share of ``scale`` [1].
-    scale : str
-        What it is a share of, where it is not that of a logarithm.
-    least_sigma : float
-        Prior standard deviation that an interval in the machine file cannot go below.
-    lower, upper : float, optional
-        Limits between which the model follows it [SI unit].
-    reach : float, optional
-        Factor on its prior value up to which the model follows it [1]: what no record shows drifts, and a
-        race that is braked a thousand times harder is no race.
-    drift : float
-        Random walk per square root of a second, in the measure or share of the prior. It keeps what the model
-        gets wrong late in a drop from spoiling what the first impacts say.
-    late_drift_factor : float
-        Factor on the drift late in a drop [1], when creep decides between rotor and race.
-    entries : tuple of Entry
-        Kernel entries it sets; empty where it is no parameter of the drop model.
-    step : Step
-        Step of the replay that finds it.
-    decisive, leading : bool
-        Whether the fit of the first impacts tells minima apart by it; whether the first window shows it.
-    spin_up_only : bool
-        Whether it only says when a race catches up with the rotor: it may go far without moving a force.
-    field : str
-        Field of the JSON document, unit included.
-    truth : tuple of str
-        Where a truth file has it: a field with a number or one number per bearing, or a list of bearings and
-        a key.
-    taken_over : {"needed", "welcome", "no"}
-        Whether an earlier estimate must have, or may have, it to stand for the identification.
-    common_sigma : float
-        For a value of each sensor: prior standard deviation of what the sensors of a group have in common,
-        where it differs from that of one of them.
-    group : {"plane", "machine"}
-        Sensors that have it in common.
-    measured_by : str
-        What measurement would make it known, with ``{owner}`` for what has it; empty where none is usual.
-    separated_by : dict
-        What measurement would tell it from another parameter, by the path of the other.
-    """
+    """One row of the table."""
 
     path: str
+    """Path below its owner, such as ``"support.stiffness"`` of a touchdown bearing."""
     owner: Owner = "bearing"
+    """What has such a parameter; all drops share those of bearings and sensors."""
     label: str
+    """Name for people."""
     kind: str
+    """Kind of quantity, a key of `rotordrop.units.KINDS`."""
     shown_as: str = ""
+    """Kind a report shows it as; the same when empty."""
     logarithmic: bool = True
+    """Whether it is estimated by its logarithm (positive quantities)."""
     role: Role = Role.NUISANCE
+    """What the identification does with it."""
     guess_sigma: float = 0.0
     given_sigma: float = 0.0
+    """Prior standard deviation of a guess without a range and of a given value: of the logarithm, or as a
+    share of ``scale`` [1]."""
     scale: str = ""
+    """What it is a share of, where it is not that of a logarithm."""
     least_sigma: float = 1e-4
+    """Prior standard deviation that an interval in the machine file cannot go below."""
     lower: float | None = None
     upper: float | None = None
+    """Limits between which the model follows it [SI unit]."""
     reach: float | None = None
+    """Factor on its prior value up to which the model follows it [1]: what no record shows drifts, and a race
+    that is braked a thousand times harder is no race."""
     drift: float = 0.0
+    """Random walk per square root of a second, in the measure or share of the prior. It keeps what the model
+    gets wrong late in a drop from spoiling what the first impacts say."""
     late_drift_factor: float = 1.0
+    """Factor on the drift late in a drop [1], when creep decides between rotor and race."""
     entries: tuple[Entry, ...] = ()
+    """Kernel entries it sets; empty where it is no parameter of the drop model."""
     step: Step = Step.NONE
+    """Step of the replay that finds it."""
     decisive: bool = False
     leading: bool = False
+    """Whether the fit of the first impacts tells minima apart by it; whether the first window shows it."""
     spin_up_only: bool = False
+    """Whether it only says when a race catches up with the rotor: it may go far without moving a force."""
     field: str = ""
+    """Field of the JSON document, unit included."""
     truth: tuple[str, ...] = ()
+    """Where a truth file has it: a field with a number or one number per bearing, or a list of bearings and a
+    key."""
     taken_over: Literal["needed", "welcome", "no"] = "no"
+    """Whether an earlier estimate must have, or may have, it to stand for the identification."""
     common_sigma: float = 0.0
+    """For a value of each sensor: prior standard deviation of what the sensors of a group have in common,
+    where it differs from that of one of them."""
     group: Literal["plane", "machine"] = "machine"
+    """Sensors that have it in common."""
     measured_by: str = ""
+    """What measurement would make it known, with ``{owner}`` for what has it; empty where none is usual."""
     separated_by: dict[str, str] = dataclasses.field(default_factory=dict)
+    """What measurement would tell it from another parameter, by the path of the other."""
     floor: float | None = None
     """Where published intervals end [SI]."""
     model_error: float = 0.0
@@ -253,24 +224,15 @@ def _at(part: Any, path: str) -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class Load:
-    """A force or stress of one bearing that every estimate gives beside the parameters.
-
-    Attributes
-    ----------
-    field : str
-        Field of the JSON document, unit included.
-    label : str
-        Name for people.
-    kind : str
-        Kind of quantity, a key of `rotordrop.units.KINDS`.
-    truth : str
-        Field of a truth file.
-    truth_unit : float
-        SI value of one unit of that field.
-    """
+    """A force or stress of one bearing that every estimate gives beside the parameters."""
 
     field: str
+    """Field of the JSON document, unit included."""
     label: str
+    """Name for people."""
     kind: str
+    """Kind of quantity, a key of `rotordrop.units.KINDS`."""
     truth: str
+    """Field of a truth file."""
     truth_unit: float = 1.0
+    """SI value of one unit of that field."""

@@ -45,36 +45,25 @@ shaft the numbers of a computer no longer hold both."""
 
 @dataclass(frozen=True, kw_only=True)
 class Element:
-    """One beam element between two neighbouring nodes; plain numbers in SI units.
-
-    Attributes
-    ----------
-    length : float
-        Length [m].
-    outer_diameter, inner_diameter : float
-        Diameters of what carries load [m].
-    layer_diameter : float or None
-        Outer diameter [m] of a layer that adds mass and inertia but no stiffness.
-    layer_density : float
-        Density of the layer [kg/m³].
-    material : str
-        Name of the material.
-    youngs_modulus, poisson_ratio, density : float
-        Material constants [Pa], [1], [kg/m³].
-    part : str
-        What this piece of the shaft is.
-    """
+    """One beam element between two neighbouring nodes; plain numbers in SI units."""
 
     length: float
+    """Length [m]."""
     outer_diameter: float
     inner_diameter: float
+    """Diameters of what carries load [m]."""
     layer_diameter: float | None
+    """Outer diameter [m] of a layer that adds mass and inertia but no stiffness."""
     layer_density: float
+    """Density of the layer [kg/m³]."""
     material: str
+    """Name of the material."""
     youngs_modulus: float
     poisson_ratio: float
     density: float
+    """Material constants [Pa], [1], [kg/m³]."""
     part: str
+    """What this piece of the shaft is."""
 
 
 class Section(Description):

@@ -33,22 +33,15 @@ _TABLE_KEYS = ("value", "guess", "range", "interval", "standard_error", "lower",
 
 @dataclass(frozen=True)
 class Physical:
-    """Kind and admissible range of a physical value; reads every way of writing it.
-
-    Attributes
-    ----------
-    kind : str
-        Kind of quantity, one of `rotordrop.units.KINDS`.
-    above : float, optional
-        The value must be greater than this [SI unit of the kind].
-    least, most : float, optional
-        The value must lie between these [SI unit of the kind].
-    """
+    """Kind and admissible range of a physical value; reads every way of writing it."""
 
     kind: str
+    """Kind of quantity, one of `rotordrop.units.KINDS`."""
     above: float | None = None
+    """The value must be greater than this [SI unit of the kind]."""
     least: float | None = None
     most: float | None = None
+    """The value must lie between these [SI unit of the kind]."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Read with `read`."""

@@ -10,25 +10,17 @@ WORTH_SAYING = 0.95
 
 @dataclass(frozen=True, kw_only=True)
 class Advice:
-    """A measurement and what it would do to the intervals of the peak forces.
-
-    Attributes
-    ----------
-    measurement : str
-        What to measure.
-    paths : tuple of str
-        Parameters that it would give.
-    half_widths, narrowed : dict of str to float
-        Half the 90 % interval of the peak force of every bearing as it is, and as it would be [N].
-    at_most : bool
-        Whether the interval may become narrower than said, because the model does not fit without it.
-    """
+    """A measurement and what it would do to the intervals of the peak forces."""
 
     measurement: str
+    """What to measure."""
     paths: tuple[str, ...]
+    """Parameters that it would give."""
     half_widths: dict[str, float]
     narrowed: dict[str, float]
+    """Half the 90 % interval of the peak force of every bearing as it is, and as it would be [N]."""
     at_most: bool = False
+    """Whether the interval may become narrower than said, because the model does not fit without it."""
 
     @property
     def left(self) -> float:

@@ -29,66 +29,44 @@ CONTACTS_LISTED = 6
 
 @dataclass(frozen=True, kw_only=True)
 class WindowAgreement:
-    """Agreement over one window; B bearings.
-
-    Attributes
-    ----------
-    name : str
-        The window in words.
-    start, end : float
-        From power-off [s].
-    rms : ndarray, shape (B,)
-        Root mean square distance of the orbits [m].
-    """
+    """Agreement over one window; B bearings."""
 
     name: str
+    """The window in words."""
     start: float
     end: float
+    """From power-off [s]."""
     rms: Array
+    """Root mean square distance of the orbits [m], shape (B,)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class BearingAgreement:
-    """Contacts and bounces of one bearing; K contacts.
-
-    Attributes
-    ----------
-    measured_contacts, simulated_contacts : ndarray, shape (K, 2)
-        Begin and end of the first contacts [s from power-off].
-    measured_bounce, simulated_bounce : float
-        Height of the first bounce above the rest position [m]; NaN when it was not seen.
-    horizon : float
-        Time up to which the orbits differ by less than a tenth of the air gap [s from power-off].
-    """
+    """Contacts and bounces of one bearing; K contacts."""
 
     measured_contacts: Array
     simulated_contacts: Array
+    """Begin and end of the first contacts [s from power-off], shape (K, 2)."""
     measured_bounce: float
     simulated_bounce: float
+    """Height of the first bounce above the rest position [m]; NaN when it was not seen."""
     horizon: float
+    """Time up to which the orbits differ by less than a tenth of the air gap [s from power-off]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Agreement:
-    """Agreement of a simulated drop with the record.
-
-    Attributes
-    ----------
-    windows : tuple of WindowAgreement
-        First contact, 20, 50 and 200 ms.
-    bearings : tuple of BearingAgreement
-        Contacts, bounces, horizon of every bearing.
-    disagreement : float
-        The one number of the friction sweep for these orbits [m].
-    expected_horizon : float or None
-        Time up to which draws of all uncertain values stay within a tenth of the air gap of each other [s]:
-        beyond it a point-by-point comparison means nothing even with a right model.
-    """
+    """Agreement of a simulated drop with the record."""
 
     windows: tuple[WindowAgreement, ...]
+    """First contact, 20, 50 and 200 ms."""
     bearings: tuple[BearingAgreement, ...]
+    """Contacts, bounces, horizon of every bearing."""
     disagreement: float
+    """The one number of the friction sweep for these orbits [m]."""
     expected_horizon: float | None = None
+    """Time up to which draws of all uncertain values stay within a tenth of the air gap of each other [s]:
+    beyond it a point-by-point comparison means nothing even with a right model."""
 
     @property
     def horizon(self) -> Array:

@@ -36,24 +36,16 @@ class Origin(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class History:
-    """A quantity against time.
-
-    Attributes
-    ----------
-    label : str
-        Name in the legend.
-    time : ndarray, shape (T,)
-        Time from power-off [s].
-    values : ndarray, shape (T,)
-        Values in SI units.
-    role : Role
-        Where the history comes from; decides colour and line.
-    """
+    """A quantity against time."""
 
     label: str
+    """Name in the legend."""
     time: Array
+    """Time from power-off [s], shape (T,)."""
     values: Array
+    """Values in SI units, shape (T,)."""
     role: Role = "simulated"
+    """Where the history comes from; decides colour and line."""
 
     def between(self, start: float, end: float) -> History:
         """The part between two times [s]."""
@@ -63,24 +55,16 @@ class History:
 
 @dataclass(frozen=True, kw_only=True)
 class Motion:
-    """Movement of the rotor in the plane of one bearing.
-
-    Attributes
-    ----------
-    label : str
-        Name in the legend.
-    time : ndarray, shape (T,)
-        Time from power-off [s].
-    displacement : ndarray, shape (T, 2)
-        Displacement (x, y) from the bearing centre [m].
-    role : Role
-        Where the motion comes from; decides colour and line.
-    """
+    """Movement of the rotor in the plane of one bearing."""
 
     label: str
+    """Name in the legend."""
     time: Array
+    """Time from power-off [s], shape (T,)."""
     displacement: Array
+    """Displacement (x, y) from the bearing centre [m], shape (T, 2)."""
     role: Role = "simulated"
+    """Where the motion comes from; decides colour and line."""
 
     @property
     def horizontal(self) -> History:
@@ -150,45 +134,31 @@ class Peak:
 
 @dataclass(frozen=True, kw_only=True)
 class Impact:
-    """One impact at one bearing; numbers found from a record carry their 90 % intervals.
-
-    Attributes
-    ----------
-    start, end, peak_time : float
-        Times [s] from power-off; the end is NaN where the contact still lasts.
-    azimuth : float
-        Direction of the contact normal at the peak [rad ccw from +x], between −π and π.
-    peak_force, impulse, dissipated_energy : Known
-        Peak force [N], normal impulse [N s], energy lost in the contact [J].
-    """
+    """One impact at one bearing; numbers found from a record carry their 90 % intervals."""
 
     start: float
     end: float
     azimuth: float
+    """Direction of the contact normal at the peak [rad ccw from +x], between −π and π."""
     peak_time: float
+    """Times [s] from power-off; the end is NaN where the contact still lasts."""
     peak_force: Known
     impulse: Known
     dissipated_energy: Known
+    """Peak force [N], normal impulse [N s], energy lost in the contact [J]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class FirstContact:
-    """Times and depth of the first contact at one bearing.
-
-    Attributes
-    ----------
-    start, end : float
-        Beginning t1 and end t2 of the first contact [s] from power-off.
-    indentation : float
-        Largest displacement beyond the air gap during it [m].
-    deepest_time : float
-        Time of the largest displacement [s].
-    """
+    """Times and depth of the first contact at one bearing."""
 
     start: float
     end: float
+    """Beginning t1 and end t2 of the first contact [s] from power-off."""
     indentation: float
+    """Largest displacement beyond the air gap during it [m]."""
     deepest_time: float
+    """Time of the largest displacement [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -203,57 +173,40 @@ class BearingMotions:
 
 @dataclass(frozen=True, kw_only=True)
 class BearingDrop:
-    """Everything one touchdown bearing went through in a drop.
-
-    Attributes
-    ----------
-    name : str
-        Name of the bearing.
-    motions : tuple of Motion
-        Motions of the rotor, the measured one first where there is a record.
-    at_gap_limits : tuple of Motion
-        Motions simulated with the lower and the upper air gap (Neisi 2020, Fig. 14); may be empty.
-    air_gap : AirGap or None
-        Limits of the air gap.
-    force, stress : History
-        Magnitude of the ball force on the race [N] and largest Hertz stress at the inner race [Pa].
-    force_band, stress_band : Band or None
-        Their 90 % bands.
-    force_vector : ndarray, shape (T, 2), or None
-        Ball force on the race (x, y) [N] at the times of the force, where its direction is known.
-    preload_stress : float or None
-        Stress of the preload alone [Pa].
-    peak_force, peak_stress : Peak
-        Highest points of the two histories.
-    values : mapping
-        Further numbers by the field names of the published document, means and parameters.
-    missing : mapping
-        Numbers that are not stated, by field name, and why.
-    impacts : tuple of Impact
-        In the order of their beginning.
-    impact_force : str
-        Name of the force whose peak the impacts state.
-    first_contact : FirstContact or None
-        None where the bearing was not touched.
-    """
+    """Everything one touchdown bearing went through in a drop."""
 
     name: str
+    """Name of the bearing."""
     motions: tuple[Motion, ...]
+    """Motions of the rotor, the measured one first where there is a record."""
     force: History
     stress: History
+    """Magnitude of the ball force on the race [N] and largest Hertz stress at the inner race [Pa]."""
     peak_force: Peak
     peak_stress: Peak
+    """Highest points of the two histories."""
     air_gap: AirGap | None = None
+    """Limits of the air gap."""
     at_gap_limits: tuple[Motion, ...] = ()
+    """Motions simulated with the lower and the upper air gap (Neisi 2020, Fig. 14); may be empty."""
     force_band: Band | None = None
     stress_band: Band | None = None
+    """Their 90 % bands."""
     force_vector: Array | None = None
+    """Ball force on the race (x, y) [N] at the times of the force, where its direction is known, shape (T,
+    2)."""
     preload_stress: float | None = None
+    """Stress of the preload alone [Pa]."""
     values: Mapping[str, Known] = field(default_factory=dict)
+    """Further numbers by the field names of the published document, means and parameters."""
     missing: Mapping[str, str] = field(default_factory=dict)
+    """Numbers that are not stated, by field name, and why."""
     impacts: tuple[Impact, ...] = ()
+    """In the order of their beginning."""
     impact_force: str = "contact force"
+    """Name of the force whose peak the impacts state."""
     first_contact: FirstContact | None = None
+    """None where the bearing was not touched."""
 
     @property
     def statistics(self) -> StressStatistics:

@@ -45,41 +45,28 @@ WATCHED: Mapping[str, float] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Change:
-    """One parameter in two drops.
-
-    Attributes
-    ----------
-    path : str
-        Path in the machine.
-    before, after : float
-        Its values [SI].
-    change : float
-        Difference [SI], or factor where the parameter is positive by nature [1].
-    interval_90 : tuple of float
-        Of the change.
-    factor : bool
-        Whether the change is a factor.
-    probability : float
-        Probability that it changed by more than what is asked for [1].
-    named : bool
-        Whether the change is beyond chance, of all parameters looked at together.
-    smallest : float
-        Smallest change that these two records show in 19 of 20 cases: difference [SI], or factor where the
-        parameter is positive by nature [1]; infinite where they show none.
-    determined : bool
-        Whether both records say something of it; else nothing is said.
-    """
+    """One parameter in two drops."""
 
     path: str
+    """Path in the machine."""
     before: float
     after: float
+    """Its values [SI]."""
     change: float
+    """Difference [SI], or factor where the parameter is positive by nature [1]."""
     interval_90: tuple[float, float]
+    """Of the change."""
     factor: bool
+    """Whether the change is a factor."""
     probability: float
+    """Probability that it changed by more than what is asked for [1]."""
     named: bool
+    """Whether the change is beyond chance, of all parameters looked at together."""
     smallest: float
+    """Smallest change that these two records show in 19 of 20 cases: difference [SI], or factor where the
+    parameter is positive by nature [1]; infinite where they show none."""
     determined: bool = True
+    """Whether both records say something of it; else nothing is said."""
 
     @property
     def may_hide(self) -> bool:
@@ -114,19 +101,13 @@ def asked_for() -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class Changes:
-    """What changed between two drops.
-
-    Attributes
-    ----------
-    first, second : str
-        The drops.
-    found : tuple of Change
-        Every parameter looked at, the surest change first.
-    """
+    """What changed between two drops."""
 
     first: str
     second: str
+    """The drops."""
     found: tuple[Change, ...]
+    """Every parameter looked at, the surest change first."""
 
     @property
     def named(self) -> tuple[Change, ...]:

@@ -75,27 +75,18 @@ class Verdict(Enum):
 
 @dataclass(frozen=True, kw_only=True)
 class CrossCheck:
-    """One number found in two ways.
-
-    Attributes
-    ----------
-    name : str
-        What is compared, for example ``"NDE peak force"``.
-    estimate : Known
-        The number of the tracked twin.
-    check : float
-        The number of the estimate without contact law, in the same unit.
-    accuracy : float
-        Known accuracy of the latter, relative [1]; a larger difference is a warning.
-    replaced : bool
-        Whether the estimate has given way to the cross-check.
-    """
+    """One number found in two ways."""
 
     name: str
+    """What is compared, for example ``"NDE peak force"``."""
     estimate: Known
+    """The number of the tracked twin."""
     check: float
+    """The number of the estimate without contact law, in the same unit."""
     accuracy: float
+    """Known accuracy of the latter, relative [1]; a larger difference is a warning."""
     replaced: bool = False
+    """Whether the estimate has given way to the cross-check."""
 
     @property
     def difference(self) -> float:
@@ -133,43 +124,29 @@ class FittedParameter:
 
 @dataclass(frozen=True, kw_only=True)
 class JointEstimate:
-    """How the errors of what belongs to the machine hang together, in the measures it is estimated in.
-
-    Attributes
-    ----------
-    paths : tuple of str, length n
-        Parameters, gains and offsets of the sensors.
-    mean, prior_mean, prior_sigma : ndarray, shape (n,)
-        What the record made of them, and what was known before.
-    covariance : ndarray, shape (n, n)
-        Of the errors of the mean, as the filter holds it.
-    """
+    """How the errors of what belongs to the machine hang together, in the measures it is estimated in."""
 
     paths: tuple[str, ...]
+    """Parameters, gains and offsets of the sensors."""
     mean: Array
     covariance: Array
+    """Of the errors of the mean, as the filter holds it, shape (n, n)."""
     prior_mean: Array
     prior_sigma: Array
+    """What the record made of them, and what was known before, shape (n,)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Structure:
-    """Something the machine has beyond the usual model, as far as the record says.
-
-    Attributes
-    ----------
-    name : str
-        What it is called.
-    gain : float
-        Rise of the logarithm of the marginal likelihood that it brought [1]; infinite where the model without
-        it needed larger unknown impulses.
-    sentence : str
-        What was found, with intervals.
-    """
+    """Something the machine has beyond the usual model, as far as the record says."""
 
     name: str
+    """What it is called."""
     gain: float
+    """Rise of the logarithm of the marginal likelihood that it brought [1]; infinite where the model without
+    it needed larger unknown impulses."""
     sentence: str
+    """What was found, with intervals."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -184,151 +161,102 @@ class SensorErrors:
 
 @dataclass(frozen=True, kw_only=True)
 class Innovations:
-    """What every reading said beyond the prediction from all before it; N samples, C channels.
-
-    Attributes
-    ----------
-    channels : tuple of str
-        Names of the sensors.
-    time : ndarray, shape (N,)
-        Time from power-off [s].
-    values, deviation : ndarray, shape (N, C)
-        Reading minus prediction and its expected standard deviation [m]; NaN where nothing was read.
-    limits : tuple of float
-        Mean normalised squares between which model and record count as consistent [1].
-    """
+    """What every reading said beyond the prediction from all before it; N samples, C channels."""
 
     channels: tuple[str, ...]
+    """Names of the sensors."""
     time: Array
+    """Time from power-off [s], shape (N,)."""
     values: Array
     deviation: Array
+    """Reading minus prediction and its expected standard deviation [m]; NaN where nothing was read, shape (N,
+    C)."""
     limits: tuple[float, float]
+    """Mean normalised squares between which model and record count as consistent [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ReplaySteps:
-    """The steps of the paper's route beside the common result.
-
-    Attributes
-    ----------
-    speed : SpeedFit
-        Speed at power-off and how it falls.
-    contacts : tuple of TimedContact
-        First contact of every bearing in the record, with the stiffness of eq. (17).
-    friction : FrictionSweep or None
-        Sweep of the friction coefficient; None when it was taken over.
-    correlations : tuple of Correlation
-        Correlations of support values.
-    speed_time, speed_simulated : ndarray, shape (T,)
-        Simulated speed [rad/s] against time [s].
-    fixed : str
-        Where supports and friction were taken from; empty when they were identified.
-    draws, rejected : int or None
-        Draws behind the intervals, and those that did not keep to the record; None where none were made.
-    identified : Machine
-        The machine with what was identified.
-    document : mapping
-        Initial state, settled rest and search, ready for the published document.
-    """
+    """The steps of the paper's route beside the common result."""
 
     speed: SpeedFit
+    """Speed at power-off and how it falls."""
     contacts: tuple[TimedContact, ...]
+    """First contact of every bearing in the record, with the stiffness of eq. (17)."""
     friction: FrictionSweep | None
+    """Sweep of the friction coefficient; None when it was taken over."""
     correlations: tuple[Correlation, ...]
+    """Correlations of support values."""
     speed_time: Array
     speed_simulated: Array
+    """Simulated speed [rad/s] against time [s], shape (T,)."""
     fixed: str
+    """Where supports and friction were taken from; empty when they were identified."""
     draws: int | None
     rejected: int | None
+    """Draws behind the intervals, and those that did not keep to the record; None where none were made."""
     identified: Machine
+    """The machine with what was identified."""
     document: Mapping[str, Any]
+    """Initial state, settled rest and search, ready for the published document."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Estimate:
-    """Force and stress of one recorded drop, with everything a page or a document says of it.
-
-    Attributes
-    ----------
-    name : str
-        Name of the drop.
-    method : Tracked or Replay
-        How it was made.
-    machine : Machine
-        The machine as it was given.
-    record : Record
-        The recording.
-    drop_instant : DropInstant or PowerOff
-        Power-off in record time.
-    speed : float
-        Speed at power-off [rad/s].
-    until : float
-        End of the estimated part [s from power-off].
-    verdict : Verdict
-        What model and record say of each other.
-    checks : tuple of Check
-        The consistency checks behind it; empty for a replay.
-    bearings : tuple of BearingDrop
-        Histories, peaks, impacts and values of every bearing.
-    parameters : tuple of FittedParameter
-        Every unknown with prior and estimate.
-    sensors : tuple of SensorErrors
-        Gain, offset and noise of every sensor; empty for a replay.
-    joint : JointEstimate or None
-        How the errors of parameters and sensors hang together; None where they are not held together.
-    unbalance : tuple of PlaneUnbalance
-        Amount and phase of the unbalance of every plane; empty for a replay.
-    structure : tuple of Structure
-        What the machine has beyond the usual model; empty where that does.
-    cross_check : tuple of CrossCheck
-        Comparisons with the estimate without contact law; empty where none was made.
-    innovations : Innovations or None
-        What the filter did not foresee; None for a replay.
-    nis, noise_factor : float or None
-        Mean normalised innovation squared [1], and size of the unknown impulses over the usual one [1].
-    agreement : Agreement or None
-        How far the replayed drop follows the record.
-    replay : ReplaySteps or None
-        The steps of the paper's route.
-    advice : tuple of Advice
-        Further numbers that would narrow the peak forces of a machine that is known by few; the best first.
-    later : tuple of LaterMotion
-        What the rest of the record shows; empty where it has none.
-    findings : tuple of Finding
-        What the gate found in the record.
-    warnings, notes : tuple of str
-        What makes the numbers less certain, and what is worth knowing and does not.
-    simulated_record : bool
-        Whether the record is known to be simulated.
-    """
+    """Force and stress of one recorded drop, with everything a page or a document says of it."""
 
     name: str
+    """Name of the drop."""
     method: Method
+    """How it was made."""
     machine: Machine
+    """The machine as it was given."""
     record: Record
+    """The recording."""
     drop_instant: DropInstant | PowerOff
+    """Power-off in record time."""
     speed: float
+    """Speed at power-off [rad/s]."""
     until: float
+    """End of the estimated part [s from power-off]."""
     verdict: Verdict
+    """What model and record say of each other."""
     bearings: tuple[BearingDrop, ...]
+    """Histories, peaks, impacts and values of every bearing."""
     parameters: tuple[FittedParameter, ...]
+    """Every unknown with prior and estimate."""
     checks: tuple[Check, ...] = ()
+    """The consistency checks behind it; empty for a replay."""
     sensors: tuple[SensorErrors, ...] = ()
+    """Gain, offset and noise of every sensor; empty for a replay."""
     joint: JointEstimate | None = None
+    """How the errors of parameters and sensors hang together; None where they are not held together."""
     unbalance: tuple[PlaneUnbalance, ...] = ()
+    """Amount and phase of the unbalance of every plane; empty for a replay."""
     structure: tuple[Structure, ...] = ()
+    """What the machine has beyond the usual model; empty where that does."""
     cross_check: tuple[CrossCheck, ...] = ()
+    """Comparisons with the estimate without contact law; empty where none was made."""
     innovations: Innovations | None = None
+    """What the filter did not foresee; None for a replay."""
     nis: float | None = None
     noise_factor: float | None = None
+    """Mean normalised innovation squared [1], and size of the unknown impulses over the usual one [1]."""
     agreement: Agreement | None = None
+    """How far the replayed drop follows the record."""
     replay: ReplaySteps | None = None
+    """The steps of the paper's route."""
     advice: tuple[Advice, ...] = ()
+    """Further numbers that would narrow the peak forces of a machine that is known by few; the best first."""
     later: tuple[LaterMotion, ...] = ()
+    """What the rest of the record shows; empty where it has none."""
     findings: tuple[Finding, ...] = ()
+    """What the gate found in the record."""
     warnings: tuple[str, ...] = field(default=())
     notes: tuple[str, ...] = field(default=())
+    """What makes the numbers less certain, and what is worth knowing and does not."""
     simulated_record: bool = False
+    """Whether the record is known to be simulated."""
 
     @property
     def consistent(self) -> bool:

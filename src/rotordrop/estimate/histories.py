@@ -32,23 +32,16 @@ FORMATS = (".h5", ".nc", ".csv", ".mat", ".parquet")
 
 @dataclass(frozen=True, kw_only=True)
 class Column:
-    """One quantity of one bearing against time.
-
-    Attributes
-    ----------
-    quantity, bearing : str
-        What it is, such as "force", and where.
-    unit, text : str
-        SI unit and name for people.
-    values : ndarray, shape (T,)
-        Values; NaN where the history does not reach.
-    """
+    """One quantity of one bearing against time."""
 
     quantity: str
     bearing: str
+    """What it is, such as "force", and where."""
     unit: str
     text: str
+    """SI unit and name for people."""
     values: Array
+    """Values; NaN where the history does not reach, shape (T,)."""
 
     @property
     def label(self) -> str:

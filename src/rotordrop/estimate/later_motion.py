@@ -18,26 +18,18 @@ RESOLVED = 4.0
 
 @dataclass(frozen=True, kw_only=True)
 class LaterMotion:
-    """How far the rotor moved at one bearing after the part that was estimated, beside the part itself.
-
-    Attributes
-    ----------
-    bearing : str
-        Name of the bearing.
-    first, first_time : float
-        Largest measured distance from the bearing centre [m] in the estimated part, and when [s].
-    later, later_time : float
-        The same in the rest of the record.
-    resolved : float
-        Difference that the readings show [m].
-    """
+    """How far the rotor moved at one bearing after the part that was estimated, beside the part itself."""
 
     bearing: str
+    """Name of the bearing."""
     first: float
     first_time: float
+    """Largest measured distance from the bearing centre [m] in the estimated part, and when [s]."""
     later: float
     later_time: float
+    """The same in the rest of the record."""
     resolved: float
+    """Difference that the readings show [m]."""
 
     @property
     def larger(self) -> bool:

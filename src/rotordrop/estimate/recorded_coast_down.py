@@ -32,26 +32,18 @@ class RecordedPlane:
     """Displacement at one bearing out of the readings of a record, computed where it is asked for.
 
     A coast-down of a minute fills a quarter of a gigabyte as soon as every step keeps a copy of it.
-
-    Attributes
-    ----------
-    signals : ndarray, shape (N, S)
-        Readings from power-off on [m].
-    sensors : tuple of Sensor
-        Behind every column.
-    sensing : Sensing
-        What they say about the bearings.
-    bearing : int
-        Which of them.
-    sideways : float
-        Where the rotor rests horizontally [m]; displacements count from there.
     """
 
     signals: Array
+    """Readings from power-off on [m], shape (N, S)."""
     sensors: tuple[Sensor, ...]
+    """Behind every column."""
     sensing: Sensing
+    """What they say about the bearings."""
     bearing: int
+    """Which of them."""
     sideways: float
+    """Where the rotor rests horizontally [m]; displacements count from there."""
 
     @property
     def shape(self) -> tuple[int, ...]:

@@ -11,25 +11,17 @@ from rotordrop.known import Known
 
 @dataclass(frozen=True, kw_only=True)
 class PlaneUnbalance:
-    """Unbalance of one plane as a drop shows it.
-
-    Attributes
-    ----------
-    node : int
-        Where it sits, counted from 1.
-    amount : Known
-        Mass times radius [kg m].
-    phase : Known or None
-        Direction of the heavy spot when the mark passes, from +y, positive with the spin [rad]; None where
-        the record has no mark, or does not tell a direction.
-    reason : str
-        Why there is no phase; empty where there is one.
-    """
+    """Unbalance of one plane as a drop shows it."""
 
     node: int
+    """Where it sits, counted from 1."""
     amount: Known
+    """Mass times radius [kg m]."""
     phase: Known | None
+    """Direction of the heavy spot when the mark passes, from +y, positive with the spin [rad]; None where the
+    record has no mark, or does not tell a direction."""
     reason: str = ""
+    """Why there is no phase; empty where there is one."""
 
     def sentence(self) -> str:
         """Amount and phase with their 90 % intervals, or why there is no phase."""

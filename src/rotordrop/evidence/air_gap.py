@@ -41,66 +41,46 @@ END = 1.0
 
 @dataclass(frozen=True, kw_only=True)
 class SettledRest:
-    """Where the rotor rests at the end of a drop; B bearings, S sensors.
-
-    Attributes
-    ----------
-    radius : ndarray, shape (B,)
-        Mean distance of the rotor centre at the bearing nodes from the centre of the sway arc [m].
-    radius_lower, radius_upper : ndarray, shape (B,)
-        Smallest and largest mean over a block of the tail [m].
-    standard_error : ndarray, shape (B,)
-        Standard error of the mean radius from the scatter of the blocks [m].
-    sideways : ndarray, shape (B,)
-        Mean horizontal reading at the bearings [m]; taken as horizontal sensor zero.
-    sway : ndarray, shape (B,)
-        Half the swing around the lowest point [m].
-    spread : ndarray, shape (B,)
-        Standard deviation of the radius [m].
-    along : ndarray, shape (S,)
-        Displacements along the sensors [m] with the rotor at the lowest point of its sway.
-    start, end : float
-        Part of the record that was used [s].
-    """
+    """Where the rotor rests at the end of a drop; B bearings, S sensors."""
 
     radius: Array
+    """Mean distance of the rotor centre at the bearing nodes from the centre of the sway arc [m], shape (B,).
+    """
     radius_lower: Array
     radius_upper: Array
+    """Smallest and largest mean over a block of the tail [m], shape (B,)."""
     standard_error: Array
+    """Standard error of the mean radius from the scatter of the blocks [m], shape (B,)."""
     sideways: Array
+    """Mean horizontal reading at the bearings [m]; taken as horizontal sensor zero, shape (B,)."""
     sway: Array
+    """Half the swing around the lowest point [m], shape (B,)."""
     spread: Array
+    """Standard deviation of the radius [m], shape (B,)."""
     along: Array
+    """Displacements along the sensors [m] with the rotor at the lowest point of its sway, shape (S,)."""
     start: float
     end: float
+    """Part of the record that was used [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class AirGap:
-    """Air gaps from the settled tail, shape (B,) each [m].
-
-    Attributes
-    ----------
-    value : ndarray, shape (B,)
-        Air gap [m].
-    lower, upper : ndarray, shape (B,)
-        Limits from the smallest and largest block of the tail [m] (the paper's two windows).
-    sag : StaticSag
-        What was taken off the settled radius.
-    zero_sigma, gain_sigma : ndarray, shape (B,)
-        Standard deviation of the gap [m] by the vertical zero and by the gain of the sensors, which the tail
-        cannot separate from the gap.
-    rest : SettledRest
-        The rest position behind it.
-    """
+    """Air gaps from the settled tail, shape (B,) each [m]."""
 
     value: Array
+    """Air gap [m], shape (B,)."""
     lower: Array
     upper: Array
+    """Limits from the smallest and largest block of the tail [m] (the paper's two windows), shape (B,)."""
     sag: StaticSag
+    """What was taken off the settled radius."""
     zero_sigma: Array
     gain_sigma: Array
+    """Standard deviation of the gap [m] by the vertical zero and by the gain of the sensors, which the tail
+    cannot separate from the gap, shape (B,)."""
     rest: SettledRest
+    """The rest position behind it."""
 
     @property
     def standard_error(self) -> Array:

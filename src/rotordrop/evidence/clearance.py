@@ -60,33 +60,22 @@ _LEAST_SCATTER = 0.5e-6
 
 @dataclass(frozen=True, kw_only=True)
 class Clearance:
-    """The hole in which the shaft moves, in one plane.
-
-    Attributes
-    ----------
-    bearing : str
-        Touchdown bearing, or sensor plane where no machine is known.
-    gap : float
-        Radius of the circle through the places at the wall [m].
-    standard_error : float
-        Its standard error from noise and roundness [m]; the gain of the sensors comes on top.
-    interval_90 : tuple of float
-        Interval that holds the radius with 90 % probability [m].
-    centre : array, shape (2,)
-        Centre of the circle from the origin of the readings [m].
-    polygon : array, shape (K, 2)
-        Places at the wall, round the circle [m].
-    out_of_round : float
-        Largest deviation of a place at the wall from the circle [m].
-    """
+    """The hole in which the shaft moves, in one plane."""
 
     bearing: str
+    """Touchdown bearing, or sensor plane where no machine is known."""
     gap: float
+    """Radius of the circle through the places at the wall [m]."""
     standard_error: float
+    """Its standard error from noise and roundness [m]; the gain of the sensors comes on top."""
     interval_90: tuple[float, float]
+    """Interval that holds the radius with 90 % probability [m]."""
     centre: Array
+    """Centre of the circle from the origin of the readings [m], shape (2,)."""
     polygon: Array
+    """Places at the wall, round the circle [m], shape (K, 2)."""
     out_of_round: float
+    """Largest deviation of a place at the wall from the circle [m]."""
 
     def as_json(self) -> dict[str, Any]:
         """Give everything in SI units, ready for JSON."""
@@ -103,24 +92,16 @@ class Clearance:
 
 @dataclass(frozen=True, kw_only=True)
 class Wear:
-    """How a gap has grown between two lift checks.
-
-    Attributes
-    ----------
-    bearing : str
-        Touchdown bearing.
-    growth : float
-        Difference of the radii [m].
-    interval_90 : tuple of float
-        Interval that holds it with 90 % probability [m].
-    moved : array, shape (2,)
-        How the centre has moved [m].
-    """
+    """How a gap has grown between two lift checks."""
 
     bearing: str
+    """Touchdown bearing."""
     growth: float
+    """Difference of the radii [m]."""
     interval_90: tuple[float, float]
+    """Interval that holds it with 90 % probability [m]."""
     moved: Array
+    """How the centre has moved [m], shape (2,)."""
 
     def as_json(self) -> dict[str, Any]:
         """Give everything in SI units, ready for JSON."""

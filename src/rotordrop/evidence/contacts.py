@@ -37,53 +37,36 @@ _LEAST_SHARE = 0.15
 
 @dataclass(frozen=True, kw_only=True)
 class EarlyForces:
-    """Forces on the rotor at its touchdown bearings during the first contacts.
-
-    Attributes
-    ----------
-    time : array, shape (K,)
-        Record time [s].
-    force : array, shape (K, B, 2)
-        Force on the rotor, x and y [N]; straight lines between the times.
-    error : array, shape (K, B)
-        Standard error of a component from noise and regularisation [N]; the rotor model counts as exact.
-    bearings : tuple of str
-        Names of the touchdown bearings.
-    """
+    """Forces on the rotor at its touchdown bearings during the first contacts."""
 
     time: Array
+    """Record time [s], shape (K,)."""
     force: Array
+    """Force on the rotor, x and y [N]; straight lines between the times, shape (K, B, 2)."""
     error: Array
+    """Standard error of a component from noise and regularisation [N]; the rotor model counts as exact, shape
+    (K, B)."""
     bearings: tuple[str, ...]
+    """Names of the touchdown bearings."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class FirstForce:
-    """First force at a touchdown bearing.
-
-    Attributes
-    ----------
-    bearing : str
-        Name of the touchdown bearing.
-    start : float
-        When the force sets in, in record time [s].
-    end : float or None
-        When it has gone; None when it lasts beyond the forces known [s].
-    time_error : float
-        Standard uncertainty of both [s].
-    peak_force, peak_error : float
-        Largest force and its standard error [N].
-    azimuth : float
-        Direction of the push at the peak [rad], counter-clockwise from +x.
-    """
+    """First force at a touchdown bearing."""
 
     bearing: str
+    """Name of the touchdown bearing."""
     start: float
+    """When the force sets in, in record time [s]."""
     end: float | None
+    """When it has gone; None when it lasts beyond the forces known [s]."""
     time_error: float
+    """Standard uncertainty of both [s]."""
     peak_force: float
     peak_error: float
+    """Largest force and its standard error [N]."""
     azimuth: float
+    """Direction of the push at the peak [rad], counter-clockwise from +x."""
 
 
 def early_forces(record: Record, machine: Machine, drop: DropInstant, *, span: float = 6e-3) -> EarlyForces:

@@ -49,43 +49,30 @@ _LEAD = 5e-3
 
 @dataclass(frozen=True, kw_only=True)
 class Fall:
-    """The fall fitted by a released rotor.
-
-    Attributes
-    ----------
-    instant : float
-        Release, in record time [s].
-    standard_error : float
-        Standard error of `instant` from the noise and the fit [s].
-    remanent_force : array, shape (A, 2)
-        Lift left at the release, x and y per magnetic bearing [N].
-    remanent_time : float
-        Time constant of its decay [s].
-    gain_errors : array, shape (S,)
-        How much more than the model each sensor reads, relative [1]; held near zero by the known gains.
-    misfit : float
-        Mean square of the residual over the noise (1 is a perfect model).
-    start, end : float
-        Window of the fit [s].
-    method : str
-        The model in words.
-    rotor : FreeRotor
-        The model.
-    predicted : function of time, array (T,) -> array (T, S)
-        Readings [m] of a fall that goes on without contact.
-    """
+    """The fall fitted by a released rotor."""
 
     instant: float
+    """Release, in record time [s]."""
     standard_error: float
+    """Standard error of `instant` from the noise and the fit [s]."""
     remanent_force: Array
+    """Lift left at the release, x and y per magnetic bearing [N], shape (A, 2)."""
     remanent_time: float
+    """Time constant of its decay [s]."""
     gain_errors: Array
+    """How much more than the model each sensor reads, relative [1]; held near zero by the known gains, shape
+    (S,)."""
     misfit: float
+    """Mean square of the residual over the noise (1 is a perfect model)."""
     start: float
     end: float
+    """Window of the fit [s]."""
     method: str
+    """The model in words."""
     rotor: FreeRotor
+    """The model."""
     predicted: Callable[[Array], Array]
+    """Readings [m] of a fall that goes on without contact."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,37 +22,25 @@ APPROACH = 1.5e-3
 
 @dataclass(frozen=True, kw_only=True)
 class TimedContact:
-    """First contact of one bearing by the times at which the rotor crosses the air gap.
-
-    Attributes
-    ----------
-    start, end : float
-        t1 and t2: the rotor crosses the air gap outwards and comes back [s from power-off].
-    timing_error : float
-        Standard error of either time [s].
-    impact_speed : float
-        Radial speed at t1 [m/s].
-    mass : float
-        Share of the rotor mass at this bearing [kg].
-    equivalent_stiffness : float
-        ``M (π/T)²`` [N/m], with T = t2 − t1 as half a period (the paper's Table 3).
-    corrected_stiffness : float
-        The same from ``T = (2/ω)(π − atan(ω v0/g))``, which allows for gravity during the contact [N/m].
-    standard_error : float
-        Standard error of ``equivalent_stiffness`` by the timing [N/m].
-    indentation : float
-        Largest distance beyond the air gap during the contact, support included [m].
-    """
+    """First contact of one bearing by the times at which the rotor crosses the air gap."""
 
     start: float
     end: float
+    """t1 and t2: the rotor crosses the air gap outwards and comes back [s from power-off]."""
     timing_error: float
+    """Standard error of either time [s]."""
     impact_speed: float
+    """Radial speed at t1 [m/s]."""
     mass: float
+    """Share of the rotor mass at this bearing [kg]."""
     equivalent_stiffness: float
+    """``M (π/T)²`` [N/m], with T = t2 − t1 as half a period (the paper's Table 3)."""
     corrected_stiffness: float
+    """The same from ``T = (2/ω)(π − atan(ω v0/g))``, which allows for gravity during the contact [N/m]."""
     standard_error: float
+    """Standard error of ``equivalent_stiffness`` by the timing [N/m]."""
     indentation: float
+    """Largest distance beyond the air gap during the contact, support included [m]."""
 
     @property
     def duration(self) -> float:

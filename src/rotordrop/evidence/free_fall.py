@@ -25,26 +25,18 @@ class FreeFall:
 
     The states are amplitudes in x, in y, their velocities in x, in y, the constant one (gravity), remanent
     forces (x, y) per magnetic bearing [N], and the turning unbalance (x, y) per plane [kg m].
-
-    Attributes
-    ----------
-    model : DropModel
-        The rotor.
-    speed : float
-        Rotor speed [rad/s], constant during the fall.
-    nodes : tuple of int
-        Nodes of the unbalance planes, counted from 1.
-    planes : ndarray, shape (U, m)
-        Mode shapes at the unbalance planes.
-    system : ndarray, shape (n, n)
-        System matrix without the decay of the remanent forces [1/s].
     """
 
     model: DropModel
+    """The rotor."""
     speed: float
+    """Rotor speed [rad/s], constant during the fall."""
     nodes: tuple[int, ...]
+    """Nodes of the unbalance planes, counted from 1."""
     planes: Array
+    """Mode shapes at the unbalance planes, shape (U, m)."""
     system: Array
+    """System matrix without the decay of the remanent forces [1/s], shape (n, n)."""
 
     @property
     def n_modes(self) -> int:

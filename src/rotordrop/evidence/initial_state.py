@@ -41,59 +41,40 @@ FEWEST_SAMPLES = 12
 
 @dataclass(frozen=True, kw_only=True)
 class InitialState:
-    """Initial state with its uncertainty; m modes per plane, B bearings, A magnetic bearings, n unknowns.
-
-    Attributes
-    ----------
-    fall : FreeFall
-        Linear model of the falling rotor.
-    sensing : Sensing
-        What the sensors see of it.
-    sensors : tuple of Sensor
-        The sensors of the record.
-    rest_along : ndarray, shape (S,)
-        Displacements along the sensors at rest [m], from which deviations count.
-    levitated : LevitatedModel
-        Readings before the drop: hum and 2X runout are taken off with it.
-    angle : RotorAngle
-        Rotor angle over the record.
-    unknowns : Unknowns
-        Where each unknown is in `mean`.
-    mean, covariance : ndarray, shapes (n,), (n, n)
-        Estimate and covariance of all unknowns at power-off.
-    settled : ndarray, shape (S,)
-        Displacement along the sensors at rest, from the settled radius [m].
-    drop_instant, drop_instant_error : float
-        Power-off in record time [s] and its standard error.
-    end : float
-        End of the free fall, from power-off [s].
-    noise : ndarray, shape (S,)
-        Noise of the displacements along the sensors [m].
-    misfit : float
-        Mean square of the residual over the noise [1]; 1 is a perfect model.
-    samples : int
-        Samples of the fall that were used.
-    notes : tuple of str
-        What to know about this state.
-    """
+    """Initial state with its uncertainty; m modes per plane, B bearings, A magnetic bearings, n unknowns."""
 
     fall: FreeFall
+    """Linear model of the falling rotor."""
     sensing: Sensing
+    """What the sensors see of it."""
     sensors: tuple[Sensor, ...]
+    """The sensors of the record."""
     rest_along: Array
+    """Displacements along the sensors at rest [m], from which deviations count, shape (S,)."""
     levitated: LevitatedModel
+    """Readings before the drop: hum and 2X runout are taken off with it."""
     angle: RotorAngle
+    """Rotor angle over the record."""
     unknowns: Unknowns
+    """Where each unknown is in `mean`."""
     mean: Array
     covariance: Array
+    """Estimate and covariance of all unknowns at power-off."""
     settled: Array
+    """Displacement along the sensors at rest, from the settled radius [m], shape (S,)."""
     drop_instant: float
     drop_instant_error: float
+    """Power-off in record time [s] and its standard error."""
     end: float
+    """End of the free fall, from power-off [s]."""
     noise: Array
+    """Noise of the displacements along the sensors [m], shape (S,)."""
     misfit: float
+    """Mean square of the residual over the noise [1]; 1 is a perfect model."""
     samples: int
+    """Samples of the fall that were used."""
     notes: tuple[str, ...] = ()
+    """What to know about this state."""
 
     @property
     def decay(self) -> float:

@@ -51,34 +51,24 @@ class LevitatedModel:
     The tones hold orbit and electrical runout together: one cannot tell them apart while the rotor is
     levitated. A linear rotor on a synchronous orbit has no 2X, so what is there is runout and turns on with
     the shaft after power-off.
-
-    Attributes
-    ----------
-    frequency : float
-        Speed found from the 1X tone [Hz].
-    tones : tuple of float
-        Frequencies of the model [Hz]: 1X, 2X and, where it can be told apart, the hum.
-    hum : float or None
-        Mains frequency among `tones` [Hz].
-    mean : array, shape (S,)
-        Constant part [m].
-    amplitudes : array, shape (F, S), complex
-        Tone f reads ``Re(amplitude · exp(2πi f t))`` [m, zero to peak], t in record time.
-    noise : array, shape (S,)
-        Standard deviation of what is left [m]. This, means and amplitudes are NaN for a channel without
-        readings.
-    start, end : float
-        Window the model was fitted to [s].
     """
 
     frequency: float
+    """Speed found from the 1X tone [Hz]."""
     tones: tuple[float, ...]
+    """Frequencies of the model [Hz]: 1X, 2X and, where it can be told apart, the hum."""
     hum: float | None
+    """Mains frequency among `tones` [Hz]."""
     mean: Array
+    """Constant part [m], shape (S,)."""
     amplitudes: ComplexArray
+    """Tone f reads ``Re(amplitude · exp(2πi f t))`` [m, zero to peak], t in record time, shape (F, S)."""
     noise: Array
+    """Standard deviation of what is left [m]. This, means and amplitudes are NaN for a channel without
+    readings, shape (S,)."""
     start: float
     end: float
+    """Window the model was fitted to [s]."""
 
     def readings(self, time: Array) -> Array:
         """Readings of a rotor that went on levitating [m], shape (N, S)."""

@@ -46,30 +46,20 @@ EARLIEST = 5e-3
 
 @dataclass(frozen=True, kw_only=True)
 class PowerOff:
-    """When the magnetic bearings let the rotor go, told by the fall alone.
-
-    Attributes
-    ----------
-    value : float
-        Power-off, in record time [s].
-    standard_error : float
-        Its standard uncertainty [s].
-    interval_90 : tuple of float
-        Interval that holds it with 90 % probability [s].
-    contact : float
-        First sudden acceleration [s].
-    method : str
-        How it was found.
-    notes : tuple of str
-        What to know about this value.
-    """
+    """When the magnetic bearings let the rotor go, told by the fall alone."""
 
     value: float
+    """Power-off, in record time [s]."""
     standard_error: float
+    """Its standard uncertainty [s]."""
     interval_90: tuple[float, float]
+    """Interval that holds it with 90 % probability [s]."""
     contact: float
+    """First sudden acceleration [s]."""
     method: str
+    """How it was found."""
     notes: tuple[str, ...]
+    """What to know about this value."""
 
     def __float__(self) -> float:
         return self.value

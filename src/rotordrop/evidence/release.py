@@ -33,33 +33,23 @@ class FreeRotor:
     """A rotor without bearings, seen at the sensor planes, pushed at the magnetic bearings.
 
     Displacements and forces are complex, x + j y: ``q̈ + (D − jωG) q̇ + Λ q = force_rowsᵀ f``.
-
-    Attributes
-    ----------
-    plane_rows : array, shape (P, m)
-        Displacement at the sensor planes per modal amplitude [1/sqrt(kg)].
-    force_rows : array, shape (A, m)
-        The same at the magnetic bearings.
-    stiffness : array, shape (m,)
-        Squares of the natural frequencies [rad²/s²].
-    damping, gyroscopic : array, shape (m, m)
-        Modal damping [1/s] and polar inertia [1].
-    lift : array, shape (A,)
-        Static lift of the magnetic bearings [N] (per unit of mass where `mass` is 1).
-    mass : float
-        Mass that the synchronous force has to move at most [kg].
-    description : str
-        The model in words.
     """
 
     plane_rows: Array
+    """Displacement at the sensor planes per modal amplitude [1/sqrt(kg)], shape (P, m)."""
     force_rows: Array
+    """The same at the magnetic bearings, shape (A, m)."""
     stiffness: Array
+    """Squares of the natural frequencies [rad²/s²], shape (m,)."""
     damping: Array
     gyroscopic: Array
+    """Modal damping [1/s] and polar inertia [1], shape (m, m)."""
     lift: Array
+    """Static lift of the magnetic bearings [N] (per unit of mass where `mass` is 1), shape (A,)."""
     mass: float
+    """Mass that the synchronous force has to move at most [kg]."""
     description: str
+    """The model in words."""
 
 
 def free_rotor(machine: Machine, planes: tuple[Plane, ...]) -> FreeRotor:
@@ -189,22 +179,16 @@ def response_to_start(rotor: FreeRotor, speed: float, span: float) -> ComplexArr
 
 @dataclass(frozen=True, kw_only=True)
 class FallResponses:
-    """What a released rotor answers to forces that stay, turn with it or fade, tabulated once for a span.
-
-    Attributes
-    ----------
-    fixed : tuple of array, shape (K, P, A), complex
-        Responses to a force that stays, turns with the shaft and against it [m/N].
-    free : array, shape (K, P, 2 M), complex
-        Displacement of the planes left to themselves, by displacements and velocities of the modes.
-    system, inputs : array
-        Derivative of those by themselves and by unit forces at the magnetic bearings.
-    """
+    """What a released rotor answers to forces that stay, turn with it or fade, tabulated once for a span."""
 
     fixed: tuple[ComplexArray, ...]
+    """Responses to a force that stays, turns with the shaft and against it [m/N], shape (K, P, A)."""
     free: ComplexArray
+    """Displacement of the planes left to themselves, by displacements and velocities of the modes, shape (K,
+    P, 2 M)."""
     system: ComplexArray
     inputs: Array
+    """Derivative of those by themselves and by unit forces at the magnetic bearings."""
 
     @classmethod
     def of(cls, rotor: FreeRotor, speed: float, span: float) -> FallResponses:

@@ -23,35 +23,26 @@ WEAKEST_DIRECTION = 0.05
 
 @dataclass(frozen=True, kw_only=True)
 class Sensing:
-    """Sensors in front of a reduced rotor; S sensors, B bearings, m modes per plane.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Channels.
-    directions : ndarray, shape (S, 2)
-        Unit vector (x, y) of positive reading, polarity included [1].
-    rows : ndarray, shape (S, 2m)
-        Displacement along each sensor [m] per modal amplitude, x amplitudes before y.
-    to_bearings : ndarray, shape (B, 2, S)
-        Displacement (x, y) at the bearing nodes per displacement along the sensors, for a straight rotor [1].
-    from_bearings : ndarray, shape (S, B, 2)
-        Displacement along the sensors per displacement at the bearing nodes, for a straight rotor [1].
-    settled_bend : ndarray, shape (S,)
-        Displacement along the sensors [m] by which the resting rotor bends away from the line through the
-        bearings.
-    gain_sigma, offset_sigma : ndarray, shape (S,)
-        Standard deviations of gain [1] and zero [m].
-    """
+    """Sensors in front of a reduced rotor; S sensors, B bearings, m modes per plane."""
 
     names: tuple[str, ...]
+    """Channels."""
     directions: Array
+    """Unit vector (x, y) of positive reading, polarity included [1], shape (S, 2)."""
     rows: Array
+    """Displacement along each sensor [m] per modal amplitude, x amplitudes before y, shape (S, 2m)."""
     to_bearings: Array
+    """Displacement (x, y) at the bearing nodes per displacement along the sensors, for a straight rotor [1],
+    shape (B, 2, S)."""
     from_bearings: Array
+    """Displacement along the sensors per displacement at the bearing nodes, for a straight rotor [1], shape
+    (S, B, 2)."""
     settled_bend: Array
+    """Displacement along the sensors [m] by which the resting rotor bends away from the line through the
+    bearings, shape (S,)."""
     gain_sigma: Array
     offset_sigma: Array
+    """Standard deviations of gain [1] and zero [m], shape (S,)."""
 
     def at_bearings(self, along: Array) -> Array:
         """Displacement at the bearings [m], shape (..., B, 2), from that along the sensors (..., S)."""

@@ -27,22 +27,16 @@ _SHORTEST = 0.2
 
 @dataclass(frozen=True, kw_only=True)
 class SettledTail:
-    """The part of a record in which the rotor rests on its touchdown bearings.
-
-    Attributes
-    ----------
-    start, end : float
-        Where it is, in record time [s].
-    mean : array, shape (S,)
-        Mean readings [m]; a mean over a swing lies above the lowest point, take the arc into account.
-    swing : array, shape (P, 2)
-        Peak-to-peak motion in x and y per sensor plane [m].
-    """
+    """The part of a record in which the rotor rests on its touchdown bearings."""
 
     start: float
     end: float
+    """Where it is, in record time [s]."""
     mean: Array
+    """Mean readings [m]; a mean over a swing lies above the lowest point, take the arc into account, shape
+    (S,)."""
     swing: Array
+    """Peak-to-peak motion in x and y per sensor plane [m], shape (P, 2)."""
 
 
 def settled_tail(record: Record, machine: Machine) -> SettledTail:

@@ -28,33 +28,23 @@ SEPARABLE = 0.6
 
 @dataclass(frozen=True, kw_only=True)
 class SpeedFit:
-    """Speed at power-off and how it falls.
-
-    Attributes
-    ----------
-    initial : float
-        Speed at power-off [rad/s].
-    initial_error : float
-        Its standard error [rad/s].
-    profile_time_constant : float
-        Time constant of a plain exponential through the record [s], friction included (the paper's profile).
-    aero_time_constant : Known
-        Time constant of the aerodynamic part [s].
-    friction_loss : float
-        Speed that friction took at the touchdown bearings [rad/s].
-    residual : float
-        Scatter of the speed readings about the fit [rad/s].
-    note : str
-        What to know about this fit; empty when nothing.
-    """
+    """Speed at power-off and how it falls."""
 
     initial: float
+    """Speed at power-off [rad/s]."""
     initial_error: float
+    """Its standard error [rad/s]."""
     profile_time_constant: float
+    """Time constant of a plain exponential through the record [s], friction included (the paper's profile).
+    """
     aero_time_constant: Known
+    """Time constant of the aerodynamic part [s]."""
     friction_loss: float
+    """Speed that friction took at the touchdown bearings [rad/s]."""
     residual: float
+    """Scatter of the speed readings about the fit [rad/s]."""
     note: str = ""
+    """What to know about this fit; empty when nothing."""
 
 
 def identify_speed(record: Record, power_off: float, *, turning: float | None = None) -> SpeedFit:

@@ -28,29 +28,20 @@ MARK_SPAN = 0.5
 
 @dataclass(frozen=True, kw_only=True)
 class Synchronous:
-    """1X of a plane: the circle that runs with the spin, electrical runout included.
-
-    Attributes
-    ----------
-    plane : str
-        Plane of the sensors.
-    amplitude : float
-        Radius of the circle [m].
-    phase : float
-        Direction of the high spot when the mark passes, from +y, positive with the spin [rad].
-    amplitude_interval_90, phase_interval_90 : tuple of float
-        90 % intervals from the scatter between turns [m], [rad]; the phase that of the whole circle where
-        the amplitude is within its noise.
-    turns : int
-        Turns used [1].
-    """
+    """1X of a plane: the circle that runs with the spin, electrical runout included."""
 
     plane: str
+    """Plane of the sensors."""
     amplitude: float
+    """Radius of the circle [m]."""
     phase: float
+    """Direction of the high spot when the mark passes, from +y, positive with the spin [rad]."""
     amplitude_interval_90: tuple[float, float]
     phase_interval_90: tuple[float, float]
+    """90 % intervals from the scatter between turns [m], [rad]; the phase that of the whole circle where the
+    amplitude is within its noise."""
     turns: int
+    """Turns used [1]."""
 
 
 def synchronous_motion(

@@ -25,24 +25,16 @@ TANGENT = 1e-3
 
 @dataclass(frozen=True, kw_only=True)
 class Directions:
-    """Directions of the fall's unknowns, one standard deviation each, that which matters most first.
-
-    Attributes
-    ----------
-    unknowns : ndarray, shape (u, K)
-        Change of the unknowns of the fall.
-    states : ndarray, shape (n, K)
-        Change of the state at the start of the simulation.
-    unbalances : ndarray, shape (2, m, K)
-        Change of the modal unbalance.
-    remaining : ndarray, shape (u, u)
-        A square root of what is left of the covariance.
-    """
+    """Directions of the fall's unknowns, one standard deviation each, that which matters most first."""
 
     unknowns: Array
+    """Change of the unknowns of the fall, shape (u, K)."""
     states: Array
+    """Change of the state at the start of the simulation, shape (n, K)."""
     unbalances: Array
+    """Change of the modal unbalance, shape (2, m, K)."""
     remaining: Array
+    """A square root of what is left of the covariance, shape (u, u)."""
 
 
 def influential_directions(replica: Replica, count: int = DIRECTIONS) -> Directions:

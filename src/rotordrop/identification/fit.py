@@ -62,36 +62,24 @@ class Misfit(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Fit:
-    """A minimum of a misfit over one window; n unknowns.
-
-    Attributes
-    ----------
-    x : ndarray, shape (n,)
-        The unknowns.
-    cost : float
-        Sum of squares of weighted residuals and priors.
-    misfit : float
-        Mean square of the weighted residuals [1]; 1 is noise level.
-    covariance : ndarray, shape (n, n)
-        Covariance of the unknowns (Laplace), scaled up where the misfit exceeds the noise.
-    window : float
-        End of the window [s].
-    evaluations : int
-        Simulations used for it.
-    active : tuple of bool
-        Which unknowns lie at a bound.
-    information : ndarray, shape (n, n)
-        What the record alone says: the normal matrix without the priors.
-    """
+    """A minimum of a misfit over one window; n unknowns."""
 
     x: Array
+    """The unknowns, shape (n,)."""
     cost: float
+    """Sum of squares of weighted residuals and priors."""
     misfit: float
+    """Mean square of the weighted residuals [1]; 1 is noise level."""
     covariance: Array
+    """Covariance of the unknowns (Laplace), scaled up where the misfit exceeds the noise, shape (n, n)."""
     window: float
+    """End of the window [s]."""
     evaluations: int
+    """Simulations used for it."""
     active: tuple[bool, ...]
+    """Which unknowns lie at a bound."""
     information: Array
+    """What the record alone says: the normal matrix without the priors, shape (n, n)."""
 
 
 @dataclass(frozen=True, kw_only=True)

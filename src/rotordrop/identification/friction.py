@@ -33,27 +33,19 @@ SCATTER_WIDENING = 2.0
 
 @dataclass(frozen=True, kw_only=True)
 class FrictionSweep:
-    """Orbit agreement over friction coefficients; K coefficients, D draws.
-
-    Attributes
-    ----------
-    coefficients : ndarray, shape (K,)
-        Dynamic coefficients [1].
-    disagreement : ndarray, shape (K,)
-        Distance of simulated and measured orbit [m rms], each moment weighted by how well it can be known.
-    best : ndarray, shape (D + 1,)
-        Best coefficient with the best parameters, then with each draw of them [1].
-    value : Known
-        The dynamic coefficient.
-    window : tuple of float
-        Compared part of the drop [s from power-off].
-    """
+    """Orbit agreement over friction coefficients; K coefficients, D draws."""
 
     coefficients: Array
+    """Dynamic coefficients [1], shape (K,)."""
     disagreement: Array
+    """Distance of simulated and measured orbit [m rms], each moment weighted by how well it can be known,
+    shape (K,)."""
     best: Array
+    """Best coefficient with the best parameters, then with each draw of them [1], shape (D + 1,)."""
     value: Known
+    """The dynamic coefficient."""
     window: tuple[float, float]
+    """Compared part of the drop [s from power-off]."""
 
 
 def orbit_disagreement(time: Array, distance: Array, contact: float) -> float:

@@ -20,23 +20,16 @@ SMOOTHING = 2e-3
 
 @dataclass(frozen=True, kw_only=True)
 class ExpandedState:
-    """Initial state by modal expansion; m modes per plane, B bearings.
-
-    Attributes
-    ----------
-    displacement, velocity : ndarray, shape (m, 2)
-        Amplitudes (x, y) and their velocities; zero beyond the modes used.
-    at_bearings, velocity_at_bearings : ndarray, shape (B, 2)
-        Displacement [m] and velocity [m/s] at the bearing nodes.
-    modes : int
-        Modes per plane used in the expansion.
-    """
+    """Initial state by modal expansion; m modes per plane, B bearings."""
 
     displacement: Array
     velocity: Array
+    """Amplitudes (x, y) and their velocities; zero beyond the modes used, shape (m, 2)."""
     at_bearings: Array
     velocity_at_bearings: Array
+    """Displacement [m] and velocity [m/s] at the bearing nodes, shape (B, 2)."""
     modes: int
+    """Modes per plane used in the expansion."""
 
 
 def expansion_matrix(rows: Array, modes: int) -> Array:

@@ -19,15 +19,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class ParameterVector:
-    """Unknown parameters in a fixed order; most are counted by their logarithm.
-
-    Attributes
-    ----------
-    unknowns : tuple of Unknown
-        The parameters with prior and the kernel entries they set.
-    """
+    """Unknown parameters in a fixed order; most are counted by their logarithm."""
 
     unknowns: tuple[Unknown, ...]
+    """The parameters with prior and the kernel entries they set."""
 
     @property
     def paths(self) -> tuple[str, ...]:

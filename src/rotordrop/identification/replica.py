@@ -35,42 +35,28 @@ closed form, so only what follows it has to be integrated again and again."""
 
 @dataclass(frozen=True, kw_only=True)
 class Replica:
-    """A recorded drop that can be simulated again and again; T samples, S sensors, B bearings.
-
-    Attributes
-    ----------
-    model : DropModel
-        The model, with unbalance, remanent force and speed of this drop.
-    sensing : Sensing
-        What the sensors see of it.
-    initial : InitialState
-        Initial state of the drop, of the model's own reduction.
-    radius : ndarray, shape (B,)
-        Settled radius [m]: air gap and static sag together, as the tail gives them.
-    race_sag : ndarray, shape (B,)
-        Part of the static sag that race and balls take [m].
-    start : float
-        Time from power-off at which the simulation starts [s].
-    state : ndarray, shape (n,)
-        State there.
-    time : ndarray, shape (T,)
-        Samples after that [s from power-off].
-    deviation : ndarray, shape (T, S)
-        Measured displacements along the sensors, from the rest position [m].
-    noise : ndarray, shape (S,)
-        Noise of these [m].
-    """
+    """A recorded drop that can be simulated again and again; T samples, S sensors, B bearings."""
 
     model: DropModel
+    """The model, with unbalance, remanent force and speed of this drop."""
     sensing: Sensing
+    """What the sensors see of it."""
     initial: InitialState
+    """Initial state of the drop, of the model's own reduction."""
     radius: Array
+    """Settled radius [m]: air gap and static sag together, as the tail gives them, shape (B,)."""
     race_sag: Array
+    """Part of the static sag that race and balls take [m], shape (B,)."""
     start: float
+    """Time from power-off at which the simulation starts [s]."""
     state: Array
+    """State there, shape (n,)."""
     time: Array
+    """Samples after that [s from power-off], shape (T,)."""
     deviation: Array
+    """Measured displacements along the sensors, from the rest position [m], shape (T, S)."""
     noise: Array
+    """Noise of these [m], shape (S,)."""
     scale: Array
 
     def bearing_rows(self, vector: ParameterVector, theta: Array, rest_error: Array | None = None) -> Array:

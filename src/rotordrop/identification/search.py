@@ -29,72 +29,48 @@ ANOTHER_MINIMUM = 0.25
 
 @dataclass(frozen=True, kw_only=True)
 class Schedule:
-    """How a search from many starts goes.
-
-    Attributes
-    ----------
-    windows : tuple of float
-        Ends of the windows, growing [s].
-    kept : tuple of int
-        How many starts go on after each window; the last number holds for the rest.
-    draws : tuple of int
-        Points drawn from the covariance of the fits before each window grows; the last number holds for the
-        rest.
-    few : int
-        Number of first windows in which only the leading unknowns are fitted.
-    iterations : tuple of int
-        Jacobians per window while several starts run, and for the last one.
-    tolerances : tuple of float
-        Share of the cost below which a fit ends, on the way and in the last window.
-    breaking : float
-        A window whose misfit exceeds that of the window before by this factor (and 1.5) is given up, after a
-        second try from many more draws.
-    filled : bool
-        Whether the number kept is filled with draws where the fits are the same minimum.
-    """
+    """How a search from many starts goes."""
 
     windows: tuple[float, ...]
+    """Ends of the windows, growing [s]."""
     kept: tuple[int, ...] = (4, 4, 3, 2)
+    """How many starts go on after each window; the last number holds for the rest."""
     draws: tuple[int, ...] = (200, 200, 100, 50)
+    """Points drawn from the covariance of the fits before each window grows; the last number holds for the
+    rest."""
     few: int = 2
+    """Number of first windows in which only the leading unknowns are fitted."""
     iterations: tuple[int, int] = (4, 8)
+    """Jacobians per window while several starts run, and for the last one."""
     tolerances: tuple[float, float] = (2e-3, 2e-3)
+    """Share of the cost below which a fit ends, on the way and in the last window."""
     breaking: float = 1.6
+    """A window whose misfit exceeds that of the window before by this factor (and 1.5) is given up, after a
+    second try from many more draws."""
     filled: bool = True
+    """Whether the number kept is filled with draws where the fits are the same minimum."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Search:
-    """Result of a search from many starts.
-
-    Attributes
-    ----------
-    best : Fit
-        The best fit over the longest window that the model explains.
-    by_window : tuple of Fit
-        The best fit of every window.
-    starts : ndarray, shape (k, n)
-        Where the search began.
-    costs : tuple of tuple of float
-        Costs of the fits that ran in each window, best first.
-    agreeing : int
-        Fits within five percent of the best cost in the last window that several reached.
-    evaluations : int
-        Simulations in all.
-    ended_early : str
-        Why the window stopped growing before the end of the schedule; empty when it did not.
-    finalists : tuple of Fit
-        All fits over the last window, best first.
-    """
+    """Result of a search from many starts."""
 
     best: Fit
+    """The best fit over the longest window that the model explains."""
     by_window: tuple[Fit, ...]
+    """The best fit of every window."""
     starts: Array
+    """Where the search began, shape (k, n)."""
     costs: tuple[tuple[float, ...], ...]
+    """Costs of the fits that ran in each window, best first."""
     agreeing: int
+    """Fits within five percent of the best cost in the last window that several reached."""
     evaluations: int
+    """Simulations in all."""
     ended_early: str
+    """Why the window stopped growing before the end of the schedule; empty when it did not."""
     finalists: tuple[Fit, ...]
+    """All fits over the last window, best first."""
 
 
 def search(

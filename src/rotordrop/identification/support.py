@@ -62,30 +62,22 @@ UNDETERMINED = 0.7
 
 @dataclass(frozen=True, kw_only=True)
 class ImpactFit:
-    """The problem of the first impacts: parameters by their logarithm, then directions of the initial state.
-
-    Attributes
-    ----------
-    replica : Replica
-        The drop to be run again.
-    vector : ParameterVector
-        Supports first, then what is marginalised.
-    directions : ndarray, shape (u, K)
-        Directions of the unknowns of the fall, one standard deviation each.
-    states : ndarray, shape (n, K)
-        What these directions change in the state at the start of the simulation.
-    unbalances : ndarray, shape (2, m, K)
-        What they change in the modal unbalance.
-    remaining_directions : ndarray, shape (u, u)
-        Square root of what is left of the covariance: it matters too little to be fitted along.
-    """
+    """The problem of the first impacts: parameters by their logarithm, then directions of the
+    initial state."""
 
     replica: Replica
+    """The drop to be run again."""
     vector: ParameterVector
+    """Supports first, then what is marginalised."""
     directions: Array
+    """Directions of the unknowns of the fall, one standard deviation each, shape (u, K)."""
     states: Array
+    """What these directions change in the state at the start of the simulation, shape (n, K)."""
     unbalances: Array
+    """What they change in the modal unbalance, shape (2, m, K)."""
     remaining_directions: Array
+    """Square root of what is left of the covariance: it matters too little to be fitted along, shape (u, u).
+    """
 
     @cached_property
     def prior_mean(self) -> Array:
@@ -181,30 +173,20 @@ class ImpactFit:
 
 @dataclass(frozen=True, kw_only=True)
 class SupportFit:
-    """Supports found from the first impacts, with everything that was fitted beside them.
-
-    Attributes
-    ----------
-    problem : ImpactFit
-        The problem that was solved, with the fine basis.
-    coarse : Search
-        Search from many starts over the first windows.
-    search : Search
-        Fits over the longer windows.
-    covariance : ndarray, shape (n, n)
-        Covariance of all unknowns, widened for what the linearised fit leaves out.
-    values : dict
-        Identified value by path, such as ``"NDE.support.stiffness"``.
-    correlations : tuple of Correlation
-        Correlation of pairs of support parameters of one bearing.
-    """
+    """Supports found from the first impacts, with everything that was fitted beside them."""
 
     problem: ImpactFit
+    """The problem that was solved, with the fine basis."""
     coarse: Search
+    """Search from many starts over the first windows."""
     search: Search
+    """Fits over the longer windows."""
     covariance: Array
+    """Covariance of all unknowns, widened for what the linearised fit leaves out, shape (n, n)."""
     values: dict[str, Known]
+    """Identified value by path, such as ``"NDE.support.stiffness"``."""
     correlations: tuple[Correlation, ...]
+    """Correlation of pairs of support parameters of one bearing."""
 
 
 def impact_problem(replica: Replica, *, directions: int = DIRECTIONS) -> ImpactFit:

@@ -43,46 +43,33 @@ class Severity:
 
 @dataclass(frozen=True, kw_only=True)
 class LoggedDrop:
-    """One drop of the log.
-
-    Attributes
-    ----------
-    machine, bearing_set : str
-        Which machine, and which set of touchdown bearings it had.
-    record, sha256 : str
-        The recording and the digest of its file.
-    recorded, added : str
-        When it happened, and when it was logged (ISO 8601); ``recorded`` may be empty.
-    speed : float
-        Speed at power-off [rad/s].
-    duration : float or None
-        How long the rotor was in its touchdown bearings [s].
-    cause : str
-        Why levitation was lost.
-    method, verdict, version, fingerprint : str
-        How the severity was estimated, what the estimate says of itself, by which version, and the numeric
-        fingerprint of the computer's arithmetic.
-    simulated : bool
-        Whether the recording is simulated.
-    severity : tuple of Severity
-        Force and stress per bearing.
-    """
+    """One drop of the log."""
 
     machine: str
     bearing_set: str
+    """Which machine, and which set of touchdown bearings it had."""
     record: str
     sha256: str
+    """The recording and the digest of its file."""
     recorded: str = ""
     added: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
+    """When it happened, and when it was logged (ISO 8601); ``recorded`` may be empty."""
     speed: float
+    """Speed at power-off [rad/s]."""
     duration: float | None = None
+    """How long the rotor was in its touchdown bearings [s]."""
     cause: str = ""
+    """Why levitation was lost."""
     method: str
     verdict: str
     simulated: bool = False
+    """Whether the recording is simulated."""
     version: str = ""
     fingerprint: str = ""
+    """How the severity was estimated, what the estimate says of itself, by which version, and the numeric
+    fingerprint of the computer's arithmetic."""
     severity: tuple[Severity, ...] = ()
+    """Force and stress per bearing."""
 
 
 COLUMNS = tuple(item.name for item in fields(LoggedDrop) if item.name != "severity")
@@ -91,28 +78,20 @@ COLUMNS = tuple(item.name for item in fields(LoggedDrop) if item.name != "severi
 
 @dataclass(frozen=True, kw_only=True)
 class UsedShare:
-    """How much of an allowance is used; None where nothing is allowed or known.
-
-    Attributes
-    ----------
-    drops, allowed_drops : int, int or None
-        Drops logged and allowed.
-    seconds, allowed_seconds : float or None
-        Time in the touchdown bearings logged and allowed [s].
-    untimed : int
-        Drops whose duration is not known: they count as drops, not as seconds.
-    source : str
-        Who allowed it; by API 617 and ISO 14839-5 it is a matter of agreement.
-    """
+    """How much of an allowance is used; None where nothing is allowed or known."""
 
     machine: str
     bearing_set: str
     drops: int
     allowed_drops: int | None
+    """Drops logged and allowed."""
     seconds: float
     allowed_seconds: float | None
+    """Time in the touchdown bearings logged and allowed [s]."""
     untimed: int
+    """Drops whose duration is not known: they count as drops, not as seconds."""
     source: str
+    """Who allowed it; by API 617 and ISO 14839-5 it is a matter of agreement."""
 
     def sentence(self) -> str:
         """The share in words."""
@@ -327,27 +306,19 @@ def _severities(bearings: Mapping[str, Any]) -> list[Severity]:
 
 @dataclass(frozen=True, kw_only=True)
 class Trend:
-    """Whether a number rises from drop to drop of one set of touchdown bearings.
-
-    Attributes
-    ----------
-    machine, bearing_set, bearing, quantity : str
-        What of whom.
-    drops : int
-        Drops that state it.
-    tau : float
-        Kendall's rank correlation with the order of the drops [1].
-    by_chance : float
-        Probability of one as large without any trend [1].
-    """
+    """Whether a number rises from drop to drop of one set of touchdown bearings."""
 
     machine: str
     bearing_set: str
     bearing: str
     quantity: str
+    """What of whom."""
     drops: int
+    """Drops that state it."""
     tau: float
+    """Kendall's rank correlation with the order of the drops [1]."""
     by_chance: float
+    """Probability of one as large without any trend [1]."""
 
     def sentence(self) -> str:
         """The trend in words."""

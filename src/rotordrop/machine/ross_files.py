@@ -38,27 +38,18 @@ _BUILT_IN = {
 
 @dataclass(frozen=True, kw_only=True)
 class ImportedRotor:
-    """A rotor from another program.
-
-    Attributes
-    ----------
-    rotor : Rotor
-        Shaft, discs, materials.
-    springs : tuple of Spring
-        Bearings of the source.
-    source : str
-        Program and version that wrote it.
-    notes : tuple of str
-        What was changed or left out.
-    nodes : tuple of int
-        The node here of every node of the source.
-    """
+    """A rotor from another program."""
 
     rotor: Rotor
+    """Shaft, discs, materials."""
     springs: tuple[Spring, ...]
+    """Bearings of the source."""
     source: str
+    """Program and version that wrote it."""
     notes: tuple[str, ...]
+    """What was changed or left out."""
     nodes: tuple[int, ...] = ()
+    """The node here of every node of the source."""
 
 
 def read_ross(path: str | Path) -> ImportedRotor:

@@ -9,32 +9,23 @@ from itertools import pairwise
 
 @dataclass(frozen=True, kw_only=True)
 class Spring:
-    """A bearing of the source.
-
-    Attributes
-    ----------
-    node : int
-        Node here.
-    name : str
-        Its name.
-    stiffness, damping : tuple of float
-        In x and y [N/m], [N s/m]; where the source has them by speed, the first of its table.
-    cross_stiffness, cross_damping : tuple of float
-        Force in x against motion in y, and in y against motion in x.
-    kind : str
-        What it is in the source; seals are held in the same way.
-    told : dict of str to tuple of float
-        All coefficients of the source by its own names, over ``frequency`` [rad/s]; written back as they are.
-    """
+    """A bearing of the source."""
 
     node: int
+    """Node here."""
     name: str
+    """Its name."""
     stiffness: tuple[float, float]
     damping: tuple[float, float]
+    """In x and y [N/m], [N s/m]; where the source has them by speed, the first of its table."""
     cross_stiffness: tuple[float, float] = (0.0, 0.0)
     cross_damping: tuple[float, float] = (0.0, 0.0)
+    """Force in x against motion in y, and in y against motion in x."""
     kind: str = "BearingElement"
+    """What it is in the source; seals are held in the same way."""
     told: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    """All coefficients of the source by its own names, over ``frequency`` [rad/s]; written back as they are.
+    """
 
     @property
     def stiffness_matrix(self) -> tuple[tuple[float, float], tuple[float, float]]:

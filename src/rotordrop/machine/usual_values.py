@@ -23,26 +23,18 @@ from rotordrop.units import format_quantity
 
 @dataclass(frozen=True, kw_only=True)
 class Doubt:
-    """Something that looks odd in a description.
-
-    Attributes
-    ----------
-    kind : str
-        "air gap", "rotor radius", "friction", "smoothing speed", "bearing damping", "preload", or the name
-        of the entry that no machine of the field has so.
-    bearing : str
-        Name of the touchdown bearing, or of the part of the machine.
-    value, limit : float
-        The two numbers compared, SI units.
-    message : str
-        What it means and what to look at.
-    """
+    """Something that looks odd in a description."""
 
     kind: str
+    """"air gap", "rotor radius", "friction", "smoothing speed", "bearing damping", "preload", or the name of
+    the entry that no machine of the field has so."""
     bearing: str
+    """Name of the touchdown bearing, or of the part of the machine."""
     value: float
     limit: float
+    """The two numbers compared, SI units."""
     message: str
+    """What it means and what to look at."""
 
 
 SURFACE_SPEED = 700.0

@@ -35,30 +35,6 @@ _NEWTON_STEPS = 60
 class BearingConstants:
     """Everything about a preloaded ball bearing that does not change during a drop.
 
-    Attributes
-    ----------
-    groove_distance : float
-        Distance of the groove centres A₀ of an unloaded row [m].
-    contact_angle : float
-        Nominal contact angle α₀ [rad]; of deep grooves the free contact angle ``acos(1 − P_d / (2 A₀))``.
-    radial_offset, axial_offset : float
-        ``A₀ cos α₀`` and ``A₀ sin α₀ + preload_approach`` [m]; without preload that of deep grooves is
-        zero, as under a radial load, and that of a pair with play is smaller by its axial half.
-    pitch_radius : float
-        ``D_pw / 2`` [m], the arm of the tilt in kinematics and in moment.
-    inner_stiffness, outer_stiffness, ball_stiffness : float
-        Stiffness of the ball on one race and of both contacts in series, K_tot [N/m^1.5].
-    stress_coefficient_inner, stress_coefficient_outer : float
-        ``σ = coefficient · Q^(1/3)`` [Pa/N^(1/3)].
-    ball_angles : ndarray, shape (Z,)
-        Angles of the balls of the first row from +x towards +y [rad].
-    second_row_offset : float
-        Angle of the second row against the first, as a fraction of the ball pitch [1].
-    axial_signs : tuple of float
-        For each row: +1 if an axial displacement of the race along +z loads it, else −1 [1].
-    preload, preload_approach, preload_ball_load : float
-        Axial force of each row [N], its axial approach [m], the load of each ball [N].
-
     Notes
     -----
     Source: Neisi 2020, eqs. (2)–(7). Differs from the paper: its equations are those of a deep-groove
@@ -66,21 +42,32 @@ class BearingConstants:
     """
 
     groove_distance: float
+    """Distance of the groove centres A₀ of an unloaded row [m]."""
     contact_angle: float
+    """Nominal contact angle α₀ [rad]; of deep grooves the free contact angle ``acos(1 − P_d / (2 A₀))``."""
     radial_offset: float
     axial_offset: float
+    """``A₀ cos α₀`` and ``A₀ sin α₀ + preload_approach`` [m]; without preload that of deep grooves is zero,
+    as under a radial load, and that of a pair with play is smaller by its axial half."""
     pitch_radius: float
+    """``D_pw / 2`` [m], the arm of the tilt in kinematics and in moment."""
     inner_stiffness: float
     outer_stiffness: float
     ball_stiffness: float
+    """Stiffness of the ball on one race and of both contacts in series, K_tot [N/m^1.5]."""
     stress_coefficient_inner: float
     stress_coefficient_outer: float
+    """``σ = coefficient · Q^(1/3)`` [Pa/N^(1/3)]."""
     ball_angles: Array
+    """Angles of the balls of the first row from +x towards +y [rad], shape (Z,)."""
     second_row_offset: float
+    """Angle of the second row against the first, as a fraction of the ball pitch [1]."""
     axial_signs: tuple[float, ...]
+    """For each row: +1 if an axial displacement of the race along +z loads it, else −1 [1]."""
     preload: float
     preload_approach: float
     preload_ball_load: float
+    """Axial force of each row [N], its axial approach [m], the load of each ball [N]."""
 
     @property
     def preloaded(self) -> bool:

@@ -99,34 +99,6 @@ class BallBearingDescription(Protocol):
 class BallBearingGeometry:
     """A ball bearing by plain numbers [SI]; the default materials are steel rings and silicon nitride balls.
 
-    Attributes
-    ----------
-    ball_diameter, pitch_diameter : float
-        D_w and D_pw [m].
-    ball_count : int
-        Balls per row [1].
-    contact_angle : float
-        Nominal contact angle α₀ [rad].
-    conformity_inner, conformity_outer : float
-        Groove radius over ball diameter [1].
-    ring_youngs_modulus, ball_youngs_modulus : float
-        Young's moduli [Pa].
-    ring_poisson_ratio, ball_poisson_ratio : float
-        Poisson ratios [1].
-    ball_density : float
-        Density of the balls [kg/m³].
-    preload : float
-        Axial preload of each row [N].
-    clearance : float, optional
-        Radial internal clearance P_d, across the diameter [m]. Rows of deep grooves (α₀ = 0) get their free
-        contact angle from it; in an X or O pair with a contact angle it is the play of the mounted pair.
-    arrangement : str
-        "X" (face to face), "O" (back to back), "tandem" or "single".
-    first_ball_angle : float
-        Angle of the first ball from +y towards −x [rad].
-    second_row_offset : float
-        Angle of the second row against the first, as a fraction of the ball pitch [1].
-
     Notes
     -----
     Source: Neisi 2020, Fig. 1.
@@ -134,17 +106,30 @@ class BallBearingGeometry:
 
     ball_diameter: float
     ball_count: int
+    """Balls per row [1]."""
     pitch_diameter: float
+    """D_w and D_pw [m]."""
     contact_angle: float
+    """Nominal contact angle α₀ [rad]."""
     conformity_inner: float
     conformity_outer: float
+    """Groove radius over ball diameter [1]."""
     ring_youngs_modulus: float = 208e9
     ring_poisson_ratio: float = 0.3
     ball_youngs_modulus: float = 315e9
+    """Young's moduli [Pa]."""
     ball_poisson_ratio: float = 0.26
+    """Poisson ratios [1]."""
     ball_density: float = 3200.0
+    """Density of the balls [kg/m³]."""
     preload: float = 0.0
+    """Axial preload of each row [N]."""
     clearance: float | None = None
+    """Radial internal clearance P_d, across the diameter [m]. Rows of deep grooves (α₀ = 0) get their free
+    contact angle from it; in an X or O pair with a contact angle it is the play of the mounted pair."""
     arrangement: Arrangement = "X"
+    """"X" (face to face), "O" (back to back), "tandem" or "single"."""
     first_ball_angle: float = 0.0
+    """Angle of the first ball from +y towards −x [rad]."""
     second_row_offset: float = 0.0
+    """Angle of the second row against the first, as a fraction of the ball pitch [1]."""

@@ -26,33 +26,25 @@ _STRIBECK_LOAD_FACTOR = 5.0
 class BearingResponse:
     """What a ball bearing does at a displacement of its inner race.
 
-    Attributes
-    ----------
-    force : ndarray, shape (5,)
-        Force and moment *on the race* (F_x, F_y, F_z [N], M_x, M_y [N m]).
-    stiffness : ndarray, shape (5, 5)
-        Tangent stiffness, minus the derivative of the force [N/m, N, N m]; symmetric.
-    energy : float
-        Elastic energy in all balls [J].
-    ball_loads : ndarray, shape (rows, Z)
-        Load of each ball [N].
-    contact_angles : ndarray, shape (rows, Z)
-        Contact angle of each ball under load [rad]; positive if the ball pushes the race towards −z.
-    stress_inner, stress_outer : ndarray, shape (rows, Z)
-        Largest Hertz pressure of each ball on the two races [Pa].
-
     Notes
     -----
     Source: Neisi 2020, eqs. (2)–(7).
     """
 
     force: Array
+    """Force and moment *on the race* (F_x, F_y, F_z [N], M_x, M_y [N m]), shape (5,)."""
     stiffness: Array
+    """Tangent stiffness, minus the derivative of the force [N/m, N, N m]; symmetric, shape (5, 5)."""
     energy: float
+    """Elastic energy in all balls [J]."""
     ball_loads: Array
+    """Load of each ball [N], shape (rows, Z)."""
     contact_angles: Array
+    """Contact angle of each ball under load [rad]; positive if the ball pushes the race towards −z, shape
+    (rows, Z)."""
     stress_inner: Array
     stress_outer: Array
+    """Largest Hertz pressure of each ball on the two races [Pa], shape (rows, Z)."""
 
 
 def bearing_response(

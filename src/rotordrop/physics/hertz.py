@@ -26,27 +26,20 @@ _SECANT_STEPS = 40
 class Contact:
     """Point contact of two bodies, ready to be loaded: all its laws are powers of the load.
 
-    Attributes
-    ----------
-    curvature_sum : float or ndarray
-        Σρ [1/m].
-    curvature_difference : float or ndarray
-        F(ρ) [1], zero for a circular contact.
-    stiffness : float or ndarray
-        ``Q = stiffness · δ^1.5`` [N/m^1.5].
-    semi_major_coefficient, semi_minor_coefficient : float or ndarray
-        ``a, b = coefficient · Q^(1/3)`` [m/N^(1/3)].
-
     Notes
     -----
     Source: Hertz; Harris, Rolling Bearing Analysis, chapter on contact stress and deformation.
     """
 
     curvature_sum: ArrayLike
+    """Σρ [1/m]."""
     curvature_difference: ArrayLike
+    """F(ρ) [1], zero for a circular contact."""
     stiffness: ArrayLike
+    """``Q = stiffness · δ^1.5`` [N/m^1.5]."""
     semi_major_coefficient: ArrayLike
     semi_minor_coefficient: ArrayLike
+    """``a, b = coefficient · Q^(1/3)`` [m/N^(1/3)]."""
 
     @property
     def ellipticity(self) -> ArrayLike:
@@ -209,23 +202,17 @@ def contacts_in_series(K_i: ArrayLike, K_o: ArrayLike) -> Any:
 class LineContact:
     """Two parallel cylinders, one perhaps hollow around the other, pressed together over a length.
 
-    Attributes
-    ----------
-    radius : float
-        Relative radius R [m], ``1/R = 1/R₁ + 1/R₂``; a bore counts negative.
-    length : float
-        Length of the contact [m].
-    compliance : float
-        Compliance of the material pair, 1/E* [1/Pa], see `compliance`.
-
     Notes
     -----
     Source: Johnson, Contact Mechanics, ch. 4.
     """
 
     radius: float
+    """Relative radius R [m], ``1/R = 1/R₁ + 1/R₂``; a bore counts negative."""
     length: float
+    """Length of the contact [m]."""
     compliance: float
+    """Compliance of the material pair, 1/E* [1/Pa], see `compliance`."""
 
     def maximum_pressure(self, F: ArrayLike) -> Any:
         """Largest Hertz pressure ``p₀ = √(F' E* / (π R))`` [Pa] under a load [N], F' per length.

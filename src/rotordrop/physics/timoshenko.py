@@ -27,29 +27,21 @@ _GAUSS_WEIGHTS = np.array([18.0 + sign * math.sqrt(30.0) for sign in (-1.0, 1.0,
 class Section:
     """Cross-section of a shaft, as stiffnesses and as inertias per length.
 
-    Attributes
-    ----------
-    bending_stiffness : float
-        E I [N m²].
-    shear_stiffness : float
-        κ G A [N]; infinite for a beam that does not shear.
-    mass : float
-        ρ A [kg/m].
-    diametral_inertia : float
-        ρ I [kg m]; zero switches rotary inertia off.
-    polar_inertia : float
-        ρ I_p [kg m]; zero switches the gyroscopic effect off.
-
     Notes
     -----
     Source: Timoshenko beam theory.
     """
 
     bending_stiffness: float
+    """E I [N m²]."""
     shear_stiffness: float
+    """κ G A [N]; infinite for a beam that does not shear."""
     mass: float
+    """ρ A [kg/m]."""
     diametral_inertia: float
+    """ρ I [kg m]; zero switches rotary inertia off."""
     polar_inertia: float
+    """ρ I_p [kg m]; zero switches the gyroscopic effect off."""
 
 
 def shear_coefficient(nu: float, diameter_ratio: float = 0.0) -> float:

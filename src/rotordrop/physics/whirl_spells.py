@@ -22,19 +22,13 @@ LEAST_RADIUS = 0.5
 
 @dataclass(frozen=True, kw_only=True)
 class WhirlSpell:
-    """One stretch of whirl.
-
-    Attributes
-    ----------
-    start, end : float
-        When it began and ended [s].
-    frequency : float
-        Mean whirl frequency [Hz]; positive with the spin (forward), negative against it (backward).
-    """
+    """One stretch of whirl."""
 
     start: float
     end: float
+    """When it began and ended [s]."""
     frequency: float
+    """Mean whirl frequency [Hz]; positive with the spin (forward), negative against it (backward)."""
 
     @property
     def turns(self) -> float:

@@ -20,21 +20,14 @@ _ENTRY = re.compile(r"\s*(?P<channel>.+?)\s+(?P<angle>[+-]?[0-9.]+\s*(?:°|deg|r
 
 @dataclass(frozen=True, kw_only=True)
 class Arrangement:
-    """Sensors made for the channels of a recording, and what was guessed about them.
-
-    Attributes
-    ----------
-    sensors : tuple of Sensor
-        One per channel used; the node numbers the plane, counted from 1.
-    angles_known : bool
-        Whether the angles were given; else two sensors of a plane are taken as perpendicular.
-    notes : tuple of str
-        Guesses in words.
-    """
+    """Sensors made for the channels of a recording, and what was guessed about them."""
 
     sensors: tuple[Sensor, ...]
+    """One per channel used; the node numbers the plane, counted from 1."""
     angles_known: bool
+    """Whether the angles were given; else two sensors of a plane are taken as perpendicular."""
     notes: tuple[str, ...]
+    """Guesses in words."""
 
 
 def arrangement_of(recording: Recording, given: Sequence[str] = ()) -> Arrangement:

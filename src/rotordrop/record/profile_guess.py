@@ -18,21 +18,14 @@ _VOLTS = ("V", "mV")
 
 @dataclass(frozen=True, kw_only=True)
 class Guess:
-    """A profile and what it still lacks.
-
-    Attributes
-    ----------
-    profile : Profile
-        What was given and what could be guessed.
-    found : tuple of str
-        What was found, in words.
-    missing : tuple of str
-        What has to be said, each with the way to say it; empty when the profile is complete.
-    """
+    """A profile and what it still lacks."""
 
     profile: Profile
+    """What was given and what could be guessed."""
     found: tuple[str, ...]
+    """What was found, in words."""
     missing: tuple[str, ...]
+    """What has to be said, each with the way to say it; empty when the profile is complete."""
 
 
 def guess_profile(recording: Recording, given: Profile, sensors: Sequence[Sensor] = ()) -> Guess:

@@ -45,53 +45,37 @@ ROUNDING_SLACK = 0.05
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Record:
-    """Readings of the displacement sensors over a drop, with the shaft speed.
-
-    Attributes
-    ----------
-    time : array, shape (N,)
-        Record time [s].
-    signals : array, shape (N, S)
-        Readings [m], positive in the reading direction, offsets included.
-    sensors : tuple of Sensor
-        The sensor of the machine behind every column of `signals`.
-    sampling_rate : float
-        Samples per second [Hz].
-    speed : array, shape (N,), optional
-        Shaft speed [rad/s], between the readings by straight lines.
-    speed_time, speed_readings : array, shape (K,), optional
-        When the speed was read [s] and what was read [rad/s].
-    speed_by_hand : bool
-        Whether somebody gave the speed: it then holds until the magnetic bearings let go, and nothing is
-        known of it afterwards.
-    marks : array, shape (M,), optional
-        When a mark of the shaft passed the keyphasor [s]: the rotor angle there is a whole number of turns.
-    path : Path, optional
-        Where the record comes from.
-    sha256 : str
-        Hash of that file.
-    metadata : mapping of str to str
-        Header entries of the file.
-    notes : tuple of str
-        Choices made on reading.
-    warnings : tuple of str
-        Damage worked around on reading.
-    """
+    """Readings of the displacement sensors over a drop, with the shaft speed."""
 
     time: Array
+    """Record time [s], shape (N,)."""
     signals: Array
+    """Readings [m], positive in the reading direction, offsets included, shape (N, S)."""
     sensors: tuple[Sensor, ...]
+    """The sensor of the machine behind every column of `signals`."""
     sampling_rate: float
+    """Samples per second [Hz]."""
     speed: Array | None = None
+    """Shaft speed [rad/s], between the readings by straight lines, shape (N,)."""
     speed_time: Array | None = None
     speed_readings: Array | None = None
+    """When the speed was read [s] and what was read [rad/s], shape (K,)."""
     speed_by_hand: bool = False
+    """Whether somebody gave the speed: it then holds until the magnetic bearings let go, and nothing is known
+    of it afterwards."""
     marks: Array | None = None
+    """When a mark of the shaft passed the keyphasor [s]: the rotor angle there is a whole number of turns,
+    shape (M,)."""
     path: Path | None = None
+    """Where the record comes from."""
     sha256: str = ""
+    """Hash of that file."""
     metadata: Mapping[str, str] = field(default_factory=dict)
+    """Header entries of the file."""
     notes: tuple[str, ...] = ()
+    """Choices made on reading."""
     warnings: tuple[str, ...] = ()
+    """Damage worked around on reading."""
 
     def __post_init__(self) -> None:
         shape = (len(self.time), len(self.sensors))

@@ -26,55 +26,36 @@ MARKS = "mark_passages"
 
 @dataclass(frozen=True, kw_only=True)
 class Channel:
-    """One column, dataset or variable of a file, with its own clock.
-
-    Attributes
-    ----------
-    name : str
-        Name without the unit.
-    label : str
-        Name as written in the file, unit in brackets removed.
-    unit : str
-        Unit as this package spells it, empty where the file names none.
-    values : array, shape (N,)
-        Samples, in `unit`.
-    time : array, shape (N,)
-        Time of each sample [s].
-    """
+    """One column, dataset or variable of a file, with its own clock."""
 
     name: str
+    """Name without the unit."""
     label: str
+    """Name as written in the file, unit in brackets removed."""
     unit: str
+    """Unit as this package spells it, empty where the file names none."""
     values: Array
+    """Samples, in `unit`, shape (N,)."""
     time: Array
+    """Time of each sample [s], shape (N,)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Recording:
-    """All channels of a file and what the file says about them.
-
-    Attributes
-    ----------
-    channels : tuple of Channel
-        In the order of the file.
-    metadata : mapping of str to str
-        Header entries as written.
-    notes : tuple of str
-        Choices the reader made, for the report.
-    warnings : tuple of str
-        Damage the reader worked around; each says what is missing.
-    sensitivity : float, optional
-        Volts per metre [V/m] stated in the file for all channels.
-    voltage_offset : float
-        Voltage at zero displacement stated in the file [V].
-    """
+    """All channels of a file and what the file says about them."""
 
     channels: tuple[Channel, ...]
+    """In the order of the file."""
     metadata: Mapping[str, str] = field(default_factory=dict)
+    """Header entries as written."""
     notes: tuple[str, ...] = ()
+    """Choices the reader made, for the report."""
     warnings: tuple[str, ...] = ()
+    """Damage the reader worked around; each says what is missing."""
     sensitivity: float | None = None
+    """Volts per metre [V/m] stated in the file for all channels."""
     voltage_offset: float = 0.0
+    """Voltage at zero displacement stated in the file [V]."""
 
 
 def known_unit(text: str) -> str | None:

@@ -23,27 +23,18 @@ _AFTER = 0.2
 
 @dataclass(frozen=True, kw_only=True)
 class SpeedAtDrop:
-    """Speed when the rotor was let go.
-
-    Attributes
-    ----------
-    value : float
-        Speed at the drop [rad/s].
-    standard_error : float
-        Standard error of `value` [rad/s].
-    slope : float
-        Mean rate of change over the first 0.2 s after the drop [rad/s²].
-    scatter : float
-        Standard deviation of one reading [rad/s].
-    readings : int
-        Readings used.
-    """
+    """Speed when the rotor was let go."""
 
     value: float
+    """Speed at the drop [rad/s]."""
     standard_error: float
+    """Standard error of `value` [rad/s]."""
     slope: float
+    """Mean rate of change over the first 0.2 s after the drop [rad/s²]."""
     scatter: float
+    """Standard deviation of one reading [rad/s]."""
     readings: int
+    """Readings used."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,26 +44,19 @@ class RotorAngle:
     Up to power-off the rotor turns evenly. Afterwards the angle is the integral of the readings, shifted so
     that they begin with the speed before; without readings it is known the less the more friction may have
     taken.
-
-    Attributes
-    ----------
-    power_off : float
-        End of the even turning, in record time [s].
-    turning : float
-        Speed until then [rad/s].
-    knots : array, shape (K,)
-        Times from power-off on between which the speed changes evenly [s]; the first is power-off.
-    speed : array, shape (K,)
-        Speed there [rad/s].
-    slowing_error : float
-        Standard deviation of the deceleration after power-off where no speed was read [rad/s²].
     """
 
     power_off: float
+    """End of the even turning, in record time [s]."""
     turning: float
+    """Speed until then [rad/s]."""
     knots: Array
+    """Times from power-off on between which the speed changes evenly [s]; the first is power-off, shape (K,).
+    """
     speed: Array
+    """Speed there [rad/s], shape (K,)."""
     slowing_error: float = 0.0
+    """Standard deviation of the deceleration after power-off where no speed was read [rad/s²]."""
 
     def at(self, time: Array) -> tuple[Array, Array]:
         """Angle [rad] at record times (N,), ``turning · time`` before power-off, and its deviation."""

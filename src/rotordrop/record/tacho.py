@@ -34,23 +34,16 @@ SEVERAL = 5
 
 @dataclass(frozen=True, kw_only=True)
 class Passages:
-    """What a channel of pulses says.
-
-    Attributes
-    ----------
-    marks : array, shape (M,)
-        When the mark passed [s]: the rotor angle there is a whole number of turns. Empty where a turn has
-        several pulses, which are not told apart.
-    time, speed : array, shape (K,)
-        Middle of as many turns as are looked at together [s], and mean speed over them [rad/s].
-    warnings : tuple of str
-        Pulses that are missing or too many, with times.
-    """
+    """What a channel of pulses says."""
 
     marks: Array
+    """When the mark passed [s]: the rotor angle there is a whole number of turns. Empty where a turn has
+    several pulses, which are not told apart, shape (M,)."""
     time: Array
     speed: Array
+    """Middle of as many turns as are looked at together [s], and mean speed over them [rad/s], shape (K,)."""
     warnings: tuple[str, ...]
+    """Pulses that are missing or too many, with times."""
 
 
 def passages(

@@ -64,28 +64,19 @@ STAGES = {"supports": 0.06, "friction": 0.6, "replay": 0.68, "draws": 0.7}
 
 @dataclass(frozen=True, kw_only=True)
 class Impacts:
-    """What the first impacts say: best unknowns with covariance, and the steps behind them.
-
-    Attributes
-    ----------
-    problem : ImpactFit
-        The drop with its unknowns.
-    x, covariance : ndarray, shapes (n,), (n, n)
-        Best unknowns and their covariance.
-    support : SupportFit or None
-        Fit of the supports; None when they were taken over.
-    friction : FrictionSweep or None
-        Sweep of the friction; None when it was taken over.
-    values : dict
-        Identified values by path.
-    """
+    """What the first impacts say: best unknowns with covariance, and the steps behind them."""
 
     problem: ImpactFit
+    """The drop with its unknowns."""
     x: Array
     covariance: Array
+    """Best unknowns and their covariance."""
     support: SupportFit | None
+    """Fit of the supports; None when they were taken over."""
     friction: FrictionSweep | None
+    """Sweep of the friction; None when it was taken over."""
     values: dict[str, Known]
+    """Identified values by path."""
 
 
 def replay_drop(

@@ -41,29 +41,22 @@ NO_INTERVAL: Status = "the record does not determine it"
 
 @dataclass(frozen=True, kw_only=True)
 class Replayed:
-    """The whole drop replayed with the identified values, beside the record; N samples, B bearings.
-
-    Attributes
-    ----------
-    result : DropResult
-        Simulation from power-off.
-    middle, lower, upper : ndarray, shape (T, B, 2)
-        Rotor at the bearings as the sensors would show it [m], for the air gap and for its two limits.
-    time : ndarray, shape (N,)
-        Samples of the record in the simulated window [s from power-off].
-    measured : ndarray, shape (N, B, 2)
-        Measured displacement at the bearings, along the straight rotor, from the rest position [m].
-    draws : Draws or None
-        Draws behind the intervals.
-    """
+    """The whole drop replayed with the identified values, beside the record; N samples, B bearings."""
 
     result: DropResult
+    """Simulation from power-off."""
     middle: Array
     lower: Array
     upper: Array
+    """Rotor at the bearings as the sensors would show it [m], for the air gap and for its two limits, shape
+    (T, B, 2)."""
     time: Array
+    """Samples of the record in the simulated window [s from power-off], shape (N,)."""
     measured: Array
+    """Measured displacement at the bearings, along the straight rotor, from the rest position [m], shape (N,
+    B, 2)."""
     draws: Draws | None
+    """Draws behind the intervals."""
 
 
 def replay_bearings(

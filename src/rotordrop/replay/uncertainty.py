@@ -42,30 +42,21 @@ LATE = (0.15, 0.2)
 
 @dataclass(frozen=True, kw_only=True)
 class Draws:
-    """Results of the draws; D draws, B bearings.
-
-    Attributes
-    ----------
-    peak_force, mean_force, peak_stress, mean_stress : ndarray, shape (D, B)
-        Numbers of each draw [N], [Pa]; the mean force over 0.15–0.2 s.
-    gaps : ndarray, shape (D, B)
-        Air gaps drawn [m].
-    spread_time : ndarray, shape (T,)
-        Times [s].
-    spread : ndarray, shape (T, B)
-        Root mean square distance of the draws' orbits from their mean [m].
-    rejected : int
-        Candidates that did not keep to the record.
-    """
+    """Results of the draws; D draws, B bearings."""
 
     peak_force: Array
     mean_force: Array
     peak_stress: Array
     mean_stress: Array
+    """Numbers of each draw [N], [Pa]; the mean force over 0.15–0.2 s, shape (D, B)."""
     gaps: Array
+    """Air gaps drawn [m], shape (D, B)."""
     spread_time: Array
+    """Times [s], shape (T,)."""
     spread: Array
+    """Root mean square distance of the draws' orbits from their mean [m], shape (T, B)."""
     rejected: int
+    """Candidates that did not keep to the record."""
 
     def __len__(self) -> int:
         return len(self.peak_force)

@@ -25,46 +25,31 @@ LESS_IS_WORSE = frozenset(one.field for one in SEVERITY if not one.more_is_worse
 
 @dataclass(frozen=True, kw_only=True)
 class ComparedDrop:
-    """One drop of a comparison.
-
-    Attributes
-    ----------
-    name : str
-        Name of the drop.
-    speed : float
-        Speed at power-off [rad/s].
-    numbers : mapping
-        By bearing and name of the number in an estimate file (``"peak_force_N"``, …), with intervals.
-    warnings : tuple of str
-        What the estimate warns of.
-    consistent : bool
-        Whether the estimate's own checks found the model consistent with the record.
-    method : str
-        How it was estimated.
-    record : str
-        SHA-256 of the recording, to know a drop that is given twice.
-    simulated : bool
-        Whether the record is known to be simulated.
-    machine, recorded : str
-        Name of the machine, and when the recorder says the drop was.
-    statistics : mapping
-        By bearing, the statistics of the stress as the document has them.
-    hardest : mapping
-        By bearing, what its worst impact was and how much of the whole it made, in words.
-    """
+    """One drop of a comparison."""
 
     name: str
+    """Name of the drop."""
     speed: float
+    """Speed at power-off [rad/s]."""
     numbers: Mapping[str, Mapping[str, Quantity]]
+    """By bearing and name of the number in an estimate file (``"peak_force_N"``, …), with intervals."""
     warnings: tuple[str, ...] = ()
+    """What the estimate warns of."""
     consistent: bool = True
+    """Whether the estimate's own checks found the model consistent with the record."""
     method: str = ""
+    """How it was estimated."""
     record: str = ""
+    """SHA-256 of the recording, to know a drop that is given twice."""
     simulated: bool = False
+    """Whether the record is known to be simulated."""
     machine: str = ""
     recorded: str = ""
+    """Name of the machine, and when the recorder says the drop was."""
     statistics: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    """By bearing, the statistics of the stress as the document has them."""
     hardest: Mapping[str, str] = field(default_factory=dict)
+    """By bearing, what its worst impact was and how much of the whole it made, in words."""
 
     @property
     def label(self) -> str:

@@ -47,24 +47,16 @@ class Card:
 
 @dataclass(frozen=True, kw_only=True)
 class Table:
-    """A table; cells are text or quantities.
-
-    Attributes
-    ----------
-    columns : tuple of str
-        Headings.
-    rows : tuple of tuple
-        Cells, as many per row as columns.
-    caption : str
-        What the table shows.
-    note : str
-        Small print below, for example the rule behind a statistic.
-    """
+    """A table; cells are text or quantities."""
 
     columns: tuple[str, ...]
+    """Headings."""
     rows: tuple[tuple[Cell, ...], ...]
+    """Cells, as many per row as columns."""
     caption: str = ""
+    """What the table shows."""
     note: str = ""
+    """Small print below, for example the rule behind a statistic."""
 
     def __post_init__(self) -> None:
         for row in self.rows:
@@ -97,34 +89,23 @@ class Section:
 
 @dataclass(frozen=True, kw_only=True)
 class ReportContent:
-    """Everything a report says; pages and terminal summaries are made from it alone.
-
-    Attributes
-    ----------
-    title, subtitle : str
-        What was done, to which machine, at which speed.
-    facts : tuple of (str, str)
-        Provenance: machine file, record, method, version.
-    simulated : str
-        Sentence that says the record is simulated; empty for a measured one.
-    verdict : tuple of Statement
-        The result in sentences, warnings included, most important first.
-    cards : tuple of Card
-        Headline numbers per bearing.
-    summary : tuple of Table
-        Tables that belong beside the verdict and into the terminal.
-    sections : tuple of Section
-        Figures and tables.
-    """
+    """Everything a report says; pages and terminal summaries are made from it alone."""
 
     title: str
     subtitle: str = ""
+    """What was done, to which machine, at which speed."""
     facts: tuple[tuple[str, str], ...] = ()
+    """Provenance: machine file, record, method, version."""
     simulated: str = ""
+    """Sentence that says the record is simulated; empty for a measured one."""
     verdict: tuple[Statement, ...] = ()
+    """The result in sentences, warnings included, most important first."""
     cards: tuple[Card, ...] = ()
+    """Headline numbers per bearing."""
     summary: tuple[Table, ...] = ()
+    """Tables that belong beside the verdict and into the terminal."""
     sections: tuple[Section, ...] = field(default=())
+    """Figures and tables."""
 
     @property
     def figures(self) -> dict[str, go.Figure]:

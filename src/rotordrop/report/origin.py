@@ -32,27 +32,18 @@ class UsedFile:
 
 @dataclass(frozen=True, kw_only=True)
 class Origin:
-    """What a report says of its own making, beside the result.
-
-    Attributes
-    ----------
-    command : str
-        The command, or the lines of Python, that make the same numbers again.
-    files : tuple of UsedFile
-        Machine, record, tail and whatever else was read.
-    operator : str
-        Who made it; empty where nobody said.
-    made : str
-        When, in UTC.
-    fingerprint : str
-        That of the arithmetic of this computer; empty where it was not taken.
-    """
+    """What a report says of its own making, beside the result."""
 
     command: str = ""
+    """The command, or the lines of Python, that make the same numbers again."""
     files: tuple[UsedFile, ...] = ()
+    """Machine, record, tail and whatever else was read."""
     operator: str = ""
+    """Who made it; empty where nobody said."""
     made: str = ""
+    """When, in UTC."""
     fingerprint: str = ""
+    """That of the arithmetic of this computer; empty where it was not taken."""
 
     def facts(self, told_of: str = "") -> tuple[tuple[str, str], ...]:
         """Lines for a report; what is not known is left out, and the file of a hash that was told of."""

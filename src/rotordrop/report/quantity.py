@@ -57,43 +57,29 @@ THIN_SPACE = "\u202f"
 
 @dataclass(frozen=True, kw_only=True)
 class Quantity:
-    """A number for a table or a headline, in SI units, with what is known about its error.
-
-    Attributes
-    ----------
-    value : float
-        Value in the SI unit of the kind; NaN shows as a dash.
-    kind : str
-        Kind of quantity, a key of `DISPLAY` or of `rotordrop.units.KINDS`.
-    interval_90 : tuple of float, optional
-        Interval that holds the true value with 90 % probability.
-    allowance_90 : float, optional
-        Half width of the interval by what the model leaves out alone, in the SI unit of the kind.
-    standard_error : float, optional
-        Standard error.
-    lower, upper : float, optional
-        Limits set by the record itself, for example of the air gap.
-    status : str
-        Verdict or reason, for example why there is no interval.
-    digits : int
-        Significant digits when no interval says how many are meant.
-    range_only : bool
-        Show the interval in place of the value, where a single number would say too much.
-    system : str
-        ``"SI"``, or ``"US"`` for mil, rpm and lbf.
-    """
+    """A number for a table or a headline, in SI units, with what is known about its error."""
 
     value: float
+    """Value in the SI unit of the kind; NaN shows as a dash."""
     kind: str
+    """Kind of quantity, a key of `DISPLAY` or of `rotordrop.units.KINDS`."""
     interval_90: tuple[float, float] | None = None
+    """Interval that holds the true value with 90 % probability."""
     allowance_90: float | None = None
+    """Half width of the interval by what the model leaves out alone, in the SI unit of the kind."""
     standard_error: float | None = None
+    """Standard error."""
     lower: float | None = None
     upper: float | None = None
+    """Limits set by the record itself, for example of the air gap."""
     status: str = ""
+    """Verdict or reason, for example why there is no interval."""
     digits: int = 4
+    """Significant digits when no interval says how many are meant."""
     range_only: bool = False
+    """Show the interval in place of the value, where a single number would say too much."""
     system: System = "SI"
+    """``"SI"``, or ``"US"`` for mil, rpm and lbf."""
 
     def __post_init__(self) -> None:
         if self.kind not in DISPLAY and self.kind not in KINDS:

@@ -22,24 +22,16 @@ DRAWN_OUTLIERS = 300
 
 @dataclass(frozen=True, kw_only=True)
 class StressBox:
-    """Distribution of the stress at one bearing in one drop.
-
-    Attributes
-    ----------
-    label : str
-        Drop, for example its speed.
-    bearing : str
-        Name of the bearing.
-    statistics : StressStatistics
-        Numbers of the box and of the table [Pa].
-    outliers : ndarray
-        Values beyond the whiskers [Pa].
-    """
+    """Distribution of the stress at one bearing in one drop."""
 
     label: str
+    """Drop, for example its speed."""
     bearing: str
+    """Name of the bearing."""
     statistics: StressStatistics
+    """Numbers of the box and of the table [Pa]."""
     outliers: Array
+    """Values beyond the whiskers [Pa]."""
 
 
 def stress_box(label: str, bearing: str, stress: Array, statistics: StressStatistics) -> StressBox:

@@ -33,39 +33,26 @@ LONG = 3.0
 
 @dataclass(frozen=True, kw_only=True)
 class Panel:
-    """One panel of a figure against time.
-
-    Attributes
-    ----------
-    title : str
-        Above the panel.
-    axis : str
-        What the vertical axis shows.
-    histories : tuple of History
-        The curves.
-    band : Band or None
-        The 90 % band of the first.
-    air_gap : AirGap or None
-        Drawn as horizontal limits, with the signs in ``gap_signs``.
-    gap_signs : tuple of float
-        1 above zero, −1 below.
-    levels : tuple of (str, float)
-        Further horizontal limits with their names.
-    peak : Peak or None
-        Marked with its value, time and interval.
-    series : bool
-        Whether the curves take the colours of a series instead of those of their roles.
-    """
+    """One panel of a figure against time."""
 
     title: str
+    """Above the panel."""
     axis: str
+    """What the vertical axis shows."""
     histories: tuple[History, ...]
+    """The curves."""
     band: Band | None = None
+    """The 90 % band of the first."""
     air_gap: AirGap | None = None
+    """Drawn as horizontal limits, with the signs in ``gap_signs``."""
     gap_signs: tuple[float, ...] = (1.0,)
+    """1 above zero, −1 below."""
     levels: tuple[tuple[str, float], ...] = ()
+    """Further horizontal limits with their names."""
     peak: Peak | None = None
+    """Marked with its value, time and interval."""
     series: bool = False
+    """Whether the curves take the colours of a series instead of those of their roles."""
 
     def around(self, before: float, after: float) -> Panel:
         """The panel around its peak, from so long before it to so long after it [s]."""

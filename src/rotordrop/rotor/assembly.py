@@ -27,22 +27,15 @@ DEFAULT_MODAL_DAMPING = 0.005
 
 @dataclass(frozen=True, kw_only=True)
 class PointMass:
-    """A disc or mass that sits on one node, small against the rotor's length.
-
-    Attributes
-    ----------
-    node : int
-        Node, counted from 1.
-    mass : float
-        Mass [kg].
-    polar_inertia, diametral_inertia : float
-        Inertia about the rotor axis and about a diameter [kg m²].
-    """
+    """A disc or mass that sits on one node, small against the rotor's length."""
 
     node: int
+    """Node, counted from 1."""
     mass: float
+    """Mass [kg]."""
     polar_inertia: float = 0.0
     diametral_inertia: float = 0.0
+    """Inertia about the rotor axis and about a diameter [kg m²]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -50,22 +43,17 @@ class RotorFE:
     """Finite elements of a free rotor; the two planes share the matrices.
 
     ``M q̈x + K qx + ω P q̇y + ω̇ P qy = fx`` and ``M q̈y + K qy − ω P q̇x − ω̇ P qx = fy``.
-
-    Attributes
-    ----------
-    node_positions : ndarray, shape (N,)
-        Positions along z [m]; node 1 of the files is index 0.
-    mass, stiffness, polar : ndarray, shape (2N, 2N)
-        M, K and P in ``[u_1, u_1', u_2, u_2', …]``, displacement [m] and slope [rad] per node.
-    modal_damping : float
-        Damping ratio of the free-free flexible modes [1].
     """
 
     node_positions: Array
+    """Positions along z [m]; node 1 of the files is index 0, shape (N,)."""
     mass: Array
     stiffness: Array
     polar: Array
+    """M, K and P in ``[u_1, u_1', u_2, u_2', …]``, displacement [m] and slope [rad] per node, shape (2N, 2N).
+    """
     modal_damping: float = DEFAULT_MODAL_DAMPING
+    """Damping ratio of the free-free flexible modes [1]."""
 
     @property
     def size(self) -> int:

@@ -26,58 +26,38 @@ _STANDSTILL = 1e-3  # of the first speed: forward and backward are told apart at
 
 @dataclass(frozen=True, kw_only=True)
 class Crossing:
-    """A critical speed: where a line of the diagram meets the rotor's own speed.
-
-    Attributes
-    ----------
-    speed : float
-        Speed of the rotor [rad/s].
-    line : int
-        Index of the line.
-    direction : str
-        ``"forward"``, ``"backward"`` or ``"mixed"``.
-    damping_ratio : float
-        Damping ratio there [1].
-    """
+    """A critical speed: where a line of the diagram meets the rotor's own speed."""
 
     speed: float
+    """Speed of the rotor [rad/s]."""
     line: int
+    """Index of the line."""
     direction: str
+    """``"forward"``, ``"backward"`` or ``"mixed"``."""
     damping_ratio: float
+    """Damping ratio there [1]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CampbellDiagram:
-    """Damped modes of a rotor against its speed; a line keeps its shape from one speed to the next.
-
-    Attributes
-    ----------
-    suspension : str
-        What holds the rotor: ``"free-free"``, ``"AMBs"``, ``"touchdown bearings"`` or a description.
-    speed : ndarray, shape (S,)
-        Speeds [rad/s], increasing.
-    frequency : ndarray, shape (S, K)
-        Damped frequencies [Hz]; NaN where a line has left the lowest modes or is overdamped.
-    damping_ratio : ndarray, shape (S, K)
-        Damping ratios [1].
-    whirl : ndarray, shape (S, K)
-        +1 circular forward, −1 circular backward, 0 on a line.
-    shapes : ndarray, shape (S, K, N, 2), complex
-        Displacement (x, y) at the nodes, largest displacement 1.
-    node_positions : ndarray, shape (N,)
-        Positions along z [m].
-    crossings : tuple of Crossing
-        Critical speeds between the first and the last speed.
-    """
+    """Damped modes of a rotor against its speed; a line keeps its shape from one speed to the next."""
 
     suspension: str
+    """What holds the rotor: ``"free-free"``, ``"AMBs"``, ``"touchdown bearings"`` or a description."""
     speed: Array
+    """Speeds [rad/s], increasing, shape (S,)."""
     frequency: Array
+    """Damped frequencies [Hz]; NaN where a line has left the lowest modes or is overdamped, shape (S, K)."""
     damping_ratio: Array
+    """Damping ratios [1], shape (S, K)."""
     whirl: Array
+    """+1 circular forward, −1 circular backward, 0 on a line, shape (S, K)."""
     shapes: ComplexArray
+    """Displacement (x, y) at the nodes, largest displacement 1, shape (S, K, N, 2)."""
     node_positions: Array
+    """Positions along z [m], shape (N,)."""
     crossings: tuple[Crossing, ...]
+    """Critical speeds between the first and the last speed."""
 
     def direction(self, line: int) -> str:
         """Direction of a line, by the mean over its speeds."""

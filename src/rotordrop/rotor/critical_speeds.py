@@ -24,36 +24,25 @@ _SUPPORT_RIGID = 0.999
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CriticalSpeedMap:
-    """Undamped map of a machine on its touchdown bearings (Neisi 2020, Fig. 19).
-
-    Attributes
-    ----------
-    machine_name : str
-        The machine.
-    whirl : str
-        ``"standstill"``: natural frequencies without spin, as in the paper; ``"forward"`` or ``"backward"``:
-        critical speeds, at which the whirl keeps step with the spin.
-    stiffness : ndarray, shape (S,)
-        Equivalent stiffness of bearing and support, the same at all bearings [N/m].
-    massless : ndarray, shape (S, K)
-        Frequencies with supports that have no mass, as in the paper [Hz].
-    with_support_mass : ndarray, shape (S, K)
-        Frequencies with the masses of the supports, and the bearings' tangent stiffness fixed [Hz]; NaN
-        where the stiffness exceeds what a bearing on a rigid support would have.
-    lines : tuple of EquivalentStiffness
-        The machine's own stiffness per bearing: the vertical lines of the map.
-    at_lines : mapping
-        Frequencies [Hz], shape (K,), with every bearing at its own equivalent stiffness: ``"tangent"``,
-        ``"simple"``, ``"with contact"`` (massless) and ``"with support mass"``.
-    """
+    """Undamped map of a machine on its touchdown bearings (Neisi 2020, Fig. 19)."""
 
     machine_name: str
+    """The machine."""
     whirl: str
+    """``"standstill"``: natural frequencies without spin, as in the paper; ``"forward"`` or ``"backward"``:
+    critical speeds, at which the whirl keeps step with the spin."""
     stiffness: Array
+    """Equivalent stiffness of bearing and support, the same at all bearings [N/m], shape (S,)."""
     massless: Array
+    """Frequencies with supports that have no mass, as in the paper [Hz], shape (S, K)."""
     with_support_mass: Array
+    """Frequencies with the masses of the supports, and the bearings' tangent stiffness fixed [Hz]; NaN where
+    the stiffness exceeds what a bearing on a rigid support would have, shape (S, K)."""
     lines: tuple[EquivalentStiffness, ...]
+    """The machine's own stiffness per bearing: the vertical lines of the map."""
     at_lines: Mapping[str, Array]
+    """Frequencies [Hz], shape (K,), with every bearing at its own equivalent stiffness: ``"tangent"``,
+    ``"simple"``, ``"with contact"`` (massless) and ``"with support mass"``."""
 
 
 def critical_speed_map(

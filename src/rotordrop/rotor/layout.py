@@ -47,23 +47,17 @@ class StateLayout:
     (x, y) and after all races the supports (x, y) [m]. After the velocities come the race spins [rad/s], the
     further states of bearings and AMBs that have some, the rotor speed [rad/s], the rotor angle [rad], the
     energy dissipated [J] and the work put in from outside [J].
-
-    Attributes
-    ----------
-    n_modes, n_bearings : int
-        Modes per plane, touchdown bearings.
-    bearing_own, magnet_own : tuple of int
-        Number of further states of each touchdown bearing and of each AMB; empty where none has any. Those
-        of a bearing are displacement (x, y) and velocity (x, y) of its foundation.
-    sensor_own : int
-        Number of sensors that lag behind, each with the reading that it has got to [m].
     """
 
     n_modes: int
     n_bearings: int
+    """Modes per plane, touchdown bearings."""
     bearing_own: tuple[int, ...] = ()
     magnet_own: tuple[int, ...] = ()
+    """Number of further states of each touchdown bearing and of each AMB; empty where none has any. Those of
+    a bearing are displacement (x, y) and velocity (x, y) of its foundation."""
     sensor_own: int = 0
+    """Number of sensors that lag behind, each with the reading that it has got to [m]."""
 
     @property
     def n_coordinates(self) -> int:

@@ -25,61 +25,42 @@ SHOWN_MODES = 4
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BearingSummary:
-    """One touchdown bearing with the rotor at rest in it.
-
-    Attributes
-    ----------
-    name : str
-        Name of the bearing.
-    load : float
-        Share of the rotor's weight [N].
-    figures : tuple of BearingFigure
-        What the bearing states of itself: what holds it without a load, how it lies under this one.
-    contact_pressure : float
-        Hertz pressure of the rotor at rest on the race, over its whole width [Pa].
-    deflection : float
-        Deflection of the race against the outer ring under the load [m].
-    tangent_stiffness : float
-        Radial stiffness of the bearing at that deflection [N/m].
-    support_frequency : float
-        Natural frequency of the support by itself, vertical [Hz].
-    equivalent_stiffness : float
-        Bearing and support in series [N/m].
-    """
+    """One touchdown bearing with the rotor at rest in it."""
 
     name: str
+    """Name of the bearing."""
     load: float
+    """Share of the rotor's weight [N]."""
     figures: tuple[BearingFigure, ...]
+    """What the bearing states of itself: what holds it without a load, how it lies under this one."""
     contact_pressure: float
+    """Hertz pressure of the rotor at rest on the race, over its whole width [Pa]."""
     deflection: float
+    """Deflection of the race against the outer ring under the load [m]."""
     tangent_stiffness: float
+    """Radial stiffness of the bearing at that deflection [N/m]."""
     support_frequency: float
+    """Natural frequency of the support by itself, vertical [Hz]."""
     equivalent_stiffness: float
+    """Bearing and support in series [N/m]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MachineSummary:
-    """What a machine description amounts to.
-
-    Attributes
-    ----------
-    fe : RotorFE
-        Finite elements of the rotor, which know mass, centre of gravity and inertias.
-    bearings : tuple of BearingSummary
-        The touchdown bearings.
-    free_free : ndarray, shape (up to 4,)
-        Lowest bending frequencies of the free rotor [Hz].
-    settled : ndarray, shape (up to 4,)
-        Lowest frequencies of the rotor resting in its bearings, supports without mass [Hz].
-    levitated_sag : ndarray, shape (N,), or None
-        Vertical displacement of the levitated rotor at the nodes [m]; None with fewer than two AMB planes.
-    """
+    """What a machine description amounts to."""
 
     fe: RotorFE
+    """Finite elements of the rotor, which know mass, centre of gravity and inertias."""
     bearings: tuple[BearingSummary, ...]
+    """The touchdown bearings."""
     free_free: Array
+    """Lowest bending frequencies of the free rotor [Hz], shape (up to 4,)."""
     settled: Array
+    """Lowest frequencies of the rotor resting in its bearings, supports without mass [Hz], shape (up to 4,).
+    """
     levitated_sag: Array | None
+    """Vertical displacement of the levitated rotor at the nodes [m]; None with fewer than two AMB planes,
+    shape (N,)."""
 
 
 def summarise_machine(machine: Machine) -> MachineSummary:

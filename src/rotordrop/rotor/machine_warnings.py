@@ -33,29 +33,20 @@ ASIDE = 0.5
 
 @dataclass(frozen=True, kw_only=True)
 class MachineWarning:
-    """One thing to know before trusting a result of this machine.
-
-    Attributes
-    ----------
-    kind : str
-        "limiting speed", "ball centrifugal force", "support resonance", "frictional heat", "load direction",
-        "guess", or one of the doubts about the description itself.
-    bearing : str
-        Name of the touchdown bearing, or of the part of the machine.
-    value, limit : float
-        The two numbers compared, SI units.
-    message : str
-        What it means.
-    doubtful : bool
-        Whether the description itself looks wrong; else it is the drop model that ends there.
-    """
+    """One thing to know before trusting a result of this machine."""
 
     kind: str
+    """"limiting speed", "ball centrifugal force", "support resonance", "frictional heat", "load direction",
+    "guess", or one of the doubts about the description itself."""
     bearing: str
+    """Name of the touchdown bearing, or of the part of the machine."""
     value: float
     limit: float
+    """The two numbers compared, SI units."""
     message: str
+    """What it means."""
     doubtful: bool = False
+    """Whether the description itself looks wrong; else it is the drop model that ends there."""
 
 
 def machine_warnings(

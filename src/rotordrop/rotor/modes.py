@@ -18,18 +18,12 @@ N_RIGID = 2
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PlanarModes:
-    """Undamped modes of one plane, lowest first, normalised to unit modal mass.
-
-    Attributes
-    ----------
-    omega : ndarray, shape (m,)
-        Natural frequencies [rad/s].
-    shapes : ndarray, shape (2N, m)
-        Displacement and slope per node; the largest displacement of each mode is positive.
-    """
+    """Undamped modes of one plane, lowest first, normalised to unit modal mass."""
 
     omega: Array
+    """Natural frequencies [rad/s], shape (m,)."""
     shapes: Array
+    """Displacement and slope per node; the largest displacement of each mode is positive, shape (2N, m)."""
 
     @property
     def frequency(self) -> Array:

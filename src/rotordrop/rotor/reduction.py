@@ -25,18 +25,12 @@ _DEPENDENT = 1e-8
 
 @dataclass(frozen=True, kw_only=True)
 class Reduction:
-    """How many shapes describe the rotor in each plane.
-
-    Attributes
-    ----------
-    modes : int or None
-        Free-free modes, the two rigid ones included; None for all finite-element coordinates.
-    attachment : bool
-        Whether residual-flexibility modes at the touchdown bearings are added.
-    """
+    """How many shapes describe the rotor in each plane."""
 
     modes: int | None = 14
+    """Free-free modes, the two rigid ones included; None for all finite-element coordinates."""
     attachment: bool = True
+    """Whether residual-flexibility modes at the touchdown bearings are added."""
 
 
 PRESETS = {
@@ -48,33 +42,22 @@ PRESETS = {
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RotorBasis:
-    """Shapes of the reduced rotor, the same in both planes, with unit modal mass and diagonal stiffness.
-
-    Attributes
-    ----------
-    shapes : ndarray, shape (2N, m)
-        Displacement [1/sqrt(kg)] and slope per node; amplitudes have the unit sqrt(kg) m.
-    eigenvalues : ndarray, shape (m,)
-        Modal stiffness [rad²/s²]; exactly 0 for the rigid modes, which come first.
-    polar : ndarray, shape (m, m)
-        Polar inertia matrix [1].
-    damping : ndarray, shape (m, m)
-        Modal damping of the free-free flexible modes, projected [1/s].
-    reduction : Reduction
-        The choice that made it.
-    attachment_nodes : tuple of int
-        Nodes with an attachment mode, counted from 1.
-    n_rigid : int
-        Number of rigid modes.
-    """
+    """Shapes of the reduced rotor, the same in both planes, with unit modal mass and diagonal stiffness."""
 
     shapes: Array
+    """Displacement [1/sqrt(kg)] and slope per node; amplitudes have the unit sqrt(kg) m, shape (2N, m)."""
     eigenvalues: Array
+    """Modal stiffness [rad²/s²]; exactly 0 for the rigid modes, which come first, shape (m,)."""
     polar: Array
+    """Polar inertia matrix [1], shape (m, m)."""
     damping: Array
+    """Modal damping of the free-free flexible modes, projected [1/s], shape (m, m)."""
     reduction: Reduction
+    """The choice that made it."""
     attachment_nodes: tuple[int, ...] = ()
+    """Nodes with an attachment mode, counted from 1."""
     n_rigid: int = N_RIGID
+    """Number of rigid modes."""
 
     @property
     def size(self) -> int:

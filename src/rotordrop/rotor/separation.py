@@ -37,24 +37,16 @@ def required_margin(factor: float, *, above: bool) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class Separation:
-    """A critical speed set against a range of operating speeds.
-
-    Attributes
-    ----------
-    crossing : Crossing
-        The critical speed.
-    factor : float
-        Amplification factor [1].
-    margin : float
-        Distance from the nearer end of the range, as a share of that speed [1]; zero within the range.
-    required : float
-        Margin that API 617 asks for [1].
-    """
+    """A critical speed set against a range of operating speeds."""
 
     crossing: Crossing
+    """The critical speed."""
     factor: float
+    """Amplification factor [1]."""
     margin: float
+    """Distance from the nearer end of the range, as a share of that speed [1]; zero within the range."""
     required: float
+    """Margin that API 617 asks for [1]."""
 
     @property
     def met(self) -> bool:

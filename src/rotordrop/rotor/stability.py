@@ -29,30 +29,21 @@ POINTS, BEYOND = 26, 1.25
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StabilityMap:
-    """Least logarithmic decrement of a rotor at one speed against cross-coupled stiffness.
-
-    Attributes
-    ----------
-    suspension : str
-        What holds the rotor.
-    speed : float
-        Speed of the rotor [rad/s].
-    node : int
-        Node where the coupling acts, counted from 1.
-    coupling : ndarray, shape (Q,)
-        Cross-coupled stiffness q [N/m]: the force is −q y horizontally, q x vertically.
-    decrement : ndarray, shape (Q,)
-        Least logarithmic decrement of the lowest modes [1]; negative where the rotor whirls by itself.
-    limit : float
-        Coupling at which it is zero [N/m]; infinite where none is found.
-    """
+    """Least logarithmic decrement of a rotor at one speed against cross-coupled stiffness."""
 
     suspension: str
+    """What holds the rotor."""
     speed: float
+    """Speed of the rotor [rad/s]."""
     node: int
+    """Node where the coupling acts, counted from 1."""
     coupling: Array
+    """Cross-coupled stiffness q [N/m]: the force is −q y horizontally, q x vertically, shape (Q,)."""
     decrement: Array
+    """Least logarithmic decrement of the lowest modes [1]; negative where the rotor whirls by itself, shape
+    (Q,)."""
     limit: float
+    """Coupling at which it is zero [N/m]; infinite where none is found."""
 
 
 def stability_map(machine: Machine, suspension: str = "AMBs") -> StabilityMap:

@@ -20,21 +20,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class StaticSag:
-    """What gives way under the rotor at rest, below the air gap.
-
-    Attributes
-    ----------
-    indentation : ndarray, shape (B,)
-        Contact indentation under the static load shares [m].
-    race : ndarray, shape (B,)
-        Deflection of the bearing [m].
-    support : ndarray, shape (B,)
-        Deflection of the support [m].
-    """
+    """What gives way under the rotor at rest, below the air gap."""
 
     indentation: Array
+    """Contact indentation under the static load shares [m], shape (B,)."""
     race: Array
+    """Deflection of the bearing [m], shape (B,)."""
     support: Array
+    """Deflection of the support [m], shape (B,)."""
 
     @property
     def total(self) -> Array:

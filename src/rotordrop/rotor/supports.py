@@ -15,37 +15,24 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Link:
-    """A spring with a damper, in both directions and coupled if need be.
-
-    Attributes
-    ----------
-    stiffness : ndarray, shape (2, 2)
-        Force in (x, y) against displacement in (x, y) [N/m].
-    damping : ndarray, shape (2, 2)
-        Force in (x, y) against velocity in (x, y) [N s/m].
-    """
+    """A spring with a damper, in both directions and coupled if need be."""
 
     stiffness: Array
+    """Force in (x, y) against displacement in (x, y) [N/m], shape (2, 2)."""
     damping: Array
+    """Force in (x, y) against velocity in (x, y) [N s/m], shape (2, 2)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Support:
-    """A chain of links from a node of the rotor to the ground, with a mass between each link and the next.
-
-    Attributes
-    ----------
-    node : int
-        Node of the rotor, counted from 1.
-    links : tuple of Link
-        From the rotor outwards; the last one ends at the ground.
-    masses : tuple of float
-        Masses between the links [kg], one fewer than links; they move in x and y.
-    """
+    """A chain of links from a node of the rotor to the ground, with a mass between each link and the next."""
 
     node: int
+    """Node of the rotor, counted from 1."""
     links: tuple[Link, ...]
+    """From the rotor outwards; the last one ends at the ground."""
     masses: tuple[float, ...] = ()
+    """Masses between the links [kg], one fewer than links; they move in x and y."""
 
     def __post_init__(self) -> None:
         if len(self.masses) != len(self.links) - 1:
@@ -91,20 +78,15 @@ class PlanarMatrices:
     """Second-order matrices of rotor and supports in both planes: ``M q̈ + (C + ω G) q̇ + K q = f``.
 
     The coordinates are those of the rotor in x, the masses of the supports in x, then the same in y.
-
-    Attributes
-    ----------
-    mass, stiffness, damping, gyroscopic : ndarray, shape (2n, 2n)
-        M, K, C and G; G is skew.
-    rotor_size : int
-        Coordinates of the rotor per plane.
     """
 
     mass: Array
     stiffness: Array
     damping: Array
     gyroscopic: Array
+    """M, K, C and G; G is skew, shape (2n, 2n)."""
     rotor_size: int
+    """Coordinates of the rotor per plane."""
 
     @property
     def plane_size(self) -> int:

@@ -23,32 +23,22 @@ FORMULAS = ("tangent", "simple")
 
 @dataclass(frozen=True, kw_only=True)
 class EquivalentStiffness:
-    """How stiff one touchdown bearing holds the settled rotor, vertically, part by part.
-
-    Attributes
-    ----------
-    bearing : str
-        Name of the touchdown bearing.
-    node : int
-        Its node, counted from 1.
-    load : float
-        Static load [N].
-    tangent, simple : float
-        Radial stiffness of the bearing at that load [N/m]: slope of its forces with any preload, and
-        the simple engineering formula, which knows no preload.
-    support : float
-        Stiffness of the support [N/m].
-    contact : float
-        Slope of the contact law between rotor and race at that load [N/m].
-    """
+    """How stiff one touchdown bearing holds the settled rotor, vertically, part by part."""
 
     bearing: str
+    """Name of the touchdown bearing."""
     node: int
+    """Its node, counted from 1."""
     load: float
+    """Static load [N]."""
     tangent: float
     simple: float
+    """Radial stiffness of the bearing at that load [N/m]: slope of its forces with any preload, and the
+    simple engineering formula, which knows no preload."""
     support: float
+    """Stiffness of the support [N/m]."""
     contact: float
+    """Slope of the contact law between rotor and race at that load [N/m]."""
 
     def equivalent(self, formula: str = "tangent", *, contact: bool = False) -> float:
         """Bearing and support in series [N/m], with the contact if asked (Neisi 2020, section 5.4)."""

@@ -30,30 +30,20 @@ SHARP = 20.0
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MachineResponse:
-    """Synchronous response of a rotor to its unbalance.
-
-    Attributes
-    ----------
-    suspension : str
-        What holds the rotor.
-    speed : ndarray, shape (S,)
-        Speeds [rad/s].
-    displacement : ndarray, shape (S, N, 2), complex
-        Displacement (x, y) at the nodes [m], ``Re(value · e^(jωt))``.
-    node_positions : ndarray, shape (N,)
-        Positions along z [m].
-    places : tuple of (str, int)
-        Planes of interest with their nodes, counted from 1.
-    unbalance : tuple of (int, float, float)
-        Node, amount [kg m] and phase from +y [rad] of every unbalance.
-    """
+    """Synchronous response of a rotor to its unbalance."""
 
     suspension: str
+    """What holds the rotor."""
     speed: Array
+    """Speeds [rad/s], shape (S,)."""
     displacement: ComplexArray
+    """Displacement (x, y) at the nodes [m], ``Re(value · e^(jωt))``, shape (S, N, 2)."""
     node_positions: Array
+    """Positions along z [m], shape (N,)."""
     places: tuple[tuple[str, int], ...]
+    """Planes of interest with their nodes, counted from 1."""
     unbalance: tuple[tuple[int, float, float], ...]
+    """Node, amount [kg m] and phase from +y [rad] of every unbalance."""
 
     def at(self, node: int) -> ComplexArray:
         """Displacement (x, y) at a node [m], shape (S, 2)."""

@@ -35,41 +35,28 @@ class Target:
 
 @dataclass(frozen=True, kw_only=True)
 class Unknown:
-    """One unknown parameter of a machine or a drop with its prior.
-
-    Attributes
-    ----------
-    parameter : Parameter
-        Its row in the parameter table.
-    owner : str
-        Name of the bearing or magnet, number of the unbalance, or nothing for a drop.
-    mean, sigma : float
-        Prior mean and standard deviation, of the logarithm where the parameter is logarithmic.
-    targets : tuple of Target
-        Kernel entries it sets.
-    start : float, optional
-        Where a search begins, in the measure of the mean: the value of the machine file.
-    calibrated : bool
-        Whether its prior is an estimate made before, not a guess.
-    published : callable, optional
-        The published value [SI] of the number that is estimated, where they differ: preload for the axial
-        offset of the ball rows, anisotropy for its ratio to the one described.
-    common_variance : float
-        Prior covariance with the same unknown of the other sensors of its group.
-    limits : tuple of float, optional
-        Bounds that depend on the machine, in the measure of the mean; those of the row when left out.
-    """
+    """One unknown parameter of a machine or a drop with its prior."""
 
     parameter: Parameter
+    """Its row in the parameter table."""
     owner: str = ""
+    """Name of the bearing or magnet, number of the unbalance, or nothing for a drop."""
     mean: float
     sigma: float
+    """Prior mean and standard deviation, of the logarithm where the parameter is logarithmic."""
     targets: tuple[Target, ...]
+    """Kernel entries it sets."""
     start: float | None = None
+    """Where a search begins, in the measure of the mean: the value of the machine file."""
     calibrated: bool = False
+    """Whether its prior is an estimate made before, not a guess."""
     published: Callable[[float], float] | None = None
+    """The published value [SI] of the number that is estimated, where they differ: preload for the axial
+    offset of the ball rows, anisotropy for its ratio to the one described."""
     common_variance: float = 0.0
+    """Prior covariance with the same unknown of the other sensors of its group."""
     limits: tuple[float, float] | None = None
+    """Bounds that depend on the machine, in the measure of the mean; those of the row when left out."""
 
     @property
     def path(self) -> str:
@@ -134,19 +121,13 @@ class Unknown:
 
 @dataclass(frozen=True, kw_only=True)
 class Prior:
-    """What is known of a parameter before a record is read, in the measure it is estimated in.
-
-    Attributes
-    ----------
-    mean, sigma : float
-        Normal distribution, of the logarithm where the parameter is logarithmic.
-    start : float
-        The value of the machine file, where a search begins.
-    """
+    """What is known of a parameter before a record is read, in the measure it is estimated in."""
 
     mean: float
     sigma: float
+    """Normal distribution, of the logarithm where the parameter is logarithmic."""
     start: float
+    """The value of the machine file, where a search begins."""
 
 
 def prior(row: Parameter, quantity: Known, scale: float = 1.0, *, logarithmic: bool | None = None) -> Prior:

@@ -23,28 +23,19 @@ CLEAR_DIRECTION = 0.05
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class WhirlModes:
-    """Damped modes of a rotor that turns at one speed, lowest frequency first.
-
-    Attributes
-    ----------
-    speed : float
-        Speed of the rotor [rad/s].
-    eigenvalue : ndarray, shape (K,), complex
-        λ with positive imaginary part [rad/s].
-    whirl : ndarray, shape (K,)
-        +1 circular forward (with the spin), −1 circular backward, 0 on a line; meaningless at standstill
-        on equal supports, where both directions share a frequency.
-    shapes : ndarray, shape (K, N, 2), complex
-        Displacement (x, y) at the nodes, largest displacement 1.
-    vectors : ndarray, shape (2n, K), complex
-        Displacement in the coordinates of `planar_matrices`, unit modal mass.
-    """
+    """Damped modes of a rotor that turns at one speed, lowest frequency first."""
 
     speed: float
+    """Speed of the rotor [rad/s]."""
     eigenvalue: ComplexArray
+    """λ with positive imaginary part [rad/s], shape (K,)."""
     whirl: Array
+    """+1 circular forward (with the spin), −1 circular backward, 0 on a line; meaningless at standstill on
+    equal supports, where both directions share a frequency, shape (K,)."""
     shapes: ComplexArray
+    """Displacement (x, y) at the nodes, largest displacement 1, shape (K, N, 2)."""
     vectors: ComplexArray
+    """Displacement in the coordinates of `planar_matrices`, unit modal mass, shape (2n, K)."""
 
     @property
     def frequency(self) -> Array:

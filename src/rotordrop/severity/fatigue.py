@@ -24,22 +24,15 @@ SEGMENTS = 720
 
 @dataclass(frozen=True, kw_only=True)
 class BallRow:
-    """One row of balls.
-
-    Attributes
-    ----------
-    balls : int
-        Number of balls.
-    gamma : float
-        Ball diameter times cosine of the contact angle over pitch diameter [1].
-    inner, outer : float
-        Ball loads at which a raceway reaches the basic rating life [N].
-    """
+    """One row of balls."""
 
     balls: int
+    """Number of balls."""
     gamma: float
+    """Ball diameter times cosine of the contact angle over pitch diameter [1]."""
     inner: float
     outer: float
+    """Ball loads at which a raceway reaches the basic rating life [N]."""
 
 
 def ball_row(

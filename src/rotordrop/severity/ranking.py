@@ -24,21 +24,14 @@ CLEAR = 0.9
 
 @dataclass(frozen=True, kw_only=True)
 class DropSeverity:
-    """One number that stands for a drop, with what is known about its error.
-
-    Attributes
-    ----------
-    name : str
-        Of the drop, e.g. "210 Hz".
-    value : float
-        Peak force [N] or stress [Pa].
-    standard_error : float
-        Of the estimate of this one drop [unit of value].
-    """
+    """One number that stands for a drop, with what is known about its error."""
 
     name: str
+    """Of the drop, e.g. "210 Hz"."""
     value: float
+    """Peak force [N] or stress [Pa]."""
     standard_error: float
+    """Of the estimate of this one drop [unit of value]."""
 
     @classmethod
     def from_interval(cls, name: str, value: float, interval_90: tuple[float, float]) -> DropSeverity:
@@ -51,32 +44,21 @@ class DropSeverity:
 
 @dataclass(frozen=True, kw_only=True)
 class Ranking:
-    """Drops from worst to mildest, with the probability of each to be the worst.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Worst first, by value.
-    values : tuple of float
-        [unit of value].
-    worst_drop : tuple of float
-        Probability that this recorded drop was the worst of them [1].
-    worst_condition : tuple of float or None
-        Probability that drops like this one are the worst on average [1]; None when the scatter between equal
-        drops is unknown.
-    drop_scatter : float or None
-        Standard deviation between equal drops [unit of value].
-    worse_than_next : tuple of float
-        Probability that each drop but the last was worse than the one after it [1].
-    statement : str
-    """
+    """Drops from worst to mildest, with the probability of each to be the worst."""
 
     names: tuple[str, ...]
+    """Worst first, by value."""
     values: tuple[float, ...]
+    """[unit of value]."""
     worst_drop: tuple[float, ...]
+    """Probability that this recorded drop was the worst of them [1]."""
     worst_condition: tuple[float, ...] | None
+    """Probability that drops like this one are the worst on average [1]; None when the scatter between equal
+    drops is unknown."""
     drop_scatter: float | None
+    """Standard deviation between equal drops [unit of value]."""
     worse_than_next: tuple[float, ...]
+    """Probability that each drop but the last was worse than the one after it [1]."""
     statement: str
 
     def as_json(self) -> dict[str, Any]:

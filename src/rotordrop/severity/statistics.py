@@ -23,53 +23,37 @@ SIGMA_REACH = 3.0
 
 @dataclass(frozen=True, kw_only=True)
 class StressStatistics:
-    """Summary of a stress history.
-
-    Attributes
-    ----------
-    rule : str
-        Rule of the quartiles, "hazen" or "linear".
-    weighted_by_time : bool
-        Whether each value counts by the time it lasted.
-    count : int
-        Values [1].
-    mean, median, lower_quartile, upper_quartile : float
-        [Pa].
-    lower_whisker, upper_whisker : float
-        Most extreme values within 1.5 interquartile ranges of the box [Pa].
-    standard_deviation : float
-        With n − 1 [Pa].
-    minimum, maximum : float
-        [Pa].
-    beyond_whiskers : int
-        Values outside the whiskers: the outliers of a MATLAB box plot [1].
-    above_three_sigma : int
-        Values above mean + 3 standard deviations: the outliers of the paper's text [1].
-    three_sigma_limit : float
-        mean + 3 standard deviations [Pa].
-    preload_stress : float or None
-        Stress of the preload alone [Pa].
-    preload_share : float or None
-        ``preload_stress`` over ``mean`` [1]: near 1 the mean says little about the drop.
-    """
+    """Summary of a stress history."""
 
     rule: QuartileRule
+    """Rule of the quartiles, "hazen" or "linear"."""
     weighted_by_time: bool
+    """Whether each value counts by the time it lasted."""
     count: int
+    """Values [1]."""
     mean: float
     median: float
     lower_quartile: float
     upper_quartile: float
+    """[Pa]."""
     lower_whisker: float
     upper_whisker: float
+    """Most extreme values within 1.5 interquartile ranges of the box [Pa]."""
     standard_deviation: float
+    """With n − 1 [Pa]."""
     minimum: float
     maximum: float
+    """[Pa]."""
     beyond_whiskers: int
+    """Values outside the whiskers: the outliers of a MATLAB box plot [1]."""
     above_three_sigma: int
+    """Values above mean + 3 standard deviations: the outliers of the paper's text [1]."""
     three_sigma_limit: float
+    """mean + 3 standard deviations [Pa]."""
     preload_stress: float | None
+    """Stress of the preload alone [Pa]."""
     preload_share: float | None
+    """``preload_stress`` over ``mean`` [1]: near 1 the mean says little about the drop."""
 
     def rules(self) -> str:
         """Name the rules in use, for a table or a figure."""

@@ -25,18 +25,14 @@ class CentredStart:
 
 @dataclass(frozen=True, kw_only=True)
 class PlacedStart:
-    """The rotor starts straight, from given positions and velocities at the first and last bearing's nodes.
-
-    Attributes
-    ----------
-    displacement : ndarray, shape (B, 2)
-        Rotor centre at the bearing nodes [m], (x, y); two bearings fix the line, more must lie on it.
-    velocity : ndarray, shape (B, 2)
-        Velocity there [m/s].
-    """
+    """The rotor starts straight, from given positions and velocities at the first and last
+    bearing's nodes."""
 
     displacement: Array
+    """Rotor centre at the bearing nodes [m], (x, y); two bearings fix the line, more must lie on it, shape
+    (B, 2)."""
     velocity: Array
+    """Velocity there [m/s], shape (B, 2)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,31 +44,21 @@ class StateStart:
 
 @dataclass(frozen=True, kw_only=True)
 class LevitatedStart:
-    """The rotor floats in its AMBs on a synchronous orbit and with its sag, then the power goes off.
-
-    Attributes
-    ----------
-    rotor_angle : float
-        Rotor angle at the power-off command [rad].
-    delay : float
-        Time the magnets keep holding after the command [s].
-    remanent_force : ndarray, shape (A, 2), optional
-        Force of each AMB left at the end of the delay [N], (x, y).
-    remanence_time_constant : float
-        Decay of that force [s].
-    offset : ndarray, shape (A, 2), optional
-        Position in which the controller holds the rotor at each AMB [m]; centre by default.
-    orbit : ndarray of complex, shape (A,), optional
-        Circular synchronous orbit at each AMB [m], ``x + jy`` at rotor angle zero, as a controller that
-        follows the runout of its sensors makes it; by default the response to the unbalance alone.
-    """
+    """The rotor floats in its AMBs on a synchronous orbit and with its sag, then the power goes off."""
 
     rotor_angle: float = 0.0
+    """Rotor angle at the power-off command [rad]."""
     delay: float = 0.0
+    """Time the magnets keep holding after the command [s]."""
     remanent_force: Array | None = None
+    """Force of each AMB left at the end of the delay [N], (x, y), shape (A, 2)."""
     remanence_time_constant: float = REMANENCE_TIME
+    """Decay of that force [s]."""
     offset: Array | None = None
+    """Position in which the controller holds the rotor at each AMB [m]; centre by default, shape (A, 2)."""
     orbit: NDArray[np.complex128] | None = None
+    """Circular synchronous orbit at each AMB [m], ``x + jy`` at rotor angle zero, as a controller that
+    follows the runout of its sensors makes it; by default the response to the unbalance alone, shape (A,)."""
 
 
 Start: TypeAlias = CentredStart | PlacedStart | StateStart | LevitatedStart
@@ -80,43 +66,29 @@ Start: TypeAlias = CentredStart | PlacedStart | StateStart | LevitatedStart
 
 @dataclass(frozen=True, kw_only=True)
 class DropCase:
-    """One drop to simulate; speed and times are floats in SI units, or texts such as ``"60 Hz"``.
-
-    Attributes
-    ----------
-    speed : float
-        Rotor speed at power-off [rad/s]; positive from x to y.
-    duration : float
-        Length of the simulation [s].
-    output_step : float
-        Distance of the output grid [s].
-    tolerance : float
-        Relative accuracy of one step of the integrator [1].
-    reduction : str or Reduction
-        Basis of the rotor; ignored when a ready model is simulated.
-    start : Start
-        How the drop starts.
-    spin : {"dynamic", "prescribed", "function of speed", "coasting", "constant"}
-        What changes the speed: aerodynamic deceleration in time plus friction; the measured profile as it is,
-        friction or not; drag as a function of speed plus friction; friction alone; nothing at all.
-    integrator : {"tsit5", "dp5"}
-        Runge–Kutta pair.
-    largest_step : float
-        Bound of the step [s].
-    most_steps : int
-        Bound of the number of steps [1].
-    """
+    """One drop to simulate; speed and times are floats in SI units, or texts such as ``"60 Hz"``."""
 
     speed: InSI = InSI("speed")  # noqa: RUF009 - a descriptor, read by the dataclass
+    """Rotor speed at power-off [rad/s]; positive from x to y."""
     duration: InSI = InSI("time", 0.2)  # noqa: RUF009
+    """Length of the simulation [s]."""
     output_step: InSI = InSI("time", 1e-5)  # noqa: RUF009
+    """Distance of the output grid [s]."""
     tolerance: float = 1e-6
+    """Relative accuracy of one step of the integrator [1]."""
     reduction: str | Reduction = "accurate"
+    """Basis of the rotor; ignored when a ready model is simulated."""
     start: Start = field(default_factory=CentredStart)
+    """How the drop starts."""
     spin: SpinMode = "dynamic"
+    """What changes the speed: aerodynamic deceleration in time plus friction; the measured profile as it is,
+    friction or not; drag as a function of speed plus friction; friction alone; nothing at all."""
     integrator: IntegratorName = "tsit5"
+    """Runge–Kutta pair."""
     largest_step: InSI = InSI("time", 1e-3)  # noqa: RUF009
+    """Bound of the step [s]."""
     most_steps: int = 50_000_000
+    """Bound of the number of steps [1]."""
 
     def __post_init__(self) -> None:
         for name in ("duration", "output_step", "tolerance", "largest_step"):

@@ -15,31 +15,22 @@ COMPARABLE_WINDOW = 0.02
 
 @dataclass(frozen=True, kw_only=True)
 class Certificate:
-    """Error certificate of one simulated drop.
-
-    Attributes
-    ----------
-    energy_residual : float
-        Largest imbalance of stored, dissipated and supplied energy [J].
-    energy_scale : float
-        Energy it is to be compared with: the largest change of stored energy [J].
-    peak_force : ndarray, shape (B,)
-        Peak magnitude of the ball force [N].
-    peak_change_tolerance : ndarray, shape (B,), or None
-        Relative change of the peak in the first 20 ms when the tolerance is ten times tighter [1].
-    peak_change_truncation : ndarray, shape (B,), or None
-        Relative change of the peak in the first 20 ms with eight more modes per plane [1].
-    peak_change_tolerance_whole, peak_change_truncation_whole : ndarray, shape (B,), or None
-        The same over the whole drop [1]; chaos makes it grow with time.
-    """
+    """Error certificate of one simulated drop."""
 
     energy_residual: float
+    """Largest imbalance of stored, dissipated and supplied energy [J]."""
     energy_scale: float
+    """Energy it is to be compared with: the largest change of stored energy [J]."""
     peak_force: Array
+    """Peak magnitude of the ball force [N], shape (B,)."""
     peak_change_tolerance: Array | None = None
+    """Relative change of the peak in the first 20 ms when the tolerance is ten times tighter [1], shape (B,).
+    """
     peak_change_truncation: Array | None = None
+    """Relative change of the peak in the first 20 ms with eight more modes per plane [1], shape (B,)."""
     peak_change_tolerance_whole: Array | None = None
     peak_change_truncation_whole: Array | None = None
+    """The same over the whole drop [1]; chaos makes it grow with time, shape (B,)."""
 
     def sentence(self) -> str:
         """The certificate in words."""

@@ -19,51 +19,34 @@ STOP_SPEED = 0.01
 
 @dataclass(frozen=True, kw_only=True)
 class CoastDownCase:
-    """One coast-down to simulate.
-
-    Attributes
-    ----------
-    speed : float
-        Rotor speed at power-off [rad/s]; positive from x to y.
-    duration : float or None
-        Length of the simulation [s]; None: until the rotor stands still.
-    rest : float
-        Time simulated after standstill [s], in which the rotor only rocks.
-    longest : float
-        A rotor that has not stopped by then [s] ends the simulation.
-    output_step : float
-        Distance of the samples [s]; a whole number of them must fit into 0.2 s.
-    tolerance : float
-        Relative accuracy of one step of the integrator [1].
-    reduction : str or Reduction
-        Basis of the rotor; ignored when a ready model is simulated.
-    start : Start
-        How the drop starts.
-    stop_speed : float
-        The rotor stops and sticks when it turns no faster than this [rad/s].
-    integrator : {"tsit5", "dp5"}
-        Runge–Kutta pair.
-    largest_step : float
-        Bound of the step [s].
-    settled_scheme : bool
-        Use the cheaper scheme once every bearing has been in contact for a whole second.
-    settled_error : float
-        Difference of displacement [m] from the Runge–Kutta pair over 2 ms above which it is given up.
-    """
+    """One coast-down to simulate."""
 
     speed: float
+    """Rotor speed at power-off [rad/s]; positive from x to y."""
     duration: float | None = None
+    """Length of the simulation [s]; None: until the rotor stands still."""
     rest: float = 0.0
+    """Time simulated after standstill [s], in which the rotor only rocks."""
     longest: float = 600.0
+    """A rotor that has not stopped by then [s] ends the simulation."""
     output_step: float = 5e-5
+    """Distance of the samples [s]; a whole number of them must fit into 0.2 s."""
     tolerance: float = 1e-6
+    """Relative accuracy of one step of the integrator [1]."""
     reduction: str | Reduction = "quick"
+    """Basis of the rotor; ignored when a ready model is simulated."""
     start: Start = field(default_factory=CentredStart)
+    """How the drop starts."""
     stop_speed: float = STOP_SPEED
+    """The rotor stops and sticks when it turns no faster than this [rad/s]."""
     integrator: IntegratorName = "tsit5"
+    """Runge–Kutta pair."""
     largest_step: float = 1e-3
+    """Bound of the step [s]."""
     settled_scheme: bool = True
+    """Use the cheaper scheme once every bearing has been in contact for a whole second."""
     settled_error: float = 1e-9
+    """Difference of displacement [m] from the Runge–Kutta pair over 2 ms above which it is given up."""
 
     def __post_init__(self) -> None:
         positive = ("longest", "output_step", "tolerance", "stop_speed", "largest_step", "settled_error")

@@ -26,36 +26,25 @@ AGREED_FORCE, AGREED_SPEED = 0.02, 0.005
 
 @dataclass(frozen=True, kw_only=True)
 class CoastDownCertificate:
-    """Differences between a coast-down and the same one with a tighter tolerance and no settled scheme.
-
-    Attributes
-    ----------
-    tolerance, tighter_tolerance : float
-        Of both runs [1].
-    peak_change : ndarray, shape (B, 3)
-        Relative change of the largest indentation, force and stress [1].
-    median_force_change, high_force_change : float
-        Root mean square over the seconds after 0.2 s of the relative change of the median and of the 99 %
-        quantile of the bearing force [1].
-    speed_change : float
-        Largest change of the rotor speed at the end of a window, over the initial speed [1].
-    standstill_change : float or None
-        Change of the time of standstill [s].
-    dissipated_change : float
-        Relative change of the energy dissipated [1].
-    contacts : ndarray, shape (2, B)
-        Contacts of both runs.
-    """
+    """Differences between a coast-down and the same one with a tighter tolerance and no settled scheme."""
 
     tolerance: float
     tighter_tolerance: float
+    """Of both runs [1]."""
     peak_change: Array
+    """Relative change of the largest indentation, force and stress [1], shape (B, 3)."""
     median_force_change: float
     high_force_change: float
+    """Root mean square over the seconds after 0.2 s of the relative change of the median and of the 99 %
+    quantile of the bearing force [1]."""
     speed_change: float
+    """Largest change of the rotor speed at the end of a window, over the initial speed [1]."""
     standstill_change: float | None
+    """Change of the time of standstill [s]."""
     dissipated_change: float
+    """Relative change of the energy dissipated [1]."""
     contacts: Array
+    """Contacts of both runs, shape (2, B)."""
 
     @property
     def agrees(self) -> bool:

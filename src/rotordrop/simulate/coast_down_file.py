@@ -50,18 +50,12 @@ _ARRAYS = ("peak_value", "peak_time", "whirl_time", "contacts", "contact_energy"
 
 @dataclass(frozen=True, kw_only=True)
 class Frame:
-    """What every sample of a file refers to.
-
-    Attributes
-    ----------
-    sensor_nodes : tuple of int
-        Nodes of the sensor planes, counted from 1.
-    air_gap : ndarray, shape (B,)
-        Air gaps of the bearings [m].
-    """
+    """What every sample of a file refers to."""
 
     sensor_nodes: tuple[int, ...]
+    """Nodes of the sensor planes, counted from 1."""
     air_gap: Array
+    """Air gaps of the bearings [m], shape (B,)."""
 
 
 def write_part(path: Path, samples: Mapping[str, NDArray[Any]], contact_log: Array) -> None:
@@ -209,24 +203,16 @@ class PlaneInFile:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CoastDownSamples:
-    """Samples of a coast-down file as the frequency analysis wants them.
-
-    Attributes
-    ----------
-    planes : dict of str to PlaneInFile
-        Displacement at each bearing, and at each sensor plane as ``"node 5"``; they stay in the file.
-    speed : ndarray, shape (N,)
-        Rotor speed [rad/s].
-    sampling_rate : float
-        Samples per second [Hz].
-    air_gap : dict of str to float
-        Air gap of each bearing [m].
-    """
+    """Samples of a coast-down file as the frequency analysis wants them."""
 
     planes: dict[str, PlaneInFile]
+    """Displacement at each bearing, and at each sensor plane as ``"node 5"``; they stay in the file."""
     speed: Array
+    """Rotor speed [rad/s], shape (N,)."""
     sampling_rate: float
+    """Samples per second [Hz]."""
     air_gap: dict[str, float]
+    """Air gap of each bearing [m]."""
 
 
 def open_samples(path: str | Path) -> CoastDownSamples:

@@ -26,25 +26,18 @@ QUANTITIES: Mapping[str, tuple[str, str]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Maximum:
-    """The largest value of a quantity over a coast-down, and whether the first 0.2 s held it.
-
-    Attributes
-    ----------
-    quantity, bearing : str
-        What, and where.
-    value, time : float
-        Largest value [SI] and when [s].
-    later, later_time : float
-        Largest value after the first 0.2 s [SI] on the output grid, and the middle of the second in which it
-        came [s]; NaN when the simulation ends before.
-    """
+    """The largest value of a quantity over a coast-down, and whether the first 0.2 s held it."""
 
     quantity: str
     bearing: str
+    """What, and where."""
     value: float
     time: float
+    """Largest value [SI] and when [s]."""
     later: float
     later_time: float
+    """Largest value after the first 0.2 s [SI] on the output grid, and the middle of the second in which it
+    came [s]; NaN when the simulation ends before."""
 
     @property
     def in_first_window(self) -> bool:
@@ -82,73 +75,39 @@ class Maximum:
 
 @dataclass(frozen=True, kw_only=True)
 class WindowStatistics:
-    """Statistics window by window: the first 0.2 s, the rest of the first second, then second by second.
-
-    Attributes
-    ----------
-    start, end : ndarray, shape (W,)
-        Limits of the windows [s].
-    speed : ndarray, shape (W,)
-        Rotor speed at the end of each [rad/s].
-    race_speed : ndarray, shape (W, B)
-        Race spin at the end of each [rad/s].
-    dissipated : ndarray, shape (W,)
-        Energy lost in contacts, bearings, supports and rotor damping within each [J]; air drag apart.
-    contacts : ndarray, shape (W, B)
-        Contacts that began within each [1].
-    contact_share : ndarray, shape (W, B)
-        Share of the time in contact [1].
-    peak : ndarray, shape (W, B, 3)
-        Largest value on the output grid, last axis in the order of `QUANTITIES` [m, N, Pa].
-    quantile : ndarray, shape (W, B, 3, Q)
-        Quantiles at the levels `QUANTILES` of the samples, indentation as −depth when in flight [m, N, Pa].
-    energy_residual : ndarray, shape (W,)
-        Stored, dissipated and supplied energy out of balance at the end of each, since the start [J].
-    settled : ndarray, shape (W, 3)
-        Share of the window done with the scheme for settled rotors [1], and how far it was from the
-        Runge–Kutta pair over the first 2 ms: displacement at the bearings [m], ball force [N].
-    """
+    """Statistics window by window: the first 0.2 s, the rest of the first second, then second by second."""
 
     start: Array
     end: Array
+    """Limits of the windows [s], shape (W,)."""
     speed: Array
+    """Rotor speed at the end of each [rad/s], shape (W,)."""
     race_speed: Array
+    """Race spin at the end of each [rad/s], shape (W, B)."""
     dissipated: Array
+    """Energy lost in contacts, bearings, supports and rotor damping within each [J]; air drag apart, shape
+    (W,)."""
     contacts: Array
+    """Contacts that began within each [1], shape (W, B)."""
     contact_share: Array
+    """Share of the time in contact [1], shape (W, B)."""
     peak: Array
+    """Largest value on the output grid, last axis in the order of `QUANTITIES` [m, N, Pa], shape (W, B, 3).
+    """
     quantile: Array
+    """Quantiles at the levels `QUANTILES` of the samples, indentation as −depth when in flight [m, N, Pa],
+    shape (W, B, 3, Q)."""
     energy_residual: Array
+    """Stored, dissipated and supplied energy out of balance at the end of each, since the start [J], shape
+    (W,)."""
     settled: Array
+    """Share of the window done with the scheme for settled rotors [1], and how far it was from the
+    Runge–Kutta pair over the first 2 ms: displacement at the bearings [m], ball force [N], shape (W, 3)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class CoastDownResult:
-    """One simulated coast-down, reduced to statistics; the samples are in the file at ``path``, if any.
-
-    Attributes
-    ----------
-    end_time : float
-        Time reached [s].
-    standstill_time : float or None
-        When the rotor stopped [s].
-    windows : WindowStatistics
-        Statistics second by second.
-    peak_value, peak_time : ndarray, shape (B, 3)
-        Largest values at the integrator's own steps [m, N, Pa] and their times [s].
-    whirl_time : ndarray, shape (B, 2)
-        Time of forward and backward whirl, whole turns round the race only [s].
-    contacts : ndarray, shape (B,)
-        Number of contacts.
-    contact_energy : ndarray, shape (B,)
-        Energy lost in contact and friction at each bearing [J].
-    dissipated, air_work : float
-        Energy lost in all of the machine, and work done by air drag and unbalance (mostly negative) [J].
-    energy_residual, energy_scale : float
-        Largest imbalance of energy, and the energy it is to be compared with [J].
-    path : Path or None
-        Where the samples are.
-    """
+    """One simulated coast-down, reduced to statistics; the samples are in the file at ``path``, if any."""
 
     machine_name: str
     bearing_names: tuple[str, ...]
@@ -157,22 +116,32 @@ class CoastDownResult:
     reduction: str
     output_step: float
     end_time: float
+    """Time reached [s]."""
     standstill_time: float | None
+    """When the rotor stopped [s]."""
     finished: bool
     outcome: str
     windows: WindowStatistics
+    """Statistics second by second."""
     peak_value: Array
     peak_time: Array
+    """Largest values at the integrator's own steps [m, N, Pa] and their times [s], shape (B, 3)."""
     whirl_time: Array
+    """Time of forward and backward whirl, whole turns round the race only [s], shape (B, 2)."""
     contacts: Array
+    """Number of contacts, shape (B,)."""
     contact_energy: Array
+    """Energy lost in contact and friction at each bearing [J], shape (B,)."""
     dissipated: float
     air_work: float
+    """Energy lost in all of the machine, and work done by air drag and unbalance (mostly negative) [J]."""
     energy_residual: float
     energy_scale: float
+    """Largest imbalance of energy, and the energy it is to be compared with [J]."""
     steps: int
     rejected_steps: int
     path: Path | None = None
+    """Where the samples are."""
 
     def maxima(self) -> tuple[Maximum, ...]:
         """When the largest indentation, force and stress of every bearing came: does 0.2 s hold them?"""

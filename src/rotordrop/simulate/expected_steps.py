@@ -22,21 +22,14 @@ MANY_STEPS = 2_000_000
 
 @dataclass(frozen=True, kw_only=True)
 class ExpectedSteps:
-    """The fastest rate of a machine and what it costs.
-
-    Attributes
-    ----------
-    steps : float
-        Least number of steps [1].
-    rate : float
-        The fastest rate [1/s].
-    cause : str
-        What is so fast.
-    """
+    """The fastest rate of a machine and what it costs."""
 
     steps: float
+    """Least number of steps [1]."""
     rate: float
+    """The fastest rate [1/s]."""
     cause: str
+    """What is so fast."""
 
     def __str__(self) -> str:
         """One sentence."""

@@ -18,34 +18,23 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Losses:
-    """Energy that a drop dissipated, by place [J]; shape (B,) where it belongs to a bearing.
-
-    Attributes
-    ----------
-    sliding : ndarray
-        Heat of sliding between rotor and race.
-    contact : ndarray
-        Lost in the normal direction of the contacts.
-    ball_set : ndarray
-        Damping between race and support.
-    support : ndarray
-        Damping of support and foundation.
-    drag : ndarray
-        Friction inside the bearing that brakes the race.
-    spin_up : ndarray
-        Work of friction on the spin of the race: its kinetic energy and what drag took of it. No loss of its
-        own: the drag is counted above, the rest is still in the race.
-    bending : float
-        Damping of the rotor's modes.
-    """
+    """Energy that a drop dissipated, by place [J]; shape (B,) where it belongs to a bearing."""
 
     sliding: Array
+    """Heat of sliding between rotor and race."""
     contact: Array
+    """Lost in the normal direction of the contacts."""
     ball_set: Array
+    """Damping between race and support."""
     support: Array
+    """Damping of support and foundation."""
     drag: Array
+    """Friction inside the bearing that brakes the race."""
     spin_up: Array
+    """Work of friction on the spin of the race: its kinetic energy and what drag took of it. No loss of its
+    own: the drag is counted above, the rest is still in the race."""
     bending: float
+    """Damping of the rotor's modes."""
 
     @property
     def total(self) -> float:

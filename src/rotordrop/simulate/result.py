@@ -67,56 +67,33 @@ class ContactLog:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class DropResult:
-    """One simulated drop. Axes: time T, bearing B, last axis (x, y).
-
-    Attributes
-    ----------
-    time : ndarray, shape (T,)
-        Time from power-off [s].
-    displacement, race_displacement, support_displacement : ndarray, shape (T, B, 2)
-        Rotor at the bearing node, race, support [m], all from the undisturbed centre.
-    indentation : ndarray, shape (T, B)
-        Indentation of the rotor in the race [m]; negative in flight.
-    contact_force : ndarray, shape (T, B)
-        Normal force between rotor and race [N].
-    friction_force : ndarray, shape (T, B)
-        Friction force [N], positive when it brakes positive spin.
-    bearing_force : ndarray, shape (T, B, 2)
-        Elastic ball force on the race [N].
-    max_ball_load, max_stress : ndarray, shape (T, B)
-        Load of the most loaded ball [N] and Hertz stress at its inner race [Pa].
-    speed : ndarray, shape (T,)
-        Rotor speed [rad/s].
-    race_speed : ndarray, shape (T, B)
-        Spin of the races [rad/s].
-    state : ndarray, shape (T, n)
-        Complete states, in the order ``state_names``.
-    contacts : ContactLog
-        Every contact.
-    outcome : str
-        How the computation ended, as a sentence.
-    finished : bool
-        Whether the whole duration was reached.
-    line_contacts : tuple of LineContact
-        Rotor in each race, which gives the pressure there; one per bearing.
-    lost : ndarray, shape (B + 1, 5), optional
-        Energy lost by place [J], for `rotordrop.simulate.losses`; None where none were booked.
-    """
+    """One simulated drop. Axes: time T, bearing B, last axis (x, y)."""
 
     time: Array
+    """Time from power-off [s], shape (T,)."""
     displacement: Array
     race_displacement: Array
     support_displacement: Array
+    """Rotor at the bearing node, race, support [m], all from the undisturbed centre, shape (T, B, 2)."""
     indentation: Array
+    """Indentation of the rotor in the race [m]; negative in flight, shape (T, B)."""
     contact_force: Array
+    """Normal force between rotor and race [N], shape (T, B)."""
     friction_force: Array
+    """Friction force [N], positive when it brakes positive spin, shape (T, B)."""
     bearing_force: Array
+    """Elastic ball force on the race [N], shape (T, B, 2)."""
     max_ball_load: Array
     max_stress: Array
+    """Load of the most loaded ball [N] and Hertz stress at its inner race [Pa], shape (T, B)."""
     speed: Array
+    """Rotor speed [rad/s], shape (T,)."""
     race_speed: Array
+    """Spin of the races [rad/s], shape (T, B)."""
     state: Array
+    """Complete states, in the order ``state_names``, shape (T, n)."""
     contacts: ContactLog
+    """Every contact."""
     bearing_names: tuple[str, ...]
     state_names: tuple[str, ...]
     shapes: Array = field(repr=False)
@@ -127,10 +104,15 @@ class DropResult:
     steps: int
     rejected_steps: int
     outcome: str
+    """How the computation ended, as a sentence."""
     finished: bool
+    """Whether the whole duration was reached."""
     certificate: Certificate
     line_contacts: tuple[LineContact, ...]
+    """Rotor in each race, which gives the pressure there; one per bearing."""
     lost: Array | None = field(default=None, repr=False)
+    """Energy lost by place [J], for `rotordrop.simulate.losses`; None where none were booked, shape (B + 1,
+    5)."""
 
     def index_of(self, bearing: int | str) -> int:
         """Place of a bearing, given by name or by number from 0.

@@ -21,22 +21,14 @@ TURN = 2.0 * math.pi
 
 @dataclass(frozen=True, kw_only=True)
 class View:
-    """One way to look at a signal: over frequency, or over order.
-
-    Attributes
-    ----------
-    frames : FramePower
-    of_orders : bool
-    length : shape (F,)
-        Length of the frames [s].
-    share : float
-        Of the usual length [1].
-    """
+    """One way to look at a signal: over frequency, or over order."""
 
     frames: FramePower
     of_orders: bool
     length: Array
+    """Length of the frames [s], shape (F,)."""
     share: float
+    """Of the usual length [1]."""
 
     @property
     def resolution(self) -> float:

@@ -17,20 +17,8 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FoundLine:
-    """A line that was found; fields as in `rotordrop.spectrum.lines.Line`, and what the search goes on with.
-
-    Attributes
-    ----------
-    path : shape (N,)
-        The frequency that it follows [Hz].
-    power : shape (N,)
-        Square of what was taken out of the signal [m²], over all channels, in single precision: dozens of
-        lines are kept until all are named.
-    brief : bool
-        Seen only for a short part of the signal.
-    parent, multiple
-        For a sum or difference: the steady line, and the order that is added to it [1].
-    """
+    """A line that was found; fields as in `rotordrop.spectrum.lines.Line`, and what the search goes
+    on with."""
 
     kind: LineKind
     frequency: float
@@ -49,10 +37,15 @@ class FoundLine:
     existence: float
     time: Array
     path: Array
+    """The frequency that it follows [Hz], shape (N,)."""
     power: NDArray[np.float32]
+    """Square of what was taken out of the signal [m²], over all channels, in single precision: dozens of
+    lines are kept until all are named, shape (N,)."""
     brief: bool
+    """Seen only for a short part of the signal."""
     parent: FoundLine | None = None
     multiple: float = 0.0
+    """For a sum or difference: the steady line, and the order that is added to it [1]."""
 
     @property
     def strength(self) -> float:

@@ -19,42 +19,28 @@ MAINS_TOLERANCE = 0.003
 
 @dataclass(frozen=True, kw_only=True)
 class Candidate:
-    """One possible source of a line, with where it would be and why.
-
-    Attributes
-    ----------
-    name : str
-        What the line would be called.
-    family : str
-        Sources of one family are not told apart when both fit ("pendulum" of either end).
-    kind : {"order", "steady"}
-        Whether it follows the rotor speed or stands still.
-    value : float
-        Order [1] or frequency [Hz].
-    tolerance : float
-        How far the true place may be from ``value`` [same unit].
-    reason : str
-        Where the value comes from.
-    shape : {"any", "flat", "round"}
-        Form of the orbit that the source would make.
-    weight : float
-        How likely the source is before the line is looked at, against other candidates [1].
-    planes : tuple of str
-        Planes in which it would be strongest; empty when it may be in any.
-    narrow : bool
-        Whether the source holds its frequency, as a power grid does: a broad line is then something else.
-    """
+    """One possible source of a line, with where it would be and why."""
 
     name: str
+    """What the line would be called."""
     family: str
+    """Sources of one family are not told apart when both fit ("pendulum" of either end)."""
     kind: Kind
+    """Whether it follows the rotor speed or stands still."""
     value: float
+    """Order [1] or frequency [Hz]."""
     tolerance: float
+    """How far the true place may be from ``value`` [same unit]."""
     reason: str
+    """Where the value comes from."""
     shape: OrbitShape = "any"
+    """Form of the orbit that the source would make."""
     weight: float = 1.0
+    """How likely the source is before the line is looked at, against other candidates [1]."""
     planes: tuple[str, ...] = ()
+    """Planes in which it would be strongest; empty when it may be in any."""
     narrow: bool = False
+    """Whether the source holds its frequency, as a power grid does: a broad line is then something else."""
 
 
 def order_candidates(highest: int = 6) -> tuple[Candidate, ...]:

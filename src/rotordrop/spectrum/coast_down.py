@@ -68,88 +68,58 @@ _SEED = 2020
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CoastDownSignal:
-    """Displacement and speed of a coast-down, recorded or simulated.
-
-    Attributes
-    ----------
-    planes : mapping of str to signal (N, 2)
-        Displacement (x, y) [m] by name of the plane, from power-off on, from the centre of the race.
-    air_gap : mapping of str to float
-        Radius of the air-gap window of each plane [m].
-    sampling_rate : float
-        [Hz].
-    start_time : float
-        Time of the first sample after power-off [s].
-    profile : SpeedProfile or None
-        Rotor speed.
-    speed_time, speed : ndarray, shape (K,), or None
-        Speed as it was recorded or simulated [s], [rad/s].
-    recorded : bool
-        False for a simulation.
-    air_gap_error : mapping of str to float, or None
-        Standard error of the air gaps [m], where the signal shows them.
-    centre : str
-        Where the displacements count from, in words.
-    standstill : float or None
-        When the rotor stopped [s], where that is known and need not be found, as in a simulation.
-    force_and_stress : tuple of dict
-        When indentation, force and stress were largest, one entry per bearing and quantity, as a simulation
-        knows it; empty for a recording, which shows displacement only.
-    """
+    """Displacement and speed of a coast-down, recorded or simulated."""
 
     planes: Mapping[str, PlanarSignal]
+    """Displacement (x, y) [m] by name of the plane, from power-off on, from the centre of the race."""
     air_gap: Mapping[str, float]
+    """Radius of the air-gap window of each plane [m]."""
     sampling_rate: float
+    """[Hz]."""
     start_time: float
+    """Time of the first sample after power-off [s]."""
     profile: SpeedProfile | None
+    """Rotor speed."""
     speed_time: Array | None
     speed: Array | None
+    """Speed as it was recorded or simulated [s], [rad/s], shape (K,)."""
     recorded: bool
+    """False for a simulation."""
     air_gap_error: Mapping[str, float] | None = None
+    """Standard error of the air gaps [m], where the signal shows them."""
     centre: str = "the centre of the bearing"
+    """Where the displacements count from, in words."""
     standstill: float | None = None
+    """When the rotor stopped [s], where that is known and need not be found, as in a simulation."""
     force_and_stress: tuple[Mapping[str, Any], ...] = ()
+    """When indentation, force and stress were largest, one entry per bearing and quantity, as a simulation
+    knows it; empty for a recording, which shows displacement only."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class WaterfallChoice:
-    """Which waterfalls are wanted.
-
-    Attributes
-    ----------
-    components : tuple of {"x", "y", "full"}
-        Directions, or forward and backward.
-    amplitude_kind : {"zero-to-peak", "peak-to-peak"}
-        Said in every label.
-    highest_frequency : float
-        [Hz].
-    settings : WaterfallSettings
-        Those of the paper by default.
-    """
+    """Which waterfalls are wanted."""
 
     components: tuple[Component, ...] = ("x", "y", "full")
+    """Directions, or forward and backward."""
     amplitude_kind: AmplitudeKind = "zero-to-peak"
+    """Said in every label."""
     highest_frequency: float = 600.0
+    """[Hz]."""
     settings: WaterfallSettings = PAPER_SETTINGS
+    """Those of the paper by default."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SpeedLaw:
-    """How the rotor slowed down.
-
-    Attributes
-    ----------
-    exponential : ExponentialFit
-        One time constant, as in the paper.
-    drag : DragFit
-        Dry, linear and quadratic drag.
-    standstill : Known
-        When it stopped [s].
-    """
+    """How the rotor slowed down."""
 
     exponential: ExponentialFit
+    """One time constant, as in the paper."""
     drag: DragFit
+    """Dry, linear and quadratic drag."""
     standstill: Known
+    """When it stopped [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -28,34 +28,23 @@ CLOSE_ENOUGH = 1e-4
 
 @dataclass(frozen=True, kw_only=True)
 class ExponentialFit:
-    """Exponential coast-down ``ω = ω_0 e^(−(t − t_0)/τ)`` fitted to a recorded speed.
-
-    Attributes
-    ----------
-    initial_speed : Known
-        ω_0 [rad/s] at ``start``.
-    time_constant : Known
-        τ [s].
-    start, end : float
-        Window of the fit [s].
-    time, residual : shape (K,)
-        Recorded minus fitted speed [rad/s] over time [s].
-    residual_rms, residual_largest : float
-        Size of the residual [rad/s].
-    noise : float
-        What of the residual is noise of the recording [rad/s]; the rest says the law is not exponential.
-    statement : str
-    """
+    """Exponential coast-down ``ω = ω_0 e^(−(t − t_0)/τ)`` fitted to a recorded speed."""
 
     initial_speed: Known
+    """ω_0 [rad/s] at ``start``."""
     time_constant: Known
+    """τ [s]."""
     start: float
     end: float
+    """Window of the fit [s]."""
     time: Array
     residual: Array
+    """Recorded minus fitted speed [rad/s] over time [s], shape (K,)."""
     residual_rms: float
     residual_largest: float
+    """Size of the residual [rad/s]."""
     noise: float
+    """What of the residual is noise of the recording [rad/s]; the rest says the law is not exponential."""
     statement: str
 
     def speed_at(self, time: ArrayLike) -> Array:
@@ -66,38 +55,26 @@ class ExponentialFit:
 
 @dataclass(frozen=True, kw_only=True)
 class DragFit:
-    """Deceleration ``−(constant + linear ω + quadratic ω²)`` fitted to a recorded speed.
-
-    Attributes
-    ----------
-    constant : Known
-        Dry part [rad/s²]: friction of balls and races, which a recorded speed always contains.
-    linear : Known
-        Laminar drag per polar inertia of rotor and races [1/s]; times that inertia it is the machine file's
-        ``aero_linear``.
-    quadratic : Known
-        Turbulent drag per polar inertia of rotor and races [1/rad]; times that inertia it is the machine
-        file's ``aero_quadratic``.
-    initial_speed : Known
-        [rad/s] at ``start``.
-    correlation : shape (4, 4)
-        Of initial speed, constant, linear, quadratic, in this order [1].
-    start, end : float
-        Window of the fit [s].
-    residual_rms, noise : float
-        Of the recorded speed about the fit, and of the recording itself [rad/s].
-    statement : str
-    """
+    """Deceleration ``−(constant + linear ω + quadratic ω²)`` fitted to a recorded speed."""
 
     constant: Known
+    """Dry part [rad/s²]: friction of balls and races, which a recorded speed always contains."""
     linear: Known
+    """Laminar drag per polar inertia of rotor and races [1/s]; times that inertia it is the machine file's
+    ``aero_linear``."""
     quadratic: Known
+    """Turbulent drag per polar inertia of rotor and races [1/rad]; times that inertia it is the machine
+    file's ``aero_quadratic``."""
     initial_speed: Known
+    """[rad/s] at ``start``."""
     correlation: Array
+    """Of initial speed, constant, linear, quadratic, in this order [1], shape (4, 4)."""
     start: float
     end: float
+    """Window of the fit [s]."""
     residual_rms: float
     noise: float
+    """Of the recorded speed about the fit, and of the recording itself [rad/s]."""
     statement: str
 
     def speed_at(self, time: ArrayLike) -> Array:

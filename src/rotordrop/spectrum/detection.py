@@ -24,51 +24,34 @@ HANN_OVERLAP_SHARE = 1.0 / 18.0
 
 @dataclass(frozen=True, kw_only=True)
 class DetectionSettings:
-    """When a peak counts as a line.
-
-    Attributes
-    ----------
-    least_ratio : float
-        Amplitude over the local floor [1].
-    false_alarm : float
-        Accepted probability that noise alone shows any line in the whole search [1].
-    floor_lines : int
-        Neighbouring lines whose median is the local floor [1].
-    """
+    """When a peak counts as a line."""
 
     least_ratio: float = 2.0
+    """Amplitude over the local floor [1]."""
     false_alarm: float = 1e-3
+    """Accepted probability that noise alone shows any line in the whole search [1]."""
     floor_lines: int = 81
+    """Neighbouring lines whose median is the local floor [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Peak:
-    """The clearest peak of a view.
-
-    Attributes
-    ----------
-    coordinate : float
-        Frequency [Hz] or order [1], interpolated between lines.
-    channel : int
-        Channel in which it is clearest.
-    first, last : int
-        Frames it was found in, last one excluded.
-    amplitude, floor : float
-        Zero-to-peak amplitude and local floor [m].
-    score : float
-        Minus the logarithm of the probability that noise alone shows it [1].
-    width : float
-        Full width at half power of the peak [unit of the coordinate].
-    """
+    """The clearest peak of a view."""
 
     coordinate: float
+    """Frequency [Hz] or order [1], interpolated between lines."""
     channel: int
+    """Channel in which it is clearest."""
     first: int
     last: int
+    """Frames it was found in, last one excluded."""
     amplitude: float
     floor: float
+    """Zero-to-peak amplitude and local floor [m]."""
     score: float
+    """Minus the logarithm of the probability that noise alone shows it [1]."""
     width: float
+    """Full width at half power of the peak [unit of the coordinate]."""
 
     @property
     def ratio(self) -> float:

@@ -13,18 +13,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class FrequencyPath:
-    """Frequency over time.
-
-    Attributes
-    ----------
-    time : shape (K,)
-        [s], rising.
-    frequency : shape (K,)
-        [Hz].
-    """
+    """Frequency over time."""
 
     time: Array
+    """[s], rising, shape (K,)."""
     frequency: Array
+    """[Hz], shape (K,)."""
 
     def frequency_at(self, time: ArrayLike) -> Array:
         """Frequency [Hz] at times [s]; that of the nearest end beyond the path."""

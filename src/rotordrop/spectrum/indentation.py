@@ -22,73 +22,49 @@ PAPER_WINDOW = 0.2
 
 @dataclass(frozen=True, kw_only=True)
 class DisplacementHistory:
-    """Magnitude of displacement over a coast-down in one plane, with its air-gap window.
-
-    Attributes
-    ----------
-    time : shape (K,)
-        Middle of each interval [s].
-    lowest, highest : shape (K,)
-        Smallest and largest magnitude of displacement within each interval [m], zero-to-peak from the centre.
-    lowest_xy, highest_xy : shape (K, 2)
-        Smallest and largest displacement (x, y) within each interval [m].
-    air_gap : float
-        Radius of the air-gap window [m].
-    largest : float
-        Largest magnitude [m].
-    largest_time : float
-        When [s].
-    largest_indentation : float
-        ``largest`` less the air gap [m].
-    largest_later : float
-        Largest magnitude after ``window`` [m]; nan when the signal ends before.
-    largest_later_time : float
-        When [s].
-    window : float
-        The time after power-off that a simulation would cover [s].
-    noise : float
-        Noise of the displacement [m], which lifts every maximum by some four times itself.
-    statement : str
-        Whether the window held the maximum.
-    """
+    """Magnitude of displacement over a coast-down in one plane, with its air-gap window."""
 
     time: Array
+    """Middle of each interval [s], shape (K,)."""
     lowest: Array
     highest: Array
+    """Smallest and largest magnitude of displacement within each interval [m], zero-to-peak from the centre,
+    shape (K,)."""
     lowest_xy: Array
     highest_xy: Array
+    """Smallest and largest displacement (x, y) within each interval [m], shape (K, 2)."""
     air_gap: float
+    """Radius of the air-gap window [m]."""
     largest: float
+    """Largest magnitude [m]."""
     largest_time: float
+    """When [s]."""
     largest_indentation: float
+    """``largest`` less the air gap [m]."""
     largest_later: float
+    """Largest magnitude after ``window`` [m]; nan when the signal ends before."""
     largest_later_time: float
+    """When [s]."""
     window: float
+    """The time after power-off that a simulation would cover [s]."""
     noise: float
+    """Noise of the displacement [m], which lifts every maximum by some four times itself."""
     statement: str
+    """Whether the window held the maximum."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Settling:
-    """When the rotor stopped bouncing, and how it lay and swung then.
-
-    Attributes
-    ----------
-    last_lift_off : float
-        Last time the rotor was off the race [s]; from then on it stayed in contact.
-    contact_radius : float
-        Magnitude of displacement in contact [m].
-    margin : float
-        By how much the magnitude must fall below ``contact_radius`` to count as off the race [m].
-    settled : bool
-        False when the rotor was still lifting off in the last second of the signal.
-    statement : str
-    """
+    """When the rotor stopped bouncing, and how it lay and swung then."""
 
     last_lift_off: float
+    """Last time the rotor was off the race [s]; from then on it stayed in contact."""
     contact_radius: float
+    """Magnitude of displacement in contact [m]."""
     margin: float
+    """By how much the magnitude must fall below ``contact_radius`` to count as off the race [m]."""
     settled: bool
+    """False when the rotor was still lifting off in the last second of the signal."""
     statement: str
 
 

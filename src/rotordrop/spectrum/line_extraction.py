@@ -21,18 +21,12 @@ SHARPENING = 3
 
 @dataclass(frozen=True, kw_only=True)
 class Envelope:
-    """Complex amplitude of a line over time, in every channel.
-
-    Attributes
-    ----------
-    value : shape (N, C)
-        The line is the real part of value times e^(j phase) [m], zero-to-peak.
-    phase : shape (N,)
-        Phase [rad] the line was assumed to follow.
-    """
+    """Complex amplitude of a line over time, in every channel."""
 
     value: ComplexArray
+    """The line is the real part of value times e^(j phase) [m], zero-to-peak, shape (N, C)."""
     phase: Array
+    """Phase [rad] the line was assumed to follow, shape (N,)."""
 
     def line(self) -> Array:
         """The line itself [m], shape (N, C)."""
@@ -109,16 +103,11 @@ def power_share(envelope: Envelope, present: NDArray[np.bool_]) -> Array:
 
 @dataclass(frozen=True, kw_only=True)
 class Offset:
-    """How far a line's true frequency (or order) lies from the assumed one.
-
-    Attributes
-    ----------
-    value, error : float
-        Offset and its standard error [unit of advance per radian].
-    """
+    """How far a line's true frequency (or order) lies from the assumed one."""
 
     value: float
     error: float
+    """Offset and its standard error [unit of advance per radian]."""
 
 
 def mean_offset(envelope: ComplexArray, advance: Array, *, lag: int, present: NDArray[np.bool_]) -> Offset:

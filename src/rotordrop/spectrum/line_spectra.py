@@ -25,21 +25,14 @@ SPLINE_DEGREE = 5
 
 @dataclass(frozen=True, kw_only=True)
 class FramePower:
-    """Power of each channel over a coordinate (frequency or order), frame by frame.
-
-    Attributes
-    ----------
-    time : shape (F,)
-        Middle of each frame [s].
-    coordinate : shape (K,)
-        Frequency [Hz] or order [1].
-    power : shape (F, K, C)
-        Square of the zero-to-peak amplitude [m²]; nan where a frame does not reach.
-    """
+    """Power of each channel over a coordinate (frequency or order), frame by frame."""
 
     time: Array
+    """Middle of each frame [s], shape (F,)."""
     coordinate: Array
+    """Frequency [Hz] or order [1], shape (K,)."""
     power: Array
+    """Square of the zero-to-peak amplitude [m²]; nan where a frame does not reach, shape (F, K, C)."""
 
     @property
     def spacing(self) -> float:

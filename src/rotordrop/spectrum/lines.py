@@ -23,68 +23,47 @@ from rotordrop.spectrum.waterfall import PlanarSignal
 
 @dataclass(frozen=True, kw_only=True)
 class Line:
-    """One line of a coast-down, with its name and the reason for it.
-
-    Attributes
-    ----------
-    kind : {"order", "steady", "combination", "undecided"}
-        Follows the speed, stands still, both (sum or difference of an order and a steady line), or the speed
-        changes too little to say.
-    label : str
-        Its name, or "unnamed".
-    named : bool
-    confidence : float
-        Probability that line and name are right [1].
-    reason : str
-    frequency, frequency_error : float
-        Mean frequency over the time it was seen [Hz], weighted by power, and its standard error: never less
-        than the resolution of that time, which is one over it, divided by √12.
-    order, order_error : float or None
-        Multiple of the rotor speed [1], and its standard error, with the turns in place of the time; None for
-        a steady line.
-    drift : tuple of float
-        Lowest and highest frequency of a steady line over its time [Hz].
-    width : float
-        Full width at half power [Hz], without that of the frame; 0 when it is below the resolution.
-    amplitude : float
-        Zero-to-peak [m], in the plane and direction where it is largest, root mean square over its time.
-    amplitude_xy : dict of str to tuple
-        Zero-to-peak amplitude [m] of (x, y) in each plane, root mean square over its time.
-    forward, backward : dict of str to float
-        Radii of the forward and backward turning parts [m] in each plane, root mean square over its time.
-    floor : float
-        Local noise floor [m] where it was found.
-    ratio : float
-        Amplitude over the local floor where it was found [1].
-    first_seen, last_seen : float
-        [s].
-    path : FrequencyPath
-        Its frequency over time [Hz].
-    name : Name
-        With all candidates worth considering.
-    """
+    """One line of a coast-down, with its name and the reason for it."""
 
     kind: LineKind
+    """Follows the speed, stands still, both (sum or difference of an order and a steady line), or the speed
+    changes too little to say."""
     label: str
+    """Its name, or "unnamed"."""
     named: bool
     confidence: float
+    """Probability that line and name are right [1]."""
     reason: str
     frequency: float
     frequency_error: float
+    """Mean frequency over the time it was seen [Hz], weighted by power, and its standard error: never less
+    than the resolution of that time, which is one over it, divided by √12."""
     order: float | None
     order_error: float | None
+    """Multiple of the rotor speed [1], and its standard error, with the turns in place of the time; None for
+    a steady line."""
     drift: tuple[float, float]
+    """Lowest and highest frequency of a steady line over its time [Hz]."""
     width: float
+    """Full width at half power [Hz], without that of the frame; 0 when it is below the resolution."""
     amplitude: float
+    """Zero-to-peak [m], in the plane and direction where it is largest, root mean square over its time."""
     amplitude_xy: dict[str, tuple[float, float]]
+    """Zero-to-peak amplitude [m] of (x, y) in each plane, root mean square over its time."""
     forward: dict[str, float]
     backward: dict[str, float]
+    """Radii of the forward and backward turning parts [m] in each plane, root mean square over its time."""
     floor: float
+    """Local noise floor [m] where it was found."""
     ratio: float
+    """Amplitude over the local floor where it was found [1]."""
     first_seen: float
     last_seen: float
+    """[s]."""
     path: FrequencyPath
+    """Its frequency over time [Hz]."""
     name: Name
+    """With all candidates worth considering."""
 
     def as_json(self) -> dict[str, Any]:
         """Everything known about the line, ready for JSON; amplitudes are zero-to-peak in m."""

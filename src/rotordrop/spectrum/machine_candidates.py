@@ -34,27 +34,21 @@ _SAME = 0.02
 
 @dataclass(frozen=True, kw_only=True)
 class SwingRange:
-    """Frequencies at which the settled rotor may swing in one touchdown bearing.
-
-    Attributes
-    ----------
-    bearing : str
-        Name of the touchdown bearing.
-    length, length_lower, length_upper : float
-        Pendulum length: air gap, indentation, sag of race and support [m]; its limits with those of the gap.
-    small : float
-        Frequency of a small sliding swing [Hz].
-    lowest, highest : float
-        Frequencies possible at all: large swings with race and rotor spinning along, small sliding ones [Hz].
-    """
+    """Frequencies at which the settled rotor may swing in one touchdown bearing."""
 
     bearing: str
+    """Name of the touchdown bearing."""
     length: float
     length_lower: float
     length_upper: float
+    """Pendulum length: air gap, indentation, sag of race and support [m]; its limits with those of the gap.
+    """
     small: float
+    """Frequency of a small sliding swing [Hz]."""
     lowest: float
     highest: float
+    """Frequencies possible at all: large swings with race and rotor spinning along, small sliding ones [Hz].
+    """
 
 
 def machine_candidates(machine: Machine, planes: dict[str, str] | None = None) -> tuple[Candidate, ...]:

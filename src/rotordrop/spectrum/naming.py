@@ -31,83 +31,54 @@ FLAT_ORBIT = 0.6
 
 @dataclass(frozen=True, kw_only=True)
 class LineEvidence:
-    """What is known about a line when it is named.
-
-    Attributes
-    ----------
-    kind : str
-        Whether it follows the speed.
-    frequency, frequency_error : float
-        [Hz]; at ``speed`` for an order.
-    order, order_error : float
-        [1].
-    roundness : float
-        (forward − backward) / (forward + backward) of its orbit [1]: 0 flat, +1 forward circle, −1 backward
-        circle.
-    radius : float
-        Largest half axis of its orbit over its time [m].
-    plane : str
-        Where it is largest.
-    band : float
-        Width of the frequency band searched [Hz].
-    order_band : float
-        Width of the band of orders searched [1].
-    width : float
-        Of the line itself [Hz].
-    """
+    """What is known about a line when it is named."""
 
     kind: LineKind
+    """Whether it follows the speed."""
     frequency: float
     frequency_error: float
+    """[Hz]; at ``speed`` for an order."""
     order: float
     order_error: float
+    """[1]."""
     roundness: float
+    """(forward − backward) / (forward + backward) of its orbit [1]: 0 flat, +1 forward circle, −1 backward
+    circle."""
     radius: float
+    """Largest half axis of its orbit over its time [m]."""
     plane: str
+    """Where it is largest."""
     band: float
+    """Width of the frequency band searched [Hz]."""
     order_band: float
+    """Width of the band of orders searched [1]."""
     width: float = 0.0
+    """Of the line itself [Hz]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Match:
-    """How well a candidate explains a line.
-
-    Attributes
-    ----------
-    candidate : Candidate
-    probability : float
-        That this candidate made the line, among all candidates and none of them [1].
-    deviation : float
-        Found minus expected [Hz], or order [1] for an order.
-    """
+    """How well a candidate explains a line."""
 
     candidate: Candidate
     probability: float
+    """That this candidate made the line, among all candidates and none of them [1]."""
     deviation: float
+    """Found minus expected [Hz], or order [1] for an order."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Name:
-    """The name given to a line.
-
-    Attributes
-    ----------
-    label : str
-        The name, "unnamed", or "unnamed (A or B?)".
-    named : bool
-    confidence : float
-        Probability of the name [1]; of the most likely candidate when unnamed.
-    reason : str
-    matches : tuple of Match
-        Candidates worth considering, most likely first.
-    """
+    """The name given to a line."""
 
     label: str
+    """The name, "unnamed", or "unnamed (A or B?)"."""
     named: bool
     confidence: float
+    """Probability of the name [1]; of the most likely candidate when unnamed."""
     reason: str
     matches: tuple[Match, ...]
+    """Candidates worth considering, most likely first."""
 
 
 def name_line(line: LineEvidence, candidates: Sequence[Candidate], *, air_gap: float | None = None) -> Name:

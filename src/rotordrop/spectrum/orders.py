@@ -31,24 +31,16 @@ STEADY_EXTRA = 2
 
 @dataclass(frozen=True, kw_only=True)
 class TrackingSettings:
-    """How much signal each amplitude is taken from.
-
-    Attributes
-    ----------
-    revolutions : float
-        Turns of the rotor per window [1]: more average away more noise, fewer follow faster changes.
-    longest_window : float
-        Limit of the window at low speed [s].
-    step : float
-        Time from one amplitude to the next [s].
-    degree : int
-        Degree of the polynomial an amplitude may follow within a window [1].
-    """
+    """How much signal each amplitude is taken from."""
 
     revolutions: float = 24.0
+    """Turns of the rotor per window [1]: more average away more noise, fewer follow faster changes."""
     longest_window: float = 3.0
+    """Limit of the window at low speed [s]."""
     step: float = 0.1
+    """Time from one amplitude to the next [s]."""
     degree: int = 2
+    """Degree of the polynomial an amplitude may follow within a window [1]."""
 
     def __post_init__(self) -> None:
         if self.revolutions < 4.0 or self.longest_window <= 0.0 or self.step <= 0.0 or self.degree < 0:
@@ -64,34 +56,24 @@ STANDARD_SETTINGS = TrackingSettings()
 
 @dataclass(frozen=True, kw_only=True)
 class OrderTrack:
-    """Complex amplitude of each order along the coast-down.
-
-    Attributes
-    ----------
-    time : shape (F,)
-        [s].
-    speed : shape (F,)
-        Rotor speed [rad/s].
-    orders : shape (O,)
-        Multiples of the rotor speed [1].
-    amplitude : shape (F, O, 2)
-        Complex zero-to-peak amplitude [m] of (x, y): the motion is its real part times e^(j order angle).
-    standard_error : shape (F, O, 2)
-        Of the magnitude [m], from what the window left unexplained.
-    window : shape (F,)
-        Length of the window each row was taken from [s].
-    separable : shape (F, O)
-        False where a steady line lies within the window's resolution of the order: the amplitude then holds
-        both.
-    """
+    """Complex amplitude of each order along the coast-down."""
 
     time: Array
+    """[s], shape (F,)."""
     speed: Array
+    """Rotor speed [rad/s], shape (F,)."""
     orders: Array
+    """Multiples of the rotor speed [1], shape (O,)."""
     amplitude: ComplexArray
+    """Complex zero-to-peak amplitude [m] of (x, y): the motion is its real part times e^(j order angle),
+    shape (F, O, 2)."""
     standard_error: Array
+    """Of the magnitude [m], from what the window left unexplained, shape (F, O, 2)."""
     window: Array
+    """Length of the window each row was taken from [s], shape (F,)."""
     separable: NDArray[np.bool_]
+    """False where a steady line lies within the window's resolution of the order: the amplitude then holds
+    both, shape (F, O)."""
 
     @property
     def forward(self) -> Array:

@@ -22,45 +22,30 @@ TURN = 2.0 * math.pi
 
 @dataclass(frozen=True, kw_only=True)
 class PassedResonance:
-    """One rise of an order's amplitude on the way down.
-
-    Attributes
-    ----------
-    order : float
-        The order that rises [1].
-    plane : str
-        Where it was seen.
-    time : float
-        When it was highest [s].
-    speed : float
-        Rotor speed then [rad/s].
-    frequency : float
-        Order times rotor speed then [Hz]: what was excited.
-    frequency_error : float
-        Half the distance over which the rise is within a tenth of its top [Hz].
-    width : float
-        Full width of the rise at half of its height [Hz].
-    amplitude : float
-        Longest half axis of the orbit [m], zero-to-peak; at least, where the rise is not certain.
-    rise : float
-        Amplitude over that beside the rise [1].
-    certain : bool
-        False where the top is hidden under a steady line at the same frequency.
-    name : Name
-        The mode, if one is known there.
-    """
+    """One rise of an order's amplitude on the way down."""
 
     order: float
+    """The order that rises [1]."""
     plane: str
+    """Where it was seen."""
     time: float
+    """When it was highest [s]."""
     speed: float
+    """Rotor speed then [rad/s]."""
     frequency: float
+    """Order times rotor speed then [Hz]: what was excited."""
     frequency_error: float
+    """Half the distance over which the rise is within a tenth of its top [Hz]."""
     width: float
+    """Full width of the rise at half of its height [Hz]."""
     amplitude: float
+    """Longest half axis of the orbit [m], zero-to-peak; at least, where the rise is not certain."""
     rise: float
+    """Amplitude over that beside the rise [1]."""
     certain: bool
+    """False where the top is hidden under a steady line at the same frequency."""
     name: Name
+    """The mode, if one is known there."""
 
     def as_json(self) -> dict[str, Any]:
         """Everything known about the resonance, ready for JSON; amplitudes are zero-to-peak in m."""

@@ -26,24 +26,16 @@ TURNING_SHARE = 0.02
 
 @dataclass(frozen=True, kw_only=True)
 class SpeedProfile:
-    """Smooth rotor speed over time; gives speed, angle and change of speed at any time.
-
-    Attributes
-    ----------
-    time : shape (K,)
-        Knots [s].
-    speed : shape (K,)
-        Speed at the knots [rad/s].
-    noise : float
-        Standard deviation of the recorded speed about the profile [rad/s]; 0 for an exact speed.
-    rejected : int
-        Recorded values left out as outliers [1].
-    """
+    """Smooth rotor speed over time; gives speed, angle and change of speed at any time."""
 
     time: Array
+    """Knots [s], shape (K,)."""
     speed: Array
+    """Speed at the knots [rad/s], shape (K,)."""
     noise: float
+    """Standard deviation of the recorded speed about the profile [rad/s]; 0 for an exact speed."""
     rejected: int
+    """Recorded values left out as outliers [1]."""
     _curve: PPoly
     _angle: PPoly
 

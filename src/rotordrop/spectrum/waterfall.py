@@ -30,21 +30,15 @@ class PlanarSignal(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class WaterfallSettings:
-    """How the signal is cut into frames; the defaults are those of the paper.
-
-    Attributes
-    ----------
-    points : int
-        Samples per frame [1].
-    overlap : float
-        Share of a frame that the next one uses again [1].
-    remove_mean : bool
-        Subtract each frame's mean, which with a Hann window changes only the lines at 0 and ± one resolution.
-    """
+    """How the signal is cut into frames; the defaults are those of the paper."""
 
     points: int = 32768
+    """Samples per frame [1]."""
     overlap: float = 0.5
+    """Share of a frame that the next one uses again [1]."""
     remove_mean: bool = True
+    """Subtract each frame's mean, which with a Hann window changes only the lines at 0 and ± one resolution.
+    """
 
     def __post_init__(self) -> None:
         if self.points < 16:
@@ -71,37 +65,24 @@ PAPER_SETTINGS = WaterfallSettings()
 
 @dataclass(frozen=True, kw_only=True)
 class Waterfall:
-    """Amplitude of displacement over frequency, one row per frame.
-
-    Attributes
-    ----------
-    time : shape (F,)
-        Middle of each frame [s].
-    frequency : shape (K,)
-        Lines [Hz]; negative ones are backward (against the spin) in a full spectrum.
-    amplitude : shape (F, K)
-        Amplitude [m], zero-to-peak or peak-to-peak as ``amplitude_kind`` says.
-    speed : shape (F,) or None
-        Mean rotor speed of each frame [rad/s].
-    speed_change : shape (F,) or None
-        Largest minus smallest rotor speed within each frame [rad/s]: what smears the orders.
-    component : str
-        "x", "y" or "full".
-    amplitude_kind : str
-        "zero-to-peak" or "peak-to-peak".
-    sampling_rate : float
-        Of the signal [Hz].
-    settings : WaterfallSettings
-    """
+    """Amplitude of displacement over frequency, one row per frame."""
 
     time: Array
+    """Middle of each frame [s], shape (F,)."""
     frequency: Array
+    """Lines [Hz]; negative ones are backward (against the spin) in a full spectrum, shape (K,)."""
     amplitude: Array
+    """Amplitude [m], zero-to-peak or peak-to-peak as ``amplitude_kind`` says, shape (F, K)."""
     speed: Array | None
+    """Mean rotor speed of each frame [rad/s], shape (F,)."""
     speed_change: Array | None
+    """Largest minus smallest rotor speed within each frame [rad/s]: what smears the orders, shape (F,)."""
     component: Component
+    """"x", "y" or "full"."""
     amplitude_kind: AmplitudeKind
+    """"zero-to-peak" or "peak-to-peak"."""
     sampling_rate: float
+    """Of the signal [Hz]."""
     settings: WaterfallSettings
 
     @property

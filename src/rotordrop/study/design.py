@@ -34,21 +34,14 @@ that none lies beside another."""
 
 @dataclass(frozen=True, kw_only=True)
 class Aim:
-    """Something that shall be small: a quantile of a quantity, or the probability to exceed a limit.
-
-    Attributes
-    ----------
-    column : str
-        Column of a study; with ``*`` for the bearing, the worst bearing counts in every drop.
-    quantile : float or None
-        Which quantile [1].
-    above : float or None
-        Limit [SI], whose probability to be exceeded counts.
-    """
+    """Something that shall be small: a quantile of a quantity, or the probability to exceed a limit."""
 
     column: str
+    """Column of a study; with ``*`` for the bearing, the worst bearing counts in every drop."""
     quantile: float | None = None
+    """Which quantile [1]."""
     above: float | None = None
+    """Limit [SI], whose probability to be exceeded counts."""
 
     def __post_init__(self) -> None:
         if (self.quantile is None) == (self.above is None):
@@ -100,46 +93,30 @@ def _named(spread: Distribution, value: float) -> float | str:
 
 @dataclass(frozen=True, kw_only=True)
 class DesignResult:
-    """Outcome of a design study.
-
-    Attributes
-    ----------
-    aims : tuple of Aim
-        What was made small.
-    candidates : tuple of Candidate
-        All that were tried, with the chances that all of them met.
-    front : tuple of Candidate
-        The best of them, drawn again with other chances: what was luck shows here.
-    described : Candidate
-        The machine as it is described, drawn with those other chances too.
-    """
+    """Outcome of a design study."""
 
     aims: tuple[Aim, ...]
+    """What was made small."""
     candidates: tuple[Candidate, ...]
+    """All that were tried, with the chances that all of them met."""
     front: tuple[Candidate, ...]
+    """The best of them, drawn again with other chances: what was luck shows here."""
     described: Candidate
+    """The machine as it is described, drawn with those other chances too."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class DesignPlan:
-    """What to choose from, what is left to chance, and what shall be small.
-
-    Attributes
-    ----------
-    study : Study
-        Of the design ``"candidates"``.
-    aims : tuple of Aim
-        What shall be small.
-    rounds : int
-        Rounds around the front after the first, each with half as many candidates.
-    again : int
-        Drops of each candidate of the front when it is drawn again.
-    """
+    """What to choose from, what is left to chance, and what shall be small."""
 
     study: Study
+    """Of the design ``"candidates"``."""
     aims: tuple[Aim, ...] = USUAL
+    """What shall be small."""
     rounds: int = 1
+    """Rounds around the front after the first, each with half as many candidates."""
     again: int = 100
+    """Drops of each candidate of the front when it is drawn again."""
 
 
 def front_of(numbers: Array) -> NDArray[np.bool_]:

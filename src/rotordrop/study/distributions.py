@@ -29,21 +29,14 @@ _MEANING = {
 
 @dataclass(frozen=True, kw_only=True)
 class Distribution:
-    """Spread of one varied value.
-
-    Attributes
-    ----------
-    shape : str
-        One of `SHAPES`.
-    numbers : tuple of float
-        Its numbers, as `SHAPES` explains them [SI unit of the value, the second of a log-normal 1].
-    names : tuple of str
-        What the numbers stand for, where they count the items of a list.
-    """
+    """Spread of one varied value."""
 
     shape: str
+    """One of `SHAPES`."""
     numbers: tuple[float, ...]
+    """Its numbers, as `SHAPES` explains them [SI unit of the value, the second of a log-normal 1]."""
     names: tuple[str, ...] = ()
+    """What the numbers stand for, where they count the items of a list."""
 
     @property
     def written(self) -> list[float] | list[str]:

@@ -40,24 +40,16 @@ LEASE = 120.0
 
 @dataclass(frozen=True, kw_only=True)
 class Shard:
-    """Finished drops of a shard, in order.
-
-    Attributes
-    ----------
-    first : int
-        Number of the first drop.
-    varied : ndarray, shape (n, V)
-        Values drawn [SI].
-    numbers : ndarray, shape (n, Q)
-        Quantities [SI]; all NaN where a drop failed.
-    reasons : tuple of str, length n
-        Why a drop failed; empty where it did not.
-    """
+    """Finished drops of a shard, in order."""
 
     first: int
+    """Number of the first drop."""
     varied: Array
+    """Values drawn [SI], shape (n, V)."""
     numbers: Array
+    """Quantities [SI]; all NaN where a drop failed, shape (n, Q)."""
     reasons: tuple[str, ...]
+    """Why a drop failed; empty where it did not."""
 
 
 @dataclass(frozen=True)

@@ -71,84 +71,56 @@ _AS_WRITTEN = (
 
 @dataclass(frozen=True, kw_only=True)
 class Until:
-    """When a study may end early: a quantile known well enough.
-
-    Attributes
-    ----------
-    column : str
-        Column of the results, such as ``"NDE.peak_force"``.
-    quantile : float
-        Which quantile [1].
-    within : float
-        Half width of its 90 % interval relative to its value [1].
-    """
+    """When a study may end early: a quantile known well enough."""
 
     column: str
+    """Column of the results, such as ``"NDE.peak_force"``."""
     quantile: float
+    """Which quantile [1]."""
     within: float
+    """Half width of its 90 % interval relative to its value [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    """A study: a machine, what varies, how many drops, in shards.
-
-    Attributes
-    ----------
-    name : str
-        What the study is about.
-    machine : Machine
-        The machine around which values vary.
-    drops : int
-        Drops at most.
-    seed : int
-        Key of the random numbers; drop ``i`` uses ``(seed, i)``, whatever shard or computer it runs on.
-    duration, output_step : float
-        Length of each drop and step of its histories [s].
-    tolerance : float
-        Accuracy of the integrator [1].
-    reduction : str
-        Preset of the rotor's reduction.
-    levitated : bool
-        Whether drops start floating in the AMBs; else straight in the centre.
-    design : str
-        One of `sampling.DESIGNS`.
-    shard : int
-        Drops of a shard.
-    speed : float
-        Speed of drops whose speed does not vary [rad/s].
-    vary : dict of Distribution
-        Spread by path (``"NDE.support.stiffness"``, ``"*.friction.dynamic"`` for all touchdown bearings with
-        one value) or by a name of `CASE_KINDS`.
-    until : Until or None
-        When to end early.
-    calibrated : bool
-        Whether the values of a calibrated machine vary by their joint distribution.
-    choose : dict of Distribution
-        Values that are chosen, not left to chance, in the design ``"candidates"``.
-    repeats : int
-        Drops of each candidate; every candidate meets the same chances.
-    candidates : tuple of tuple of float
-        Values of every candidate [SI], in the order of ``choose``; drawn over its bounds when left out.
-    """
+    """A study: a machine, what varies, how many drops, in shards."""
 
     name: str
+    """What the study is about."""
     machine: Machine
+    """The machine around which values vary."""
     drops: int
+    """Drops at most."""
     seed: int = 1
+    """Key of the random numbers; drop ``i`` uses ``(seed, i)``, whatever shard or computer it runs on."""
     duration: float = 0.2
     output_step: float = 1e-5
+    """Length of each drop and step of its histories [s]."""
     tolerance: float = 1e-6
+    """Accuracy of the integrator [1]."""
     reduction: str = "accurate"
+    """Preset of the rotor's reduction."""
     levitated: bool = True
+    """Whether drops start floating in the AMBs; else straight in the centre."""
     design: str = "random"
+    """One of `sampling.DESIGNS`."""
     shard: int = 200
+    """Drops of a shard."""
     speed: float = math.nan
+    """Speed of drops whose speed does not vary [rad/s]."""
     vary: Mapping[str, Distribution] = field(default_factory=dict)
+    """Spread by path (``"NDE.support.stiffness"``, ``"*.friction.dynamic"`` for all touchdown bearings with
+    one value) or by a name of `CASE_KINDS`."""
     until: Until | None = None
+    """When to end early."""
     calibrated: bool = False
+    """Whether the values of a calibrated machine vary by their joint distribution."""
     choose: Mapping[str, Distribution] = field(default_factory=dict)
+    """Values that are chosen, not left to chance, in the design ``"candidates"``."""
     repeats: int = 1
+    """Drops of each candidate; every candidate meets the same chances."""
     candidates: tuple[tuple[float, ...], ...] = ()
+    """Values of every candidate [SI], in the order of ``choose``; drawn over its bounds when left out."""
 
     def __post_init__(self) -> None:
         _check(self)

@@ -39,29 +39,20 @@ it held the truth in 81 % of 72 problems whose probability is known."""
 
 @dataclass(frozen=True, kw_only=True)
 class RareEvent:
-    """Probability of a rare event with its 90 % interval.
-
-    Attributes
-    ----------
-    probability, lower, upper : float
-        [1]; the interval follows from the scatter of independent repeats.
-    runs : tuple of float
-        What each repeat found [1].
-    levels : int
-        Levels of the deepest repeat.
-    evaluations : int
-        Drops that were computed.
-    failed : int
-        Drops that could not be computed; they count as not beyond the limit.
-    """
+    """Probability of a rare event with its 90 % interval."""
 
     probability: float
     lower: float
     upper: float
+    """[1]; the interval follows from the scatter of independent repeats."""
     runs: tuple[float, ...]
+    """What each repeat found [1]."""
     levels: int
+    """Levels of the deepest repeat."""
     evaluations: int
+    """Drops that were computed."""
     failed: int = 0
+    """Drops that could not be computed; they count as not beyond the limit."""
 
     def sentence(self, what: str) -> str:
         """The probability in words; ``what`` says of what."""

@@ -45,34 +45,23 @@ smallest air gap [1]."""
 
 @dataclass(frozen=True, kw_only=True)
 class Repeat:
-    """One quantity among the drops that could have happened.
-
-    Attributes
-    ----------
-    column : str
-        Column of the study.
-    median : Known
-        Half of the drops stay below.
-    low, high : Known
-        Between them lie 90 % of the drops: the prediction of the next one.
-    worst : Known
-        Half of all sets of `of` drops have a worst one below this.
-    of : int
-        Drops of such a set.
-    recorded : Known or None
-        The number of the recorded drop.
-    place : Known or None
-        Share of the drops that were milder than the recorded one [1].
-    """
+    """One quantity among the drops that could have happened."""
 
     column: str
+    """Column of the study."""
     median: Known
+    """Half of the drops stay below."""
     low: Known
     high: Known
+    """Between them lie 90 % of the drops: the prediction of the next one."""
     worst: Known
+    """Half of all sets of `of` drops have a worst one below this."""
     of: int
+    """Drops of such a set."""
     recorded: Known | None = None
+    """The number of the recorded drop."""
     place: Known | None = None
+    """Share of the drops that were milder than the recorded one [1]."""
 
 
 def repeat_study(

@@ -39,22 +39,15 @@ shards takes 0.1 s."""
 
 @dataclass(frozen=True, kw_only=True)
 class StudyProgress:
-    """How far a study is.
-
-    Attributes
-    ----------
-    drops, of : int
-        Finished drops and drops in all.
-    rate : float
-        Drops finished per second since this run began [1/s].
-    left : float
-        Time left at that rate [s]; infinite before the first shard.
-    """
+    """How far a study is."""
 
     drops: int
     of: int
+    """Finished drops and drops in all."""
     rate: float
+    """Drops finished per second since this run began [1/s]."""
     left: float
+    """Time left at that rate [s]; infinite before the first shard."""
 
 
 Report = Callable[[StudyProgress], None]

@@ -115,24 +115,16 @@ def crossed(
 
 @dataclass(frozen=True, kw_only=True)
 class Joint:
-    """Joint distribution of calibrated values: normal in the values or in their logarithms.
-
-    Attributes
-    ----------
-    paths : tuple of str
-        Values by path.
-    logarithmic : ndarray of bool, shape (n,)
-        Whether the logarithm is normal.
-    middle : ndarray, shape (n,)
-        Mean of each, of the logarithm where that is normal [SI].
-    root : ndarray, shape (n, n)
-        Root of the covariance.
-    """
+    """Joint distribution of calibrated values: normal in the values or in their logarithms."""
 
     paths: tuple[str, ...]
+    """Values by path."""
     logarithmic: NDArray[np.bool_]
+    """Whether the logarithm is normal, shape (n,)."""
     middle: Array
+    """Mean of each, of the logarithm where that is normal [SI], shape (n,)."""
     root: Array
+    """Root of the covariance, shape (n, n)."""
 
     def values(self, share: Array) -> Array:
         """Values [SI], shape (n, V), at independent shares of the probability, shape (n, V)."""

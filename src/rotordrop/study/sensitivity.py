@@ -23,22 +23,15 @@ MOST_CELLS = 20
 
 @dataclass(frozen=True, kw_only=True)
 class Influence:
-    """What one varied value does to a quantity.
-
-    Attributes
-    ----------
-    name : str
-        The varied value.
-    alone : Known
-        Known of the variance that would be gone if the value were known (first-order Sobol index).
-    total : Known or None
-        Known that would be left if all others were known; None unless the study has the design
-        ``"sensitivity"``.
-    """
+    """What one varied value does to a quantity."""
 
     name: str
+    """The varied value."""
     alone: Known
+    """Known of the variance that would be gone if the value were known (first-order Sobol index)."""
     total: Known | None
+    """Known that would be left if all others were known; None unless the study has the design
+    ``"sensitivity"``."""
 
 
 def influences(results: StudyResults, column: str) -> tuple[Influence, ...]:

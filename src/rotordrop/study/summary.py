@@ -31,27 +31,18 @@ COVER = 0.90
 
 @dataclass(frozen=True, kw_only=True)
 class StudyResults:
-    """Finished drops of a study, in order; N drops, V varied values, Q quantities.
-
-    Attributes
-    ----------
-    study : Study
-        What was computed.
-    drop : ndarray, shape (N,)
-        Number of each drop.
-    varied : dict of ndarray, shape (N,)
-        Values drawn [SI], by path or case name.
-    numbers : dict of ndarray, shape (N,)
-        Quantities [SI] by column, NaN where a drop has none.
-    reasons : tuple of str, length N
-        Why a drop failed; empty where it did not.
-    """
+    """Finished drops of a study, in order; N drops, V varied values, Q quantities."""
 
     study: Study
+    """What was computed."""
     drop: NDArray[np.int64]
+    """Number of each drop, shape (N,)."""
     varied: Mapping[str, Array]
+    """Values drawn [SI], by path or case name, shape (N,)."""
     numbers: Mapping[str, Array]
+    """Quantities [SI] by column, NaN where a drop has none, shape (N,)."""
     reasons: tuple[str, ...]
+    """Why a drop failed; empty where it did not."""
 
     def __len__(self) -> int:
         return len(self.drop)

@@ -94,27 +94,18 @@ THREADS = 2
 
 @dataclass(frozen=True, kw_only=True)
 class TrackedDrops:
-    """Smoothed estimates of all drops of a fit.
-
-    Attributes
-    ----------
-    problems : tuple of DropProblem
-        The drops, in the order of the chain.
-    smoothed : tuple of Smoothed
-        Their smoothed estimates.
-    nis : tuple of float
-        Mean normalised innovation squared of each drop [1].
-    diverged : tuple of bool
-        Drops in which the filter had to give up.
-    noise_factors : tuple of float
-        Factor on the usual unknown impulses that the last pass needed to follow each drop [1].
-    """
+    """Smoothed estimates of all drops of a fit."""
 
     problems: tuple[DropProblem, ...]
+    """The drops, in the order of the chain."""
     smoothed: tuple[Smoothed, ...]
+    """Their smoothed estimates."""
     nis: tuple[float, ...]
+    """Mean normalised innovation squared of each drop [1]."""
     diverged: tuple[bool, ...] = field(default=())
+    """Drops in which the filter had to give up."""
     noise_factors: tuple[float, ...] = field(default=())
+    """Factor on the usual unknown impulses that the last pass needed to follow each drop [1]."""
 
     @property
     def negative_log_likelihood(self) -> float:

@@ -85,39 +85,28 @@ def force_values(
 
 @dataclass(frozen=True, kw_only=True)
 class ForceHistory:
-    """Forces of a smoothed drop; N samples, B bearings.
-
-    Attributes
-    ----------
-    time : ndarray, shape (N,)
-        Time from power-off [s].
-    force : ndarray, shape (N, B, 2)
-        Elastic ball force on the race [N].
-    magnitude, magnitude_sigma : ndarray, shape (N, B)
-        Its magnitude and standard deviation [N].
-    stress, stress_sigma : ndarray, shape (N, B)
-        Largest Hertz stress at the inner race and standard deviation [Pa].
-    indentation, contact_force, friction_force, contact_power : ndarray, shape (N, B)
-        Indentation [m], normal and friction force [N], power lost in the contact [W].
-    azimuth : ndarray, shape (N, B)
-        Direction of the contact normal from race to rotor [rad ccw from +x]; NaN in flight.
-    displacement, displacement_sigma : ndarray, shape (N, B, 2)
-        Rotor at the bearing nodes and standard deviation [m].
-    """
+    """Forces of a smoothed drop; N samples, B bearings."""
 
     time: Array
+    """Time from power-off [s], shape (N,)."""
     force: Array
+    """Elastic ball force on the race [N], shape (N, B, 2)."""
     magnitude: Array
     magnitude_sigma: Array
+    """Its magnitude and standard deviation [N], shape (N, B)."""
     stress: Array
     stress_sigma: Array
+    """Largest Hertz stress at the inner race and standard deviation [Pa], shape (N, B)."""
     indentation: Array
     contact_force: Array
     friction_force: Array
     contact_power: Array
+    """Indentation [m], normal and friction force [N], power lost in the contact [W], shape (N, B)."""
     azimuth: Array
+    """Direction of the contact normal from race to rotor [rad ccw from +x]; NaN in flight, shape (N, B)."""
     displacement: Array
     displacement_sigma: Array
+    """Rotor at the bearing nodes and standard deviation [m], shape (N, B, 2)."""
 
 
 def force_history(problem: DropProblem, smoothed: Smoothed) -> ForceHistory:

@@ -61,67 +61,48 @@ MEAN_ERROR = 0.05
 
 @dataclass(frozen=True, kw_only=True)
 class InputEstimate:
-    """Forces at the bearing nodes found without a contact law; N samples, B bearings.
-
-    Attributes
-    ----------
-    time : ndarray, shape (N,)
-        Time from power-off [s].
-    turn : float
-        Angular frequency of the contacts that makes the readings likeliest [rad/s].
-    force, sigma : ndarray, shape (N, B, 2)
-        Force of the rotor on the race and its standard error by the noise of the readings alone [N].
-    magnitude : ndarray, shape (N, B)
-        Its magnitude [N].
-    peak, put_back, peak_error : ndarray, shape (B,)
-        Largest magnitude [N], the part of it that twicing has put back [1], and the relative error that nine
-        of ten such peaks stay within [1].
-    stress : ndarray, shape (N, B)
-        Largest Hertz stress that this force gives in the bearing at rest [Pa].
-    peak_stress, stress_error : ndarray, shape (B,)
-        Its largest value [Pa] and the relative error that nine of ten stay within [1].
-    mean_late : ndarray, shape (B,)
-        Magnitude of the mean force vector between 0.15 and 0.2 s [N]; NaN when the record is shorter.
-    mean_magnitude_late : ndarray, shape (B,)
-        Mean magnitude of the force in the same time [N]; NaN when the record is shorter.
-    """
+    """Forces at the bearing nodes found without a contact law; N samples, B bearings."""
 
     time: Array
+    """Time from power-off [s], shape (N,)."""
     turn: float
+    """Angular frequency of the contacts that makes the readings likeliest [rad/s]."""
     force: Array
     sigma: Array
+    """Force of the rotor on the race and its standard error by the noise of the readings alone [N], shape (N,
+    B, 2)."""
     magnitude: Array
+    """Its magnitude [N], shape (N, B)."""
     peak: Array
     put_back: Array
     peak_error: Array
+    """Largest magnitude [N], the part of it that twicing has put back [1], and the relative error that nine
+    of ten such peaks stay within [1], shape (B,)."""
     stress: Array
+    """Largest Hertz stress that this force gives in the bearing at rest [Pa], shape (N, B)."""
     peak_stress: Array
     stress_error: Array
+    """Its largest value [Pa] and the relative error that nine of ten stay within [1], shape (B,)."""
     mean_late: Array
+    """Magnitude of the mean force vector between 0.15 and 0.2 s [N]; NaN when the record is shorter, shape
+    (B,)."""
     mean_magnitude_late: Array
+    """Mean magnitude of the force in the same time [N]; NaN when the record is shorter, shape (B,)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Lent:
-    """What the cross-check has to be told; N samples, B bearings, C channels.
-
-    Attributes
-    ----------
-    gain_errors, offsets : ndarray, shape (C,)
-        Errors of the readings [1], [m].
-    radius : ndarray, shape (N, B)
-        Distance of rotor and race [m]; NaN where it is not known.
-    reach : ndarray, shape (B,)
-        Distance below which rotor and race cannot touch [m].
-    theta : ndarray, shape (P,)
-        Parameters of the drop model, of which the stress takes the preload.
-    """
+    """What the cross-check has to be told; N samples, B bearings, C channels."""
 
     gain_errors: Array
     offsets: Array
+    """Errors of the readings [1], [m], shape (C,)."""
     radius: Array
+    """Distance of rotor and race [m]; NaN where it is not known, shape (N, B)."""
     reach: Array
+    """Distance below which rotor and race cannot touch [m], shape (B,)."""
     theta: Array
+    """Parameters of the drop model, of which the stress takes the preload, shape (P,)."""
 
 
 def lent_by_record(problem: DropProblem) -> Lent:

@@ -43,31 +43,22 @@ mean of the friction law over what is possible is what a linearisation may use."
 
 @dataclass(frozen=True, kw_only=True)
 class RecordedDrop:
-    """What a record says of a drop, as the filter takes it; N samples, C channels.
-
-    Attributes
-    ----------
-    time : ndarray, shape (N,)
-        Time from power-off [s], evenly spaced.
-    readings : ndarray, shape (N, C)
-        Readings in the positive direction of each sensor [m], hum and 2X runout taken off; NaN where missing.
-    noise : ndarray, shape (C,)
-        Standard deviation of the noise [m]; NaN where the record does not say.
-    initial_speed, initial_speed_error : float
-        Rotor speed at power-off and its standard error [rad/s].
-    speed : ndarray, shape (N,)
-        Measured rotor speed [rad/s], NaN where nobody measured it.
-    tail_level : ndarray, shape (C,), or None
-        Mean readings of the settled tail in the positive direction of each sensor [m].
-    """
+    """What a record says of a drop, as the filter takes it; N samples, C channels."""
 
     time: Array
+    """Time from power-off [s], evenly spaced, shape (N,)."""
     readings: Array
+    """Readings in the positive direction of each sensor [m], hum and 2X runout taken off; NaN where missing,
+    shape (N, C)."""
     noise: Array
+    """Standard deviation of the noise [m]; NaN where the record does not say, shape (C,)."""
     initial_speed: float
     initial_speed_error: float
+    """Rotor speed at power-off and its standard error [rad/s]."""
     speed: Array
+    """Measured rotor speed [rad/s], NaN where nobody measured it, shape (N,)."""
     tail_level: Array | None
+    """Mean readings of the settled tail in the positive direction of each sensor [m], shape (C,)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,44 +75,31 @@ class Fall:
 
 @dataclass(frozen=True, kw_only=True)
 class DropProblem:
-    """One recorded drop with all the filter needs; N samples, C channels, n estimated, s dynamic.
-
-    Attributes
-    ----------
-    time : ndarray, shape (N,)
-        Time from power-off [s].
-    readings : ndarray, shape (N, C)
-        Readings in the positive direction of each sensor [m], hum and 2X runout removed.
-    speed : ndarray, shape (N,)
-        Rotor speed [rad/s], NaN where it is not used.
-    sensor_rows : ndarray, shape (C, s)
-        Displacement along each sensor's direction from the dynamic state.
-    variances : ndarray, shape (C,)
-        Noise variance of each channel [m²].
-    mean, covariance : ndarray, shapes (n,), (n, n)
-        Prior at the first sample.
-    start : ndarray, shape (n,)
-        Where the first pass begins: the prior mean with the guesses of the machine file.
-    sensor_form : SensorForm
-        What the sensors do beyond gain, offset and runout.
-    fall : Fall, optional
-        The fall, where the lift of the magnets may last longer than usual.
-    """
+    """One recorded drop with all the filter needs; N samples, C channels, n estimated, s dynamic."""
 
     model: DropModel
     unknowns: tuple[Unknown, ...]
     targets: P.ParameterTargets
     time: Array
+    """Time from power-off [s], shape (N,)."""
     readings: Array
+    """Readings in the positive direction of each sensor [m], hum and 2X runout removed, shape (N, C)."""
     speed: Array
+    """Rotor speed [rad/s], NaN where it is not used, shape (N,)."""
     sensor_rows: Array
+    """Displacement along each sensor's direction from the dynamic state, shape (C, s)."""
     variances: Array
+    """Noise variance of each channel [m²], shape (C,)."""
     speed_variance: float
     mean: Array
     start: Array
+    """Where the first pass begins: the prior mean with the guesses of the machine file, shape (n,)."""
     covariance: Array
+    """Prior at the first sample."""
     sensor_form: F.SensorForm
+    """What the sensors do beyond gain, offset and runout."""
     fall: Fall | None = None
+    """The fall, where the lift of the magnets may last longer than usual."""
 
     @property
     def reading_rows(self) -> Array:

@@ -16,18 +16,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Readings:
-    """Readings with their errors taken out, and when no force can act; N samples, C channels, B bearings.
-
-    Attributes
-    ----------
-    along : ndarray, shape (N, C)
-        Displacement along every sensor [m].
-    closed : ndarray, shape (N, 2 B)
-        Whether rotor and race cannot touch.
-    """
+    """Readings with their errors taken out, and when no force can act; N samples, C channels, B bearings."""
 
     along: Array
+    """Displacement along every sensor [m], shape (N, C)."""
     closed: NDArray[np.bool_]
+    """Whether rotor and race cannot touch, shape (N, 2 B)."""
 
 
 def readings_of(problem: DropProblem) -> Readings:

@@ -43,32 +43,22 @@ LARGEST_PHASE = 1.0
 
 @dataclass(frozen=True, kw_only=True)
 class PassSettings:
-    """Numbers of one pass.
-
-    Attributes
-    ----------
-    substeps : int
-        Integration steps per sample.
-    impulse : float
-        Standard deviation of an unknown impulse per 50 µs at each bearing and axis [N s].
-    share : float
-        The same as a fraction of the contact impulse of 50 µs [1].
-    spin_noise : float
-        Standard deviation of the race spin per 50 µs [rad/s].
-    speed_noise : float
-        Standard deviation of the rotor speed per 50 µs [rad/s].
-    learning_end : float
-        Time [s] after which friction and race may drift faster: once a race turns with the rotor, the
-        friction law near zero speed decides, which no record of positions shows, and must not rewrite what
-        the first impacts said.
-    """
+    """Numbers of one pass."""
 
     substeps: int = 4
+    """Integration steps per sample."""
     impulse: float = 2e-4
+    """Standard deviation of an unknown impulse per 50 µs at each bearing and axis [N s]."""
     share: float = 0.01
+    """The same as a fraction of the contact impulse of 50 µs [1]."""
     spin_noise: float = 0.1
+    """Standard deviation of the race spin per 50 µs [rad/s]."""
     speed_noise: float = 1e-3
+    """Standard deviation of the rotor speed per 50 µs [rad/s]."""
     learning_end: float = 0.05
+    """Time [s] after which friction and race may drift faster: once a race turns with the rotor, the friction
+    law near zero speed decides, which no record of positions shows, and must not rewrite what the first
+    impacts said."""
 
     def for_sampling(self, dt: float, fastest: float = 0.0, fall: Fall | None = None) -> P.FilterSettings:
         """Settings of the kernel for a sample distance [s]; noise grows with the square root of time.
@@ -367,30 +357,21 @@ def _unpacked(stretch: Stretch, sample: int, n: int) -> Array:
 
 @dataclass(frozen=True, kw_only=True)
 class Smoothed:
-    """Smoothed estimate of one drop.
-
-    Attributes
-    ----------
-    means : ndarray, shape (N, n)
-        Smoothed estimate at each sample.
-    watched : ndarray, shape (N, G, G)
-        Smoothed covariance of the watched linear functions at each sample.
-    kept : ndarray, shape (K,)
-        Samples whose whole covariance can be asked for.
-    spread, information : ndarray, shape (K, n, n)
-        Filtered P and Λ of these samples: the smoothed covariance is ``P − P Λ P``.
-    score_0, information_0 : ndarray, shapes (n,), (n, n)
-        λ and Λ before the first measurement.
-    """
+    """Smoothed estimate of one drop."""
 
     filtered: Forward
     means: Array
+    """Smoothed estimate at each sample, shape (N, n)."""
     watched: Array
+    """Smoothed covariance of the watched linear functions at each sample, shape (N, G, G)."""
     kept: NDArray[np.int64]
+    """Samples whose whole covariance can be asked for, shape (K,)."""
     spread: Array
     information: Array
+    """Filtered P and Λ of these samples: the smoothed covariance is ``P − P Λ P``, shape (K, n, n)."""
     score_0: Array
     information_0: Array
+    """λ and Λ before the first measurement."""
 
     def covariance(self, sample: int) -> Array:
         """Smoothed covariance at a kept sample, shape (n, n)."""

@@ -63,34 +63,23 @@ class Confounded:
 
 @dataclass(frozen=True, kw_only=True)
 class Calibration:
-    """A calibrated machine with what stands behind it.
-
-    Attributes
-    ----------
-    machine : Machine
-        The machine with estimates in place of guesses.
-    values : dict
-        Every estimated parameter by path.
-    identifiability : tuple of Identifiability
-        What the records determine.
-    confounded : tuple of Confounded
-        What they cannot tell apart.
-    checks : dict
-        Consistency checks of each drop.
-    consistent : bool
-        Whether all checks of all drops passed.
-    structure : tuple of Structure
-        What the machine has beyond the usual model; empty where that does.
-    """
+    """A calibrated machine with what stands behind it."""
 
     machine: Machine
+    """The machine with estimates in place of guesses."""
     values: dict[str, Known]
+    """Every estimated parameter by path."""
     identifiability: tuple[Identifiability, ...]
+    """What the records determine."""
     confounded: tuple[Confounded, ...]
+    """What they cannot tell apart."""
     checks: dict[str, tuple[Check, ...]]
+    """Consistency checks of each drop."""
     consistent: bool
+    """Whether all checks of all drops passed."""
     nis: dict[str, float]
     structure: tuple[Structure, ...] = ()
+    """What the machine has beyond the usual model; empty where that does."""
 
     def sentence(self) -> str:
         """The outcome in words."""

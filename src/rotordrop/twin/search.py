@@ -125,21 +125,14 @@ class Candidate:
 
 @dataclass(frozen=True, kw_only=True)
 class Checkpoint:
-    """Where a fit from guesses is after some windows: less than the fit, of which many are on their way.
-
-    Attributes
-    ----------
-    problems : tuple of DropProblem
-        The drops.
-    trajectories : tuple of ndarray
-        Smoothed means of each drop, shape (M, n).
-    score : tuple
-        How the fit follows the record.
-    """
+    """Where a fit from guesses is after some windows: less than the fit, of which many are on their way."""
 
     problems: tuple[DropProblem, ...]
+    """The drops."""
     trajectories: tuple[Array, ...]
+    """Smoothed means of each drop, shape (M, n)."""
     score: Score
+    """How the fit follows the record."""
 
 
 class Fits(Protocol):

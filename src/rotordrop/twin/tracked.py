@@ -21,40 +21,27 @@ from rotordrop.twin.tracked_loads import check_without_contact_law, checks_begun
 
 @dataclass(frozen=True, kw_only=True)
 class TrackedDrop:
-    """A drop that the twin has followed, with the arrays of its filter: the workshop, not the result.
-
-    Attributes
-    ----------
-    evidence : Evidence
-        What the record says beside the contacts.
-    problem, smoothed : DropProblem, Smoothed
-        The estimation problem and its smoothed estimate with the likeliest unknown impulses.
-    judged : Forward
-        The pass by whose innovations the model is judged.
-    forces : ForceHistory
-        Force and stress over time with standard deviations.
-    checks : tuple of Check
-        Consistency of model and record.
-    noise_factor : float
-        Size of the unknown impulses over the usual one [1].
-    drops : int
-        Number of drops that were fitted together.
-    accepted : tuple of Accepted
-        Extensions of the usual model that the readings paid for.
-    unaided : Future of InputEstimate, optional
-        The estimate without contact law, where it was begun beside the passes.
-    """
+    """A drop that the twin has followed, with the arrays of its filter: the workshop, not the result."""
 
     evidence: Evidence
+    """What the record says beside the contacts."""
     problem: DropProblem
     smoothed: Smoothed
+    """The estimation problem and its smoothed estimate with the likeliest unknown impulses."""
     judged: Forward
+    """The pass by whose innovations the model is judged."""
     forces: ForceHistory
+    """Force and stress over time with standard deviations."""
     checks: tuple[Check, ...]
+    """Consistency of model and record."""
     noise_factor: float
+    """Size of the unknown impulses over the usual one [1]."""
     drops: int = 1
+    """Number of drops that were fitted together."""
     accepted: tuple[Accepted, ...] = ()
+    """Extensions of the usual model that the readings paid for."""
     unaided: Future[InputEstimate] | None = None
+    """The estimate without contact law, where it was begun beside the passes."""
 
     def without_contact_law(self) -> InputEstimate:
         """The estimate without contact law: as it was begun, or made now."""

@@ -33,24 +33,16 @@ MOST_COLUMNS = 12
 
 @dataclass(frozen=True, kw_only=True)
 class Traces:
-    """Histories over one clock.
-
-    Attributes
-    ----------
-    columns : tuple of str
-        Names.
-    time : ndarray, shape (N,)
-        Time [s], rising.
-    values : ndarray, shape (C, N)
-        Values in SI units, in single precision.
-    levels : ndarray, shape (C, B, 2)
-        Index of the smallest and of the largest sample of every block, level after level.
-    """
+    """Histories over one clock."""
 
     columns: tuple[str, ...]
+    """Names."""
     time: Array
+    """Time [s], rising, shape (N,)."""
     values: NDArray[np.float32]
+    """Values in SI units, in single precision, shape (C, N)."""
     levels: NDArray[np.int32]
+    """Index of the smallest and of the largest sample of every block, level after level, shape (C, B, 2)."""
 
     def chosen(self, names: tuple[str, ...]) -> list[int]:
         """Rows of the columns of these names.

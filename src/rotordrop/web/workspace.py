@@ -53,18 +53,12 @@ class TooLargeError(OutputError):
 
 @dataclass
 class Room:
-    """What uploads that run side by side take of the room that is left [byte].
-
-    Attributes
-    ----------
-    kept : int
-        What lies in the folder, uploads that still come in left out.
-    coming : dict
-        What each of these has brought, or said it will bring.
-    """
+    """What uploads that run side by side take of the room that is left [byte]."""
 
     kept: int = 0
+    """What lies in the folder, uploads that still come in left out."""
     coming: dict[object, int] = field(default_factory=dict)
+    """What each of these has brought, or said it will bring."""
 
 
 @dataclass(frozen=True)

@@ -67,51 +67,34 @@ _PRELOADS: dict[str, Literal["light", "medium", "heavy"]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Designation:
-    """What a designation says.
-
-    Attributes
-    ----------
-    written : str
-        As it was written.
-    series : str
-        Bearing series of ISO 15 writing: 60, 62, 618, 619, 70, 72, 718 or 719.
-    bore : float
-        Bore [m].
-    kind : {"deep groove", "angular contact"}
-        Whether the grooves have shoulders on both sides.
-    contact_angle : float or None
-        Contact angle [rad]; None where the designation does not say it.
-    hybrid : bool
-        Ceramic balls.
-    balls : {"small", "standard"}
-        Size of the balls within the series.
-    clearance_class : str or None
-        Class of ISO 5753.
-    preload_class : str or None
-        "light", "medium" or "heavy".
-    arrangement : str or None
-        Arrangement of a matched pair.
-    maker : str or None
-        Maker named.
-    prefix : str
-        Letters before the series.
-    goes_on : bool
-        Whether anything follows the bore.
-    """
+    """What a designation says."""
 
     written: str
+    """As it was written."""
     series: str
+    """Bearing series of ISO 15 writing: 60, 62, 618, 619, 70, 72, 718 or 719."""
     bore: float
+    """Bore [m]."""
     kind: Kind
+    """Whether the grooves have shoulders on both sides."""
     contact_angle: float | None
+    """Contact angle [rad]; None where the designation does not say it."""
     hybrid: bool
+    """Ceramic balls."""
     balls: Size
+    """Size of the balls within the series."""
     clearance_class: ClearanceClass | None
+    """Class of ISO 5753."""
     preload_class: Literal["light", "medium", "heavy"] | None
+    """"light", "medium" or "heavy"."""
     arrangement: Literal["X", "O", "tandem"] | None
+    """Arrangement of a matched pair."""
     maker: str | None
+    """Maker named."""
     prefix: str
+    """Letters before the series."""
     goes_on: bool
+    """Whether anything follows the bore."""
 
     @property
     def basic(self) -> str:

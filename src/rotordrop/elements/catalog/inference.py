@@ -48,50 +48,33 @@ _DYNAMIC = (
 
 @dataclass(frozen=True, kw_only=True)
 class PairRigidity:
-    """What a catalogue says of the axial rigidity of a pair.
-
-    Attributes
-    ----------
-    value : float
-        Axial rigidity of an X or O pair without load [N/m].
-    preload : float
-        Preload it is stated for [N].
-    hybrid : bool, optional
-        Whether the balls are of silicon nitride; None where the designation says it.
-    """
+    """What a catalogue says of the axial rigidity of a pair."""
 
     value: float
+    """Axial rigidity of an X or O pair without load [N/m]."""
     preload: float
+    """Preload it is stated for [N]."""
     hybrid: bool | None = None
+    """Whether the balls are of silicon nitride; None where the designation says it."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class InferredBalls:
-    """Balls of one row, with what is not known about them.
-
-    Attributes
-    ----------
-    ball_count : int
-        Most probable number of balls.
-    ball_diameter, pitch_diameter : float
-        Most probable D_w, and D_pw [m].
-    count_range : tuple of int
-        90 % interval of the number of balls.
-    diameter_range : tuple of float
-        90 % interval of D_w [m].
-    conformity : tuple of float
-        Middle and standard deviation of the groove radius over ball diameter [1].
-    basis : str
-        What it rests on.
-    """
+    """Balls of one row, with what is not known about them."""
 
     ball_count: int
+    """Most probable number of balls."""
     ball_diameter: float
     pitch_diameter: float
+    """Most probable D_w, and D_pw [m]."""
     count_range: tuple[int, int]
+    """90 % interval of the number of balls."""
     diameter_range: tuple[float, float]
+    """90 % interval of D_w [m]."""
     conformity: tuple[float, float]
+    """Middle and standard deviation of the groove radius over ball diameter [1]."""
     basis: str
+    """What it rests on."""
 
 
 def static_rating(

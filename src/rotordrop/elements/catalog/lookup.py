@@ -28,82 +28,57 @@ _HYBRID_PRELOAD = 0.6
 
 @dataclass(frozen=True, kw_only=True)
 class BallComplement:
-    """Balls of one row: published, or reconstructed with what that rests on.
-
-    Attributes
-    ----------
-    ball_count : int
-        Balls per row.
-    ball_diameter, pitch_diameter : float
-        D_w and D_pw [m].
-    conformity : float
-        Groove radius over ball diameter of both races [1].
-    basis : str
-        What the numbers rest on.
-    count_range : tuple of int, optional
-        90 % interval of the balls per row, where they are inferred.
-    diameter_range, conformity_range : tuple of float, optional
-        90 % intervals of D_w [m] and of the conformity [1], where they are inferred.
-    """
+    """Balls of one row: published, or reconstructed with what that rests on."""
 
     ball_count: int
+    """Balls per row."""
     ball_diameter: float
     pitch_diameter: float
+    """D_w and D_pw [m]."""
     conformity: float
+    """Groove radius over ball diameter of both races [1]."""
     basis: str
+    """What the numbers rest on."""
     count_range: tuple[int, int] | None = None
+    """90 % interval of the balls per row, where they are inferred."""
     diameter_range: tuple[float, float] | None = None
     conformity_range: tuple[float, float] | None = None
+    """90 % intervals of D_w [m] and of the conformity [1], where they are inferred."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class CatalogueBearing:
-    """A bearing as its maker lists it.
-
-    Attributes
-    ----------
-    maker, designation : str
-        Maker and full designation.
-    bore, outside_diameter : float
-        Bore and outside diameter [m].
-    width : float or None
-        Width of one bearing [m].
-    contact_angle : float
-        Nominal contact angle [rad].
-    preload, axial_rigidity, lift_off : mapping
-        By preload class: preload [N], axial rigidity of the pair [N/m], lift-off force [N].
-    ball_material : str
-        "steel" or "silicon nitride".
-    complement : BallComplement
-        Balls of one row.
-    kind : {"deep groove", "angular contact"}
-        Whether the grooves have shoulders on both sides.
-    contact_angle_range : tuple of float, optional
-        Angles [rad] it may have where the designation does not say it.
-    listed : bool
-        Whether its maker's list is in the catalogue; False where size and balls follow from the designation.
-    preload_basis : str
-        What the preloads rest on, where they are not its maker's.
-    read : Designation, optional
-        What the designation said, where it was not found in a maker's list.
-    """
+    """A bearing as its maker lists it."""
 
     maker: str
     designation: str
+    """Maker and full designation."""
     bore: float
     outside_diameter: float
+    """Bore and outside diameter [m]."""
     width: float | None
+    """Width of one bearing [m]."""
     contact_angle: float
+    """Nominal contact angle [rad]."""
     preload: dict[PreloadClass, float]
     axial_rigidity: dict[PreloadClass, float]
     lift_off: dict[PreloadClass, float]
+    """By preload class: preload [N], axial rigidity of the pair [N/m], lift-off force [N]."""
     ball_material: Literal["steel", "silicon nitride"]
+    """"steel" or "silicon nitride"."""
     complement: BallComplement
+    """Balls of one row."""
     kind: Kind = "angular contact"
+    """Whether the grooves have shoulders on both sides."""
     contact_angle_range: tuple[float, float] | None = None
+    """Angles [rad] it may have where the designation does not say it."""
     listed: bool = True
+    """Whether its maker's list is in the catalogue; False where size and balls follow from the designation.
+    """
     preload_basis: str = ""
+    """What the preloads rest on, where they are not its maker's."""
     read: Designation | None = None
+    """What the designation said, where it was not found in a maker's list."""
 
 
 @lru_cache(maxsize=256)

@@ -44,31 +44,21 @@ INDEX_WINDOW = 0.2
 
 @dataclass(frozen=True, kw_only=True)
 class PlaneLook:
-    """What one plane shows of a drop.
-
-    Attributes
-    ----------
-    plane : str
-        Name of the plane.
-    gap : float
-        Air gap used [m].
-    largest : float
-        Largest distance from the centre [m].
-    largest_time : float
-        When [s].
-    position_index : float
-        Mean distance from the centre over the air gap, from the release on for `INDEX_WINDOW` [1].
-    velocity_index : float or None
-        Root mean square of the velocity of the shaft centre over shaft speed times air gap, over the same
-        time [1]: 1 for a rotor that runs round its whole gap once per turn. None without a speed.
-    """
+    """What one plane shows of a drop."""
 
     plane: str
+    """Name of the plane."""
     gap: float
+    """Air gap used [m]."""
     largest: float
+    """Largest distance from the centre [m]."""
     largest_time: float
+    """When [s]."""
     position_index: float
+    """Mean distance from the centre over the air gap, from the release on for `INDEX_WINDOW` [1]."""
     velocity_index: float | None
+    """Root mean square of the velocity of the shaft centre over shaft speed times air gap, over the same time
+    [1]: 1 for a rotor that runs round its whole gap once per turn. None without a speed."""
 
     @property
     def excess(self) -> float:
@@ -78,43 +68,29 @@ class PlaneLook:
 
 @dataclass(frozen=True, kw_only=True)
 class Look:
-    """A recorded drop at a glance.
-
-    Attributes
-    ----------
-    record : Record
-        The readings in SI units.
-    motion : Motion
-        The path of the shaft in every plane.
-    findings : tuple of Finding
-        What the quality gate says, the worst first.
-    drops : tuple of Drop
-        Every fall in the record.
-    impacts, whirls : tuple
-        Of the first drop.
-    planes : tuple of PlaneLook
-        Of the first drop.
-    standstill : float or None
-        When the shaft came to rest [s].
-    speed : float or None
-        Shaft speed at the release [rad/s].
-    synchronous : tuple of Synchronous
-        1X before the drop against the mark of the shaft, per plane; empty without a keyphasor.
-    notes : tuple of str
-        What was guessed.
-    """
+    """A recorded drop at a glance."""
 
     record: Record
+    """The readings in SI units."""
     motion: Motion
+    """The path of the shaft in every plane."""
     findings: tuple[Finding, ...]
+    """What the quality gate says, the worst first."""
     drops: tuple[Drop, ...]
+    """Every fall in the record."""
     impacts: tuple[Impact, ...]
     whirls: tuple[Whirl, ...]
+    """Of the first drop."""
     planes: tuple[PlaneLook, ...]
+    """Of the first drop."""
     standstill: float | None
+    """When the shaft came to rest [s]."""
     speed: float | None
+    """Shaft speed at the release [rad/s]."""
     synchronous: tuple[Synchronous, ...]
+    """1X before the drop against the mark of the shaft, per plane; empty without a keyphasor."""
     notes: tuple[str, ...]
+    """What was guessed."""
 
     def timeline(self) -> tuple[tuple[float, str], ...]:
         """Events in the order of time: time [s] and words."""

@@ -22,52 +22,35 @@ _FOLLOWED = 2e-4
 
 @dataclass(frozen=True, kw_only=True)
 class Impact:
-    """The rotor thrown back by its touchdown bearing.
-
-    Attributes
-    ----------
-    plane : str
-        Sensor plane.
-    time : float
-        Deepest point [s].
-    azimuth : float
-        Direction of the contact from the centre [rad], counter-clockwise from +x.
-    depth : float
-        How far beyond the air gap the rotor went, negative for short of it [m].
-    approach, rebound : float
-        Largest radial velocity in the 2 ms before and after, by straight lines over 1 ms and so up to 5 mm/s
-        too small [m/s], both positive.
-    """
+    """The rotor thrown back by its touchdown bearing."""
 
     plane: str
+    """Sensor plane."""
     time: float
+    """Deepest point [s]."""
     azimuth: float
+    """Direction of the contact from the centre [rad], counter-clockwise from +x."""
     depth: float
+    """How far beyond the air gap the rotor went, negative for short of it [m]."""
     approach: float
     rebound: float
+    """Largest radial velocity in the 2 ms before and after, by straight lines over 1 ms and so up to 5 mm/s
+    too small [m/s], both positive."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Whirl:
-    """A spell in which the rotor runs round the bearing by two turns or more.
-
-    Attributes
-    ----------
-    plane : str
-        Sensor plane.
-    start, end : float
-        When [s].
-    turns : float
-        Turns, positive for forward whirl (with the spin), negative for backward.
-    frequency : float
-        Mean frequency [Hz].
-    """
+    """A spell in which the rotor runs round the bearing by two turns or more."""
 
     plane: str
+    """Sensor plane."""
     start: float
     end: float
+    """When [s]."""
     turns: float
+    """Turns, positive for forward whirl (with the spin), negative for backward."""
     frequency: float
+    """Mean frequency [Hz]."""
 
     @property
     def sense(self) -> str:
@@ -83,24 +66,16 @@ class Whirl:
 
 @dataclass(frozen=True, kw_only=True)
 class Drop:
-    """One fall from levitation, to the next levitation or the end of the record.
-
-    Attributes
-    ----------
-    release : float
-        When the rotor began to fall [s], to about 2 ms.
-    end : float
-        When it was lifted again, or the record ends [s].
-    permanent_contact : float or None
-        From when on it no longer left its bearings until `end` [s].
-    lifted : bool
-        Whether it was lifted again in the record.
-    """
+    """One fall from levitation, to the next levitation or the end of the record."""
 
     release: float
+    """When the rotor began to fall [s], to about 2 ms."""
     end: float
+    """When it was lifted again, or the record ends [s]."""
     permanent_contact: float | None
+    """From when on it no longer left its bearings until `end` [s]."""
     lifted: bool
+    """Whether it was lifted again in the record."""
 
 
 def drops_of(motion: Motion) -> tuple[Drop, ...]:

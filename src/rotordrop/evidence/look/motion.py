@@ -23,27 +23,18 @@ SMOOTHING = 1e-3
 
 @dataclass(frozen=True, kw_only=True)
 class Path:
-    """Where the shaft is in one sensor plane.
-
-    Attributes
-    ----------
-    name : str
-        Plane, by its touchdown bearing or by the names of its channels.
-    position : array, shape (N, 2)
-        Displacement from the centre of the clearance circle [m], y up.
-    levitated : array, shape (2,)
-        Mean levitated position [m].
-    gap : float
-        Radius of the clearance circle [m].
-    noise : float
-        Standard deviation of the readings beside their motion [m].
-    """
+    """Where the shaft is in one sensor plane."""
 
     name: str
+    """Plane, by its touchdown bearing or by the names of its channels."""
     position: Array
+    """Displacement from the centre of the clearance circle [m], y up, shape (N, 2)."""
     levitated: Array
+    """Mean levitated position [m], shape (2,)."""
     gap: float
+    """Radius of the clearance circle [m]."""
     noise: float
+    """Standard deviation of the readings beside their motion [m]."""
 
     @property
     def radius(self) -> Array:

@@ -79,21 +79,14 @@ SURE = 5.0
 
 @dataclass(frozen=True, kw_only=True)
 class Weighed:
-    """How fast every sensor saw the rotor fall in its flights, over what gravity lets it.
-
-    Attributes
-    ----------
-    share : array, shape (S,)
-        Reading over true displacement [1]; 1 with right gains, angles and clock.
-    covariance : array, shape (S, S)
-        Its covariance [1].
-    flights : int
-        Flights it comes from.
-    """
+    """How fast every sensor saw the rotor fall in its flights, over what gravity lets it."""
 
     share: Array
+    """Reading over true displacement [1]; 1 with right gains, angles and clock, shape (S,)."""
     covariance: Array
+    """Its covariance [1], shape (S, S)."""
     flights: int
+    """Flights it comes from."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -54,22 +54,15 @@ _REMEDIES = {
 
 @dataclass(frozen=True, kw_only=True)
 class _Fault:
-    """A way in which sensors or recorder change a fall, by one number that is 0 without it.
-
-    Attributes
-    ----------
-    kind, channels
-        Name of the fault and what it hits.
-    words : function
-        A size in words.
-    slope : array, shape (T, S)
-        What it adds to the readings per size.
-    """
+    """A way in which sensors or recorder change a fall, by one number that is 0 without it."""
 
     kind: Kind
     channels: tuple[str, ...]
+    """Name of the fault and what it hits."""
     words: Callable[[float], str]
+    """A size in words."""
     slope: Array
+    """What it adds to the readings per size, shape (T, S)."""
 
 
 def read_otherwise(record: Record, levitated: LevitatedModel, fall: Fall) -> list[Finding]:

@@ -24,33 +24,22 @@ _VOLTAGE_OFFSET = re.compile(r"offset\s*[:=]?\s*([+-]?\d+(?:[.,]\d+)?)\s*(m?V)\b
 
 @dataclass(frozen=True, kw_only=True)
 class Header:
-    """What the header says.
-
-    Attributes
-    ----------
-    entries : dict
-        Keys and values as written.
-    step : float, optional
-        Time between samples [s].
-    start : float, optional
-        Time of the first sample [s].
-    trigger_sample : int, optional
-        Sample at which the record time is zero.
-    count : int, optional
-        Number of samples.
-    sensitivity : float, optional
-        Volts per metre [V/m].
-    voltage_offset : float
-        Voltage at zero displacement [V].
-    """
+    """What the header says."""
 
     entries: dict[str, str]
+    """Keys and values as written."""
     step: float | None
+    """Time between samples [s]."""
     start: float | None
+    """Time of the first sample [s]."""
     trigger_sample: int | None
+    """Sample at which the record time is zero."""
     count: int | None
+    """Number of samples."""
     sensitivity: float | None
+    """Volts per metre [V/m]."""
     voltage_offset: float
+    """Voltage at zero displacement [V]."""
 
 
 def read_header(lines: list[str], separator: str) -> Header:

@@ -44,25 +44,17 @@ _SAMPLED_LINES = 60
 
 @dataclass(frozen=True, kw_only=True)
 class Layout:
-    """Where things are in a delimited text file.
-
-    Attributes
-    ----------
-    separator, decimal : str
-        Signs between columns and in numbers.
-    first : int
-        Index of the first data line, counted from 0.
-    columns : int
-        Number of columns of the data lines.
-    kinds : tuple of str
-        What every column holds: "number", "time" (a date, a time of day or both) or "text".
-    """
+    """Where things are in a delimited text file."""
 
     separator: str
     decimal: str
+    """Signs between columns and in numbers."""
     first: int
+    """Index of the first data line, counted from 0."""
     columns: int
+    """Number of columns of the data lines."""
     kinds: tuple[ColumnKind, ...]
+    """What every column holds: "number", "time" (a date, a time of day or both) or "text"."""
 
 
 def read_lines(path: Path, rules: TextLayout) -> tuple[list[str], bool, str]:

@@ -45,21 +45,14 @@ UNPACKED_PER_BYTE = 200
 
 @dataclass(frozen=True, kw_only=True)
 class Item:
-    """An array of a file with what the file says about it.
-
-    Attributes
-    ----------
-    name : str
-        Path or name in the file.
-    values : array
-        Samples as stored.
-    attributes : mapping
-        Texts, numbers and lists of them.
-    """
+    """An array of a file with what the file says about it."""
 
     name: str
+    """Path or name in the file."""
     values: NDArray[Any]
+    """Samples as stored."""
     attributes: Mapping[str, Any]
+    """Texts, numbers and lists of them."""
 
 
 @dataclass(frozen=True, kw_only=True)
