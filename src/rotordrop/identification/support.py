@@ -63,7 +63,8 @@ UNDETERMINED = 0.7
 @dataclass(frozen=True, kw_only=True)
 class ImpactFit:
     """The problem of the first impacts: parameters by their logarithm, then directions of the
-    initial state."""
+    initial state.
+    """
 
     replica: Replica
     """The drop to be run again."""

@@ -26,7 +26,8 @@ class CentredStart:
 @dataclass(frozen=True, kw_only=True)
 class PlacedStart:
     """The rotor starts straight, from given positions and velocities at the first and last
-    bearing's nodes."""
+    bearing's nodes.
+    """
 
     displacement: Array
     """Rotor centre at the bearing nodes [m], (x, y); two bearings fix the line, more must lie on it, shape

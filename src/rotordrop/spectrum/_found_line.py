@@ -18,7 +18,8 @@ Mask = NDArray[np.bool_]
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FoundLine:
     """A line that was found; fields as in `rotordrop.spectrum.lines.Line`, and what the search goes
-    on with."""
+    on with.
+    """
 
     kind: LineKind
     frequency: float
