@@ -22,6 +22,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,6 @@ from tuned_drop import TunedDrop
 
 from rotordrop.machine import example_machine
 from rotordrop.rotor.parameters import DropModel, build_drop_model
-from rotordrop.simulate.batch import simulate_drops
 from rotordrop.simulate.case import DropCase, PlacedStart
 from rotordrop.simulate.drop import simulate_drop
 
@@ -132,7 +132,8 @@ def batch(model: DropModel, rounds: int) -> dict[str, Any]:
         times = []
         for threads in (1, 2):
             began = time.perf_counter()
-            simulate_drops([model] * BATCH, [CASE] * BATCH, threads=threads)
+            with ThreadPoolExecutor(threads) as pool:
+                list(pool.map(simulate_drop, [model] * BATCH, [CASE] * BATCH))
             times.append(time.perf_counter() - began)
         ratios.append(times[0] / times[1])
         rates.append(BATCH / times[1])

@@ -875,7 +875,8 @@ def timed_actions() -> dict[str, Callable[[], Any]]:
     from rotordrop.simulate.drop import simulate_drop
     from rotordrop.track.calibration import stage_settings
     from rotordrop.track.smoother import forward, smooth
-    from rotordrop.twin.tracked import FINE_SCHEDULE, WINDOW, twin_problem
+    from rotordrop.twin.problems import WINDOW, twin_problem
+    from rotordrop.twin.search import FINE_SCHEDULE
 
     paper = example_machine("paper")
     quick, accurate = build_drop_model(paper, "quick"), build_drop_model(paper, "accurate")

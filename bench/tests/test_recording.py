@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from tests.scaled_machines import scaled_machine
 
-from rotordrop.record.axes import planar
 from rotordrop_bench import SensorChain, hidden_machine, synthesize_drop
 from rotordrop_bench.event import drop_conditions
 from rotordrop_bench.sensor_chain import (
@@ -84,7 +83,7 @@ def test_gains_and_offsets_belong_to_the_machine_not_to_the_drop(hidden, synthet
 def test_the_levitated_part_is_a_circle_with_an_offset(perfect, hidden):
     record = perfect.record
     before = record.time < perfect.truth["t_off_in_record_s"] - 1e-4
-    displacement, _ = planar(record)
+    displacement = record.motion
     z = displacement[before, 0, 0] + 1j * displacement[before, 0, 1]
     turn = np.exp(1j * SPEED * record.time[before])
     basis = np.column_stack([np.ones(len(z)), turn, turn.conj()])
@@ -117,7 +116,7 @@ def test_the_tail_lies_where_the_rotor_rests(hidden, perfect):
     """Mean of the tail: the settled place; what the swing adds is known."""
     rest = settled_coordinates(hidden.model)
     layout = hidden.model.layout
-    mean = np.mean(planar(perfect.tail)[0], axis=0)
+    mean = np.mean(perfect.tail.motion, axis=0)
     for p, node in enumerate(dict.fromkeys(s.node for s in hidden.known.sensors)):
         row = hidden.model.basis.node_row(node)
         assert mean[p, 1] == pytest.approx(row @ rest[layout.modal_y], abs=1.5e-6)

@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from rotordrop.elements.table import parameter
 from rotordrop.estimate.allowances import (
     MODEL_FORCE_SIGMA,
     MODEL_MEAN_FORCE_SIGMA,
@@ -27,7 +28,6 @@ from rotordrop.estimate.allowances import (
     MODEL_STRESS_SIGMA,
 )
 from rotordrop.known import NINETY
-from rotordrop.twin.tracked_parameters import MODEL_GAP_SIGMA
 
 STUDIES = Path(__file__).parent.parent
 NUMBERS = {
@@ -51,7 +51,7 @@ CHOSEN = {
     "peak_stress_Pa": MODEL_STRESS_SIGMA,
     "mean_force_0p15_0p2_N": MODEL_MEAN_FORCE_SIGMA,
     "mean_stress_Pa": MODEL_MEAN_STRESS_SIGMA,
-    "air_gap_m": MODEL_GAP_SIGMA,
+    "air_gap_m": parameter("air_gap").model_error,
 }
 Row = tuple[str, float, float, float]
 """Number, error, half width by the record alone and by the allowance alone; relative."""
