@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -33,6 +33,13 @@ def quantity(kind: str) -> Callable[[str | float], float]:
 
     parse.__name__ = kind.replace("_", " ")
     return parse
+
+
+def refuse_beside(option: str, others: Mapping[str, object]) -> None:
+    """Refuse what has no meaning beside an option that makes another command of a verb."""
+    given = [name for name, value in others.items() if value is not None]
+    if given:
+        raise UsageError(f"{option} does not go with {', '.join(given)}; leave out the one or the other")
 
 
 MachineArgument = Annotated[

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rotordrop.cli._options import DataOption, JsonOption, ReportOption, quantity
+from rotordrop.cli._options import DataOption, JsonOption, ReportOption, quantity, refuse_beside
 from rotordrop.cli._output import deliver, require_places
 from rotordrop.errors import UsageError
 
@@ -54,6 +54,14 @@ def compare(
 ) -> None:
     """Compare several drops: which was worst, and how sure that is; or what changed between two."""
     if changed:
+        others = {
+            "--scatter": scatter,
+            "--limit": limit,
+            "--allowed": allowed,
+            "--report": report,
+            "--data": data,
+        }
+        refuse_beside("--changes", others)
         _say_changes(estimates, json)
         return
     from rotordrop.report.compare_page import compare_page

@@ -6,13 +6,14 @@ machine file of it. The other way round, writes the rotor of a machine as ROSS l
 
 from __future__ import annotations
 
+import math
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from rotordrop.cli._options import ForceOption, JsonOption, quantity
+from rotordrop.cli._options import ForceOption, JsonOption, quantity, refuse_beside
 from rotordrop.cli._output import deliver, deliver_text, require_places
 from rotordrop.errors import UsageError
 
@@ -40,19 +41,26 @@ def convert(
         ),
     ] = None,
     designation: Annotated[
-        str, typer.Option(metavar="NAME", help="Touchdown bearings of the machine file.")
-    ] = "XCB7013C",
+        str | None,
+        typer.Option(metavar="NAME", help="Touchdown bearings of the machine file; XCB7013C by default."),
+    ] = None,
     gap: Annotated[
-        float, typer.Option(parser=quantity("length"), metavar="LENGTH", help="Their radial air gap.")
-    ] = 250e-6,
+        float | None,
+        typer.Option(
+            parser=quantity("length"), metavar="LENGTH", help="Their radial air gap; 250 um by default."
+        ),
+    ] = None,
     speed: Annotated[
-        float, typer.Option(parser=quantity("speed"), metavar="SPEED", help="Nominal speed.")
-    ] = 1884.9555921538758,
+        float | None,
+        typer.Option(parser=quantity("speed"), metavar="SPEED", help="Nominal speed; 300 Hz by default."),
+    ] = None,
     force: ForceOption = False,
     json_file: JsonOption = None,
 ) -> None:
     """Make a machine file of a rotor of ROSS or of a shaft table, or a file for ROSS of a machine."""
     if to is Target.ross:
+        others = {"--designation": designation, "--gap": gap, "--speed": speed, "--force": force or None}
+        refuse_beside("--to ross", others)
         _written_for_ross(source, output or Path("rotor_ross.toml"), json_file)
         return
     from rotordrop.machine.other_programs import read_rotor
@@ -83,9 +91,9 @@ def convert(
         bearings=(0.0, imported.rotor.node_positions[-1]),
         sensors=(0.0, imported.rotor.node_positions[-1]),
         sensor_angle="135 deg",
-        designation=designation,
-        gap=gap,
-        speed=speed,
+        designation="XCB7013C" if designation is None else designation,
+        gap=250e-6 if gap is None else gap,
+        speed=600.0 * math.pi if speed is None else speed,
         grade="G 2.5",
         support="1e8 N/m",
         name=source.stem,

@@ -10,7 +10,14 @@ from typing import Annotated
 
 import typer
 
-from rotordrop.cli._options import JsonOption, PlanesOption, ProfileOption, ReportOption, quantity
+from rotordrop.cli._options import (
+    JsonOption,
+    PlanesOption,
+    ProfileOption,
+    ReportOption,
+    quantity,
+    refuse_beside,
+)
 from rotordrop.cli._output import console, deliver, require_places
 from rotordrop.errors import UsageError
 
@@ -47,6 +54,8 @@ def look(
             raise UsageError(
                 "--split needs the machine file too: rotordrop look both.h5 machine.toml --split parts"
             )
+        others = {"--gap": gap, "--speed": speed, "--map": mapping, "--report": report, "--json": json}
+        refuse_beside("--split", others)
         _split(record, machine, split, profile)
         return
     from rotordrop.evidence.look import look as look_at

@@ -270,3 +270,34 @@ def test_a_quantity_without_unit_is_refused_with_the_way_out():
         typer.BadParameter, match=r"'280' has no unit; a length needs one, for example '280 um'"
     ):
         quantity("length")("280")
+
+
+def test_verbs_of_two_words_are_listed_by_their_first(capsys):
+    for call in (["study"], ["study", "--help"], ["study", "-h"]):
+        assert command_line.run(call) == 0
+        out = capsys.readouterr().out
+        assert all(f"rotordrop {verb}: " in out for verb in VERBS if verb.startswith("study "))
+
+
+def test_a_command_of_before_is_told_its_present_name(capsys):
+    for old, new in command_line.NOW.items():
+        assert command_line.run([old]) == 64
+        assert f"there is no command {old!r}; it is {new} now" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (["look", "a.h5", "b.toml", "--split", "x", "--json", "y"], "--split does not go with --json"),
+        (["look", "a.h5", "--split", "x"], "--split needs the machine file too"),
+        (
+            ["compare", "a.json", "b.json", "--changes", "--report", "x"],
+            "--changes does not go with --report",
+        ),
+        (["compare", "a.json", "--changes"], "--changes compares two estimates, and 1 are given"),
+        (["convert", "a.toml", "--to", "ross", "--gap", "1 mm"], "--to ross does not go with --gap"),
+    ],
+)
+def test_options_that_would_be_ignored_are_refused(call, message, capsys):
+    assert command_line.run(call) == 64
+    assert message in capsys.readouterr().err

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotordrop.errors import UnsettledError
+from rotordrop.errors import RecordError, UnsettledError
 from rotordrop.evidence.events import nominal_gaps
 from rotordrop.evidence.evidence import Missing
 from rotordrop.evidence.levitated import MAINS, LevitatedModel
@@ -51,7 +51,7 @@ def check_tail(still: Record | Missing, machine: Machine, levitated: LevitatedMo
     """
     if isinstance(still, Missing):
         if not isinstance(still.error, UnsettledError):
-            return []
+            raise still.error or RecordError(still.reason)
         return [
             Finding(
                 kind=Kind.NOT_SETTLED,
