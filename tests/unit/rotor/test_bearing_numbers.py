@@ -8,6 +8,7 @@ import pytest
 from tests.scaled_machines import scaled_machine
 
 from rotordrop.elements.bearing_numbers import numbers_of
+from rotordrop.elements.table import parameter
 from rotordrop.known import Known
 from rotordrop.machine import Machine, example_machine
 from rotordrop.physics.ball_bearing import bearing_constants
@@ -22,12 +23,14 @@ def paper() -> Machine:
 
 @pytest.mark.parametrize("preload", [20.0, 92.0, 400.0])
 def test_the_number_a_preload_is_estimated_by_gives_it_back(paper, preload):
-    measure = numbers_of(paper.touchdown_bearings[0]).measure("preload")
+    by = parameter("preload").estimated_by
+    assert by is not None
+    measure = by(paper.touchdown_bearings[0])
     assert measure.value_of(measure.of_value(preload)) == pytest.approx(preload, rel=1e-9)
 
 
-def test_a_parameter_the_bearing_does_not_turn_into_another_is_estimated_by_itself(paper):
-    assert numbers_of(paper.touchdown_bearings[0]).measure("support.mass") is None
+def test_a_parameter_that_is_not_turned_into_another_is_estimated_by_itself():
+    assert parameter("support.mass").estimated_by is None
 
 
 def test_the_seat_of_a_held_race_carries_the_load(paper):
