@@ -21,8 +21,8 @@ from rotordrop.evidence.evidence import Evidence
 from rotordrop.known import Known
 from rotordrop.machine import Machine, loads_machine
 from rotordrop.machine.saving import machine_text
+from rotordrop.physics import blocks, support
 from rotordrop.physics import columns as L
-from rotordrop.physics import support
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns
 from rotordrop.simulate.case import DropCase
@@ -66,9 +66,9 @@ def sensing(machine: Machine) -> Machine:
 
 
 def form_of(**entries: float) -> np.ndarray:
-    form = np.zeros(support.N_ENTRIES)
+    form = np.zeros(blocks.SUPPORT_N_ENTRIES)
     for name, value in entries.items():
-        form[getattr(support, name)] = value
+        form[getattr(blocks, f"SUPPORT_{name}")] = value
     return form
 
 

@@ -142,7 +142,7 @@ def test_sensors_start_from_what_the_machine_says(lp400, prepared):
         }
     )
     problem = drop_problem(
-        build_drop_model(known, COARSE_BASIS), replace(prepared, settled_level=NO_TAIL), until=0.003
+        build_drop_model(known, COARSE_BASIS), prepared.with_facts(settled_level=NO_TAIL), until=0.003
     )
     gain = problem.n_dynamic + len(problem.unknowns)
     offset = gain + problem.n_channels
@@ -182,7 +182,7 @@ def test_the_noise_of_the_levitated_part_is_that_of_the_channels(flight, prepare
 @pytest.fixture(scope="module")
 def loose(model, prepared):
     """The problem before the tail is used."""
-    return drop_problem(model, replace(prepared, settled_level=NO_TAIL), until=0.003)
+    return drop_problem(model, prepared.with_facts(settled_level=NO_TAIL), until=0.003)
 
 
 def height_at_sensors(problem, theta):
@@ -249,8 +249,7 @@ def test_a_single_sensor_in_a_plane_cannot_tell_height_from_aside(lp400, prepare
     """With one of two sensors gone the tail must not tie the gap to the height it cannot see."""
     three = lp400.model_copy(update={"sensors": lp400.sensors[:3]})
     record = prepared.record
-    prepared = replace(
-        prepared,
+    prepared = prepared.with_facts(
         record=replace(record, signals=record.signals[:, :3].copy(), sensors=three.sensors),
         levitated=prepared.levitated.of_channels(range(3)),
         settled_level=NO_TAIL,
