@@ -140,8 +140,9 @@ class VerbTable(TyperGroup):
             if name in known:
                 return name, load_verb(name), args[words:]
         if args[:1] and args[0] in OF_TWO_WORDS and (len(args) == 1 or args[1] in ("-h", "--help")):
-            for name in (name for name in known if name.startswith(f"{args[0]} ")):
-                typer.echo(f"rotordrop {name}: {known[name]}")
+            for name, line in known.items():
+                if name.startswith(f"{args[0]} "):
+                    typer.echo(f"rotordrop {name}: {line}")
             raise typer.Exit
         wrong = " ".join(args[:2]) if args[:1] and args[0] in OF_TWO_WORDS else "".join(args[:1])
         if wrong in NOW:

@@ -16,7 +16,6 @@ from rotordrop.physics.ball_bearing import BearingConstants
 
 Array = NDArray[np.float64]
 
-_MOST_STEPS = 500
 _PALMGREN_RADIAL = 4.36e-8
 """Palmgren's ``δ_r cos α = 4.36e-8 (Q²/D_w)^(1/3)`` for steel, in metre and newton."""
 _STRIBECK_LOAD_FACTOR = 5.0
