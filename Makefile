@@ -9,7 +9,7 @@ OUTPUT := output/demo
 MACHINE := src/rotordrop/machine/examples/lp400.toml
 RECORDS := src/rotordrop/examples/lp400
 
-.PHONY: help demo test arithmetic lint docs bench lock wheelhouse offline clean
+.PHONY: help demo test arithmetic lint docs audit bench lock wheelhouse offline clean
 .DEFAULT_GOAL := help
 
 help: ## list the commands
@@ -44,6 +44,9 @@ docs: $(READY) ## build the documentation and run its examples
 	@$(BIN)/python -m sphinx -q -W --keep-going -b doctest docs docs/_build/doctest
 	@NUMBA_DISABLE_JIT=1 $(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build/html
 	@echo "The documentation is $(CURDIR)/docs/_build/html/index.html"
+
+audit: $(READY) ## look the locked versions up in a database of known vulnerabilities
+	@$(BIN)/python tools/audit.py
 
 bench: $(READY) ## measure the speed of a drop against naive numpy (some minutes)
 	@$(BIN)/python benchmarks/speed.py --output benchmarks/results.json

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import runpy
 import tomllib
 from pathlib import Path
 
@@ -29,8 +30,23 @@ def test_a_dependency_has_a_floor_and_no_pin(requirement):
 
 def test_the_lock_file_names_every_dependency():
     extras = SETTINGS["project"]["optional-dependencies"]
-    wanted = _names(SETTINGS["project"]["dependencies"]) | _names(extras["dev"]) - {"rotordrop"}
+    wanted = _names(SETTINGS["project"]["dependencies"]).union(*map(_names, extras.values())) - {"rotordrop"}
     assert wanted <= LOCKED
+    assert {"psycopg", "distributed"} <= wanted, "every extra counts"
+
+
+def test_what_was_not_looked_up_is_not_called_free_of_vulnerabilities():
+    path = ROOT / "tools" / "audit.py"
+    audit = runpy.run_path(str(path))
+    held = {"name": "old", "version": "1.0", "vulns": [{"id": "CVE-1", "fix_versions": ["1.1"]}]}
+    absent = {"name": "new", "version": "9.0", "skip_reason": "not found"}
+    assert audit["lines"]([held, absent], 3) == [
+        "old 1.0: CVE-1, mended in 1.1",
+        "1 of 3 locked versions looked up, 1 known vulnerabilities; 2 could not be looked up from here",
+    ]
+    assert audit["lines"]([], 2) == [
+        "0 of 2 locked versions looked up, 0 known vulnerabilities; 2 could not be looked up from here"
+    ]
 
 
 def test_each_locked_package_has_a_hash():
