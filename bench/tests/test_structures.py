@@ -10,7 +10,7 @@ import pytest
 
 from rotordrop.errors import SimulationError
 from rotordrop.physics import columns as L
-from rotordrop.rotor.modes import free_free_modes
+from rotordrop.rotor.assembly import free_free_modes
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.simulate.case import CentredStart, DropCase, LevitatedStart, PlacedStart
 from rotordrop.simulate.drop import simulate_drop

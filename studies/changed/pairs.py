@@ -26,7 +26,7 @@ from rotordrop.errors import RotordropError
 from rotordrop.estimate.changed import changes
 from rotordrop.estimation import Tracked, estimate_drop
 from rotordrop.machine import example_machine
-from rotordrop.machine.parameter_paths import value_of_path
+from rotordrop.machine.machine import value_of_path
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop_bench.event import FINER, HiddenMachine, hidden_machine
 from rotordrop_bench.recording import synthesize_drop

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from rotordrop import DropCase, example_machine, simulate_drop
-from rotordrop.elements.bearing_numbers import numbers_of
+from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.severity.numbers import fatigue_shares
 from rotordrop.simulate.case import LevitatedStart
 

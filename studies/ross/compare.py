@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from rotordrop.errors import RotordropError
 from rotordrop.machine.ross_files import ImportedRotor, read_ross, write_ross
 from rotordrop.rotor.assembly import rotor_fe
-from rotordrop.rotor.supports import Support, spring
+from rotordrop.rotor.suspension import Support, spring
 from rotordrop.rotor.whirl import unbalance_response, whirl_modes
 
 HERE = Path(__file__).parent

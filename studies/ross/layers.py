@@ -22,7 +22,7 @@ import numpy as np
 from rotordrop.machine.ross_files import ImportedRotor, read_ross
 from rotordrop.physics import timoshenko
 from rotordrop.rotor.assembly import PointMass, RotorFE, assemble
-from rotordrop.rotor.supports import spring
+from rotordrop.rotor.suspension import spring
 from rotordrop.rotor.whirl import whirl_modes
 
 HERE = Path(__file__).parent

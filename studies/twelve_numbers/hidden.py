@@ -26,8 +26,7 @@ from typing import Any
 import numpy as np
 
 from rotordrop import estimate_drop
-from rotordrop.elements.beam import is_beam
-from rotordrop.elements.rotor import Rotor
+from rotordrop.elements.rotor import Rotor, is_beam
 from rotordrop.errors import RotordropError
 from rotordrop.estimate.allowances import BEAM_FORCE_SIGMA
 from rotordrop.evidence.evidence import read_evidence
@@ -35,8 +34,7 @@ from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
 from rotordrop.machine.simple import SimpleMachine, simple_machine
 from rotordrop.record.record import read_record
-from rotordrop.rotor.assembly import rotor_fe
-from rotordrop.rotor.modes import free_free_modes
+from rotordrop.rotor.assembly import free_free_modes, rotor_fe
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import Unknown, all_unknowns
 from rotordrop.track.input_state import input_state_estimate, lent_by_record

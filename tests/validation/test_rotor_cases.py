@@ -13,11 +13,10 @@ from scipy.optimize import minimize_scalar
 from tests.reference.closed_forms import rectangle_shear_coefficient
 
 from rotordrop.physics.timoshenko import Section, round_section
-from rotordrop.rotor.assembly import PointMass, RotorFE, assemble
+from rotordrop.rotor.assembly import PointMass, RotorFE, assemble, modes_on_springs
 from rotordrop.rotor.critical_speeds import critical_speeds
-from rotordrop.rotor.modes import modes_on_springs
 from rotordrop.rotor.reduction import Reduction, RotorBasis, reduce_rotor
-from rotordrop.rotor.supports import Support, spring
+from rotordrop.rotor.suspension import Support, spring
 from rotordrop.rotor.whirl import WhirlModes, unbalance_response, whirl_modes
 
 pytestmark = pytest.mark.acceptance

@@ -13,9 +13,8 @@ import pytest
 from cases import Compute, check, fails_with, load_case
 from test_rotor_cases import disc_rotor, rigid_rotor, rpm
 
-from rotordrop.rotor.campbell import Crossing
-from rotordrop.rotor.separation import response_peaks, separations
-from rotordrop.rotor.supports import Link, Support, spring
+from rotordrop.rotor.campbell import Crossing, response_peaks, separations
+from rotordrop.rotor.suspension import Link, Support, spring
 from rotordrop.rotor.unbalanced import orbit_axis
 from rotordrop.rotor.whirl import unbalance_response
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.elements.bearing_numbers import Spread, numbers_of
+from rotordrop.elements.race_bearing import Spread, numbers_of
 from rotordrop.elements.table import structure_rows as structure_rows_of
 from rotordrop.errors import UsageError
 from rotordrop.known import Known

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import SimulationError
 from rotordrop.physics.columns import KernelParameters
+from rotordrop.rotor.machine_summary import rotor_on_race
 from rotordrop.rotor.parameters import DropModel
-from rotordrop.rotor.rotor_on_race import rotor_on_race
 from rotordrop.simulate import _histories
 from rotordrop.simulate._loop import FINISHED
 from rotordrop.simulate.case import DropCase

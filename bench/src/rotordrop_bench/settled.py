@@ -8,13 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.elements.bearing_numbers import numbers_of
+from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.errors import SimulationError
 from rotordrop.physics import columns as L
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.pendulum import small_frequency
-from rotordrop.rotor.parameters import DropModel
-from rotordrop.rotor.static_sag import sag_of_model
+from rotordrop.rotor.parameters import DropModel, sag_of_model
 from rotordrop.simulate._histories import stored_energy
 from rotordrop.simulate._rhs import drop_derivative, scratch_of
 from rotordrop.simulate._sensitivity import drop_jacobian

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.elements.parameter import Step
+from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.table import rows
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.rotor.statics import bearing_load_shares

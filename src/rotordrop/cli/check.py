@@ -42,8 +42,7 @@ def check(
     from rotordrop.machine import load_machine
     from rotordrop.report.machine_content import machine_content, machine_json
     from rotordrop.report.terminal import print_summary
-    from rotordrop.rotor.machine_summary import summarise_machine
-    from rotordrop.rotor.machine_warnings import machine_warnings
+    from rotordrop.rotor.machine_summary import machine_warnings, summarise_machine
 
     require_places(report, json_file)
     described = load_machine(machine)

@@ -63,7 +63,7 @@ def convert(
         refuse_beside("--to ross", others)
         _written_for_ross(source, output or Path("rotor_ross.toml"), json_file)
         return
-    from rotordrop.machine.other_programs import read_rotor
+    from rotordrop.machine.ross_files import read_rotor
     from rotordrop.report.rotor_content import imported_content, imported_json
     from rotordrop.report.terminal import print_summary
 

@@ -52,9 +52,8 @@ def critical_speeds(
     from rotordrop.report.critical_speeds_page import critical_speeds_json, critical_speeds_page
     from rotordrop.report.page import write_page
     from rotordrop.report.terminal import print_summary
-    from rotordrop.rotor.campbell import campbell_diagram
+    from rotordrop.rotor.campbell import campbell_diagram, stability_map
     from rotordrop.rotor.critical_speeds import WHIRLS, critical_speed_map
-    from rotordrop.rotor.stability import stability_map
 
     require_places(report, json_file)
     described = load_machine(machine)

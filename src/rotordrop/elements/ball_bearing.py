@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
-from typing import Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, Strict
 
@@ -17,10 +17,10 @@ from rotordrop.elements.catalog import (
     PreloadClass,
     find_bearing,
 )
-from rotordrop.elements.clearance import CLASSES, ClearanceClass, clearance_range
+from rotordrop.elements.catalog.boundary import CLASSES, ClearanceClass, clearance_range
 from rotordrop.elements.description import Misfit, Text, Usual
-from rotordrop.elements.material import DENSITY, ELASTIC, POISSON
 from rotordrop.elements.race_bearing import Oddity, RaceBearing
+from rotordrop.elements.rotor import DENSITY, ELASTIC, POISSON
 from rotordrop.elements.values import (
     Angle,
     Conformity,
@@ -40,6 +40,9 @@ from rotordrop.elements.values import (
 )
 from rotordrop.known import Known
 from rotordrop.units import format_quantity
+
+if TYPE_CHECKING:
+    from rotordrop.elements.ball_numbers import BallNumbers
 
 BallMaterial = Literal["silicon nitride", "steel"]
 
@@ -382,6 +385,12 @@ class BallBearing(RaceBearing):
                 f"at most {int(3.14159266 * pitch / ball)} do",
                 ("ball_count",),
             )
+
+    def numbers(self) -> BallNumbers:
+        """Give the numbers that follow from it."""
+        from rotordrop.elements.ball_numbers import BallNumbers  # compiled: a description needs no compiler
+
+        return BallNumbers(self)
 
     def check_bore(self, radius: float) -> None:
         """Refuse a bore [m] that reaches into the inner ring or the balls."""

@@ -9,8 +9,7 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field, Strict
 
 from rotordrop.elements.description import Name, Placed
-from rotordrop.elements.extension import Extension, Values, guess, in_words, itself
-from rotordrop.elements.parameter import Entry, Parameter
+from rotordrop.elements.parameter import Entry, Extension, Parameter, Values, guess, in_words, itself
 from rotordrop.elements.values import Damping, Stiffness, follows
 from rotordrop.known import NINETY, Known
 from rotordrop.physics import columns as L

@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from rotordrop.elements.description import Description
+from rotordrop.known import Known
+
+if TYPE_CHECKING:
+    from rotordrop.elements.touchdown_bearing import TouchdownBearing
 
 Oddity = tuple[str, float, float, str]
 """Name of an entry, its value and the limit it is compared with [SI], and what to say."""
@@ -14,8 +23,12 @@ Oddity = tuple[str, float, float, str]
 class RaceBearing(Description):
     """The bearing that carries the race of a touchdown bearing, of whatever kind.
 
-    The numbers that follow from it are in `rotordrop.elements.bearing_numbers`.
+    The numbers that follow from it are its `BearingNumbers`.
     """
+
+    @abstractmethod
+    def numbers(self) -> BearingNumbers:
+        """Give the numbers that follow from it."""
 
     @abstractmethod
     def check_bore(self, radius: float) -> None:
@@ -32,3 +45,183 @@ class RaceBearing(Description):
     def oddities(self, bore_radius: float) -> Iterator[Oddity]:
         """What looks odd in the description, which can be used all the same."""
         yield from ()
+
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class BearingFigure:
+    """A number that a bearing states of itself at rest."""
+
+    field: str
+    """Its field in a document, unit included."""
+    label: str
+    """What it is called."""
+    kind: str
+    """Kind of quantity, which sets the unit it is shown in."""
+    value: float
+    """Its value [SI]."""
+    described: Known | None = None
+    """The same as the machine file describes it, with its range."""
+    note: str = ""
+    """What to add when it is shown."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Excess:
+    """Something beyond a limit: what it is, the two numbers compared [SI], the text.
+
+    ``doubtful`` says that the description looks wrong; else the drop model ends there.
+    """
+
+    kind: str
+    value: float
+    limit: float
+    text: str
+    doubtful: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class RollingElements:
+    """What cage and defects turn with: rolling elements of a row [1], lengths [m], angle [rad]."""
+
+    ball_count: int
+    ball_diameter: float
+    pitch_diameter: float
+    contact_angle: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spread:
+    """How far a parameter of a hidden machine may lie: by a factor on what is described, or in a range."""
+
+    path: str
+    low: float
+    high: float
+    described: Known | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ratings:
+    """What a bearing bears by the standards, and what follows from its balls."""
+
+    static: float
+    """Static radial load rating C_0 of the whole bearing [N], ISO 76."""
+    dynamic: float
+    """Basic dynamic radial load rating C of one row [N], ISO 281."""
+    rows: int
+    balls: int
+    """Rows, and balls of each."""
+    gamma: float
+    cosine: float
+    """Ball diameter times cosine of the contact angle over pitch diameter, and that cosine [1]."""
+    conformity_inner: float
+    conformity_outer: float
+    """Groove radius over ball diameter [1]."""
+    source: str
+    """Where the load ratings come from."""
+
+
+class BearingNumbers(ABC):
+    """The numbers of one kind of bearing; a kind that has none of something says so."""
+
+    @property
+    @abstractmethod
+    def held(self) -> bool:
+        """Whether the race is held in the middle without any load on it."""
+
+    @property
+    @abstractmethod
+    def play(self) -> float:
+        """Way of the race from the middle to where it first meets a force [m]."""
+
+    @property
+    @abstractmethod
+    def drag_diameter(self) -> float:
+        """Twice the arm of the drag on the race [m]."""
+
+    @property
+    @abstractmethod
+    def ring_material(self) -> tuple[float, float]:
+        """Young's modulus [Pa] and Poisson's ratio [1] of the race."""
+
+    @abstractmethod
+    def entries(self) -> Array:
+        """Numbers of the force law, shape (N,), in the order of `rotordrop.physics.ball_set`."""
+
+    @abstractmethod
+    def places(self, least: int = 0) -> Array:
+        """Where the force acts around the race, shape (3, Z), padded to ``least`` places."""
+
+    @abstractmethod
+    def deflection(self, load: float) -> tuple[float, float]:
+        """Way of the race downwards under a load [N]: the way [m] and the tangent stiffness there [N/m]."""
+
+    @abstractmethod
+    def seat(self, load: float) -> tuple[float, float]:
+        """Where the race comes to rest under a downward load [N]: x and y [m]."""
+
+    def tangent_stiffness(self, load: float) -> float:
+        """Radial stiffness [N/m] under a static load [N] downwards."""
+        return self.deflection(load)[1]
+
+    @abstractmethod
+    def simple_stiffness(self, load: float) -> float:
+        """Radial stiffness [N/m] under a load [N] by the engineering formula of handbooks."""
+
+    @abstractmethod
+    def figures(self, load: float) -> tuple[BearingFigure, ...]:
+        """What holds the race without a load, and how it lies under a rotor at rest of a load [N]."""
+
+    @abstractmethod
+    def excesses(self, omega: float, load: float) -> Iterator[Excess]:
+        """What is beyond a limit when the race turns at ω [rad/s] under a static load [N]."""
+
+    @abstractmethod
+    def room_to_grow(self) -> tuple[float, str]:
+        """What the growth of a hot race is compared with [m], and a text with the place ``{room}`` for it."""
+
+    @property
+    def stress_sigma(self) -> float:
+        """Relative standard deviation [1] of its stress at a force, by what is inferred of it."""
+        return 0.0
+
+    def element_loads(self, moved: Array) -> Array:
+        """Load of every rolling element [N], (T, rows, Z), of a race moved (x, y) [m], (T, 2); none here."""
+        return np.zeros((len(moved), 0, 0))
+
+    def element_loads_under(self, force: Array) -> Array:
+        """The same under a force of the elements on the race (x, y) [N], (T, 2); none here."""
+        return np.zeros((len(force), 0, 0))
+
+    def load_of_stress(self, stress: Array) -> Array:
+        """Load [N] of the element whose largest Hertz stress is given [Pa]; NaN without rolling elements."""
+        return np.full_like(stress, np.nan)
+
+    def ratings(self) -> Ratings | None:
+        """Load ratings; None without rolling elements."""
+        return None
+
+    def rolling_elements(self) -> RollingElements | None:
+        """What defects may show in a spectrum; None without rolling elements."""
+        return None
+
+    def spreads(self) -> Iterator[Spread]:
+        """How far its own parameters may lie in a hidden machine."""
+        yield from ()
+
+    @abstractmethod
+    def truth(self) -> dict[str, float]:
+        """Its parameters in the fields of truth files."""
+
+
+def numbers_of(bearing: TouchdownBearing) -> BearingNumbers:
+    """The numbers of a touchdown bearing, whatever its kind."""
+    return bearing.bearing.numbers()
+
+
+def places_of(numbers: list[BearingNumbers]) -> Array:
+    """Places of every bearing, shape (B, 3, Z), padded to the longest."""
+    longest = max((one.places().shape[1] for one in numbers), default=0)
+    return np.array([one.places(longest) for one in numbers]).reshape(len(numbers), 3, -1)

@@ -9,6 +9,8 @@ from functools import cached_property
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag
 
 from rotordrop.elements.description import (
@@ -21,9 +23,7 @@ from rotordrop.elements.description import (
     place_on_nodes,
     unknown_key,
 )
-from rotordrop.elements.extension import Extension, Values, guess, in_words, itself
-from rotordrop.elements.material import DENSITY, STEEL, Material
-from rotordrop.elements.parameter import Entry, Parameter, Rule
+from rotordrop.elements.parameter import Entry, Extension, Parameter, Rule, Values, guess, in_words, itself
 from rotordrop.elements.values import (
     Density,
     Inertia,
@@ -31,12 +31,46 @@ from rotordrop.elements.values import (
     NonNegativeLength,
     Number,
     Physical,
+    PoissonRatio,
     Positive,
     PositiveLength,
     PositiveMass,
+    Pressure,
     default,
 )
 from rotordrop.errors import UsageError
+
+ELASTIC = Usual(least=20e9, most=700e9, kind="pressure", look="E of steel is 210 GPa; check the unit")
+DENSITY = Usual(least=800.0, most=2.3e4, kind="density", look="steel has 7850 kg/m^3; check the unit")
+POISSON = Usual(least=0.05, most=0.499, kind="dimensionless", look="metals have 0.25 to 0.35")
+
+
+class Material(Description):
+    """Elastic constants and density of a material.
+
+    Attributes
+    ----------
+    youngs_modulus : Known
+        Young's modulus [Pa].
+    poisson_ratio : Known
+        Poisson ratio [1].
+    density : Known
+        Density [kg/m³].
+    """
+
+    youngs_modulus: Pressure
+    poisson_ratio: PoissonRatio
+    density: Density
+
+    usual: ClassVar[Mapping[str, Usual]] = {
+        "youngs_modulus": ELASTIC,
+        "density": DENSITY,
+        "poisson_ratio": POISSON,
+    }
+
+
+STEEL = {"youngs_modulus": "210 GPa", "poisson_ratio": 0.3, "density": "7850 kg/m^3"}
+"""What a shaft is made of when the file names no material."""
 
 THINNEST, THICKEST = 1e-4, 100.0
 """Diameters [m] beyond which a section is a mistake: stiffness goes with the fourth power, and beside a usual
@@ -435,3 +469,63 @@ EXTENSIONS: tuple[Extension, ...] = (
         ),
     ),
 )
+
+
+Array = NDArray[np.float64]
+
+
+def _form(path: str, label: str, sigma: float) -> Parameter:
+    return Parameter(
+        path=path,
+        owner="rotor",
+        label=label,
+        kind="dimensionless",
+        logarithmic=False,
+        guess_sigma=sigma,
+        given_sigma=0.1,
+        scale="one",
+    )
+
+
+FORM: tuple[Parameter, ...] = (
+    _form("mass_to_ends", "mass at the ends of the beam over that at its middle", 0.8),
+    _form("mass_to_de", "mass towards the DE of the beam, its centre of mass as it is", 0.6),
+    _form("stiffness_to_de", "bending stiffness of the beam towards the DE", 0.6),
+    _form("stiffness_to_ends", "bending stiffness at the ends of the beam over that at its middle", 0.7),
+)
+"""Rows of the form of a beam; found from a record before any contact law, and held from then on."""
+
+
+def is_beam(rotor: Rotor) -> bool:
+    """Whether a rotor is a beam in place of one that nobody has described."""
+    return any(row.stated(rotor) is not None for row in FORM)
+
+
+def element_factors(rotor: Rotor) -> tuple[Array, Array]:
+    """Factors on density and bending stiffness of the elements by the form of the beam, shapes (E,), (E,).
+
+    Raises
+    ------
+    UsageError
+        If so much mass would have to move that some element had none left.
+    """
+    ends, de, stiff_de, stiff_ends = (
+        0.0 if (value := row.stated(rotor)) is None else float(value) for row in FORM
+    )
+    middles = np.array([0.5 * (a + b) for a, b in pairwise(rotor.node_positions)])
+    s = 2.0 * middles / rotor.node_positions[-1] - 1.0
+    masses = np.array([element_mass(element) for element in rotor.elements])
+    density = 1.0 + ends * _without_moment(s**2, s, masses) + de * _without_moment(s**3, s, masses)
+    if density.min() <= 0.0:
+        raise UsageError(
+            f"rotor.mass_to_ends = {ends:.3g} and mass_to_de = {de:.3g} leave no mass at "
+            f"{1e3 * middles[int(density.argmin())]:.4g} mm from the NDE end; expected smaller ones"
+        )
+    return density, np.exp(stiff_de * s + stiff_ends * (s**2 - 1.0 / 3.0))
+
+
+def _without_moment(shape: Array, s: Array, masses: Array) -> Array:
+    """A shape along the beam less what would change its mass or move its centre of mass."""
+    rigid = np.stack([np.ones_like(s), s], axis=1)
+    gram = rigid.T @ (masses[:, None] * rigid)
+    return np.asarray(shape - rigid @ np.linalg.solve(gram, rigid.T @ (masses * shape)))

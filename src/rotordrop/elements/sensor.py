@@ -10,8 +10,7 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from rotordrop.elements.description import Channel, Misfit, Name, Placed, Usual
-from rotordrop.elements.extension import Extension, Values, guess, in_words, itself
-from rotordrop.elements.parameter import Parameter
+from rotordrop.elements.parameter import Extension, Parameter, Values, guess, in_words, itself
 from rotordrop.elements.values import (
     Angle,
     Length,

@@ -13,7 +13,6 @@ from rotordrop.elements import (
     air,
     ball_numbers,
     contact,
-    foundation,
     friction,
     magnet,
     race,
@@ -23,9 +22,8 @@ from rotordrop.elements import (
     touchdown_bearing,
     unbalance,
 )
-from rotordrop.elements.beam import FORM
-from rotordrop.elements.extension import Extension
-from rotordrop.elements.parameter import Load, Owner, Parameter
+from rotordrop.elements.parameter import Extension, Load, Owner, Parameter
+from rotordrop.elements.rotor import FORM
 
 TABLE: tuple[Parameter, ...] = (
     *touchdown_bearing.PARAMETERS,
@@ -45,7 +43,6 @@ TABLE: tuple[Parameter, ...] = (
 
 EXTENSIONS: tuple[Extension, ...] = (
     *support.EXTENSIONS,
-    *foundation.EXTENSIONS,
     *sensor.EXTENSIONS,
     *magnet.EXTENSIONS,
     *unbalance.EXTENSIONS,

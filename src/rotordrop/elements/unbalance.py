@@ -9,8 +9,7 @@ from typing import Any, ClassVar
 from pydantic import Field
 
 from rotordrop.elements.description import Description, Placed, Usual
-from rotordrop.elements.extension import Extension, Values, derived, guess, in_words
-from rotordrop.elements.parameter import Entry, Parameter
+from rotordrop.elements.parameter import Entry, Extension, Parameter, Values, derived, guess, in_words
 from rotordrop.elements.values import Angle, Positive, PositiveSpeed
 from rotordrop.elements.values import Unbalance as UnbalanceAmount
 from rotordrop.errors import UsageError

@@ -10,7 +10,7 @@ import numpy as np
 from rotordrop.elements.table import parameter
 from rotordrop.evidence.evidence import Evidence, Missing, strongest_slowing
 from rotordrop.known import NINETY
-from rotordrop.rotor.contact_band import contact_frequency
+from rotordrop.rotor.reduction import contact_frequency
 from rotordrop.rotor.unknowns import sensor_prior, smallest_gap
 from rotordrop.track.problem import DropProblem, rough_noise
 from rotordrop.units import format_quantity

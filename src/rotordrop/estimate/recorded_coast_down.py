@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.elements.bearing_numbers import numbers_of
+from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import IdentificationError, RecordError
 from rotordrop.evidence.air_gap import AirGap, identify_air_gap, rest_at_end

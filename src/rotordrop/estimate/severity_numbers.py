@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.elements.bearing_numbers import Ratings, numbers_of
+from rotordrop.elements.race_bearing import Ratings, numbers_of
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.estimate.estimate import Estimate
 from rotordrop.evidence.look import INDEX_WINDOW

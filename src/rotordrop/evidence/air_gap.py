@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from rotordrop.errors import IdentificationError
 from rotordrop.evidence.sensing import Sensing
 from rotordrop.record.record import Record
-from rotordrop.rotor.parameters import DropModel
-from rotordrop.rotor.static_sag import StaticSag, sag_of_model
+from rotordrop.rotor.parameters import DropModel, StaticSag, sag_of_model
 
 Array = NDArray[np.float64]
 

@@ -16,8 +16,7 @@ from rotordrop.identification.parameter_vector import ParameterVector, with_bear
 from rotordrop.physics import aerodynamics
 from rotordrop.physics import columns as L
 from rotordrop.physics.columns import KernelParameters
-from rotordrop.rotor.parameters import DropModel
-from rotordrop.rotor.static_sag import sag_of_model, static_sag
+from rotordrop.rotor.parameters import DropModel, sag_of_model, static_sag
 from rotordrop.simulate import _loop
 from rotordrop.simulate._tableau import tsit5
 from rotordrop.simulate.drop import FIRST_STEP, error_scale

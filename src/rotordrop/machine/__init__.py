@@ -5,9 +5,8 @@ from rotordrop.elements.ball_bearing import BallBearing
 from rotordrop.elements.contact import Contact
 from rotordrop.elements.friction import Friction
 from rotordrop.elements.magnet import ActiveMagneticBearing
-from rotordrop.elements.material import Material
 from rotordrop.elements.race import Race
-from rotordrop.elements.rotor import Disc, Element, Rotor, Section, SectionByLength, SectionByNodes
+from rotordrop.elements.rotor import Disc, Element, Material, Rotor, Section, SectionByLength, SectionByNodes
 from rotordrop.elements.sensor import Sensor
 from rotordrop.elements.support import Support
 from rotordrop.elements.touchdown_bearing import TouchdownBearing
@@ -16,11 +15,10 @@ from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin, Jo
 from rotordrop.machine.examples import example_machine, example_names, example_path
 from rotordrop.machine.loading import load_machine, loads_machine
 from rotordrop.machine.machine import Machine
-from rotordrop.machine.plausibility import doubts
+from rotordrop.machine.plausibility import Doubt, doubts
 from rotordrop.machine.saving import machine_text, save_machine
 from rotordrop.machine.schema import machine_schema
 from rotordrop.machine.template import template_text
-from rotordrop.machine.usual_values import Doubt
 
 __all__ = [
     "ActiveMagneticBearing",

@@ -10,14 +10,15 @@ import json
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 from rotordrop.elements.rotor import Rotor
 from rotordrop.errors import MachineFileError, UsageError
 from rotordrop.files import write_text
-from rotordrop.machine.source_bearing import Spring as Spring
+from rotordrop.machine.shaft_table import SECTION_LINE, read_shaft_table
 
 _FORMAT_VERSION = "2.3.0"
 _CONE_CUTS = 8
@@ -417,3 +418,104 @@ def _toml(content: Mapping[str, Any]) -> str:
     import tomlkit
 
     return tomlkit.dumps(content)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spring:
+    """A bearing of the source."""
+
+    node: int
+    """Node here."""
+    name: str
+    """Its name."""
+    stiffness: tuple[float, float]
+    damping: tuple[float, float]
+    """In x and y [N/m], [N s/m]; where the source has them by speed, the first of its table."""
+    cross_stiffness: tuple[float, float] = (0.0, 0.0)
+    cross_damping: tuple[float, float] = (0.0, 0.0)
+    """Force in x against motion in y, and in y against motion in x."""
+    kind: str = "BearingElement"
+    """What it is in the source; seals are held in the same way."""
+    told: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    """All coefficients of the source by its own names, over ``frequency`` [rad/s]; written back as they are.
+    """
+
+    @property
+    def stiffness_matrix(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Force in (x, y) against displacement in (x, y) [N/m]."""
+        return _matrix(self.stiffness, self.cross_stiffness)
+
+    @property
+    def damping_matrix(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Force in (x, y) against velocity in (x, y) [N s/m]."""
+        return _matrix(self.damping, self.cross_damping)
+
+    def at_speed(self, speed: float) -> Spring:
+        """The bearing with its coefficients at a speed [rad/s], straight between those of its table."""
+        speeds = self.told.get("frequency", ())
+        if len(speeds) < 2:
+            return self
+
+        def between(key: str, otherwise: float) -> float:
+            values = self.told.get(key)
+            return otherwise if values is None or len(values) < 2 else _between(speed, speeds, values)
+
+        def pair(kind: str, keys: tuple[str, str], now: tuple[float, float]) -> tuple[float, float]:
+            first, second = (between(f"{kind}{key}", value) for key, value in zip(keys, now, strict=True))
+            return first, second
+
+        own, cross = ("xx", "yy"), ("xy", "yx")
+        return replace(
+            self,
+            stiffness=pair("k", own, self.stiffness),
+            damping=pair("c", own, self.damping),
+            cross_stiffness=pair("k", cross, self.cross_stiffness),
+            cross_damping=pair("c", cross, self.cross_damping),
+        )
+
+
+def _between(at: float, places: tuple[float, ...], values: tuple[float, ...]) -> float:
+    """Value on the straight line between two of a table; the end one beyond it."""
+    for (a, u), (b, v) in pairwise(zip(places, values, strict=True)):
+        if at <= b:
+            return u if at <= a else u + (v - u) * (at - a) / (b - a)
+    return values[-1]
+
+
+def _matrix(
+    own: tuple[float, float], cross: tuple[float, float]
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    return (own[0], cross[0]), (cross[1], own[1])
+
+
+TABLES = (".csv", ".txt", ".tsv", ".xlsx", ".xlsm")
+
+
+def read_rotor(path: str | Path) -> ImportedRotor:
+    """Read a rotor from a file of ROSS (.toml, .json) or a shaft table (.csv, .txt, .xlsx).
+
+    Raises
+    ------
+    MachineFileError
+        If the file holds no rotor; names what is missing.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise MachineFileError("there is no such file", file=path)
+    if path.suffix.lower() in (".toml", ".json"):
+        return read_ross(path)
+    if path.suffix.lower() not in TABLES:
+        raise MachineFileError(
+            f"{path.suffix or 'no suffix'!r} is no format of a rotor; give a file of ROSS (.toml, .json) or "
+            f"a shaft table ({', '.join(TABLES)})",
+            file=path,
+        )
+    table = read_shaft_table(path)
+    for section in table["sections"]:
+        section.pop(SECTION_LINE, None)
+    notes = tuple(table.pop("notes", ()))
+    try:
+        rotor = Rotor.model_validate(table)
+    except ValueError as error:
+        raise MachineFileError(f"the table describes no rotor: {error}", file=path) from error
+    return ImportedRotor(rotor=rotor, springs=(), source=f"shaft table {path.name}", notes=notes)

@@ -13,8 +13,7 @@ from rotordrop.elements.rotor import Rotor
 from rotordrop.elements.unbalance import BalanceGrade
 from rotordrop.files import write_text
 from rotordrop.known import Known
-from rotordrop.machine.machine import Machine
-from rotordrop.machine.provenance import kind_of
+from rotordrop.machine.machine import Machine, kind_of
 from rotordrop.units import KINDS, parse_quantity, si_unit
 
 _FILE_UNITS = {

@@ -5,12 +5,11 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from rotordrop.elements.clearance import CLASSES
+from rotordrop.elements.catalog.boundary import CLASSES
 from rotordrop.elements.description import Description
 from rotordrop.elements.values import KIND_MARK, STATUSES
 from rotordrop.known import Known
-from rotordrop.machine.machine import Machine
-from rotordrop.machine.provenance import kind_of
+from rotordrop.machine.machine import Machine, kind_of
 from rotordrop.units import KINDS, format_quantity
 
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.elements.parameter import Step
+from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.table import parameter, rows
 from rotordrop.estimate.allowances import MODEL_FORCE_SIGMA, MODEL_MEAN_FORCE_SIGMA, MODEL_STRESS_SIGMA
 from rotordrop.estimate.bearing_drop import (

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from rotordrop.elements.catalog import CatalogueBearing
-from rotordrop.elements.clearance import clearance_range
+from rotordrop.elements.catalog.boundary import clearance_range
 from rotordrop.report.content import Cell, ReportContent, Statement, Table
 
 _COLUMNS = ("listed bearings of this size", "angle", "balls", "preload light / medium / heavy", "balls are")

@@ -21,9 +21,8 @@ from rotordrop.report.style import (
     plain,
     single,
 )
-from rotordrop.rotor.campbell import CampbellDiagram
+from rotordrop.rotor.campbell import CampbellDiagram, StabilityMap
 from rotordrop.rotor.critical_speeds import CriticalSpeedMap
-from rotordrop.rotor.stability import StabilityMap
 
 Array = NDArray[np.float64]
 TURN = 2.0 * math.pi

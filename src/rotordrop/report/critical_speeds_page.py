@@ -18,10 +18,14 @@ from rotordrop.report.critical_speeds_figure import (
 )
 from rotordrop.report.machine_sections import defaults_section
 from rotordrop.report.quantity import Quantity
-from rotordrop.rotor.campbell import CampbellDiagram
+from rotordrop.rotor.campbell import (
+    CampbellDiagram,
+    Separation,
+    StabilityMap,
+    amplification_factor,
+    separations,
+)
 from rotordrop.rotor.critical_speeds import CriticalSpeedMap
-from rotordrop.rotor.separation import Separation, amplification_factor, separations
-from rotordrop.rotor.stability import StabilityMap
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine

@@ -10,7 +10,7 @@ import plotly.graph_objects as go
 from rotordrop._version import __version__
 from rotordrop.known import Known
 from rotordrop.machine import Machine
-from rotordrop.machine.parameter_paths import kind_of_path
+from rotordrop.machine.machine import kind_of_path
 from rotordrop.report.content import Cell, Figure, ReportContent, Section, Statement, Table
 from rotordrop.report.origin import study_facts
 from rotordrop.report.quantity import display_unit

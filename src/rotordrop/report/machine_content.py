@@ -12,10 +12,9 @@ from rotordrop.report.machine_sections import defaults_section, drawing_section
 from rotordrop.report.quantity import Quantity
 
 if TYPE_CHECKING:
-    from rotordrop.elements.bearing_numbers import BearingFigure
+    from rotordrop.elements.race_bearing import BearingFigure
     from rotordrop.machine import Machine
-    from rotordrop.rotor.machine_summary import BearingSummary, MachineSummary
-    from rotordrop.rotor.machine_warnings import MachineWarning
+    from rotordrop.rotor.machine_summary import BearingSummary, MachineSummary, MachineWarning
 
 
 def machine_content(

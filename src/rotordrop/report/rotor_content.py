@@ -7,8 +7,7 @@ import numpy as np
 from rotordrop.machine.ross_files import ImportedRotor
 from rotordrop.report.content import Cell, ReportContent, Statement, Table
 from rotordrop.report.quantity import Quantity
-from rotordrop.rotor.assembly import rotor_fe
-from rotordrop.rotor.modes import N_RIGID, free_free_modes, modes_on_springs
+from rotordrop.rotor.assembly import N_RIGID, free_free_modes, modes_on_springs, rotor_fe
 
 SHOWN = 6
 

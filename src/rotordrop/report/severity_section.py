@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rotordrop.elements.bearing_numbers import numbers_of
+from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.estimate.estimate import Estimate
 from rotordrop.estimate.severity_numbers import severity_values
 from rotordrop.report.content import Cell, Section, Table

@@ -8,7 +8,7 @@ import numpy as np
 
 from rotordrop._version import __version__
 from rotordrop.estimate.bearing_drop import BearingDrop, History, simulated_bearings
-from rotordrop.machine.usual_values import doubts_of_speed
+from rotordrop.machine.plausibility import doubts_of_speed
 from rotordrop.report.content import Card, Figure, KeyFigure, ReportContent, Section, Statement
 from rotordrop.report.drop_sections import drop_sections, speed_figure, static_limit_statement
 from rotordrop.report.estimate_numbers import headline_card

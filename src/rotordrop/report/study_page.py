@@ -13,7 +13,7 @@ from rotordrop._version import __version__
 from rotordrop.elements.description import unknown_key
 from rotordrop.errors import UsageError
 from rotordrop.known import Known
-from rotordrop.machine.parameter_paths import kind_of_path
+from rotordrop.machine.machine import kind_of_path
 from rotordrop.report.content import Cell, Figure, ReportContent, Section, Statement, Table
 from rotordrop.report.quantity import display_unit
 from rotordrop.report.style import SERIES, axis_title, fit_legend, panels, plain

@@ -13,7 +13,7 @@ from rotordrop._version import __version__
 from rotordrop.report.content import Figure, ReportContent, Section, Statement, Table
 from rotordrop.report.quantity import Quantity
 from rotordrop.report.style import LIMIT, MICRO, MUTED, SERIES, axis_title, fit_legend, panels, plain, single
-from rotordrop.rotor.separation import LEAST_FACTOR, ResponsePeak, required_margin, response_peaks
+from rotordrop.rotor.campbell import LEAST_FACTOR, ResponsePeak, required_margin, response_peaks
 from rotordrop.rotor.unbalanced import MachineResponse, orbit_axis
 
 if TYPE_CHECKING:

@@ -12,8 +12,15 @@ from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
 from rotordrop.rotor.assembly import RotorFE, build_rotor_fe
 from rotordrop.rotor.reduction import RotorBasis
-from rotordrop.rotor.supports import Support, link, planar_matrices, spring
-from rotordrop.rotor.suspension import FORMULAS, EquivalentStiffness, equivalent_stiffness
+from rotordrop.rotor.suspension import (
+    FORMULAS,
+    EquivalentStiffness,
+    Support,
+    equivalent_stiffness,
+    link,
+    planar_matrices,
+    spring,
+)
 
 Array = NDArray[np.float64]
 

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.elements.bearing_numbers import numbers_of, places_of
-from rotordrop.elements.foundation import foundation_states
+from rotordrop.elements.race_bearing import numbers_of, places_of
+from rotordrop.elements.support import foundation_states, support_sag
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.physics import aerodynamics
 from rotordrop.physics import columns as L
 from rotordrop.physics.columns import KernelParameters
+from rotordrop.physics.contact import depth_at
 from rotordrop.physics.elementary import sine_cosine
 from rotordrop.physics.linear_algebra import product
 from rotordrop.rotor.assembly import RotorFE, build_rotor_fe
@@ -201,3 +202,54 @@ def bearing_row(bearing: TouchdownBearing, static_load: float) -> Array:
     for part in (bearing.contact, bearing.friction, bearing.race, bearing.support):
         part.fill(row)
     return row
+
+
+@dataclass(frozen=True, kw_only=True)
+class StaticSag:
+    """What gives way under the rotor at rest, below the air gap."""
+
+    indentation: Array
+    """Contact indentation under the static load shares [m], shape (B,)."""
+    race: Array
+    """Deflection of the bearing [m], shape (B,)."""
+    support: Array
+    """Deflection of the support [m], shape (B,)."""
+
+    @property
+    def total(self) -> Array:
+        """Their sum [m], shape (B,): the radius at rest less the air gap."""
+        return self.indentation + self.race + self.support
+
+    def depth(self, gap: Array) -> Array:
+        """How deep [m] the rotor lies below the centre with an air gap (B,) [m]."""
+        return gap + self.indentation + self.race + self.support
+
+
+def race_sag(bearings: Sequence[TouchdownBearing], loads: Array) -> Array:
+    """Deflection [m] of every bearing, shape (B,), under static loads (B,) [N]."""
+    pairs = zip(bearings, loads, strict=True)
+    return np.array([numbers_of(b).deflection(float(load))[0] for b, load in pairs])
+
+
+def static_sag(rows: Array, race: Array, loads: Array) -> StaticSag:
+    """Sag under static loads.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (B, columns)
+        Bearing parameters, columns of `rotordrop.physics.columns`.
+    race : ndarray, shape (B,)
+        From `race_sag` [m].
+    loads : ndarray, shape (B,)
+        Static load of each bearing [N].
+    """
+    laws = rows[:, L.CONTACT : L.CONTACT_END]
+    indentation = np.array([depth_at(law, float(load)) for law, load in zip(laws, loads, strict=True)])
+    support = np.array([support_sag(row, float(load)) for row, load in zip(rows, loads, strict=True)])
+    return StaticSag(indentation=indentation, race=race, support=support)
+
+
+def sag_of_model(model: DropModel) -> StaticSag:
+    """Sag of a model's rotor under its static load shares."""
+    loads = np.asarray(model.load_shares)
+    return static_sag(model.parameters.bearing, race_sag(model.machine.touchdown_bearings, loads), loads)

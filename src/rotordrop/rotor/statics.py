@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import SimulationError
 from rotordrop.physics.linear_algebra import product, solve
-from rotordrop.rotor.assembly import RotorFE, build_rotor_fe
-from rotordrop.rotor.modes import N_RIGID, free_free_modes, rigid_modes
+from rotordrop.rotor.assembly import N_RIGID, RotorFE, build_rotor_fe, free_free_modes, rigid_modes
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
 from rotordrop.rotor.assembly import build_rotor_fe
+from rotordrop.rotor.campbell import response_peaks
 from rotordrop.rotor.reduction import Reduction, reduce_rotor
-from rotordrop.rotor.separation import response_peaks
 from rotordrop.rotor.suspension import suspension_of
 from rotordrop.rotor.whirl import unbalance_response
 

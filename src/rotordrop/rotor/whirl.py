@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotordrop.errors import SimulationError
-from rotordrop.rotor.assembly import RotorFE
-from rotordrop.rotor.modes import modal_damping_matrix
+from rotordrop.rotor.assembly import RotorFE, modal_damping_matrix
 from rotordrop.rotor.reduction import RotorBasis
-from rotordrop.rotor.supports import PlanarMatrices, Support, planar_matrices
+from rotordrop.rotor.suspension import PlanarMatrices, Support, planar_matrices
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.elements.ball_bearing import STATIC_STRESS
-from rotordrop.elements.bearing_numbers import Ratings
+from rotordrop.elements.race_bearing import Ratings
 from rotordrop.severity.fatigue import (
     ball_row,
     joined,

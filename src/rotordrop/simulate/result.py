@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.elements.bearing_numbers import numbers_of
+from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.errors import SimulationError, UsageError
 from rotordrop.files import new_hdf5
 from rotordrop.physics.hertz import LineContact

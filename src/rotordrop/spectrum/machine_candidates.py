@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rotordrop.elements.bearing_numbers import numbers_of
+from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.physics.contact import depth_at
 from rotordrop.physics.pendulum import effective_length, period_ratio, small_frequency, spin_participation

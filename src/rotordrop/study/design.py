@@ -170,7 +170,7 @@ def _with_candidates(study: Study, values: Sequence[tuple[float, ...]], repeats:
 
 
 def _described(study: Study) -> tuple[float, ...]:
-    from rotordrop.machine.parameter_paths import value_of_path
+    from rotordrop.machine.machine import value_of_path
 
     first = study.machine.touchdown_bearings[0].name
     return tuple(

@@ -20,7 +20,7 @@ from rotordrop.elements.magnet import REMANENCE_TIME
 from rotordrop.elements.table import fitted_row, parameter
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine, load_machine
-from rotordrop.machine.parameter_paths import kind_of_path, value_of_path
+from rotordrop.machine.machine import kind_of_path, value_of_path
 from rotordrop.machine.saving import machine_text
 from rotordrop.simulate.case import DropCase, LevitatedStart
 from rotordrop.study import sampling

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rotordrop.elements.table import fitted_row
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
-from rotordrop.machine.parameter_paths import value_of_path
+from rotordrop.machine.machine import value_of_path
 from rotordrop.physics.elementary import exp_each, ln_each
 from rotordrop.physics.linear_algebra import product, symmetric_eigen
 from rotordrop.study.distributions import Distribution, normal_score

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.elements.beam import is_beam
 from rotordrop.elements.magnet import REMANENCE
+from rotordrop.elements.rotor import is_beam
 from rotordrop.elements.table import STRUCTURE
 from rotordrop.track.calibration import FITTING_NIS
 from rotordrop.track.problem import DropProblem

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.elements.bearing_numbers import numbers_of
+from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.track.forces import stress_at_force
 from rotordrop.track.problem import DropProblem

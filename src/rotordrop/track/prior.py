@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 
 from rotordrop.elements.table import parameter
 from rotordrop.machine import Machine
-from rotordrop.rotor.joint_values import correlate
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.statics import levitated_sag
-from rotordrop.rotor.unknowns import Unknown, sensor_prior, smallest_gap
+from rotordrop.rotor.unknowns import Unknown, correlate, sensor_prior, smallest_gap
 from rotordrop.track.sensor_form import begin_caught_up, share_in_groups
 
 Array = NDArray[np.float64]

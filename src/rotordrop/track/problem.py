@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from rotordrop.errors import IdentificationError
 from rotordrop.physics import aerodynamics
 from rotordrop.physics import columns as L
-from rotordrop.rotor.parameters import DropModel
-from rotordrop.rotor.static_sag import race_sag, static_sag
+from rotordrop.rotor.parameters import DropModel, race_sag, static_sag
 from rotordrop.rotor.statics import settled_sag
 from rotordrop.rotor.unknowns import Unknown, all_unknowns, smallest_gap
 from rotordrop.series import noise_by_differences

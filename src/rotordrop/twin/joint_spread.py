@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rotordrop.known import NINETY, Known
 from rotordrop.machine import JointSpread
-from rotordrop.rotor.joint_values import (
+from rotordrop.rotor.unknowns import (
     file_of_fitted,
     file_path,
     is_logarithmic,

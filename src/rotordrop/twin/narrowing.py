@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.elements.beam import is_beam
+from rotordrop.elements.rotor import is_beam
 from rotordrop.estimate.advice import WORTH_SAYING, Advice
 from rotordrop.estimate.allowances import BEAM_FORCE_SIGMA, MODEL_FORCE_SIGMA
 from rotordrop.known import NINETY

@@ -10,9 +10,8 @@ import numpy as np
 from rotordrop.evidence.evidence import Evidence, Missing
 from rotordrop.machine import Machine
 from rotordrop.record.axes import sees_both_directions
-from rotordrop.rotor.contact_band import reduction_for_contact
 from rotordrop.rotor.parameters import DropModel, build_drop_model
-from rotordrop.rotor.reduction import Reduction
+from rotordrop.rotor.reduction import Reduction, reduction_for_contact
 from rotordrop.track.calibration import BLIND_SCHEDULE, Stage, shifted
 from rotordrop.track.prior import fall_time
 from rotordrop.track.problem import DropProblem, Fall, RecordedDrop, build_problem

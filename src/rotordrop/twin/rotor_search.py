@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from rotordrop.elements.beam import FORM, is_beam
 from rotordrop.elements.parameter import Parameter
+from rotordrop.elements.rotor import FORM, is_beam
 from rotordrop.elements.table import parameter
 from rotordrop.errors import RotordropError
 from rotordrop.evidence.evidence import Evidence

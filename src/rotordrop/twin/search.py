@@ -17,8 +17,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.elements.beam import is_beam
-from rotordrop.elements.extension import Extension
+from rotordrop.elements.parameter import Extension
+from rotordrop.elements.rotor import is_beam
 from rotordrop.elements.table import EXTENSIONS
 from rotordrop.errors import IdentificationError
 from rotordrop.evidence.evidence import Evidence

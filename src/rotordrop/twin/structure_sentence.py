@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rotordrop.elements.extension import Values
+from rotordrop.elements.parameter import Values
 from rotordrop.estimate.estimate import Structure
 from rotordrop.machine import Machine
 from rotordrop.rotor.statics import bearing_load_shares

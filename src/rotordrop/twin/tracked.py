@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
-from rotordrop.elements.beam import is_beam
+from rotordrop.elements.rotor import is_beam
 from rotordrop.evidence.evidence import Evidence
 from rotordrop.machine import Machine
 from rotordrop.track.consistency import DIRECTIONS, Check, consistency_checks, judged_by

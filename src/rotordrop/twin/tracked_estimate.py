@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.elements.beam import is_beam
-from rotordrop.elements.bearing_numbers import numbers_of
+from rotordrop.elements.race_bearing import numbers_of
+from rotordrop.elements.rotor import is_beam
 from rotordrop.errors import IdentificationError
 from rotordrop.estimate.advice import Advice
 from rotordrop.estimate.assumptions import twin_assumptions

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.elements.beam import is_beam
+from rotordrop.elements.rotor import is_beam
 from rotordrop.estimate.allowances import (
     BEAM_FORCE_SIGMA,
     MODEL_FORCE_SIGMA,

@@ -14,8 +14,7 @@ from rotordrop.evidence.settled import resting_record
 from rotordrop.machine import Machine
 from rotordrop.record.axes import sensor_directions
 from rotordrop.record.record import Record
-from rotordrop.rotor.parameters import DropModel
-from rotordrop.rotor.static_sag import sag_of_model
+from rotordrop.rotor.parameters import DropModel, sag_of_model
 from rotordrop_bench import SyntheticDrop
 
 

@@ -4,10 +4,10 @@ import math
 
 import pytest
 
+from rotordrop.elements.ball_numbers import inferred_stress_sigma
 from rotordrop.elements.catalog import PairRigidity, designations, find_bearing, read_designation
 from rotordrop.elements.catalog.boundary import DIMENSION_SERIES, boundary_dimensions
 from rotordrop.elements.catalog.inference import dynamic_rating, infer_balls, pair_rigidity, static_rating
-from rotordrop.elements.inferred_balls import inferred_stress_sigma
 from rotordrop.errors import MachineFileError
 from rotordrop.machine import loads_machine
 from rotordrop.physics.ball_bearing import axial_rigidity, bearing_constants

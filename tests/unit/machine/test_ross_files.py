@@ -8,10 +8,8 @@ import pytest
 from rotordrop.cli.app import run
 from rotordrop.errors import MachineFileError
 from rotordrop.machine import example_machine, load_machine
-from rotordrop.machine.other_programs import read_rotor
-from rotordrop.machine.ross_files import Spring, read_ross, write_ross
-from rotordrop.rotor.assembly import rotor_fe
-from rotordrop.rotor.modes import modes_on_springs
+from rotordrop.machine.ross_files import Spring, read_ross, read_rotor, write_ross
+from rotordrop.rotor.assembly import modes_on_springs, rotor_fe
 
 STEEL = {"name": "Steel", "rho": 7810.0, "E": 211e9, "G_s": 81.2e9}
 

@@ -9,11 +9,10 @@ from tests.scaled_machines import TWELVE_NUMBERS
 from rotordrop.cli.app import run
 from rotordrop.errors import UsageError
 from rotordrop.machine import load_machine, loads_machine, machine_text
-from rotordrop.machine.other_programs import read_rotor
+from rotordrop.machine.ross_files import read_rotor
 from rotordrop.machine.simple import SimpleMachine, simple_machine
-from rotordrop.rotor.assembly import rotor_fe
+from rotordrop.rotor.assembly import free_free_modes, rotor_fe
 from rotordrop.rotor.machine_summary import summarise_machine
-from rotordrop.rotor.modes import free_free_modes
 from rotordrop_bench.rotors import ROTORS
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rotordrop.report.critical_speeds_page import _stability_section, _verdict, critical_speeds_json
-from rotordrop.rotor.stability import StabilityMap
+from rotordrop.rotor.campbell import StabilityMap
 
 AT_LINES = {"tangent": np.array([100.0]), "with support mass": np.array([90.0])}
 

@@ -9,8 +9,7 @@ import pytest
 
 from rotordrop.errors import UsageError
 from rotordrop.physics.timoshenko import round_section
-from rotordrop.rotor.assembly import PointMass, assemble
-from rotordrop.rotor.modes import free_free_modes
+from rotordrop.rotor.assembly import PointMass, assemble, free_free_modes
 
 SHAFT = round_section(0.05, 0.0, 2.1e11, 0.3, 7850.0)
 

@@ -7,13 +7,12 @@ import math
 import pytest
 from tests.scaled_machines import scaled_machine
 
-from rotordrop.elements.bearing_numbers import numbers_of
+from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.table import parameter
 from rotordrop.known import Known
 from rotordrop.machine import Machine, example_machine
 from rotordrop.physics.ball_bearing import bearing_constants
-from rotordrop.rotor.machine_summary import summarise_machine
-from rotordrop.rotor.machine_warnings import machine_warnings
+from rotordrop.rotor.machine_summary import machine_warnings, summarise_machine
 
 
 @pytest.fixture(scope="module")

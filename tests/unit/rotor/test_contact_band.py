@@ -6,9 +6,8 @@ from pathlib import Path
 import pytest
 
 from rotordrop.machine import example_machine, load_machine
-from rotordrop.rotor.assembly import build_rotor_fe
-from rotordrop.rotor.contact_band import contact_frequency, reduction_for_contact
-from rotordrop.rotor.modes import free_free_modes
+from rotordrop.rotor.assembly import build_rotor_fe, free_free_modes
+from rotordrop.rotor.reduction import contact_frequency, reduction_for_contact
 
 LONG = Path(__file__).parents[2] / "machines" / "long_rotor.toml"
 NAMES = ("NDE", "DE")

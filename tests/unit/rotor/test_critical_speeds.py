@@ -7,14 +7,15 @@ import pytest
 
 from rotordrop.errors import UsageError
 from rotordrop.physics.timoshenko import round_section
-from rotordrop.rotor.assembly import PointMass, assemble
+from rotordrop.rotor.assembly import PointMass, assemble, free_free_modes, modes_on_springs
 from rotordrop.rotor.campbell import campbell_diagram, campbell_lines
 from rotordrop.rotor.critical_speeds import critical_speed_map, critical_speeds
-from rotordrop.rotor.modes import free_free_modes, modes_on_springs
 from rotordrop.rotor.reduction import Reduction, reduce_rotor
-from rotordrop.rotor.supports import Support, link, spring
 from rotordrop.rotor.suspension import (
+    Support,
     equivalent_stiffness,
+    link,
+    spring,
     suspension_of,
     touchdown_supports,
 )

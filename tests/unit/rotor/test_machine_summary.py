@@ -7,8 +7,12 @@ import math
 import pytest
 
 from rotordrop.machine import Machine, example_machine
-from rotordrop.rotor.machine_summary import MachineSummary, summarise_machine
-from rotordrop.rotor.machine_warnings import MachineWarning, machine_warnings
+from rotordrop.rotor.machine_summary import (
+    MachineSummary,
+    MachineWarning,
+    machine_warnings,
+    summarise_machine,
+)
 
 
 @pytest.fixture(scope="module")

@@ -9,8 +9,13 @@ import pytest
 
 from rotordrop.errors import SimulationError
 from rotordrop.physics.timoshenko import Section, round_section
-from rotordrop.rotor.assembly import PointMass, assemble
-from rotordrop.rotor.modes import free_free_modes, modal_damping_matrix, modes_on_springs
+from rotordrop.rotor.assembly import (
+    PointMass,
+    assemble,
+    free_free_modes,
+    modal_damping_matrix,
+    modes_on_springs,
+)
 
 EXACT_FREE_FREE = (228.6965036678562, 622.9134501251403, 1200.6896615980231)
 CLAMPED_FREE_FREE = (4.730040744862704, 7.853204624095838, 10.995607838001671)

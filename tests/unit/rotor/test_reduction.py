@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import SimulationError, UsageError
-from rotordrop.rotor.modes import free_free_modes, modal_damping_matrix
+from rotordrop.rotor.assembly import free_free_modes, modal_damping_matrix
 from rotordrop.rotor.reduction import (
     PRESETS,
     Reduction,

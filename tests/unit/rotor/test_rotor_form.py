@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from tests.scaled_machines import TWELVE_NUMBERS
 
-from rotordrop.elements.beam import FORM, element_factors, is_beam
+from rotordrop.elements.rotor import FORM, element_factors, is_beam
 from rotordrop.elements.table import structure_rows
 from rotordrop.errors import UsageError
 from rotordrop.machine.simple import SimpleMachine, simple_machine
-from rotordrop.rotor.assembly import rotor_fe
-from rotordrop.rotor.modes import free_free_modes
+from rotordrop.rotor.assembly import free_free_modes, rotor_fe
 
 PLAIN = {f"rotor.{row.path}": 0.0 for row in FORM} | {"rotor.stiffness_factor": 1.0}
 

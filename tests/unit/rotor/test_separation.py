@@ -10,8 +10,8 @@ from rotordrop.cli.app import run
 from rotordrop.errors import UsageError
 from rotordrop.machine import example_machine, example_path
 from rotordrop.report.unbalance_page import _judged
-from rotordrop.rotor.campbell import Crossing
-from rotordrop.rotor.separation import (
+from rotordrop.rotor.campbell import (
+    Crossing,
     amplification_factor,
     required_margin,
     response_peaks,

@@ -8,8 +8,8 @@ import pytest
 from rotordrop.elements.rotor import Rotor
 from rotordrop.machine import example_machine
 from rotordrop.rotor.assembly import rotor_fe
-from rotordrop.rotor.stability import stability_map, stability_of
-from rotordrop.rotor.supports import spring
+from rotordrop.rotor.campbell import stability_map, stability_of
+from rotordrop.rotor.suspension import spring
 
 STIFFNESS, DAMPING = 1e5, 30.0
 

@@ -7,10 +7,9 @@ import pytest
 
 from rotordrop.errors import SimulationError, UsageError
 from rotordrop.physics.timoshenko import round_section
-from rotordrop.rotor.assembly import PointMass, assemble
-from rotordrop.rotor.modes import modes_on_springs
+from rotordrop.rotor.assembly import PointMass, assemble, modes_on_springs
 from rotordrop.rotor.reduction import reduce_rotor
-from rotordrop.rotor.supports import Support, in_series, link, spring
+from rotordrop.rotor.suspension import Support, in_series, link, spring
 from rotordrop.rotor.whirl import direction_name, matrices_of, unbalance_response, whirl_modes
 
 EVEN = [spring(2, 2e7), spring(8, 2e7)]

@@ -11,8 +11,7 @@ from tests.scaled_machines import scaled_machine
 from rotordrop.physics import columns as L
 from rotordrop.physics.ball_bearing import bearing_constants
 from rotordrop.report.simulation_numbers import simulation_numbers
-from rotordrop.rotor.machine_summary import summarise_machine
-from rotordrop.rotor.machine_warnings import machine_warnings
+from rotordrop.rotor.machine_summary import machine_warnings, summarise_machine
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.simulate.case import DropCase
 from rotordrop.simulate.drop import simulate_drop

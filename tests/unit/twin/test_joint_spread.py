@@ -11,9 +11,8 @@ import pytest
 from rotordrop.known import NINETY
 from rotordrop.machine import example_machine
 from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin
-from rotordrop.rotor.joint_values import correlate
 from rotordrop.rotor.parameters import build_drop_model
-from rotordrop.rotor.unknowns import bearing_unknowns
+from rotordrop.rotor.unknowns import bearing_unknowns, correlate
 from rotordrop.twin.calibrated import at_fitted_exponents
 from rotordrop.twin.joint_spread import joint_spread
 from rotordrop.twin.tracked_parameters import identified

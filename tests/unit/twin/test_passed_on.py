@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rotordrop.elements.bearing_numbers import numbers_of
+from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.table import parameter
 from rotordrop.estimate import simulated_coast_down
 from rotordrop.estimate.bearing_drop import Motion, deepest

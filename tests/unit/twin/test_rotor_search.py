@@ -11,14 +11,13 @@ import numpy as np
 import pytest
 
 import rotordrop
-from rotordrop.elements.beam import FORM
+from rotordrop.elements.rotor import FORM
 from rotordrop.estimate.advice import Advice
 from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine import example_machine
 from rotordrop.machine.simple import SimpleMachine, simple_machine
 from rotordrop.record.record import read_record
-from rotordrop.rotor.assembly import rotor_fe
-from rotordrop.rotor.modes import free_free_modes
+from rotordrop.rotor.assembly import free_free_modes, rotor_fe
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.track.forces import ForceHistory
 from rotordrop.track.input_state import InputEstimate

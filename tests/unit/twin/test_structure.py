@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rotordrop.elements.extension import derived
+from rotordrop.elements.parameter import derived
 from rotordrop.elements.support import soft_axis, soft_over_stiff
 from rotordrop.elements.table import EXTENSIONS
 from rotordrop.errors import IdentificationError

@@ -7,7 +7,7 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
-from rotordrop.elements.clearance import ClearanceClass
+from rotordrop.elements.catalog.boundary import ClearanceClass
 
 Kind = Literal["deep groove", "angular contact"]
 Size = Literal["small", "standard"]

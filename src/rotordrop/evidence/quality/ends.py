@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotordrop.elements.beam import is_beam
+from rotordrop.elements.rotor import is_beam
 from rotordrop.evidence.events import Beginning, CoarseDrop, find_fall
 from rotordrop.evidence.levitated import LevitatedModel
 from rotordrop.evidence.quality.finding import Finding, Kind
