@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import equation_index
 import parameter_page
@@ -67,25 +68,28 @@ def package_page(name: str) -> str:
 
 
 def command_page() -> str:
-    """Write what ``rotordrop VERB --help`` prints, verb by verb."""
-    from rotordrop.cli import app
+    """Write what ``--help`` prints of both programs, verb by verb."""
+    import typer
 
-    parts = ["# Commands", "", f"```text\n{_help(None)}\n```", ""]
-    for verb in app.verbs():
-        parts += [f"## {verb}", "", f"```text\n{_help(verb)}\n```", ""]
+    from rotordrop.cli import app
+    from rotordrop_bench.cli.app import BenchTable
+    from rotordrop_bench.cli.app import app as bench
+
+    parts = ["# Commands", ""]
+    for name, program, table in (
+        ("rotordrop", app.app, app.VerbTable),
+        ("rotordrop-bench", bench, BenchTable),
+    ):
+        parts += [f"## {name}", "", _help(name, typer.main.get_command(program))]
+        for verb, row in table.verbs().items():
+            parts += [f"### {name} {verb}", "", _help(f"{name} {verb}", row.load())]
     parts += ["## Exit codes", "", (app.__doc__ or "").split("\n\n", 1)[1].strip(), ""]
     return "\n".join(parts)
 
 
-def _help(verb: str | None) -> str:
-    import typer
-
-    from rotordrop.cli import app
-
-    command = typer.main.get_command(app.app) if verb is None else app.load_verb(verb)
-    name = "rotordrop" if verb is None else f"rotordrop {verb}"
+def _help(name: str, command: Any) -> str:
     context = command.make_context(name, [], resilient_parsing=True)
-    return str(command.get_help(context)).strip()
+    return f"```text\n{command.get_help(context).strip()}\n```\n"
 
 
 def _module_block(module: str) -> list[str]:

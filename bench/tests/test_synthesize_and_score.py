@@ -8,7 +8,7 @@ import pytest
 
 from rotordrop.machine import example_path
 from rotordrop_bench.cli.app import run
-from rotordrop_bench.cli.score import percent
+from rotordrop_bench.cli.scores import percent
 
 LP400 = str(example_path("lp400"))
 
@@ -99,3 +99,12 @@ def test_a_score_of_the_wrong_file_says_which_one_is_wanted(folder, tmp_path, ca
     assert "expected the JSON of 'rotordrop estimate'" in capsys.readouterr().err
     assert run(["score", str(wrong), str(wrong)]) == 64
     assert "is no truth file: it has no 'air_gap_m'" in capsys.readouterr().err
+
+
+def test_errors_name_the_program_that_was_called(capsys):
+    assert run(["score", "nowhere.json", "nowhere.json"]) != 0
+    assert capsys.readouterr().err.startswith("rotordrop-bench: ")
+    assert run(["frobnicate"]) == 64
+    assert capsys.readouterr().err == (
+        "rotordrop-bench: there is no command 'frobnicate'; try 'rotordrop-bench --help'\n"
+    )

@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 import rotordrop
-from rotordrop.cli import app
-from rotordrop.cli._examples import EXAMPLES
+from rotordrop.cli.app import VerbTable
 
 ROOT = Path(__file__).resolve().parents[2]
+VERBS = VerbTable.verbs()
 TEXTS = [
     ROOT / "README.md",
     ROOT / "Makefile",
@@ -44,16 +44,15 @@ def test_the_texts_show_commands():
 
 @pytest.mark.parametrize(("file", "verb", "options"), COMMANDS)
 def test_every_command_shown_exists_with_its_options(file, verb, options):
-    assert verb in app.verbs(), f"{file} shows 'rotordrop {verb}'"
-    known = {name for parameter in app.load_verb(verb).params for name in parameter.opts}
+    assert verb in VERBS, f"{file} shows 'rotordrop {verb}'"
+    known = {name for parameter in VERBS[verb].load().params for name in parameter.opts}
     assert set(options) <= known, f"{file} shows 'rotordrop {verb}' with options it does not have"
 
 
 def test_the_help_of_every_verb_ends_with_an_example_that_has_its_options():
-    assert set(EXAMPLES) == set(app.verbs())
-    for verb, line in EXAMPLES.items():
-        command = app.load_verb(verb)
-        assert command.epilog == f"Example: {line}"
+    for verb, row in VERBS.items():
+        command = row.load()
+        line = str(command.epilog).removeprefix("Example: ")
         assert line.startswith(f"rotordrop {verb}")
         known = {name for parameter in command.params for name in parameter.opts}
         options = set(re.findall(r"(?<=\s)(--?[a-z][a-z-]*)", line))

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
-from rotordrop_bench.cli.app import main
+from rotordrop.__main__ import main as guarded
+
+
+def main() -> None:
+    """Entry point of the command ``rotordrop-bench``."""
+    guarded("rotordrop_bench.cli.app", "rotordrop-bench")
+
 
 if __name__ == "__main__":
     main()

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer import Argument, Option
 
 from rotordrop.errors import UsageError
 from rotordrop.units import parse_quantity
@@ -35,6 +37,21 @@ def quantity(kind: str) -> Callable[[str | float], float]:
     return parse
 
 
+def measured(kind: str, text: str, default: str | bool = True) -> Any:
+    """An option with a unit; ``default`` says it as people write it."""
+    return Option(parser=quantity(kind), metavar=kind.upper(), help=text, show_default=default)
+
+
+def text_option(metavar: str, text: str) -> Any:
+    """An option that takes a text as it is."""
+    return Option(metavar=metavar, help=text, show_default=False)
+
+
+def file_option(name: str, text: str, short: str | None = None) -> Any:
+    """An option that names a file."""
+    return Option(name, *([short] if short else []), metavar="FILE", help=text, show_default=False)
+
+
 def refuse_beside(option: str, others: Mapping[str, object]) -> None:
     """Refuse what has no meaning beside an option that makes another command of a verb."""
     given = [name for name, value in others.items() if value is not None]
@@ -42,46 +59,62 @@ def refuse_beside(option: str, others: Mapping[str, object]) -> None:
         raise UsageError(f"{option} does not go with {', '.join(given)}; leave out the one or the other")
 
 
-MachineArgument = Annotated[
-    Path, typer.Argument(metavar="MACHINE", help="Machine description, a .toml file.", show_default=False)
-]
+class Reduction(StrEnum):
+    """Presets of the reduction of the rotor."""
 
+    accurate = "accurate"
+    quick = "quick"
+    full = "full"
+
+
+class Integrator(StrEnum):
+    """Runge–Kutta pairs."""
+
+    tsit5 = "tsit5"
+    dp5 = "dp5"
+
+
+MachineArgument = Annotated[
+    Path, Argument(metavar="MACHINE", help="Machine description, a .toml file.", show_default=False)
+]
+RecordsArgument = Annotated[
+    list[Path], Argument(metavar="RECORD...", help="Recorded drops of this machine.", show_default=False)
+]
+PowerOffSpeed = Annotated[float, measured("speed", 'Speed at power-off, "60 Hz".')]
+LevitatedOption = Annotated[
+    bool, Option("--levitated", help="Start floating in the AMBs: synchronous orbit and sag.")
+]
+ReductionOption = Annotated[Reduction, Option(help="Modes of the rotor.")]
+ToleranceOption = Annotated[float, Option(min=1e-12, max=1e-3, help="Accuracy of a step.")]
+IntegratorOption = Annotated[Integrator, Option(help="Runge–Kutta pair.")]
 JsonOption = Annotated[
     Path | None,
-    typer.Option(
-        "--json",
-        metavar="FILE",
-        help="Write the result as JSON to FILE; '-' prints it in place of the summary.",
-        show_default=False,
-    ),
+    file_option("--json", "Write the result as JSON to FILE; '-' prints it in place of the summary."),
 ]
-
 DataOption = Annotated[
     Path | None,
-    typer.Option(
-        "--data",
+    Option(
         metavar="FOLDER",
         help="Write every table and figure of the report as CSV.",
         file_okay=False,
         show_default=False,
     ),
 ]
-
-ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite what stands there already.")]
-
-ProfileOption = Annotated[
-    Path | None, typer.Option("--profile", metavar="FILE", help="Channel map of the recorder.")
+ForceOption = Annotated[bool, Option("--force", help="Overwrite what stands there already.")]
+TextFileOption = Annotated[Path | None, file_option("--output", "Write to FILE instead of printing.", "-o")]
+ReportOption = Annotated[Path | None, file_option("--report", "Write the report, one offline HTML file.")]
+ProfileOption = Annotated[Path | None, file_option("--profile", "Channel map of the recorder.")]
+TailOption = Annotated[
+    list[Path] | None,
+    file_option("--tail", "Settled tail: one for all drops, or one for each in order."),
 ]
-
+TailProfileOption = Annotated[
+    Path | None, file_option("--tail-profile", "Channel map of the recorder of the tails.")
+]
 PlanesOption = Annotated[
     list[str] | None,
-    typer.Option("--map", metavar="PLANE", help='A plane and its channels: "NDE: X1 0 deg, Y1 90 deg".'),
+    Option("--map", metavar="PLANE", help='A plane and its channels: "NDE: X1 0 deg, Y1 90 deg".'),
 ]
-
-ReportOption = Annotated[
-    Path | None, typer.Option("--report", metavar="FILE", help="Write the report, one offline HTML file.")
-]
-
 ThreadsOption = Annotated[
-    int | None, typer.Option("--threads", min=1, metavar="N", help="Threads; all cores by default.")
+    int | None, Option("--threads", min=1, metavar="N", help="Threads; all cores by default.")
 ]

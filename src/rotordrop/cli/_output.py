@@ -1,4 +1,4 @@
-"""What the verbs print: summaries for people, JSON for programs, progress on anything that takes time."""
+"""What the verbs write: summaries for people, JSON, pages, tables, progress on anything that takes time."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -16,10 +17,15 @@ from rotordrop.files import require_place, write_json, write_text
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from rotordrop.study.run import Report, StudyProgress
+    from rotordrop.report.content import ReportContent
 
 STANDARD_OUTPUT = Path("-")
 _PLAIN_WIDTH = 110
+
+OUTPUTS = ("json", "report", "output")
+"""Parameters of the verbs that name files to write; other paths are read."""
+FILLED = ("target", "folder", "data")
+"""Parameters that name a folder to fill, or a file that is never replaced unasked."""
 
 Progress = Callable[[str, float], None]
 
@@ -43,18 +49,27 @@ def console(stream: TextIO | None = None) -> Console:
     )
 
 
-def deliver(content: Any, json_file: Path | None, summarise: Callable[[Console], None]) -> None:
-    """Print the summary, and write the JSON where it was asked for.
+def deliver(
+    content: Any,
+    json_file: Path | None,
+    summary: ReportContent | Callable[[Console], None],
+    *,
+    report: Path | None = None,
+    data: Path | None = None,
+) -> None:
+    """Write page, tables and JSON where they were asked for, and print the summary.
 
-    Parameters
-    ----------
-    content : object
-        The result as JSON-ready dictionaries, lists, numbers and text.
-    json_file : Path or None
-        Where the JSON goes; ``-`` prints it and leaves the summary out.
-    summarise : callable
-        Prints the summary on the console it is given.
+    ``content`` is ready for JSON; with ``-`` as its file it is printed in place of the summary, which is a
+    page or a function that prints on the console it is given. Pages and tables need a page.
     """
+    if not callable(summary):
+        from rotordrop.report.csv_files import write_data
+        from rotordrop.report.page import write_page
+
+        if report is not None:
+            write_page(summary, report)
+        if data is not None:
+            write_data(summary, data)
     if json_file == STANDARD_OUTPUT:
         whole = (sys.stdout.encoding or "utf-8").lower().replace("-", "") == "utf8"
         sys.stdout.write(json.dumps(content, indent=2, ensure_ascii=not whole, allow_nan=False) + "\n")
@@ -62,14 +77,46 @@ def deliver(content: Any, json_file: Path | None, summarise: Callable[[Console],
     if json_file is not None:
         write_json(json_file, content)
     out = console()
-    summarise(out)
+    if callable(summary):
+        summary(out)
+    else:
+        from rotordrop.report.terminal import print_summary
+
+        print_summary(summary, out)
+        if report is not None:
+            out.print(f"Report: {report}")
     if json_file is not None:
         out.print(f"JSON: {json_file}")
 
 
-def read_by_this_command(files: Iterable[Path]) -> None:
-    """Tell which files the command reads; `require_places` keeps its outputs away from them."""
-    _inputs[:] = [*files, *(beside for file in files for beside in _read_beside(file))]
+def deliver_text(text: str, file: Path | None, *, overwrite: bool) -> None:
+    """Print a text, or write it to a file that must not exist yet unless `overwrite` says so."""
+    if file is None or file == STANDARD_OUTPUT:
+        sys.stdout.write(text)
+        return
+    if file.exists() and not overwrite:
+        raise OutputError(f"{file} exists already; name another file or add --force")
+    write_text(file, text)
+    console(sys.stderr).print(f"written: {file}")
+
+
+def with_files_apart(verb: Callable[..., None]) -> Callable[..., None]:
+    """Make a verb refuse to write over what it reads, and two outputs of one name, before it begins."""
+
+    @wraps(verb)
+    def called(**values: Any) -> None:
+        _inputs[:] = [
+            file
+            for name, value in values.items()
+            if name not in (*OUTPUTS, *FILLED)
+            for path in (value if isinstance(value, list) else [value])
+            if isinstance(path, Path)
+            for file in (path, *_read_beside(path))
+        ]
+        require_places(*(values[name] for name in OUTPUTS if name in values))
+        verb(**values)
+
+    return called
 
 
 def _read_beside(file: Path) -> list[Path]:
@@ -92,6 +139,7 @@ def _read_beside(file: Path) -> list[Path]:
 
 def require_places(*files: Path | None) -> None:
     """Refuse outputs that cannot be written, or would replace an input or another output, before any work."""
+    read = {_identity(file) for file in _inputs}
     places: dict[object, Path] = {}
     for file in files:
         if file is None or file == STANDARD_OUTPUT:
@@ -99,12 +147,12 @@ def require_places(*files: Path | None) -> None:
         require_place(file)
         if file.exists() and not file.is_file():
             continue  # a device or a pipe takes more than one
-        for read in _inputs:
-            if _identity(read) == _identity(file):
-                raise UsageError(f"{file} is read by this command and would be replaced; name another file")
-        if _identity(file) in places:
-            raise UsageError(f"{places[_identity(file)]} and {file} are one file; give each output its own")
-        places[_identity(file)] = file
+        place = _identity(file)
+        if place in read:
+            raise UsageError(f"{file} is read by this command and would be replaced; name another file")
+        if place in places:
+            raise UsageError(f"{places[place]} and {file} are one file; give each output its own")
+        places[place] = file
 
 
 def _identity(file: Path) -> object:
@@ -116,15 +164,12 @@ def _identity(file: Path) -> object:
     return found.st_dev, found.st_ino
 
 
-def deliver_text(text: str, file: Path | None, *, overwrite: bool) -> None:
-    """Print a text, or write it to a file that must not exist yet unless `overwrite` says so."""
-    if file is None or file == STANDARD_OUTPUT:
-        sys.stdout.write(text)
-        return
-    if file.exists() and not overwrite:
-        raise OutputError(f"{file} exists already; name another file or add --force")
-    write_text(file, text)
-    console(sys.stderr).print(f"written: {file}")
+def places_beside(named: Path | None, records: Iterable[Path]) -> list[Path]:
+    """The file or folder named, or one for each of several records."""
+    stems = [record.stem for record in records]
+    if named is None or len(stems) == 1:
+        return [] if named is None else [named]
+    return [named.with_name(f"{named.stem}_{stem}{named.suffix}") for stem in stems]
 
 
 @contextmanager
@@ -143,17 +188,4 @@ def progress_bar(title: str) -> Iterator[Progress]:
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"))
     with Bars(*columns, TimeRemainingColumn(), console=console(sys.stderr), transient=True) as bars:
         task = bars.add_task(title, total=1.0)
-
-        def report(stage: str, fraction: float) -> None:
-            bars.update(task, completed=fraction, description=stage or title)
-
-        yield report
-
-
-def drops_shown(bar: Progress) -> Report:
-    """Make what a study calls with its progress, to be shown by a bar."""
-
-    def show(progress: StudyProgress) -> None:
-        bar(f"{progress.drops} of {progress.of} drops, {progress.rate:.1f}/s", progress.drops / progress.of)
-
-    return show
+        yield lambda stage, fraction: bars.update(task, completed=fraction, description=stage or title)

@@ -1,49 +1,42 @@
-"""Compare drops: which was worst, and how sure that is.
-
-Reads what 'rotordrop estimate --json' wrote, one file per drop or one of several drops.
-"""
+"""Compare drops: which was worst, and how sure that is; or what changed between two of them."""
 
 from __future__ import annotations
 
 import json as json_module
-from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from typer import Argument, Option
 
-from rotordrop.cli._options import DataOption, JsonOption, ReportOption, quantity, refuse_beside
-from rotordrop.cli._output import deliver, require_places
-from rotordrop.errors import UsageError
+from rotordrop.cli._options import DataOption, JsonOption, ReportOption, measured, refuse_beside
+from rotordrop.cli._output import deliver
+from rotordrop.errors import RotordropError, UsageError
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from rotordrop.estimate.changed import Changes
-    from rotordrop.report.compared_drop import ComparedDrop
 
 
 def compare(
     estimates: Annotated[
-        list[Path], typer.Argument(metavar="ESTIMATE...", help="Estimates (.json) of one or more drops each.")
+        list[Path], Argument(metavar="ESTIMATE...", help="Estimates (.json) of one or more drops each.")
     ],
     scatter: Annotated[
         float | None,
-        typer.Option(
-            "--scatter",
-            parser=quantity("force"),
-            metavar="FORCE",
-            help='Scatter of the peak force between equal drops (1 s.d.), "400 N", to judge speeds.',
+        measured(
+            "force", 'Scatter of the peak force between equal drops (1 s.d.), "400 N", to judge speeds.'
         ),
     ] = None,
     limit: Annotated[
         list[str] | None,
-        typer.Option(metavar="LIMIT", help='Limit to judge by, "peak_stress=2.5 GPa"; repeat it.'),
+        Option(metavar="LIMIT", help='Limit to judge by, "peak_stress=2.5 GPa"; repeat it.'),
     ] = None,
-    allowed: Annotated[int | None, typer.Option(metavar="N", help="Drops that somebody allows.")] = None,
+    allowed: Annotated[int | None, Option(metavar="N", help="Drops that somebody allows.")] = None,
     changed: Annotated[
         bool,
-        typer.Option(
+        Option(
             "--changes",
             help="Say what changed on the machine between two estimates of it, the earlier one first.",
         ),
@@ -52,7 +45,10 @@ def compare(
     data: DataOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Compare several drops: which was worst, and how sure that is; or what changed between two."""
+    """Compare several drops: which was worst, and how sure that is; or what changed between two.
+
+    Example: rotordrop compare drop1.json drop2.json
+    """
     if changed:
         others = {
             "--scatter": scatter,
@@ -62,16 +58,21 @@ def compare(
             "--data": data,
         }
         refuse_beside("--changes", others)
-        _say_changes(estimates, json)
+        _deliver_changes(estimates, json)
         return
-    from rotordrop.report.compare_page import compare_page
+    from rotordrop.report.compare_page import compare_page, rankings
+    from rotordrop.report.compared_drop import ComparedDrop, left_out
     from rotordrop.report.limits import limit_statement, read_limits
-    from rotordrop.report.page import write_page
-    from rotordrop.report.terminal import print_summary
 
-    require_places(json, report)
-    documents = _documents(estimates)
-    drops = _compared(documents)
+    documents: dict[str, dict[str, Any]] = {}
+    for path in estimates:
+        content = read_estimate(path)
+        for name, document in content.get("drops", {path.stem: content}).items():
+            documents[name if name not in documents else f"{path.stem}: {name}"] = document
+    drops = [
+        ComparedDrop.of_document(name, document, simulated=bool(document.get("simulated_record", False)))
+        for name, document in documents.items()
+    ]
     if len(drops) < 2:
         raise UsageError(
             f"{len(drops)} drop to compare; at least two are needed. "
@@ -87,67 +88,10 @@ def compare(
         limits=limits,
         allowed=allowed,
     )
-    if report is not None:
-        write_page(page, report)
-    if data is not None:
-        from rotordrop.report.csv_files import write_data
-
-        write_data(page, data)
-
-    def summarise(out: Console) -> None:
-        print_summary(page, out)
-        if report is not None:
-            out.print(f"Report: {report}")
-
-    verdict = limit_statement(drops, limits, allowed).text
-    deliver(_ranked(drops, drop_scatter) | {"verdict": verdict}, json, summarise)
-
-
-def _documents(paths: list[Path]) -> dict[str, dict[str, Any]]:
-    """Every drop of every file, by name; the same name in two files gets the file's name before it."""
-    found: dict[str, dict[str, Any]] = {}
-    for path in paths:
-        content = read_estimate(path)
-        drops = content.get("drops", {path.stem: content})
-        for name, drop in drops.items():
-            found[name if name not in found else f"{path.stem}: {name}"] = drop
-    return found
-
-
-def read_estimate(path: Path) -> dict[str, Any]:
-    """Content of a file that the estimate command wrote, of one drop or several."""
-    try:
-        content = json_module.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise UsageError(
-            f"{path} cannot be read ({error.strerror}); give a file of 'rotordrop estimate --json'."
-        ) from error
-    except ValueError as error:
-        raise UsageError(
-            f"{path} is not JSON ({error}); give a file written by 'rotordrop estimate --json'."
-        ) from error
-    if not isinstance(content, dict):
-        raise UsageError(f"{path} holds a {type(content).__name__}; expected the object of an estimate.")
-    return content
-
-
-def _compared(documents: Mapping[str, dict[str, Any]]) -> list[ComparedDrop]:
-    from rotordrop.report.compared_drop import ComparedDrop
-
-    return [
-        ComparedDrop.of_document(name, document, simulated=bool(document.get("simulated_record", False)))
-        for name, document in documents.items()
-    ]
-
-
-def _ranked(drops: list[ComparedDrop], scatter: Mapping[str, float] | None) -> dict[str, Any]:
-    from rotordrop.report.compare_page import rankings
-    from rotordrop.report.compared_drop import left_out
-
-    tree: dict[str, Any] = {}
-    for (bearing, key), ranking in rankings(drops, list(drops[0].numbers), scatter or {}).items():
+    ranked: dict[str, Any] = {}
+    for (bearing, key), ranking in rankings(drops, list(drops[0].numbers), drop_scatter or {}).items():
         condition = ranking.worst_condition
-        tree.setdefault(bearing, {})[key] = {
+        ranked.setdefault(bearing, {})[key] = {
             "worst_first": list(ranking.names),
             "values": list(ranking.values),
             "probability_worst_drop": list(ranking.worst_drop),
@@ -155,24 +99,40 @@ def _ranked(drops: list[ComparedDrop], scatter: Mapping[str, float] | None) -> d
             "probability_worst_condition": None if condition is None else list(condition),
             "statement": ranking.statement,
         }
-    return {"left_out": left_out(drops), "bearings": tree}
+    verdict = limit_statement(drops, limits, allowed).text
+    numbers = {"left_out": left_out(drops), "bearings": ranked, "verdict": verdict}
+    deliver(numbers, json, page, report=report, data=data)
 
 
-def _say_changes(estimates: list[Path], json: Path | None) -> None:
-    from dataclasses import asdict
+def read_estimate(path: Path, error: type[RotordropError] = UsageError) -> dict[str, Any]:
+    """Content of a file that the estimate command wrote, of one drop or several."""
+    try:
+        content = json_module.loads(path.read_text(encoding="utf-8"))
+    except OSError as fault:
+        raise error(
+            f"{path} cannot be read ({fault.strerror}); give a file of 'rotordrop estimate --json'."
+        ) from fault
+    except ValueError as fault:
+        raise error(
+            f"{path} is not JSON ({fault}); give a file written by 'rotordrop estimate --json'."
+        ) from fault
+    if not isinstance(content, dict):
+        raise error(f"{path} holds a {type(content).__name__}; expected the object of an estimate.")
+    return content
 
+
+def _deliver_changes(estimates: list[Path], json: Path | None) -> None:
     from rotordrop.estimate.changed import changes
     from rotordrop.report.repeat_page import finite
 
     if len(estimates) != 2:
         raise UsageError(f"--changes compares two estimates, and {len(estimates)} are given; name two files.")
-    require_places(json)
     found = changes(*(read_estimate(path) for path in estimates))
-    content = {**asdict(found), "sentence": found.sentence()}
-    deliver(finite(content), json, lambda out: _changes_table(out, found))
+    content = asdict(found) | {"sentence": found.sentence()}
+    deliver(finite(content), json, lambda out: _print_changes(found, out))
 
 
-def _changes_table(out: Console, found: Changes) -> None:
+def _print_changes(found: Changes, out: Console) -> None:
     from rich.table import Table
 
     from rotordrop.elements.table import row_of

@@ -1,29 +1,38 @@
-"""Estimate bearing force and stress from recorded drops.
-
-Prints the verdict; writes the numbers as JSON and an offline report on request.
-"""
+"""Estimate force and stress from recorded drops, and calibrate a machine on several."""
 
 from __future__ import annotations
 
+import hashlib
 import sys
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Option
 
-from rotordrop.cli._options import DataOption, JsonOption, MachineArgument, ProfileOption
-from rotordrop.cli._output import deliver, progress_bar, require_places
-from rotordrop.cli._recordings import require_own_content, require_own_names, tails_of
+from rotordrop.cli._options import (
+    DataOption,
+    JsonOption,
+    MachineArgument,
+    ProfileOption,
+    RecordsArgument,
+    TailOption,
+    TailProfileOption,
+    file_option,
+    text_option,
+)
+from rotordrop.cli._output import deliver, places_beside, progress_bar, require_places
 from rotordrop.errors import ConsistencyError, UsageError
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from rotordrop.estimate.estimate import Estimate
     from rotordrop.machine import Machine
-    from rotordrop.report.origin import Origin
+    from rotordrop.record.record import Record
+    from rotordrop.report.content import ReportContent
+    from rotordrop.twin.calibrated import Calibration
 
 
 class Method(StrEnum):
@@ -35,137 +44,216 @@ class Method(StrEnum):
 
 def estimate(
     machine: MachineArgument,
-    records: Annotated[
-        list[Path], typer.Argument(metavar="RECORD...", help="Recorded drops of this machine.")
-    ],
-    tail: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--tail", metavar="FILE", help="Settled tail: one for all drops, or one for each in order."
-        ),
-    ] = None,
-    method: Annotated[Method, typer.Option("--method", help="How the force is found.")] = Method.tracked,
+    records: RecordsArgument,
+    tail: TailOption = None,
+    method: Annotated[Method, Option("--method", help="How the force is found.")] = Method.tracked,
     fixed: Annotated[
-        Path | None,
-        typer.Option("--fixed", metavar="FILE", help="Replay: use the support of this earlier estimate."),
+        Path | None, file_option("--fixed", "Replay: use the support of this earlier estimate.")
     ] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="One pass; for a calibrated machine.")] = False,
+    quick: Annotated[bool, Option("--quick", help="One pass; for a calibrated machine.")] = False,
     profile: ProfileOption = None,
-    tail_profile: Annotated[
-        Path | None,
-        typer.Option("--tail-profile", metavar="FILE", help="Channel map of the recorder of the tails."),
-    ] = None,
+    tail_profile: TailProfileOption = None,
     report: Annotated[
-        Path | None,
-        typer.Option("--report", metavar="FILE", help="Write the report, one offline HTML file per drop."),
+        Path | None, file_option("--report", "Write the report, one offline HTML file per drop.")
     ] = None,
     since: Annotated[
-        Path | None,
-        typer.Option("--since", metavar="FILE", help="Earlier estimate (.json), for what changed."),
+        Path | None, file_option("--since", "Earlier estimate (.json), for what changed.")
     ] = None,
-    operator: Annotated[str, typer.Option("--operator", metavar="NAME", help="Who, for the report.")] = "",
+    operator: Annotated[str, text_option("NAME", "Who, for the report.")] = "",
     output: Annotated[
         Path | None,
-        typer.Option(
-            "-o",
+        file_option(
             "--output",
-            metavar="FILE",
-            help="Write force, stress, displacement, ball load against time: .h5, .csv, .mat, .parquet.",
+            "Write force, stress, displacement, ball load against time: .h5, .csv, .mat, .parquet.",
+            "-o",
         ),
     ] = None,
     data: DataOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Estimate touchdown-bearing force and stress from recorded drops."""
+    """Estimate touchdown-bearing force and stress from recorded drops.
+
+    Example: rotordrop estimate machine.toml record.csv --tail tail.csv --report report.html
+    """
     from rotordrop.cli.compare import read_estimate
+    from rotordrop.estimate.document import combined, estimate_document
     from rotordrop.estimate.histories import require_format
     from rotordrop.estimation import Replay, Tracked, estimate_drops
     from rotordrop.machine import load_machine
-    from rotordrop.record.record import read_record
+    from rotordrop.report.estimate_page import estimate_page, estimate_summary
     from rotordrop.report.origin import origin_here
+    from rotordrop.report.page import write_page
+    from rotordrop.twin.search import is_calibrated
 
     if fixed is not None and method is not Method.replay:
         raise UsageError(
             "--fixed belongs to --method replay; the tracked twin uses a calibrated machine file instead."
         )
     description, earlier = load_machine(machine), None if since is None else read_estimate(since)
-    require_own_names(records)
-    require_own_content(records)
-    if quick and method is Method.tracked:
-        _require_calibrated(description, machine)
-    reports, outputs = _places(report, records), _places(output, records)
+    require_own_drops(records)
+    if quick and method is Method.tracked and not is_calibrated(description):
+        raise UsageError(
+            f"--quick needs a calibrated machine; supports and contacts of {machine.name} are guesses. "
+            f"Calibrate it with 'rotordrop calibrate {machine.name} RECORD... --output calibrated.toml', "
+            "or leave --quick out."
+        )
+    reports, outputs, folders = (places_beside(named, records) for named in (report, output, data))
     if output is not None:
         require_format(output)
     require_places(json, *reports, *outputs)
-    read = [read_record(path, description, profile=profile) for path in records]
-    of_tails = tail_profile or profile
-    tails = tails_of(tail or [], len(read), lambda path: read_record(path, description, profile=of_tails))
+    read, tails = _read(description, records, tail or [], profile, tail_profile)
     chosen = Tracked(quick=quick) if method is Method.tracked else Replay(fixed=fixed)
     with progress_bar("estimating") as progress:
         estimates = estimate_drops(description, read, tails, method=chosen, progress=progress)
-    folders = _places(data, records)
-    for made, place in zip(estimates, outputs, strict=False):
-        made.save(place)
-    for made, place in zip(estimates, folders, strict=False):
-        made.data(place)
     used = [
         ("machine file", machine),
         *(("record", path) for path in records),
         *(("tail", path) for path in tail or []),
         *(() if since is None else (("earlier estimate", since),)),
     ]
-    _write(estimates, reports, [*outputs, *folders], json, origin_here(sys.argv[1:], used, operator), earlier)
+    origin = origin_here(sys.argv[1:], used, operator)
+    whole = bool(reports) or since is not None
+    pages = [estimate_page(e, origin, earlier) if whole else estimate_summary(e, origin) for e in estimates]
+    for made, place in zip(estimates, outputs, strict=False):
+        made.save(place)
+    for made, place in zip(estimates, folders, strict=False):
+        made.data(place)
+    for page, place in zip(pages, reports, strict=False):
+        write_page(page, place)
+    words = (("Report", reports), ("Histories", outputs), ("Tables and figures", folders))
+    written = [f"{word}: {place}" for word, places in words for place in places]
+    documents = [estimate_document(made) for made in estimates]
+    numbers = combined(documents, [made.name for made in estimates])
+    deliver(numbers, json, lambda out: _summarise(pages, written, out))
+    inconsistent = [made for made in estimates if not made.consistent]
+    if inconsistent:
+        names = ", ".join(made.name for made in inconsistent)
+        raise ConsistencyError(f"{names}: {inconsistent[0].sentence}")
 
 
-def _places(named: Path | None, records: Sequence[Path]) -> list[Path]:
-    """The file or folder named, or one for each of several records."""
-    if named is None:
-        return []
-    if len(records) == 1:
-        return [named]
-    return [named.with_name(f"{named.stem}_{record.stem}{named.suffix}") for record in records]
+def _summarise(pages: Sequence[ReportContent], written: Sequence[str], out: Console) -> None:
+    from rotordrop.report.terminal import print_summary
+
+    for page in pages:
+        print_summary(page, out)
+    for line in written:
+        out.print(line)
 
 
-def _require_calibrated(description: Machine, file: Path) -> None:
-    from rotordrop.twin.search import is_calibrated
+def require_own_drops(records: Sequence[Path]) -> None:
+    """Refuse two records of one file stem, by which results are listed, and the same recording given twice.
 
-    if not is_calibrated(description):
+    One drop would count as two then, and its errors would look smaller.
+    """
+    name, count = Counter(path.stem for path in records).most_common(1)[0]
+    if count > 1:
         raise UsageError(
-            f"--quick needs a calibrated machine; supports and contacts of {file.name} are guesses. "
-            f"Calibrate it with 'rotordrop calibrate {file.name} RECORD... --output calibrated.toml', "
-            "or leave --quick out."
+            f"{count} records are named {name!r}; expected a name of its own for each, because results are "
+            "listed by it. Rename the files, or give each record once."
+        )
+    seen: dict[str, Path] = {}
+    for path in records:
+        try:
+            with path.open("rb") as stream:
+                digest = hashlib.file_digest(stream, "sha256").hexdigest()
+        except OSError:
+            continue  # the reader says what is wrong with it
+        if digest in seen:
+            raise UsageError(
+                f"{seen[digest]} and {path} are the same recording (equal content); expected another drop in "
+                "each. Leave one of them out."
+            )
+        seen[digest] = path
+
+
+def _read(
+    machine: Machine,
+    records: Sequence[Path],
+    tails: Sequence[Path],
+    profile: Path | None,
+    tail_profile: Path | None,
+) -> tuple[list[Record], list[Record | None]]:
+    """Every record and its settled tail: one for all, one for each in order, or none."""
+    from rotordrop.record.record import read_record
+
+    read = [read_record(path, machine, profile=profile) for path in records]
+    if len(tails) not in (0, 1, len(records)):
+        raise UsageError(
+            f"{len(tails)} tails for {len(records)} records; expected one for all, one for each, or none. "
+            "Repeat --tail in the order of the records."
+        )
+    found: list[Record | None] = [
+        read_record(path, machine, profile=tail_profile or profile) for path in tails
+    ]
+    return read, found if len(found) == len(read) else (found or [None]) * len(read)
+
+
+def calibrate(
+    machine: MachineArgument,
+    records: RecordsArgument,
+    output: Annotated[Path, file_option("--output", "Calibrated machine file to write (.toml).", "-o")],
+    tail: TailOption = None,
+    profile: ProfileOption = None,
+    tail_profile: TailProfileOption = None,
+    even_if_inconsistent: Annotated[
+        bool,
+        Option("--even-if-inconsistent", help="Write the machine file, marked, although it does not fit."),
+    ] = False,
+    json: JsonOption = None,
+) -> None:
+    """Calibrate a machine on recorded drops.
+
+    Example: rotordrop calibrate machine.toml drop1.csv drop2.csv --output calibrated.toml
+    """
+    from rotordrop.evidence.quality import check_record
+    from rotordrop.evidence.quality.finding import refuse_unusable
+    from rotordrop.machine import load_machine, save_machine
+    from rotordrop.twin.calibrated import calibrate_machine, calibration_json
+
+    require_own_drops(records)
+    description = load_machine(machine)
+    read, tails = _read(description, records, tail or [], profile, tail_profile)
+    for record, rest in zip(read, tails, strict=True):
+        refuse_unusable(check_record(record, description, rest), record.name)
+    with progress_bar("calibrating") as report:
+        result = calibrate_machine(description, read, tails, progress=report)
+    written = result.consistent or even_if_inconsistent
+    if written:
+        save_machine(result.machine, output)
+
+    def summarise(out: Console) -> None:
+        print_calibration(result, out)
+        if written:
+            out.print(f"Calibrated machine: {output}")
+
+    deliver(calibration_json(result), json, summarise)
+    if not result.consistent:
+        outcome = f"{output} is marked as such" if written else f"{output} was not written"
+        raise ConsistencyError(
+            f"{result.sentence()} {outcome}: air gaps and supports that do not fit would send every later "
+            "estimate the wrong way. Leave out the drop that does not fit, check sensors and bearing nodes, "
+            "or give better guesses; --even-if-inconsistent writes the file all the same."
         )
 
 
-def _write(
-    estimates: Sequence[Estimate],
-    reports: list[Path],
-    others: list[Path],
-    json: Path | None,
-    origin: Origin,
-    since: Mapping[str, Any] | None,
-) -> None:
-    from rotordrop.estimate.document import combined, estimate_document
-    from rotordrop.report.estimate_page import estimate_page, estimate_summary
-    from rotordrop.report.page import write_page
-    from rotordrop.report.terminal import print_summary
+def print_calibration(result: Calibration, out: Console) -> None:
+    """Print every calibrated value in display units, what cannot be told apart, and what does not fit."""
+    from rich.table import Table
 
-    whole = bool(reports) or since is not None
-    pages = [estimate_page(e, origin, since) if whole else estimate_summary(e, origin) for e in estimates]
-    for page, place in zip(pages, reports, strict=False):
-        write_page(page, place)
+    from rotordrop.elements.table import row_of
+    from rotordrop.report.quantity import Quantity
 
-    def summarise(out: Console) -> None:
-        for page in pages:
-            print_summary(page, out)
-        for place in reports:
-            out.print(f"Report: {place}")
-        for place in others:
-            out.print(f"Histories: {place}" if place.suffix else f"Tables and figures: {place}")
-
-    documents = [estimate_document(estimate) for estimate in estimates]
-    deliver(combined(documents, [estimate.name for estimate in estimates]), json, summarise)
-    beside = [estimate for estimate in estimates if not estimate.consistent]
-    if beside:
-        names = ", ".join(estimate.name for estimate in beside)
-        raise ConsistencyError(f"{names}: {beside[0].sentence}")
+    table = Table("parameter", "estimate", "90 % interval", "verdict", box=None)
+    for path, value in result.values.items():
+        shown = Quantity(value=value.value, kind=row_of(path).display_kind, interval_90=value.interval_90)
+        table.add_row(path, shown.text, shown.interval_text, value.status)
+    out.print(table)
+    for pair in result.confounded:
+        out.print(
+            f"confounded: {pair.first} and {pair.second} (correlation {pair.correlation:.2f}); {pair.way_out}"
+        )
+    for name, checks in result.checks.items():
+        for check in checks:
+            if not check.passed:
+                out.print(f"{name}: {check.message}")
+    out.print(result.sentence())

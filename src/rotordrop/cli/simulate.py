@@ -1,33 +1,46 @@
-"""Simulate a drop and show forces, stresses and contacts.
-
-Starts centred, from given displacements and velocities, or levitated in the AMBs.
-"""
+"""Simulate a drop or a whole coast-down."""
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from typer import Option
 
-from rotordrop.cli._interruption import interruptible
-from rotordrop.cli._options import DataOption, JsonOption, MachineArgument, quantity
-from rotordrop.cli._output import deliver, require_places
-from rotordrop.cli._start import levitated_start, placed_start
+from rotordrop.cli._options import (
+    DataOption,
+    Integrator,
+    IntegratorOption,
+    JsonOption,
+    LevitatedOption,
+    MachineArgument,
+    PowerOffSpeed,
+    Reduction,
+    ReductionOption,
+    ReportOption,
+    ToleranceOption,
+    file_option,
+    measured,
+    text_option,
+)
+from rotordrop.cli._output import console, deliver, progress_bar
+from rotordrop.cli._terminal import interruptible
 from rotordrop.errors import UsageError
+from rotordrop.units import parse_quantity
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from rotordrop.machine import Machine
     from rotordrop.simulate.case import Start
 
-
-class Reduction(StrEnum):
-    """Presets of the reduction of the rotor."""
-
-    accurate = "accurate"
-    quick = "quick"
-    full = "full"
+STANDSTILL = "standstill"
+_EXAMPLES = {"length": "10 um, -20 um", "velocity": "0 mm/s, -5 mm/s", "force": "0 N, 40 N"}
 
 
 class Spin(StrEnum):
@@ -39,99 +52,71 @@ class Spin(StrEnum):
     constant = "constant"
 
 
-class Integrator(StrEnum):
-    """Runge–Kutta pairs."""
-
-    tsit5 = "tsit5"
-    dp5 = "dp5"
-
-
 def simulate(
     machine: MachineArgument,
-    speed: Annotated[
-        float, typer.Option(parser=quantity("speed"), metavar="SPEED", help='Speed at power-off, "60 Hz".')
-    ],
-    duration: Annotated[
-        float,
-        typer.Option(
-            parser=quantity("time"), metavar="TIME", help="How long to simulate.", show_default="0.2 s"
-        ),
-    ] = 0.2,
-    output_step: Annotated[
-        float,
-        typer.Option(
-            parser=quantity("time"), metavar="TIME", help="Step of the histories.", show_default="10 us"
-        ),
-    ] = 1e-5,
+    speed: PowerOffSpeed,
+    duration: Annotated[float, measured("time", "How long to simulate.", "0.2 s")] = 0.2,
+    output_step: Annotated[float, measured("time", "Step of the histories.", "10 us")] = 1e-5,
     displacement: Annotated[
         list[str] | None,
-        typer.Option(metavar="PLACE", help='Start displaced: "NDE: 10 um, -20 um" (horizontal, vertical).'),
+        text_option("PLACE", 'Start displaced: "NDE: 10 um, -20 um" (horizontal, vertical).'),
     ] = None,
     velocity: Annotated[
-        list[str] | None, typer.Option(metavar="PLACE", help='Start moving: "NDE: 0 mm/s, -5 mm/s".')
+        list[str] | None, text_option("PLACE", 'Start moving: "NDE: 0 mm/s, -5 mm/s".')
     ] = None,
-    levitated: Annotated[
-        bool, typer.Option("--levitated", help="Start floating in the AMBs: synchronous orbit and sag.")
-    ] = False,
-    rotor_angle: Annotated[
-        float,
-        typer.Option(
-            parser=quantity("angle"), metavar="ANGLE", help="Levitated: rotor angle.", show_default="0 deg"
-        ),
-    ] = 0.0,
-    delay: Annotated[
-        float,
-        typer.Option(
-            parser=quantity("time"), metavar="TIME", help="Levitated: magnets hold on.", show_default="0 s"
-        ),
-    ] = 0.0,
+    levitated: LevitatedOption = False,
+    rotor_angle: Annotated[float, measured("angle", "Levitated: rotor angle.", "0 deg")] = 0.0,
+    delay: Annotated[float, measured("time", "Levitated: magnets hold on.", "0 s")] = 0.0,
     remanent_force: Annotated[
         list[str] | None,
-        typer.Option(metavar="FORCE", help='Levitated: force left at power-off, "NDE: 0 N, 40 N".'),
+        text_option("FORCE", 'Levitated: force left at power-off, "NDE: 0 N, 40 N".'),
     ] = None,
-    remanence_time: Annotated[
-        float,
-        typer.Option(
-            parser=quantity("time"), metavar="TIME", help="Levitated: its decay.", show_default="2 ms"
-        ),
-    ] = 2e-3,
+    remanence_time: Annotated[float, measured("time", "Levitated: its decay.", "2 ms")] = 2e-3,
     spin: Annotated[
-        Spin, typer.Option(help="What brakes: drag and friction; a drag profile; friction alone; nothing.")
+        Spin, Option(help="What brakes: drag and friction; a drag profile; friction alone; nothing.")
     ] = Spin.dynamic,
-    reduction: Annotated[Reduction, typer.Option(help="Modes of the rotor.")] = Reduction.accurate,
-    tolerance: Annotated[float, typer.Option(min=1e-12, max=1e-3, help="Accuracy of a step.")] = 1e-6,
-    integrator: Annotated[Integrator, typer.Option(help="Runge–Kutta pair.")] = Integrator.tsit5,
+    reduction: ReductionOption = Reduction.accurate,
+    tolerance: ToleranceOption = 1e-6,
+    integrator: IntegratorOption = Integrator.tsit5,
     certify: Annotated[
-        bool, typer.Option("--certify", help="Also measure the numerical error (three times the time).")
+        bool, Option("--certify", help="Also measure the numerical error (three times the time).")
     ] = False,
     output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", metavar="FILE", help="Write all histories as HDF5 (NetCDF4)."),
+        Path | None, file_option("--output", "Write all histories as HDF5 (NetCDF4).", "-o")
     ] = None,
-    report: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write the report as one HTML file.")
-    ] = None,
+    report: ReportOption = None,
     data: DataOption = None,
-    json_file: JsonOption = None,
+    json: JsonOption = None,
 ) -> None:
-    """Simulate a drop and show forces, stresses and contacts of every touchdown bearing."""
+    """Simulate a drop and show forces, stresses and contacts of every touchdown bearing.
+
+    Example: rotordrop simulate machine.toml --speed "60 Hz" --report drop.html
+    """
     from rotordrop.machine import load_machine
-    from rotordrop.report.page import write_page
     from rotordrop.report.simulate_page import simulate_page
     from rotordrop.report.simulation_numbers import simulation_numbers
-    from rotordrop.report.terminal import print_summary, summary_console
-    from rotordrop.simulate.case import DropCase
+    from rotordrop.report.terminal import summary_console
+    from rotordrop.simulate.case import DropCase, LevitatedStart, PlacedStart
     from rotordrop.simulate.drop import simulate_drop
     from rotordrop.simulate.expected_steps import long_run
 
-    require_places(output, report, json_file)
     described = load_machine(machine)
+    bearings = [bearing.name for bearing in described.touchdown_bearings]
     if levitated:
         if displacement or velocity:
             raise UsageError("--levitated cannot go with --displacement or --velocity; choose one start")
-        start: Start = levitated_start(described, rotor_angle, delay, remanent_force or (), remanence_time)
+        left = named_pairs(remanent_force or (), "force", [amb.name for amb in described.ambs])
+        start: Start = LevitatedStart(
+            rotor_angle=rotor_angle,
+            delay=delay,
+            remanent_force=left if remanent_force else None,
+            remanence_time_constant=remanence_time,
+        )
     else:
-        start = placed_start(described, displacement or (), velocity or ())
+        start = PlacedStart(
+            displacement=named_pairs(displacement or (), "length", bearings),
+            velocity=named_pairs(velocity or (), "velocity", bearings),
+        )
     case = DropCase(
         speed=speed,
         duration=duration,
@@ -146,13 +131,144 @@ def simulate(
     if warning is not None:
         summary_console(sys.stderr).print(warning, soft_wrap=True)
     result = interruptible(lambda: simulate_drop(described, case, certify=certify))
-    page = simulate_page(result, described)
     if output is not None:
         result.save(output)
-    if report is not None:
-        write_page(page, report)
-    if data is not None:
-        from rotordrop.report.csv_files import write_data
+    page = simulate_page(result, described)
+    deliver(simulation_numbers(result), json, page, report=report, data=data)
 
-        write_data(page, data)
-    deliver(simulation_numbers(result), json_file, lambda out: print_summary(page, out))
+
+def named_pairs(texts: Sequence[str], kind: str, names: Sequence[str]) -> NDArray[np.float64]:
+    """Read entries such as ``"NDE: 10 um, -20 um"`` into SI values, shape (names, 2), zero where not named.
+
+    Examples
+    --------
+    >>> from rotordrop.cli.simulate import named_pairs
+    >>> named_pairs(["DE: 10 um, -20 um"], "length", ["NDE", "DE"]).tolist()
+    [[0.0, 0.0], [1e-05, -2e-05]]
+    """
+    import numpy as np
+
+    if texts and not names:
+        raise UsageError(f"{texts[0]!r} names a part of the machine, which has none of this kind")
+    values = np.zeros((len(names), 2))
+    for text in texts:
+        name, _, pair = text.rpartition(":")
+        parts = pair.split(",")
+        if name.strip() not in names or len(parts) != 2:
+            raise UsageError(
+                f"{text!r} is not 'NAME: horizontal, vertical' with a name out of {', '.join(names)}; "
+                f"write for example '{names[0]}: {_EXAMPLES[kind]}'"
+            )
+        values[list(names).index(name.strip())] = [parse_quantity(part, kind) for part in parts]
+    return values
+
+
+def coast_down(
+    machine: MachineArgument,
+    speed: PowerOffSpeed,
+    until: Annotated[str, Option(metavar="END", help='"standstill", or a time such as "20 s".')] = STANDSTILL,
+    rest: Annotated[float, measured("time", "Go on after standstill.", "0 s")] = 0.0,
+    drag_from: Annotated[
+        Path | None, text_option("RECORD", "Take the drag from the speed of a recorded coast-down.")
+    ] = None,
+    output_step: Annotated[float, measured("time", "Step of the samples.", "50 us")] = 5e-5,
+    levitated: LevitatedOption = False,
+    reduction: ReductionOption = Reduction.quick,
+    tolerance: ToleranceOption = 1e-6,
+    integrator: IntegratorOption = Integrator.tsit5,
+    certify: Annotated[
+        bool, Option("--certify", help="Also repeat it at a tighter tolerance (five times the time).")
+    ] = False,
+    output: Annotated[Path | None, file_option("--output", "Write the samples as HDF5.", "-o")] = None,
+    resume: Annotated[
+        bool, Option("--resume", help="Go on with a run to the same output that was killed.")
+    ] = False,
+    report: ReportOption = None,
+    json: JsonOption = None,
+) -> None:
+    """Simulate a coast-down to standstill: statistics, peaks with their time, whirl, energy.
+
+    The machine needs a drag: speed.aero_linear and speed.aero_quadratic (torques as a function of speed) or
+    speed.aero_time_constant in its file, or --drag-from with a recorded coast-down whose speed shows it. The
+    linear and the quadratic part go to the air then, the dry part to the races. Only a race drag brings a
+    rotor to standstill.
+
+    With --output the samples go to disk second by second. A run that was stopped with Ctrl-C or killed goes
+    on with --resume and the same values, to the same last bit.
+
+    Example: rotordrop coast-down machine.toml --speed "60 Hz" --report coast.html
+    """
+    from rotordrop.estimate.recorded_coast_down import recorded_coast_down, with_recorded_drag
+    from rotordrop.machine import load_machine
+    from rotordrop.record.record import read_record
+    from rotordrop.report.coast_down_page import coast_down_page
+    from rotordrop.report.page import write_page
+    from rotordrop.report.terminal import summary_console
+    from rotordrop.rotor.parameters import build_drop_model
+    from rotordrop.simulate._coast_run import MOST_STEPS_PER_WINDOW
+    from rotordrop.simulate.case import CentredStart, LevitatedStart
+    from rotordrop.simulate.coast_down import simulate_coast_down
+    from rotordrop.simulate.coast_down_case import CoastDownCase
+    from rotordrop.simulate.coast_down_certificate import certify_coast_down
+    from rotordrop.simulate.expected_steps import long_run
+
+    if resume and output is None:
+        raise UsageError("--resume needs the --output of the run that was killed")
+    described = load_machine(machine)
+    if drag_from is not None:
+        recorded = recorded_coast_down(described, read_record(drag_from, described))
+        described = with_recorded_drag(described, recorded)
+    case = CoastDownCase(
+        speed=speed,
+        duration=None if until.strip() == STANDSTILL else parse_quantity(until, "time"),
+        rest=rest,
+        output_step=output_step,
+        tolerance=tolerance,
+        reduction=reduction.value,
+        start=LevitatedStart() if levitated else CentredStart(),
+        integrator=integrator.value,
+    )
+    model = build_drop_model(described, case.reduction)
+    warning = long_run(described, 1.0, MOST_STEPS_PER_WINDOW)
+    if warning is not None:
+        summary_console(sys.stderr).print(f"each second: {warning}", soft_wrap=True)
+    with _resumable(output), progress_bar("coast-down") as progress:
+        result = interruptible(
+            lambda: simulate_coast_down(model, case, output=output, resume=resume, progress=progress)
+        )
+    assert result is not None
+    certificate = None
+    if certify:
+        with progress_bar("at a tighter tolerance") as progress:
+            certificate = certify_coast_down(model, case, result, progress=progress)
+    numbers: dict[str, Any] = result.as_json()
+    if report is not None:
+        # with samples on disk the page also has waterfalls, lines and resonances
+        analysis = None if result.path is None else _frequencies(described, result.path)
+        write_page(coast_down_page(result, described, analysis, certificate), report)
+        numbers["frequencies"] = None if analysis is None else analysis.as_json()
+    if certificate is not None:
+        numbers["certificate"] = certificate.as_json()
+    deliver(numbers, json, coast_down_page(result, described, certificate=certificate))
+
+
+@contextmanager
+def _resumable(output: Path | None) -> Iterator[None]:
+    """Say how to go on after Ctrl-C."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        if output is not None:
+            console(sys.stderr).print(f"the part of {output} done so far is kept: go on with --resume")
+        raise
+
+
+def _frequencies(machine: Machine, path: Path) -> Any:
+    from rotordrop.estimate.simulated_coast_down import simulated_coast_down
+    from rotordrop.spectrum.coast_down import analyse_coast_down
+    from rotordrop.spectrum.machine_candidates import machine_candidates
+
+    signal = simulated_coast_down(path, machine)
+    candidates = machine_candidates(machine, {name: name for name in signal.planes})
+    with progress_bar("frequencies") as progress:
+        return analyse_coast_down(signal, candidates, progress=progress)

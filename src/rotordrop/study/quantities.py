@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.description import unknown_key
+from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
 from rotordrop.physics.whirl_spells import WhirlSpell, whirl_spells
 from rotordrop.rotor.parameters import DropModel
@@ -107,6 +109,14 @@ def columns_of(machine: Machine) -> tuple[Quantity, ...]:
         for amb in machine.ambs
     ]
     return (*bearings, *magnets, *DROP_QUANTITIES)
+
+
+def column_of(machine: Machine, name: str) -> Quantity:
+    """A column of a study by its name; refuses a name there is none of."""
+    columns = {q.name: q for q in columns_of(machine)}
+    if name not in columns:
+        raise UsageError(unknown_key(name, tuple(columns)))
+    return columns[name]
 
 
 def row_of(model: DropModel, result: DropResult) -> Array:

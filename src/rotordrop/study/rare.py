@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 from scipy.stats import t as student
 
-from rotordrop.elements.description import unknown_key
 from rotordrop.errors import UsageError
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.study.plan import Study
-from rotordrop.study.quantities import columns_of
+from rotordrop.study.quantities import column_of, columns_of
 from rotordrop.study.run import one_drop
 
 Array = NDArray[np.float64]
@@ -205,14 +204,8 @@ def rare_drops(
     progress : callable, optional
         Called with a sentence and the number of drops done over the expected number.
     """
-    names = [q.name for q in columns_of(study.machine)]
-    if column not in names:
-        raise UsageError(unknown_key(column, tuple(names)))
-    place, model, varied = (
-        names.index(column),
-        build_drop_model(study.machine, study.reduction),
-        list(study.varied),
-    )
+    place = columns_of(study.machine).index(column_of(study.machine, column))
+    model, varied = build_drop_model(study.machine, study.reduction), list(study.varied)
     failed = done = 0
 
     def quantity(values: Array) -> float:

@@ -15,7 +15,7 @@ from rotordrop import errors
 from rotordrop.cli import app as command_line
 from rotordrop.cli._options import quantity
 
-VERBS = command_line.verbs()
+VERBS = command_line.VerbTable.verbs()
 
 
 def call(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -31,9 +31,9 @@ def call(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str
 def test_help_lists_every_verb_with_its_line():
     done = call("--help")
     assert done.returncode == 0
-    for verb, line in VERBS.items():
-        assert f"  {verb}" in done.stdout
-        assert line.split()[0] in done.stdout
+    for name, verb in VERBS.items():
+        assert f"  {name}" in done.stdout
+        assert verb.line.split()[0] in done.stdout
 
 
 def test_no_arguments_is_help():
@@ -48,10 +48,10 @@ def test_version():
 
 @pytest.mark.parametrize("verb", VERBS)
 def test_each_verb_has_help_and_a_line_that_fits(verb):
-    command = command_line.load_verb(verb)
+    command = VERBS[verb].load()
     assert command.name == verb
     assert command.help, "the function of the verb needs a docstring"
-    assert 10 < len(VERBS[verb]) <= 60, "one line of the help page"
+    assert 10 < len(VERBS[verb].line) <= 60, "one line of the help page"
     for parameter in command.params:
         if parameter.name != "help":
             assert getattr(parameter, "help", None), f"{verb}: {parameter.name} has no help text"
@@ -61,7 +61,7 @@ def test_each_verb_has_help_and_a_line_that_fits(verb):
     "verb", [verb for verb in VERBS if verb not in {"init", "schema", "profile", "serve"}]
 )
 def test_each_verb_that_computes_offers_json(verb):
-    options = [name for parameter in command_line.load_verb(verb).params for name in parameter.opts]
+    options = [name for parameter in VERBS[verb].load().params for name in parameter.opts]
     assert "--json" in options
 
 
@@ -76,20 +76,17 @@ def test_an_unknown_verb_is_a_wrong_call_with_a_suggestion():
 
 @pytest.fixture
 def verb_folder(tmp_path, monkeypatch):
-    """Let the command line find its verbs in a folder of the test."""
-    import rotordrop.cli
-
-    monkeypatch.setattr(rotordrop.cli, "__path__", [str(tmp_path)])
-    monkeypatch.setattr(command_line, "__file__", str(tmp_path / "app.py"))
+    """Let the command line have verbs whose modules lie in a folder of the test."""
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(command_line.VerbTable, "groups", {"Try": ()})
     yield tmp_path
-    for name in [name for name in sys.modules if name.startswith("rotordrop.cli.try_")]:
+    for name in [name for name in sys.modules if name.startswith("try_")]:
         del sys.modules[name]
 
 
 def write_verb(folder: Path, name: str, body: str) -> None:
-    text = '"""Try it out.\n\nMore.\n"""\n'
-    text += "from rotordrop import errors\n"
-    (folder / f"{name}.py").write_text(text + body)
+    (folder / f"{name}.py").write_text("from rotordrop import errors\n" + body)
+    command_line.VerbTable.groups = {"Try": (command_line.Verb(name.replace("_", "-"), "Try it out", name),)}
 
 
 @pytest.mark.parametrize(
@@ -164,9 +161,8 @@ def test_ctrl_c_in_the_real_command_ends_with_130():
     program = (
         "import os, signal, sys\n"
         "from rotordrop.cli import app\n"
-        "app.load_verb = lambda name: os.kill(os.getpid(), signal.SIGINT)\n"
-        "app.verbs = lambda: {'wait': 'Wait'}\n"
-        "sys.exit(app.run(['wait']))\n"
+        "app.Verb.load = lambda verb: os.kill(os.getpid(), signal.SIGINT)\n"
+        "sys.exit(app.run(['simulate']))\n"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
     assert done.returncode == 130
@@ -179,9 +175,8 @@ def command_in_which(fault):
     program = (
         "import sys\n"
         "from rotordrop.cli import app\n"
-        f"app.load_verb = lambda name: exec({fault!r}, {{}})\n"
-        "app.verbs = lambda: {'wait': 'Wait'}\n"
-        "sys.argv = ['rotordrop', 'wait']\n"
+        f"app.Verb.load = lambda verb: exec({fault!r}, {{}})\n"
+        "sys.argv = ['rotordrop', 'simulate']\n"
         "app.main()\n"
     )
     return subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)

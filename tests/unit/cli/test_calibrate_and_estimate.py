@@ -207,7 +207,7 @@ def test_several_records_give_machine_and_drops(
 def test_a_stopped_calibration_leaves_no_file(
     shortened: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("rotordrop.cli.calibrate.progress_bar", interrupted)
+    monkeypatch.setattr("rotordrop.cli.estimate.progress_bar", interrupted)
     output = tmp_path / "calibrated.toml"
     assert run(["calibrate", LP400, RECORD, "--tail", TAIL, "--output", str(output)]) == INTERRUPTED
     assert "stopped; nothing was left half written" in words(capsys.readouterr().err)

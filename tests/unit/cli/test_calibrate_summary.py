@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import io
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 from rich.console import Console
 
-from rotordrop.cli.calibrate import _summary
+from rotordrop.cli.estimate import print_calibration
 from rotordrop.known import Known
 
 
@@ -24,7 +23,7 @@ def test_a_calibrated_gap_and_stiffness_are_shown_in_display_units() -> None:
         sentence=lambda: "done",
     )
     out = Console(file=io.StringIO(), width=160)
-    _summary(result, Path("out.toml"), out)
+    print_calibration(result, out)
     text = out.file.getvalue()  # type: ignore[attr-defined]
     assert "281 µm" in text
     assert "25.0 N/µm" in text

@@ -6,8 +6,8 @@ import json
 
 import pytest
 
-from rotordrop.cli._rotor_text import rotor_lines
 from rotordrop.cli.app import run
+from rotordrop.cli.machine import rotor_lines
 from rotordrop.machine import example_machine, example_path
 
 PAPER = str(example_path("paper"))

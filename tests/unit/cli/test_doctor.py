@@ -2,9 +2,10 @@
 
 import json
 import tomllib
+from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 
-from rotordrop.cli import doctor
+from rotordrop.cli import computer
 from rotordrop.cli.app import run
 
 ROOT = Path(__file__).parents[3]
@@ -19,12 +20,18 @@ def test_it_names_what_is_installed(capsys):
     stated = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     extras = {name: needs for name, needs in stated["optional-dependencies"].items() if name not in MAKING}
     told = {name: list(one["packages"]) for name, one in found["extras"].items()}
-    assert told == {name: [doctor._bare(text) for text in needs] for name, needs in extras.items()}
+    assert told == {name: [computer.bare(text) for text in needs] for name, needs in extras.items()}
 
 
 def test_a_missing_package_and_a_missing_extra_are_told_with_the_way_out(capsys, monkeypatch):
-    known = doctor._version
-    monkeypatch.setattr(doctor, "_version", lambda name: None if name in ("pint", "npTDMS") else known(name))
+    known = computer.version
+
+    def stated(name: str) -> str:
+        if name in ("pint", "npTDMS"):
+            raise PackageNotFoundError(name)
+        return known(name)
+
+    monkeypatch.setattr(computer, "version", stated)
     assert run(["doctor"]) == 0
     out = capsys.readouterr().out
     assert "problem: pint is missing; install rotordrop again" in out
@@ -33,15 +40,15 @@ def test_a_missing_package_and_a_missing_extra_are_told_with_the_way_out(capsys,
 
 def test_an_empty_cache_and_one_that_cannot_be_written_are_told_apart():
     empty = {"folder": "/there", "writable": True, "kernels": 0, "bytes": 0}
-    assert doctor._cache_lines(empty) == [
+    assert computer.cache_lines(empty) == [
         "compiled code is not cached yet in /there; the first run takes a minute or two"
     ]
-    assert "cannot be written" in doctor._cache_lines(empty | {"writable": False})[0]
-    full = doctor._cache_lines(empty | {"kernels": 12, "bytes": 3_400_000})[0]
+    assert "cannot be written" in computer.cache_lines(empty | {"writable": False})[0]
+    full = computer.cache_lines(empty | {"kernels": 12, "bytes": 3_400_000})[0]
     assert full == "compiled code is cached: 12 kernels, 3.4 MB, in /there"
 
 
 def test_requirements_lose_their_versions():
-    assert doctor._bare("npTDMS>=1.9") == "npTDMS"
-    assert doctor._bare("tree-sitter-toml>=0.7") == "tree-sitter-toml"
-    assert doctor._bare("psycopg[binary]>=3.1") == "psycopg"
+    assert computer.bare("npTDMS>=1.9") == "npTDMS"
+    assert computer.bare("tree-sitter-toml>=0.7") == "tree-sitter-toml"
+    assert computer.bare("psycopg[binary]>=3.1") == "psycopg"

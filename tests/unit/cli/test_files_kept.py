@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+from importlib import import_module
 from inspect import signature
 from pathlib import Path
 from typing import get_args
@@ -13,7 +14,8 @@ from typing import get_args
 import pytest
 
 from rotordrop.cli import app
-from rotordrop.cli._streams import printable
+from rotordrop.cli._output import FILLED, OUTPUTS
+from rotordrop.cli._terminal import printable
 from rotordrop.cli.app import run
 from rotordrop.errors import UsageError
 from rotordrop.machine import example_machine, example_path, save_machine
@@ -64,14 +66,13 @@ def test_two_outputs_need_two_files(machine, capsys):
     assert run(["check", str(machine), "--json", os.devnull, "--report", os.devnull]) == 0
 
 
-@pytest.mark.parametrize("verb", list(app.verbs()))
+@pytest.mark.parametrize("verb", app.VerbTable.verbs().values(), ids=lambda verb: verb.name)
 def test_every_path_of_every_command_is_known_as_read_or_written(verb):
-    module = __import__(f"rotordrop.cli.{verb.replace('-', '_').replace(' ', '_')}", fromlist=["_"])
-    function = getattr(module, verb.replace("-", "_").replace(" ", "_"))
+    function = getattr(import_module(verb.module), verb.name.replace("-", "_").replace(" ", "_"))
     for name, parameter in signature(function, eval_str=True).parameters.items():
         written = str(parameter.default) + str(parameter.annotation)
         if "Path" in str(get_args(parameter.annotation)[:1]) and "rite" in written:
-            assert name in (*app._OUTPUTS, *app._NEITHER), f"{verb} writes {name}: is it kept apart?"
+            assert name in (*OUTPUTS, *FILLED), f"{verb.name} writes {name}: is it kept apart?"
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252", "utf-8"])

@@ -87,7 +87,7 @@ def test_an_allowance_for_a_machine_of_another_name_is_told(tmp_path, estimate, 
     [
         (["show", "{log}"], 64, "is not there; 'rotordrop log add' makes a log"),
         (["add", "{log}"], 64, "nothing to add"),
-        (["add", "{log}", "{log}"], 3, "cannot read the estimate"),
+        (["add", "{log}", "{log}"], 3, "cannot be read (No such file or directory); give a file"),
         (["add", "{log}", "{estimate}", "--recorded", "14.3.2026"], 64, "'14.3.2026' is not a date"),
         (["export", "{log}", "{log}"], 64, "is the log itself; name another file"),
         (["remove", "{log}", "first"], 64, "'first' is not the number of a drop"),

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from rotordrop.cli._recordings import require_own_content
 from rotordrop.cli.app import run
+from rotordrop.cli.estimate import require_own_drops
 from rotordrop.errors import UsageError
 from rotordrop.machine import example_path
 from rotordrop.record.examples import example_record_path
@@ -18,13 +18,13 @@ def test_equal_files_under_two_names_are_refused(tmp_path: Path) -> None:
     paths = [tmp_path / name for name in ("a.csv", "b.csv", "c.csv")]
     for path, content in zip(paths, ("t,x", "t,y", "t,x"), strict=True):
         path.write_text(content)
-    require_own_content(paths[:2])
+    require_own_drops(paths[:2])
     with pytest.raises(UsageError, match=r"a\.csv and .*c\.csv are the same recording .* Leave one"):
-        require_own_content(paths)
+        require_own_drops(paths)
 
 
 def test_a_missing_file_is_left_to_the_reader(tmp_path: Path) -> None:
-    require_own_content([tmp_path / "none.csv", tmp_path / "none.csv"])
+    require_own_drops([tmp_path / "none.csv", tmp_path / "other.csv"])
 
 
 @pytest.mark.parametrize("verb", ["estimate", "calibrate"])

@@ -11,8 +11,8 @@ import time
 import numpy as np
 import pytest
 
-from rotordrop.cli._start import named_pairs
 from rotordrop.cli.app import run
+from rotordrop.cli.simulate import named_pairs
 from rotordrop.errors import UsageError
 from rotordrop.machine import example_machine, example_path, save_machine
 from rotordrop.simulate.result import load_result

@@ -5,69 +5,50 @@ Errors, exit codes and Ctrl-C are those of the command ``rotordrop``.
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import Annotated
+from collections.abc import Sequence
+from typing import ClassVar
 
 import typer
 
 from rotordrop.cli import app as rotordrop_command
-from rotordrop.cli._options import ForceOption
-from rotordrop.cli._output import deliver_text
-from rotordrop_bench.cli.bench import list_drops, make, score_all
-from rotordrop_bench.cli.score import score
-from rotordrop_bench.cli.synthesize import synthesize
+from rotordrop.cli.app import CONTEXT, Verb, VerbTable
 
-EXAMPLES = {
-    "synthesize": 'rotordrop-bench synthesize machine.toml --speed "60 Hz" --output folder',
-    "score": "rotordrop-bench score estimate.json truth.json",
-    "list": "rotordrop-bench list",
-    "make": "rotordrop-bench make dropbench",
-    "score-all": "rotordrop-bench score-all dropbench estimates",
-    "schema": "rotordrop-bench schema > violations.schema.json",
-}
+NAME = "rotordrop-bench"
+
+_DROPS, _SCORES = "rotordrop_bench.cli.drops", "rotordrop_bench.cli.scores"
 
 
-def schema(
-    output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", metavar="FILE", help="Write to FILE instead of printing."),
-    ] = None,
-    force: ForceOption = False,
-) -> None:
-    """Print the JSON Schema of the violations that 'synthesize --violation' reads."""
-    from rotordrop_bench.violations import violations_schema
+class BenchTable(VerbTable):
+    """The verbs of the bench."""
 
-    text = json.dumps(violations_schema(), indent=2, ensure_ascii=False) + "\n"
-    deliver_text(text, output, overwrite=force)
+    program: ClassVar = NAME
+    groups: ClassVar = {
+        "Any machine": (
+            Verb("synthesize", "Make simulated recordings of drops whose truth is known", _DROPS),
+            Verb("score", "Compare an estimate with the truth of its recording", _SCORES),
+            Verb("schema", "Print the JSON Schema of the violations 'synthesize' reads", _DROPS),
+        ),
+        "DropBench": (
+            Verb("list", "Name the drops of the bench", _DROPS, "list_drops"),
+            Verb("make", "Make the drops that are missing in a folder", _DROPS),
+            Verb("score-all", "Score anybody's estimates of the drops of the bench", _SCORES),
+        ),
+    }
 
 
-app = typer.Typer(
-    name="rotordrop-bench",
-    help="Simulated recordings of drops whose truth is known, and scores of estimators on them.",
-    add_completion=False,
-    rich_markup_mode=None,
-    no_args_is_help=True,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-VERBS: dict[str, Callable[..., None]] = {
-    "synthesize": synthesize,
-    "score": score,
-    "list": list_drops,
-    "make": make,
-    "score-all": score_all,
-    "schema": schema,
-}
-for name, verb in VERBS.items():
-    app.command(name, epilog=f"Example: {EXAMPLES[name]}")(rotordrop_command.with_files_apart(verb))
+app = typer.Typer(cls=BenchTable, add_completion=False, rich_markup_mode=None, context_settings=CONTEXT)
+
+
+@app.callback(invoke_without_command=False)
+def rotordrop_bench() -> None:
+    """Simulated recordings of drops whose truth is known, and scores of estimators on them."""
 
 
 def run(arguments: Sequence[str]) -> int:
     """Run one command and give its exit code; errors become one sentence on standard error."""
-    return rotordrop_command.run(arguments, typer.main.get_command(app))
+    return rotordrop_command.run(arguments, app, NAME)
 
 
 def main() -> None:
     """Entry point of the command ``rotordrop-bench``."""
-    rotordrop_command.main(typer.main.get_command(app))
+    rotordrop_command.main(app, NAME)

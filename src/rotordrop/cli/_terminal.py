@@ -1,4 +1,4 @@
-"""Ctrl-C that is never lost, wherever in the program it arrives.
+"""The process a command runs in: streams that take any text, Ctrl-C that is never lost.
 
 An interrupt that arrives while foreign code calls back into Python, as the compiler does several times per
 kernel, cannot travel further: Python prints it as ignored and goes on, or fails later for a reason that has
@@ -7,8 +7,11 @@ nothing to do with it. It is raised again here a moment later, and told apart fr
 
 from __future__ import annotations
 
+import codecs
+import os
 import signal
 import sys
+import unicodedata
 from _thread import interrupt_main
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -22,6 +25,40 @@ Result = TypeVar("Result")
 
 AGAIN_AFTER_S = 0.02
 """Until an ignored interrupt is raised again [s]: the callback that ignored it has returned by then."""
+
+_PLAIN_SIGNS = {
+    "µ": "u", "μ": "u", "−": "-", "–": "-", "°": " deg", "×": "x", "·": ".", "²": "^2", "³": "^3", "ⁿ": "^n",
+    "…": "...", "≤": "<=", "≥": ">=", "±": "+-", "→": "->", "ω": "omega", "█": "#", "░": ".", "┃": "|",
+    "▲": "^", "☐": "-",
+}  # fmt: skip
+"""What a terminal shows in place of signs its encoding lacks."""
+
+
+def open_streams() -> None:
+    """Make standard output and error take any text, whatever their encoding, also where they are closed."""
+    codecs.register_error("plain signs", _plain_signs)
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115, PTH123
+        elif hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="plain signs")
+
+
+def _plain_signs(error: UnicodeError) -> tuple[str, int]:
+    assert isinstance(error, UnicodeEncodeError)
+    signs = error.object[error.start : error.end]
+    without_accents = (unicodedata.normalize("NFKD", sign).encode("ascii", "ignore") for sign in signs)
+    shown = zip(signs, without_accents, strict=True)
+    return "".join(_PLAIN_SIGNS.get(sign) or plain.decode() or "?" for sign, plain in shown), error.end
+
+
+def printable(text: str) -> str:
+    """Text whose control characters, which a name from a file could use to repaint the terminal, are gone."""
+    return "".join(
+        "\N{REPLACEMENT CHARACTER}" if unicodedata.category(sign)[0] == "C" and sign != "\n" else sign
+        for sign in text
+    )
 
 
 @contextmanager

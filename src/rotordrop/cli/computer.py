@@ -1,25 +1,26 @@
-"""Say what is installed, missing and cached.
-
-Looks only at this computer; nothing is changed and nothing is sent.
-"""
+"""Serve a local page on this computer, and say what is installed on it."""
 
 from __future__ import annotations
 
 import os
 import platform
+import re
 import sys
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer import Option
 
 from rotordrop._version import __version__
-from rotordrop.cli._options import JsonOption
-from rotordrop.cli._output import deliver
+from rotordrop.cli._options import JsonOption, text_option
+from rotordrop.cli._output import console, deliver
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+USUAL_PORT = 8737
 
 EXTRAS = {
     "io": ("recordings of TDMS, UFF and Excel, shaft tables of Excel", ("npTDMS", "pyuff", "openpyxl")),
@@ -32,22 +33,60 @@ EXTRAS = {
 """What an extra is for, and its packages."""
 
 
+def serve(
+    folder: Annotated[
+        Path | None, text_option("FOLDER", "Where jobs are kept; your data folder by default.")
+    ] = None,
+    port: Annotated[
+        int, Option("--port", min=0, max=65535, help="Where to listen; 0 takes a free port.")
+    ] = USUAL_PORT,
+    log: Annotated[str | None, text_option("LOG", "Log of drops that the page compares with.")] = None,
+    open_page: Annotated[bool, Option("--open", help="Open the page in the browser.")] = False,
+) -> None:
+    """Serve a local page: look at drops, estimate, read reports.
+
+    Example: rotordrop serve
+    """
+    from rotordrop.web.server import serve as serve_page
+
+    place = folder or data_folder()
+
+    def announce(address: str) -> None:
+        out = console()
+        out.print(f"The page is {address}\nJobs are kept in {place}. Ctrl-C ends the server.", soft_wrap=True)
+        sys.stdout.flush()
+        if open_page:
+            typer.launch(address)
+
+    serve_page(place, port, announce, log)
+
+
+def data_folder() -> Path:
+    """Folder for data of this user that outlives a restart, by the custom of the system."""
+    if os.name == "nt":
+        return Path(os.environ.get("LOCALAPPDATA", str(Path.home()))) / "rotordrop" / "serve"
+    return Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share") / "rotordrop" / "serve"
+
+
 def doctor(
     fingerprint: Annotated[
         bool,
-        typer.Option(
+        Option(
             "--fingerprint",
             help="Print only the hash of a short probe drop: equal where every drop has the same bits.",
         ),
     ] = False,
-    json_file: JsonOption = None,
+    json: JsonOption = None,
 ) -> None:
-    """Say what is installed, what is missing, and whether compiled code is cached."""
+    """Say what is installed, what is missing, and whether compiled code is cached.
+
+    Example: rotordrop doctor
+    """
     if fingerprint:
         from rotordrop.simulate.fingerprint import fingerprint as of_this_computer
 
         bits = of_this_computer()
-        deliver({"fingerprint": bits}, json_file, lambda out: out.print(bits, no_wrap=True, crop=True))
+        deliver({"fingerprint": bits}, json, lambda out: out.print(bits, no_wrap=True, crop=True))
         return
     found = examined()
 
@@ -63,11 +102,11 @@ def doctor(
             lost = ", ".join(name for name, number in one["packages"].items() if number is None)
             state = f"missing: {lost}; pip install 'rotordrop[{extra}]'" if lost else "installed"
             out.print(f"extra {extra} ({one['for']}): {state}")
-        for line in _cache_lines(found["cache"]):
+        for line in cache_lines(found["cache"]):
             out.print(line)
         out.print(f"{found['cores']} cores; threads of linear algebra: {found['threads'] or 'as it likes'}")
 
-    deliver(found, json_file, summarise)
+    deliver(found, json, summarise)
 
 
 def examined() -> dict[str, Any]:
@@ -94,12 +133,12 @@ def _needed() -> list[str]:
         stated = requires("rotordrop") or []
     except PackageNotFoundError:
         return ["numpy", "scipy", "numba", "pydantic", "pint", "h5py", "plotly", "jinja2", "typer", "rich"]
-    return [_bare(text) for text in stated if "extra ==" not in text]
+    return [bare(text) for text in stated if "extra ==" not in text]
 
 
-def _bare(requirement: str) -> str:
-    letters = (k for k, letter in enumerate(requirement) if not (letter.isalnum() or letter in "-_."))
-    return requirement[: next(letters, len(requirement))]
+def bare(requirement: str) -> str:
+    """Name of a package that a requirement names."""
+    return re.split(r"[^\w.-]", requirement, maxsplit=1)[0]
 
 
 def _version(name: str) -> str | None:
@@ -124,7 +163,8 @@ def _cache() -> dict[str, Any]:
     }
 
 
-def _cache_lines(cache: dict[str, Any]) -> list[str]:
+def cache_lines(cache: dict[str, Any]) -> list[str]:
+    """What to say of compiled code."""
     if not cache["writable"]:
         return [
             f"problem: {cache['folder']} cannot be written; every run compiles again, for a minute or two. "

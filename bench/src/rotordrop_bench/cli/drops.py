@@ -1,0 +1,174 @@
+"""Make recordings whose truth is known: around any machine, or the fixed set of DropBench."""
+
+from __future__ import annotations
+
+import json as json_module
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from typer import Argument, Option
+
+from rotordrop.cli._options import (
+    ForceOption,
+    JsonOption,
+    MachineArgument,
+    TextFileOption,
+    measured,
+    quantity,
+    text_option,
+)
+from rotordrop.cli._output import deliver, deliver_text, progress_bar
+from rotordrop.errors import UsageError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+FolderArgument = Annotated[Path, Argument(metavar="FOLDER", help="Folder of the bench.", show_default=False)]
+OnlyOption = Annotated[
+    list[str] | None,
+    Option("--only", metavar="NAME", help="A drop, a family or a rotor; repeatable. All by default."),
+]
+
+
+def synthesize(
+    machine: MachineArgument,
+    speed: Annotated[list[float], measured("speed", 'Speed at power-off, such as "60 Hz"; repeatable.')],
+    folder: Annotated[Path, Option("--output", "-o", metavar="FOLDER", help="Where the files go.")],
+    seed: Annotated[int, Option(metavar="NUMBER", min=0, help="Seed of the hidden machine.")] = 0,
+    first_drop: Annotated[
+        int, Option(metavar="NUMBER", min=0, help="Seed of the first drop; the next ones follow.")
+    ] = 0,
+    duration: Annotated[float, measured("time", "Recorded after power-off.", "0.3 s")] = 0.3,
+    sampling_rate: Annotated[
+        float,
+        Option(parser=quantity("frequency"), metavar="RATE", help="Sampling rate.", show_default="20 kHz"),
+    ] = 20e3,
+    noise: Annotated[float, measured("length", "Sensor noise, rms.", "0.45 um")] = 0.45e-6,
+    bits: Annotated[int, Option(metavar="NUMBER", help="Bits of the converter; 0 for none.")] = 16,
+    violation: Annotated[
+        str,
+        Option(
+            metavar="NAME|FILE",
+            help="What the estimator's model cannot represent, by name ('list' names all) or as .toml file.",
+        ),
+    ] = "none",
+    fault: Annotated[
+        str | None, text_option("NAME", "A deliberate mistake in the file; 'list' names all.")
+    ] = None,
+    hdf5: Annotated[bool, Option("--hdf5", help="Write the recording as HDF5 too.")] = False,
+    json: JsonOption = None,
+) -> None:
+    """Make simulated recordings of drops; the hidden truth goes into a folder of its own.
+
+    Example: rotordrop-bench synthesize machine.toml --speed "60 Hz" --output folder
+    """
+    from rotordrop_bench import FAULTS, VIOLATIONS
+
+    if (not violation.endswith(".toml") and _listed(violation, VIOLATIONS)) or _listed(fault, FAULTS):
+        return
+    from rotordrop.machine import load_machine
+    from rotordrop_bench import SensorChain, hidden_machine, synthesize_drop, with_fault, write_synthetic
+
+    chain = SensorChain(sampling_rate=sampling_rate, noise=noise, bits=bits)
+    names = [f"synthetic_{round(value / (2.0 * math.pi)):03d}Hz" for value in speed]
+    written: list[dict[str, Any]] = []
+    with progress_bar("synthesizing") as report:
+        hidden = hidden_machine(load_machine(machine), seed, violation)
+        for index, value in enumerate(speed):
+            # numbered where a speed comes more than once; no bundled recording is named so
+            stem, number = names[index], names[: index + 1].count(names[index])
+            name = stem if names.count(stem) == 1 else f"{stem}_{number}"
+            report(name, index / len(speed))
+            drop = synthesize_drop(
+                hidden, value, first_drop + index, sensor_chain=chain, duration=duration, name=name
+            )
+            if fault is not None:
+                drop = replace(
+                    drop,
+                    record=with_fault(drop.record, fault),
+                    tail=None if drop.tail is None else with_fault(drop.tail, fault),
+                    truth={**drop.truth, "fault": fault},
+                )
+            files = write_synthetic(drop, folder, formats=("csv", "h5") if hdf5 else ("csv",))
+            written.append(
+                {
+                    "name": drop.truth["name"],
+                    "outcome": drop.result.outcome,
+                    "files": [str(file) for file in files],
+                }
+            )
+
+    def summarise(out: Console) -> None:
+        out.print(f"Simulated recordings of {hidden.known.name} (not measured), hidden machine {seed}")
+        for entry in written:
+            out.print(f"{entry['name']}: {entry['outcome']}")
+            for file in entry["files"]:
+                out.print(f"  written: {file}")
+
+    deliver({"origin": "simulated, not measured", "machine_seed": seed, "drops": written}, json, summarise)
+
+
+def _listed(choice: str | None, known: dict[str, Any]) -> bool:
+    if choice == "list":
+        typer.echo("\n".join(known))
+        return True
+    if choice is not None and choice not in known:
+        raise UsageError(f"there is no {choice!r}; choose one of {', '.join(map(repr, known))}")
+    return False
+
+
+def schema(output: TextFileOption = None, force: ForceOption = False) -> None:
+    """Print the JSON Schema of the violations that 'synthesize --violation' reads.
+
+    Example: rotordrop-bench schema > violations.schema.json
+    """
+    from rotordrop_bench.violations import violations_schema
+
+    text = json_module.dumps(violations_schema(), indent=2, ensure_ascii=False) + "\n"
+    deliver_text(text, output, overwrite=force)
+
+
+def list_drops(only: OnlyOption = None, json: JsonOption = None) -> None:
+    """Name the drops of the bench: rotor, speed, family, departures.
+
+    Example: rotordrop-bench list
+    """
+    from rotordrop_bench import VERSION
+    from rotordrop_bench.make import chosen_drops
+
+    drops = chosen_drops(only or [])
+
+    def summarise(out: Console) -> None:
+        out.print(f"DropBench, version {VERSION}; drops: {len(drops)}")
+        for drop in drops:
+            kinds = " + ".join(kind for kind, _ in drop.departures)
+            out.print(
+                f"{drop.name}  {drop.rotor:>6}  {drop.speed:>4g} Hz  {drop.family}"
+                + (f": {kinds}" if kinds else "")
+                + ("" if drop.sampling_rate == 20e3 else f": {drop.sampling_rate / 1e3:g} kHz"),
+                highlight=False,
+            )
+
+    deliver({"bench_version": VERSION, "drops": [vars(drop) for drop in drops]}, json, summarise)
+
+
+def make(folder: FolderArgument, only: OnlyOption = None, json: JsonOption = None) -> None:
+    """Make the drops that are missing in a folder; their truth goes into a folder of its own.
+
+    Example: rotordrop-bench make dropbench
+    """
+    from rotordrop_bench import make_bench
+    from rotordrop_bench.make import chosen_drops
+
+    with progress_bar("making drops") as report:
+        made = make_bench(folder, only or [], report)
+    there = len(chosen_drops(only or [])) - len(made)
+
+    def summarise(out: Console) -> None:
+        out.print(f"drops made: {len(made)}, there already: {there} (simulated, not measured)")
+        out.print(f"for estimators: {folder / 'drops'}; hidden truth, not for them: {folder / 'truth'}")
+
+    deliver({"made": made, "there": there}, json, summarise)

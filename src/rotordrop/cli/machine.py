@@ -1,0 +1,402 @@
+"""Describe a machine: start a file, check it, search bearings, convert rotors, print schemas."""
+
+from __future__ import annotations
+
+import json as json_module
+import math
+import sys
+from enum import StrEnum
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from typer import Argument, Option
+
+from rotordrop.cli._options import (
+    ForceOption,
+    JsonOption,
+    MachineArgument,
+    TextFileOption,
+    file_option,
+    measured,
+    refuse_beside,
+    text_option,
+)
+from rotordrop.cli._output import deliver, deliver_text, require_places
+from rotordrop.errors import OutputError, UsageError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from rotordrop.machine import Machine
+
+TEMPLATE_FILE = Path("machine.toml")
+
+_QUESTIONS = {
+    "mass": 'mass of the rotor, such as "60 kg"',
+    "length": 'length of the rotor, "1.1 m"',
+    "centre": 'centre of mass from its NDE end, "520 mm"',
+    "bearings": 'touchdown bearings from the NDE end, "110 mm, 980 mm"',
+    "sensors": 'sensor planes from the NDE end, "180 mm, 900 mm"',
+    "sensor_angle": 'angle of the first sensor of a plane, "135 deg" (the second stands 90° before it)',
+    "designation": 'designation of the touchdown bearings, "7014 ACD/HCP4A"',
+    "gap": 'radial air gap, "0.25 mm"',
+    "speed": 'nominal speed, "9000 rpm"',
+    "grade": 'balance grade, "G 2.5"',
+    "support": 'support of the touchdown bearings: "stiff", "soft" or a stiffness, "1e8 N/m"',
+}
+
+
+def _number(name: str) -> Any:
+    return text_option("TEXT", f"For --simple: {_QUESTIONS[name]}.")
+
+
+def init(
+    target: Annotated[
+        Path | None,
+        Argument(
+            metavar="[FILE or FOLDER]",
+            help="Machine file to write (machine.toml; '-' prints it), or folder for the example.",
+            show_default=False,
+        ),
+    ] = None,
+    example: Annotated[
+        str | None,
+        text_option("NAME", 'Copy an example: "paper", "small", or "lp400" with a recording.'),
+    ] = None,
+    force: ForceOption = False,
+    simple: Annotated[
+        bool, Option("--simple", help="Make it of twelve numbers; those not given are asked for.")
+    ] = False,
+    mass: Annotated[str | None, _number("mass")] = None,
+    length: Annotated[str | None, _number("length")] = None,
+    centre: Annotated[str | None, _number("centre")] = None,
+    bearings: Annotated[str | None, _number("bearings")] = None,
+    sensors: Annotated[str | None, _number("sensors")] = None,
+    sensor_angle: Annotated[str | None, _number("sensor_angle")] = None,
+    designation: Annotated[str | None, _number("designation")] = None,
+    gap: Annotated[str | None, _number("gap")] = None,
+    speed: Annotated[str | None, _number("speed")] = None,
+    grade: Annotated[str | None, _number("grade")] = None,
+    support: Annotated[str | None, _number("support")] = None,
+    preload: Annotated[str | None, text_option("TEXT", "For --simple: preload of a row.")] = None,
+) -> None:
+    """Write a commented machine file to start from, or copy an example machine into a folder.
+
+    With --simple the machine is made of twelve numbers.
+
+    Example: rotordrop init machine.toml
+    """
+    given = {
+        "mass": mass,
+        "length": length,
+        "centre": centre,
+        "bearings": bearings,
+        "sensors": sensors,
+        "sensor_angle": sensor_angle,
+        "designation": designation,
+        "gap": gap,
+        "speed": speed,
+        "grade": grade,
+        "support": support,
+    }
+    if simple:
+        deliver_text(_simple_text(given, preload), target or TEMPLATE_FILE, overwrite=force)
+        return
+    if any(value is not None for value in (*given.values(), preload)):
+        raise UsageError("numbers of a machine belong to --simple; add it")
+    if example is not None:
+        _copy_example(example, target or Path(example), overwrite=force)
+        return
+    from rotordrop.machine import template_text
+
+    deliver_text(template_text(), target or TEMPLATE_FILE, overwrite=force)
+
+
+def _simple_text(given: dict[str, str | None], preload: str | None) -> str:
+    """The machine file of twelve numbers; what was not given as an option is asked for."""
+    from pydantic import ValidationError
+
+    from rotordrop.machine import machine_text
+    from rotordrop.machine.simple import SimpleMachine, simple_machine
+
+    missing = [f"--{name.replace('_', '-')}" for name, value in given.items() if not value]
+    if missing and not (sys.stdin and sys.stdin.isatty()):
+        raise UsageError(
+            f"--simple needs {', '.join(missing)}; nobody can be asked, because the input is no terminal: "
+            "give them as options"
+        )
+    said = {name: value or typer.prompt(_QUESTIONS[name], err=True).strip() for name, value in given.items()}
+    numbers: dict[str, Any] = dict(said)
+    for name in ("bearings", "sensors"):
+        places = [place.strip() for place in said[name].replace(";", ",").split(",")]
+        if len(places) != 2:
+            raise UsageError(f'--{name} needs two planes, such as "110 mm, 980 mm"')
+        numbers[name] = tuple(places)
+    try:
+        machine = simple_machine(SimpleMachine(**numbers, preload=preload))
+    except ValidationError as error:
+        reasons = "; ".join(str(e["msg"]).removeprefix("Value error, ") for e in error.errors())
+        raise UsageError(f"these numbers make no machine: {reasons}") from None
+    return machine_text(machine)
+
+
+def _copy_example(name: str, folder: Path, *, overwrite: bool) -> None:
+    """Copy the machine file of an example, its shaft table and recordings; or none when one stands there."""
+    from rotordrop.files import atomic_path, make_folder
+    from rotordrop.machine import example_path
+
+    machine = example_path(name)
+    contents = {"machine.toml": machine.read_bytes()}
+    contents |= {table.name: table.read_bytes() for table in machine.parent.glob(f"{name}_*.csv")}
+    records = files("rotordrop") / "examples" / name
+    if records.is_dir():
+        contents |= {record.name: record.read_bytes() for record in records.iterdir()}
+    standing = [folder / file for file in contents if (folder / file).exists()]
+    if standing and not overwrite:
+        raise OutputError(f"{standing[0]} exists already; name another folder or add --force")
+    make_folder(folder)
+    for file, content in contents.items():
+        with atomic_path(folder / file) as temporary:
+            temporary.write_bytes(content)
+        typer.echo(f"written: {folder / file}")
+
+
+def check(
+    machine: MachineArgument,
+    speed: Annotated[
+        float | None,
+        measured(
+            "speed", 'Speed at the drop, such as "60 Hz", for the warnings; the nominal speed when left out.'
+        ),
+    ] = None,
+    everything: Annotated[
+        bool, Option("--all", help="Also every default and inferred value, and limits with numbers.")
+    ] = False,
+    report: Annotated[
+        Path | None, file_option("--report", "Write the same with a drawing of the rotor as an HTML page.")
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """Check a machine file and show what it amounts to: mass, load shares, frequencies, sag, assumptions.
+
+    Example: rotordrop check machine.toml --report machine.html
+    """
+    from rotordrop.machine import load_machine
+    from rotordrop.report.machine_content import machine_content, machine_json
+    from rotordrop.report.page import write_page
+    from rotordrop.report.terminal import print_summary
+    from rotordrop.rotor.machine_summary import machine_warnings, summarise_machine
+
+    described = load_machine(machine)
+    summary = summarise_machine(described)
+    warnings = machine_warnings(described, summary, speed)
+
+    def summarise(out: Console) -> None:
+        print_summary(machine_content(described, summary, warnings, brief=not everything), out)
+        for line in rotor_lines(described):
+            out.print(line, no_wrap=True, crop=True)
+
+    if report is not None:
+        write_page(machine_content(described, summary, warnings, drawn=True), report)
+    deliver(machine_json(described, summary, warnings), json, summarise)
+
+
+WIDTH = 96
+HALF_ROWS = 3
+SHAFT, LAYER, DISC = "█", "░", "┃"
+
+
+def rotor_lines(machine: Machine, width: int = WIDTH) -> list[str]:
+    """Draw the rotor as lines of text, NDE at the left.
+
+    Full blocks are the shaft, light ones layers without stiffness, bars discs. Below stand the marks:
+    ``▲`` touchdown bearing, ``M`` AMB, ``s`` sensor plane.
+    """
+    nodes, elements = machine.rotor.node_positions, machine.rotor.elements
+    begin, length = nodes[0], nodes[-1] - nodes[0]
+    reach = max(max(e.outer_diameter, e.layer_diameter or 0.0) for e in elements)
+    rows = range(-HALF_ROWS, HALF_ROWS + 1)
+
+    def place(node: int) -> int:
+        fraction = (nodes[node - 1] - begin) / length
+        return min(width - 1, int(fraction * width))
+
+    columns = []
+    for i in range(width):
+        z = begin + (i + 0.5) / width * length
+        element = elements[next(k for k in range(len(nodes) - 1) if z <= nodes[k + 1])]
+        column = ""
+        for row in rows:
+            diameter = reach * abs(row) / HALF_ROWS * 0.95
+            layer = diameter < (element.layer_diameter or 0.0)
+            column += SHAFT if diameter < element.outer_diameter else LAYER if layer else " "
+        columns.append(column)
+    for disc in machine.rotor.discs:
+        columns[place(disc.node)] = DISC * len(rows)
+    lines = ["".join(signs).rstrip() for signs in zip(*columns, strict=True)]
+    for parts, mark in ((machine.touchdown_bearings, "▲"), (machine.ambs, "M"), (machine.sensors, "s")):
+        marks = [" "] * width
+        for part in parts:
+            marks[place(part.node)] = mark
+        if parts:
+            lines.append("".join(marks).rstrip())
+    return [*lines, "█ shaft  ░ layer  ┃ disc  ▲ touchdown bearing  M AMB  s sensor plane"]
+
+
+def bearings(
+    designation: Annotated[
+        str, Argument(metavar="DESIGNATION", help='Such as 71914, "7016 ACD/HCP4A", "6016-2Z/C3".')
+    ],
+    json: JsonOption = None,
+) -> None:
+    """Search bearings by designation: size, angle, balls listed or inferred, clearance, preload.
+
+    Example: rotordrop bearings "7016 ACD/HCP4A"
+    """
+    from rotordrop.elements.catalog import find_bearing, search_bearings
+    from rotordrop.report.bearing_content import bearing_content, bearing_json
+
+    try:
+        find_bearing(designation)
+    except LookupError as error:
+        raise UsageError(str(error)) from None
+    found = search_bearings(designation)
+    deliver([bearing_json(bearing) for bearing in found], json, bearing_content(designation, found))
+
+
+class Document(StrEnum):
+    """Documents with a published schema."""
+
+    machine = "machine"
+    numbers = "numbers"
+    estimate = "estimate"
+    look = "look"
+
+
+def schema(
+    document: Annotated[
+        Document,
+        Argument(
+            help="A machine file, the numbers of 'init --simple', or what 'rotordrop estimate --json' writes."
+        ),
+    ] = Document.machine,
+    output: TextFileOption = None,
+    force: ForceOption = False,
+) -> None:
+    """Print the JSON Schema of a file or of an estimate, for editors and programs.
+
+    Example: rotordrop schema machine > machine.schema.json
+    """
+    if document is Document.machine:
+        from rotordrop.machine import machine_schema as schema_of
+    elif document is Document.numbers:
+        from rotordrop.machine.simple import simple_schema as schema_of
+    elif document is Document.look:
+        from rotordrop.evidence.look.schema import look_schema as schema_of
+    else:
+        from rotordrop.estimate.schema import estimate_schema as schema_of
+
+    text = json_module.dumps(schema_of(), indent=2, ensure_ascii=False) + "\n"
+    deliver_text(text, output, overwrite=force)
+
+
+class Target(StrEnum):
+    """What a rotor is converted to."""
+
+    machine = "machine"
+    ross = "ross"
+
+
+def convert(
+    source: Annotated[
+        Path,
+        Argument(
+            metavar="SOURCE",
+            help="ROSS file (.toml, .json) or shaft table (.csv, .xlsx); with --to ross a machine file.",
+        ),
+    ],
+    to: Annotated[Target, Option("--to", help="What to make of it.")] = Target.machine,
+    output: Annotated[
+        Path | None,
+        file_option("--output", "File to write; rotor_ross.toml by default with --to ross.", "-o"),
+    ] = None,
+    designation: Annotated[
+        str | None, text_option("NAME", "Touchdown bearings of the machine file; XCB7013C by default.")
+    ] = None,
+    gap: Annotated[float | None, measured("length", "Their radial air gap; 250 um by default.")] = None,
+    speed: Annotated[float | None, measured("speed", "Nominal speed; 300 Hz by default.")] = None,
+    force: ForceOption = False,
+    json: JsonOption = None,
+) -> None:
+    """Make a machine file of a rotor of ROSS or of a shaft table, or a file for ROSS of a machine.
+
+    Example: rotordrop convert rotor.json -o machine.toml --designation "7014 CD"
+    """
+    if to is Target.ross:
+        others = {"--designation": designation, "--gap": gap, "--speed": speed, "--force": force or None}
+        refuse_beside("--to ross", others)
+        _written_for_ross(source, output or Path("rotor_ross.toml"), json)
+        return
+    from rotordrop.machine.ross_files import read_rotor
+    from rotordrop.report.rotor_content import imported_content, imported_json
+
+    imported = read_rotor(source)
+    deliver(imported_json(imported), json, imported_content(imported, source.name))
+    if output is None:
+        return
+    from rotordrop.machine import machine_text
+    from rotordrop.machine.simple import SimpleMachine, drafted_machine
+
+    ends = sorted({spring.node for spring in imported.springs if spring.kind == "BearingElement"})
+    last = len(imported.rotor.node_positions)
+    if len(ends) < 2:
+        ends = [max(1, round(0.1 * last)), min(last, round(0.9 * last))]
+    nodes = (ends[0], ends[-1])
+    if nodes[0] == nodes[1]:
+        raise UsageError("the rotor has too few nodes for two bearings; cut it into more elements")
+    length = imported.rotor.node_positions[-1]
+    known = SimpleMachine(
+        mass=imported.rotor.mass,
+        centre=imported.rotor.centre_of_gravity,
+        length=length,
+        bearings=(0.0, length),
+        sensors=(0.0, length),
+        sensor_angle="135 deg",
+        designation="XCB7013C" if designation is None else designation,
+        gap=250e-6 if gap is None else gap,
+        speed=600.0 * math.pi if speed is None else speed,
+        grade="G 2.5",
+        support="1e8 N/m",
+        name=source.stem,
+    )
+    planes = [("NDE", nodes[0]), ("DE", nodes[1])]
+    notes = [f"rotor from {source.name} ({imported.source})", *imported.notes]
+    machine = drafted_machine(rotor=imported.rotor, bearings=planes, sensors=planes, known=known, notes=notes)
+    deliver_text(machine_text(machine), output, overwrite=force)
+
+
+def _written_for_ross(machine: Path, output: Path, json: Path | None) -> None:
+    """Write the rotor of a machine, with its AMBs as springs and dampers."""
+    from rotordrop.machine import load_machine
+    from rotordrop.machine.ross_files import Spring, write_ross
+
+    require_places(output, json)  # the output has a name of its own by default
+    described = load_machine(machine)
+    springs = [
+        Spring(
+            node=amb.node,
+            name=f"AMB {amb.name}",
+            stiffness=(amb.stiffness.value, amb.stiffness.value),
+            damping=(amb.damping.value, amb.damping.value),
+        )
+        for amb in described.ambs
+    ]
+    write_ross(described.rotor, output, springs)
+    content = {
+        "file": str(output),
+        "elements": len(described.rotor.elements),
+        "mass_kg": described.rotor.mass,
+    }
+    deliver(content, json, lambda out: out.print(f"written: {output}"))

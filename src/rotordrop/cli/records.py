@@ -1,0 +1,349 @@
+"""See a record: look at it, name its channels, measure the gap with a lift check, find its frequencies."""
+
+from __future__ import annotations
+
+import sys
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from typer import Argument, Option
+
+from rotordrop.cli._options import (
+    DataOption,
+    JsonOption,
+    MachineArgument,
+    PlanesOption,
+    ProfileOption,
+    ReportOption,
+    file_option,
+    measured,
+    refuse_beside,
+    text_option,
+)
+from rotordrop.cli._output import console, deliver, progress_bar, require_places
+from rotordrop.errors import RecordError, UsageError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from rotordrop.machine import Machine
+    from rotordrop.spectrum.coast_down import CoastDownSignal
+
+
+def look(
+    record: Annotated[Path, Argument(metavar="RECORD", help="Recorded drop.", show_default=False)],
+    machine: Annotated[
+        Path | None, Argument(metavar="[MACHINE]", help="Machine description, if there is one.")
+    ] = None,
+    gap: Annotated[float | None, measured("length", 'Radial air gap, "250 um".')] = None,
+    speed: Annotated[float | None, measured("speed", 'Speed at the drop, "9000 rpm".')] = None,
+    mapping: PlanesOption = None,
+    profile: ProfileOption = None,
+    split: Annotated[
+        Path | None,
+        Option(
+            metavar="FOLDER",
+            help="Write one record for each of several drops there, as HDF5, and look no further.",
+            file_okay=False,
+        ),
+    ] = None,
+    report: ReportOption = None,
+    json: JsonOption = None,
+) -> None:
+    """Look at a recorded drop: what was read, its quality, what happened when, impacts, whirl, indices.
+
+    Example: rotordrop look record.csv --report look.html
+    """
+    if split is not None and machine is None:
+        raise UsageError(
+            "--split needs the machine file too: rotordrop look both.h5 machine.toml --split parts"
+        )
+    if split is not None:
+        others = {"--gap": gap, "--speed": speed, "--map": mapping, "--report": report, "--json": json}
+        refuse_beside("--split", others)
+    described = _loaded(machine)
+    if split is not None and described is not None:
+        _split(record, described, split, profile)
+        return
+    from rotordrop.evidence.look import look as look_at
+    from rotordrop.report.look_page import look_page
+    from rotordrop.report.page import write_page
+
+    seen = look_at(record, machine=described, gap=gap, speed=speed, mapping=mapping or (), profile=profile)
+    if report is not None:
+        write_page(look_page(seen), report)
+    deliver(seen.as_json(), json, look_page(seen, drawn=False))
+
+
+def _loaded(machine: Path | None) -> Machine | None:
+    from rotordrop.machine import load_machine
+
+    return None if machine is None else load_machine(machine)
+
+
+def _split(record: Path, machine: Machine, folder: Path, profile: Path | None) -> None:
+    """Cut a recording with several drops into one record for each; no sample is changed."""
+    from rotordrop.evidence.splitting import split_drops
+    from rotordrop.files import make_folder
+    from rotordrop.record.record import read_record, save_record
+
+    parts = split_drops(read_record(record, machine, profile=profile))
+    places = [folder / f"{part.name}.h5" for part in parts]
+    if len(parts) == 1:
+        console().print(f"{record} holds one drop; nothing to split.")
+        return
+    make_folder(folder)
+    require_places(*places)
+    for part, place in zip(parts, places, strict=True):
+        save_record(part, place)
+        console().print(f"{place}: {part.time[0]:.6g} to {part.time[-1]:.6g} s, {len(part.time)} samples")
+
+
+def profile(
+    record: Annotated[Path, Argument(metavar="RECORD", help="A file of the recorder.")],
+    output: Annotated[Path, file_option("--output", "Profile to write, a .toml file.", "-o")],
+    machine: Annotated[Path | None, file_option("--machine", "Machine whose sensors need a channel.")] = None,
+    channel: Annotated[
+        list[str] | None,
+        text_option("SENSOR=CHANNEL", "Channel of a sensor of the machine; repeatable."),
+    ] = None,
+    unit: Annotated[str | None, Option(help="Unit of displacements that name none, um.")] = None,
+    sensitivity: Annotated[str | None, Option(help='Volts per length, "8 mV/um".')] = None,
+    full_scale: Annotated[str | None, Option(help='Full scale of a WAV file, "500 um".')] = None,
+    speed: Annotated[str | None, Option(help='Speed by hand, "60 Hz".')] = None,
+    speed_channel: Annotated[str | None, Option(help="Channel of the shaft speed.")] = None,
+    speed_unit: Annotated[str | None, Option(help="Its unit, rpm.")] = None,
+    pulses: Annotated[str | None, Option(help="Channel of tacho or keyphasor pulses.")] = None,
+    pulses_per_turn: Annotated[int | None, Option(min=1, help="Pulses per turn, 1.")] = None,
+    edge: Annotated[str | None, Option(help="Edge that counts, rising or falling.")] = None,
+    time_step: Annotated[str | None, Option(help='Sampling interval, "50 us".')] = None,
+    time_start: Annotated[str | None, Option(help='Time of the first sample, "-0.25 s".')] = None,
+    names: Annotated[str | None, Option(help="Names of the columns, commas between them.")] = None,
+    file_format: Annotated[str | None, Option("--format", help="Reader, where the suffix lies.")] = None,
+) -> None:
+    """Make a profile of a recorder: what its files do not say themselves, said once.
+
+    Example: rotordrop profile record.csv
+    """
+    from rotordrop.record.profile import profile_of, save_profile
+    from rotordrop.record.profile_guess import guess_profile
+    from rotordrop.record.readers import read_recording
+
+    channels = {}
+    for text in channel or []:
+        sensor, equals, name = text.partition("=")
+        if not equals:
+            raise UsageError(f'{text!r} is not SENSOR=CHANNEL; write for example --channel "S_NDE_A=X1"')
+        channels[sensor.strip()] = name.strip()
+    entries: dict[str, Any] = {
+        "format": file_format,
+        "channels": channels,
+        "unit": unit,
+        "sensitivity": sensitivity,
+        "full_scale": full_scale,
+        "text": {"names": None if names is None else [name.strip() for name in names.split(",")]},
+        "time": {"step": time_step, "start": time_start},
+        "speed": {
+            "constant": speed,
+            "channel": speed_channel,
+            "unit": speed_unit,
+            "pulses": pulses,
+            "pulses_per_turn": pulses_per_turn,
+            "edge": edge,
+        },
+    }
+    told = {
+        key: {k: v for k, v in entry.items() if v is not None} if isinstance(entry, dict) else entry
+        for key, entry in entries.items()
+        if entry is not None
+    }
+    given = profile_of(told, "the options")
+    described = _loaded(machine)
+    guess = guess_profile(
+        read_recording(record, given), given, () if described is None else described.sensors
+    )
+    out = console()
+    for line in guess.found:
+        out.print(line)
+    if guess.missing:
+        raise RecordError(
+            f"{record}: say what is missing:" + "".join(f"\n  {line}" for line in guess.missing)
+        )
+    save_profile(guess.profile, output)
+    out.print(f"Profile: {output}")
+
+
+def clearance(
+    before: Annotated[Path, Argument(metavar="RECORD", help="Recorded lift check.", show_default=False)],
+    after: Annotated[
+        Path | None, Argument(metavar="[AFTER]", help="A later one; its growth is the wear.")
+    ] = None,
+    machine: Annotated[Path | None, file_option("--machine", "Machine description with the sensors.")] = None,
+    output: Annotated[
+        Path | None, file_option("--output", "Write the machine file with the measured gaps.", "-o")
+    ] = None,
+    mapping: PlanesOption = None,
+    profile: ProfileOption = None,
+    json: JsonOption = None,
+) -> None:
+    """Measure the air gap of every touchdown bearing by a lift check, and its wear by two.
+
+    Example: rotordrop clearance lift.csv --machine machine.toml -o measured.toml
+    """
+    from rotordrop.evidence.clearance import measure_clearance, wear_between
+    from rotordrop.known import Known
+    from rotordrop.machine import save_machine
+
+    if output is not None and machine is None:
+        raise UsageError("--output writes a machine file with the measured gaps; give --machine too")
+    described = _loaded(machine)
+    paths = [before] if after is None else [before, after]
+    checks = [
+        measure_clearance(path, machine=described, mapping=mapping or (), profile=profile) for path in paths
+    ]
+    wear = wear_between(*checks) if after is not None else ()
+    if output is not None and described is not None:
+        gaps = {
+            f"{found.bearing}.air_gap": Known(
+                value=found.gap,
+                status="estimated",
+                interval_90=found.interval_90,
+                standard_error=found.standard_error,
+                source=f"lift check {paths[-1].name}",
+                unit="m",
+            )
+            for found in checks[-1]
+        }
+        save_machine(described.with_values(gaps), output)
+    content: dict[str, Any] = {"clearances": [found.as_json() for found in checks[-1]]}
+    if wear:
+        content["earlier"] = [found.as_json() for found in checks[0]]
+        content["wear"] = [found.as_json() for found in wear]
+
+    def summarise(out: Console) -> None:
+        for found in checks[-1]:
+            low, high = (1e6 * limit for limit in found.interval_90)
+            x, y = 1e6 * found.centre
+            out.print(
+                f"{found.bearing}: air gap {1e6 * found.gap:.1f} µm (90 %: {low:.1f} to {high:.1f} µm), "
+                f"centre at x = {x:+.1f} µm, y = {y:+.1f} µm, {len(found.polygon)} directions, "
+                f"out of round by {1e6 * found.out_of_round:.1f} µm"
+            )
+        for change in wear:
+            low, high = (1e6 * limit for limit in change.interval_90)
+            told = "" if low <= 0.0 <= high else "; it has worn" if change.growth > 0 else "; it has shrunk"
+            span = f"{low:+.1f} to {high:+.1f} µm"
+            out.print(f"{change.bearing}: grown by {1e6 * change.growth:+.1f} µm (90 %: {span}){told}")
+        out.print("The gain of the sensors comes on top: an error of 1 % is 1 % of the gap.")
+        if output is not None:
+            out.print(f"Machine file with the measured gaps: {output}")
+
+    deliver(content, json, summarise)
+
+
+class Direction(StrEnum):
+    """What of the displacement is transformed."""
+
+    x = "x"
+    y = "y"
+    full = "full"
+
+
+class Amplitude(StrEnum):
+    """How amplitudes are given."""
+
+    zero_to_peak = "zero-to-peak"
+    peak_to_peak = "peak-to-peak"
+
+
+class Against(StrEnum):
+    """What goes upwards in a waterfall."""
+
+    time = "time"
+    speed = "speed"
+
+
+def waterfall(
+    machine: MachineArgument,
+    record: Annotated[
+        Path, Argument(metavar="RECORD", help="Recorded coast-down, or one from 'coast-down --output'.")
+    ],
+    component: Annotated[
+        list[Direction] | None, Option(help="Direction, or forward and backward; all when left out.")
+    ] = None,
+    amplitude: Annotated[Amplitude, Option(help="Amplitudes of the waterfalls.")] = Amplitude.zero_to_peak,
+    against: Annotated[Against, Option(help="What goes upwards.")] = Against.time,
+    points: Annotated[int, Option(min=16, help="Samples per frame; the paper's by default.")] = 32768,
+    overlap: Annotated[float, Option(min=0.0, max=0.95, help="Share used again.")] = 0.5,
+    highest: Annotated[
+        float | None,
+        measured("frequency", "Highest frequency drawn; as far as anything happens when left out."),
+    ] = None,
+    profile: ProfileOption = None,
+    output: Annotated[
+        Path | None, file_option("--output", "Write waterfalls, envelopes, orders and speed as HDF5.", "-o")
+    ] = None,
+    report: ReportOption = None,
+    data: DataOption = None,
+    json: JsonOption = None,
+) -> None:
+    """Find and name the frequencies of a coast-down, and say whether 0.2 s held the maximum.
+
+    Example: rotordrop waterfall machine.toml coastdown.h5 --report waterfall.html
+    """
+    from rotordrop.estimate.recorded_coast_down import with_found_air_gaps
+    from rotordrop.machine import load_machine
+    from rotordrop.report.origin import origin_here
+    from rotordrop.report.waterfall_page import waterfall_page
+    from rotordrop.spectrum.coast_down import WaterfallChoice, analyse_coast_down
+    from rotordrop.spectrum.findings_file import write_findings
+    from rotordrop.spectrum.machine_candidates import machine_candidates
+    from rotordrop.spectrum.waterfall import WaterfallSettings
+
+    described = load_machine(machine)
+    signal, simulated = _signal(described, record, profile)
+    if against is Against.speed and signal.profile is None:
+        raise UsageError(f"--against speed: {record} has no rotor speed; use --against time")
+    choice = WaterfallChoice(
+        components=tuple(direction.value for direction in component or tuple(Direction)),
+        amplitude_kind=amplitude.value,
+        highest_frequency=highest or WaterfallChoice().highest_frequency,
+        settings=WaterfallSettings(points=points, overlap=overlap),
+    )
+    planes = {name: name for name in signal.planes}
+    candidates = machine_candidates(with_found_air_gaps(described, signal), planes)
+    with progress_bar("frequencies") as progress:
+        found = analyse_coast_down(signal, candidates, choice, progress=progress)
+    page = waterfall_page(
+        found,
+        title=f"Frequencies of a coast-down of {described.name}",
+        facts=(
+            ("machine", f"{described.name} ({machine.name})"),
+            ("record", record.name),
+            ("centre of the bearings", signal.centre),
+            *origin_here(sys.argv[1:], [("machine file", machine), ("record", record)]).facts(),
+        ),
+        simulated=simulated,
+        against=against.value,
+        highest=highest,
+    )
+    if output is not None:
+        write_findings(found, output)
+    deliver(found.as_json(), json, page, report=report, data=data)
+
+
+def _signal(machine: Machine, path: Path, profile: Path | None) -> tuple[CoastDownSignal, str]:
+    """Open a recording or a simulated file, with the sentence that says it is simulated."""
+    from rotordrop.estimate.recorded_coast_down import recorded_coast_down
+    from rotordrop.estimate.simulated_coast_down import simulated_coast_down
+    from rotordrop.record.record import read_record
+    from rotordrop.record.simulated import is_simulated
+    from rotordrop.report.content import SIMULATED_RECORD
+    from rotordrop.simulate.coast_down_file import is_coast_down
+
+    if is_coast_down(path):
+        text = "Everything on this page is computed from the machine description; nothing was measured."
+        return simulated_coast_down(path, machine), text
+    record = read_record(path, machine, profile=profile)
+    return recorded_coast_down(machine, record), SIMULATED_RECORD if is_simulated(record) else ""

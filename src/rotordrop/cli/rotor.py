@@ -1,0 +1,96 @@
+"""Critical speeds, Campbell diagrams and the response to unbalance of a machine."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Annotated
+
+from typer import Option
+
+from rotordrop.cli._options import DataOption, JsonOption, MachineArgument, ReportOption, measured
+from rotordrop.cli._output import deliver, progress_bar
+from rotordrop.errors import UsageError
+
+BEYOND_NOMINAL = 1.1
+"""Highest speed of a Campbell diagram over the nominal one [1]; chosen, not measured."""
+BEYOND = 1.5
+"""Highest speed of an unbalance response over the nominal one [1]; chosen, not measured."""
+SPEEDS = 61
+"""Speeds of a Campbell diagram; chosen, not measured."""
+
+
+class Held(StrEnum):
+    """What holds the rotor."""
+
+    free_free = "free-free"
+    ambs = "AMBs"
+    touchdown_bearings = "touchdown bearings"
+
+
+def critical_speeds(
+    machine: MachineArgument,
+    top_speed: Annotated[
+        float | None,
+        measured("speed", "Highest speed of the Campbell diagrams; 1.1 × nominal when left out."),
+    ] = None,
+    held: Annotated[
+        list[Held] | None, Option(help="What holds the rotor; all that the machine has when left out.")
+    ] = None,
+    report: ReportOption = None,
+    data: DataOption = None,
+    json: JsonOption = None,
+) -> None:
+    """Show critical speeds on supports of any stiffness, and damped modes against the speed.
+
+    Example: rotordrop critical-speeds machine.toml --report speeds.html
+    """
+    import numpy as np
+
+    from rotordrop.machine import load_machine
+    from rotordrop.report.critical_speeds_page import critical_speeds_json, critical_speeds_page
+    from rotordrop.rotor.campbell import campbell_diagram, stability_map
+    from rotordrop.rotor.critical_speeds import WHIRLS, critical_speed_map
+
+    described = load_machine(machine)
+    grid = np.linspace(0.0, top_speed or BEYOND_NOMINAL * float(described.speed.nominal), SPEEDS)
+    chosen = list(held or (item for item in Held if item is not Held.ambs or described.ambs))
+    maps, diagrams = {}, {}
+    with progress_bar("critical speeds") as progress:
+        parts = len(WHIRLS) + len(chosen)
+        for number, whirl in enumerate(WHIRLS):
+            progress(f"map, {whirl}", number / parts)
+            maps[whirl] = critical_speed_map(described, whirl=whirl)
+        for number, item in enumerate(chosen, start=len(WHIRLS)):
+            progress(f"Campbell diagram, {item.value}", number / parts)
+            diagrams[item.value] = campbell_diagram(described, grid, item.value)
+    stability = [stability_map(described, item.value) for item in chosen if item is not Held.free_free]
+    page = critical_speeds_page(described, maps, diagrams, stability)
+    deliver(critical_speeds_json(maps, diagrams, stability), json, page, report=report, data=data)
+
+
+def unbalance_response(
+    machine: MachineArgument,
+    top_speed: Annotated[
+        float | None, measured("speed", "Highest speed; 1.5 × nominal when left out.")
+    ] = None,
+    held: Annotated[Held | None, Option(help="What holds the rotor; its AMBs where it has some.")] = None,
+    report: ReportOption = None,
+    data: DataOption = None,
+    json: JsonOption = None,
+) -> None:
+    """Show amplitude and phase under unbalance over the speed, with amplification factors and margins.
+
+    Example: rotordrop unbalance-response machine.toml --report response.html
+    """
+    from rotordrop.machine import load_machine
+    from rotordrop.report.unbalance_page import unbalance_json, unbalance_page
+    from rotordrop.rotor.unbalanced import resolved_response
+
+    described = load_machine(machine)
+    chosen = held or (Held.ambs if described.ambs else Held.touchdown_bearings)
+    if chosen is Held.free_free:
+        raise UsageError("nothing holds a free rotor: choose 'AMBs' or 'touchdown bearings'")
+    top = top_speed or BEYOND * float(described.speed.nominal)
+    response = resolved_response(described, top, chosen.value)
+    page = unbalance_page(described, response)
+    deliver(unbalance_json(described, response), json, page, report=report, data=data)

@@ -1,0 +1,243 @@
+"""Studies of many drops: run one, show it, repeat a recorded drop, find rare ones, choose a design."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from typer import Argument, Option
+
+from rotordrop.cli._options import (
+    DataOption,
+    JsonOption,
+    MachineArgument,
+    ReportOption,
+    ThreadsOption,
+    file_option,
+    measured,
+)
+from rotordrop.cli._output import Progress, console, deliver, progress_bar
+from rotordrop.errors import UsageError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from rotordrop.study.run import StudyProgress
+    from rotordrop.study.summary import StudyResults
+
+ByOption = Annotated[
+    list[str] | None,
+    Option("--by", metavar="VALUE", help='Map the results against a varied value, "speed"; repeat it.'),
+]
+AboveOption = Annotated[
+    list[str] | None,
+    Option(
+        "--above",
+        metavar="LIMIT",
+        help='Map the probability to exceed a limit, "peak_stress=1.8 GPa"; repeat it.',
+    ),
+]
+DropsOption = Annotated[
+    Path | None, file_option("--output", "Write all drops as HDF5 (NetCDF4) or .parquet.", "-o")
+]
+
+
+def _drops_of(bar: Progress) -> Callable[[StudyProgress], None]:
+    """Shows the progress of a study by a bar."""
+    return lambda done: bar(f"{done.drops} of {done.of} drops, {done.rate:.1f}/s", done.drops / done.of)
+
+
+def study_run(
+    place: Annotated[
+        Path, Argument(metavar="STUDY", help="Study file (.toml) or the folder of a study that has begun.")
+    ],
+    folder: Annotated[
+        Path | None, Option(metavar="FOLDER", help="Folder of the study; the name of its file by default.")
+    ] = None,
+    threads: ThreadsOption = None,
+    claim: Annotated[
+        bool,
+        Option("--claim", help="Help with a study that others work on: stop when nothing is left to claim."),
+    ] = False,
+    dask: Annotated[
+        str | None,
+        Option(metavar="ADDRESS", help='Dask scheduler, "tcp://…", or "local" for a cluster made here.'),
+    ] = None,
+    by: ByOption = None,
+    above: AboveOption = None,
+    output: DropsOption = None,
+    report: ReportOption = None,
+    data: DataOption = None,
+    json: JsonOption = None,
+) -> None:
+    """Compute what is missing of a study and show how force, stress and whirl are spread.
+
+    Example: rotordrop study run study.toml --report study.html
+    """
+    from rotordrop.study.folder import study_of
+    from rotordrop.study.plan import load_study
+    from rotordrop.study.run import run_study
+
+    begun = place.is_dir()
+    if begun and folder is not None:
+        raise UsageError(f"{place} is the folder of a study already; leave out --folder {folder}")
+    planned = study_of(place) if begun else load_study(place)
+    home = place if begun else folder or place.with_suffix("")
+    with progress_bar(planned.name) as bar:
+        results = run_study(
+            planned, home, threads=threads, dask=dask, wait_for_others=not claim, report=_drops_of(bar)
+        )
+    _deliver_results(results, place, by or (), above or (), output, report, data, json)
+
+
+def study_show(
+    place: Annotated[Path, Argument(metavar="STUDY", help="Folder of a study that has begun.")],
+    by: ByOption = None,
+    above: AboveOption = None,
+    output: DropsOption = None,
+    report: ReportOption = None,
+    data: DataOption = None,
+    json: JsonOption = None,
+) -> None:
+    """Show what is there of a study: how force, stress and whirl are spread.
+
+    Example: rotordrop study show study --by speed
+    """
+    from rotordrop.study.summary import load_results
+
+    _deliver_results(load_results(place), place, by or (), above or (), output, report, data, json)
+
+
+def _deliver_results(
+    results: StudyResults,
+    place: Path,
+    by: Sequence[str],
+    above: Sequence[str],
+    output: Path | None,
+    report: Path | None,
+    data: Path | None,
+    json: Path | None,
+) -> None:
+    """Write what was asked for, and print how force, stress and whirl are spread."""
+    from rotordrop.elements.description import unknown_key
+    from rotordrop.report.study_page import study_numbers, study_page
+    from rotordrop.study.quantities import BEARING_QUANTITIES
+    from rotordrop.study.summary import save_results
+    from rotordrop.units import parse_quantity
+
+    if not len(results):
+        console().print(f"{place}: no drop is finished yet")
+        return
+    kinds = {q.name: q.kind for q in BEARING_QUANTITIES}
+    limits = {}
+    for text in above:
+        name, equals, limit = (part.strip() for part in text.partition("="))
+        if not equals:
+            raise UsageError(f'--above {text!r}; expected a quantity and its limit, "peak_stress=1.8 GPa"')
+        if name not in kinds:
+            raise UsageError(f"--above: {unknown_key(name, tuple(kinds))}")
+        limits[name] = parse_quantity(limit, kinds[name])
+    if output is not None:
+        save_results(results, output)
+    page = study_page(results, by, limits)
+    deliver(study_numbers(results, by, limits), json, page, report=report, data=data)
+
+
+def study_repeat(
+    machine: MachineArgument,
+    folder: Annotated[Path, Option(metavar="FOLDER", help="Folder of the simulated drops.")],
+    estimate: Annotated[
+        Path | None, Argument(metavar="[ESTIMATE]", help="Estimate of the recorded drop (.json).")
+    ] = None,
+    speed: Annotated[
+        float | None, measured("speed", 'Predict at this speed, "210 Hz"; else that of the drop.')
+    ] = None,
+    drops: Annotated[int, Option(min=20, metavar="N", help="Drops to simulate.")] = 500,
+    worst_of: Annotated[int, Option(min=2, metavar="N", help="Worst of how many drops.")] = 100,
+    seed: Annotated[int, Option(min=0, metavar="N", help="Key of the random numbers.")] = 1,
+    threads: ThreadsOption = None,
+    report: ReportOption = None,
+    json: JsonOption = None,
+) -> None:
+    """See where a recorded drop lies among those that could have happened.
+
+    Example: rotordrop study repeat calibrated.toml drop.json --folder repeats
+    """
+    from rotordrop.cli.compare import read_estimate
+    from rotordrop.machine import load_machine
+    from rotordrop.report.repeat_page import repeat_numbers, repeat_page
+    from rotordrop.study.repeat import recorded_numbers, repeat_study, repeats
+    from rotordrop.study.run import run_study
+
+    described = load_machine(machine)
+    document = None if estimate is None else read_estimate(estimate)
+    # refuses what is no estimate before hours of drops
+    recorded = {} if document is None else recorded_numbers(document)
+    if document is None and speed is None:
+        raise UsageError("neither an estimate nor a speed; give one of them, as in --speed '210 Hz'")
+    omega = 2.0 * math.pi * document["speed_Hz"] if speed is None and document is not None else speed
+    assert omega is not None
+    length = 0.2 if document is None else float(document["estimated_until_s"])
+    study = repeat_study(described, omega, duration=length, drops=drops, seed=seed)
+    with progress_bar(study.name) as bar:
+        results = run_study(study, folder, threads=threads, report=_drops_of(bar))
+    # at another speed the recorded drop is none of these
+    found = repeats(results, recorded if speed is None else {}, worst_of=worst_of)
+    deliver(repeat_numbers(results, found), json, repeat_page(results, found), report=report)
+
+
+def study_rare(
+    study: Annotated[Path, Argument(metavar="STUDY", help="Study file (.toml).")],
+    column: Annotated[str, Option(metavar="COLUMN", help='Quantity of a study, such as "NDE.peak_force".')],
+    above: Annotated[str, Option(metavar="LIMIT", help='Limit with its unit, such as "12 kN".')],
+    samples: Annotated[int, Option(metavar="N", help="Points of a level, a multiple of ten.")] = 500,
+    repeats: Annotated[int, Option(metavar="N", help="Independent repeats.")] = 8,
+    threads: ThreadsOption = None,
+    json: JsonOption = None,
+) -> None:
+    """Find the probability that a drop exceeds a limit, where that is rare.
+
+    Example: rotordrop study rare study.toml --column NDE.peak_force --above "9 kN"
+    """
+    from rotordrop.study.plan import load_study
+    from rotordrop.study.quantities import column_of
+    from rotordrop.study.rare import rare_drops
+    from rotordrop.units import parse_quantity
+
+    plan = load_study(study)
+    limit = parse_quantity(above, column_of(plan.machine, column).kind)
+    with progress_bar(plan.name) as bar:
+        found = rare_drops(plan, column, limit, samples=samples, runs=repeats, threads=threads, progress=bar)
+    sentence = found.sentence(f"{column} above {above}")
+
+    def summarise(out: Console) -> None:
+        out.print(sentence)
+        out.print("The spread is that of the values that vary in the study, not of all that is unknown.")
+
+    content = {"machine": plan.machine.name, "digest": plan.digest, "column": column, "above": limit}
+    deliver(content | asdict(found) | {"sentence": sentence}, json, summarise)
+
+
+def study_design(
+    plan: Annotated[Path, Argument(metavar="DESIGN", help="Design file (.toml).")],
+    folder: Annotated[
+        Path | None, Option(metavar="FOLDER", help="Folder of the drops; the name of the file by default.")
+    ] = None,
+    threads: ThreadsOption = None,
+    report: ReportOption = None,
+    json: JsonOption = None,
+) -> None:
+    """Choose values of a machine within bounds for the mildest drops.
+
+    Example: rotordrop study design design.toml --report design.html
+    """
+    from rotordrop.report.design_page import design_numbers, design_page
+    from rotordrop.study.design import best_designs, load_design
+
+    read = load_design(plan)
+    with progress_bar(read.study.name) as bar:
+        found = best_designs(read, folder or plan.with_suffix(""), threads=threads, report=_drops_of(bar))
+    deliver(design_numbers(read, found), json, design_page(read, found), report=report)
