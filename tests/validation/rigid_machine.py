@@ -60,10 +60,10 @@ support = {{ mass = "{half} kg", stiffness = "{v["Ks"]} N/m", damping = "{v["Cs"
 """
     )
     model = build_drop_model(machine, Reduction(modes=2, attachment=False))
-    return replace(model, parameters=_linked(model, link, half))
+    return replace(model, parameters=linked(model, link, half))
 
 
-def _linked(model: DropModel, link: float, half: float) -> L.KernelParameters:
+def linked(model: DropModel, link: float, half: Any) -> L.KernelParameters:
     """Balls pressed in so far that they are one stiff spring, damped against the ringing of the race."""
     bearing = model.parameters.bearing.copy()
     bearing[:, L.GROOVE_DISTANCE] = 1e-3
