@@ -3,10 +3,10 @@
     pip install exudyn==1.13.6
     python studies/exudyn/rigid_drop.py
 
-EXUDYN (https://exudyn.readthedocs.io) is a multibody code whose authors did not know of this program. It moves
-the rotor in three dimensions with finite rotations; each bearing is a hollow sphere on a planar body that may
-shift and spin, held by springs and dampers. The script reads what it needs from the case and writes its numbers
-into it.
+EXUDYN (https://exudyn.readthedocs.io) is a multibody code whose authors did not know of this program. It
+moves the rotor in three dimensions with finite rotations; each bearing is a hollow sphere on a planar body
+that may shift and spin, held by springs and dampers. The script reads what it needs from the case and writes
+its numbers into it.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ import numpy as np
 CASE = Path(__file__).resolve().parents[2] / "tests" / "validation" / "cases" / "E01.json"
 
 TOLERANCE = 1e-7
-"""Of the compared displacements [m]. After the first contact both codes are 2e-9 m apart, as finite rotations by
-1e-3 rad make them, and 13 more contacts carry that to 5e-8 m."""
+"""Of the compared displacements [m]. After the first contact both codes are 2e-9 m apart, as finite rotations
+by 1e-3 rad make them, and 13 more contacts carry that to 5e-8 m."""
 
 
 def drop(inputs: dict[str, Any], step: float) -> np.ndarray:
