@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from rotordrop import estimate_drop
-from rotordrop.elements.rotor import Rotor, is_beam
+from rotordrop.elements.rotor import Rotor
 from rotordrop.errors import RotordropError
 from rotordrop.estimate.allowances import BEAM_FORCE_SIGMA
 from rotordrop.evidence.evidence import read_evidence
@@ -112,7 +112,7 @@ def estimated(machine: Machine, folder: Path, truth: Mapping[str, Any], describe
         {"measurement": one.measurement, "paths": one.paths, "half": one.half_widths, "left": one.narrowed}
         for one in found.advice
     ]
-    if is_beam(found.machine.rotor):
+    if found.machine.rotor.is_beam:
         row["rotor"] = found_rotor(found.machine.rotor, described)
     return row
 
@@ -175,9 +175,9 @@ def checked(machine: Machine, folder: Path, truth: Mapping[str, Any], described:
     problem = drop_problem(build_drop_model(found, COARSE_BASIS), evidence, 0.1)
     check = input_state_estimate(problem, lent_by_record(problem))
     row: dict[str, Any] = {"cpu_s": round(time.process_time() - began, 1)}
-    if is_beam(found.rotor):
+    if found.rotor.is_beam:
         row["rotor"] = found_rotor(found.rotor, described)
-    beam = NINETY * BEAM_FORCE_SIGMA if is_beam(found.rotor) else 0.0
+    beam = NINETY * BEAM_FORCE_SIGMA if found.rotor.is_beam else 0.0
     for b, name in enumerate(problem.model.bearing_names):
         error = check.peak[b] / truth["peak_force_N"][name] - 1.0
         half = math.hypot(float(check.peak_error[b]), beam) * (1.0 + error)

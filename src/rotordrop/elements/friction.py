@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
@@ -11,11 +12,14 @@ from numpy.typing import NDArray
 from rotordrop.elements.description import Description, Usual
 from rotordrop.elements.parameter import Parameter, Role, Step, bearing_entries
 from rotordrop.elements.values import NonNegative, Velocity, default, follows, scaled
+from rotordrop.known import Known
 from rotordrop.physics import columns as L
 
 Array = NDArray[np.float64]
 
 _STATIC_OVER_DYNAMIC = 1.3
+_RATIO_ERROR = 0.15
+"""Half width of the 90 % interval of static over dynamic coefficient, over it: chosen, not measured [1]."""
 
 
 class Friction(Description):
@@ -60,6 +64,22 @@ class Friction(Description):
         why = f"{_STATIC_OVER_DYNAMIC:g} times the dynamic coefficient, the ratio of Neisi 2020"
         return {"static": scaled(self.dynamic, _STATIC_OVER_DYNAMIC, why, "")}
 
+    @property
+    def ratio(self) -> float:
+        """Static over dynamic coefficient [1]."""
+        return float(self.static) / float(self.dynamic)
+
+    def static_of(self, dynamic: Known) -> Known:
+        """Static coefficient at its described ratio to a dynamic one: sliding drops say little about it."""
+        low, high = dynamic.interval_90 or (dynamic.value, dynamic.value)
+        return Known(
+            value=self.ratio * dynamic.value,
+            status="the record does not determine it",
+            standard_error=None if dynamic.standard_error is None else self.ratio * dynamic.standard_error,
+            interval_90=((1.0 - _RATIO_ERROR) * self.ratio * low, (1.0 + _RATIO_ERROR) * self.ratio * high),
+            unit="1",
+        )
+
     def fill(self, row: Array) -> None:
         """Write the columns of the friction."""
         row[L.FRICTION_STATIC] = float(self.static)
@@ -81,6 +101,7 @@ PARAMETERS: tuple[Parameter, ...] = (
     ),
     Parameter(
         path="friction.dynamic",
+        worn=math.log(1.2),
         label="dynamic friction coefficient",
         kind="dimensionless",
         measured_by="a speed sensor on the inner race of {owner}",

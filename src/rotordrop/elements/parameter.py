@@ -152,6 +152,8 @@ class Parameter:
     """What measurement would make it known, with ``{owner}`` for what has it; empty where none is usual."""
     separated_by: dict[str, str] = dataclasses.field(default_factory=dict)
     """What measurement would tell it from another parameter, by the path of the other."""
+    worn: float | None = None
+    """Change by wear that two drops are asked for: [SI], or of the logarithm."""
     floor: float | None = None
     """Where published intervals end [SI]."""
     model_error: float = 0.0

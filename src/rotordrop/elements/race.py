@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -75,6 +77,7 @@ PARAMETERS: tuple[Parameter, ...] = (
     ),
     Parameter(
         path="race.drag_coefficient",
+        worn=math.log(2.0),
         label="drag coefficient of the race",
         kind="dimensionless",
         guess_sigma=0.5,

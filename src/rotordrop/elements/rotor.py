@@ -360,6 +360,11 @@ class Rotor(Description):
         wanted = self.material if name is None else name
         return self.materials[wanted] if wanted in self.materials else _builtin_steel()
 
+    @cached_property
+    def is_beam(self) -> bool:
+        """Whether it is a beam in place of a rotor that nobody has described."""
+        return any(row.stated(self) is not None for row in FORM)
+
     @property
     def uses_builtin_steel(self) -> bool:
         """Tell whether some section is made of the steel that the file does not describe."""
@@ -494,11 +499,6 @@ FORM: tuple[Parameter, ...] = (
     _form("stiffness_to_ends", "bending stiffness at the ends of the beam over that at its middle", 0.7),
 )
 """Rows of the form of a beam; found from a record before any contact law, and held from then on."""
-
-
-def is_beam(rotor: Rotor) -> bool:
-    """Whether a rotor is a beam in place of one that nobody has described."""
-    return any(row.stated(rotor) is not None for row in FORM)
 
 
 def element_factors(rotor: Rotor) -> tuple[Array, Array]:

@@ -245,6 +245,7 @@ def _growth(bearing: Any, found: Values, load: float) -> str:
 PARAMETERS: tuple[Parameter, ...] = (
     Parameter(
         path="support.stiffness",
+        worn=math.log(1.1),
         label="support stiffness",
         kind="stiffness",
         measured_by="a hammer test of the touchdown-bearing housing at {owner}",
@@ -296,6 +297,7 @@ PARAMETERS: tuple[Parameter, ...] = (
     ),
     Parameter(
         path="support.damping",
+        worn=math.log(1.1),
         label="support damping",
         kind="damping",
         measured_by="a hammer test of the touchdown-bearing housing at {owner}",

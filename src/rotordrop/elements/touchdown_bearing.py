@@ -130,6 +130,7 @@ Sensors that read 1 % of the motion across, as mounted 0.6° aside, moved gaps o
 PARAMETERS: tuple[Parameter, ...] = (
     Parameter(
         path="air_gap",
+        worn=10e-6,
         floor=0.0,
         model_error=MODEL_GAP_ERROR,
         label="air gap",

@@ -10,6 +10,7 @@ import numpy as np
 from rotordrop.elements.table import parameter
 from rotordrop.evidence.evidence import Evidence, Missing, strongest_slowing
 from rotordrop.known import NINETY
+from rotordrop.physics import columns as L
 from rotordrop.rotor.reduction import contact_frequency
 from rotordrop.rotor.unknowns import sensor_prior, smallest_gap
 from rotordrop.track.problem import DropProblem, rough_noise
@@ -123,7 +124,7 @@ def _gaps(evidence: Evidence, problem: DropProblem) -> Iterator[str]:
 def _air(problem: DropProblem) -> Iterator[str]:
     if problem.model.machine.speed.aero_time_constant is not None:
         return
-    unknown = next(u for u in problem.unknowns if u.path == "speed.aero_time_constant")
+    unknown = next(u for u in problem.unknowns if u.sets("spin", L.AERO_TIME_CONSTANT))
     low, value, high = (math.exp(unknown.mean + k * NINETY * unknown.sigma) for k in (-1.0, 0.0, 1.0))
     yield (
         "the machine file gives no time constant of the drag of the air: it begins at "

@@ -19,18 +19,6 @@ def published_values(name: str, found: Sequence[FittedParameter]) -> dict[str, K
     return {field: own[field] for field in published() if field in own}
 
 
-def static_friction(ratio: float, dynamic: Known) -> Known:
-    """Static coefficient at its prior ratio to the dynamic one: sliding drops say little about it."""
-    low, high = dynamic.interval_90 or (dynamic.value, dynamic.value)
-    return Known(
-        value=ratio * dynamic.value,
-        status="the record does not determine it",
-        standard_error=None if dynamic.standard_error is None else ratio * dynamic.standard_error,
-        interval_90=(0.85 * ratio * low, 1.15 * ratio * high),
-        unit="1",
-    )
-
-
 def equivalent_stiffness(
     machine: Machine, b: int, load: float, support: Known, preload: Known | None
 ) -> Known:

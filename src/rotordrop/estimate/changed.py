@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
 from rotordrop.elements.parameter import Parameter
-from rotordrop.elements.table import fitted_row, row_of
+from rotordrop.elements.table import fitted_row, row_of, rows
 from rotordrop.errors import UsageError
 from rotordrop.known import NINETY
 from rotordrop.physics.linear_algebra import solve, symmetric_eigen
@@ -33,13 +33,7 @@ UNKNOWN_CHANGE = math.sqrt(2.0 / (BY_PRIOR**-2 - 1.0))
 """Standard error of a change, over the prior's deviation, from which the records say nothing of it [1]."""
 NO_CHANGE = 0.5 / math.sqrt(LITTLE)
 """Standard error of a change, over the prior's deviation, from which no size of it is worth a number [1]."""
-WATCHED: Mapping[str, float] = {
-    "air_gap": 10e-6,
-    "support.stiffness": math.log(1.1),
-    "support.damping": math.log(1.1),
-    "friction.dynamic": math.log(1.2),
-    "race.drag_coefficient": math.log(2.0),
-}
+WATCHED: Mapping[str, float] = {row.path: row.worn for row in rows("bearing") if row.worn is not None}
 """Parameters that wear, loosen or seize, with the change that is asked for: [m], or of the logarithm."""
 
 

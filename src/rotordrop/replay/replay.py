@@ -302,7 +302,7 @@ def _identified_machine(machine: Machine, impacts: Impacts, gap: AirGap) -> Mach
     values: dict[str, Known] = {}
     vector = impacts.problem.vector
     for unknown in vector.unknowns:
-        if unknown.parameter.path == "preload" or unknown.parameter.step is Step.SWEEP:
+        if unknown.parameter.estimated_by is not None or unknown.parameter.step is Step.SWEEP:
             continue
         value = impacts.values[unknown.path]
         values[unknown.path] = Known(value=value.value, status="estimated", interval_90=value.interval_90)
@@ -312,11 +312,10 @@ def _identified_machine(machine: Machine, impacts: Impacts, gap: AirGap) -> Mach
         )
         if impacts.friction is not None:
             dynamic = impacts.friction.value
-            ratio = float(bearing.friction.static) / float(bearing.friction.dynamic)
             values[f"{bearing.name}.friction.dynamic"] = Known(
                 value=dynamic.value, status="estimated", interval_90=dynamic.interval_90
             )
-            values[f"{bearing.name}.friction.static"] = Known(value=ratio * dynamic.value)
+            values[f"{bearing.name}.friction.static"] = Known(value=bearing.friction.ratio * dynamic.value)
     return machine.with_values(values)
 
 

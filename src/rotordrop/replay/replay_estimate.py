@@ -23,7 +23,7 @@ from rotordrop.estimate.bearing_drop import (
     deepest,
     simulated_bearings,
 )
-from rotordrop.estimate.bearing_values import equivalent_stiffness, published_values, static_friction
+from rotordrop.estimate.bearing_values import equivalent_stiffness, published_values
 from rotordrop.estimate.estimate import FittedParameter
 from rotordrop.evidence.air_gap import AirGap as IdentifiedGap
 from rotordrop.evidence.evidence import Evidence, known
@@ -92,9 +92,7 @@ def _bearing(
     contact, draws = known(evidence.contacts)[b], _enough(replayed.draws)
     seen = deepest(measured, contact.start, contact.end, 0.0)
     values = published_values(bearing.name, found)
-    values["friction.static"] = static_friction(
-        float(bearing.friction.static) / float(bearing.friction.dynamic), values["friction.dynamic"]
-    )
+    values["friction.static"] = bearing.friction.static_of(values["friction.dynamic"])
     values["equivalent_stiffness_N_per_m"] = equivalent_stiffness(
         evidence.model.machine,
         b,

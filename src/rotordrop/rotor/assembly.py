@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.elements.rotor import element_factors, is_beam
+from rotordrop.elements.rotor import element_factors
 from rotordrop.errors import SimulationError, UsageError
 from rotordrop.physics import timoshenko
 from rotordrop.physics.linear_algebra import generalised_eigen, product
@@ -165,12 +165,11 @@ def build_rotor_fe(machine: Machine) -> RotorFE:
 def rotor_fe(rotor: Rotor) -> RotorFE:
     """Finite elements of a rotor alone. Source: Neisi 2020, eq. (1)."""
     factor = 1.0 if rotor.stiffness_factor is None else float(rotor.stiffness_factor)
-    densities, stiffnesses = element_factors(rotor) if is_beam(rotor) else (None, None)
+    densities, stiffnesses = element_factors(rotor)
     sections = []
     for e, element in enumerate(rotor.elements):
         outer = float(element.outer_diameter)
-        heavier = 1.0 if densities is None else float(densities[e])
-        stiffer = factor if stiffnesses is None else factor * float(stiffnesses[e])
+        heavier, stiffer = float(densities[e]), factor * float(stiffnesses[e])
         section = timoshenko.round_section(
             outer,
             float(element.inner_diameter),

@@ -65,6 +65,10 @@ class Unknown:
         """Path in the machine, such as ``"NDE.support.stiffness"``."""
         return self.parameter.path_of(self.owner)
 
+    def sets(self, array: str, column: int) -> bool:
+        """Whether it sets an entry of the kernel."""
+        return any((entry.array, entry.column) == (array, column) for entry in self.parameter.entries)
+
     @property
     def logarithmic(self) -> bool:
         """Whether it is estimated by its logarithm."""

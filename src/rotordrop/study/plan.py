@@ -20,7 +20,7 @@ from rotordrop.elements.magnet import REMANENCE_TIME
 from rotordrop.elements.table import fitted_row, parameter
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine, load_machine
-from rotordrop.machine.machine import kind_of_path, value_of_path
+from rotordrop.machine.machine import kind_of_path
 from rotordrop.machine.saving import machine_text
 from rotordrop.simulate.case import DropCase, LevitatedStart
 from rotordrop.study import sampling
@@ -191,9 +191,9 @@ class Study:
         if self.joint is not None:
             dynamic, static_row = parameter("friction.dynamic"), parameter("friction.static")
             for path in [path for path in self.joint.paths if fitted_row(path) is dynamic]:
-                static = static_row.path_of(path.partition(".")[0])  # known by its ratio alone
-                ratio = value_of_path(self.machine, static) / value_of_path(self.machine, path)
-                found.setdefault(static, ratio * found[path])
+                bearing = self.machine.bearing(path.partition(".")[0])
+                static = static_row.path_of(bearing.name)  # known by its ratio alone
+                found.setdefault(static, bearing.friction.ratio * found[path])
         return found
 
     def machine_of(self, values: Mapping[str, float]) -> Machine:

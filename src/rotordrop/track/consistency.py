@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.elements.magnet import REMANENCE
-from rotordrop.elements.rotor import is_beam
 from rotordrop.elements.table import STRUCTURE
 from rotordrop.track.calibration import FITTING_NIS
 from rotordrop.track.problem import DropProblem
@@ -51,7 +50,7 @@ def judged_by(problem: DropProblem, likeliest: Forward, usual: Forward) -> Forwa
     A beam in place of the rotor leaves more unexplained than a described rotor does, and its loads are stated
     with that error: it is judged with the impulses that were likeliest, up to their limit.
     """
-    return likeliest if is_beam(problem.model.machine.rotor) else usual
+    return likeliest if problem.model.machine.rotor.is_beam else usual
 
 
 def consistency_checks(problem: DropProblem, smoothed: Smoothed, noise_factor: float) -> tuple[Check, ...]:
@@ -70,7 +69,7 @@ def consistency_checks(problem: DropProblem, smoothed: Smoothed, noise_factor: f
             passed=noise_factor < NOISE_FACTOR_LIMIT,
             message=f"unknown impulses {noise_factor:.3g} × their usual size "
             f"(limit {NOISE_FACTOR_LIMIT:g} ×)",
-            note=_of_a_beam(noise_factor) if is_beam(problem.model.machine.rotor) else "",
+            note=_of_a_beam(noise_factor) if problem.model.machine.rotor.is_beam else "",
         ),
         Check(
             name="filter",
@@ -137,7 +136,7 @@ def _sensor_check(problem: DropProblem, smoothed: Smoothed) -> Check:
     start, n_c = problem.n_dynamic + len(problem.unknowns), problem.n_channels
     chosen = slice(start, start + 2 * n_c)
     sigma = np.sqrt(np.diag(problem.covariance)[chosen])
-    if is_beam(problem.model.machine.rotor):
+    if problem.model.machine.rotor.is_beam:
         sigma[:n_c] = np.hypot(sigma[:n_c], BEAM_GAIN_SIGMA)
     departure = (smoothed.means[-1][chosen] - problem.mean[chosen]) / sigma
     worst = int(np.argmax(np.abs(departure)))

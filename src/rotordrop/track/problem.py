@@ -178,7 +178,7 @@ class DropProblem:
             rows[axis, layout.race.start + 2 * b + axis] = 1.0
             rows[axis, layout.support.start + 2 * b + axis] = -1.0
         for k, unknown in enumerate(self.unknowns):
-            if unknown.path == f"{name}.preload":
+            if unknown.owner == name and unknown.sets("bearing", L.AXIAL_OFFSET):
                 rows[2, self.n_dynamic + k] = 1.0
         rows[3, layout.modal_x] = self.model.parameters.bearing_shape[b]
         rows[4, layout.modal_y] = self.model.parameters.bearing_shape[b]

@@ -8,7 +8,6 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.elements.rotor import is_beam
 from rotordrop.estimate.advice import WORTH_SAYING, Advice
 from rotordrop.estimate.allowances import BEAM_FORCE_SIGMA, MODEL_FORCE_SIGMA
 from rotordrop.known import NINETY
@@ -44,7 +43,7 @@ def narrowing(
     names = problem.model.bearing_names
     peaks = [int(np.argmax(forces.magnitude[:, b])) for b in range(len(names))]
     at_peaks = smooth(smoothed.filtered, kept=peaks)
-    beam = BEAM_FORCE_SIGMA if is_beam(problem.model.machine.rotor) else 0.0
+    beam = BEAM_FORCE_SIGMA if problem.model.machine.rotor.is_beam else 0.0
     before: dict[str, float] = {}
     after: dict[str, dict[str, float]] = {name: {} for name, _ in _measurements(problem)}
     drawing: dict[str, float] = {}

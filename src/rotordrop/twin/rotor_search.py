@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from rotordrop.elements.parameter import Parameter
-from rotordrop.elements.rotor import FORM, is_beam
+from rotordrop.elements.rotor import FORM
 from rotordrop.elements.table import parameter
 from rotordrop.errors import RotordropError
 from rotordrop.evidence.evidence import Evidence
@@ -100,7 +100,7 @@ def with_found_rotor(machine: Machine, drops: Sequence[tuple[Evidence, RecordedD
 
 def _sought(machine: Machine) -> list[_Unknown]:
     """What is only guessed of a beam."""
-    if not is_beam(machine.rotor):
+    if not machine.rotor.is_beam:
         return []
     sought = []
     for row in (parameter("stiffness_factor", "rotor"), *FORM):

@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.elements.parameter import Extension
-from rotordrop.elements.rotor import is_beam
 from rotordrop.elements.table import EXTENSIONS
 from rotordrop.errors import IdentificationError
 from rotordrop.evidence.evidence import Evidence
@@ -199,7 +198,7 @@ def track_drops(
         if progress is not None:
             progress("trying extensions of the usual model, and other starts", 0.0)
         # Where a beam stands for a rotor, its form is what does not fit: no extension stands for that.
-        other = best_start(base, search) if is_beam(machine.rotor) else best_structure(base, search)
+        other = best_start(base, search) if machine.rotor.is_beam else best_structure(base, search)
         again = None if other.fit is base.fit else search.refine_if_followed(other)
         followed = [one for one in (found, again) if one is not None]
         if not followed:
@@ -373,7 +372,7 @@ class Search:
 
     def with_rotor(self, machine: Machine) -> Machine:
         """The machine with its rotor as the records show it, where a beam stands for it."""
-        if not is_beam(machine.rotor):
+        if not machine.rotor.is_beam:
             return machine
         until = ROTOR_SEEN * fall_time(machine)
         return with_found_rotor(machine, [(item, recorded_drop(item, until)) for item in self.drops.evidence])

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
-from rotordrop.elements.rotor import is_beam
 from rotordrop.evidence.evidence import Evidence
 from rotordrop.machine import Machine
 from rotordrop.track.consistency import DIRECTIONS, Check, consistency_checks, judged_by
@@ -76,7 +75,7 @@ def tracked_drop(
         problem=problem,
         smoothed=smoothed,
         judged=seen,
-        forces=of_a_beam(forces) if is_beam(problem.model.machine.rotor) else forces,
+        forces=of_a_beam(forces) if problem.model.machine.rotor.is_beam else forces,
         checks=consistency_checks(problem, replace(smoothed, filtered=seen), noise_factor),
         noise_factor=noise_factor,
         drops=drops,

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.elements.race_bearing import numbers_of
-from rotordrop.elements.rotor import is_beam
 from rotordrop.errors import IdentificationError
 from rotordrop.estimate.advice import Advice
 from rotordrop.estimate.assumptions import twin_assumptions
@@ -154,7 +153,7 @@ def _by_a_drawing(drop: TrackedDrop, judged: _Judgement) -> tuple[Advice, ...]:
     Its covariances say nothing then, so no other number can be weighed. The error of a beam is known and
     falls away; the rest stays as wide as the cross-check leaves it, though a twin of the rotor may well fit.
     """
-    if judged.check is None or not is_beam(drop.problem.model.machine.rotor):
+    if judged.check is None or not drop.problem.model.machine.rotor.is_beam:
         return ()
     drawn = replace(drop, forces=of_the_rotor(drop.forces))
     known = replace(judged, check=check_of_the_rotor(judged.check))
@@ -197,7 +196,7 @@ def _cross_checked(drop: TrackedDrop, method: Tracked) -> tuple[TrackedDrop, Inp
     quick estimate does without it, but not for a bearing with play, whose force no study has validated.
     """
     problem = drop.problem
-    departs = is_apart if is_beam(problem.model.machine.rotor) else is_beside
+    departs = is_apart if problem.model.machine.rotor.is_beam else is_beside
     with_play = any(not numbers_of(b).held for b in problem.model.machine.touchdown_bearings)
     if not drop.sees_all_directions or (drop.consistent and method.quick and not with_play):
         return drop, None

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.elements.rotor import is_beam
 from rotordrop.estimate.allowances import (
     BEAM_FORCE_SIGMA,
     MODEL_FORCE_SIGMA,
@@ -92,7 +91,7 @@ def of_the_rotor(forces: ForceHistory) -> ForceHistory:
 def check_without_contact_law(problem: DropProblem) -> InputEstimate:
     """The cross-check, with the error of a beam where one stands for the rotor; the twin lends nothing."""
     check = input_state_estimate(problem, lent_by_record(problem))
-    return check_of_a_beam(check) if is_beam(problem.model.machine.rotor) else check
+    return check_of_a_beam(check) if problem.model.machine.rotor.is_beam else check
 
 
 def checks_begun(pool: Executor, fit: TrackedDrops) -> list[Future[InputEstimate] | None]:

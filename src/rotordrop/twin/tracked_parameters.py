@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rotordrop.elements.parameter import Parameter
 from rotordrop.elements.table import parameter
 from rotordrop.elements.touchdown_bearing import MODEL_GAP_ERROR
-from rotordrop.estimate.bearing_values import equivalent_stiffness, published_values, static_friction
+from rotordrop.estimate.bearing_values import equivalent_stiffness, published_values
 from rotordrop.estimate.estimate import FittedParameter, JointEstimate, SensorErrors
 from rotordrop.known import NINETY, Known, Status
 from rotordrop.rotor.unknowns import Unknown, sensor_prior, smallest_gap
@@ -166,8 +166,7 @@ def bearing_values(problem: DropProblem, found: Sequence[FittedParameter], b: in
     bearing = problem.model.machine.touchdown_bearings[b]
     values = published_values(bearing.name, found)
     if "friction.dynamic" in values:  # a bearing described without friction has none to find
-        ratio = float(bearing.friction.static) / float(bearing.friction.dynamic)
-        values["friction.static"] = static_friction(ratio, values["friction.dynamic"])
+        values["friction.static"] = bearing.friction.static_of(values["friction.dynamic"])
     values["equivalent_stiffness_N_per_m"] = equivalent_stiffness(
         problem.model.machine,
         b,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tests.scaled_machines import TWELVE_NUMBERS
 
-from rotordrop.elements.rotor import FORM, element_factors, is_beam
+from rotordrop.elements.rotor import FORM, element_factors
 from rotordrop.elements.table import structure_rows
 from rotordrop.errors import UsageError
 from rotordrop.machine.simple import SimpleMachine, simple_machine
@@ -46,8 +46,8 @@ def test_no_form_leaves_the_beam_as_it_is_and_a_described_rotor_has_none(beam, p
     density, stiffness = element_factors(beam.rotor)
     np.testing.assert_allclose(density, 1.0)
     np.testing.assert_allclose(stiffness, 1.0)
-    assert is_beam(beam.rotor)
-    assert not is_beam(paper.rotor)
+    assert beam.rotor.is_beam
+    assert not paper.rotor.is_beam
     assert not {row.path for row in FORM} & {row.path for row in structure_rows("rotor")}
 
 

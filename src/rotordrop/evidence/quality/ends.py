@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotordrop.elements.rotor import is_beam
 from rotordrop.evidence.events import Beginning, CoarseDrop, find_fall
 from rotordrop.evidence.levitated import LevitatedModel
 from rotordrop.evidence.quality.finding import Finding, Kind
@@ -75,7 +74,7 @@ def check_ends(
     if own.misfit <= GOOD_FIT and own.end >= coarse.contact - _NEAR_CONTACT:
         return _as_described(record, levitated, own, machine)
     cases = _other_cases(record, levitated)
-    if not is_beam(machine.rotor):
+    if not machine.rotor.is_beam:
         cases.append(_any_gain(record, levitated))
     grown = [fitted(case.record, case.levitated) for case in cases]
     until = max([own.end, *(fall.end for fall in grown if fall.misfit <= GOOD_FIT)])
@@ -89,7 +88,7 @@ def check_ends(
         for case, fall in zip(cases, grown, strict=True)
     ]
     decided = _decide(mine, cases, finals)
-    if is_beam(machine.rotor) and decided.severity == "stop":
+    if machine.rotor.is_beam and decided.severity == "stop":
         return [_doubted(decided)]
     if decided.kind not in (Kind.UNDECIDED_ENDS, Kind.WRONG_GAIN):
         return [decided]
