@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from rotordrop.machine import machine_schema
-from rotordrop.machine.schema import attribute_meanings
+from rotordrop.machine.schema import field_meanings
 from rotordrop.record.profile import Profile
 
 MACHINE = """\
@@ -70,7 +70,7 @@ def profile_page() -> str:
     schema = Profile.model_json_schema()
     parts = schema["$defs"]
     top = {name: entry for name, entry in schema["properties"].items() if "$ref" not in entry}
-    meanings = attribute_meanings(Profile.__doc__ or "")
+    meanings = field_meanings(Profile)
     lines = [PROFILE, "## At the top", "", *_table({"properties": top}, {}, meanings)]
     for name, entry in schema["properties"].items():
         if "$ref" in entry:

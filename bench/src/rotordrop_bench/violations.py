@@ -24,32 +24,20 @@ from rotordrop_bench.violation_parts import (
 
 
 class Violations(BearingViolations):
-    """What is true of the hidden machine and unknown to the estimator.
+    """What is true of the hidden machine and unknown to the estimator."""
 
-    Attributes
-    ----------
-    support, foundation, contact, race, friction, gap, balls, centre : Violation
-        At every touchdown bearing.
-    bearing : dict of str to BearingViolations
-        At one touchdown bearing, before what is said for all.
-    sensors : ChainViolation
-        At every sensor.
-    sensor : dict of str to SensorViolation
-        At one sensor, before what is said for all.
-    magnets : MagnetViolation
-        The magnets.
-    rotor : RotorViolation
-        The rotor.
-    unbalance_jump : UnbalanceJump, optional
-        An unbalance that comes during the drop.
-    """
-
-    bearing: dict[Name, BearingViolations] = Field(default_factory=dict, description="By name of the bearing")
+    bearing: dict[Name, BearingViolations] = Field(default_factory=dict)
+    """At one touchdown bearing, before what is said for all."""
     sensors: ChainViolation = ChainViolation()
-    sensor: dict[Channel, SensorViolation] = Field(default_factory=dict, description="By name of the sensor")
+    """At every sensor."""
+    sensor: dict[Channel, SensorViolation] = Field(default_factory=dict)
+    """At one sensor, before what is said for all."""
     magnets: MagnetViolation = MagnetViolation()
+    """The magnets."""
     rotor: RotorViolation = RotorViolation()
+    """The rotor."""
     unbalance_jump: UnbalanceJump | None = None
+    """An unbalance that comes during the drop."""
 
     def of_bearing(self, name: str) -> BearingViolations:
         """What holds at one bearing: what is said of it, then what is said of all."""

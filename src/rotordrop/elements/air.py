@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pydantic import Field
-
 from rotordrop.elements.description import Description
 from rotordrop.elements.parameter import Entry, Parameter
 from rotordrop.elements.values import Drag, PositiveSpeed, PositiveTime, QuadraticDrag
@@ -11,26 +9,16 @@ from rotordrop.physics import columns as L
 
 
 class SpeedDescription(Description):
-    """Nominal speed and aerodynamic drag.
-
-    Attributes
-    ----------
-    nominal : Known
-        Nominal speed [rad/s].
-    aero_time_constant : Known, optional
-        Time constant [s] of the exponential fall of speed by aerodynamic drag alone.
-    aero_linear, aero_quadratic : Known, optional
-        Aerodynamic torque as a function of speed: linear [N m s] and quadratic [N m s²] coefficients.
-    """
+    """Nominal speed and aerodynamic drag."""
 
     nominal: PositiveSpeed
-    aero_time_constant: PositiveTime | None = Field(
-        default=None, description="Time constant of the fall of speed by aerodynamic drag alone"
-    )
-    aero_linear: Drag | None = Field(default=None, description="Aerodynamic torque per speed")
-    aero_quadratic: QuadraticDrag | None = Field(
-        default=None, description="Aerodynamic torque per speed squared"
-    )
+    """Nominal speed [rad/s]."""
+    aero_time_constant: PositiveTime | None = None
+    """Time constant [s] of the exponential fall of speed by aerodynamic drag alone."""
+    aero_linear: Drag | None = None
+    """Aerodynamic torque per speed."""
+    aero_quadratic: QuadraticDrag | None = None
+    """Aerodynamic torque per speed squared."""
 
 
 PARAMETERS: tuple[Parameter, ...] = (

@@ -74,97 +74,63 @@ class BallBearing(RaceBearing):
 
     A row of deep grooves has no contact angle of its own: the clearance leaves it one, and the load zone.
     Where a pair has a contact angle and a clearance, the clearance is the play its rows were mounted with.
-
-    Attributes
-    ----------
-    designation : str, optional
-        Designation, for example "XCB71914-E"; where no maker's list in the catalogue has it, the balls are
-        inferred from its size.
-    ball_diameter, pitch_diameter : Known
-        Ball diameter D_w and pitch diameter D_pw [m].
-    ball_count : int
-        Balls per row.
-    contact_angle : Known
-        Nominal contact angle [rad].
-    conformity_inner, conformity_outer : Known
-        Groove radius over ball diameter [1].
-    ring_youngs_modulus, ring_poisson_ratio : Known
-        Ring material [Pa], [1].
-    ball_youngs_modulus, ball_poisson_ratio, ball_density : Known
-        Ball material [Pa], [1], [kg/m³].
-    preload : Known
-        Axial preload force F_V of each row [N].
-    preload_class : {"light", "medium", "heavy"}, optional
-        Preload class of the catalogue, where the preload was given so.
-    clearance : Known, optional
-        Radial internal clearance, from one extreme position of the inner ring to the opposite one [m].
-    clearance_class : {"C2", "CN", "C3", "C4", "C5"}, optional
-        Clearance class of ISO 5753, where the clearance was given so.
-    bore_diameter : Known, optional
-        Bore of the inner ring [m], which a clearance class counts from.
-    arrangement : {"X", "O", "tandem", "single"}
-        Arrangement of the rows; ``rows = 1`` writes "single", ``rows = 2`` "X".
-    first_ball_angle : Known
-        Angle of the first ball from +y, positive with the spin [rad].
-    second_row_offset : Known
-        Angle by which the second row is turned, as a fraction of the ball pitch [1].
-    width : Known, optional
-        Width of one row [m].
-    limiting_speed : Known, optional
-        Speed up to which the maker allows the bearing [rad/s].
-    static_load_rating, dynamic_load_rating : Known, optional
-        Static and dynamic load rating C_0 and C of one row [N]; they narrow balls that are inferred.
-    axial_rigidity : Known, optional
-        Axial rigidity of the pair at its preload, as a catalogue states it [N/m]; narrows them further.
-    ball_count_range : tuple of int, optional
-        90 % interval of the number of balls, where it is inferred.
     """
 
-    designation: Text | None = Field(
-        default=None, description="Designation, such as XCB71914-E, 7016 ACD/HCP4A or 6016-2Z/C3"
-    )
+    designation: Text | None = None
+    """Designation, for example "XCB71914-E"; where no maker's list in the catalogue has it, the balls are
+    inferred from its size."""
     ball_diameter: PositiveLength = follows("reconstructed from the catalogue")
-    ball_count: Annotated[int, Strict(), Field(ge=3)] = Field(
-        default=0, validate_default=False, description="Balls per row; reconstructed from the catalogue"
-    )
+    """Ball diameter D_w and pitch diameter D_pw [m]."""
+    ball_count: Annotated[int, Strict(), Field(ge=3)] = Field(default=0, validate_default=False)
+    """Balls per row."""
     pitch_diameter: PositiveLength = follows("reconstructed from the catalogue")
+    """Ball diameter D_w and pitch diameter D_pw [m]."""
     contact_angle: ContactAngle = follows("from the catalogue")
+    """Nominal contact angle [rad]."""
     conformity_inner: Conformity = follows("0.53, a usual value for spindle bearings")
     conformity_outer: Conformity = follows("0.53, a usual value for spindle bearings")
+    """Groove radius over ball diameter [1]."""
     ball_material: BallMaterial = Field(
         default="silicon nitride", description="Touchdown bearings usually have ceramic balls"
     )
+    """Material of the balls."""
     ring_youngs_modulus: Pressure = default(208e9, "bearing steel")
     ring_poisson_ratio: PoissonRatio = default(0.3, "bearing steel")
+    """Ring material [Pa], [1]."""
     ball_youngs_modulus: Pressure = follows("from the ball material")
     ball_poisson_ratio: PoissonRatio = follows("from the ball material")
     ball_density: Density = follows("from the ball material")
+    """Ball material [Pa], [1], [kg/m³]."""
     preload: Force = follows("that of the preload class")
-    preload_class: PreloadClass | None = Field(default=None, description='Written as preload = "light"')
-    clearance: NonNegativeLength | None = Field(
-        default=None, description="Radial internal clearance, across the diameter; or a class of ISO 5753"
-    )
-    clearance_class: ClearanceClass | None = Field(default=None, description='Written as clearance = "C3"')
-    bore_diameter: PositiveLength | None = Field(default=None, description="Bore of the inner ring")
+    """Axial preload force F_V of each row [N]."""
+    preload_class: PreloadClass | None = None
+    """Preload class of the catalogue, where the preload was given so."""
+    clearance: NonNegativeLength | None = None
+    """Radial internal clearance, from one extreme position of the inner ring to the opposite one [m]."""
+    clearance_class: ClearanceClass | None = None
+    """Clearance class of ISO 5753, where the clearance was given so."""
+    bore_diameter: PositiveLength | None = None
+    """Bore of the inner ring [m], which a clearance class counts from."""
     arrangement: Literal["X", "O", "tandem", "single"] = Field(
         default="X", description="Two rows face to face, as in Neisi 2020"
     )
+    """Arrangement of the rows; ``rows = 1`` writes "single", ``rows = 2`` "X"."""
     first_ball_angle: Angle = default(0.0, "the first ball is straight up")
+    """Angle of the first ball from +y, positive with the spin [rad]."""
     second_row_offset: Number = default(0.0, "the balls of both rows stand at the same angles")
-    width: PositiveLength | None = Field(default=None, description="Width of one row")
-    limiting_speed: PositiveSpeed | None = Field(default=None, description="Highest speed the maker allows")
-    static_load_rating: PositiveForce | None = Field(
-        default=None, description="Static load rating of one row"
-    )
-    dynamic_load_rating: PositiveForce | None = Field(
-        default=None, description="Dynamic load rating of one row"
-    )
-    axial_rigidity: Stiffness | None = Field(
-        default=None, description="Axial rigidity of the pair at the preload that is given"
-    )
-    ball_count_range: tuple[int, int] | None = Field(
-        default=None, description="90 % interval of the balls per row where they are inferred"
-    )
+    """Angle by which the second row is turned, as a fraction of the ball pitch [1]."""
+    width: PositiveLength | None = None
+    """Width of one row [m]."""
+    limiting_speed: PositiveSpeed | None = None
+    """Speed up to which the maker allows the bearing [rad/s]."""
+    static_load_rating: PositiveForce | None = None
+    """Static load rating of one row."""
+    dynamic_load_rating: PositiveForce | None = None
+    """Dynamic load rating of one row."""
+    axial_rigidity: Stiffness | None = None
+    """Axial rigidity of the pair at its preload, as a catalogue states it [N/m]; narrows them further."""
+    ball_count_range: tuple[int, int] | None = None
+    """90 % interval of the number of balls, where it is inferred."""
 
     usual: ClassVar[Mapping[str, Usual]] = {
         "ring_youngs_modulus": ELASTIC,

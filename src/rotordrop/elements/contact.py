@@ -9,7 +9,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from rotordrop.elements.description import Description, Misfit, Usual
 from rotordrop.elements.parameter import Entry, Parameter, Role, Rule, Step, bearing_entries
@@ -37,24 +36,16 @@ _UNIT_EXPONENT = re.compile(r"m\s*(?:\^|\*\*)\s*([\d.]+)\s*$")
 
 
 class Contact(Description):
-    """Contact between rotor and inner race, F = K δⁿ (1 + 1.5 λ δ̇).
-
-    Attributes
-    ----------
-    stiffness : Known
-        Contact stiffness K [N/m^n].
-    exponent : Known
-        Exponent n [1].
-    damping : Known
-        Contact damping λ [s/m].
-    length : Known, optional
-        Length of the line contact [m], from which Palmgren's formula gives the stiffness.
-    """
+    """Contact between rotor and inner race, F = K δⁿ (1 + 1.5 λ δ̇)."""
 
     stiffness: ContactStiffness = follows("8e8 N/m^1.11, or Palmgren's line contact where 'length' is given")
+    """Contact stiffness K [N/m^n]."""
     exponent: ContactExponent = default(LINE_CONTACT, "line contact (Palmgren), as in Neisi 2020")
+    """Exponent n [1]."""
     damping: ContactDamping = default(0.08, "contact damping of steel at low speed", (0.0, 0.5))
-    length: PositiveLength | None = Field(default=None, description="Length of the line contact")
+    """Contact damping λ [s/m]."""
+    length: PositiveLength | None = None
+    """Length of the line contact [m], from which Palmgren's formula gives the stiffness."""
 
     usual: ClassVar[Mapping[str, Usual]] = {
         "damping": Usual(

@@ -145,8 +145,10 @@ class Description(BaseModel):
 class Placed(Description):
     """Something that sits at a node of the rotor, given by number or by position."""
 
-    node: Node = Field(default=0, validate_default=False, description="Node number, counted from 1")
-    position: Length | None = Field(default=None, description="In place of the node: distance from node 1")
+    node: Node = Field(default=0, validate_default=False)
+    """Node number, counted from 1."""
+    position: Length | None = None
+    """In place of the node: distance from node 1."""
 
     def check(self) -> None:
         """Refuse both or neither of node and position."""

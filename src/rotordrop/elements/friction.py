@@ -23,22 +23,15 @@ _RATIO_ERROR = 0.15
 
 
 class Friction(Description):
-    """Stribeck friction between rotor and inner race.
-
-    Attributes
-    ----------
-    static, dynamic : Known
-        Friction coefficients at rest and when sliding fast [1].
-    stribeck_speed : Known
-        Sliding speed over which static falls to dynamic [m/s].
-    smoothing_speed : Known
-        Sliding speed below which the friction is smoothed [m/s].
-    """
+    """Stribeck friction between rotor and inner race."""
 
     static: NonNegative = follows("1.3 times the dynamic coefficient")
     dynamic: NonNegative = default(0.1, "the range swept in Neisi 2020 lies around it", (0.05, 0.2))
+    """Friction coefficients at rest and when sliding fast [1]."""
     stribeck_speed: Velocity = default(0.5, "as in the reference machine", (0.1, 2.0))
+    """Sliding speed over which static falls to dynamic [m/s]."""
     smoothing_speed: Velocity = default(0.02, "small against any sliding speed that matters in a drop")
+    """Sliding speed below which the friction is smoothed [m/s]."""
 
     usual: ClassVar[Mapping[str, Usual]] = {
         "dynamic": Usual(

@@ -25,26 +25,18 @@ REMANENCE_TIME = 2e-3
 
 
 class ActiveMagneticBearing(Placed):
-    """A radial active magnetic bearing, near its operating point.
-
-    Attributes
-    ----------
-    node : int
-        Node number, counted from 1.
-    stiffness : Known
-        Stiffness of the closed loop [N/m].
-    damping : Known
-        Damping of the closed loop [N s/m].
-    integral_action : bool
-        Whether the controller holds the rotor centred against gravity.
-    """
+    """A radial active magnetic bearing, near its operating point."""
 
     name: Name
+    """Name, of which no two are the same."""
     stiffness: Stiffness = follows("a rigid-body frequency of 40 Hz of the mass this AMB carries")
+    """Stiffness of the closed loop [N/m]."""
     damping: Damping = follows("30 % of critical for the mass this AMB carries")
+    """Damping of the closed loop [N s/m]."""
     integral_action: Annotated[bool, Strict()] = Field(
         default=True, description="The controller holds the rotor centred against gravity"
     )
+    """Whether the controller holds the rotor centred against gravity."""
 
     reserved: ClassVar[Mapping[str, str]] = {"controller": "the controller of a closed loop"}
 

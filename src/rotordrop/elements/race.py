@@ -24,29 +24,20 @@ Array = NDArray[np.float64]
 
 
 class Race(Description):
-    """The inner race with everything that spins with it.
-
-    Attributes
-    ----------
-    mass : Known
-        Mass [kg].
-    inertia : Known
-        Polar moment of inertia [kg m²].
-    width : Known
-        Width over which the rotor lies in the race [m]; the pressure between them follows from it.
-    drag_coefficient : Known
-        Drag torque over bearing force and half the pitch diameter [1].
-    drag_speed : Known
-        Race speed over which the drag builds up [rad/s].
-    """
+    """The inner race with everything that spins with it."""
 
     mass: PositiveMass = follows("from the size of the bearing")
+    """Mass [kg]."""
     inertia: PositiveInertia = follows("from the size of the bearing")
+    """Polar moment of inertia [kg m²]."""
     width: PositiveLength = follows("the length of the contact, or from the size of the bearing")
+    """Width over which the rotor lies in the race [m]; the pressure between them follows from it."""
     drag_coefficient: NonNegative = default(
         0.002, "rolling friction of angular-contact bearings", (0.001, 0.005)
     )
+    """Drag torque over bearing force and half the pitch diameter [1]."""
     drag_speed: PositiveSpeed = default(1.0, "small against any race speed that matters in a drop")
+    """Race speed over which the drag builds up [rad/s]."""
 
     def fill(self, row: Array) -> None:
         """Write the columns of the race."""

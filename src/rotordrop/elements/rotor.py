@@ -46,21 +46,14 @@ POISSON = Usual(least=0.05, most=0.499, kind="dimensionless", look="metals have 
 
 
 class Material(Description):
-    """Elastic constants and density of a material.
-
-    Attributes
-    ----------
-    youngs_modulus : Known
-        Young's modulus [Pa].
-    poisson_ratio : Known
-        Poisson ratio [1].
-    density : Known
-        Density [kg/m³].
-    """
+    """Elastic constants and density of a material."""
 
     youngs_modulus: Pressure
+    """Young's modulus [Pa]."""
     poisson_ratio: PoissonRatio
+    """Poisson ratio [1]."""
     density: Density
+    """Density [kg/m³]."""
 
     usual: ClassVar[Mapping[str, Usual]] = {
         "youngs_modulus": ELASTIC,
@@ -103,14 +96,18 @@ class Element:
 class Section(Description):
     """What every shaft section has: diameters, a layer, a material."""
 
-    part: Text = Field(default="", description="What this piece of the shaft is")
+    part: Text = ""
+    """What this piece of the shaft is."""
     outer_diameter: PositiveLength
+    """Outer diameter [m]."""
     inner_diameter: NonNegativeLength = default(0.0, "a solid shaft")
-    layer_diameter: PositiveLength | None = Field(
-        default=None, description="Outer diameter of a layer that adds mass and inertia but no stiffness"
-    )
-    layer_density: Density | None = Field(default=None, description="Density of the layer")
-    material: Name | None = Field(default=None, description="Material; that of the rotor when left out")
+    """Diameter of the bore [m]."""
+    layer_diameter: PositiveLength | None = None
+    """Outer diameter of a layer that adds mass and inertia but no stiffness."""
+    layer_density: Density | None = None
+    """Density of the layer."""
+    material: Name | None = None
+    """Material; that of the rotor when left out."""
 
     usual: ClassVar[Mapping[str, Usual]] = {
         "layer_density": DENSITY,
@@ -153,9 +150,8 @@ class SectionByLength(Section):
 class SectionByNodes(Section):
     """A shaft section from one node to another."""
 
-    nodes: tuple[Annotated[int, Strict()], Annotated[int, Strict()]] = Field(
-        description="First and last node of the section, counted from 1"
-    )
+    nodes: tuple[Annotated[int, Strict()], Annotated[int, Strict()]]
+    """First and last node of the section, counted from 1."""
 
     @classmethod
     def rewritten(cls, raw: dict[str, Any]) -> dict[str, Any]:
@@ -188,22 +184,15 @@ AnySection = Annotated[
 
 
 class Disc(Placed):
-    """A disc or point mass at a node: impeller, thrust disc, coupling.
-
-    Attributes
-    ----------
-    node : int
-        Node number, counted from 1.
-    mass : Known
-        Mass [kg].
-    polar_inertia, diametral_inertia : Known
-        Moments of inertia [kg m²] about the shaft axis and about a diameter.
-    """
+    """A disc or point mass at a node: impeller, thrust disc, coupling."""
 
     name: Text = ""
+    """What it is."""
     mass: PositiveMass
+    """Mass [kg]."""
     polar_inertia: Inertia = default(0.0, "a point mass")
     diametral_inertia: Inertia = default(0.0, "a point mass")
+    """Moments of inertia [kg m²] about the shaft axis and about a diameter."""
 
     def check(self) -> None:
         """Refuse inertias no body can have."""
@@ -240,50 +229,30 @@ NodePositions = Annotated[tuple[float, ...], BeforeValidator(_node_positions)]
 
 
 class Rotor(Description):
-    """The rotor as built: shaft, discs, materials.
-
-    Attributes
-    ----------
-    node_positions : tuple of float
-        Distance of every node from node 1 [m], NDE to DE.
-    sections : tuple of Section
-        Shaft sections, as lengths one after the other or from node to node.
-    discs : tuple of Disc
-        Discs and point masses.
-    modal_damping : Known
-        Damping ratio of the free-free flexible modes [1].
-    stiffness_factor : Known, optional
-        Bending stiffness over the one that sections and materials give [1].
-    mass_to_ends, mass_to_de : Known, optional
-        Of a beam in place of a rotor: part of its mass moved from the middle to the ends, and towards the DE,
-        such that mass and centre of mass stay [1].
-    stiffness_to_de, stiffness_to_ends : Known, optional
-        The same of the logarithm of its bending stiffness [1].
-    """
+    """The rotor as built: shaft, discs, materials."""
 
     material: Name = Field(default="steel", description="Material of all sections that name no other")
-    materials: dict[Name, Material] = Field(default_factory=dict, description="Materials by name")
+    """Name of the material of all sections that name no other."""
+    materials: dict[Name, Material] = Field(default_factory=dict)
+    """Materials by name."""
     modal_damping: NonNegative = default(0.005, "0.5 % of critical on every free-free flexible mode")
-    stiffness_factor: Positive | None = Field(
-        default=None, description="Bending stiffness over the one that sections and materials give"
-    )
-    mass_to_ends: Number | None = Field(
-        default=None, description="Of a beam in place of a rotor: mass moved from its middle to its ends"
-    )
-    mass_to_de: Number | None = Field(
-        default=None, description="Of a beam: mass moved towards the DE; its centre of mass stays"
-    )
-    stiffness_to_de: Number | None = Field(
-        default=None, description="Of a beam: logarithm of bending stiffness, more towards the DE"
-    )
-    stiffness_to_ends: Number | None = Field(
-        default=None, description="Of a beam: logarithm of bending stiffness, more at the ends"
-    )
-    node_positions: NodePositions = Field(
-        default=(), validate_default=False, description="Position of every node, for sections given by nodes"
-    )
-    sections: tuple[AnySection, ...] = Field(min_length=1, description="Shaft sections from NDE to DE")
+    """Damping ratio of the free-free flexible modes [1]."""
+    stiffness_factor: Positive | None = None
+    """Bending stiffness over the one that sections and materials give [1]."""
+    mass_to_ends: Number | None = None
+    """Of a beam in place of a rotor: mass moved from its middle to its ends."""
+    mass_to_de: Number | None = None
+    """Of a beam: mass moved towards the DE; its centre of mass stays."""
+    stiffness_to_de: Number | None = None
+    """Of a beam: logarithm of bending stiffness, more towards the DE."""
+    stiffness_to_ends: Number | None = None
+    """Of a beam: logarithm of bending stiffness, more at the ends."""
+    node_positions: NodePositions = Field(default=(), validate_default=False)
+    """Distance of every node from node 1 [m], NDE to DE."""
+    sections: tuple[AnySection, ...] = Field(min_length=1)
+    """Shaft sections, as lengths one after the other or from node to node."""
     discs: tuple[Disc, ...] = ()
+    """Discs and point masses."""
 
     usual: ClassVar[Mapping[str, Usual]] = {
         "modal_damping": Usual(

@@ -27,65 +27,38 @@ LEAST_PLANE_DISTANCE = 1e-3
 
 
 class Sensor(Placed):
-    """A displacement sensor looking at the shaft.
+    """A displacement sensor looking at the shaft."""
 
-    Attributes
-    ----------
-    name : str
-        Name of its channel in the recording.
-    node : int
-        Node number, counted from 1.
-    angle : Known
-        Direction of positive reading [rad], counter-clockwise from +x (horizontal), y up, seen from the DE.
-    polarity : {1, -1}
-        -1 when a motion in the direction of the angle makes the reading fall.
-    gain : Known
-        True displacement over reading [1].
-    offset : Known
-        Reading [m] when the rotor is centred.
-    sensitivity : Known, optional
-        Volts per metre [V/m], for recordings in volts.
-    bearing : str
-        Name of the touchdown bearing at this end; the nearest when left out.
-    position_error : Known
-        Standard uncertainty of the axial position [m].
-    time_constant : Known, optional
-        Time by which the reading lags behind, first order [s].
-    cross_axis : Known, optional
-        Reading per displacement across, in the direction turned by +90° [1].
-    follows_housing : Known, optional
-        Part of the motion of the bearing housing that the bracket of the sensor makes too [1].
-    plane_offset : Known, optional
-        How far the sensor stands from its node, towards higher nodes [m].
-    lost : bool
-        Whether the sensor gave no readings; the machine then goes without it.
-    """
-
-    name: Channel = Field(description="Name of the channel in the recording")
+    name: Channel
+    """Name of its channel in the recording."""
     angle: Angle
+    """Direction of positive reading [rad], counter-clockwise from +x (horizontal), y up, seen from the DE."""
     polarity: Literal[1, -1] = 1
+    """-1 when a motion in the direction of the angle makes the reading fall."""
     gain: Positive = default(1.0, "true displacement over reading of a calibrated sensor", (0.97, 1.03))
+    """True displacement over reading [1]."""
     offset: Length = default(0.0, "reads zero when the rotor is centred", (-50e-6, 50e-6))
-    sensitivity: Sensitivity | None = Field(
-        default=None, description="Volts per metre, for recordings in volts"
-    )
+    """Reading [m] when the rotor is centred."""
+    sensitivity: Sensitivity | None = None
+    """Volts per metre [V/m], for recordings in volts."""
     bearing: Name = Field(
         default="-",
         validate_default=False,
         description="Touchdown bearing at this end; the nearest when left out",
     )
+    """Name of the touchdown bearing at this end; the nearest when left out."""
     position_error: NonNegativeLength = default(1e-3, "standard uncertainty of the axial position")
-    time_constant: PositiveTime | None = Field(
-        default=None, description="Time by which the reading lags behind, first order"
-    )
-    cross_axis: Number | None = Field(default=None, description="Reading per displacement across")
-    follows_housing: Number | None = Field(
-        default=None, description="Part of the motion of the bearing housing that the bracket makes too"
-    )
-    plane_offset: Length | None = Field(
-        default=None, description="How far the sensor stands from its node, towards higher nodes"
-    )
+    """Standard uncertainty of the axial position [m]."""
+    time_constant: PositiveTime | None = None
+    """Time by which the reading lags behind, first order [s]."""
+    cross_axis: Number | None = None
+    """Reading per displacement across, in the direction turned by +90° [1]."""
+    follows_housing: Number | None = None
+    """Part of the motion of the bearing housing that the bracket of the sensor makes too [1]."""
+    plane_offset: Length | None = None
+    """How far the sensor stands from its node, towards higher nodes [m]."""
     lost: bool = Field(default=False, description="A sensor without readings; left out of everything")
+    """Whether the sensor gave no readings; the machine then goes without it."""
 
     usual: ClassVar[Mapping[str, Usual]] = {
         "gain": Usual(

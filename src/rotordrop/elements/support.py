@@ -9,7 +9,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from rotordrop.elements.description import Description, Misfit
 from rotordrop.elements.parameter import (
@@ -55,52 +54,33 @@ PEAK_LOADS = 10.0
 
 
 class Support(Description):
-    """What carries the outer ring: mass on a spring and a damper, vertical (y) and horizontal (x).
-
-    Attributes
-    ----------
-    mass, stiffness, damping : Known
-        Vertical support mass [kg], stiffness [N/m] and damping [N s/m].
-    damping_ratio : Known, optional
-        In place of the damping: C = 2 ζ √(K m).
-    mass_horizontal, stiffness_horizontal, damping_horizontal : Known
-        The same in the horizontal direction; equal to the vertical ones when left out.
-    damping_ratio_horizontal : Known, optional
-        In place of the horizontal damping.
-    coupling : Known, optional
-        Coupling of x and y over the geometric mean of horizontal and vertical stiffness [1]: principal axes
-        that are turned.
-    cubic : Known, optional
-        Cubic term k₃ of the spring, F = K h (1 + k₃ h²) along x and along y [1/m²].
-    foundation_share : Known, optional
-        Support mass over modal mass of a foundation that gives way under the support [1].
-    foundation_frequency, foundation_damping_ratio : Known, optional
-        Natural frequency [rad/s] and damping ratio [1] of that foundation.
-    """
+    """What carries the outer ring: mass on a spring and a damper, vertical (y) and horizontal (x)."""
 
     mass: PositiveMass = default(
         40.0, "the housing parts around the bearing of the reference machine", (4.0, 400.0)
     )
     stiffness: Stiffness = default(1e8, "a first guess for a bearing housing", (1e7, 2e9))
     damping: Damping = follows("2.5 % of critical, or from the damping ratio")
-    damping_ratio: NonNegative | None = Field(default=None, description="")
+    """Vertical support mass [kg], stiffness [N/m] and damping [N s/m]."""
+    damping_ratio: NonNegative | None = None
+    """In place of the damping: C = 2 ζ √(K m)."""
     mass_horizontal: PositiveMass = follows("equal to the vertical one")
     stiffness_horizontal: Stiffness = follows("equal to the vertical one")
     damping_horizontal: Damping = follows("from the damping ratio, or equal to the vertical one")
-    damping_ratio_horizontal: NonNegative | None = Field(default=None, description="")
-    coupling: Coupling | None = Field(
-        default=None, description="Coupling of x and y over the geometric mean of both stiffnesses"
-    )
-    cubic: CubicTerm | None = Field(default=None, description="Cubic term k3 of F = K h (1 + k3 h^2)")
-    foundation_share: NonNegative | None = Field(
-        default=None, description="Support mass over modal mass of a foundation that gives way"
-    )
-    foundation_frequency: PositiveSpeed | None = Field(
-        default=None, description="Natural frequency of that foundation"
-    )
-    foundation_damping_ratio: Positive | None = Field(
-        default=None, description="Damping ratio of that foundation"
-    )
+    """The same in the horizontal direction; equal to the vertical ones when left out."""
+    damping_ratio_horizontal: NonNegative | None = None
+    """In place of the horizontal damping."""
+    coupling: Coupling | None = None
+    """Coupling of x and y over the geometric mean of horizontal and vertical stiffness [1]: principal axes
+    that are turned."""
+    cubic: CubicTerm | None = None
+    """Cubic term k₃ of the spring, F = K h (1 + k₃ h²) along x and along y [1/m²]."""
+    foundation_share: NonNegative | None = None
+    """Support mass over modal mass of a foundation that gives way under the support [1]."""
+    foundation_frequency: PositiveSpeed | None = None
+    """Natural frequency of that foundation."""
+    foundation_damping_ratio: Positive | None = None
+    """Damping ratio of that foundation."""
 
     displaces: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "damping": ("damping_ratio",),

@@ -27,31 +27,26 @@ _MOUNTING = frozenset(
 
 
 class TouchdownBearing(Placed):
-    """One touchdown bearing with its clearance and all that the rotor meets when it drops.
-
-    Attributes
-    ----------
-    name : str
-        Name, such as "NDE" or "DE".
-    node : int
-        Node number, counted from 1.
-    air_gap : Known
-        Radial clearance between rotor and inner race [m].
-    bore_radius : Known
-        Radius of the bore of the inner race [m]; the rotor's radius is smaller by the air gap.
-    damping_time : Known
-        Bearing damping over tangent stiffness, C_b/K_b [s].
-    """
+    """One touchdown bearing with its clearance and all that the rotor meets when it drops."""
 
     name: Name
+    """Name, such as "NDE" or "DE"."""
     air_gap: PositiveLength
+    """Radial clearance between rotor and inner race [m]."""
     bore_radius: PositiveLength
+    """Radius of the bore of the inner race [m]; the rotor's radius is smaller by the air gap."""
     damping_time: Time = default(1e-5, "within (0.25–2.5)·10⁻⁵ s of Neisi 2020", (0.25e-5, 2.5e-5))
+    """Bearing damping over tangent stiffness, C_b/K_b [s]."""
     bearing: BallBearing
-    contact: Contact = Field(default_factory=Contact, description="Contact between rotor and inner race")
-    friction: Friction = Field(default_factory=Friction, description="Friction between rotor and inner race")
-    race: Race = Field(default_factory=Race, description="The inner race")
-    support: Support = Field(default_factory=Support, description="What carries the outer ring")
+    """The rolling bearing that carries the race."""
+    contact: Contact = Field(default_factory=Contact)
+    """Contact between rotor and inner race."""
+    friction: Friction = Field(default_factory=Friction)
+    """Friction between rotor and inner race."""
+    race: Race = Field(default_factory=Race)
+    """The inner race."""
+    support: Support = Field(default_factory=Support)
+    """What carries the outer ring."""
 
     reserved: ClassVar[Mapping[str, str]] = {
         "kind": "another kind of touchdown bearing than a ball bearing (sleeve, planetary)",

@@ -18,43 +18,25 @@ from rotordrop.units import parse_quantity
 
 
 class Unbalance(Placed):
-    """An unbalance at a node.
-
-    Attributes
-    ----------
-    node : int
-        Node number, counted from 1.
-    amount : Known
-        Mass times radius [kg m].
-    phase : Known
-        Angle from +y, positive with the spin [rad], when the rotor angle is zero.
-    beyond_described : Known, optional
-        Factor by which the amount stands above what was described, where a record asked for more [1].
-    """
+    """An unbalance at a node."""
 
     amount: UnbalanceAmount
+    """Mass times radius [kg m]."""
     phase: Angle
-    beyond_described: Positive | None = Field(
-        default=None, description="Factor above the described amount, where a record asked for more"
-    )
+    """Angle from +y, positive with the spin [rad], when the rotor angle is zero."""
+    beyond_described: Positive | None = None
+    """Factor by which the amount stands above what was described, where a record asked for more [1]."""
 
 
 class BalanceGrade(Description):
-    """Balance quality after ISO 21940-11 (formerly ISO 1940): the permissible unbalance, of unknown phase.
+    """Balance quality after ISO 21940-11 (formerly ISO 1940): the permissible unbalance, of unknown phase."""
 
-    Attributes
-    ----------
-    grade_mm_s : float
-        The grade G: permissible speed of the centre of gravity [mm/s].
-    at_speed : Known
-        Speed for which the grade holds [rad/s].
-    permissible : Known, optional
-        Permissible unbalance of the whole rotor [kg m], where it is given beside the grade.
-    """
-
-    grade_mm_s: float = Field(gt=0.0, description='The grade, such as "G 2.5", "2.5 mm/s" or 2.5')
+    grade_mm_s: float = Field(gt=0.0)
+    """The grade G: permissible speed of the centre of gravity [mm/s]."""
     at_speed: PositiveSpeed
+    """Speed for which the grade holds [rad/s]."""
     permissible: UnbalanceAmount | None = None
+    """Permissible unbalance of the whole rotor [kg m], where it is given beside the grade."""
 
     usual: ClassVar[Mapping[str, Usual]] = {
         "at_speed": Usual(least=1.0, most=2e4, kind="speed", look="check the unit"),

@@ -10,61 +10,40 @@ from rotordrop.elements.description import Description, Misfit, Text
 
 
 class RecordedLift(Description):
-    """The remanent force of one magnet in one recorded drop, over the weight that the magnet carries.
-
-    Attributes
-    ----------
-    magnet : str
-        Name of the magnet.
-    sideways, up : float
-        Its two parts [1].
-    sideways_error, up_error : float
-        Their standard errors, what was known before the record included [1].
-    """
+    """The remanent force of one magnet in one recorded drop, over the weight that the magnet carries."""
 
     magnet: Text
+    """Name of the magnet."""
     sideways: float
+    """Its two parts [1]."""
     sideways_error: float = Field(gt=0.0)
+    """Their standard errors, what was known before the record included [1]."""
     up: float
+    """Its two parts [1]."""
     up_error: float = Field(gt=0.0)
+    """Their standard errors, what was known before the record included [1]."""
 
 
 class CalibrationDrop(Description):
-    """One recorded drop that a machine was calibrated on.
-
-    Attributes
-    ----------
-    name : str
-        Name of the recording, as it is, with commas and blanks.
-    sha256 : str
-        Hash of its file; empty where there was no file.
-    lift : tuple of RecordedLift
-        What the drop showed of the remanent force of each magnet; no other drop need have it.
-    """
+    """One recorded drop that a machine was calibrated on."""
 
     name: Text
-    sha256: Text = Field(default="", description="SHA-256 of the file of the recording")
-    lift: tuple[RecordedLift, ...] = Field(
-        default=(), description="Remanent force of each magnet in this drop, over the weight it carries"
-    )
+    """Name of the recording, as it is, with commas and blanks."""
+    sha256: Text = ""
+    """Hash of its file; empty where there was no file."""
+    lift: tuple[RecordedLift, ...] = ()
+    """What the drop showed of the remanent force of each magnet; no other drop need have it."""
 
 
 class JointSpread(Description):
-    """How the errors of calibrated values belong together.
-
-    Attributes
-    ----------
-    paths : tuple of str
-        Values by path, such as ``"NDE.support.stiffness"``; their own numbers in the file are the middle.
-    logarithmic : tuple of bool
-        Whether the natural logarithm of each is normal, or the value [SI] itself.
-    covariance : tuple of float
-        Lower triangle of the covariance, row by row with its diagonal.
-    """
+    """How the errors of calibrated values belong together."""
 
     paths: tuple[Text, ...] = Field(min_length=1)
+    """Values by path, such as ``"NDE.support.stiffness"``; their own numbers in the file are the middle."""
     logarithmic: tuple[StrictBool, ...]
+    """Whether the natural logarithm of each is normal, or the value [SI] itself."""
     covariance: tuple[float, ...]
+    """Lower triangle of the covariance, row by row with its diagonal."""
 
     def check(self) -> None:
         """Refuse a covariance that is none, or none of these values."""
@@ -89,23 +68,14 @@ class JointSpread(Description):
 
 
 class CalibrationOrigin(Description):
-    """Where the estimates of a calibrated machine come from; written by ``rotordrop calibrate``.
-
-    Attributes
-    ----------
-    drops : tuple of CalibrationDrop
-        Recorded drops that the machine was fitted to.
-    consistent : bool
-        Whether the model agreed with all of them.
-    joint : JointSpread, optional
-        How the errors of the values belong together: their distribution for a study.
-    """
+    """Where the estimates of a calibrated machine come from; written by ``rotordrop calibrate``."""
 
     drops: tuple[CalibrationDrop, ...] = Field(min_length=1)
-    consistent: StrictBool = Field(description="Whether the model agreed with all drops")
-    joint: JointSpread | None = Field(
-        default=None, description="How the errors of the calibrated values belong together"
-    )
+    """Recorded drops that the machine was fitted to."""
+    consistent: StrictBool
+    """Whether the model agreed with all of them."""
+    joint: JointSpread | None = None
+    """How the errors of the values belong together: their distribution for a study."""
 
     def check(self) -> None:
         """Refuse a drop that is named twice."""

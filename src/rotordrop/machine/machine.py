@@ -29,52 +29,32 @@ RESERVED_NAMES = ("speed", "unbalance", "rotor", "gravity", "sensors", "ambs", "
 
 
 class Machine(Description):
-    """A machine whose rotor can drop onto its touchdown bearings; immutable.
-
-    Attributes
-    ----------
-    name : str
-        Name of the machine.
-    gravity : Known
-        Acceleration of gravity, acting towards -y [m/s²].
-    rotor : Rotor
-        Shaft, discs, materials.
-    unbalances : tuple of Unbalance
-        Unbalances; from the balance grade where none is given.
-    balance_grade : BalanceGrade, optional
-        Balance quality after ISO 21940-11.
-    touchdown_bearings : tuple of TouchdownBearing
-        Touchdown bearings, any number, NDE first.
-    ambs : tuple of ActiveMagneticBearing
-        Radial active magnetic bearings.
-    remanence_time_constant : Known, optional
-        Time in which the remanent force of the magnets decays [s]; 2 ms, to a factor of two, when left out.
-    sensors : tuple of Sensor
-        Displacement sensors.
-    speed : SpeedDescription
-        Nominal speed and aerodynamic drag.
-    notes : tuple of str
-        Remarks of the file's author.
-    calibration : CalibrationOrigin, optional
-        Recorded drops that its estimates come from.
-    """
+    """A machine whose rotor can drop onto its touchdown bearings; immutable."""
 
     name: Text
+    """Name of the machine."""
     notes: tuple[Text, ...] = ()
+    """Remarks of the file's author."""
     gravity: Acceleration = default(9.81, "usual value")
+    """Acceleration of gravity, acting towards -y [m/s²]."""
     speed: SpeedDescription
+    """Nominal speed and aerodynamic drag."""
     rotor: Rotor
+    """Shaft, discs, materials."""
     balance_grade: BalanceGrade | None = None
+    """Balance quality after ISO 21940-11."""
     unbalances: tuple[Unbalance, ...] = ()
+    """Unbalances; from the balance grade where none is given."""
     touchdown_bearings: tuple[TouchdownBearing, ...] = Field(min_length=1)
+    """Touchdown bearings, any number, NDE first."""
     ambs: tuple[ActiveMagneticBearing, ...] = ()
-    remanence_time_constant: PositiveTime | None = Field(
-        default=None, description="Time in which the remanent force of the magnets decays"
-    )
+    """Radial active magnetic bearings."""
+    remanence_time_constant: PositiveTime | None = None
+    """Time in which the remanent force of the magnets decays [s]; 2 ms, to a factor of two, when left out."""
     sensors: tuple[Sensor, ...] = ()
-    calibration: CalibrationOrigin | None = Field(
-        default=None, description="Drops it was calibrated on, written by 'rotordrop calibrate'"
-    )
+    """Displacement sensors."""
+    calibration: CalibrationOrigin | None = None
+    """Recorded drops that its estimates come from."""
 
     _source_path: Path | None = PrivateAttr(default=None)
 

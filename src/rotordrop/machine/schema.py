@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import re
+import ast
+import inspect
 from typing import Any
 
 from rotordrop.elements.catalog.boundary import CLASSES
@@ -14,7 +15,6 @@ from rotordrop.units import KINDS, format_quantity
 
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _TEXT = {"type": "string"}
-_ATTRIBUTE = re.compile(r"^(\w[\w, ]*) : .*\n((?:    .*\n?)+)", re.MULTILINE)
 
 
 def machine_schema() -> dict[str, Any]:
@@ -62,41 +62,39 @@ def _parts(base: type[Description]) -> list[type[Description]]:
 
 def _describe(schema: dict[str, Any], description: type[Description]) -> None:
     """Put the words of the class into its schema: what each key means and what holds when it is left out."""
-    text = description.__doc__ or ""
-    schema["description"] = text.split("\n")[0]
+    schema["description"] = (description.__doc__ or "").split("\n")[0]
     schema.pop("title", None)
-    meanings = attribute_meanings(text)
-    shared = list(meanings.values())
+    meanings = field_meanings(description)
     for name, entry in schema["properties"].items():
         entry.pop("title", None)
         standing = entry.pop("default", None)
         field = description.model_fields[name]
-        meaning = meanings.get(name, "")
-        words = _words(meaning, shared.count(meaning) > 1, field.description or "")
+        said = field.description or ""
+        meaning = meanings.get(name, said)
+        words = [meaning, said if said.startswith("When left out") and "left out" not in meaning else ""]
         if isinstance(field.default, Known) and field.default.value == field.default.value:
             value = format_quantity(field.default.value, kind_of(description, name) or "dimensionless")
-            words = [meanings.get(name, ""), f"Default {value}: {field.default.source}"]
+            words = [meaning, f"Default {value}: {field.default.source}"]
         elif isinstance(standing, str | int | float | bool) and standing not in ("", "-", 0):
             entry["default"] = standing
         entry["description"] = ". ".join(word.rstrip(".") for word in words if word)
 
 
-def _words(meaning: str, shared: bool, field: str) -> list[str]:
-    """What is said of a key: once, and the words of its own rather than those of several keys together."""
-    if not field or not meaning:
-        return [meaning or field]
-    if field.lower().startswith("when left out"):
-        return [meaning] if "left out" in meaning else [meaning, field]
-    return [field if shared else meaning]
-
-
-def attribute_meanings(text: str) -> dict[str, str]:
-    """Read the attributes of a numpydoc docstring."""
+def field_meanings(kind: type) -> dict[str, str]:
+    """What stands beneath each field of a class; beneath the last of several, it holds for all of them."""
     found: dict[str, str] = {}
-    plain = "\n".join(line.removeprefix("    ") for line in text.split("\n"))
-    for match in _ATTRIBUTE.finditer(plain):
-        words = " ".join(match.group(2).split())
-        found |= {name.strip(): words for name in match.group(1).split(",")}
+    for part in reversed(kind.__mro__):
+        if part.__module__.partition(".")[0] not in ("rotordrop", "rotordrop_bench"):
+            continue
+        (described,) = ast.parse(inspect.getsource(part)).body
+        fields: list[str] = []
+        for statement in getattr(described, "body", []):
+            match statement:
+                case ast.AnnAssign(target=ast.Name(id=name)):
+                    fields.append(name)
+                case ast.Expr(value=ast.Constant(value=str(words))):
+                    found |= dict.fromkeys(fields, " ".join(words.split()))
+                    fields = []
     return found
 
 

@@ -11,7 +11,7 @@ from rotordrop.elements.catalog import find_bearing
 from rotordrop.elements.rotor import Rotor
 from rotordrop.errors import UsageError
 from rotordrop.machine.machine import Machine
-from rotordrop.machine.schema import attribute_meanings
+from rotordrop.machine.schema import field_meanings
 from rotordrop.units import InSI, format_quantity, in_si
 
 STEEL_DENSITY, STEEL_MODULUS = 7850.0, 206e9
@@ -44,51 +44,34 @@ those rotors have 0.88 to 1.44."""
 
 @dataclass(frozen=True, kw_only=True)
 class SimpleMachine:
-    """What is known of a machine when no drawing is at hand; texts with units, or numbers in SI units.
-
-    Attributes
-    ----------
-    mass : float
-        Mass of the rotor [kg].
-    centre : float
-        Its centre of mass [m from its NDE end].
-    length : float
-        Length of the rotor [m].
-    bearings : tuple of float
-        Two planes of touchdown bearings [m from the NDE end].
-    sensors : tuple of float
-        Two planes of sensors [m from the NDE end].
-    sensor_angle : float
-        Direction of the first sensor of each plane, from +x [rad]; the second stands 90° before it.
-    designation : str
-        Designation of the touchdown bearings.
-    gap : float
-        Radial air gap [m], known to about a fifth.
-    speed : float
-        Nominal speed [rad/s].
-    grade : str
-        Balance grade, such as "G 2.5".
-    support : str
-        Support of the touchdown bearings: "stiff", "soft" or a stiffness such as "1e8 N/m".
-    preload : str, optional
-        Preload of the bearings, where their designation leaves it open.
-    name : str
-        Name of the machine.
-    """
+    """What is known of a machine when no drawing is at hand; texts with units, or numbers in SI units."""
 
     mass: InSI = InSI("mass")  # noqa: RUF009 - a descriptor, read by the dataclass
+    """Mass of the rotor [kg]."""
     centre: InSI = InSI("length")  # noqa: RUF009
+    """Its centre of mass [m from its NDE end]."""
     length: InSI = InSI("length")  # noqa: RUF009
+    """Length of the rotor [m]."""
     bearings: tuple[float | str, float | str]
+    """Two planes of touchdown bearings [m from the NDE end]."""
     sensors: tuple[float | str, float | str]
+    """Two planes of sensors [m from the NDE end]."""
     sensor_angle: InSI = InSI("angle")  # noqa: RUF009
+    """Direction of the first sensor of each plane, from +x [rad]; the second stands 90° before it."""
     designation: str
+    """Designation of the touchdown bearings."""
     gap: InSI = InSI("length")  # noqa: RUF009
+    """Radial air gap [m], known to about a fifth."""
     speed: InSI = InSI("speed")  # noqa: RUF009
+    """Nominal speed [rad/s]."""
     grade: str
+    """Balance grade, such as "G 2.5"."""
     support: Literal["stiff", "soft"] | str
+    """Support of the touchdown bearings: "stiff", "soft" or a stiffness such as "1e8 N/m"."""
     preload: str | None = None
+    """Preload of the bearings, where their designation leaves it open."""
     name: str = "my machine"
+    """Name of the machine."""
 
 
 EXAMPLES = {
@@ -109,7 +92,7 @@ EXAMPLES = {
 
 def simple_schema() -> dict[str, Any]:
     """Give the JSON Schema (draft 2020-12) of the twelve numbers, as texts with units."""
-    meanings = attribute_meanings(str(SimpleMachine.__doc__))
+    meanings = field_meanings(SimpleMachine)
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "rotordrop machine of twelve numbers",

@@ -64,32 +64,20 @@ class SpeedSource(_Section):
 
 
 class Profile(_Section):
-    """A channel map and the reading rules of one recorder, saved once and used again.
-
-    Attributes
-    ----------
-    format : str, optional
-        Name of the reader, when the suffix of the file does not tell it.
-    channels : dict
-        Sensor name of the machine file -> channel name in the recording.
-    units : dict
-        Channel name in the recording -> unit.
-    unit : str, optional
-        Unit of all displacement channels that name none.
-    sensitivity : str, optional
-        Volts per length of all channels, for example ``"8 mV/um"``.
-    full_scale : str, optional
-        What full scale stands for where a file only knows shares of it (WAV), for example ``"10 V"``.
-    text, time, speed
-        See `TextLayout`, `Clock`, `SpeedSource`.
-    """
+    """A channel map and the reading rules of one recorder, saved once and used again."""
 
     format: str | None = None
+    """Name of the reader, when the suffix of the file does not tell it."""
     channels: dict[str, str] = Field(default_factory=dict)
+    """Sensor name of the machine file -> channel name in the recording."""
     units: dict[str, str] = Field(default_factory=dict)
+    """Channel name in the recording -> unit."""
     unit: str | None = None
+    """Unit of all displacement channels that name none."""
     sensitivity: str | None = None
+    """Volts per length of all channels, for example ``"8 mV/um"``."""
     full_scale: str | None = None
+    """What full scale stands for where a file only knows shares of it (WAV), for example ``"10 V"``."""
     text: TextLayout = TextLayout()
     time: Clock = Clock()
     speed: SpeedSource = SpeedSource()
