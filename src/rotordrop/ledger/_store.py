@@ -60,19 +60,7 @@ def is_url(where: str | Path) -> bool:
 def transaction(where: str | Path, *, writing: bool) -> Iterator[Transaction]:
     """Open a log for one transaction: all of it is kept, or nothing.
 
-    Parameters
-    ----------
-    where : path or str
-        A SQLite file, made when it is written to first, or ``postgresql://…``.
-    writing : bool
-        Whether something is to be written; a log that is only read must exist.
-
-    Raises
-    ------
-    UsageError
-        If there is no log, or the file is none.
-    OutputError
-        If it cannot be written.
+    A SQLite file is made when it is written to first; a log that is only read must exist.
     """
     with _postgresql(str(where)) if is_url(where) else _sqlite(Path(where), writing) as opened:
         yield opened

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from collections.abc import Mapping
+from dataclasses import astuple, dataclass, field, fields
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from rotordrop.errors import UsageError
-from rotordrop.ledger._store import Transaction, transaction
+from rotordrop.ledger._store import transaction
 
 QUANTITIES: Mapping[str, str] = {
     "peak_force_N": "N",
@@ -21,7 +21,7 @@ QUANTITIES: Mapping[str, str] = {
 """Numbers of an estimate that are logged, by their name in its document, with their units."""
 
 FEWEST_FOR_TREND, BY_CHANCE = 5, 0.01
-"""Drops from which a trend is looked for, and how rare it must be without one [1]."""
+"""Drops from which a trend is looked for, and how rare it must be without one [1]; chosen, not measured."""
 
 STATEMENT = (
     "This is bookkeeping: it counts drops against an allowance that somebody agreed on. It is no verdict on "
@@ -73,7 +73,8 @@ class LoggedDrop:
 
 
 COLUMNS = tuple(item.name for item in fields(LoggedDrop) if item.name != "severity")
-"""What a log keeps of a drop beside its severity."""
+SEVERITY = tuple(item.name for item in fields(Severity))
+"""What a log keeps of a drop beside its severity, and of that."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,13 +111,7 @@ class UsedShare:
 
 
 def add_drop(where: str | Path, drop: LoggedDrop) -> int:
-    """Add a drop to a log and give its number.
-
-    Raises
-    ------
-    UsageError
-        If this recording is in the log already.
-    """
+    """Add a drop to a log and give its number; a recording that is in the log already is refused."""
     values = [getattr(drop, name) for name in COLUMNS]
     with transaction(where, writing=True) as log:
         key = (drop.machine, drop.bearing_set, drop.sha256)
@@ -134,10 +129,7 @@ def add_drop(where: str | Path, drop: LoggedDrop) -> int:
             )[0][0]
         )
         for one in drop.severity:
-            log.run(
-                "INSERT INTO severity VALUES (?, ?, ?, ?, ?, ?, ?)",
-                (number, one.bearing, one.quantity, one.unit, one.value, one.lower, one.upper),
-            )
+            log.run("INSERT INTO severity VALUES (?, ?, ?, ?, ?, ?, ?)", (number, *astuple(one)))
     return number
 
 
@@ -163,20 +155,17 @@ def logged_drops(
             [value for _, value in wanted],
         )
         severities = log.run(
-            "SELECT drop_id, bearing, quantity, unit, value, lower, upper FROM severity "
-            "ORDER BY drop_id, bearing, quantity"
+            f"SELECT drop_id, {', '.join(SEVERITY)} FROM severity ORDER BY drop_id, bearing, quantity"
         )
-    found: dict[int, list[Severity]] = {}
-    for number, bearing, quantity, unit, value, lower, upper in severities:
-        one = Severity(bearing=bearing, quantity=quantity, unit=unit, value=value, lower=lower, upper=upper)
-        found.setdefault(number, []).append(one)
-    return {row[0]: _drop(row, found.get(row[0], ())) for row in rows}
-
-
-def _drop(row: Sequence[Any], severity: Sequence[Severity]) -> LoggedDrop:
-    values = dict(zip(COLUMNS, row[1:], strict=True))
-    values["simulated"] = bool(values["simulated"])
-    return LoggedDrop(**values, severity=tuple(severity))
+    of_drop: dict[int, list[Severity]] = {}
+    for number, *severity in severities:
+        of_drop.setdefault(number, []).append(Severity(**dict(zip(SEVERITY, severity, strict=True))))
+    found = {}
+    for number, *row in rows:
+        values = dict(zip(COLUMNS, row, strict=True))
+        values["simulated"] = bool(values["simulated"])  # SQLite keeps 0 and 1
+        found[number] = LoggedDrop(**values, severity=tuple(of_drop.get(number, ())))
+    return found
 
 
 def allow(
@@ -204,56 +193,36 @@ def allow(
 def used_shares(where: str | Path) -> tuple[UsedShare, ...]:
     """How much every machine and set of bearings has used of what it is allowed."""
     with transaction(where, writing=False) as log:
-        return tuple(_used(log, machine, bearings) for machine, bearings in _pairs(log))
-
-
-def _pairs(log: Transaction) -> list[tuple[str, str]]:
-    rows = log.run(
-        "SELECT machine, bearing_set FROM drops UNION SELECT machine, bearing_set FROM allowances "
-        "ORDER BY 1, 2"
-    )
-    return [(machine, bearings) for machine, bearings in rows]
-
-
-def _used(log: Transaction, machine: str, bearings: str) -> UsedShare:
-    key = (machine, bearings)
-    durations = [
-        row[0] for row in log.run("SELECT duration FROM drops WHERE machine = ? AND bearing_set = ?", key)
-    ]
-    known = [one for one in durations if one is not None]
-    allowed = log.run(
-        "SELECT drops, seconds, source FROM allowances WHERE machine = ? AND bearing_set = ?", key
-    )
-    drops, seconds, source = allowed[0] if allowed else (None, None, "")
-    return UsedShare(
-        machine=machine,
-        bearing_set=bearings,
-        drops=len(durations),
-        allowed_drops=drops,
-        seconds=math.fsum(known),
-        allowed_seconds=seconds,
-        untimed=len(durations) - len(known),
-        source=source,
-    )
+        durations = log.run("SELECT machine, bearing_set, duration FROM drops")
+        allowances = log.run("SELECT machine, bearing_set, drops, seconds, source FROM allowances")
+    logged: dict[tuple[str, str], list[float | None]] = {(row[0], row[1]): [] for row in allowances}
+    for machine, bearings, duration in durations:
+        logged.setdefault((machine, bearings), []).append(duration)
+    allowed = {(row[0], row[1]): row[2:] for row in allowances}
+    found = []
+    for key, lasted in sorted(logged.items()):
+        drops, seconds, source = allowed.get(key, (None, None, ""))
+        known = [one for one in lasted if one is not None]
+        found.append(
+            UsedShare(
+                machine=key[0],
+                bearing_set=key[1],
+                drops=len(lasted),
+                allowed_drops=drops,
+                seconds=math.fsum(known),
+                allowed_seconds=seconds,
+                untimed=len(lasted) - len(known),
+                source=source,
+            )
+        )
+    return tuple(found)
 
 
 def drop_of_estimate(document: Mapping[str, Any], bearing_set: str, **known: Any) -> LoggedDrop:
-    """A drop as the document of its estimate tells it.
+    """A drop as the document of its estimate tells it, beside which set of touchdown bearings it was.
 
-    Parameters
-    ----------
-    document : mapping
-        One estimate, as ``rotordrop estimate --json`` writes it.
-    bearing_set : str
-        Which set of touchdown bearings the machine had.
-    known : optional
-        ``duration`` [s], ``cause``: what the estimate does not know; ``recorded``, where its recorder wrote
-        no date or a wrong one.
-
-    Raises
-    ------
-    UsageError
-        If the document is no estimate of one drop.
+    ``known`` is what the estimate does not know: ``duration`` [s], ``cause``, and ``recorded``, where its
+    recorder wrote no date or a wrong one.
     """
     if "drops" in document:
         raise UsageError(
@@ -267,6 +236,14 @@ def drop_of_estimate(document: Mapping[str, Any], bearing_set: str, **known: Any
         raise UsageError(
             f"the file has no {missing[0]!r}; expected the JSON that 'rotordrop estimate --json' writes"
         )
+    severity = []
+    for name, numbers in document["bearings"].items():
+        for quantity, unit in QUANTITIES.items():
+            entry = numbers.get(quantity)
+            if entry and entry.get("interval_90"):  # a number without an interval is no evidence
+                of = {"bearing": name, "quantity": quantity, "unit": unit, "value": entry.get("value")}
+                lower, upper = entry["interval_90"]
+                severity.append(Severity(**of, lower=lower, upper=upper))
     return LoggedDrop(
         machine=document["machine"],
         bearing_set=bearing_set,
@@ -278,30 +255,9 @@ def drop_of_estimate(document: Mapping[str, Any], bearing_set: str, **known: Any
         simulated=bool(document.get("simulated_record")),
         version=document.get("rotordrop_version", ""),
         fingerprint=str(document.get("fingerprint", "")),
-        severity=tuple(_severities(document["bearings"])),
+        severity=tuple(severity),
         **{**known, "recorded": known.get("recorded") or str(document.get("recorded") or "")},
     )
-
-
-def _severities(bearings: Mapping[str, Any]) -> list[Severity]:
-    found = []
-    for name, numbers in bearings.items():
-        for quantity, unit in QUANTITIES.items():
-            entry = numbers.get(quantity)
-            if not entry or not entry.get("interval_90"):
-                continue  # a number without an interval is no evidence
-            lower, upper = entry["interval_90"]
-            found.append(
-                Severity(
-                    bearing=name,
-                    quantity=quantity,
-                    unit=unit,
-                    value=entry.get("value"),
-                    lower=lower,
-                    upper=upper,
-                )
-            )
-    return found
 
 
 @dataclass(frozen=True, kw_only=True)

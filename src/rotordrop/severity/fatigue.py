@@ -17,9 +17,11 @@ Array = NDArray[np.float64]
 LIFE = 1e6
 """Revolutions of the basic rating life at the basic dynamic load rating."""
 LOAD_EXPONENT = 3.0
+"""Power of the load with which the life of ball bearings falls [1]; ISO 281."""
 WEIBULL = 10.0 / 9.0
 """Slope of the distribution of lives [1]: how segments add up to a ring, and rings to a bearing."""
 SEGMENTS = 720
+"""Segments of a raceway, half a degree each; chosen, not measured."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,21 +67,9 @@ def share_by_segments(
 ) -> float:
     """Share of the rating life that a row uses, counted ball by ball over finite segments of both raceways.
 
-    Parameters
-    ----------
-    row : BallRow
-        The row.
-    time : ndarray, shape (T,)
-        [s], rising.
-    loads : ndarray, shape (T, Z)
-        Load at Z equal steps of azimuth round the bearing [N], straight between them.
-    spin : ndarray, shape (T,)
-        Spin of the inner ring [rad/s]; the outer ring stands.
-    segments : int
-        Segments of each raceway.
+    Time (T,) [s] rises; loads (T, Z) [N] are those at Z equal steps of azimuth, straight between them; spin
+    (T,) [rad/s] is that of the inner ring, the outer one stands.
 
-    Notes
-    -----
     Source: idea of Menck 2023, The finite segment method, Journal of Tribology 145: a ball that rolls over a
     segment harms it by the cube of its load; segments add up to a ring as pieces of one Weibull body. For a
     ring that turns on and on under a steady load this is ISO/TS 16281.

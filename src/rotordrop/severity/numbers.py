@@ -20,50 +20,32 @@ from rotordrop.severity.fatigue import (
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class SeverityNumber:
-    """A number of the table: field of a document, name for people, kind, whether more is worse."""
+    """A number of the table: key under ``severity``, name for people, kind, whether more is worse."""
 
-    field: str
+    key: str
     label: str
     kind: str
     more_is_worse: bool = True
 
+    @property
+    def field(self) -> str:
+        """Its field in a document."""
+        return f"severity.{self.key}"
 
+
+_PURE = "dimensionless"
 SEVERITY: tuple[SeverityNumber, ...] = (
-    SeverityNumber(
-        field="severity.static_safety",
-        label="static safety factor by the peak stress",
-        kind="dimensionless",
-        more_is_worse=False,
-    ),
-    SeverityNumber(
-        field="severity.static_safety_of_rating",
-        label="static safety factor by C0",
-        kind="dimensionless",
-        more_is_worse=False,
-    ),
-    SeverityNumber(field="severity.impulse_N_s", label="impulse of all impacts", kind="impulse"),
-    SeverityNumber(field="severity.skid_energy_J", label="energy lost in the contact", kind="energy"),
-    SeverityNumber(
-        field="severity.position_index", label="position index (mean distance over gap)", kind="dimensionless"
-    ),
-    SeverityNumber(
-        field="severity.velocity_index",
-        label="velocity index (velocity over speed times gap)",
-        kind="dimensionless",
-    ),
-    SeverityNumber(
-        field="severity.fatigue_by_segments", label="share of rating life, segments", kind="dimensionless"
-    ),
-    SeverityNumber(
-        field="severity.fatigue_by_16281",
-        label="share of rating life, ISO/TS 16281",
-        kind="dimensionless",
-    ),
-    SeverityNumber(
-        field="severity.fatigue_by_rainflow", label="share of rating life, rainflow", kind="dimensionless"
-    ),
+    SeverityNumber("static_safety", "static safety factor by the peak stress", _PURE, more_is_worse=False),
+    SeverityNumber("static_safety_of_rating", "static safety factor by C0", _PURE, more_is_worse=False),
+    SeverityNumber("impulse_N_s", "impulse of all impacts", "impulse"),
+    SeverityNumber("skid_energy_J", "energy lost in the contact", "energy"),
+    SeverityNumber("position_index", "position index (mean distance over gap)", _PURE),
+    SeverityNumber("velocity_index", "velocity index (velocity over speed times gap)", _PURE),
+    SeverityNumber("fatigue_by_segments", "share of rating life, segments", _PURE),
+    SeverityNumber("fatigue_by_16281", "share of rating life, ISO/TS 16281", _PURE),
+    SeverityNumber("fatigue_by_rainflow", "share of rating life, rainflow", _PURE),
 )
 """Severity of a drop at a bearing, in the order in which it is shown."""
 
@@ -89,16 +71,8 @@ def static_safety_of_load(rating: float, force: float) -> float:
 def fatigue_shares(ratings: Ratings, time: Array, loads: Array, spin: Array) -> tuple[float, float, float]:
     """Shares of the rating life that a drop uses: by segments, by ISO/TS 16281, by rainflow [1].
 
-    Parameters
-    ----------
-    ratings : Ratings
-        Of the bearing.
-    time : ndarray, shape (T,)
-        [s], rising.
-    loads : ndarray, shape (T, rows, Z)
-        Ball loads at equal steps of azimuth [N].
-    spin : ndarray, shape (T,)
-        Spin of the inner ring [rad/s].
+    Time (T,) [s] rises; ball loads (T, rows, Z) [N] are those at equal steps of azimuth, spin (T,) [rad/s]
+    that of the inner ring.
     """
     row = ball_row(
         ratings.dynamic,

@@ -6,11 +6,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 from rotordrop.errors import UsageError
 from rotordrop.known import NINETY
@@ -19,7 +17,7 @@ from rotordrop.units import format_chance
 Array = NDArray[np.float64]
 
 CLEAR = 0.9
-"""Probability from which one drop is called the worst."""
+"""Probability from which one drop is called the worst [1]; chosen, not measured."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,20 +58,7 @@ class Ranking:
     worse_than_next: tuple[float, ...]
     """Probability that each drop but the last was worse than the one after it [1]."""
     statement: str
-
-    def as_json(self) -> dict[str, Any]:
-        """Everything, ready for JSON."""
-        return {
-            "order": list(self.names),
-            "values": list(self.values),
-            "probability_worst_drop": list(self.worst_drop),
-            "probability_worst_condition": None
-            if self.worst_condition is None
-            else list(self.worst_condition),
-            "drop_scatter": self.drop_scatter,
-            "probability_worse_than_next": list(self.worse_than_next),
-            "statement": self.statement,
-        }
+    """The order in words."""
 
 
 def rank_drops(
@@ -121,22 +106,24 @@ def rank_drops(
     )
 
 
-@lru_cache(maxsize=1)
-def _quadrature() -> tuple[Array, Array]:
-    """Nodes and weights of Gauss and Legendre; finding them takes longer than all that they are used for."""
-    nodes, weights = np.polynomial.legendre.leggauss(400)
-    return nodes, weights
+_quadrature = lru_cache(np.polynomial.legendre.leggauss)
+"""Nodes and weights of Gauss and Legendre; finding them takes longer than all that they are used for."""
+
+
+def _below(score: Array) -> Array:
+    """Probability of a standard normal quantity to lie below a score [1]; scipy takes longer to load."""
+    return np.array([0.5 * math.erfc(-x / math.sqrt(2.0)) for x in score.tolist()])
 
 
 def worst_probability(value: Array, error: Array) -> Array:
     """Probability of each of several independent normal quantities to be the largest [1], shape as given."""
     sigma = np.maximum(error, 1e-9 * max(float(np.ptp(value)), float(np.abs(value).max()), 1e-300))
-    nodes, weights = _quadrature()
+    nodes, weights = _quadrature(400)
     z, dz = 8.0 * nodes, 8.0 * weights
     result = np.empty(value.size)
     for k in range(value.size):
         x = value[k] + sigma[k] * z
-        others = [ndtr((x - value[j]) / sigma[j]) for j in range(value.size) if j != k]
+        others = [_below((x - value[j]) / sigma[j]) for j in range(value.size) if j != k]
         density = np.exp(-0.5 * z**2) / math.sqrt(2.0 * math.pi)
         result[k] = float(np.sum(dz * density * np.prod(others, axis=0)))
     return np.asarray(result / result.sum())
@@ -145,7 +132,7 @@ def worst_probability(value: Array, error: Array) -> Array:
 def worse_probability(value: Array, error: Array) -> Array:
     """Probability that each of several independent normal quantities exceeds the next one [1], (n − 1,)."""
     error = np.maximum(error, 1e-300)
-    return np.asarray(ndtr((value[:-1] - value[1:]) / np.hypot(error[:-1], error[1:])))
+    return np.asarray(_below((value[:-1] - value[1:]) / np.hypot(error[:-1], error[1:])))
 
 
 def _statement(

@@ -18,7 +18,9 @@ QUARTILE_RULES: dict[str, str] = {
     "linear": "linear, (k − 1)/(n − 1), the default of numpy",
 }
 WHISKER_REACH = 1.5
+"""Interquartile ranges that a whisker reaches [1]; MATLAB's box plot, as in Neisi 2020, Fig. 16."""
 SIGMA_REACH = 3.0
+"""Standard deviations above the mean beyond which a value is an outlier [1]; Neisi 2020, Table 5."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,9 +10,9 @@ if TYPE_CHECKING:
     from rotordrop.study.plan import load_study as load_study
     from rotordrop.study.run import StudyProgress as StudyProgress
     from rotordrop.study.run import run_study as run_study
+    from rotordrop.study.run import sweep as sweep
     from rotordrop.study.summary import StudyResults as StudyResults
     from rotordrop.study.summary import load_results as load_results
-    from rotordrop.study.sweep import sweep as sweep
 
 _PUBLIC = {
     "Study": "rotordrop.study.plan",
@@ -21,7 +21,7 @@ _PUBLIC = {
     "load_results": "rotordrop.study.summary",
     "load_study": "rotordrop.study.plan",
     "run_study": "rotordrop.study.run",
-    "sweep": "rotordrop.study.sweep",
+    "sweep": "rotordrop.study.run",
 }
 
 __all__ = list(_PUBLIC)

@@ -5,24 +5,27 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, TypeAdapter
 
 from rotordrop.elements.description import unknown_key
 from rotordrop.errors import UsageError
 from rotordrop.known import Known
 from rotordrop.machine import Machine
-from rotordrop.study.chosen_bearings import AS_DESCRIBED
-from rotordrop.study.distributions import Distribution
-from rotordrop.study.plan import Study, read_file, read_study
+from rotordrop.machine.machine import value_of_path
+from rotordrop.study.distributions import AS_DESCRIBED
+from rotordrop.study.plan import WHOLE, Study, read_file, read_study, required
 from rotordrop.study.quantities import columns_of
 from rotordrop.study.run import Report, run_study
 from rotordrop.study.summary import StudyResults, exceedance, quantile
+from rotordrop.units import parse_quantity
 
 Array = NDArray[np.float64]
 
+_ROUNDS = (TypeAdapter(Annotated[int, Field(strict=True, ge=0)]), "a whole number from 0 on")
 FRESH = 0x5EED
 """What is added to the seed for the drops that draw a front again."""
 STEP = 0.12
@@ -82,13 +85,11 @@ class Candidate:
 
     def chosen(self, study: Study) -> dict[str, float | str]:
         """The values, bearings by their designation."""
-        return {name: _named(study.choose[name], value) for name, value in self.values.items()}
-
-
-def _named(spread: Distribution, value: float) -> float | str:
-    if not spread.names:
-        return value
-    return "as described" if value == AS_DESCRIBED else spread.names[int(value)]
+        found: dict[str, float | str] = {}
+        for name, value in self.values.items():
+            names = ("as described", *study.choose[name].names)  # -1 stands for the first of them
+            found[name] = names[int(value) + 1] if len(names) > 1 else value
+        return found
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,19 +131,7 @@ def front_of(numbers: Array) -> NDArray[np.bool_]:
 def best_designs(
     plan: DesignPlan, folder: str | Path, *, threads: int | None = None, report: Report | None = None
 ) -> DesignResult:
-    """Find the front, and draw it again with other chances.
-
-    Parameters
-    ----------
-    plan : DesignPlan
-        What to choose.
-    folder : path
-        Holds one study a round; continued when it holds them already.
-    threads : int, optional
-        Threads; all cores by default.
-    report : callable, optional
-        Called with the progress of each round.
-    """
+    """Find the front, and draw it again with other chances; the folder holds one study a round."""
     place = Path(folder)
     tried: list[Candidate] = []
     study = plan.study
@@ -152,7 +141,12 @@ def best_designs(
         results = run_study(study, place / f"round {number}", threads=threads, report=report)
         tried = _marked([*tried, *_read(results, plan.aims)])
     best = [one for one in tried if one.on_front]
-    values = [tuple(one.values.values()) for one in best] + [_described(plan.study)]
+    first = study.machine.touchdown_bearings[0].name
+    described = tuple(
+        AS_DESCRIBED if spread.names else value_of_path(study.machine, name.replace("*", first, 1))
+        for name, spread in study.choose.items()
+    )
+    values = [*(tuple(one.values.values()) for one in best), described]
     fresh = replace(
         _with_candidates(plan.study, values, repeats=plan.again),
         seed=(plan.study.seed + FRESH) % 2**64,
@@ -167,16 +161,6 @@ def best_designs(
 def _with_candidates(study: Study, values: Sequence[tuple[float, ...]], repeats: int | None = None) -> Study:
     count = repeats or study.repeats
     return replace(study, candidates=tuple(values), repeats=count, drops=count * len(values))
-
-
-def _described(study: Study) -> tuple[float, ...]:
-    from rotordrop.machine.machine import value_of_path
-
-    first = study.machine.touchdown_bearings[0].name
-    return tuple(
-        AS_DESCRIBED if spread.names else value_of_path(study.machine, name.replace("*", first, 1))
-        for name, spread in study.choose.items()
-    )
 
 
 def _around(study: Study, tried: Sequence[Candidate], number: int) -> list[tuple[float, ...]]:
@@ -212,7 +196,11 @@ def _share(spread: Any, value: float) -> float:
 def _read(results: StudyResults, aims: Sequence[Aim]) -> list[Candidate]:
     """Candidates of a study with their aims; a drop that failed counts as the worst there is."""
     study = results.study
-    columns = [_column(results, aim.column) for aim in aims]
+    bearings = [bearing.name for bearing in study.machine.touchdown_bearings]
+    columns = []
+    for aim in aims:
+        of_bearings = [results.column(aim.column.replace("*", name, 1)) for name in bearings]
+        columns.append(np.max(of_bearings, axis=0) if "*" in aim.column else of_bearings[0])
     found = []
     for c in range(len(results) // study.repeats):
         drops = slice(c * study.repeats, (c + 1) * study.repeats)
@@ -226,13 +214,6 @@ def _read(results: StudyResults, aims: Sequence[Aim]) -> list[Candidate]:
     return found
 
 
-def _column(results: StudyResults, column: str) -> Array:
-    if not column.startswith("*."):
-        return results.column(column)
-    bearings = [bearing.name for bearing in results.study.machine.touchdown_bearings]
-    return np.asarray(np.max([results.column(f"{name}.{column[2:]}") for name in bearings], axis=0))
-
-
 def _marked(candidates: Sequence[Candidate]) -> list[Candidate]:
     numbers = np.array([[known.value for known in one.aims] for one in candidates])
     best = front_of(np.nan_to_num(numbers, nan=np.inf))
@@ -240,17 +221,13 @@ def _marked(candidates: Sequence[Candidate]) -> list[Candidate]:
 
 
 def read_design(table: Mapping[str, Any], machine: Machine) -> DesignPlan:
-    """Make a plan of what a design file holds; ``machine`` is already read.
-
-    Raises
-    ------
-    UsageError
-        If the plan cannot be used.
-    """
+    """Make a plan of what a design file holds; ``machine`` is already read."""
     content = dict(table)
     aims = content.pop("aims", None)
+    usual = {"candidates": 64, "rounds": 1, "again": 100}
     candidates, rounds, again = (
-        _count(content, key, usual) for key, usual in (("candidates", 64), ("rounds", 1), ("again", 100))
+        required(key, content.pop(key, number), _ROUNDS if key == "rounds" else WHOLE)
+        for key, number in usual.items()
     )
     repeats = content.setdefault("repeats", 40)
     if "drops" in content or "design" in content:
@@ -266,18 +243,9 @@ def read_design(table: Mapping[str, Any], machine: Machine) -> DesignPlan:
     )
 
 
-def _count(content: dict[str, Any], key: str, usual: int) -> int:
-    value = content.pop(key, usual)
-    if isinstance(value, bool) or not isinstance(value, int) or value < (key != "rounds"):
-        raise UsageError(f"{key} = {value!r}; expected a whole number, such as {usual}")
-    return value
-
-
 def _aim(machine: Machine, raw: Any) -> Aim:
     if not isinstance(raw, Mapping) or "column" not in raw or set(raw) - {"column", "quantile", "above"}:
         raise UsageError(f'aims: {raw!r}; expected {{column = "*.peak_stress", quantile = 0.9}} or "above"')
-    from rotordrop.units import parse_quantity
-
     bearings = [bearing.name for bearing in machine.touchdown_bearings]
     columns = {q.name: q for q in columns_of(machine)}
     column = str(raw["column"])

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import UsageError
+from rotordrop.machine import Machine
 from rotordrop.physics.elementary import exp_each, ln, ln_each
 
 Array = NDArray[np.float64]
 Number = Callable[[Any], float]
 """Reads what stands in a study file, such as ``"60 Hz"``, to SI."""
 
-SHAPES = ("uniform", "log_uniform", "normal", "log_normal", "choices", "grid")
 _MEANING = {
     "uniform": "[lowest, highest]",
     "log_uniform": "[lowest, highest], both above zero",
@@ -25,6 +25,11 @@ _MEANING = {
     "choices": "a list of values, each as likely as the others",
     "grid": "a list of values, each of them visited",
 }
+SHAPES = tuple(_MEANING)
+PART = ".bearing"
+"""End of the name of a choice among bearings, ``"DE.bearing"`` or ``"*.bearing"``."""
+AS_DESCRIBED = -1.0
+"""In place of a number of the list: the bearing of the machine file."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,22 +106,7 @@ def _ratio(coefficients: tuple[tuple[float, ...], tuple[float, ...]], x: Array) 
 
 
 def read_distribution(name: str, table: Any, number: Number) -> Distribution:
-    """Read a spread such as ``{uniform = ["60 Hz", "200 Hz"]}``.
-
-    Parameters
-    ----------
-    name : str
-        What is varied, for messages.
-    table : mapping
-        One key out of `SHAPES` with its numbers.
-    number : callable
-        Reads one value to SI.
-
-    Raises
-    ------
-    UsageError
-        If shape or numbers cannot be used.
-    """
+    """Read a spread such as ``{uniform = ["60 Hz", "200 Hz"]}``; ``number`` reads one value to SI."""
     if not isinstance(table, Mapping) or len(table) != 1 or next(iter(table)) not in SHAPES:
         raise UsageError(
             f"{name} is varied by {table!r}; expected one of {', '.join(SHAPES)}, "
@@ -130,12 +120,8 @@ def read_distribution(name: str, table: Any, number: Number) -> Distribution:
         float(item) if plain and i == 1 and isinstance(item, int | float) else number(item)
         for i, item in enumerate(written)
     )
-    if shape not in ("choices", "grid"):
-        _check_pair(name, shape, numbers)
-    return Distribution(shape=shape, numbers=numbers)
-
-
-def _check_pair(name: str, shape: str, numbers: tuple[float, ...]) -> None:
+    if shape in ("choices", "grid"):
+        return Distribution(shape=shape, numbers=numbers)
     expected = f"expected {_MEANING[shape]}"
     if len(numbers) != 2:
         raise UsageError(f"{name}: {shape} has {len(numbers)} numbers; {expected}")
@@ -146,3 +132,44 @@ def _check_pair(name: str, shape: str, numbers: tuple[float, ...]) -> None:
         raise UsageError(f"{name}: {shape} has a standard deviation of {second:g}; {expected}")
     if shape in ("log_uniform", "log_normal") and not first > 0.0:
         raise UsageError(f"{name}: {shape} begins at {first:g} (SI); {expected}")
+    return Distribution(shape=shape, numbers=numbers)
+
+
+def is_bearing(name: str) -> bool:
+    """Whether a name means a whole bearing, not a number."""
+    return name.endswith(PART) and name.count(".") == 1
+
+
+def read_bearings(machine: Machine, name: str, table: Any) -> Distribution:
+    """Read a choice such as ``{choices = ["B7014-E", "HCB7014-E"]}``; every one must fit the machine."""
+    listed = table.get("choices") if isinstance(table, Mapping) and len(table) == 1 else None
+    if not (isinstance(listed, list) and len(listed) > 1 and all(isinstance(one, str) for one in listed)):
+        raise UsageError(
+            f"{name} is chosen from {table!r}; expected designations, as in "
+            '{choices = ["XCB71914-E", "HCB71914-E"]}'
+        )
+    twice = sorted({one for one in listed if listed.count(one) > 1})
+    if twice:
+        raise UsageError(f"{name}: {', '.join(twice)} listed twice; expected each designation once")
+    spread = bearings_of(listed)
+    for number in spread.numbers:
+        with_chosen(machine, {name: spread}, {name: number})
+    return spread
+
+
+def bearings_of(designations: list[str]) -> Distribution:
+    """A choice among bearings, as likely as one another."""
+    return Distribution(
+        shape="choices", numbers=tuple(map(float, range(len(designations)))), names=tuple(designations)
+    )
+
+
+def with_chosen(machine: Machine, choose: Mapping[str, Distribution], values: Mapping[str, float]) -> Machine:
+    """The machine with the bearings that the values say; itself where none is chosen."""
+    for name, spread in choose.items():
+        if spread.names and values[name] != AS_DESCRIBED:
+            owner, designation = name.removesuffix(PART), spread.names[int(values[name])]
+            owners = [b.name for b in machine.touchdown_bearings] if owner == "*" else [owner]
+            for one in owners:
+                machine = machine.with_bearing(one, designation)
+    return machine

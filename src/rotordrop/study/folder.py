@@ -78,16 +78,18 @@ class StudyFolder:
 
 
 def open_folder(study: Study, path: str | Path) -> StudyFolder:
-    """Make the folder of a study, or continue in one that holds the same study.
-
-    Raises
-    ------
-    UsageError
-        If the folder holds another study.
-    OutputError
-        If it cannot be written.
-    """
+    """Make the folder of a study, or continue in one that holds the same study."""
     folder = StudyFolder(Path(path))
+    existing = folder.path / "plan.json"
+    if existing.exists():
+        there = read_plan(folder.path)
+        if there["digest"] != study.digest:
+            raise UsageError(
+                f"{folder.path} holds another study ({there['study'].get('name')!r}, digest "
+                f"{there['digest'][:12]}; this one has {study.digest[:12]}); name another folder, or "
+                "undo the change of study or machine"
+            )
+        return folder
     plan = {
         "format": FORMAT,
         "rotordrop": __version__,
@@ -97,10 +99,6 @@ def open_folder(study: Study, path: str | Path) -> StudyFolder:
             {"name": q.name, "unit": q.unit, "meaning": q.meaning} for q in columns_of(study.machine)
         ],
     }
-    existing = folder.path / "plan.json"
-    if existing.exists():
-        _require_same(folder, study)
-        return folder
     try:
         for part in (folder.path, folder.shards, folder.claims):
             part.mkdir(parents=True, exist_ok=True)
@@ -139,24 +137,8 @@ def study_of(path: str | Path) -> Study:
     return study
 
 
-def _require_same(folder: StudyFolder, study: Study) -> None:
-    plan = read_plan(folder.path)
-    if plan["digest"] != study.digest:
-        raise UsageError(
-            f"{folder.path} holds another study ({plan['study'].get('name')!r}, digest "
-            f"{plan['digest'][:12]}; this one has {study.digest[:12]}); name another folder, or undo the "
-            "change of study or machine"
-        )
-
-
 def publish(folder: StudyFolder, study: Study, shard: int, found: Shard) -> None:
-    """Write a finished shard, complete or not at all.
-
-    Raises
-    ------
-    OutputError
-        If the disk is full or the folder cannot be written; what is published already stays.
-    """
+    """Write a finished shard, complete or not at all; what is published already stays."""
     table = np.zeros(len(found.numbers), dtype=shard_type(study))
     table["drop"] = np.arange(found.first, found.first + len(table))
     table["varied"] = found.varied
@@ -226,7 +208,14 @@ class Claim:
 def claimed(folder: StudyFolder, shard: int) -> Iterator[Claim | None]:
     """Claim a shard for the time of the block; None where another one works on it."""
     file = folder.claims / f"{shard:06d}.json"
-    if not _made(file) and not (_abandoned(file) and _taken_over(file) and _made(file)):
+    mine = _made(file)
+    if not mine and _abandoned(file):
+        aside = file.with_name(f"{file.stem}.{secrets.token_hex(8)}.stale")
+        with suppress(OSError):  # of several who put an abandoned claim aside, one succeeds
+            file.rename(aside)
+            mine = _made(file)
+            aside.unlink()
+    if not mine:
         yield None
         return
     try:
@@ -261,28 +250,13 @@ def _abandoned(file: Path) -> bool:
         return age > 5.0
     if age > LEASE:
         return True
-    return bool(owner.get("host") == socket.gethostname() and not _runs(int(owner.get("process", 0))))
-
-
-def _runs(process: int) -> bool:
-    if os.name != "posix":
-        return True  # only the lease tells
+    # elsewhere than on POSIX there is no harmless way to ask whether a process runs: only the lease tells
+    if os.name != "posix" or owner.get("host") != socket.gethostname():
+        return False
     try:
-        os.kill(process, 0)
+        os.kill(int(owner.get("process", 0)), 0)
     except ProcessLookupError:
-        return False
-    except PermissionError:
         return True
-    return True
-
-
-def _taken_over(file: Path) -> bool:
-    """Put an abandoned claim aside; of several who try, one succeeds."""
-    aside = file.with_name(f"{file.stem}.{secrets.token_hex(8)}.stale")
-    try:
-        file.rename(aside)
-    except OSError:
-        return False
-    with suppress(OSError):
-        aside.unlink()
-    return True
+    except PermissionError:
+        pass
+    return False

@@ -7,13 +7,15 @@ import json
 import math
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic.dataclasses import dataclass as checked_dataclass
 
 from rotordrop.elements.description import unknown_key
 from rotordrop.elements.magnet import REMANENCE_TIME
@@ -24,8 +26,14 @@ from rotordrop.machine.machine import kind_of_path
 from rotordrop.machine.saving import machine_text
 from rotordrop.simulate.case import DropCase, LevitatedStart
 from rotordrop.study import sampling
-from rotordrop.study.chosen_bearings import bearings_of, is_bearing, read_bearings, with_chosen
-from rotordrop.study.distributions import Distribution, read_distribution
+from rotordrop.study.distributions import (
+    Distribution,
+    bearings_of,
+    is_bearing,
+    read_bearings,
+    read_distribution,
+    with_chosen,
+)
 from rotordrop.units import parse_quantity
 
 Array = NDArray[np.float64]
@@ -53,32 +61,56 @@ MAGNET_KINDS: Mapping[str, str] = {
 shares of the weight it carries, where it holds the rotor, radius and angle of a synchronous orbit there."""
 
 TURN = Distribution(shape="uniform", numbers=(0.0, 2.0 * math.pi))
-_KEYS = (
-    "name", "machine", "drops", "seed", "duration", "output_step", "tolerance", "reduction", "start",
-    "design", "shard", "speed", "vary", "until", "calibrated", "choose", "repeats",
-)  # fmt: skip
-_WHOLE = ("drops", "seed", "shard", "repeats")
-_QUANTITIES = {
-    "duration": "time",
-    "output_step": "time",
-    "speed": "speed",
-    "tolerance": "dimensionless",
-}
+_QUANTITIES = {"duration": "time", "output_step": "time", "speed": "speed", "tolerance": "dimensionless"}
 _AS_WRITTEN = (
     "name", "drops", "seed", "tolerance", "reduction", "design", "shard", "calibrated", "repeats"
 )  # fmt: skip
 
 
-@dataclass(frozen=True, kw_only=True)
+@checked_dataclass(frozen=True, kw_only=True, config=ConfigDict(extra="forbid"))
 class Until:
     """When a study may end early: a quantile known well enough."""
 
     column: str
     """Column of the results, such as ``"NDE.peak_force"``."""
-    quantile: float
+    quantile: Annotated[float, Field(gt=0.0, lt=1.0)]
     """Which quantile [1]."""
-    within: float
+    within: Annotated[float, Field(gt=0.0)]
     """Half width of its 90 % interval relative to its value [1]."""
+
+
+WHOLE = (TypeAdapter(Annotated[int, Field(strict=True, ge=1)]), "a whole number above zero")
+_RULES: Mapping[str, tuple[TypeAdapter[Any], str]] = {
+    "drops": WHOLE,
+    "shard": WHOLE,
+    "repeats": WHOLE,
+    "seed": (
+        TypeAdapter(Annotated[int, Field(strict=True, ge=0, lt=2**64)]),
+        "a whole number from 0 to 2^64 - 1",
+    ),
+    "design": (TypeAdapter(sampling.Design), f"one of {', '.join(sampling.DESIGNS)}"),
+    "tolerance": (
+        TypeAdapter(Annotated[float, Field(gt=0.0, le=1e-3)]),
+        "a number up to 1e-3, such as 1e-6",
+    ),
+    "start": (TypeAdapter(Literal["levitated", "centred"]), '"levitated" or "centred"'),
+    "calibrated": (TypeAdapter(Annotated[bool, Field(strict=True)]), "true or false"),
+    "until": (
+        TypeAdapter(Until | None),
+        '{column = "NDE.peak_force", quantile = 0.99, within = 0.05}, with a quantile between 0 and 1 and a '
+        "half width above zero",
+    ),
+}
+"""What a setting of a study must be, for pydantic and in words."""
+
+
+def required(name: str, value: Any, rule: tuple[TypeAdapter[Any], str]) -> Any:
+    """A setting as its rule wants it; refuses another one with what was expected."""
+    adapter, expected = rule
+    try:
+        return adapter.validate_python(value)
+    except ValidationError:
+        raise UsageError(f"{name} = {value!r}; expected {expected}") from None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,8 +132,8 @@ class Study:
     """Accuracy of the integrator [1]."""
     reduction: str = "accurate"
     """Preset of the rotor's reduction."""
-    levitated: bool = True
-    """Whether drops start floating in the AMBs; else straight in the centre."""
+    start: str = "levitated"
+    """How drops start: ``"levitated"`` in the AMBs, or ``"centred"``, straight in the centre."""
     design: str = "random"
     """One of `sampling.DESIGNS`."""
     shard: int = 200
@@ -123,7 +155,21 @@ class Study:
     """Values of every candidate [SI], in the order of ``choose``; drawn over its bounds when left out."""
 
     def __post_init__(self) -> None:
-        _check(self)
+        for name, rule in _RULES.items():
+            object.__setattr__(self, name, required(name, getattr(self, name), rule))
+        if math.isnan(self.speed) and "speed" not in self.vary:
+            raise UsageError('the study has no speed; write speed = "60 Hz", or vary it under [vary]')
+        if self.levitated and not self.machine.ambs:
+            raise UsageError(
+                "the drops start levitated, but the machine has no AMBs; describe them or write start = "
+                '"centred"'
+            )
+        _check_spreads(self)
+
+    @property
+    def levitated(self) -> bool:
+        """Whether drops start floating in the AMBs."""
+        return self.start == "levitated"
 
     @cached_property
     def varied(self) -> Mapping[str, Distribution]:
@@ -156,7 +202,21 @@ class Study:
         Every drop has random numbers of its own (Philox, key = seed, counter = drop), so that no value
         depends on shards, threads or the order of work.
         """
-        values = self.values_at(self._shares(first, last))
+        names = list(self.varied)
+        if self.design == "grid":
+            shares = sampling.grid(self.seed, first, last, self.varied)
+        elif self.design == "candidates":
+            shares = sampling.crossed(self.seed, first, last, names, list(self.choose), self.repeats)
+        elif self.design == "latin hypercube":
+            shares = sampling.hypercube(self.seed, self.drops, len(names))[first:last]
+        else:
+            draw = {
+                "random": sampling.independent,
+                "sobol": sampling.sobol,
+                "sensitivity": sampling.sensitivity,
+            }
+            shares = draw[self.design](self.seed, first, last, len(names))
+        values = self.values_at(shares)
         if self.candidates:
             chosen = [list(self.varied).index(name) for name in self.choose]
             values[:, chosen] = np.array(self.candidates)[np.arange(first, last) // self.repeats]
@@ -170,17 +230,6 @@ class Study:
             together = [list(self.varied).index(path) for path in self.joint.paths]
             values[:, together] = self.joint.values(share[:, together])
         return values
-
-    def _shares(self, first: int, last: int) -> Array:
-        names = list(self.varied)
-        if self.design == "grid":
-            return sampling.grid(self.seed, first, last, self.varied)
-        if self.design == "candidates":
-            return sampling.crossed(self.seed, first, last, names, list(self.choose), self.repeats)
-        if self.design == "latin hypercube":
-            return sampling.hypercube(self.seed, self.drops, len(names))[first:last]
-        draw = {"random": sampling.independent, "sobol": sampling.sobol, "sensitivity": sampling.sensitivity}
-        return draw[self.design](self.seed, first, last, len(names))
 
     def machine_values(self, values: Mapping[str, float]) -> dict[str, float]:
         """Machine values by full path [SI]; a star stands for every touchdown bearing."""
@@ -237,10 +286,10 @@ class Study:
             **{key: getattr(self, key) for key in _AS_WRITTEN},
             "duration_s": self.duration,
             "output_step_s": self.output_step,
-            "start": "levitated" if self.levitated else "centred",
+            "start": self.start,
             "speed_rad_per_s": None if math.isnan(self.speed) else self.speed,
             "vary": {name: {spread.shape: spread.written} for name, spread in self.vary.items()},
-            "until": None if self.until is None else dict(self.until.__dict__),
+            "until": None if self.until is None else asdict(self.until),
             "choose": {name: {spread.shape: spread.written} for name, spread in self.choose.items()},
             "candidates": [list(one) for one in self.candidates],
         }
@@ -267,26 +316,7 @@ def _starred(machine: Machine, path: str) -> list[str]:
     return [f"{bearing.name}.{rest}" for bearing in machine.touchdown_bearings]
 
 
-def _check(study: Study) -> None:
-    for name in ("drops", "shard", "repeats"):
-        if not getattr(study, name) >= 1:
-            raise UsageError(f"{name} = {getattr(study, name)!r}; expected a whole number above zero")
-    if not 0 <= study.seed < 2**64:
-        raise UsageError(f"seed = {study.seed}; expected a whole number from 0 to 2^64 - 1")
-    if study.design not in sampling.DESIGNS:
-        raise UsageError(f"design = {study.design!r}; expected one of {', '.join(sampling.DESIGNS)}")
-    if not 0.0 < study.tolerance <= 1e-3:
-        raise UsageError(f"tolerance = {study.tolerance!r}; expected a number up to 1e-3, such as 1e-6")
-    _check_vary(study)
-
-
-def _check_vary(study: Study) -> None:
-    if math.isnan(study.speed) and "speed" not in study.vary:
-        raise UsageError('the study has no speed; write speed = "60 Hz", or vary it under [vary]')
-    if study.levitated and not study.machine.ambs:
-        raise UsageError(
-            'the drops start levitated, but the machine has no AMBs; describe them or write start = "centred"'
-        )
+def _check_spreads(study: Study) -> None:
     for name in study.vary:
         if case_kind(study.machine, name) is not None:
             if name != "speed" and not study.levitated:
@@ -294,21 +324,6 @@ def _check_vary(study: Study) -> None:
             continue
         for path in _starred(study.machine, name):
             kind_of_path(study.machine, path)
-    _check_choice(study)
-    gridded = [name for name, spread in study.vary.items() if spread.shape == "grid"]
-    if bool(gridded) != (study.design == "grid"):
-        raise UsageError(
-            f"design = {study.design!r} with {len(gridded)} values varied by 'grid'; a design \"grid\" needs "
-            "at least one of them, and other designs none ('choices' draws from a list)"
-        )
-
-
-def _check_choice(study: Study) -> None:
-    if bool(study.choose) != (study.design == "candidates"):
-        raise UsageError(
-            f'design = {study.design!r} with {len(study.choose)} values under [choose]; "candidates" '
-            "needs at least one of them, and other designs none"
-        )
     for name, spread in study.choose.items():
         for path in () if spread.names else _starred(study.machine, name):
             kind_of_path(study.machine, path)
@@ -320,49 +335,58 @@ def _check_choice(study: Study) -> None:
             f"{', '.join(sorted(twice))}: drawn in two ways; expected each value once among [vary], [choose] "
             "and the calibrated values. Leave one of them out"
         )
+    if bool(study.choose) != (study.design == "candidates"):
+        raise UsageError(
+            f'design = {study.design!r} with {len(study.choose)} values under [choose]; "candidates" '
+            "needs at least one of them, and other designs none"
+        )
+    gridded = [name for name, spread in study.vary.items() if spread.shape == "grid"]
+    if bool(gridded) != (study.design == "grid"):
+        raise UsageError(
+            f"design = {study.design!r} with {len(gridded)} values varied by 'grid'; a design \"grid\" needs "
+            "at least one of them, and other designs none ('choices' draws from a list)"
+        )
 
 
 def read_study(table: Mapping[str, Any], machine: Machine) -> Study:
     """Make a study of what a study file holds; ``machine`` is already read."""
+    known = ("machine", *(item.name for item in fields(Study) if item.name not in ("machine", "candidates")))
     for key in table:
-        if key not in _KEYS:
-            raise UsageError(unknown_key(key, _KEYS))
+        if key not in known:
+            raise UsageError(unknown_key(key, known))
     if "drops" not in table:
         raise UsageError("the study does not say how many drops; write drops = 1000")
-    settings: dict[str, Any] = {"name": machine.name}
-    settings |= {key: table[key] for key in ("name", "design", "reduction") if key in table}
-    settings |= {key: _whole(key, table[key]) for key in _WHOLE if key in table}
-    settings |= {key: _quantity(key, table[key], kind) for key, kind in _QUANTITIES.items() if key in table}
-    if table.get("start", "levitated") not in ("levitated", "centred"):
-        raise UsageError(f'start = {table["start"]!r}; expected "levitated" or "centred"')
-    settings["levitated"] = table.get("start", "levitated") == "levitated"
-    if "calibrated" in table:
-        settings["calibrated"] = _flag("calibrated", table["calibrated"])
+    settings: dict[str, Any] = {"name": machine.name, **table, "machine": machine}
+    for key in _QUANTITIES.keys() & table.keys():
+        settings[key] = _quantity(key, table[key], _QUANTITIES[key])
     for part in ("vary", "choose"):
         settings[part] = {
             name: read_bearings(machine, name, spread)
             if part == "choose" and is_bearing(name)
-            else read_distribution(name, spread, _reader(machine, name))
+            else _read_spread(machine, name, spread)
             for name, spread in dict(table.get(part, {})).items()
         }
-    if "until" in table:
-        settings["until"] = _until(table["until"])
-    return Study(machine=machine, **settings)
+    return Study(**settings)
+
+
+def _read_spread(machine: Machine, name: str, spread: Any) -> Distribution:
+    kind = case_kind(machine, name) or kind_of_path(machine, _starred(machine, name)[0])
+    return read_distribution(name, spread, lambda raw: _quantity(name, raw, kind))
 
 
 def planned_study(document: Mapping[str, Any], machine: Machine) -> Study:
     """The study of a plan, as `Study.document` wrote it: all numbers are SI already."""
-    speed, until = document["speed_rad_per_s"], document["until"]
+    speed = document["speed_rad_per_s"]
     return Study(
         machine=machine,
         duration=document["duration_s"],
         output_step=document["output_step_s"],
-        levitated=document["start"] == "levitated",
         speed=math.nan if speed is None else speed,
         vary=_spreads(document["vary"]),
         choose=_spreads(document["choose"]),
         candidates=tuple(tuple(one) for one in document["candidates"]),
-        until=None if until is None else Until(**until),
+        start=document["start"],
+        until=document["until"],
         **{key: document[key] for key in _AS_WRITTEN},
     )
 
@@ -375,42 +399,11 @@ def _spreads(written: Mapping[str, Any]) -> dict[str, Distribution]:
     }
 
 
-def _flag(key: str, raw: Any) -> bool:
-    if not isinstance(raw, bool):
-        raise UsageError(f"{key} = {raw!r}; expected true or false")
-    return raw
-
-
-def _whole(key: str, raw: Any) -> int:
-    if isinstance(raw, bool) or not isinstance(raw, int):
-        raise UsageError(f"{key} = {raw!r}; expected a whole number")
-    return raw
-
-
 def _quantity(key: str, raw: Any, kind: str) -> float:
     try:
         return parse_quantity(raw, kind)
     except UsageError as error:
         raise UsageError(f"{key}: {error}") from error
-
-
-def _reader(machine: Machine, name: str) -> Any:
-    kind = case_kind(machine, name) or kind_of_path(machine, _starred(machine, name)[0])
-    return lambda raw: _quantity(name, raw, kind)
-
-
-def _until(raw: Any) -> Until:
-    if not isinstance(raw, Mapping) or set(raw) != {"column", "quantile", "within"}:
-        raise UsageError(
-            f'until = {raw!r}; expected {{column = "NDE.peak_force", quantile = 0.99, within = 0.05}}'
-        )
-    until = Until(column=str(raw["column"]), quantile=float(raw["quantile"]), within=float(raw["within"]))
-    if not 0.0 < until.quantile < 1.0 or not until.within > 0.0:
-        raise UsageError(
-            f"until: quantile {until.quantile:g} within {until.within:g}; expected a quantile between 0 and "
-            "1 and a half width above zero, such as 0.99 and 0.05"
-        )
-    return until
 
 
 def load_study(path: str | Path) -> Study:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 from rotordrop.elements.description import unknown_key
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
-from rotordrop.physics.whirl_spells import WhirlSpell, whirl_spells
+from rotordrop.physics.whirl_spells import whirl_spells
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.simulate.losses import losses
 from rotordrop.simulate.result import DropResult
@@ -38,77 +37,58 @@ class Quantity:
         return "Hz" if self.kind == "frequency" else si_unit(self.kind) or "1"
 
 
-BEARING_QUANTITIES: tuple[Quantity, ...] = (
-    Quantity(name="peak_force", kind="force", meaning="largest force of the balls on the race"),
-    Quantity(name="peak_force_time", kind="time", meaning="time of the largest force from power-off"),
-    Quantity(name="mean_force", kind="force", meaning="mean force after the first contact"),
-    Quantity(name="peak_contact_force", kind="force", meaning="largest normal force between rotor and race"),
-    Quantity(name="peak_stress", kind="pressure", meaning="largest Hertz stress at the inner race"),
-    Quantity(name="stress_50", kind="pressure", meaning="median in time of the largest Hertz stress"),
-    Quantity(name="stress_90", kind="pressure", meaning="90 % quantile in time of the largest Hertz stress"),
-    Quantity(name="stress_99", kind="pressure", meaning="99 % quantile in time of the largest Hertz stress"),
-    Quantity(name="contacts", kind="dimensionless", meaning="contacts that began"),
-    Quantity(name="impulse", kind="impulse", meaning="impulse of the normal force over all contacts"),
-    Quantity(
-        name="contact_energy", kind="energy", meaning="energy dissipated by contact damping and friction"
+def _quantities(*rows: tuple[str, str, str]) -> tuple[Quantity, ...]:
+    return tuple(Quantity(name=name, kind=kind, meaning=meaning) for name, kind, meaning in rows)
+
+
+BEARING_QUANTITIES: tuple[Quantity, ...] = _quantities(
+    ("peak_force", "force", "largest force of the balls on the race"),
+    ("peak_force_time", "time", "time of the largest force from power-off"),
+    ("mean_force", "force", "mean force after the first contact"),
+    ("peak_contact_force", "force", "largest normal force between rotor and race"),
+    ("peak_stress", "pressure", "largest Hertz stress at the inner race"),
+    ("stress_50", "pressure", "median in time of the largest Hertz stress"),
+    ("stress_90", "pressure", "90 % quantile in time of the largest Hertz stress"),
+    ("stress_99", "pressure", "99 % quantile in time of the largest Hertz stress"),
+    ("contacts", "dimensionless", "contacts that began"),
+    ("impulse", "impulse", "impulse of the normal force over all contacts"),
+    ("contact_energy", "energy", "energy dissipated by contact damping and friction"),
+    ("sliding_energy", "energy", "heat of sliding between rotor and race"),
+    ("damping_energy", "energy", "energy lost in the normal direction of contacts"),
+    ("ball_set_energy", "energy", "energy lost between race and support"),
+    ("support_energy", "energy", "energy lost in support and foundation"),
+    ("drag_energy", "energy", "energy lost to the drag of the race"),
+    ("spin_up_energy", "energy", "work of friction on the spin of the race, drag included"),
+    ("largest_radius", "dimensionless", "largest displacement over the air gap"),
+    ("forward_whirl", "dimensionless", "share of the time in forward whirl"),
+    ("backward_whirl", "dimensionless", "share of the time in backward whirl"),
+    ("whirl_frequency", "frequency", "mean frequency of whirl, negative backward; missing without whirl"),
+    (
+        "spin_up_time",
+        "time",
+        "time until the race has 95 % of the rotor's surface speed; missing when it never has",
     ),
-    Quantity(name="sliding_energy", kind="energy", meaning="heat of sliding between rotor and race"),
-    Quantity(name="damping_energy", kind="energy", meaning="energy lost in the normal direction of contacts"),
-    Quantity(name="ball_set_energy", kind="energy", meaning="energy lost between race and support"),
-    Quantity(name="support_energy", kind="energy", meaning="energy lost in support and foundation"),
-    Quantity(name="drag_energy", kind="energy", meaning="energy lost to the drag of the race"),
-    Quantity(
-        name="spin_up_energy",
-        kind="energy",
-        meaning="work of friction on the spin of the race, drag included",
-    ),
-    Quantity(name="largest_radius", kind="dimensionless", meaning="largest displacement over the air gap"),
-    Quantity(name="forward_whirl", kind="dimensionless", meaning="share of the time in forward whirl"),
-    Quantity(name="backward_whirl", kind="dimensionless", meaning="share of the time in backward whirl"),
-    Quantity(
-        name="whirl_frequency",
-        kind="frequency",
-        meaning="mean frequency of whirl, negative backward; missing without whirl",
-    ),
-    Quantity(
-        name="spin_up_time",
-        kind="time",
-        meaning="time until the race has 95 % of the rotor's surface speed; missing when it never has",
-    ),
-    Quantity(
-        name="settling_time",
-        kind="time",
-        meaning="begin of the contact that lasts to the end; missing when the rotor is in flight there",
+    (
+        "settling_time",
+        "time",
+        "begin of the contact that lasts to the end; missing when the rotor is in flight there",
     ),
 )
-DROP_QUANTITIES: tuple[Quantity, ...] = (
-    Quantity(name="dissipated", kind="energy", meaning="energy dissipated in all places"),
-    Quantity(name="bending_energy", kind="energy", meaning="energy lost to the damping of the rotor"),
-    Quantity(name="final_speed", kind="speed", meaning="rotor speed at the end"),
-    Quantity(
-        name="energy_residual",
-        kind="dimensionless",
-        meaning="error of the energy balance over the energy turned over",
-    ),
+DROP_QUANTITIES: tuple[Quantity, ...] = _quantities(
+    ("dissipated", "energy", "energy dissipated in all places"),
+    ("bending_energy", "energy", "energy lost to the damping of the rotor"),
+    ("final_speed", "speed", "rotor speed at the end"),
+    ("energy_residual", "dimensionless", "error of the energy balance over the energy turned over"),
 )
 
 
 def columns_of(machine: Machine) -> tuple[Quantity, ...]:
     """All columns of a study of a machine, in order: per bearing, per magnet, per drop."""
-    bearings = [
-        Quantity(name=f"{bearing.name}.{q.name}", kind=q.kind, meaning=f"{bearing.name}: {q.meaning}")
-        for bearing in machine.touchdown_bearings
-        for q in BEARING_QUANTITIES
-    ]
-    magnets = [
-        Quantity(
-            name=f"{amb.name}.largest_displacement",
-            kind="length",
-            meaning=f"largest displacement of the rotor in the magnet {amb.name}: rubs there beyond its gap",
-        )
-        for amb in machine.ambs
-    ]
-    return (*bearings, *magnets, *DROP_QUANTITIES)
+    names = [bearing.name for bearing in machine.touchdown_bearings]
+    rubs = "largest displacement of the rotor in the magnet {}: rubs there beyond its gap"
+    of_parts = [(f"{b}.{q.name}", q.kind, f"{b}: {q.meaning}") for b in names for q in BEARING_QUANTITIES]
+    of_parts += [(f"{a.name}.largest_displacement", "length", rubs.format(a.name)) for a in machine.ambs]
+    return (*_quantities(*of_parts), *DROP_QUANTITIES)
 
 
 def column_of(machine: Machine, name: str) -> Quantity:
@@ -147,7 +127,8 @@ def row_of(model: DropModel, result: DropResult) -> Array:
 
 
 def _bearing_numbers(machine: Machine, result: DropResult, b: int) -> dict[str, float]:
-    gap = float(machine.touchdown_bearings[b].air_gap)
+    bearing = machine.touchdown_bearings[b]
+    gap, bore, end = float(bearing.air_gap), float(bearing.bore_radius), float(result.time[-1])
     log = result.contacts
     mine = log.bearing == b
     force = result.bearing_force_magnitude[:, b]
@@ -155,8 +136,12 @@ def _bearing_numbers(machine: Machine, result: DropResult, b: int) -> dict[str, 
     after = result.time >= (float(log.start[mine][0]) if mine.any() else math.inf)
     stress = result.max_stress[:, b]
     median, high, highest = np.quantile(stress, (0.5, 0.9, 0.99), method="hazen").tolist()
-    spells = whirl_spells(result.time, result.displacement[:, b], gap, spin=float(result.speed[0]))
     radius = np.hypot(result.displacement[:, b, 0], result.displacement[:, b, 1])
+    spells = whirl_spells(result.time, result.displacement[:, b], gap, spin=float(result.speed[0]))
+    whirl = sum(spell.duration for spell in spells)
+    spun_up = np.abs(result.race_speed[:, b]) * bore >= SPUN_UP * np.abs(result.speed) * (bore - gap)
+    # the sample after the last one in flight; the first where the rotor never flies
+    settled = int(np.flatnonzero(np.append(True, result.indentation[:, b] <= 0.0))[-1])
     return {
         "peak_force": peak,
         "peak_force_time": when,
@@ -170,32 +155,9 @@ def _bearing_numbers(machine: Machine, result: DropResult, b: int) -> dict[str, 
         "impulse": float(np.sum(log.impulse[mine])),
         "contact_energy": float(np.sum(log.dissipated_energy[mine])),
         "largest_radius": float(radius.max()) / gap,
-        "forward_whirl": _share(result, spells, lambda f: f > 0.0),
-        "backward_whirl": _share(result, spells, lambda f: f < 0.0),
-        "whirl_frequency": _mean_frequency(spells),
-        "spin_up_time": _spin_up(machine, result, b, gap),
-        "settling_time": _settling(result, b),
+        "forward_whirl": sum(spell.duration for spell in spells if spell.frequency > 0.0) / end,
+        "backward_whirl": sum(spell.duration for spell in spells if spell.frequency < 0.0) / end,
+        "whirl_frequency": sum(s.frequency * s.duration for s in spells) / whirl if whirl else math.nan,
+        "spin_up_time": float(result.time[np.argmax(spun_up)]) if spun_up.any() else math.nan,
+        "settling_time": float(result.time[settled]) if settled < len(result.time) else math.nan,
     }
-
-
-def _share(result: DropResult, spells: tuple[WhirlSpell, ...], wanted: Callable[[float], bool]) -> float:
-    return sum(spell.duration for spell in spells if wanted(spell.frequency)) / float(result.time[-1])
-
-
-def _mean_frequency(spells: tuple[WhirlSpell, ...]) -> float:
-    whole = sum(spell.duration for spell in spells)
-    return sum(spell.frequency * spell.duration for spell in spells) / whole if whole else math.nan
-
-
-def _spin_up(machine: Machine, result: DropResult, b: int, gap: float) -> float:
-    bore = float(machine.touchdown_bearings[b].bore_radius)
-    reached = np.abs(result.race_speed[:, b]) * bore >= SPUN_UP * np.abs(result.speed) * (bore - gap)
-    return float(result.time[np.argmax(reached)]) if reached.any() else math.nan
-
-
-def _settling(result: DropResult, b: int) -> float:
-    flight = np.flatnonzero(result.indentation[:, b] <= 0.0)
-    if len(flight) == 0:
-        return 0.0
-    last = int(flight[-1])
-    return float(result.time[last + 1]) if last + 1 < len(result.time) else math.nan

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import cpu_count
 
 import numpy as np
@@ -62,13 +62,6 @@ class RareEvent:
         return f"{text}; {self.failed} of them could not be computed" if self.failed else text
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Run:
-    probability: float
-    levels: int
-    evaluations: int
-
-
 def rare_event(
     performance: Performance,
     limit: float,
@@ -80,23 +73,9 @@ def rare_event(
 ) -> RareEvent:
     """Probability that a quantity exceeds a limit, where that is rare.
 
-    Parameters
-    ----------
-    performance : callable
-        The quantity at points of the standard normal space.
-    limit : float
-        In the unit of the quantity.
-    dimension : int
-        Number of independent standard normal variables.
-    samples : int
-        Points of a level; a multiple of ten.
-    runs : int
-        Independent repeats; their scatter gives the interval.
-    seed : int
-        Key of the random numbers.
+    ``dimension`` counts the independent standard normal variables, ``samples`` the points of a level (a
+    multiple of ten), ``runs`` the independent repeats, whose scatter gives the interval.
 
-    Notes
-    -----
     Source: Au and Beck, Probabilistic Engineering Mechanics 16, 2001; moves by conditional sampling with
     adapted width, Papaioannou, Betz, Zwirglmaier and Straub, Probabilistic Engineering Mechanics 41, 2015.
     Differs from them: the interval is that of repeats, not of a formula for correlated chains, which is too
@@ -108,11 +87,7 @@ def rare_event(
             f"{1.0 / LEVEL_SHARE:.0f} from 100 on, in at least {FEWEST_RUNS} repeats, such as 1000 in 10"
         )
     found = [_one_run(performance, limit, dimension, samples, (seed, k)) for k in range(runs)]
-    return _joined(found)
-
-
-def _joined(found: list[_Run]) -> RareEvent:
-    values = np.array([one.probability for one in found])
+    values = np.array([probability for probability, _, _ in found])
     middle = float(values.mean())
     if middle == 0.0:
         reach = 0.0
@@ -124,14 +99,15 @@ def _joined(found: list[_Run]) -> RareEvent:
         lower=middle * math.exp(-reach),
         upper=middle * math.exp(reach) if middle else LEVEL_SHARE**MOST_LEVELS,
         runs=tuple(values.tolist()),
-        levels=max(one.levels for one in found),
-        evaluations=sum(one.evaluations for one in found),
+        levels=max(levels for _, levels, _ in found),
+        evaluations=sum(done for _, _, done in found),
     )
 
 
 def _one_run(
     performance: Performance, limit: float, dimension: int, samples: int, seed: tuple[int, int]
-) -> _Run:
+) -> tuple[float, int, int]:
+    """Probability of one repeat, its levels and the points it took."""
     random = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed)))
     points = random.standard_normal((samples, dimension))
     values = performance(points)
@@ -141,13 +117,13 @@ def _one_run(
         threshold = 0.5 * float(values[order[beyond - 1]] + values[order[beyond]])
         if threshold >= limit:
             share = float(np.mean(values > limit))
-            return _Run(probability=LEVEL_SHARE**level * share, levels=level + 1, evaluations=done)
+            return LEVEL_SHARE**level * share, level + 1, done
         seeds = order[:beyond]
         points, values, width = _next_level(
             performance, points[seeds], values[seeds], threshold, width, samples, random
         )
         done += samples - beyond
-    return _Run(probability=0.0, levels=MOST_LEVELS, evaluations=done)
+    return 0.0, MOST_LEVELS, done
 
 
 def _next_level(
@@ -189,20 +165,8 @@ def rare_drops(
 ) -> RareEvent:
     """Probability that a quantity of a drop exceeds a limit [SI], with the spreads of a study.
 
-    Parameters
-    ----------
-    study : Study
-        Machine, case and what varies; its number of drops and its design do not matter.
-    column : str
-        Column of its results, such as ``"NDE.peak_force"``.
-    limit : float
-        Limit [SI].
-    samples, runs : int
-        As for `rare_event`; one in a million takes about six levels of 0.9 times ``samples`` drops a repeat.
-    threads : int, optional
-        Threads; all cores by default.
-    progress : callable, optional
-        Called with a sentence and the number of drops done over the expected number.
+    Its number of drops and its design do not matter. One in a million takes about six levels of 0.9 times
+    ``samples`` drops a repeat. ``progress`` hears a sentence and the drops done over the expected number.
     """
     place = columns_of(study.machine).index(column_of(study.machine, column))
     model, varied = build_drop_model(study.machine, study.reduction), list(study.varied)
@@ -223,4 +187,4 @@ def rare_drops(
             return np.where(np.isnan(found), -math.inf, found)
 
         event = rare_event(performance, limit, len(varied), samples=samples, runs=runs, seed=study.seed)
-    return RareEvent(**{**event.__dict__, "failed": failed})
+    return replace(event, failed=failed)

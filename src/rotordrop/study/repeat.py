@@ -8,7 +8,7 @@ worst of them is worse.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,7 +22,6 @@ from rotordrop.errors import UsageError
 from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
 from rotordrop.rotor.unknowns import smallest_gap
-from rotordrop.study.between_drops import next_draw
 from rotordrop.study.distributions import Distribution
 from rotordrop.study.plan import Study
 from rotordrop.study.summary import COVER, StudyResults, quantile, share_of
@@ -38,6 +37,10 @@ COMPARED: Mapping[str, str] = {
 """Numbers of an estimate, and the column of a study below its bearing that is the same."""
 RAYLEIGH_MEDIAN, RAYLEIGH_SPREAD = math.sqrt(2.0 * math.log(2.0)), math.pi / math.sqrt(24.0)
 """Median and standard deviation of the logarithm of the length of two normal parts of unit spread [1]."""
+Estimate = tuple[float, float]
+"""A value and its standard error, what was known before the record included."""
+SHARES = 64
+"""Points over the share that all drops have in common; chosen, not measured."""
 OFF_CENTRE, LARGEST_ORBIT = 0.05, 0.05
 """Standard deviation of where a magnet holds the rotor, and largest synchronous orbit there, over the
 smallest air gap [1]."""
@@ -113,27 +116,16 @@ def repeat_study(
 def repeats(
     results: StudyResults, recorded: Mapping[str, Known] | None = None, *, worst_of: int = 100
 ) -> tuple[Repeat, ...]:
-    """Every compared quantity of every bearing among the drops of a study.
-
-    Parameters
-    ----------
-    results : StudyResults
-        Of a `repeat_study`.
-    recorded : mapping, optional
-        Numbers of the recorded drop by column.
-    worst_of : int
-        How many drops the worst one is of.
-    """
+    """Every compared quantity of every bearing among the drops of a `repeat_study`."""
     if worst_of < 2:
         raise UsageError(f"worst of {worst_of}; expected two drops or more")
-    told = recorded or {}
     tail = 0.5 * (1.0 - COVER)
     found = []
     for bearing in results.study.machine.touchdown_bearings:
         for name in COMPARED.values():
             column = f"{bearing.name}.{name}"
             values = results.column(column)
-            mine = told.get(column)
+            mine = (recorded or {}).get(column)
             found.append(
                 Repeat(
                     column=column,
@@ -167,13 +159,7 @@ def place_among(values: ArrayLike, recorded: Known) -> Known:
 
 
 def recorded_numbers(document: Mapping[str, Any]) -> dict[str, Known]:
-    """Numbers of a recorded drop by column of a study, from the document of its estimate.
-
-    Raises
-    ------
-    UsageError
-        If it is no estimate of one drop.
-    """
+    """Numbers of a recorded drop by column of a study, from the document of its estimate."""
     if "bearings" not in document or "speed_Hz" not in document:
         raise UsageError(
             "the file is no estimate of one drop; give one that 'rotordrop estimate --json' wrote"
@@ -191,3 +177,49 @@ def recorded_numbers(document: Mapping[str, Any]) -> dict[str, Known]:
                     interval_90=None if interval is None else (float(interval[0]), float(interval[1])),
                 )
     return found
+
+
+def next_draw(recorded: Sequence[Estimate], spread: float) -> Distribution:
+    """Distribution of a value in the next drop, from value and standard error in each recorded drop.
+
+    ``spread`` is the standard deviation of a value before any record, which stands in the errors too; all in
+    one unit. Before any record each value is normal about zero; which part of that variance all drops share
+    is not known. Values that agree speak for a large common part: the next one will then lie near them, and
+    no nearer than they lie to one another. The result is normal, with mean and standard deviation of the
+    mixture over the unknown common part.
+
+    Source: the normal model of values that may be exchanged, Gelman and others, Bayesian Data Analysis, 2013,
+    chapter 5, with the total variance given and the common share uniform between 0 and 1.
+    """
+    own = []
+    for value, error in recorded:
+        if error < spread:
+            # what the record alone says: the quotient of estimate and prior about zero
+            variance = 1.0 / (error**-2 - spread**-2)
+            own.append((value * variance / error**2, variance))
+    if not own:
+        return Distribution(shape="normal", numbers=(0.0, spread))
+    parts = [_given_share((k + 0.5) / SHARES, own, spread) for k in range(SHARES)]
+    best = max(weight for weight, _, _ in parts)
+    weights = [math.exp(weight - best) for weight, _, _ in parts]
+    whole = math.fsum(weights)
+    mean = math.fsum(w * m for w, (_, m, _) in zip(weights, parts, strict=True)) / whole
+    square = math.fsum(w * (v + m * m) for w, (_, m, v) in zip(weights, parts, strict=True)) / whole
+    return Distribution(shape="normal", numbers=(mean, math.sqrt(square - mean * mean)))
+
+
+def _given_share(share: float, own: Sequence[Estimate], spread: float) -> tuple[float, float, float]:
+    """Logarithm of the likelihood of a common share, and mean and variance of the next value with it.
+
+    The covariance of the recorded values is diagonal but for the common part c in every entry, so that its
+    inverse and determinant are sums.
+    """
+    common = share * spread**2
+    alone = [(1.0 - share) * spread**2 + variance for _, variance in own]
+    ones = math.fsum(1.0 / d for d in alone)
+    sums = math.fsum(value / d for (value, _), d in zip(own, alone, strict=True))
+    squares = math.fsum(value**2 / d for (value, _), d in zip(own, alone, strict=True))
+    seen = 1.0 + common * ones
+    misfit = squares - common * sums**2 / seen
+    size = math.fsum(math.log(d) for d in alone) + math.log(seen)
+    return -0.5 * (misfit + size), common * sums / seen, (1.0 - share) * spread**2 + common / seen

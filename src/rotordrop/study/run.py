@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_EXCEPTION, Executor, ThreadPoolExecutor, wait
+from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from os import cpu_count
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Literal
 
 import numpy as np
 
 from rotordrop.errors import RotordropError, UsageError
+from rotordrop.machine import Machine
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.simulate.drop import simulate_drop
 from rotordrop.study.folder import (
@@ -28,7 +33,7 @@ from rotordrop.study.folder import (
     study_of,
     tidy,
 )
-from rotordrop.study.plan import Study
+from rotordrop.study.plan import Study, read_study
 from rotordrop.study.quantities import columns_of, row_of
 from rotordrop.study.summary import EarlyEnd, StudyResults, load_results
 
@@ -92,14 +97,61 @@ def run_study(
     """
     place = open_folder(study, folder)
     wanted = _missing(study, place)
+    watch = _Watch(study, place, report)
     if dask is not None:
-        _on_dask(place, wanted, dask, study, report)
+        _on_dask(place, wanted, dask, watch)
     else:
-        _on_threads(place, wanted, threads or cpu_count() or 1, study, report)
-    if wait_for_others:
-        _wait_for_others(study, place, report)
+        _on_threads(place, wanted, threads or cpu_count() or 1, study, watch)
+    enough = not wait_for_others or watch.look()
+    while not enough and (missing := _missing(study, place)):
+        # others work on these; those whose worker has gone are taken over
+        worked = [work_on(place.path, shard) for shard in missing]
+        enough = watch.look()
+        if not enough and not any(worked):
+            time.sleep(LOOK_EVERY)
     tidy(place)
     return load_results(place.path)
+
+
+def sweep(
+    machine: Machine,
+    vary: Mapping[str, Sequence[float | str]],
+    *,
+    repeats: int = 1,
+    folder: str | Path | None = None,
+    threads: int | None = None,
+    report: Report | None = None,
+    **settings: Any,
+) -> StudyResults:
+    """Simulate a drop for every combination of values of a machine or of its drops.
+
+    Parameters
+    ----------
+    machine : Machine
+        The machine around which values vary.
+    vary : mapping
+        Values by path (``"NDE.support.stiffness"``, ``"*.friction.dynamic"`` for all touchdown bearings with
+        one value) or by name of the case (``"speed"``); texts with units, or numbers in SI units.
+    repeats : int
+        Drops of each combination; they differ in what is left to chance, above all the rotor angle.
+    folder : path, optional
+        Folder of the study, which can be resumed; left out, nothing is kept but the results.
+    threads, report : optional
+        As for `run_study`.
+    **settings
+        Further keys of a study file, such as ``speed="60 Hz"``, ``duration="0.1 s"`` or ``seed=2``.
+
+    Returns
+    -------
+    StudyResults
+        Values and quantities of every drop; ``results.to_dataframe()`` is one table.
+    """
+    spreads = {name: {"grid": list(values)} for name, values in vary.items()}
+    drops = repeats * math.prod(len(one["grid"]) for one in spreads.values())
+    study = read_study({"drops": drops, "design": "grid", "vary": spreads} | settings, machine)
+    with TemporaryDirectory() if folder is None else nullcontext(folder) as place:
+        own = Path(place) / "study" if folder is None else place
+        return run_study(study, own, threads=threads, report=report)
 
 
 def _missing(study: Study, place: StudyFolder) -> list[int]:
@@ -149,20 +201,15 @@ def one_drop(study: Study, model: DropModel, values: dict[str, float]) -> tuple[
 
 def work_on(folder: str | Path, shard: int) -> bool:
     """Compute and publish one shard of the study in a folder, unless another one does; for Dask workers."""
-    study, model = _opened(folder)
-    return _work(study, model, StudyFolder(Path(folder)), shard, None)
-
-
-_OPEN: dict[str, tuple[Study, DropModel]] = {}
-"""Studies that this process has opened, by digest: a worker builds the model of a study once."""
-
-
-def _opened(folder: str | Path) -> tuple[Study, DropModel]:
     digest = read_plan(folder)["digest"]  # another study may have taken the place of the one before
     if digest not in _OPEN:
         study = study_of(folder)
         _OPEN[digest] = (study, build_drop_model(study.machine, study.reduction))
-    return _OPEN[digest]
+    return _work(*_OPEN[digest], StudyFolder(Path(folder)), shard, None)
+
+
+_OPEN: dict[str, tuple[Study, DropModel]] = {}
+"""Studies that this process has opened, by digest: a worker builds the model of a study once."""
 
 
 def _work(
@@ -180,65 +227,38 @@ def _work(
         return True
 
 
-def _on_threads(
-    place: StudyFolder, wanted: list[int], threads: int, study: Study, report: Report | None
-) -> None:
+def _on_threads(place: StudyFolder, wanted: list[int], threads: int, study: Study, watch: _Watch) -> None:
     if not wanted:
         return
     model = build_drop_model(study.machine, study.reduction)
     stop = threading.Event()
     with ThreadPoolExecutor(max_workers=threads) as pool:
         try:
-            _drive(pool, wanted, lambda shard: _work(study, model, place, shard, stop), study, place, report)
+            _drive(pool, wanted, lambda shard: _work(study, model, place, shard, stop), watch)
         except BaseException:
             stop.set()  # the drops that run now end, nothing new begins; finished shards are on disk
             raise
 
 
-def _on_dask(
-    place: StudyFolder, wanted: list[int], address: str, study: Study, report: Report | None
-) -> None:
+def _on_dask(place: StudyFolder, wanted: list[int], address: str, watch: _Watch) -> None:
     try:
         distributed: Any = import_module("distributed")
     except ImportError as error:
         raise UsageError(
             "a Dask cluster needs the extra 'cluster'; install it with: pip install 'rotordrop[cluster]'"
         ) from error
-    path = str(place.path.resolve())
-    if address != "local":
-        with distributed.Client(address) as client:
-            _drive(client.get_executor(pure=False), wanted, _Task(path), study, place, report)
-        return
-    with (
-        distributed.LocalCluster(
-            n_workers=cpu_count() or 1, threads_per_worker=1, dashboard_address=None
-        ) as cluster,
-        distributed.Client(cluster) as client,
-    ):
-        _drive(client.get_executor(pure=False), wanted, _Task(path), study, place, report)
+    with ExitStack() as stack:
+        scheduler: Any = address
+        if address == "local":
+            workers = {"n_workers": cpu_count() or 1, "threads_per_worker": 1, "dashboard_address": None}
+            scheduler = stack.enter_context(distributed.LocalCluster(**workers))
+        client = stack.enter_context(distributed.Client(scheduler))
+        task = partial(work_on, str(place.path.resolve()))
+        _drive(client.get_executor(pure=False), wanted, task, watch)
 
 
-@dataclass(frozen=True)
-class _Task:
-    """What a Dask worker calls; it can be sent to another process."""
-
-    folder: str
-
-    def __call__(self, shard: int) -> bool:
-        return work_on(self.folder, shard)
-
-
-def _drive(
-    pool: Executor,
-    wanted: list[int],
-    work: Callable[[int], bool],
-    study: Study,
-    place: StudyFolder,
-    report: Report | None,
-) -> None:
+def _drive(pool: Executor, wanted: list[int], work: Callable[[int], bool], watch: _Watch) -> None:
     """Hand out the shards in order and look at the folder until all is done or enough is known."""
-    began, before = time.monotonic(), _drops(study, place)
-    end = EarlyEnd(study, place)
     running = {pool.submit(work, shard) for shard in wanted}
     pause = LOOK_EVERY
     try:
@@ -247,8 +267,7 @@ def _drive(
             for one in done:
                 one.result()
             looked = time.monotonic()
-            _tell(study, place, report, began, before)
-            if end.shards() is not None:
+            if watch.look():
                 break
             pause = max(LOOK_EVERY, (time.monotonic() - looked) / LOOK_SHARE)
     finally:
@@ -256,26 +275,23 @@ def _drive(
             one.cancel()
 
 
+class _Watch:
+    """Looks at the folder of a study, tells how far it is, and knows whether it may end early."""
+
+    def __init__(self, study: Study, place: StudyFolder, report: Report | None) -> None:
+        self._study, self._place, self._report = study, place, report
+        self._began, self._before = time.monotonic(), _drops(study, place)
+        self._end = EarlyEnd(study, place)
+
+    def look(self) -> bool:
+        """Tell the progress; whether enough is known."""
+        if self._report is not None:
+            drops, of = _drops(self._study, self._place), self._study.drops
+            rate = (drops - self._before) / max(time.monotonic() - self._began, 1e-9)
+            left = (of - drops) / rate if rate > 0.0 else math.inf
+            self._report(StudyProgress(drops=drops, of=of, rate=rate, left=left))
+        return self._end.shards() is not None
+
+
 def _drops(study: Study, place: StudyFolder) -> int:
     return sum(len(study.drops_of(shard)) for shard in place.finished())
-
-
-def _tell(study: Study, place: StudyFolder, report: Report | None, began: float, before: int) -> None:
-    if report is None:
-        return
-    drops = _drops(study, place)
-    rate = (drops - before) / max(time.monotonic() - began, 1e-9)
-    left = (study.drops - drops) / rate if rate > 0.0 else np.inf
-    report(StudyProgress(drops=drops, of=study.drops, rate=rate, left=float(left)))
-
-
-def _wait_for_others(study: Study, place: StudyFolder, report: Report | None) -> None:
-    """Wait for shards that others work on; take over those whose worker has gone."""
-    began, before, end = time.monotonic(), _drops(study, place), EarlyEnd(study, place)
-    while missing := _missing(study, place):
-        if end.shards() is not None:
-            return
-        worked = [work_on(place.path, shard) for shard in missing]
-        _tell(study, place, report, began, before)
-        if not any(worked):
-            time.sleep(LOOK_EVERY)

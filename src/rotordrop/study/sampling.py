@@ -10,6 +10,7 @@ import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,8 @@ from rotordrop.study.distributions import Distribution, normal_score
 
 Array = NDArray[np.float64]
 
-DESIGNS = ("random", "latin hypercube", "sobol", "grid", "sensitivity", "candidates")
+Design = Literal["random", "latin hypercube", "sobol", "grid", "sensitivity", "candidates"]
+DESIGNS: tuple[str, ...] = get_args(Design)
 
 
 def uniform(seed: int, drop: int, width: int, stream: int = 0) -> Array:
@@ -144,13 +146,7 @@ class Joint:
 
 
 def joint_of(machine: Machine) -> Joint:
-    """The joint distribution that a calibrated machine file holds.
-
-    Raises
-    ------
-    UsageError
-        If it holds none.
-    """
+    """The joint distribution that a calibrated machine file holds; refuses a file that holds none."""
     origin = machine.calibration
     if origin is None or origin.joint is None:
         raise UsageError(

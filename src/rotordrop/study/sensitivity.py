@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import UsageError
 from rotordrop.known import Known
-from rotordrop.study.summary import COVER, StudyResults
+from rotordrop.study.summary import COVER, StudyResults, cells_of
 
 Array = NDArray[np.float64]
 
@@ -37,28 +37,13 @@ class Influence:
 def influences(results: StudyResults, column: str) -> tuple[Influence, ...]:
     """Influence of every varied value on a quantity, the largest first.
 
-    Parameters
-    ----------
-    results : StudyResults
-        Of the design ``"sensitivity"``, or of any other, whose drops are then sorted into cells by value.
-    column : str
-        Quantity.
-
-    Notes
-    -----
+    Drops of another design than ``"sensitivity"`` are sorted into cells by value. Intervals by bootstrap.
     Source: Sobol 1993; estimators of Saltelli and others, Computer Physics Communications 181, 2010 (alone)
     and Jansen 1999 (total); from any sample, Plischke, Borgonovo and Smith, European Journal of Operational
-    Research 226, 2013, less what cells of pure chance would explain. Intervals by bootstrap.
-
-    Raises
-    ------
-    UsageError
-        If there are too few drops.
+    Research 226, 2013, less what cells of pure chance would explain.
     """
-    if results.study.design == "sensitivity":
-        found = _from_blocks(results, column)
-    else:
-        found = _from_cells(results, column)
+    find = _from_blocks if results.study.design == "sensitivity" else _from_cells
+    found = find(results, column)
     return tuple(sorted(found, key=lambda one: -(one.total or one.alone).value))
 
 
@@ -101,19 +86,10 @@ def _from_cells(results: StudyResults, column: str) -> list[Influence]:
         x = drawn[whole]
         if len(np.unique(x)) < 2:
             continue
-        known = _with_intervals(np.column_stack([_cells(x), y]), _explained)
+        cells = cells_of(x, min(MOST_CELLS, len(x) // DROPS_OF_A_CELL))
+        known = _with_intervals(np.column_stack([cells.astype(np.float64), y]), _explained)
         found.append(Influence(name=name, alone=known[0], total=None))
     return found
-
-
-def _cells(x: Array) -> Array:
-    """Number of the cell of every value, cells of equal numbers; one for each of a few distinct values."""
-    n, levels = len(x), np.unique(x)
-    cells = min(MOST_CELLS, n // DROPS_OF_A_CELL)
-    if len(levels) <= cells:
-        return np.searchsorted(levels, x).astype(np.float64)
-    rank = np.argsort(np.argsort(x, kind="stable"), kind="stable")
-    return (rank * cells // n).astype(np.float64)
 
 
 def _explained(pairs: Array) -> Array:

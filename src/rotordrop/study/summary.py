@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -55,11 +56,7 @@ class StudyResults:
     @property
     def failed(self) -> Mapping[str, int]:
         """How many drops failed, by reason."""
-        counts: dict[str, int] = {}
-        for reason in self.reasons:
-            if reason:
-                counts[reason] = counts.get(reason, 0) + 1
-        return counts
+        return Counter(reason for reason in self.reasons if reason)
 
     def to_dataframe(self) -> pandas.DataFrame:
         """One row per drop: number, varied values, quantities [SI], reason of a failure."""
@@ -90,35 +87,15 @@ class StudyResults:
     def map(
         self, name: str, by: str, *, cells: int = 10, share: float = 0.5, above: float | None = None
     ) -> list[dict[str, Any]]:
-        """Quantile of a quantity, or the probability that it exceeds a limit, against a varied value.
+        """Quantile of a quantity, or the probability that it exceeds a limit [SI], against a varied value.
 
-        Parameters
-        ----------
-        name : str
-            Quantity.
-        by : str
-            Varied value.
-        cells : int
-            Cells with equal numbers of drops; a value with fewer distinct values has one cell for each.
-        share : float
-            Which quantile [1].
-        above : float, optional
-            Limit [SI]; gives the probability to exceed it, among drops that were computed, in place of a
-            quantile.
-
-        Returns
-        -------
-        list of dict
-            ``from``, ``to`` [SI of the varied value] and ``known``, a `Known`.
+        Over cells with equal numbers of drops; a value with fewer distinct values has one cell for each.
+        Every cell has ``from``, ``to`` [SI of the varied value] and ``known``, a `Known`; a probability
+        counts among the drops that were computed.
         """
         x, y = self.column(by), self.column(name)
-        levels = np.unique(x)
-        if len(levels) <= cells:
-            groups = [x == level for level in levels]
-        else:
-            place = np.argsort(np.argsort(x, kind="stable"), kind="stable") * cells // len(x)
-            groups = [place == k for k in range(cells)]
-        done = self._computed
+        place, done = cells_of(x, cells), self._computed
+        groups = [place == k for k in range(int(place.max(initial=-1)) + 1)]
 
         def known(group: NDArray[np.bool_]) -> Known:
             return quantile(y[group], share) if above is None else exceedance(y[group & done], above)
@@ -128,20 +105,21 @@ class StudyResults:
         ]
 
 
+def cells_of(x: Array, cells: int) -> NDArray[np.int64]:
+    """Number of the cell of every value: cells of equal numbers; one for each of a few distinct values."""
+    levels = np.unique(x)
+    if len(levels) <= cells:
+        return np.searchsorted(levels, x).astype(np.int64)
+    rank = np.argsort(np.argsort(x, kind="stable"), kind="stable")
+    return np.asarray(rank * cells // len(x))
+
+
 def quantile(values: ArrayLike, share: float) -> Known:
     """Quantile with a 90 % interval from order statistics, free of any assumption about the distribution.
 
-    Parameters
-    ----------
-    values : ndarray, shape (N,)
-        Any unit; NaN are left out.
-    share : float
-        Which quantile [1].
-
-    Notes
-    -----
+    NaN among the values are left out; an end that the number of values cannot give is infinite.
     Source: David and Nagaraja, Order Statistics, 2003, section 7.1: the number of values below the quantile
-    is binomial. An end that the number of values cannot give is infinite.
+    is binomial.
     """
     if not 0.0 < share < 1.0:
         raise UsageError(f"quantile {share!r}; expected a number between 0 and 1, such as 0.99")
@@ -191,10 +169,7 @@ def load_results(folder: str | Path) -> StudyResults:
     """
     study, place = study_of(folder), StudyFolder(Path(folder))
     enough = EarlyEnd(study, place).shards()
-    return _joined(study, place, place.finished() if enough is None else range(enough))
-
-
-def _joined(study: Study, place: StudyFolder, shards: Sequence[int]) -> StudyResults:
+    shards = place.finished() if enough is None else range(enough)
     tables = [read_shard(place, study, shard) for shard in shards]
     varied = [table["varied"] for table in tables] or [np.zeros((0, len(study.varied)))]
     columns = columns_of(study.machine)
@@ -242,13 +217,7 @@ class EarlyEnd:
 
 
 def save_results(results: StudyResults, path: str | Path) -> None:
-    """Write all drops as one columnar file, complete or not at all: ``.parquet``, else HDF5 (NetCDF4).
-
-    Raises
-    ------
-    OutputError
-        If it cannot be written.
-    """
+    """Write all drops as one columnar file, complete or not at all: ``.parquet``, else HDF5 (NetCDF4)."""
     import h5py
 
     from rotordrop.files import atomic_path

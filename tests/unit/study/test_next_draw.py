@@ -11,9 +11,8 @@ from scipy.stats import kstest
 
 from rotordrop import example_machine
 from rotordrop.machine import CalibrationDrop, CalibrationOrigin, RecordedLift, loads_machine, machine_text
-from rotordrop.study.between_drops import next_draw
 from rotordrop.study.distributions import normal_score
-from rotordrop.study.repeat import repeat_study
+from rotordrop.study.repeat import next_draw, repeat_study
 
 SPREAD = 0.2
 MACHINE = example_machine("lp400")
