@@ -471,12 +471,10 @@ FORM: tuple[Parameter, ...] = (
 
 
 def element_factors(rotor: Rotor) -> tuple[Array, Array]:
-    """Factors on density and bending stiffness of the elements by the form of the beam, shapes (E,), (E,).
+    """Factors on density and bending stiffness of the elements by the form of the beam, shapes (E,), (E,); 1
+    without.
 
-    Raises
-    ------
-    UsageError
-        If so much mass would have to move that some element had none left.
+    Refuses a form that leaves some element no mass.
     """
     ends, de, stiff_de, stiff_ends = (
         0.0 if (value := row.stated(rotor)) is None else float(value) for row in FORM

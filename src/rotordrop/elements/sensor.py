@@ -69,6 +69,11 @@ class Sensor(Placed):
         ),
     }
 
+    @property
+    def further_states(self) -> int:
+        """Number of further states: the reading it has got to, where it lags behind."""
+        return int(self.time_constant is not None)
+
 
 def check_sensors_resolve_motion(sensors: tuple[Sensor, ...], nodes: tuple[float, ...]) -> None:
     """Refuse sensors from which the rigid motion of the rotor (x, y and both tilts) cannot be found."""

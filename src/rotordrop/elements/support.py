@@ -132,6 +132,11 @@ class Support(Description):
         why = "the damping ratio of the vertical direction"
         return replace(_from_ratio(self.damping_ratio, mass, stiffness), status="default", source=why)
 
+    @property
+    def further_states(self) -> int:
+        """Number of further states: displacement and velocity (x, y) of its foundation, or none."""
+        return L.FOUNDATION_STATES if self.foundation_share is not None else 0
+
     def fill(self, row: Array) -> None:
         """Write the columns of the support."""
         row[L.SUPPORT_MASS_X] = float(self.mass_horizontal)
@@ -188,12 +193,7 @@ def _cubic_scale(bearing: Any, load: float) -> tuple[float, tuple[float, float]]
 def soft_axis(ratio: float, coupling: float) -> float:
     """Angle of the soft axis from horizontal [°], between -90 and 90, of a support with turned axes.
 
-    Parameters
-    ----------
-    ratio : float
-        Horizontal over vertical stiffness [1].
-    coupling : float
-        Coupling over the geometric mean of both [1].
+    It follows from horizontal over vertical stiffness and the coupling over the geometric mean of both [1].
     """
     # The stiff axis stands at half the angle of (k_x - k_y, 2 k_xy); the soft one across.
     stiff = 0.5 * math.atan2(2.0 * coupling * math.sqrt(ratio), ratio - 1.0)
@@ -304,11 +304,6 @@ def foundation_sag(row: Array, load: float) -> float:
     """Deflection [m] of a foundation under a static load [N]."""
     speed, share = float(row[L.FOUNDATION_SPEED]), max(float(row[L.FOUNDATION_SHARE]), 0.0)
     return 0.0 if share == 0.0 else load * share / (float(row[L.SUPPORT_MASS_Y]) * speed**2)
-
-
-def foundation_states(bearing: Any) -> int:
-    """Number of further states of a touchdown bearing: displacement and velocity (x, y), or none."""
-    return L.FOUNDATION_STATES if bearing.support.foundation_share is not None else 0
 
 
 def _neutral(bearing: Any) -> dict[str, Known]:

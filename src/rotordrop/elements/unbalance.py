@@ -74,19 +74,11 @@ def _grade(raw: Any) -> float:
 def from_grade(
     grade: BalanceGrade, mass: float, centre_of_gravity: float, planes: tuple[tuple[int, float], ...]
 ) -> tuple[Unbalance, ...]:
-    """Share the permissible unbalance among the planes of the bearings, all at the same unknown phase.
+    """Share the permissible unbalance of a rotor [kg, m from node 1] among planes (node, position [m]), NDE
+    first.
 
     ISO 21940-11 gives each of two bearing planes the share of the weight it carries. The phase is not known
     to a balance grade: zero stands for it, with the whole turn as its range.
-
-    Parameters
-    ----------
-    mass : float
-        Mass of the rotor [kg].
-    centre_of_gravity : float
-        Distance of the centre of gravity from node 1 [m].
-    planes : tuple of (int, float)
-        Node and position [m] of the planes, NDE first.
     """
     total = grade.permissible_unbalance(mass)
     shares = _shares(centre_of_gravity, [position for _, position in planes])

@@ -270,12 +270,8 @@ def _number(machine: Machine, path: str, value: float | str) -> float:
 
 
 def kind_of_path(machine: Machine, path: str) -> str:
-    """Kind of quantity of a value by path, one of `rotordrop.units.KINDS`.
-
-    Raises
-    ------
-    UsageError
-        If the machine has no such value.
+    """Kind of quantity of a value by path, one of `rotordrop.units.KINDS`; refuses a path the machine does
+    not have.
     """
     *keys, last = _resolved(machine, path)
     part: Any = machine
@@ -287,13 +283,7 @@ def kind_of_path(machine: Machine, path: str) -> str:
 
 
 def value_of_path(machine: Machine, path: str) -> float:
-    """Value [SI] by path, such as ``"NDE.support.stiffness"``.
-
-    Raises
-    ------
-    UsageError
-        If the machine has no such value.
-    """
+    """Value [SI] by path, such as ``"NDE.support.stiffness"``; refuses one that the machine leaves out."""
     part: Any = machine
     for key in _resolved(machine, path):
         part = _step(part, key, path)

@@ -54,13 +54,7 @@ class ImportedRotor:
 
 
 def read_ross(path: str | Path) -> ImportedRotor:
-    """Read a rotor from a file of ROSS.
-
-    Raises
-    ------
-    MachineFileError
-        If the file is none of ROSS, or holds a shaft that has no counterpart here.
-    """
+    """Read a rotor from a file of ROSS; refuses a shaft that has no counterpart here."""
     path = Path(path)
     elements, version, damped = _elements(path)
     shaft = [item for kind, item in elements if kind.startswith("ShaftElement")]
@@ -492,13 +486,7 @@ TABLES = (".csv", ".txt", ".tsv", ".xlsx", ".xlsm")
 
 
 def read_rotor(path: str | Path) -> ImportedRotor:
-    """Read a rotor from a file of ROSS (.toml, .json) or a shaft table (.csv, .txt, .xlsx).
-
-    Raises
-    ------
-    MachineFileError
-        If the file holds no rotor; names what is missing.
-    """
+    """Read a rotor from a file of ROSS (.toml, .json) or a shaft table (.csv, .txt, .xlsx)."""
     path = Path(path)
     if not path.is_file():
         raise MachineFileError("there is no such file", file=path)

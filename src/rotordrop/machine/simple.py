@@ -111,11 +111,6 @@ def simple_machine(known: SimpleMachine) -> Machine:
 
     Both halves of the beam have the stiffness of a steel cylinder and densities that put the centre of mass
     where it is. The magnets stand at the sensors. What is not known stands as guesses with ranges.
-
-    Raises
-    ------
-    UsageError
-        If the numbers do not fit together; names the one.
     """
     planes = _planes(known.bearings, known.length, "bearings")
     sensed = _planes(known.sensors, known.length, "sensors")

@@ -120,18 +120,8 @@ def assemble(
     *,
     modal_damping: float = DEFAULT_MODAL_DAMPING,
 ) -> RotorFE:
-    """Assemble shaft sections and point masses.
-
-    Parameters
-    ----------
-    node_positions : sequence of float, length N
-        Positions along z [m], increasing.
-    sections : sequence of Section, length N − 1
-        Cross-section between each node and the next.
-    point_masses : sequence of PointMass
-        Discs and masses on nodes.
-    modal_damping : float
-        Damping ratio of the free-free flexible modes [1].
+    """Assemble N − 1 sections between nodes at increasing positions [m], (N,), with discs and masses on
+    nodes.
     """
     z = np.asarray(node_positions, dtype=np.float64)
     if len(sections) != len(z) - 1:
@@ -220,14 +210,8 @@ def rigid_modes(fe: RotorFE) -> Array:
 
 
 def free_free_modes(fe: RotorFE, count: int | None = None) -> PlanarModes:
-    """Modes of the free rotor: two rigid ones with frequency exactly 0, then bending.
-
-    Parameters
-    ----------
-    fe : RotorFE
-        The rotor.
-    count : int, optional
-        Number of modes, the rigid ones included; all by default.
+    """Modes of the free rotor: two rigid ones with frequency exactly 0, then bending; all of them without a
+    count.
     """
     count = fe.size if count is None else count
     if not N_RIGID <= count <= fe.size:
@@ -247,17 +231,7 @@ def free_free_modes(fe: RotorFE, count: int | None = None) -> PlanarModes:
 
 
 def modes_on_springs(fe: RotorFE, springs: dict[int, float], count: int | None = None) -> PlanarModes:
-    """Modes of one plane with the rotor on springs to the ground at standstill.
-
-    Parameters
-    ----------
-    fe : RotorFE
-        The rotor.
-    springs : dict
-        Stiffness [N/m] by node number, counted from 1.
-    count : int, optional
-        Number of modes; all by default.
-    """
+    """Modes of one plane with the rotor on springs to the ground at standstill, [N/m] by node from 1."""
     stiffness = fe.stiffness.copy()
     for node, value in springs.items():
         i = fe.node_index(node)

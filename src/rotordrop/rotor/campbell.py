@@ -67,19 +67,7 @@ class CampbellDiagram:
 def campbell_diagram(
     machine: Machine, speeds: ArrayLike, suspension: str = "touchdown bearings", *, count: int = 10
 ) -> CampbellDiagram:
-    """Campbell diagram of a machine.
-
-    Parameters
-    ----------
-    machine : Machine
-        The machine.
-    speeds : array_like, shape (S,)
-        Speeds [rad/s], increasing, not negative.
-    suspension : str
-        ``"free-free"``, ``"AMBs"`` or ``"touchdown bearings"`` (settled in them).
-    count : int
-        Number of lines K.
-    """
+    """Campbell diagram of a machine with K lines at increasing speeds [rad/s], (S,), in a suspension."""
     supports = suspension_of(machine, suspension)
     fe = build_rotor_fe(machine)
     nodes = [support.node for support in supports]

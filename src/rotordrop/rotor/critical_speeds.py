@@ -60,20 +60,10 @@ def critical_speed_map(
     count: int = 6,
     loads: Sequence[float] | None = None,
 ) -> CriticalSpeedMap:
-    """Critical speed map of a machine on its touchdown bearings.
+    """Critical speed map of a machine on its touchdown bearings, K lines over equivalent stiffnesses [N/m],
+    (S,).
 
-    Parameters
-    ----------
-    machine : Machine
-        The machine; its supports may be identified ones.
-    stiffness : array_like, shape (S,), optional
-        Equivalent stiffnesses [N/m]; 121 from 1e5 to 1e10 by default.
-    whirl : str
-        ``"standstill"`` (default), ``"forward"`` or ``"backward"``.
-    count : int
-        Number of lines K.
-    loads : sequence of float, optional
-        Static loads of the bearings [N]; the load shares of the weight by default.
+    By default 121 stiffnesses from 1e5 to 1e10 N/m, and static loads [N] that are the shares of the weight.
     """
     grid = (
         np.geomspace(*DEFAULT_STIFFNESS, 121)
@@ -107,19 +97,11 @@ def critical_speeds(
     whirl: str = "forward",
     count: int | None = None,
 ) -> Array:
-    """Undamped critical speeds of a rotor on supports, lowest first, shape (K,) [Hz].
+    """Undamped critical speeds of a rotor on supports, lowest first, shape (K,) [Hz]; vertical stiffness
+    counts in both directions.
 
-    Parameters
-    ----------
-    rotor : RotorFE or RotorBasis
-        The rotor; point masses on a shaft without mass are allowed.
-    supports : sequence of Support
-        What holds it, firmly enough that it cannot drift; its vertical stiffness counts in both directions.
-    whirl : str
-        ``"forward"`` or ``"backward"``: the whirl keeps step with the spin. ``"standstill"``: natural
-        frequencies without spin.
-    count : int, optional
-        Number of critical speeds; all by default.
+    ``"forward"`` or ``"backward"``: the whirl keeps step with the spin; ``"standstill"``: natural frequencies
+    without spin. Point masses on a shaft without mass are allowed.
     """
     if whirl not in WHIRLS:
         raise UsageError(f"unknown whirl {whirl!r}; choose one of {', '.join(map(repr, WHIRLS))}")

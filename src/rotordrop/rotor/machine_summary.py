@@ -141,16 +141,8 @@ class MachineWarning:
 def machine_warnings(
     machine: Machine, summary: MachineSummary, speed: float | None = None
 ) -> tuple[MachineWarning, ...]:
-    """List where a machine leaves the range of the drop model.
-
-    Parameters
-    ----------
-    machine : Machine
-        The machine.
-    summary : MachineSummary
-        What `summarise_machine` gave for it.
-    speed : float, optional
-        Speed at the drop [rad/s]; the nominal speed by default.
+    """List where a machine with its summary leaves the range of the drop model at a speed [rad/s], else the
+    nominal one.
     """
     omega = float(machine.speed.nominal) if speed is None else speed
     found = [MachineWarning(**vars(doubt), doubtful=True) for doubt in doubts(machine)]

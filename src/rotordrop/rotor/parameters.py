@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.description import Placed
 from rotordrop.elements.race_bearing import numbers_of, places_of
-from rotordrop.elements.support import foundation_states, support_sag
+from rotordrop.elements.support import support_sag
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.physics import aerodynamics
 from rotordrop.physics import columns as L
@@ -46,7 +48,8 @@ class DropModel:
 
     def with_machine(self, machine: Machine) -> DropModel:
         """The same model of a machine with the same rotor and other bearings or values."""
-        return replace(self, machine=machine, parameters=_with_machine(self, machine))
+        values = _of_values(machine, self.fe, self.basis, self.load_shares)
+        return replace(self, machine=machine, parameters=self.parameters._replace(**values))
 
     def at_rest(self) -> Array:
         """State, shape (n,), of a centred rotor with all at rest; loose races lie where they fall."""
@@ -80,14 +83,8 @@ def build_drop_model(machine: Machine, reduction: str | Reduction = "accurate") 
     fe = build_rotor_fe(machine)
     nodes = tuple(bearing.node for bearing in machine.touchdown_bearings)
     basis = reduce_rotor(fe, reduction, nodes)
-    shares = np.asarray(bearing_load_shares(machine), dtype=np.float64)
-    further = tuple(foundation_states(bearing) for bearing in machine.touchdown_bearings)
-    layout = StateLayout(
-        n_modes=basis.shapes.shape[1],
-        n_bearings=len(nodes),
-        bearing_own=further if any(further) else (),
-        sensor_own=sum(sensor.time_constant is not None for sensor in machine.sensors),
-    )
+    shares = np.asarray(bearing_load_shares(machine, fe), dtype=np.float64)
+    layout = StateLayout.of_machine(machine, basis.size)
     return DropModel(
         machine=machine,
         fe=fe,
@@ -98,92 +95,66 @@ def build_drop_model(machine: Machine, reduction: str | Reduction = "accurate") 
     )
 
 
-def _rows(basis: RotorBasis, nodes: list[int]) -> Array:
-    if not nodes:
-        return np.zeros((0, basis.shapes.shape[1]))
-    return np.ascontiguousarray([basis.node_row(node) for node in nodes], dtype=np.float64)
-
-
 def _kernel_parameters(
     machine: Machine, fe: RotorFE, basis: RotorBasis, shares: Array, layout: StateLayout
 ) -> KernelParameters:
-    m = basis.shapes.shape[1]
-    bearings = machine.touchdown_bearings
+    m = basis.size
     magnet = np.zeros((len(machine.ambs), L.N_MAGNET_COLUMNS))
     for a, amb in enumerate(machine.ambs):
         magnet[a, L.AMB_STIFFNESS] = float(amb.stiffness)
         magnet[a, L.AMB_DAMPING] = float(amb.damping)
-    lift = np.zeros(fe.mass.shape[0])
-    lift[0::2] = 1.0
-    unbalance_cos, unbalance_sin = _unbalance(machine, basis)
+
+    def shapes_at(parts: Sequence[Placed]) -> Array:
+        rows = [basis.node_row(part.node) for part in parts]
+        return np.ascontiguousarray(rows, dtype=np.float64) if rows else np.zeros((0, m))
+
     return KernelParameters(
         eigenvalue=np.ascontiguousarray(basis.eigenvalues, dtype=np.float64),
         damping=np.ascontiguousarray(np.diag(basis.damping), dtype=np.float64),
         polar=np.ascontiguousarray(basis.polar, dtype=np.float64).reshape(m, m),
-        gravity=-float(machine.gravity) * (product(basis.shapes.T, product(fe.mass, lift))),
-        unbalance_cos=unbalance_cos,
-        unbalance_sin=unbalance_sin,
-        bearing_shape=_rows(basis, [b.node for b in bearings]),
-        bearing=_bearing_rows(machine, shares),
-        balls=places_of([numbers_of(b) for b in bearings]),
-        magnet_shape=_rows(basis, [amb.node for amb in machine.ambs]),
+        gravity=-float(machine.gravity) * (product(basis.shapes.T, product(fe.mass, fe.rigid_shapes[:, 0]))),
+        bearing_shape=shapes_at(machine.touchdown_bearings),
+        magnet_shape=shapes_at(machine.ambs),
         magnet=magnet,
-        spin=_spin(machine, fe),
         flags=np.array([aerodynamics.OFF, 0], dtype=np.int64),
         rotor_at=layout.rotor_at(),
         bearing_at=layout.bearing_at(),
         contact_at=layout.contact_at(),
         magnet_at=layout.magnet_at(len(machine.ambs)),
         memory=np.zeros(0),
+        **_of_values(machine, fe, basis, shares),
     )
 
 
-def _with_machine(model: DropModel, machine: Machine) -> KernelParameters:
+def _of_values(machine: Machine, fe: RotorFE, basis: RotorBasis, shares: Array) -> dict[str, Any]:
+    """The kernel arrays that change with the values of a machine whose rotor stays."""
     bearings = machine.touchdown_bearings
-    unbalance_cos, unbalance_sin = _unbalance(machine, model.basis)
-    spin = _spin(machine, model.fe)
-    return model.parameters._replace(
-        bearing=_bearing_rows(machine, model.load_shares),
-        balls=places_of([numbers_of(b) for b in bearings]),
-        unbalance_cos=unbalance_cos,
-        unbalance_sin=unbalance_sin,
-        spin=spin,
-    )
-
-
-def _spin(machine: Machine, fe: RotorFE) -> Array:
-    spin = np.zeros(L.N_SPIN_ENTRIES)
-    spin[L.POLAR_INERTIA] = fe.polar_inertia
-    speed = machine.speed
-    spin[L.AERO_TIME_CONSTANT] = (
-        np.inf if speed.aero_time_constant is None else float(speed.aero_time_constant)
-    )
-    # The machine file gives torques, the kernel wants them per polar inertia.
-    spin[L.AERO_LINEAR] = float(speed.aero_linear or 0.0) / fe.polar_inertia
-    spin[L.AERO_QUADRATIC] = float(speed.aero_quadratic or 0.0) / fe.polar_inertia
-    return spin
-
-
-def _unbalance(machine: Machine, basis: RotorBasis) -> tuple[Array, Array]:
-    """Modal unbalance vectors; the phase is measured from +y, so 90° is added to get it from +x."""
-    cosine = np.zeros(basis.shapes.shape[1])
-    sine = np.zeros_like(cosine)
-    for unbalance in machine.unbalances:
-        angle = float(unbalance.phase) + 0.5 * math.pi
-        row = basis.node_row(unbalance.node)
-        s, c = sine_cosine(angle)
-        cosine += float(unbalance.amount) * c * row
-        sine += float(unbalance.amount) * s * row
-    return cosine, sine
-
-
-def _bearing_rows(machine: Machine, shares: Array) -> Array:
-    rows = np.array([bearing_row(b, w) for b, w in zip(machine.touchdown_bearings, shares, strict=True)])
-    for row, bearing in zip(rows, machine.touchdown_bearings, strict=True):
+    rows = np.array([bearing_row(bearing, load) for bearing, load in zip(bearings, shares, strict=True)])
+    for row, bearing in zip(rows, bearings, strict=True):
         # A held race gives way to its own weight by nanometres; a loose one falls.
         if not numbers_of(bearing).held:
             row[L.RACE_WEIGHT] = row[L.RACE_MASS] * float(machine.gravity)
-    return rows
+    cosine, sine = np.zeros(basis.size), np.zeros(basis.size)
+    for unbalance in machine.unbalances:
+        # The phase is measured from +y, so 90° is added to get it from +x.
+        s, c = sine_cosine(float(unbalance.phase) + 0.5 * math.pi)
+        shape = basis.node_row(unbalance.node)
+        cosine += float(unbalance.amount) * c * shape
+        sine += float(unbalance.amount) * s * shape
+    spin, speed = np.zeros(L.N_SPIN_ENTRIES), machine.speed
+    spin[L.POLAR_INERTIA] = fe.polar_inertia
+    slowed = speed.aero_time_constant
+    spin[L.AERO_TIME_CONSTANT] = np.inf if slowed is None else float(slowed)
+    # The machine file gives torques, the kernel wants them per polar inertia.
+    spin[L.AERO_LINEAR] = float(speed.aero_linear or 0.0) / fe.polar_inertia
+    spin[L.AERO_QUADRATIC] = float(speed.aero_quadratic or 0.0) / fe.polar_inertia
+    return {
+        "bearing": rows,
+        "balls": places_of([numbers_of(bearing) for bearing in bearings]),
+        "unbalance_cos": cosine,
+        "unbalance_sin": sine,
+        "spin": spin,
+    }
 
 
 def bearing_row(bearing: TouchdownBearing, static_load: float) -> Array:
@@ -232,17 +203,7 @@ def race_sag(bearings: Sequence[TouchdownBearing], loads: Array) -> Array:
 
 
 def static_sag(rows: Array, race: Array, loads: Array) -> StaticSag:
-    """Sag under static loads.
-
-    Parameters
-    ----------
-    rows : ndarray, shape (B, columns)
-        Bearing parameters, columns of `rotordrop.physics.columns`.
-    race : ndarray, shape (B,)
-        From `race_sag` [m].
-    loads : ndarray, shape (B,)
-        Static load of each bearing [N].
-    """
+    """Sag of bearings with kernel rows (B, columns) and race sags (B,) [m] under static loads (B,) [N]."""
     laws = rows[:, L.CONTACT : L.CONTACT_END]
     indentation = np.array([depth_at(law, float(load)) for law, load in zip(laws, loads, strict=True)])
     support = np.array([support_sag(row, float(load)) for row, load in zip(rows, loads, strict=True)])

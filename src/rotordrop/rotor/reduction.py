@@ -125,21 +125,9 @@ def reduction_of(choice: str | Reduction) -> Reduction:
 def reduce_rotor(
     fe: RotorFE, reduction: str | Reduction = "accurate", attachment_nodes: Sequence[int] = ()
 ) -> RotorBasis:
-    """Reduce a rotor to free-free modes and attachment modes, Ritz-orthonormalised.
+    """Reduce a rotor to free-free modes and attachment modes at nodes (counted from 1), Ritz-orthonormalised.
 
-    Parameters
-    ----------
-    fe : RotorFE
-        The rotor.
-    reduction : str or Reduction
-        ``"accurate"`` (14 + attachment), ``"quick"`` (6 + attachment), ``"full"`` or an own choice.
-    attachment_nodes : sequence of int
-        Nodes of the touchdown bearings, counted from 1.
-
-    Returns
-    -------
-    RotorBasis
-        Shapes with ``shapesᵀ M shapes = 1`` and ``shapesᵀ K shapes = diag(eigenvalues)``.
+    The shapes have ``shapesᵀ M shapes = 1`` and ``shapesᵀ K shapes = diag(eigenvalues)``.
     """
     choice = reduction_of(reduction)
     nodes = tuple(dict.fromkeys(attachment_nodes)) if choice.attachment else ()
@@ -197,33 +185,6 @@ def _basis(
     )
 
 
-def elastic_flexibility(fe: RotorFE, nodes: Sequence[int], omega: float = 0.0) -> Array:
-    """Displacement at each node per unit force there by bending alone, shape (P,) [m/N].
-
-    The rotor is free and its rigid motion is left out; ``omega`` is the frequency of the force [rad/s].
-    """
-    modes = free_free_modes(fe)
-    return _modal_flexibility(
-        modes.shapes, modes.omega**2, np.array([fe.node_index(n) for n in nodes]), omega
-    )
-
-
-def residual_flexibility(fe: RotorFE, basis: RotorBasis, nodes: Sequence[int], omega: float = 0.0) -> Array:
-    """What a reduced rotor gives way too little per unit force at each node, shape (P,) [m/N].
-
-    Times the contact stiffness it estimates the relative truncation error of a contact force whose time
-    scale is 1/omega [rad/s]; zero at standstill for nodes with an attachment mode.
-    """
-    index = np.array([fe.node_index(n) for n in nodes])
-    reduced = _modal_flexibility(basis.shapes, basis.eigenvalues, index, omega)
-    return elastic_flexibility(fe, nodes, omega) - reduced
-
-
-def _modal_flexibility(shapes: Array, eigenvalues: Array, index: NDArray[np.intp], omega: float) -> Array:
-    rows = shapes[index, N_RIGID:]
-    return np.asarray(np.sum(rows**2 / (eigenvalues[N_RIGID:] - omega**2), axis=1))
-
-
 PEAK_OVER_WEIGHT = 10.0
 """Usual ratio of the largest force of a drop to the static load [1]: 11 to 17 on machines of 13 to 130 kg."""
 
@@ -243,16 +204,8 @@ def contact_frequency(machine: Machine, fe: RotorFE | None = None) -> float:
 
 
 def reduction_for_contact(machine: Machine, *, least: int, reach: float) -> Reduction:
-    """Basis of a rotor with the modes below some multiple of its contact frequency.
-
-    Parameters
-    ----------
-    machine : Machine
-        The machine.
-    least : int
-        Modes it has at least, the two rigid ones included.
-    reach : float
-        The highest mode is not below this multiple of the contact frequency [1], where the rotor has it.
+    """Basis with the modes up to ``reach`` times the contact frequency, and ``least`` modes (two rigid ones
+    included).
     """
     fe = build_rotor_fe(machine)
     frequency = free_free_modes(fe).frequency

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import SimulationError
 from rotordrop.physics.linear_algebra import product, solve
-from rotordrop.rotor.assembly import N_RIGID, RotorFE, build_rotor_fe, free_free_modes, rigid_modes
+from rotordrop.rotor.assembly import N_RIGID, RotorFE, build_rotor_fe, free_free_modes
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
@@ -26,24 +26,9 @@ def weight_vector(fe: RotorFE, gravity: float) -> Array:
 def rest_on(
     fe: RotorFE, nodes: Sequence[int], gravity: float, compliance: Sequence[float] | None = None
 ) -> tuple[Array, Array]:
-    """Static shape of the rotor under its weight, held at nodes.
+    """Shape in y (2N,) [m, rad] of a rotor under its weight, and upward reactions [N], (P,), held at P nodes.
 
-    Parameters
-    ----------
-    fe : RotorFE
-        The rotor.
-    nodes : sequence of int, length P
-        Where it is held, counted from 1; at least two different ones.
-    gravity : float
-        Gravity [m/s²].
-    compliance : sequence of float, length P, optional
-        How much each support gives way [m/N]; 0 (rigid) by default.
-
-    Returns
-    -------
-    tuple of ndarray
-        Vertical displacement and slope per node, shape (2N,) [m, rad], and the upward reactions, shape
-        (P,) [N].
+    Gravity in m/s²; each support gives way by its compliance [m/N], or is rigid.
     """
     held = len(set(nodes))
     if held < 2 or held < len(nodes):
@@ -93,12 +78,6 @@ def levitated_sag(fe: RotorFE, machine: Machine) -> Array:
         )
     compliance = [0.0 if amb.integral_action else 1.0 / float(amb.stiffness) for amb in machine.ambs]
     return rest_on(fe, nodes, float(machine.gravity), compliance)[0]
-
-
-def bending_part(fe: RotorFE, shape: Array) -> Array:
-    """What is left of a shape (2N,) without its rigid modes [m, rad]: how far it is from a straight rotor."""
-    rigid = rigid_modes(fe)
-    return shape - product(rigid, product(rigid.T, product(fe.mass, shape)))
 
 
 def settled_sag(fe: RotorFE, machine: Machine) -> Array:

@@ -50,15 +50,7 @@ class EquivalentStiffness:
 def equivalent_stiffness(
     machine: Machine, loads: Sequence[float] | None = None
 ) -> tuple[EquivalentStiffness, ...]:
-    """Stiffness of each touchdown bearing under the settled rotor, in the machine's order.
-
-    Parameters
-    ----------
-    machine : Machine
-        The machine.
-    loads : sequence of float, length B, optional
-        Static load of each bearing [N]; the load shares of the weight by default.
-    """
+    """Stiffness of each touchdown bearing under loads [N], (B,); the shares of the weight by default."""
     shares = bearing_load_shares(machine) if loads is None else loads
     pairs = zip(machine.touchdown_bearings, shares, strict=True)
     return tuple(_of_bearing(bearing, float(load)) for bearing, load in pairs)

@@ -65,21 +65,10 @@ def orbit_axis(displacement: ComplexArray) -> Array:
 
 
 def machine_response(machine: Machine, speeds: ArrayLike, suspension: str) -> MachineResponse:
-    """Response of a machine to the unbalance of its file, in the AMBs or settled in its touchdown bearings.
+    """Response at speeds [rad/s], (S,), to the unbalance of a machine, in the AMBs or settled in its
+    bearings.
 
-    Parameters
-    ----------
-    machine : Machine
-        The machine; it needs unbalances, or a balance grade, which says nothing of their phases.
-    speeds : array_like, shape (S,)
-        Speeds [rad/s].
-    suspension : str
-        ``"AMBs"`` or ``"touchdown bearings"``.
-
-    Raises
-    ------
-    UsageError
-        If the machine has no unbalance.
+    The machine needs unbalances, or a balance grade, which says nothing of their phases.
     """
     if not machine.unbalances:
         raise UsageError(

@@ -137,21 +137,11 @@ class Prior:
 
 
 def prior(row: Parameter, quantity: Known, scale: float = 1.0, *, logarithmic: bool | None = None) -> Prior:
-    """Prior of a parameter from what the machine file says of it.
+    """Prior of a parameter from what the machine file says of it; ``scale`` is what a row's deviations are
+    shares of.
 
     A range, or the interval of an estimate, is the 90 % interval of the prior: its centre is the middle of
     the range (of its logarithms), wherever in it the guess lies. Without either, the value is the centre.
-
-    Parameters
-    ----------
-    row : Parameter
-        Row of the parameter.
-    quantity : Known
-        The value with what is known about it.
-    scale : float
-        What the standard deviations of the row are shares of, where it is not logarithmic.
-    logarithmic : bool, optional
-        Measure of the distribution; that of the row by default.
     """
     log = row.logarithmic if logarithmic is None else logarithmic
     value = float(quantity)
@@ -260,16 +250,9 @@ def _measured_otherwise(row: Parameter, bearing: TouchdownBearing, index: int, m
 
 
 def sensor_prior(row: Parameter, quantity: Known, smallest_gap: float) -> Prior:
-    """Prior of gain or offset of a sensor.
+    """Prior of gain or offset of a sensor; an unknown offset is a share of the smallest air gap [m].
 
-    Parameters
-    ----------
-    row : Parameter
-        Row of the gain or the offset.
-    quantity : Known
-        The value with what is known about it; the range of a default says what is thinkable, not usual.
-    smallest_gap : float
-        Smallest air gap of the machine [m], of which an unknown offset is a share.
+    The range of a default says what is thinkable, not usual.
     """
     if quantity.status == "default":
         quantity = replace(quantity, range=None)
@@ -422,16 +405,9 @@ def slope_signs(unknowns: Sequence[Unknown], theta: Array, sigma: Array) -> Arra
 
 
 def file_of_fitted(model: DropModel, unknowns: Sequence[Unknown], exponents: Sequence[float]) -> Array:
-    """What a change of each fitted value changes of those in the file, shape (n, n).
+    """What a change of each fitted value of bearings changes of those in the file, shape (n, n).
 
-    Parameters
-    ----------
-    model : DropModel
-        Drop model of the machine.
-    unknowns : sequence of Unknown
-        The values, of touchdown bearings.
-    exponents : sequence of float
-        Their values [SI], of which only those of contact exponents are read.
+    ``exponents`` [SI] holds the value of each; only those of contact exponents are read.
     """
     places = {(unknown.owner, unknown.parameter.path): k for k, unknown in enumerate(unknowns)}
     bearings = {bearing.name: bearing for bearing in model.machine.touchdown_bearings}

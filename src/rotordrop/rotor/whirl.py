@@ -79,19 +79,9 @@ def matrices_of(rotor: RotorFE | RotorBasis, supports: Sequence[Support]) -> Pla
 def whirl_modes(
     rotor: RotorFE | RotorBasis, speed: float, supports: Sequence[Support] = (), count: int | None = None
 ) -> WhirlModes:
-    """Damped modes of a rotor that turns at a speed.
+    """Damped modes of a rotor, full or reduced, that turns at a speed [rad/s] on supports, lowest first.
 
-    Parameters
-    ----------
-    rotor : RotorFE or RotorBasis
-        The rotor, full or reduced.
-    speed : float
-        Speed [rad/s].
-    supports : sequence of Support
-        What holds it; nothing for a free rotor.
-    count : int, optional
-        Number of modes, lowest first; all by default. Overdamped motion and the drift of a free rotor
-        (below 0.05 Hz) are no modes.
+    Overdamped motion and the drift of a free rotor (below 0.05 Hz) are no modes.
     """
     system = matrices_of(rotor, supports)
     values, vectors = _eigenpairs(system, speed)
@@ -114,23 +104,10 @@ def unbalance_response(
     unbalances: Mapping[int, complex],
     supports: Sequence[Support] = (),
 ) -> ComplexArray:
-    """Steady synchronous motion of the rotor under unbalance.
+    """Steady synchronous motion (x, y) at the nodes [m], ``Re(value · e^(jωt))``, at speeds [rad/s], shape
+    (S, N, 2).
 
-    Parameters
-    ----------
-    rotor : RotorFE or RotorBasis
-        The rotor.
-    speeds : array_like, shape (S,)
-        Speeds [rad/s].
-    unbalances : mapping
-        Unbalance [kg m] by node number, complex: magnitude and angle from +x at rotor angle 0.
-    supports : sequence of Support
-        What holds the rotor.
-
-    Returns
-    -------
-    ndarray, shape (S, N, 2), complex
-        Displacement (x, y) at the nodes [m]: ``Re(value · e^(jωt))``.
+    Unbalances [kg m] by node number are complex: magnitude and angle from +x at rotor angle 0.
     """
     system = matrices_of(rotor, supports)
     n, m = system.plane_size, system.rotor_size

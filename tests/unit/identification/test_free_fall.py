@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.reference.rotor_shapes import bending_part
 
 from rotordrop.evidence.free_fall import build_free_fall, kernel_state, sagging_amplitudes
 from rotordrop.rotor.parameters import DropModel
-from rotordrop.rotor.statics import bending_part, levitated_sag
+from rotordrop.rotor.statics import levitated_sag
 from rotordrop.simulate.case import DropCase, LevitatedStart, StateStart
 from rotordrop.simulate.drop import simulate_drop
 from rotordrop.simulate.levitation import levitated_orbit, start_of_drop

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.reference.rotor_shapes import elastic_flexibility, residual_flexibility
 
 from rotordrop.errors import SimulationError, UsageError
 from rotordrop.rotor.assembly import free_free_modes, modal_damping_matrix
@@ -11,10 +12,8 @@ from rotordrop.rotor.reduction import (
     PRESETS,
     Reduction,
     _attachment_coordinates,
-    elastic_flexibility,
     reduce_rotor,
     reduction_of,
-    residual_flexibility,
 )
 
 BEARINGS = (4, 26)

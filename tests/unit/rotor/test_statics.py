@@ -7,13 +7,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from tests.reference.rotor_shapes import bending_part
 
 from rotordrop.errors import SimulationError
 from rotordrop.physics.timoshenko import round_section
 from rotordrop.rotor.assembly import assemble
 from rotordrop.rotor.statics import (
     bearing_load_shares,
-    bending_part,
     levitated_sag,
     rest_on,
     settled_sag,
