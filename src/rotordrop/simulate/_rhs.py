@@ -249,14 +249,18 @@ def add_contact(c: int, y: Array, p: KernelParameters, dy: Array) -> tuple[float
 
 @inner_kernel
 def add_race(
-    b: int, friction: float, y: Array, p: KernelParameters, dy: Array, work: Scratch
-) -> tuple[float, float]:
-    """Rates of a race under its contacts and its balls; returns the force of the balls on the support [N]."""
+    b: int, friction: float, y: Array, p: KernelParameters, dy: Array, balls: Array
+) -> tuple[float, float, float, float]:
+    """Rates of a race under its contacts and its balls.
+
+    Returns the force of the balls on the support, x and y [N], and the power that the damping of the ball set
+    and the drag take [W].
+    """
     n_q = p.rotor_at[L.N_COORDINATES]
     r, h, spin = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.RACE_SPIN]
     row = p.bearing[b]
     race_x, race_y = race_deflection(b, y, p)
-    F_x, F_y = ball_set_force(row[L.BALL_SET : L.BALL_SET_END], p.balls[b], race_x, race_y, work.balls)
+    F_x, F_y = ball_set_force(row[L.BALL_SET : L.BALL_SET_END], p.balls[b], race_x, race_y, balls)
     drag = race_drag_torque(
         math.sqrt(F_x * F_x + F_y * F_y),
         y[spin],
@@ -269,23 +273,25 @@ def add_race(
     C_b = row[L.BEARING_DAMPING]
     F_x += C_b * wx
     F_y += C_b * wy
-    work.power[b, BALL_SET] = C_b * (wx * wx + wy * wy)
-    work.power[b, DRAG] = drag * y[spin]
+    by_balls: float = C_b * (wx * wx + wy * wy)
+    by_drag: float = drag * y[spin]
     dy[n_q + r] = (dy[n_q + r] - F_x) / row[L.RACE_MASS]
     dy[n_q + r + 1] = (dy[n_q + r + 1] - F_y - row[L.RACE_WEIGHT]) / row[L.RACE_MASS]
     dy[spin] = (friction * row[L.BORE_RADIUS] - drag) / row[L.RACE_INERTIA]
-    return F_x, F_y
+    return F_x, F_y, by_balls, by_drag
 
 
 @inner_kernel
-def bearing_accelerations(b: int, y: Array, p: KernelParameters, dy: Array, work: Scratch) -> float:
+def bearing_accelerations(
+    b: int, y: Array, p: KernelParameters, dy: Array, work: Scratch
+) -> tuple[float, float]:
     """Forces at one touchdown bearing, added to rotor, race, support and spin; power lost, in its row.
 
-    Returns the friction torque on the rotor [N m] (positive drives it). A bearing without a race has the
-    rotor touch its support.
+    Returns the friction torque on the rotor [N m] (positive drives it) and all power lost here [W]. A bearing
+    without a race has the rotor touch its support.
     """
     n_q, h = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.SUPPORT]
-    row, power = p.bearing[b], work.power[b]
+    row = p.bearing[b]
     friction = 0.0
     sliding = 0.0
     lost = 0.0
@@ -294,15 +300,12 @@ def bearing_accelerations(b: int, y: Array, p: KernelParameters, dy: Array, work
         friction += force
         sliding += by_sliding
         lost += by_law
-    power[SLIDING] = sliding
-    power[IN_CONTACT] = lost
-    F_x = 0.0
-    F_y = 0.0
+    F_x, F_y, by_balls, by_drag = 0.0, 0.0, 0.0, 0.0
     if p.bearing_at[b, L.RACE] >= 0:
-        F_x, F_y = add_race(b, friction, y, p, dy, work)
+        F_x, F_y, by_balls, by_drag = add_race(b, friction, y, p, dy, work.balls)
     sx = y[n_q + h]
     sy = y[n_q + h + 1]
-    power[SUPPORT] = row[L.SUPPORT_DAMPING_X] * sx * sx + row[L.SUPPORT_DAMPING_Y] * sy * sy
+    by_support = row[L.SUPPORT_DAMPING_X] * sx * sx + row[L.SUPPORT_DAMPING_Y] * sy * sy
     F_x += dy[n_q + h]
     F_y += dy[n_q + h + 1]
     dy[n_q + h] = (F_x - row[L.SUPPORT_DAMPING_X] * sx - row[L.SUPPORT_STIFFNESS_X] * y[h]) / row[
@@ -312,9 +315,12 @@ def bearing_accelerations(b: int, y: Array, p: KernelParameters, dy: Array, work
         L.SUPPORT_MASS_Y
     ]
     if row[L.SUPPORT_FORM + blocks.SUPPORT_PRESENT] != 0.0:
-        power[SUPPORT] += add_support_form(b, y, p, dy)
-    torque: float = -friction * row[L.ROTOR_RADIUS]
-    return torque
+        by_support += add_support_form(b, y, p, dy)
+    # Written together and last: each write makes the compiler read the arrays of the bearing again.
+    power = work.power[b]
+    power[SLIDING], power[IN_CONTACT] = sliding, lost
+    power[BALL_SET], power[SUPPORT], power[DRAG] = by_balls, by_support, by_drag
+    return -friction * row[L.ROTOR_RADIUS], by_balls + by_drag + by_support + (sliding + lost)
 
 
 @inner_kernel
@@ -342,9 +348,9 @@ def drop_derivative(t: float, y: Array, p: KernelParameters, dy: Array, work: Sc
     contact_torque = 0.0
     dissipated = 0.0
     for b in range(p.bearing.shape[0]):
-        contact_torque += bearing_accelerations(b, y, p, dy, work)
-        lost = work.power[b]
-        dissipated += lost[BALL_SET] + lost[DRAG] + lost[SUPPORT] + (lost[SLIDING] + lost[IN_CONTACT])
+        torque, lost = bearing_accelerations(b, y, p, dy, work)
+        contact_torque += torque
+        dissipated += lost
     work.power[p.bearing.shape[0], BENDING] = add_rotor_rates(t, y, contact_torque, dissipated, p, dy)
 
 

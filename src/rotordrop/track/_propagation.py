@@ -166,7 +166,7 @@ def rates_by_owner(
     if owner == p.bearing.shape[0]:
         add_rotor_rates(t, y, torque, 0.0, p, out)
         return 0.0
-    driven: float = bearing_accelerations(owner, y, p, out, work)
+    driven, _lost = bearing_accelerations(owner, y, p, out, work)
     return driven
 
 
