@@ -6,9 +6,10 @@ import asyncio
 import contextlib
 import secrets
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable
-from functools import lru_cache
-from importlib import resources
+from collections.abc import AsyncIterator
+from functools import partial
+from importlib import import_module, resources
+from pathlib import Path
 from typing import Any, cast
 
 from starlette.applications import Starlette
@@ -18,59 +19,38 @@ from starlette.routing import Route
 
 from rotordrop.errors import RotordropError, UsageError
 from rotordrop.web import histories
-from rotordrop.web.desk import Desk, Handler, NotThereError, Operation, options_of, order_of, verb_of
+from rotordrop.web.desk import Desk, NotThereError, Operation, options_of, order_of, verb_of
 from rotordrop.web.guard import App, Guard
 from rotordrop.web.numbers import machine_of_numbers, schema_of_numbers
 from rotordrop.web.running import VERBS, Runner, published_run, state_of
 from rotordrop.web.workspace import ROLES, Job, Role, TooLargeError, Workspace, labelled, receive
 
-ASSETS = {
-    **dict.fromkeys(
-        (
-            "page.js",
-            "state.js",
-            "panels.js",
-            "cursor.js",
-            "sending.js",
-            "compare.js",
-            "rotor.js",
-            "server.js",
-            "plots.js",
-            "orbit.js",
-            "tables.js",
-            "figures.js",
-            "units.js",
-            "waterfall.js",
-            "uplot.js",
-        ),
-        "text/javascript",
-    ),
-    "page.css": "text/css",
-    "uplot.css": "text/css",
-    "icon.svg": "image/svg+xml",
-}
+ASSETS = {".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
+"""What of the folder of the page is sent, by its ending."""
+STATIC = resources.files("rotordrop.web") / "static"
 BETWEEN_LOOKS_S = 0.25
+"""Pause between two looks at what waits and what ended [s]; chosen, not measured."""
 TICKET_S = 120.0
+"""How long an address of a report waits to be opened [s]; chosen, not measured."""
 REPORT_HEADERS = {
     "content-security-policy": "sandbox allow-scripts allow-downloads allow-modals",
     "cross-origin-opener-policy": "unsafe-none",  # a sandboxed page must not claim an opener policy
 }
 
 
-async def _page(desk: Desk, request: Request) -> Response:
-    return Response(_asset("index.html"), media_type="text/html")
+async def page(desk: Desk, request: Request) -> Response:
+    """The page itself."""
+    return Response((STATIC / "index.html").read_bytes(), media_type="text/html")
 
 
-async def _static(desk: Desk, request: Request) -> Response:
+async def static(desk: Desk, request: Request) -> Response:
+    """A file that the page needs."""
+    known = {file.name: file for file in STATIC.iterdir()}
     name = request.path_params["name"]
-    if name not in ASSETS:
+    kind = ASSETS.get(Path(name).suffix)
+    if name not in known or kind is None:
         raise NotThereError("there is no such file")
-    return Response(_asset(name), media_type=ASSETS[name])
-
-
-@lru_cache(maxsize=32)
-def _asset(name: str) -> bytes:
-    return resources.files("rotordrop.web").joinpath("static", name).read_bytes()
+    return Response(known[name].read_bytes(), media_type=kind)
 
 
 def _told(job: Job) -> dict[str, Any]:
@@ -87,7 +67,8 @@ def _told(job: Job) -> dict[str, Any]:
     return {"id": job.number, **told, "states": states}
 
 
-async def _jobs(desk: Desk, request: Request) -> Response:
+async def jobs(desk: Desk, request: Request) -> Response:
+    """All jobs, and what room is left."""
     told = []
     for job in desk.space.jobs():
         with contextlib.suppress(FileNotFoundError):  # one that is removed meanwhile hides no other
@@ -95,22 +76,26 @@ async def _jobs(desk: Desk, request: Request) -> Response:
     return JSONResponse({"jobs": told, "used": desk.space.used(), "quota": desk.space.quota})
 
 
-async def _new_job(desk: Desk, request: Request) -> Response:
+async def new_job(desk: Desk, request: Request) -> Response:
+    """Make a job for a drop."""
     order = await order_of(request)
     job = desk.space.new_job(labelled(str(order.get("name", ""))), options_of(order.get("options", {})))
     return JSONResponse(_told(job), status_code=201)
 
 
-async def _job(desk: Desk, request: Request) -> Response:
+async def job(desk: Desk, request: Request) -> Response:
+    """One job."""
     return JSONResponse(_told(desk.job(request)))
 
 
-async def _remove(desk: Desk, request: Request) -> Response:
+async def remove(desk: Desk, request: Request) -> Response:
+    """Stop what a job computes and remove it."""
     await asyncio.to_thread(desk.runner.remove, desk.job(request))
     return Response(status_code=204)
 
 
-async def _upload(desk: Desk, request: Request) -> Response:
+async def upload(desk: Desk, request: Request) -> Response:
+    """Take a file of a job while it comes in."""
     job, role = desk.job(request), request.path_params["role"]
     if role not in ROLES:
         raise NotThereError(f"there is no {labelled(role)!r}; a file is one of {', '.join(ROLES)}")
@@ -122,7 +107,7 @@ async def _upload(desk: Desk, request: Request) -> Response:
     return JSONResponse(entry, status_code=201)
 
 
-async def _sent_file(desk: Desk, request: Request) -> Response:
+async def sent_file(desk: Desk, request: Request) -> Response:
     """A file of a job as it was sent or made, so that what the page computes can be computed elsewhere."""
     job, role = desk.job(request), request.path_params["role"]
     place = job.file(role) if role in ROLES else None
@@ -131,7 +116,7 @@ async def _sent_file(desk: Desk, request: Request) -> Response:
     return FileResponse(place, media_type="application/octet-stream")
 
 
-async def _set_options(desk: Desk, request: Request) -> Response:
+async def set_options(desk: Desk, request: Request) -> Response:
     """Change what is said of a recording beside its files; what was found without it is dropped."""
     job, given = desk.job(request), options_of(await order_of(request))
     await asyncio.to_thread(desk.runner.forget, job)
@@ -140,7 +125,8 @@ async def _set_options(desk: Desk, request: Request) -> Response:
     return JSONResponse(_told(job))
 
 
-async def _ask(desk: Desk, request: Request) -> Response:
+async def ask(desk: Desk, request: Request) -> Response:
+    """Ask for a computation."""
     job, verb = desk.job(request), verb_of(request)
     options = {**job.read()["options"], **options_of(await order_of(request))}
     if job.file("record") is None:
@@ -149,21 +135,24 @@ async def _ask(desk: Desk, request: Request) -> Response:
     return JSONResponse(_told(job), status_code=202)
 
 
-async def _cancel(desk: Desk, request: Request) -> Response:
+async def cancel(desk: Desk, request: Request) -> Response:
+    """Stop a computation."""
     job = desk.job(request)
     await asyncio.to_thread(desk.runner.cancel, job, verb_of(request))
     return JSONResponse(_told(job))
 
 
-async def _found_page(desk: Desk, request: Request) -> Response:
+async def found_page(desk: Desk, request: Request) -> Response:
+    """What the page draws of a result."""
     return FileResponse(desk.found(request) / "page.json", media_type="application/json")
 
 
-async def _found_document(desk: Desk, request: Request) -> Response:
+async def found_document(desk: Desk, request: Request) -> Response:
+    """The document of a result."""
     return FileResponse(desk.found(request) / "document.json", media_type="application/json")
 
 
-async def _ticket(desk: Desk, request: Request) -> Response:
+async def ticket(desk: Desk, request: Request) -> Response:
     """An address for the report that works once and soon: a page that is opened carries no token."""
     place = desk.found(request) / "report.html"
     if not place.is_file():
@@ -175,7 +164,7 @@ async def _ticket(desk: Desk, request: Request) -> Response:
     return JSONResponse({"address": f"/report/{ticket}"}, status_code=201)
 
 
-async def _report(desk: Desk, request: Request) -> Response:
+async def report(desk: Desk, request: Request) -> Response:
     """A report, as a page of nobody: it brings a policy of its own and may not speak with this server."""
     place, made = desk.tickets.pop(request.path_params["ticket"], (None, 0.0))
     if place is None or time.monotonic() - made > TICKET_S:
@@ -183,12 +172,12 @@ async def _report(desk: Desk, request: Request) -> Response:
     return FileResponse(place, media_type="text/html", headers=REPORT_HEADERS)
 
 
-async def _numbers(desk: Desk, request: Request) -> Response:
+async def numbers(desk: Desk, request: Request) -> Response:
     """The schema of the twelve numbers, from which the page makes its form."""
     return Response(await asyncio.to_thread(schema_of_numbers), media_type="application/json")
 
 
-async def _machine_of_numbers(desk: Desk, request: Request) -> Response:
+async def twelve_numbers(desk: Desk, request: Request) -> Response:
     """Make the machine file of a job of twelve numbers."""
     job, given = desk.job(request), await order_of(request)
     text = await asyncio.to_thread(machine_of_numbers, given)
@@ -201,53 +190,44 @@ async def _machine_of_numbers(desk: Desk, request: Request) -> Response:
     return JSONResponse(entry, status_code=201)
 
 
-async def _formats(desk: Desk, request: Request) -> Response:
+async def formats(desk: Desk, request: Request) -> Response:
     """Endings of the recordings that can be read."""
-
-    def known() -> tuple[str, ...]:
-        from rotordrop.record.readers import known_formats
-
-        return known_formats()
-
-    return JSONResponse({"formats": await asyncio.to_thread(known)})
+    readers = await asyncio.to_thread(import_module, "rotordrop.record.readers")
+    return JSONResponse({"formats": readers.known_formats()})
 
 
-async def _drops(desk: Desk, request: Request) -> Response:
+async def drops(desk: Desk, request: Request) -> Response:
     """Drops to compare with: estimates that are here, and entries of the log."""
-
-    def found() -> list[dict[str, Any]]:
-        from rotordrop.web.compared import compared_drops
-
-        return compared_drops(desk.space, desk.log)
-
-    return JSONResponse({"drops": await asyncio.to_thread(found), "log": desk.log is not None})
+    compared = await asyncio.to_thread(import_module, "rotordrop.web.compared")
+    found = await asyncio.to_thread(compared.compared_drops, desk.space, desk.log)
+    return JSONResponse({"drops": found, "log": desk.log is not None})
 
 
 _RESULT = "/api/jobs/{job}/{verb}"
 _WINDOW = ("column", "start", "end", "points")
 OPERATIONS = (
-    Operation("GET", "/", _page),
-    Operation("GET", "/static/{name}", _static),
-    Operation("GET", "/report/{ticket}", _report),
-    Operation("GET", "/api/jobs", _jobs),
-    Operation("POST", "/api/jobs", _new_job),
-    Operation("GET", "/api/jobs/{job}", _job),
-    Operation("DELETE", "/api/jobs/{job}", _remove),
-    Operation("POST", "/api/jobs/{job}/options", _set_options),
-    Operation("PUT", "/api/jobs/{job}/files/{role}", _upload, ("name",)),
-    Operation("GET", "/api/jobs/{job}/files/{role}", _sent_file),
-    Operation("GET", "/api/formats", _formats),
-    Operation("GET", "/api/drops", _drops),
-    Operation("GET", "/api/numbers", _numbers),
-    Operation("POST", "/api/jobs/{job}/numbers", _machine_of_numbers),
-    Operation("POST", _RESULT, _ask),
-    Operation("POST", f"{_RESULT}/cancel", _cancel),
-    Operation("GET", f"{_RESULT}/page", _found_page),
-    Operation("GET", f"{_RESULT}/document", _found_document),
+    Operation("GET", "/", page),
+    Operation("GET", "/static/{name}", static),
+    Operation("GET", "/report/{ticket}", report),
+    Operation("GET", "/api/jobs", jobs),
+    Operation("POST", "/api/jobs", new_job),
+    Operation("GET", "/api/jobs/{job}", job),
+    Operation("DELETE", "/api/jobs/{job}", remove),
+    Operation("POST", "/api/jobs/{job}/options", set_options),
+    Operation("PUT", "/api/jobs/{job}/files/{role}", upload, ("name",)),
+    Operation("GET", "/api/jobs/{job}/files/{role}", sent_file),
+    Operation("GET", "/api/formats", formats),
+    Operation("GET", "/api/drops", drops),
+    Operation("GET", "/api/numbers", numbers),
+    Operation("POST", "/api/jobs/{job}/numbers", twelve_numbers),
+    Operation("POST", _RESULT, ask),
+    Operation("POST", f"{_RESULT}/cancel", cancel),
+    Operation("GET", f"{_RESULT}/page", found_page),
+    Operation("GET", f"{_RESULT}/document", found_document),
     Operation("GET", f"{_RESULT}/window", histories.window, _WINDOW),
     Operation("GET", f"{_RESULT}/field", histories.field, ("plane", "part")),
     Operation("GET", f"{_RESULT}/csv", histories.csv, _WINDOW[:3]),
-    Operation("POST", f"{_RESULT}/report", _ticket),
+    Operation("POST", f"{_RESULT}/report", ticket),
 )
 
 
@@ -268,25 +248,33 @@ def make_app(space: Workspace, *, port: int, log: str | None = None) -> App:
         yield
         task.cancel()
 
-    routes = [Route(one.path, _answered(desk, one.handler), methods=[one.method]) for one in OPERATIONS]
-    return Guard(Starlette(routes=routes, lifespan=tended), port=port, token=space.token())
+    return Guard(
+        Starlette(
+            routes=[Route(one.path, partial(one.handler, desk), methods=[one.method]) for one in OPERATIONS],
+            exception_handlers=dict.fromkeys(STATUS, refused),
+            lifespan=tended,
+        ),
+        port=port,
+        token=space.token(),
+    )
 
 
-def _answered(desk: Desk, handler: Handler) -> Callable[[Request], Awaitable[Response]]:
-    """A handler whose refusals become sentences with a status."""
+STATUS: dict[Any, int] = {
+    NotThereError: 404,
+    TooLargeError: 413,
+    RotordropError: 400,
+    FileNotFoundError: 404,
+    ClientDisconnect: 400,
+}
+"""Refusals that become sentences, with their status."""
+_SENTENCES: dict[type, str] = {
+    FileNotFoundError: "it has been removed",  # by another tab meanwhile
+    ClientDisconnect: "the upload broke off",
+}
 
-    async def endpoint(request: Request) -> Response:
-        try:
-            return await handler(desk, request)
-        except NotThereError as error:
-            return PlainTextResponse(str(error), status_code=404)
-        except TooLargeError as error:
-            return PlainTextResponse(str(error), status_code=413, headers={"connection": "close"})
-        except RotordropError as error:
-            return PlainTextResponse(str(error), status_code=400)
-        except FileNotFoundError:  # a job that was removed by another tab meanwhile
-            return PlainTextResponse("it has been removed", status_code=404)
-        except ClientDisconnect:
-            return PlainTextResponse("the upload broke off", status_code=400)
 
-    return endpoint
+async def refused(request: Request, error: Exception) -> Response:
+    """A refusal as a sentence with a status."""
+    kind = next(kind for kind in type(error).__mro__ if kind in STATUS)
+    headers = {"connection": "close"} if kind is TooLargeError else None
+    return PlainTextResponse(_SENTENCES.get(kind, str(error)), status_code=STATUS[kind], headers=headers)

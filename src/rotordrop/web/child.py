@@ -90,13 +90,7 @@ def _limit(job: Job, verb: Verb) -> None:
 
 
 def machine_of(job: Job) -> Machine | None:
-    """Read the machine file of a job; None where none was sent.
-
-    Raises
-    ------
-    MachineFileError
-        When it cannot be used, or names a file that is not beside it.
-    """
+    """Read the machine file of a job; None where none was sent."""
     from rotordrop.machine import load_machine
 
     file = job.file("machine")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from rotordrop.ledger.book import LoggedDrop, drop_of_estimate, logged_drops
 from rotordrop.report.quantity import Quantity
 from rotordrop.web.drawn import quantity_json
 from rotordrop.web.running import result_folder
-from rotordrop.web.workspace import Job, Workspace
+from rotordrop.web.workspace import Workspace
 
 _KINDS = {"N": "force", "Pa": "pressure"}
 _LABELS = {load.field: load.label for load in LOADS}
@@ -24,31 +25,21 @@ def compared_drops(space: Workspace, log: str | None) -> list[dict[str, Any]]:
     """Every drop with an estimate, and every drop of the log whose recording is not among them.
 
     Their numbers are those of the log: a number without an interval is no evidence.
-
-    Raises
-    ------
-    OutputError
-        When the log cannot be read.
     """
     drops, seen = [], set()
     for job in space.jobs():
-        drop = _estimated(job)
-        if drop is not None:
-            seen.add(drop.sha256)
-            drops.append({**_told(drop), "job": job.number, "name": job.read()["name"]})
+        # one that is removed meanwhile, or of nothing that can be compared, hides no other
+        with suppress(FileNotFoundError, UsageError):
+            folder = result_folder(job, "estimate")
+            if folder is not None:
+                drop = _drop_of(folder)
+                seen.add(drop.sha256)
+                drops.append({**_told(drop), "job": job.number, "name": job.read()["name"]})
     for number, drop in logged_drops(log).items() if log is not None else ():
         if drop.sha256 not in seen:
             lines = f"from rotordrop.ledger.book import logged_drops\n\ndrop = logged_drops(LOG)[{number}]\n"
             drops.append({**_told(drop), "log": number, "name": drop.record, "python": lines})
     return drops
-
-
-def _estimated(job: Job) -> LoggedDrop | None:
-    try:
-        folder = result_folder(job, "estimate")
-        return None if folder is None else _drop_of(folder)
-    except (FileNotFoundError, UsageError):  # removed meanwhile, or of nothing that can be compared
-        return None
 
 
 @lru_cache(maxsize=512)

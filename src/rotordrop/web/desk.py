@@ -43,26 +43,14 @@ class Desk:
     tickets: dict[str, tuple[Path, float]] = field(default_factory=dict)
 
     def job(self, request: Request) -> Job:
-        """The job an address names.
-
-        Raises
-        ------
-        NotThereError
-            When there is none.
-        """
+        """The job an address names."""
         job = self.space.job(request.path_params["job"])
         if job is None:
             raise NotThereError("there is no such job; it may have been removed")
         return job
 
     def found(self, request: Request) -> Path:
-        """The folder of the result an address names.
-
-        Raises
-        ------
-        NotThereError
-            When there is none yet.
-        """
+        """The folder of the result an address names."""
         folder = result_folder(self.job(request), verb_of(request))
         if folder is None or not folder.is_dir():
             raise NotThereError("there is no result yet")
@@ -74,13 +62,7 @@ class NotThereError(RotordropError):
 
 
 def verb_of(request: Request) -> Verb:
-    """The computation an address names.
-
-    Raises
-    ------
-    NotThereError
-        When there is none of that name.
-    """
+    """The computation an address names."""
     verb = request.path_params["verb"]
     if verb not in VERBS:
         raise NotThereError(f"there is no {labelled(verb)!r}; there are {', '.join(VERBS)}")
@@ -88,13 +70,7 @@ def verb_of(request: Request) -> Verb:
 
 
 def number(request: Request, name: str, usual: float) -> float:
-    """A number that follows an address, or its usual value.
-
-    Raises
-    ------
-    UsageError
-        When it is none.
-    """
+    """A number that follows an address, or its usual value."""
     text = request.query_params.get(name)
     try:
         value = float(usual if text is None else text)
@@ -122,13 +98,7 @@ async def order_of(request: Request) -> dict[str, Any]:
 
 
 def options_of(given: Any) -> dict[str, Any]:
-    """Options of a computation.
-
-    Raises
-    ------
-    UsageError
-        When one is unknown or of the wrong kind.
-    """
+    """Options of a computation."""
     if not isinstance(given, dict):
         raise UsageError("expected options as a table in JSON")
     for name, value in given.items():

@@ -6,8 +6,8 @@ Cards, sentences, tables and panels are those of the report; the page derives no
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rotordrop._version import __version__
 from rotordrop.files import write_json
-from rotordrop.report.content import Card, Cell, ReportContent, Statement, Table
+from rotordrop.report.content import Figure
 from rotordrop.report.origin import Origin, UsedFile, command_line, now
 from rotordrop.report.quantity import Quantity, System, display_unit
 from rotordrop.web.python_lines import course_lines, estimate_lines, look_lines, waterfall_lines
@@ -24,7 +24,6 @@ from rotordrop.web.traces import write_traces
 from rotordrop.web.workspace import Job
 
 if TYPE_CHECKING:
-    from rotordrop.estimate.bearing_drop import BearingDrop
     from rotordrop.estimate.estimate import Estimate
     from rotordrop.evidence.look import Look
     from rotordrop.machine import Machine
@@ -73,15 +72,13 @@ def write_look(
             ],
             "timeline": [{"time": time, "words": words} for time, words in seen.timeline()],
             "impacts": [
-                {
-                    "place": impact.plane,
-                    "time": impact.time,
-                    "azimuth": impact.azimuth,
-                    "numbers": [
-                        quantity_json(Quantity(value=impact.depth, kind="length", digits=3)),
-                        quantity_json(Quantity(value=impact.approach, kind="velocity", digits=3)),
-                    ],
-                }
+                _impact(
+                    impact.plane,
+                    impact.time,
+                    impact.azimuth,
+                    Quantity(value=impact.depth, kind="length", digits=3),
+                    Quantity(value=impact.approach, kind="velocity", digits=3),
+                )
                 for impact in seen.impacts
             ],
             "impact_columns": ["beyond the air gap", "radial velocity before"],
@@ -103,12 +100,35 @@ def write_estimate(
 ) -> None:
     """Write what an estimate says: histories with bands, its document, its report, and its page as JSON."""
     from rotordrop.estimate.document import estimate_document
+    from rotordrop.report.drop_sections import force_panel, stress_panel
     from rotordrop.report.estimate_page import estimate_page
+    from rotordrop.report.machine_sections import weight_shares
     from rotordrop.report.page import write_page
     from rotordrop.report.rotor_drawing import rotor_outline
 
     content = estimate_page(estimate, _origin(job, options), since)
-    names, grid, columns = _histories(estimate)
+    names, grid, columns = histories_of(estimate)
+    loads = weight_shares(estimate.machine)
+    places = []
+    for bearing, own in zip(estimate.bearings, names, strict=True):
+        gap, peaks = bearing.air_gap, {"force": bearing.peak_force, "stress": bearing.peak_stress}
+        shown = {
+            kind: {"time": one.time, "value": one.value, "interval_90": one.interval_90}
+            for kind, one in peaks.items()
+        }
+        ends = None if gap is None else [gap.lower, gap.upper]
+        places.append({"name": bearing.name, "gap": ends, **own, "peaks": shown})
+    impacts = [
+        _impact(
+            bearing.name,
+            impact.peak_time,
+            impact.azimuth,
+            Quantity.of(impact.peak_force, "force"),
+            Quantity.of(impact.impulse, "impulse", digits=3),
+        )
+        for bearing in estimate.bearings
+        for impact in bearing.impacts
+    ]
     write_traces(made, "drop", grid, columns)
     write_page(content, made / "report.html")
     write_json(made / "document.json", estimate_document(estimate))
@@ -120,20 +140,16 @@ def write_estimate(
             "rotor": rotor_outline(estimate.machine),
             "zero": estimate.drop_instant.value,
             "speed": estimate.speed,
-            "places": [_place(bearing, names[b]) for b, bearing in enumerate(estimate.bearings)],
-            "panels": _panels(estimate),
-            "impacts": _impacts(estimate.bearings),
+            "places": places,
+            "panels": {
+                "force": [_panel(force_panel(bearing, loads)) for bearing in estimate.bearings],
+                "stress": [_panel(stress_panel(bearing)) for bearing in estimate.bearings],
+            },
+            "impacts": sorted(impacts, key=lambda impact: impact["time"]),
             "impact_columns": ["peak force", "impulse"],
             "python": estimate_lines(job.read()["files"], options, [b.name for b in estimate.bearings]),
         },
     )
-
-
-_OUTSIDE: dict[str, float] = {"left": math.nan, "right": math.nan}
-
-
-def _finite(values: Array) -> list[float | None]:
-    return [float(value) if math.isfinite(value) else None for value in values]
 
 
 def field_name(plane: int, part: str) -> str:
@@ -210,7 +226,10 @@ def _falls(found: CoastDownAnalysis, job: Job, made: Path, options: Mapping[str,
                 "planes": list(line.forward),
                 "seen": f"{line.first_seen:.0f} to {line.last_seen:.0f} s",
                 "python": course_lines(line.label),
-                "frames": _finite(np.interp(falls[0].time, line.path.time, line.path.frequency, **_OUTSIDE)),
+                "frames": [
+                    float(value) if math.isfinite(value) else None
+                    for value in _on(falls[0].time, line.path.time, line.path.frequency)
+                ],
                 "path": {
                     "time": line.path.time[:: max(len(line.path.time) // MOST_PLACES, 1)].tolist(),
                     "frequency": line.path.frequency[:: max(len(line.path.time) // MOST_PLACES, 1)].tolist(),
@@ -256,7 +275,7 @@ def _units() -> dict[str, Any]:
     return {kind: {system: display_unit(kind, system) for system in SYSTEMS} for kind in SHOWN_KINDS}
 
 
-def _histories(estimate: Estimate) -> tuple[list[dict[str, Any]], Array, dict[str, Array]]:
+def histories_of(estimate: Estimate) -> tuple[list[dict[str, Any]], Array, dict[str, Array]]:
     """Every history of an estimate on the clock of its force, and which column of a bearing is what.
 
     Where a history has a clock of its own it is read off between its samples by straight lines.
@@ -298,32 +317,6 @@ def _on(grid: Array, time: Array, values: Array) -> Array:
     return np.asarray(np.interp(grid, time, values, left=math.nan, right=math.nan))
 
 
-def _place(bearing: BearingDrop, names: Mapping[str, Any]) -> dict[str, Any]:
-    gap = bearing.air_gap
-    peak = {"force": bearing.peak_force, "stress": bearing.peak_stress}
-    return {
-        "name": bearing.name,
-        "gap": None if gap is None else [gap.lower, gap.upper],
-        **names,
-        "peaks": {
-            kind: {"time": one.time, "value": one.value, "interval_90": one.interval_90}
-            for kind, one in peak.items()
-        },
-    }
-
-
-def _panels(estimate: Estimate) -> dict[str, list[dict[str, Any]]]:
-    """Titles, levels and origins of force and stress, from the panels that the report draws."""
-    from rotordrop.report.drop_sections import force_panel, stress_panel
-    from rotordrop.report.machine_sections import weight_shares
-
-    loads = weight_shares(estimate.machine)
-    return {
-        "force": [_panel(force_panel(bearing, loads)) for bearing in estimate.bearings],
-        "stress": [_panel(stress_panel(bearing)) for bearing in estimate.bearings],
-    }
-
-
 def _panel(panel: Panel) -> dict[str, Any]:
     return {
         "title": panel.title,
@@ -334,71 +327,20 @@ def _panel(panel: Panel) -> dict[str, Any]:
     }
 
 
-def _impacts(bearings: Sequence[BearingDrop]) -> list[dict[str, Any]]:
-    found = [
-        {
-            "place": bearing.name,
-            "time": impact.peak_time,
-            "azimuth": impact.azimuth,
-            "numbers": [
-                quantity_json(Quantity.of(impact.peak_force, "force")),
-                quantity_json(Quantity.of(impact.impulse, "impulse", digits=3)),
-            ],
-        }
-        for bearing in bearings
-        for impact in bearing.impacts
-    ]
-    return sorted(found, key=lambda impact: float(str(impact["time"])))
+def _impact(place: str, time: float, azimuth: float, *numbers: Quantity) -> dict[str, Any]:
+    shown = [quantity_json(one) for one in numbers]
+    return {"place": place, "time": time, "azimuth": azimuth, "numbers": shown}
 
 
-def content_json(content: ReportContent) -> dict[str, Any]:
-    """A report without its pictures, its numbers written in both systems of units."""
-    return {
-        "title": content.title,
-        "subtitle": content.subtitle,
-        "simulated": content.simulated,
-        "facts": [list(fact) for fact in content.facts],
-        "verdict": [_statement(statement) for statement in content.verdict],
-        "cards": [_card(card) for card in content.cards],
-        "summary": [_table(table) for table in content.summary],
-        "sections": [
-            {
-                "heading": section.heading,
-                "text": list(section.text),
-                "statements": [_statement(statement) for statement in section.statements],
-                "tables": [_table(table) for table in section.tables],
-            }
-            for section in content.sections
-            if section.text or section.statements or section.tables
-        ],
-    }
-
-
-def _statement(statement: Statement) -> dict[str, str]:
-    return {"text": statement.text, "level": statement.level}
-
-
-def _card(card: Card) -> dict[str, Any]:
-    return {
-        "title": card.title,
-        "figures": [
-            {"label": figure.label, "note": figure.note, "value": quantity_json(figure.value)}
-            for figure in card.figures
-        ],
-    }
-
-
-def _table(table: Table) -> dict[str, Any]:
-    return {
-        "caption": table.caption,
-        "note": table.note,
-        "columns": list(table.columns),
-        "rows": [[_cell(cell) for cell in row] for row in table.rows],
-    }
-
-
-def _cell(cell: Cell) -> Any:
-    return quantity_json(cell) if isinstance(cell, Quantity) else cell
+def content_json(part: Any) -> Any:
+    """A report or a part of it without its pictures, its numbers written in both systems of units."""
+    if isinstance(part, Quantity):
+        return quantity_json(part)
+    if isinstance(part, tuple):
+        return [content_json(one) for one in part if not isinstance(one, Figure)]
+    if not is_dataclass(part):
+        return part
+    return {item.name: content_json(getattr(part, item.name)) for item in fields(part)}
 
 
 def quantity_json(quantity: Quantity) -> dict[str, Any]:

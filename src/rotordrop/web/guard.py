@@ -10,6 +10,8 @@ import hmac
 from collections.abc import Awaitable, Callable, MutableMapping
 from typing import Any
 
+from starlette.responses import PlainTextResponse
+
 Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
 Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
@@ -36,14 +38,7 @@ HEADERS = {
 class Guard:
     """Lets requests of the own page through to an application.
 
-    Parameters
-    ----------
-    app : application
-        What answers.
-    port : int
-        Where the server listens; part of the only host names that are its own.
-    token : str
-        Secret that every request below ``/api/`` carries.
+    The port is part of the only host names that are its own; every request below ``/api/`` carries the token.
     """
 
     def __init__(self, app: App, *, port: int, token: str) -> None:
@@ -58,12 +53,21 @@ class Guard:
             return
         if scope["type"] != "http":
             return  # no web sockets: the server closes them
-        headed = _with_headers(send)
+
+        async def headed(message: MutableMapping[str, Any]) -> None:
+            if message["type"] == "http.response.start":
+                own = {key.lower() for key, _ in message.get("headers", ())}
+                added = [(key, value) for key, value in HEADERS.items() if key not in own]
+                message = {**message, "headers": [*message.get("headers", ()), *added]}
+            await send(message)
+
         refusal = self.refusal(scope)
         if refusal is None:
             await self.app(scope, receive, headed)
-        else:
-            await _refuse(headed, *refusal)
+            return
+        status, words = refusal
+        answer = PlainTextResponse(words, status_code=status, headers={"connection": "close"})
+        await answer(scope, receive, headed)
 
     def refusal(self, scope: Scope) -> tuple[int, str] | None:
         """Why a request is refused: status and sentence; None for one that may pass."""
@@ -93,25 +97,3 @@ def _only(scope: Scope, name: bytes) -> bytes | None:
     """Value of a header that is there once; None where it is missing or there twice."""
     values = _all(scope, name)
     return values[0] if len(values) == 1 else None
-
-
-def _with_headers(send: Send) -> Send:
-    async def headed(message: MutableMapping[str, Any]) -> None:
-        if message["type"] == "http.response.start":
-            own = {key.lower() for key, _ in message.get("headers", ())}
-            added = [(key, value) for key, value in HEADERS.items() if key not in own]
-            message = {**message, "headers": [*message.get("headers", ()), *added]}
-        await send(message)
-
-    return headed
-
-
-async def _refuse(send: Send, status: int, words: str) -> None:
-    body = words.encode()
-    headers = [
-        (b"content-type", b"text/plain; charset=utf-8"),
-        (b"content-length", str(len(body)).encode()),
-        (b"connection", b"close"),
-    ]
-    await send({"type": "http.response.start", "status": status, "headers": headers})
-    await send({"type": "http.response.body", "body": body})

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from rotordrop.web.traces import Traces
 
 CSV_ROWS = 20_000
+"""Rows of a table that are made at once, before others get their turn; chosen, not measured."""
 
 
 async def field(desk: Desk, request: Request) -> Response:
@@ -42,26 +43,25 @@ async def field(desk: Desk, request: Request) -> Response:
 async def window(desk: Desk, request: Request) -> Response:
     """Few samples that show a window of histories, in single precision."""
     folder = desk.found(request)
-    traces, rows, start, end = await asyncio.to_thread(_asked_window, folder, request)
-    return Response(
-        await asyncio.to_thread(_samples, traces, rows, start, end, request),
-        media_type="application/octet-stream",
-    )
 
+    def shown() -> bytes:
+        from rotordrop.web.traces import FEWEST_POINTS, MOST_POINTS, sent
 
-def _samples(traces: Traces, rows: list[int], start: float, end: float, request: Request) -> bytes:
-    from rotordrop.web.traces import FEWEST_POINTS, MOST_POINTS, sent
+        traces, rows, start, end = _asked_window(folder, request)
+        points = int(number(request, "points", MOST_POINTS))
+        if not FEWEST_POINTS <= points <= MOST_POINTS:
+            raise UsageError(f"{points} points asked for; {FEWEST_POINTS} to {MOST_POINTS} are sent")
+        return sent(traces, rows, traces.window(rows, start, end, points))
 
-    points = int(number(request, "points", MOST_POINTS))
-    if not FEWEST_POINTS <= points <= MOST_POINTS:
-        raise UsageError(f"{points} points asked for; {FEWEST_POINTS} to {MOST_POINTS} are sent")
-    return sent(traces, rows, traces.window(rows, start, end, points))
+    return Response(await asyncio.to_thread(shown), media_type="application/octet-stream")
 
 
 def _asked_window(folder: Path, request: Request) -> tuple[Traces, list[int], float, float]:
     from rotordrop.web.traces import open_traces
 
-    told = _traces_of(folder)
+    told = _page_of(folder).get("traces")
+    if told is None:
+        raise NotThereError("this result has no histories")
     traces = open_traces(folder, told["name"], tuple(told["columns"]))
     rows = traces.chosen(tuple(request.query_params.getlist("column")))
     start, end = number(request, "start", told["start"]), number(request, "end", told["end"])
@@ -70,13 +70,6 @@ def _asked_window(folder: Path, request: Request) -> tuple[Traces, list[int], fl
             f"the window from {start:g} s to {end:g} s holds nothing; give an end after its start"
         )
     return traces, rows, start, end
-
-
-def _traces_of(folder: Path) -> dict[str, Any]:
-    found = _page_of(folder)
-    if "traces" not in found:
-        raise NotThereError("this result has no histories")
-    return dict(found["traces"])
 
 
 @lru_cache(maxsize=64)
@@ -88,22 +81,19 @@ def _page_of(folder: Path) -> dict[str, Any]:
 
 async def csv(desk: Desk, request: Request) -> Response:
     """Every sample of a window as a table, in SI units."""
-    traces, rows, start, end = await asyncio.to_thread(_asked_window, desk.found(request), request)
-    headers = {"content-disposition": 'attachment; filename="rotordrop.csv"'}
-    return StreamingResponse(
-        _table(traces, rows, start, end), media_type="text/csv; charset=utf-8", headers=headers
-    )
-
-
-async def _table(traces: Traces, rows: list[int], start: float, end: float) -> AsyncIterator[str]:
     import numpy as np
 
-    first = int(np.searchsorted(traces.time, start))
-    last = int(np.searchsorted(traces.time, end, side="right"))
-    yield ",".join(["time [s]", *(f"{traces.columns[row]} [SI]" for row in rows)]) + "\n"
-    for begin in range(first, last, CSV_ROWS):
-        stop = min(begin + CSV_ROWS, last)
-        table = [[repr(float(time)) for time in traces.time[begin:stop]]]
-        table += [[f"{value:.9g}" for value in traces.values[row, begin:stop].tolist()] for row in rows]
-        yield "".join(",".join(line) + "\n" for line in zip(*table, strict=True))
-        await asyncio.sleep(0)
+    traces, rows, start, end = await asyncio.to_thread(_asked_window, desk.found(request), request)
+    first, last = np.searchsorted(traces.time, start), np.searchsorted(traces.time, end, side="right")
+
+    async def table() -> AsyncIterator[str]:
+        yield ",".join(["time [s]", *(f"{traces.columns[row]} [SI]" for row in rows)]) + "\n"
+        for begin in range(int(first), int(last), CSV_ROWS):
+            stop = min(begin + CSV_ROWS, int(last))
+            columns = [[repr(float(time)) for time in traces.time[begin:stop]]]
+            columns += [[f"{value:.9g}" for value in traces.values[row, begin:stop].tolist()] for row in rows]
+            yield "".join(",".join(line) + "\n" for line in zip(*columns, strict=True))
+            await asyncio.sleep(0)
+
+    headers = {"content-disposition": 'attachment; filename="rotordrop.csv"'}
+    return StreamingResponse(table(), media_type="text/csv; charset=utf-8", headers=headers)

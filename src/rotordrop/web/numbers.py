@@ -13,6 +13,7 @@ from rotordrop.errors import UsageError
 from rotordrop.web.workspace import LONGEST_OPTION, labelled
 
 PATIENCE_S = 60.0
+"""How long the commands may take [s]; chosen, not measured."""
 _PROGRAM = (
     "import json, sys; order = json.loads(sys.argv[1]); sys.path[:] = order['sys_path']; "
     "sys.argv[:] = ['rotordrop', *order['arguments']]; from rotordrop.__main__ import main; main()"
@@ -26,18 +27,7 @@ def schema_of_numbers() -> str:
 
 
 def machine_of_numbers(given: dict[str, Any]) -> str:
-    """The text of a machine file of twelve numbers.
-
-    Parameters
-    ----------
-    given : dict
-        Texts with units by name, as the schema says.
-
-    Raises
-    ------
-    UsageError
-        When one is missing, unknown or no text, or they make no machine.
-    """
+    """The text of a machine file of twelve numbers: texts with units by name, as the schema says."""
     schema = json.loads(schema_of_numbers())
     for name, value in given.items():
         if name not in schema["properties"]:

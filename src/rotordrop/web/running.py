@@ -39,6 +39,7 @@ _PROGRAM = (
     "from rotordrop.web.child import main; main(order)"
 )
 _PATIENCE_S = 5.0
+"""How long a killed child may take to end [s]; chosen, not measured."""
 
 
 def state_file(job: Job, verb: Verb) -> Path:
@@ -116,22 +117,19 @@ class Runner:
                 told = state_of(job, verb)
                 if told is not None and told["state"] == "waiting":
                     waiting.append((told["asked"], (number, verb), told))
-                elif told is not None and told["state"] == "running" and self._still_running(job, verb):
+                elif (
+                    told is not None
+                    and told["state"] == "running"
+                    and ((number, verb) in self._children or _locked(job, verb))
+                ):
                     busy[verb] += 1
                 else:
+                    _settle(job, verb)
                     del self._open[number, verb]
             for _, (number, verb), told in sorted(waiting, key=lambda entry: entry[0]):
                 if busy[verb] < AT_ONCE[verb]:
                     busy[verb] += 1
                     self._begin(self._open[number, verb], verb, told)
-
-    def _still_running(self, job: Job, verb: Verb) -> bool:
-        if (job.number, verb) in self._children or _locked(job, verb):
-            return True
-        told = state_of(job, verb)  # the child may have had its last word since
-        if told is not None and told["state"] == "running":
-            _settle(job, verb, told)
-        return False
 
     def _begin(self, job: Job, verb: Verb, told: dict[str, Any]) -> None:
         lock = os.open(_lock_file(job, verb), os.O_RDWR | os.O_CREAT, 0o600)
@@ -161,18 +159,15 @@ class Runner:
     def cancel(self, job: Job, verb: Verb) -> None:
         """Stop a computation that waits or runs, with everything it has begun."""
         with self._one:
-            self._cancel(job, verb)
-
-    def _cancel(self, job: Job, verb: Verb) -> None:
-        told = state_of(job, verb)
-        if told is None or told["state"] not in ("waiting", "running"):
-            return
-        if told["state"] == "running" and not self._stop(job, verb):
-            return
-        latest = state_of(job, verb) or told
-        if latest["state"] in ("waiting", "running"):
-            write_json(state_file(job, verb), {**latest, "state": "cancelled", "ended": time.time()})
-        clear(job, verb)
+            told = state_of(job, verb)
+            if told is None or told["state"] not in ("waiting", "running"):
+                return
+            if told["state"] == "running" and not self._stop(job, verb):
+                return
+            latest = state_of(job, verb) or told
+            if latest["state"] in ("waiting", "running"):
+                write_json(state_file(job, verb), {**latest, "state": "cancelled", "ended": time.time()})
+            clear(job, verb)
 
     def _stop(self, job: Job, verb: Verb) -> bool:
         """Kill a child whose lock is held, and wait for it; whether it ended."""
@@ -180,7 +175,11 @@ class Runner:
         until = time.monotonic() + _PATIENCE_S
         while (child is not None and child.poll() is None) or _locked(job, verb):
             with suppress(OSError, ValueError):
-                _kill(child.pid if child else int((job.path / f"{verb}.process").read_text(encoding="ascii")))
+                number = child.pid if child else (job.path / f"{verb}.process").read_text(encoding="ascii")
+                if os.name == "posix":
+                    os.killpg(int(number), signal.SIGKILL)
+                else:
+                    os.kill(int(number), signal.SIGTERM)
             if time.monotonic() > until:
                 return False
             time.sleep(0.02)
@@ -190,7 +189,7 @@ class Runner:
         """Stop what a job computes and drop what it found: it was of other files."""
         with self._one:
             for verb in VERBS:
-                self._cancel(job, verb)
+                self.cancel(job, verb)
                 self._open.pop((job.number, verb), None)
                 (job.path / f"{verb}.result.json").unlink(missing_ok=True)
                 state_file(job, verb).unlink(missing_ok=True)
@@ -200,29 +199,23 @@ class Runner:
         """Stop what a job computes and remove it."""
         with self._one:
             for verb in VERBS:
-                self._cancel(job, verb)
+                self.cancel(job, verb)
                 self._open.pop((job.number, verb), None)
             job.remove()
 
 
-def _kill(process: int) -> None:
-    if os.name == "posix":
-        os.killpg(process, signal.SIGKILL)
-    else:
-        os.kill(process, signal.SIGTERM)
-
-
-def _settle(job: Job, verb: Verb, told: dict[str, Any]) -> None:
+def _settle(job: Job, verb: Verb) -> None:
     """A child is gone without its last word: what it published counts, anything else is a failure."""
-    ended: dict[str, Any] = {"ended": time.time()}
-    if published_run(job, verb) == told["run"]:
-        ended |= {"state": "done", "fraction": 1.0}
-    else:
-        ended |= {
+    told = state_of(job, verb)
+    if told is None or told["state"] != "running":
+        return
+    ended: dict[str, Any] = {"state": "done", "fraction": 1.0}
+    if published_run(job, verb) != told["run"]:
+        ended = {
             "state": "failed",
             "error": "the computation was ended from outside before it was done; start it again",
         }
-    write_json(state_file(job, verb), {**told, **ended})
+    write_json(state_file(job, verb), {**told, **ended, "ended": time.time()})
     clear(job, verb)
 
 

@@ -13,21 +13,8 @@ from rotordrop.web.workspace import Workspace
 def serve(folder: Path, port: int, announce: Callable[[str], None], log: str | None = None) -> None:
     """Serve the page until it is interrupted; computations that run go on without it.
 
-    Parameters
-    ----------
-    folder : Path
-        Where jobs are kept.
-    port : int
-        Where to listen, on the loopback address only; 0 takes a free one.
-    announce : callable
-        Told the address with its token once the server listens.
-    log : str, optional
-        Log of drops to compare with.
-
-    Raises
-    ------
-    UsageError
-        When the port is taken or the extra is not installed.
+    It listens on the loopback address only, port 0 takes a free one. ``announce`` hears the address with its
+    token once the server listens.
     """
     try:
         import uvicorn
@@ -50,13 +37,7 @@ def serve(folder: Path, port: int, announce: Callable[[str], None], log: str | N
 
 
 def listening_at(port: int) -> socket.socket:
-    """A socket that listens on this computer alone.
-
-    Raises
-    ------
-    UsageError
-        When the port is taken.
-    """
+    """A socket that listens on this computer alone."""
     listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:

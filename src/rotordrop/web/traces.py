@@ -28,7 +28,9 @@ FACTOR = 8
 
 MOST_POINTS = 4000
 FEWEST_POINTS = 100
+"""Samples of a window that are sent at once, at most and at least; chosen, not measured."""
 MOST_COLUMNS = 12
+"""Columns that are sent at once; more than a figure shows."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,13 +47,7 @@ class Traces:
     """Index of the smallest and of the largest sample of every block, level after level, shape (C, B, 2)."""
 
     def chosen(self, names: tuple[str, ...]) -> list[int]:
-        """Rows of the columns of these names.
-
-        Raises
-        ------
-        UsageError
-            When there is no such column, or more are asked for than a figure shows.
-        """
+        """Rows of the columns of these names."""
         if not 1 <= len(names) <= MOST_COLUMNS:
             raise UsageError(f"{len(names)} columns asked for; 1 to {MOST_COLUMNS} are sent at once")
         missing = [name for name in names if name not in self.columns]
@@ -60,40 +56,26 @@ class Traces:
         return [self.columns.index(name) for name in names]
 
     def window(self, rows: list[int], start: float, end: float, points: int = MOST_POINTS) -> Indices:
-        """Samples that show a window: all, or the extremes of as many stretches as there is room for.
+        """Samples that show a window [s]: all, or the extremes of as many stretches as there is room for.
 
-        The sample before the window and the one after it belong to it, so that lines reach its edges.
-
-        Parameters
-        ----------
-        rows : list of int
-            Columns whose extremes count.
-        start, end : float
-            Window [s].
-        points : int
-            Samples that may be chosen.
+        The extremes of the given columns count, up to ``points`` samples may be chosen. The sample before
+        the window and the one after it belong to it, so that lines reach its edges.
         """
         first = max(int(np.searchsorted(self.time, start)) - 1, 0)
         last = min(int(np.searchsorted(self.time, end, side="right")) + 1, len(self.time))
         if last - first <= points:
             return np.arange(first, last, dtype=np.int64)
         stretches = max((points - 2 - 4 * len(rows)) // (2 * len(rows)), 1)
-        size, offset = self._level((last - first) / stretches)
+        size, offset = 1, 0
+        for level_size, level_offset, _ in levels_of(len(self.time)):
+            if level_size <= (last - first) / stretches:  # the coarsest level no wider than a stretch
+                size, offset = level_size, level_offset
         if size == 1:
             edges = np.linspace(first, last, stretches + 1).astype(np.int64)
             found = [first + extremes(self._read(row, slice(first, last)), edges - first) for row in rows]
         else:
             found = [self._from_level(row, first, last, size, offset, stretches) for row in rows]
         return np.unique(np.concatenate([[first, last - 1], *(places.ravel() for places in found)]))
-
-    def _level(self, width: float) -> tuple[int, int]:
-        """Coarsest level with blocks no wider than a stretch: samples in a block, and where it begins."""
-        size, offset = 1, 0
-        for level_size, level_offset, _ in levels_of(len(self.time)):
-            if level_size > width:
-                break
-            size, offset = level_size, level_offset
-        return size, offset
 
     def _from_level(self, row: int, first: int, last: int, size: int, offset: int, stretches: int) -> Indices:
         """Extremes of the stretches by the blocks inside the window; its ragged ends sample by sample.
@@ -139,18 +121,17 @@ def levels_of(count: int) -> list[tuple[int, int, int]]:
 def write_traces(folder: Path, name: str, time: Array, columns: Mapping[str, Array]) -> None:
     """Write histories over one clock with their levels, as plain array files."""
     values = np.stack([np.asarray(column, dtype=np.float32) for column in columns.values()])
-    levels = np.stack([_extremes_of_blocks(row) for row in values])
+    levels = np.stack([extremes_of_blocks(row) for row in values])
     for part, array in (("time", np.asarray(time, dtype=np.float64)), ("values", values), ("levels", levels)):
-        head = (
-            io.BytesIO()
-        )  # numpy's own way into a file drops the error of a full disk, and what did not fit
+        head = io.BytesIO()  # numpy's own way into a file drops the error of a full disk
         np.lib.format.write_array_header_1_0(head, np.lib.format.header_data_from_array_1_0(array))
         with atomic_path(folder / f"{name}.{part}.npy") as place, place.open("wb") as stream:
             stream.write(head.getbuffer())
             stream.write(np.ascontiguousarray(array).reshape(-1).view(np.uint8).data)
 
 
-def _extremes_of_blocks(values: NDArray[np.float32]) -> NDArray[np.int32]:
+def extremes_of_blocks(values: NDArray[np.float32]) -> NDArray[np.int32]:
+    """Index of the smallest and the largest value of every block of all levels (N,), shape (B, 2)."""
     low = np.where(np.isnan(values), np.inf, values)
     high = np.where(np.isnan(values), -np.inf, values)
     place_low = place_high = np.arange(len(values), dtype=np.int32)

@@ -37,10 +37,10 @@ LARGEST: dict[str, int] = {
 }
 """Bytes of one upload."""
 
-MOST_JOBS = 500
-MOST_BESIDE = 8
-LONGEST_NAME = 120
-LONGEST_OPTION = 200
+MOST_JOBS, MOST_BESIDE = 500, 8
+"""Jobs in the folder, and files of a job that another one names; chosen, not measured."""
+LONGEST_NAME, LONGEST_OPTION = 120, 200
+"""Characters of a name that are kept, and of an option that are taken; chosen, not measured."""
 
 _JOB = re.compile(r"[0-9a-f]{16}")
 _SUFFIX = re.compile(r"(?:\.[a-z0-9]{1,8})?\.[a-z0-9]{1,8}")
@@ -73,11 +73,6 @@ class Workspace:
         """Make the folder, for nobody else to read, and remove what a killed server left half written.
 
         A folder that held other things before keeps its permissions; jobs and token are closed all the same.
-
-        Raises
-        ------
-        OutputError
-            When there can be no such folder.
         """
         try:
             fresh = not self.path.exists() or not any(self.path.iterdir())
@@ -113,13 +108,7 @@ class Workspace:
         return made
 
     def new_job(self, name: str, options: dict[str, str]) -> Job:
-        """Make a job for a drop.
-
-        Raises
-        ------
-        UsageError
-            When there are too many.
-        """
+        """Make a job for a drop."""
         if len(self.jobs()) >= MOST_JOBS:
             raise UsageError(f"there are {MOST_JOBS} jobs; remove some before adding another")
         job = Job(self.jobs_folder / secrets.token_hex(8))
@@ -195,25 +184,7 @@ async def receive(
 ) -> dict[str, Any]:
     """Write an upload, counted while it comes in; it stands there whole or not at all.
 
-    Parameters
-    ----------
-    space, job : Workspace, Job
-        Where it belongs.
-    role : str
-        What it is for.
-    name : str
-        Name at the client: a label.
-    declared : int or None
-        Bytes the client says will come.
-    body : async iterable of bytes
-        The upload.
-
-    Raises
-    ------
-    TooLargeError
-        When it is larger than allowed, or the folder is full.
-    UsageError
-        When the name cannot be one.
+    The name at the client is a label; ``declared`` are the bytes that it says will come.
     """
     label, stored = labelled(name), stored_as(role, name)
     key = role if role != "beside" else f"beside {stored}"
@@ -228,7 +199,10 @@ async def receive(
         others = sum(length for one, length in room.coming.items() if one is not mine)
         limit = min(LARGEST[role], space.quota - room.kept - others)
         if length > limit:
-            raise _too_large(label, limit)
+            raise TooLargeError(
+                f"{label} is larger than the {max(limit, 0) / 1e6:.0f} MB that may still be sent; remove "
+                "jobs that are no longer needed, or cut the record to the drop"
+            )
         room.coming[mine] = max(length, declared or 0)
 
     try:
@@ -265,13 +239,6 @@ def _refuse_clash(job: Job, key: str, label: str, stored: str) -> None:
             )
 
 
-def _too_large(label: str, limit: int) -> TooLargeError:
-    return TooLargeError(
-        f"{label} is larger than the {max(limit, 0) / 1e6:.0f} MB that may still be sent; remove jobs that "
-        "are no longer needed, or cut the record to the drop"
-    )
-
-
 def beside(job: Job) -> list[str]:
     """Names of the files that others name."""
     return [entry["stored"] for role, entry in job.read()["files"].items() if role.startswith("beside ")]
@@ -284,13 +251,7 @@ def labelled(name: str) -> str:
 
 
 def stored_as(role: Role, name: str) -> str:
-    """Name under which an upload lies.
-
-    Raises
-    ------
-    UsageError
-        When the name has no suffix that can be one, or that of a file beside is not a plain one.
-    """
+    """Name under which an upload lies."""
     if role in ("machine", "profile"):
         return f"{role}.toml"
     if role == "beside" and name.lower().endswith(".dat"):

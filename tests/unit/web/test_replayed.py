@@ -44,10 +44,10 @@ def test_a_replayed_drop_is_drawn_with_its_residual(drop: Estimate, tmp_path: Pa
 def test_a_place_without_a_band_has_none(drop: Estimate, tmp_path: Path) -> None:
     from dataclasses import replace
 
-    from rotordrop.web.drawn import _histories
+    from rotordrop.web.drawn import histories_of
 
     bare = replace(drop, bearings=tuple(replace(one, force_band=None) for one in drop.bearings))
-    names, _, columns = _histories(bare)
+    names, _, columns = histories_of(bare)
     assert names[0]["force"] == ["force 0"]
     assert "force lower 0" not in columns
     assert pytest.approx(bare.bearings[0].force.values) == columns["force 0"]

@@ -44,9 +44,9 @@ def test_a_spike_of_one_sample_is_seen_in_every_window_that_holds_it(spike, firs
     noise[spike] = sign * 40.0
     clock = np.arange(len(noise)) / RATE
     values = np.stack([noise, np.zeros_like(noise)]).astype(np.float32)
-    from rotordrop.web.traces import _extremes_of_blocks
+    from rotordrop.web.traces import extremes_of_blocks
 
-    levels = np.stack([_extremes_of_blocks(row) for row in values])
+    levels = np.stack([extremes_of_blocks(row) for row in values])
     shown = Traces(columns=("a", "b"), time=clock, values=values, levels=levels)
     last = min(first + width, len(noise) - 1)
     chosen = shown.window([0, 1], clock[first], clock[last], points)
