@@ -16,7 +16,7 @@ from rotordrop_bench.cli.app import run
 from rotordrop_bench.departures import departures
 from rotordrop_bench.make import chosen_drops
 from rotordrop_bench.rotors import ROTORS, bench_rotor
-from rotordrop_bench.true_structure import KINDS, violated_kinds
+from rotordrop_bench.true_values import KINDS, violated_kinds
 
 MADE = ("drop_004", "drop_034")
 

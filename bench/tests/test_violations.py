@@ -12,7 +12,7 @@ from rotordrop.machine import example_machine
 from rotordrop_bench import Violations, hidden_machine, load_violations, score_estimate, synthesize_drop
 from rotordrop_bench.event import drop_conditions
 from rotordrop_bench.sensor_chain import PERFECT, lagging
-from rotordrop_bench.true_structure import KINDS, violated_kinds
+from rotordrop_bench.true_values import KINDS, violated_kinds
 from rotordrop_bench.truth import truth_of
 from rotordrop_bench.violations import violations_schema
 

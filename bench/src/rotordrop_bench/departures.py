@@ -17,7 +17,7 @@ SLIGHT, LARGE = 0, 1
 """Sizes of a departure: as many machines have it, and as only some do."""
 
 PEAK_LOADS = 10.0
-"""A typical peak force over the static load of a bearing [1]."""
+"""A typical peak force over the static load of a bearing [1]; chosen, not measured."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,6 +31,8 @@ class _Measures:
     surface_speed: float
     race_mass: float
     length: float
+    unbalance: float
+    middle: int
     contact: Any
 
     @property
@@ -39,51 +41,8 @@ class _Measures:
         return math.sqrt(self.support_stiffness / self.support_mass) / (2.0 * math.pi)
 
 
-def _measures(machine: Machine, speed: float) -> _Measures:
-    shares = [float(share) for share in bearing_load_shares(machine)]
-    bearing = machine.touchdown_bearings[shares.index(max(shares))]
-    contact = bearing.contact
-    return _Measures(
-        weight=max(shares),
-        support_stiffness=float(bearing.support.stiffness),
-        support_mass=float(bearing.support.mass),
-        gap=float(bearing.air_gap),
-        surface_speed=speed * float(bearing.bore_radius),
-        race_mass=float(bearing.race.mass),
-        length=machine.rotor.node_positions[-1],
-        contact=contact_law(float(contact.stiffness), float(contact.exponent), float(contact.damping)),
-    )
-
-
 def _si(value: float, unit: str) -> str:
     return f"{value:.6g} {unit}".strip()
-
-
-def _axes(m: _Measures, size: int) -> Parts:
-    ratio = (0.8, 0.65)[size]
-    return {"support": {"axes_angle": "30 deg", "stiffness_ratio": ratio, "damping_ratio": ratio}}
-
-
-def _hardening(m: _Measures, size: int) -> Parts:
-    force = _si(PEAK_LOADS * m.weight, "N")
-    return {"support": {"hardening": (0.15, 0.5)[size], "hardening_force": force, "hardening_radial": True}}
-
-
-def _slip(m: _Measures, size: int) -> Parts:
-    travel = _si(m.weight / m.support_stiffness, "m")
-    return {"support": {"slip_force": _si((0.2, 0.6)[size] * m.weight, "N"), "slip_travel": travel}}
-
-
-def _foundation(m: _Measures, size: int) -> Parts:
-    mass, frequency = (20.0, 9.0)[size] * m.support_mass, 0.35 * m.support_frequency
-    across = 0.8 * frequency
-    return {
-        "foundation": {
-            "mass": _si(mass, "kg"),
-            "frequency": _si(frequency, "Hz"),
-            "frequency_horizontal": _si(across, "Hz"),
-        }
-    }
 
 
 def _contact_law(m: _Measures, size: int) -> Parts:
@@ -106,39 +65,56 @@ def _tilt(m: _Measures, size: int) -> Parts:
     return {"race": {"tilt_stiffness": _si(stiffness, "N/m"), "tilt_frequency": _si(frequency, "Hz")}}
 
 
-def _drift(m: _Measures, size: int) -> Parts:
-    return {"gap": {"drift": _si(-(0.01, 0.04)[size] * m.gap, "m"), "drift_time": "0.2 s"}}
-
-
-def _heat(m: _Measures, size: int) -> Parts:
-    heat = 0.1 * m.weight * m.surface_speed * 0.1
-    return {"gap": {"closing": _si((0.01, 0.04)[size] * m.gap, "m"), "heat": _si(heat, "J")}}
-
-
-def _centres(m: _Measures, size: int) -> Parts:
-    return {"centre": {"x": _si((0.04, 0.1)[size] * m.gap, "m"), "y": _si(-(0.03, 0.07)[size] * m.gap, "m")}}
-
-
-def _planes(m: _Measures, size: int) -> Parts:
-    return {"sensors": {"plane_shift": _si((0.005, 0.02)[size] * m.length, "m")}}
-
-
 DEPARTURES: dict[str, Callable[[_Measures, int], Parts]] = {
-    "turned support axes": _axes,
-    "cubic support": _hardening,
-    "hysteretic support": _slip,
-    "foundation mode": _foundation,
+    "turned support axes": lambda m, size: {
+        "support": {
+            "axes_angle": "30 deg",
+            "stiffness_ratio": (0.8, 0.65)[size],
+            "damping_ratio": (0.8, 0.65)[size],
+        }
+    },
+    "cubic support": lambda m, size: {
+        "support": {
+            "hardening": (0.15, 0.5)[size],
+            "hardening_force": _si(PEAK_LOADS * m.weight, "N"),
+            "hardening_radial": True,
+        }
+    },
+    "hysteretic support": lambda m, size: {
+        "support": {
+            "slip_force": _si((0.2, 0.6)[size] * m.weight, "N"),
+            "slip_travel": _si(m.weight / m.support_stiffness, "m"),
+        }
+    },
+    "foundation mode": lambda m, size: {
+        "foundation": {
+            "mass": _si((20.0, 9.0)[size] * m.support_mass, "kg"),
+            "frequency": _si(0.35 * m.support_frequency, "Hz"),
+            "frequency_horizontal": _si(0.8 * (0.35 * m.support_frequency), "Hz"),
+        }
+    },
     "contact exponent": lambda m, size: {"contact": {"exponent": (1.25, 1.5)[size]}},
     "contact law": _contact_law,
     "race tilt": _tilt,
     "friction": lambda m, size: {"friction": {"dynamic": (0.23, 0.3)[size]}},
-    "gap drift": _drift,
-    "thermal gap": _heat,
+    "gap drift": lambda m, size: {
+        "gap": {"drift": _si(-(0.01, 0.04)[size] * m.gap, "m"), "drift_time": "0.2 s"}
+    },
+    "thermal gap": lambda m, size: {
+        "gap": {
+            "closing": _si((0.01, 0.04)[size] * m.gap, "m"),
+            "heat": _si(0.1 * m.weight * m.surface_speed * 0.1, "J"),
+        }
+    },
     "ball phase": lambda m, size: {"balls": {"turn": True}},
-    "bearing centres": _centres,
+    "bearing centres": lambda m, size: {
+        "centre": {"x": _si((0.04, 0.1)[size] * m.gap, "m"), "y": _si(-(0.03, 0.07)[size] * m.gap, "m")}
+    },
     "sensor lag": lambda m, size: {"sensors": {"time_constant": ("16 us", "80 us")[size]}},
     "cross-axis sensitivity": lambda m, size: {"sensors": {"cross_axis": (0.01, 0.05)[size]}},
-    "sensor planes elsewhere": _planes,
+    "sensor planes elsewhere": lambda m, size: {
+        "sensors": {"plane_shift": _si((0.005, 0.02)[size] * m.length, "m")}
+    },
     "brackets that follow the housing": lambda m, size: {"sensors": {"follows_housing": (0.1, 0.3)[size]}},
     "anti-alias filter": lambda m, size: {"sensors": {"anti_alias_frequency": ("8 kHz", "4 kHz")[size]}},
     "long remanence": lambda m, size: {"magnets": {"remanence_time": ("10 ms", "50 ms")[size]}},
@@ -151,28 +127,32 @@ DEPARTURES: dict[str, Callable[[_Measures, int], Parts]] = {
 def departures(machine: Machine, speed: float, kinds: tuple[tuple[str, int], ...]) -> Parts:
     """Violations of a machine [file units] that hold all the departures named, each in its size.
 
-    Parameters
-    ----------
-    machine : Machine
-        The machine as its owner knows it.
-    speed : float
-        Speed of the drop [rad/s].
-    kinds : tuple of (str, int)
-        Names from `DEPARTURES`, or "unbalance jump", and sizes.
+    The machine is as its owner knows it; a kind is a name from `DEPARTURES`, or "unbalance jump".
     """
-    m = _measures(machine, speed)
+    shares = [float(share) for share in bearing_load_shares(machine)]
+    bearing = machine.touchdown_bearings[shares.index(max(shares))]
+    contact = bearing.contact
+    m = _Measures(
+        weight=max(shares),
+        support_stiffness=float(bearing.support.stiffness),
+        support_mass=float(bearing.support.mass),
+        gap=float(bearing.air_gap),
+        surface_speed=speed * float(bearing.bore_radius),
+        race_mass=float(bearing.race.mass),
+        length=machine.rotor.node_positions[-1],
+        unbalance=sum(float(unbalance.amount) for unbalance in machine.unbalances),
+        middle=(len(machine.rotor.node_positions) + 1) // 2,
+        contact=contact_law(float(contact.stiffness), float(contact.exponent), float(contact.damping)),
+    )
     parts: Parts = {}
     for kind, size in kinds:
-        found = _jump(machine, size) if kind == "unbalance jump" else DEPARTURES[kind](m, size)
-        for part, keys in found.items():
+        for part, keys in {**DEPARTURES, "unbalance jump": _jump}[kind](m, size).items():
             parts[part] = parts.get(part, {}) | keys
     if "centre" in parts:  # the bearings stand apart from each other, or nothing would change
         parts["bearing"] = {machine.touchdown_bearings[0].name: {"centre": parts.pop("centre")}}
     return parts
 
 
-def _jump(machine: Machine, size: int) -> Parts:
+def _jump(m: _Measures, size: int) -> Parts:
     """A piece comes off in the middle of the rotor at the first contact."""
-    amount = (4.0, 15.0)[size] * sum(float(unbalance.amount) for unbalance in machine.unbalances)
-    node = (len(machine.rotor.node_positions) + 1) // 2
-    return {"unbalance_jump": {"node": node, "amount": _si(amount, "kg m")}}
+    return {"unbalance_jump": {"node": m.middle, "amount": _si((4.0, 15.0)[size] * m.unbalance, "kg m")}}

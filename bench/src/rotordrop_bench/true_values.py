@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -17,13 +19,10 @@ from rotordrop.simulate.certificate import refined_peak
 from rotordrop.simulate.result import DropResult
 from rotordrop_bench.event import DropConditions, HiddenMachine
 from rotordrop_bench.motion import true_motion
-from rotordrop_bench.sensor_chain import SensorChain, SensorErrors
-from rotordrop_bench.true_structure import (
-    true_structure,
-    turned_supports,
-    violated_kinds,
-    without_powers,
-)
+from rotordrop_bench.sensor_chain import SensorChain, SensorErrors, true_places
+from rotordrop_bench.structure import support_matrices
+from rotordrop_bench.violation_parts import BearingViolations
+from rotordrop_bench.violations import Violations
 
 Array = NDArray[np.float64]
 
@@ -44,26 +43,44 @@ def true_values(
     name: str,
 ) -> dict[str, Any]:
     """Everything that is true about a drop, ready for JSON; times from the true power-off."""
-    values: dict[str, Any] = {
+    start = conditions.start
+    force = np.zeros((len(hidden.machine.ambs), 2)) if start.remanent_force is None else start.remanent_force
+    structure = true_structure(hidden, conditions, errors)
+    return {
         "name": name,
         "origin": "simulated, not measured",
         "n0_hz": conditions.speed / (2.0 * math.pi),
         "fs": chain.sampling_rate,
         "t_off_in_record_s": conditions.jitter,
+        **_loads(result),
+        **_motion(hidden, result, rest),
+        **machine_truth(hidden.machine),
+        **_replaced(hidden),
+        "structure": structure,
+        "violated": list(violated_kinds(hidden.violations)),
+        "rotor_angle_at_power_off_rad": start.rotor_angle,
+        "levitated_offset_m": None if start.offset is None else np.asarray(start.offset).tolist(),
+        "remanent_force": [
+            {"vertical_N": float(y), "x_N": float(x), "time_constant_s": start.remanence_time_constant}
+            for x, y in np.asarray(force)
+        ],
+        "sensor_gain": errors.gain.tolist(),
+        "sensor_offset_m": errors.offset.tolist(),
+        "sensor_angle_error_rad": errors.angle.tolist(),
+        "sensor_plane_shift_m": errors.plane_shift.tolist(),
+        "sensor_cross_axis": errors.cross_axis.tolist(),
+        "sensor_follows_housing": errors.follows_housing.tolist(),
+        "sensor_time_constant_s": errors.time_constant.tolist(),
+        "noise_rms_m": chain.noise,
+        "hum_50hz_m": chain.hum,
+        "runout_1x_m": np.abs(errors.runout_1x).tolist(),
+        "runout_2x_m": np.abs(errors.runout_2x).tolist(),
+        "bits": chain.bits,
+        "anti_alias_hz": chain.anti_alias_frequency,
+        "violations": hidden.violations.values() | {"machine_seed": hidden.seed},
+        "time_note": "times are from power-off; record time = t_off_in_record_s + t; unbalance phases are "
+        "relative to the (unknown) rotor mark; axes x horizontal, y up",
     }
-    values |= _loads(result)
-    values |= _motion(hidden, result, rest)
-    values |= without_powers(hidden, machine_truth(hidden.machine)) | turned_supports(hidden)
-    values["structure"] = true_structure(hidden, conditions, errors)
-    values["violated"] = list(violated_kinds(hidden.violations))
-    values |= _conditions(conditions, hidden)
-    values |= _sensors(chain, errors)
-    values["violations"] = _violations(hidden)
-    values["time_note"] = (
-        "times are from power-off; record time = t_off_in_record_s + t; unbalance phases are relative to the "
-        "(unknown) rotor mark; axes x horizontal, y up"
-    )
-    return values
 
 
 def _loads(result: DropResult) -> dict[str, Any]:
@@ -99,57 +116,87 @@ def _each(names: tuple[str, ...], numbers: Array) -> dict[str, float]:
 def _motion(hidden: HiddenMachine, result: DropResult, rest: Array) -> dict[str, Any]:
     names, layout = result.bearing_names, hidden.model.layout
     shape = hidden.model.parameters.bearing_shape
-    radius = np.linalg.norm(result.displacement, axis=-1)
-    settled = np.hypot(shape @ rest[layout.modal_x], shape @ rest[layout.modal_y])
-    start = result.state[0]
-    values: dict[str, Any] = {
-        "max_radial_displacement_m": _each(names, np.max(radius, axis=0)),
-        "settled_radius_um": _each(names, 1e6 * settled),
+    start, end = result.state[0], min(CONTACT_WINDOW, result.time[-1])
+    intervals: dict[str, list[list[float]]] = {}
+    for index, name in enumerate(names):
+        log = result.contacts.of_bearing(index)
+        ends = np.minimum(np.where(np.isfinite(log.end), log.end, np.inf), end)
+        rows = np.column_stack([log.start, ends, log.peak_force])
+        intervals[name] = rows[log.start < CONTACT_WINDOW].tolist()
+    first = {name: rows[0] for name, rows in intervals.items() if rows}
+    planes = (layout.modal_x, layout.modal_y)
+    return {
+        "max_radial_displacement_m": _each(names, np.linalg.norm(result.displacement, axis=-1).max(axis=0)),
+        "settled_radius_um": _each(names, 1e6 * np.hypot(*(shape @ rest[plane] for plane in planes))),
         "initial_xy_at_bearings_m": result.displacement[0].tolist(),
         "initial_velocity_xy_m_s": np.column_stack(
-            [
-                shape @ start[layout.velocity_of(layout.modal_x)],
-                shape @ start[layout.velocity_of(layout.modal_y)],
-            ]
+            [shape @ start[layout.velocity_of(plane)] for plane in planes]
         ).tolist(),
-    }
-    return values | _contacts(result)
-
-
-def _contacts(result: DropResult) -> dict[str, Any]:
-    intervals: dict[str, list[list[float]]] = {}
-    for index, name in enumerate(result.bearing_names):
-        log = result.contacts.of_bearing(index)
-        end = np.minimum(
-            np.where(np.isfinite(log.end), log.end, np.inf), min(CONTACT_WINDOW, result.time[-1])
-        )
-        rows = zip(log.start, end, log.peak_force, strict=True)
-        intervals[name] = [[float(v) for v in row] for row in rows if row[0] < CONTACT_WINDOW]
-    first = {name: rows[0] for name, rows in intervals.items() if rows}
-    return {
         "first_contact_time_s": {name: row[0] for name, row in first.items()},
         "first_contact_duration_s": {name: row[1] - row[0] for name, row in first.items()},
         "contact_intervals_0_0p25_s": intervals,
     }
 
 
+_PARTS: Mapping[str, Mapping[str, str]] = {
+    "contact": {
+        "n": "contact.exponent",
+        "K": "contact.stiffness",
+        "lam": "contact.damping",
+        "q": "",
+        "gap": "air_gap",
+        "r_bore": "bore_radius",
+        "mu_s": "friction.static",
+        "mu_d": "friction.dynamic",
+        "v_stribeck": "friction.stribeck_speed",
+        "v_smooth": "friction.smoothing_speed",
+    },
+    "support": {
+        "m": "support.mass",
+        "K": "support.stiffness",
+        "C": "support.damping",
+        "m_horizontal": "support.mass_horizontal",
+        "K_horizontal": "support.stiffness_horizontal",
+        "C_horizontal": "support.damping_horizontal",
+    },
+    "ring": {"m": "race.mass", "Ip": "race.inertia"},
+    "bearing": {
+        "Cb_over_Kb": "damping_time",
+        "drag_mu": "race.drag_coefficient",
+        "drag_omega0": "race.drag_speed",
+    },
+}
+"""Fields of the supplied truth files that are lists over the bearings, and where a bearing has their values;
+the power of the damping in the contact is always one."""
+
+
 def machine_truth(machine: Machine) -> dict[str, Any]:
     """True parameters of a machine, in the fields of the supplied truth files."""
     bearings = machine.touchdown_bearings
-    first = bearings[0].friction
-    constant = machine.speed.aero_time_constant
     described = (row for row in rows("bearing") if len(row.truth) == 1 and row.step is not Step.FIRST_CONTACT)
+    series = {}  # support and bearing in series [N/m], the bearing by its tangent at the static load
+    for bearing, load in zip(bearings, bearing_load_shares(machine), strict=True):
+        tangent, support = (
+            numbers_of(bearing).tangent_stiffness(float(load)),
+            float(bearing.support.stiffness),
+        )
+        series[bearing.name] = support * tangent / (support + tangent)
+    parts = {
+        part: [
+            {key: float(attrgetter(path)(b)) if path else 1 for key, path in paths.items()} for b in bearings
+        ]
+        for part, paths in _PARTS.items()
+    }
+    constant = machine.speed.aero_time_constant
     return {
         **{row.truth[0]: {b.name: float(row.described(b)) for b in bearings} for row in described},
         "rotor_weight_N": machine.rotor.mass * float(machine.gravity),
-        "equivalent_stiffness": _equivalent_stiffness(machine),
-        "friction_dynamic": float(first.dynamic),
-        "friction_static": float(first.static),
+        "equivalent_stiffness": series,
+        "friction_dynamic": float(bearings[0].friction.dynamic),
+        "friction_static": float(bearings[0].friction.static),
         "tau_aero": None if constant is None else float(constant),
-        "contact": [_contact(b) for b in bearings],
-        "support": [_support(b) for b in bearings],
-        "ring": [{"m": float(b.race.mass), "Ip": float(b.race.inertia)} for b in bearings],
-        "bearing": [_bearing(b) for b in bearings],
+        **parts,
+        "bearing": [numbers_of(b).truth() | ring for b, ring in zip(bearings, parts["bearing"], strict=True)],
         "unbalance": [
             {"node": u.node, "U": float(u.amount), "phase": float(u.phase)} for u in machine.unbalances
         ],
@@ -162,87 +209,28 @@ def machine_truth(machine: Machine) -> dict[str, Any]:
     }
 
 
-def _equivalent_stiffness(machine: Machine) -> dict[str, float]:
-    """Support and bearing in series [N/m], the bearing by its tangent at the static load."""
-    found = {}
-    for bearing, load in zip(machine.touchdown_bearings, bearing_load_shares(machine), strict=True):
-        tangent = numbers_of(bearing).tangent_stiffness(float(load))
-        support = float(bearing.support.stiffness)
-        found[bearing.name] = support * tangent / (support + tangent)
-    return found
+def _replaced(hidden: HiddenMachine) -> dict[str, Any]:
+    """Fields of the truth of a machine that structures change.
 
-
-def _contact(b: TouchdownBearing) -> dict[str, float]:
-    return {
-        "n": float(b.contact.exponent),
-        "K": float(b.contact.stiffness),
-        "lam": float(b.contact.damping),
-        "q": 1,
-        "gap": float(b.air_gap),
-        "r_bore": float(b.bore_radius),
-        "mu_s": float(b.friction.static),
-        "mu_d": float(b.friction.dynamic),
-        "v_stribeck": float(b.friction.stribeck_speed),
-        "v_smooth": float(b.friction.smoothing_speed),
-    }
-
-
-def _support(b: TouchdownBearing) -> dict[str, float]:
-    s = b.support
-    return {
-        "m": float(s.mass),
-        "K": float(s.stiffness),
-        "C": float(s.damping),
-        "m_horizontal": float(s.mass_horizontal),
-        "K_horizontal": float(s.stiffness_horizontal),
-        "C_horizontal": float(s.damping_horizontal),
-    }
-
-
-def _bearing(b: TouchdownBearing) -> dict[str, float]:
-    return {
-        **numbers_of(b).truth(),
-        "Cb_over_Kb": float(b.damping_time),
-        "drag_mu": float(b.race.drag_coefficient),
-        "drag_omega0": float(b.race.drag_speed),
-    }
-
-
-def _conditions(conditions: DropConditions, hidden: HiddenMachine) -> dict[str, Any]:
-    start = conditions.start
-    force = (
-        start.remanent_force if start.remanent_force is not None else np.zeros((len(hidden.machine.ambs), 2))
-    )
-    return {
-        "rotor_angle_at_power_off_rad": start.rotor_angle,
-        "levitated_offset_m": None if start.offset is None else np.asarray(start.offset).tolist(),
-        "remanent_force": [
-            {"vertical_N": float(y), "x_N": float(x), "time_constant_s": start.remanence_time_constant}
-            for x, y in np.asarray(force)
+    A contact whose law is no power has neither stiffness nor exponent; with turned axes it is the stiffness
+    and damping that act in y which are published, and their ratio.
+    """
+    values = machine_truth(hidden.machine)
+    broken = {b.name: hidden.violations.of_bearing(b.name) for b in hidden.machine.touchdown_bearings}
+    bent = {name: bool(v.contact.law) for name, v in broken.items()}
+    found: dict[str, Any] = {
+        "contact_K": {name: value for name, value in values["contact_K"].items() if not bent[name]},
+        "contact": [
+            {key: value for key, value in row.items() if not (law and key in ("K", "n"))}
+            for row, law in zip(values["contact"], bent.values(), strict=True)
         ],
     }
-
-
-def _sensors(chain: SensorChain, errors: SensorErrors) -> dict[str, Any]:
-    return {
-        "sensor_gain": errors.gain.tolist(),
-        "sensor_offset_m": errors.offset.tolist(),
-        "sensor_angle_error_rad": errors.angle.tolist(),
-        "sensor_plane_shift_m": errors.plane_shift.tolist(),
-        "sensor_cross_axis": errors.cross_axis.tolist(),
-        "sensor_follows_housing": errors.follows_housing.tolist(),
-        "sensor_time_constant_s": errors.time_constant.tolist(),
-        "noise_rms_m": chain.noise,
-        "hum_50hz_m": chain.hum,
-        "runout_1x_m": np.abs(errors.runout_1x).tolist(),
-        "runout_2x_m": np.abs(errors.runout_2x).tolist(),
-        "bits": chain.bits,
-        "anti_alias_hz": chain.anti_alias_frequency,
-    }
-
-
-def _violations(hidden: HiddenMachine) -> dict[str, Any]:
-    return hidden.violations.values() | {"machine_seed": hidden.seed}
+    if any(float(v.support.axes_angle) != 0.0 for v in broken.values()):
+        matrices = {b.name: support_matrices(b, broken[b.name]) for b in hidden.machine.touchdown_bearings}
+        found["support_stiffness"] = {name: m["K_yy"] for name, m in matrices.items()}
+        found["support_damping"] = {name: m["C_yy"] for name, m in matrices.items()}
+        found["support_anisotropy"] = {name: m["K_xx"] / m["K_yy"] for name, m in matrices.items()}
+    return found
 
 
 def true_histories(
@@ -261,7 +249,9 @@ def true_histories(
     planes = np.array([hidden.model.basis.node_row(node) for node in nodes]).reshape(len(nodes), m)
     shape = hidden.model.parameters.bearing_shape
     force = _sampled(time, result.time, result.bearing_force, 0.0)
-    normal = _sampled(time, result.time, _contact_vectors(result), 0.0)
+    between = result.displacement - result.race_displacement
+    length = np.maximum(np.linalg.norm(between, axis=-1, keepdims=True), 1e-12)
+    normal = _sampled(time, result.time, result.contact_force[..., None] * between / length, 0.0)
     stress = _sampled(time, result.time, result.max_stress, None)
     race = _sampled(time, result.time, result.race_speed, 0.0)
     return {
@@ -280,13 +270,6 @@ def true_histories(
     }
 
 
-def _contact_vectors(result: DropResult) -> Array:
-    """Normal force on the race as a vector, shape (T, B, 2) [N]."""
-    between = result.displacement - result.race_displacement
-    length = np.linalg.norm(between, axis=-1, keepdims=True)
-    return np.asarray(result.contact_force[..., None] * between / np.maximum(length, 1e-12))
-
-
 def _sampled(time: Array, grid: Array, values: Array, before: float | None) -> Array:
     """Values on a grid at other times, by straight lines; before the grid a constant, or the first value."""
     place = np.clip(np.searchsorted(grid, time, side="right") - 1, 0, len(grid) - 2)
@@ -296,3 +279,102 @@ def _sampled(time: Array, grid: Array, values: Array, before: float | None) -> A
     if before is not None:
         sampled[time < 0.0] = before
     return np.asarray(sampled)
+
+
+KINDS: dict[str, tuple[str, ...]] = {
+    "turned support axes": (
+        "support.axes_angle",
+        "support.stiffness_ratio",
+        "support.damping_ratio",
+    ),
+    "support damping": ("support.damping",),
+    "cubic support": ("support.hardening",),
+    "hysteretic support": ("support.slip_force",),
+    "foundation mode": ("foundation.mass",),
+    "contact stiffness": ("contact.stiffness",),
+    "contact damping": ("contact.damping",),
+    "contact exponent": ("contact.exponent",),
+    "contact law": ("contact.law",),
+    "race inertia": ("race.inertia",),
+    "race tilt": ("race.tilt_stiffness",),
+    "friction": ("friction.dynamic", "friction.static", "friction.stribeck_speed"),
+    "gap drift": ("gap.drift",),
+    "thermal gap": ("gap.closing",),
+    "ball phase": ("balls.first_ball_angle", "balls.turn"),
+    "bearing centres": ("centre.x", "centre.y"),
+    "sensor lag": ("sensors.time_constant",),
+    "cross-axis sensitivity": ("sensors.cross_axis",),
+    "sensor planes elsewhere": ("sensors.plane_shift",),
+    "brackets that follow the housing": ("sensors.follows_housing",),
+    "anti-alias filter": ("sensors.anti_alias_frequency",),
+    "long remanence": ("magnets.remanence_time", "magnets.remanent_lift"),
+    "unbalance beyond its grade": ("rotor.unbalance",),
+    "rotor stiffness": ("rotor.youngs_modulus",),
+    "unbalance jump": ("unbalance_jump.node",),
+}
+"""Names of the kinds of violations, with the keys of a case file that make them."""
+
+
+def violated_kinds(violations: Violations) -> tuple[str, ...]:
+    """Names of the kinds of violations that a case holds, in the order of `KINDS`."""
+    values = violations.values()
+    parts = [(part, keys) for part, keys in values.items() if part not in ("bearing", "sensor")]
+    for bearing in values.get("bearing", {}).values():
+        parts += list(bearing.items())
+    parts += [("sensors", sensor) for sensor in values.get("sensor", {}).values()]
+    given = {f"{part}.{key}" for part, keys in parts for key in keys}
+    return tuple(kind for kind, keys in KINDS.items() if given & set(keys))
+
+
+def true_structure(
+    hidden: HiddenMachine, conditions: DropConditions, errors: SensorErrors
+) -> dict[str, float]:
+    """True values of all structures [SI] by path, absent ones with the value that means absent."""
+    values: dict[str, float] = {}
+    for bearing in hidden.machine.touchdown_bearings:
+        mine = _of_bearing(bearing, hidden.violations.of_bearing(bearing.name))
+        values |= {f"{bearing.name}.{path}": value for path, value in mine.items()}
+    stated = hidden.machine.rotor.node_positions
+    places = true_places(hidden.machine, errors)
+    for i, sensor in enumerate(hidden.machine.sensors):
+        mine = {
+            "time_constant": errors.time_constant[i],
+            "cross_axis": errors.cross_axis[i],
+            "follows_housing": errors.follows_housing[i],
+            "plane_offset": places[i] - stated[sensor.node - 1],
+        }
+        values |= {f"sensors.{sensor.name}.{path}": float(value) for path, value in mine.items()}
+    values["rotor.stiffness_factor"] = float(hidden.violations.rotor.youngs_modulus)
+    values["remanence.time_constant"] = conditions.start.remanence_time_constant
+    return values
+
+
+def _of_bearing(bearing: TouchdownBearing, v: BearingViolations) -> dict[str, float]:
+    matrix = support_matrices(bearing, v)
+    support, foundation = bearing.support, v.foundation
+    deflection = float(v.support.hardening_force) / float(support.stiffness)
+    values = {
+        "support.coupling": matrix["K_xy"] / math.sqrt(matrix["K_xx"] * matrix["K_yy"]),
+        "support.damping_coupling": matrix["C_xy"] / math.sqrt(matrix["C_xx"] * matrix["C_yy"])
+        if matrix["C_xx"] * matrix["C_yy"] > 0.0
+        else 0.0,
+        "support.axes_angle": float(v.support.axes_angle),
+        "support.axes_ratio": float(support.stiffness_horizontal) / float(support.stiffness),
+        "support.cubic": float(v.support.hardening) / deflection**2,
+        "support.slip_force": float(v.support.slip_force),
+        "support.foundation_share": 0.0,
+        "gap.drift": float(v.gap.drift),
+        "gap.closing": float(v.gap.closing),
+        "centre.x": float(v.centre.x),
+        "centre.y": float(v.centre.y),
+    }
+    if foundation.mass is not None and foundation.frequency is not None:
+        values |= {
+            "support.foundation_share": float(support.mass) / float(foundation.mass),
+            "support.foundation_frequency": 2.0 * math.pi * float(foundation.frequency),
+            "support.foundation_damping_ratio": float(foundation.damping_ratio),
+            "foundation.mass": float(foundation.mass),
+        }
+    if v.race.tilt_stiffness is not None:
+        values["race.tilt_stiffness"] = float(v.race.tilt_stiffness)
+    return values
