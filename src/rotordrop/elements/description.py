@@ -112,6 +112,14 @@ class Description(BaseModel):
         return raw
 
     @classmethod
+    def physical(cls, name: str) -> Physical | None:
+        """How a field is read, also as a member of an optional field; None where it is no quantity."""
+        field = cls.model_fields[name]
+        members = [getattr(one, "__metadata__", ()) for one in getattr(field.annotation, "__args__", ())]
+        found = (one for metadata in (field.metadata, *members) for one in metadata)
+        return next((one for one in found if isinstance(one, Physical)), None)
+
+    @classmethod
     def known_keys(cls) -> tuple[str, ...]:
         """Keys to suggest for a mistyped one."""
         return tuple(cls.model_fields)

@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from rotordrop.elements.ball_bearing import BallBearing
 from rotordrop.elements.description import LARGEST_FILE, Description, Misfit, UnknownKey
 from rotordrop.errors import MachineFileError, UsageError
-from rotordrop.machine.machine import Machine, kind_of
+from rotordrop.machine.machine import Machine
 from rotordrop.machine.shaft_table import SECTION_LINE, read_shaft_table
 from rotordrop.units import KINDS
 
@@ -260,7 +260,8 @@ def _kind_at(place: tuple[str | int, ...]) -> str | None:
         inner = _description_in(part.model_fields[key].annotation) if key in part.model_fields else None
         part = inner or part
     name = str(place[-1])
-    return kind_of(part, name) if name in part.model_fields else None
+    physical = part.physical(name) if name in part.model_fields else None
+    return physical.kind if physical else None
 
 
 def _description_in(annotation: Any) -> type[Description] | None:

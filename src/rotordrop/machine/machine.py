@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from pydantic import Field, PrivateAttr
+from pydantic import Field, PrivateAttr, ValidationError
 
 from rotordrop.elements.air import SpeedDescription
 from rotordrop.elements.description import Description, Misfit, Text, place_on_nodes
@@ -19,7 +19,7 @@ from rotordrop.elements.rotor import Rotor
 from rotordrop.elements.sensor import Sensor, check_sensors_resolve_motion
 from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.elements.unbalance import BalanceGrade, Unbalance, from_grade
-from rotordrop.elements.values import Acceleration, Physical, PositiveTime, default
+from rotordrop.elements.values import Acceleration, PositiveTime, default
 from rotordrop.errors import UsageError
 from rotordrop.known import Known, Status
 from rotordrop.machine.calibration import CalibrationOrigin
@@ -75,41 +75,9 @@ class Machine(Description):
         for key in ("unbalances", "touchdown_bearings", "ambs", "sensors"):
             place_on_nodes(getattr(self, key), nodes, key)
         self._check_names()
-        self._check_bearing_nodes()
-        working = tuple(sensor for sensor in self.sensors if not sensor.lost)
-        if working or self.sensors:
-            check_sensors_resolve_motion(working, nodes)
-
-    def _check_names(self) -> None:
-        for key in ("touchdown_bearings", "ambs", "sensors"):
-            seen: set[str] = set()
-            for index, part in enumerate(getattr(self, key)):
-                if part.name in seen:
-                    raise Misfit(
-                        f"the name {part.name!r} is used twice; names must differ", (key, index, "name")
-                    )
-                if key == "touchdown_bearings" and part.name in RESERVED_NAMES:
-                    raise Misfit(
-                        f"a touchdown bearing cannot be called {part.name!r}; choose another "
-                        'name, such as "NDE"',
-                        (key, index, "name"),
-                    )
-                seen.add(part.name)
-        names = {bearing.name for bearing in self.touchdown_bearings}
-        for index, sensor in enumerate(self.sensors):
-            if "bearing" in sensor.model_fields_set and sensor.bearing not in names:
-                raise Misfit(
-                    f"sensor {sensor.name} belongs to touchdown bearing {sensor.bearing!r}, which does "
-                    f"not exist; "
-                    f"there are {', '.join(sorted(names))}",
-                    ("sensors", index, "bearing"),
-                )
-
-    def _check_bearing_nodes(self) -> None:
-        """Refuse two touchdown bearings at one node: the weight cannot be shared out between them."""
         first: dict[int, str] = {}
         for index, bearing in enumerate(self.touchdown_bearings):
-            if bearing.node in first:
+            if bearing.node in first:  # the weight could not be shared out between them
                 raise Misfit(
                     f"touchdown bearing {bearing.name} sits at node {bearing.node}, where "
                     f"{first[bearing.node]} sits already; give it another node, or describe the two rows as "
@@ -117,38 +85,53 @@ class Machine(Description):
                     ("touchdown_bearings", index, "node" if bearing.position is None else "position"),
                 )
             first[bearing.node] = bearing.name
+        if self.sensors:
+            check_sensors_resolve_motion(tuple(one for one in self.sensors if not one.lost), nodes)
+
+    def _check_names(self) -> None:
+        for key in ("touchdown_bearings", "ambs", "sensors"):
+            seen: set[str] = set()
+            for index, part in enumerate(getattr(self, key)):
+                place = (key, index, "name")
+                if part.name in seen:
+                    raise Misfit(f"the name {part.name!r} is used twice; names must differ", place)
+                if key == "touchdown_bearings" and part.name in RESERVED_NAMES:
+                    raise Misfit(
+                        f"a touchdown bearing cannot be called {part.name!r}; choose another "
+                        'name, such as "NDE"',
+                        place,
+                    )
+                seen.add(part.name)
+        names = {bearing.name for bearing in self.touchdown_bearings}
+        for index, sensor in enumerate(self.sensors):
+            if "bearing" in sensor.model_fields_set and sensor.bearing not in names:
+                raise Misfit(
+                    f"sensor {sensor.name} belongs to touchdown bearing {sensor.bearing!r}, which does "
+                    f"not exist; there are {', '.join(sorted(names))}",
+                    ("sensors", index, "bearing"),
+                )
 
     def left_out(self) -> dict[str, Any]:
         """Share out the balance grade, complete the AMBs, assign the sensors to bearings."""
-        values: dict[str, Any] = {"ambs": self._completed_ambs(), "sensors": self._assigned_sensors()}
+        rotor, nodes = self.rotor, self.rotor.node_positions
+        carried = rotor.mass / max(1, len(self.ambs))
+
+        def assigned(sensor: Sensor) -> Sensor:
+            if "bearing" in sensor.model_fields_set:
+                return sensor
+            at = nodes[sensor.node - 1]
+            nearest = min(self.touchdown_bearings, key=lambda bearing: abs(nodes[bearing.node - 1] - at))
+            return sensor.completed_with({"bearing": nearest.name})
+
+        values: dict[str, Any] = {
+            "ambs": tuple(amb.completed_with(amb.completed(carried)) for amb in self.ambs),
+            "sensors": tuple(assigned(sensor) for sensor in self.sensors if not sensor.lost),
+        }
         if self.balance_grade is not None and "unbalances" not in self.model_fields_set:
-            rotor = self.rotor
-            values["unbalances"] = from_grade(
-                self.balance_grade, rotor.mass, rotor.centre_of_gravity, self._balance_planes()
-            )
+            carriers = self.ambs if len(self.ambs) >= 2 else self.touchdown_bearings
+            planes = tuple((node, nodes[node - 1]) for node in sorted({one.node for one in carriers}))
+            values["unbalances"] = from_grade(self.balance_grade, rotor.mass, rotor.centre_of_gravity, planes)
         return values
-
-    def _balance_planes(self) -> tuple[tuple[int, float], ...]:
-        carriers = self.ambs if len(self.ambs) >= 2 else self.touchdown_bearings
-        nodes = sorted({carrier.node for carrier in carriers})
-        return tuple((node, self.rotor.node_positions[node - 1]) for node in nodes)
-
-    def _completed_ambs(self) -> tuple[ActiveMagneticBearing, ...]:
-        carried = self.rotor.mass / max(1, len(self.ambs))
-        return tuple(amb.completed_with(amb.completed(carried)) for amb in self.ambs)
-
-    def _assigned_sensors(self) -> tuple[Sensor, ...]:
-        return tuple(
-            sensor
-            if "bearing" in sensor.model_fields_set
-            else sensor.completed_with({"bearing": self._nearest_bearing(sensor.node)})
-            for sensor in self.sensors
-            if not sensor.lost
-        )
-
-    def _nearest_bearing(self, node: int) -> str:
-        nodes = self.rotor.node_positions
-        return min(self.touchdown_bearings, key=lambda b: abs(nodes[b.node - 1] - nodes[node - 1])).name
 
     def __repr__(self) -> str:
         """Name, mass and parts."""
@@ -182,7 +165,31 @@ class Machine(Description):
         What follows from a changed value (the horizontal support, say) follows again. Unbalances are counted
         from 0, as in `unbalances`: ``"unbalance.0.amount"``.
         """
-        parts = changed_machine_parts(self, values)
+        tree: dict[str, Any] = {}
+        for path, value in values.items():
+            *keys, last = _resolved(self, path)
+            branch = tree
+            for key in keys:
+                branch = branch.setdefault(key, {})
+            read = (
+                value
+                if isinstance(value, Known)
+                else Known(value=in_si(value, kind_of_path(self, path), path))
+            )
+            branch[last] = read
+        parts: dict[str, Any] = {}
+        for key, branch in tree.items():
+            physical = type(self).physical(key)
+            try:
+                parts[key] = (
+                    _changed(getattr(self, key), branch) if physical is None else physical.read(branch)
+                )
+            except ValueError as error:
+                stated = ", ".join(
+                    f"{path} = {value if isinstance(value, str) else f'{float(value):g}'}"
+                    for path, value in values.items()
+                )
+                raise UsageError(f"cannot set {stated} (SI units): {_reasons(error)}") from error
         copy = self.completed_with(parts)
         copy.__pydantic_fields_set__.update(parts)
         if parts.keys() - {"touchdown_bearings", "speed"}:
@@ -199,7 +206,7 @@ class Machine(Description):
         try:
             changed = self.bearing(name).with_designation(designation)
         except ValueError as error:
-            raise UsageError(f"{name} cannot have a bearing {designation!r}: {reasons_of(error)}") from error
+            raise UsageError(f"{name} cannot have a bearing {designation!r}: {_reasons(error)}") from error
         others = tuple(changed if one.name == name else one for one in self.touchdown_bearings)
         return self.completed_with({"touchdown_bearings": others})
 
@@ -211,14 +218,13 @@ class Machine(Description):
 
     @cached_property
     def _mentions(self) -> tuple[Mention, ...]:
-        return tuple(self._all_mentions())
-
-    def _all_mentions(self) -> Iterator[Mention]:
-        if self.rotor.uses_builtin_steel:
-            steel = self.rotor.material_named("steel")
-            text = f"{steel.youngs_modulus.value / 1e9:g} GPa, {steel.density.value:g} kg/m³"
-            yield Mention("rotor.materials.steel", text, "no material 'steel' is described", "default")
-        yield from mentions(self)
+        found = mentions(self)
+        if not self.rotor.uses_builtin_steel:
+            return found
+        steel = self.rotor.material_named("steel")
+        text = f"{steel.youngs_modulus.value / 1e9:g} GPa, {steel.density.value:g} kg/m³"
+        why = "no material 'steel' is described"
+        return Mention("rotor.materials.steel", text, why, "default"), *found
 
     @property
     def defaults_in_use(self) -> tuple[tuple[str, str, str], ...]:
@@ -241,45 +247,15 @@ class Machine(Description):
         return hash((self.name, self.rotor.node_positions, self.touchdown_bearings))
 
 
-_Changes = dict[str, Any]
-
-
-def changed_machine_parts(machine: Machine, values: Mapping[str, float | str | Known]) -> dict[str, Any]:
-    """Give the top-level parts of a machine that change with the given values."""
-    tree: _Changes = {}
-    for path, value in values.items():
-        _graft(
-            tree,
-            _resolved(machine, path),
-            value if isinstance(value, Known) else Known(value=_number(machine, path, value)),
-        )
-    parts: dict[str, Any] = {}
-    for key, branch in tree.items():
-        try:
-            physical = physical_of(type(machine), key)
-            part = getattr(machine, key)
-            parts[key] = _changed(part, branch) if physical is None else physical.read(branch)
-        except ValueError as error:
-            raise UsageError(_refusal(error, values)) from error
-    return parts
-
-
-def _number(machine: Machine, path: str, value: float | str) -> float:
-    """The number of a value given by path: a text is read with its unit, a number is in SI units already."""
-    return in_si(value, kind_of_path(machine, path), path)
-
-
 def kind_of_path(machine: Machine, path: str) -> str:
-    """Kind of quantity of a value by path, one of `rotordrop.units.KINDS`; refuses a path the machine does
-    not have.
-    """
+    """Kind of quantity of a value by path, one of `KINDS`; refuses a path it does not have."""
     *keys, last = _resolved(machine, path)
     part: Any = machine
     for key in keys:
         part = _step(part, key, path)
-    kind = kind_of(type(part), last)
-    assert kind is not None, path
-    return kind
+    physical = type(part).physical(last)
+    assert physical is not None, path
+    return str(physical.kind)
 
 
 def value_of_path(machine: Machine, path: str) -> float:
@@ -292,28 +268,11 @@ def value_of_path(machine: Machine, path: str) -> float:
     return float(part)
 
 
-def _refusal(error: ValueError, values: Mapping[str, float | str | Known]) -> str:
-    stated = ", ".join(f"{path} = {_shown(value)}" for path, value in values.items())
-    return f"cannot set {stated} (SI units): {reasons_of(error)}"
-
-
-def reasons_of(error: ValueError) -> str:
+def _reasons(error: ValueError) -> str:
     """Why a description was refused, without the places pydantic names."""
-    from pydantic import ValidationError
-
     if not isinstance(error, ValidationError):
         return str(error)
     return "; ".join(str(e["msg"]).removeprefix("Value error, ") for e in error.errors())
-
-
-def _shown(value: float | str | Known) -> str:
-    return value if isinstance(value, str) else f"{float(value):g}"
-
-
-def _graft(tree: _Changes, keys: tuple[Any, ...], value: Known) -> None:
-    for key in keys[:-1]:
-        tree = tree.setdefault(key, {})
-    tree[keys[-1]] = value
 
 
 def _changed(part: Any, branch: Any) -> Any:
@@ -328,34 +287,28 @@ def _changed(part: Any, branch: Any) -> Any:
 def _resolved(machine: Machine, path: str) -> tuple[Any, ...]:
     """Turn a path into keys and indices from the machine down to one physical value."""
     head, *rest = path.split(".")
-    keys = _start(machine, head, rest, path)
+    keys: tuple[Any, ...] = (head, *rest)
+    bearings = [bearing.name for bearing in machine.touchdown_bearings]
+    if head in bearings:
+        inside = ["bearing", *rest] if rest == ["preload"] else rest
+        keys = ("touchdown_bearings", bearings.index(head), *inside)
+    elif head == "unbalance":
+        if rest and not rest[0].removeprefix("-").isdecimal():
+            raise UsageError(f"{path!r}: unbalances are counted from 0, as in 'unbalance.0.amount'")
+        keys = ("unbalances", *map(int, rest[:1]), *rest[1:])
+    elif head in ("sensors", "ambs") and rest:
+        names = [part.name for part in getattr(machine, head)]
+        if rest[0] in names:
+            keys = (head, names.index(rest[0]), *rest[1:])
     part: Any = machine
     for key in keys:
         part = _step(part, key, path)
     if not (isinstance(part, Known) or part is None):
-        raise UsageError(f"{path!r} is not a single physical value; {_suggestion(machine, path)}")
+        raise UsageError(
+            f"{path!r} is not a single physical value; write for example '<bearing>.support.stiffness' with "
+            f"one of the bearings {', '.join(bearings)} (given: {path})"
+        )
     return keys
-
-
-def _start(machine: Machine, head: str, rest: list[str], path: str) -> tuple[Any, ...]:
-    for index, bearing in enumerate(machine.touchdown_bearings):
-        if bearing.name == head:
-            return ("touchdown_bearings", index, *(["bearing", *rest] if rest == ["preload"] else rest))
-    if head == "unbalance":
-        return ("unbalances", *(_index(rest[:1], path)), *rest[1:])
-    for key in ("sensors", "ambs"):
-        if head == key and rest:
-            names = [part.name for part in getattr(machine, key)]
-            if rest[0] in names:
-                return (key, names.index(rest[0]), *rest[1:])
-    return (head, *rest)
-
-
-def _index(texts: list[str], path: str) -> list[int]:
-    try:
-        return [int(text) for text in texts]
-    except ValueError:
-        raise UsageError(f"{path!r}: unbalances are counted from 0, as in 'unbalance.0.amount'") from None
 
 
 def _step(part: Any, key: Any, path: str) -> Any:
@@ -365,15 +318,11 @@ def _step(part: Any, key: Any, path: str) -> Any:
         return getattr(part, key)
     if isinstance(part, tuple):
         raise UsageError(f"the machine has no value {path!r}: there are {len(part)} of them, counted from 0")
-    known = ", ".join(type(part).model_fields) if isinstance(part, Description) else ""
-    close = get_close_matches(str(key), list(type(part).model_fields), 1, 0.5) if known else []
-    way_out = f"did you mean {close[0]!r}?" if close else f"known there are {known or 'no further names'}"
+    known = list(type(part).model_fields) if isinstance(part, Description) else []
+    close = get_close_matches(str(key), known, 1, 0.5)
+    listed = ", ".join(known) or "no further names"
+    way_out = f"did you mean {close[0]!r}?" if close else f"known there are {listed}"
     raise UsageError(f"the machine has no value {path!r}: {key!r} is not known; {way_out}")
-
-
-def _suggestion(machine: Machine, path: str) -> str:
-    names = ", ".join(bearing.name for bearing in machine.touchdown_bearings)
-    return f"write for example '<bearing>.support.stiffness' with one of the bearings {names} (given: {path})"
 
 
 @dataclass(frozen=True)
@@ -387,7 +336,6 @@ class Mention:
 
 
 _ENTRY = re.compile(r"(rotor\.sections|rotor\.discs|sensors|ambs)\..+\.(\w+)$")
-_BEARINGS = "touchdown_bearings"
 _SILENT = {"position", "notes", "unbalances", "node_positions", "sections", "elements", "part", "materials"}
 _PLAIN_INFERRED = {"ball_count", "ball_material"}
 
@@ -395,74 +343,35 @@ _PLAIN_INFERRED = {"ball_count", "ball_material"}
 def mentions(part: Description) -> tuple[Mention, ...]:
     """Mention every default and inference in a description, once where list entries share it."""
     merged: dict[tuple[str, str, str, Status], list[Mention]] = {}
-    for mention in _walk(part):
+    for mention in _walk(part, ""):
         match = _ENTRY.match(mention.path)
         common = match.expand(r"\1.*.\2") if match else mention.path
         merged.setdefault((common, mention.text, mention.why, mention.status), []).append(mention)
-    return tuple(
-        found[0] if len(found) == 1 else Mention(common, text, why, status)
-        for (common, text, why, status), found in merged.items()
-    )
+    return tuple(found[0] if len(found) == 1 else Mention(*shared) for shared, found in merged.items())
 
 
-def _walk(part: Description, path: str = "") -> Iterator[Mention]:
-    for name, field in type(part).model_fields.items():
+def _walk(part: Description, path: str) -> Iterator[Mention]:
+    for name in type(part).model_fields:
         value = getattr(part, name)
         here = f"{path}.{name}" if path else name
         if isinstance(value, Known):
             if value.status in ("default", "inferred"):
-                physical = next(m for m in _physicals(field))
-                yield Mention(
-                    here, format_quantity(value.value, physical.kind), part.reason(name), value.status
-                )
+                physical = type(part).physical(name)
+                assert physical is not None
+                text = format_quantity(value.value, physical.kind)
+                yield Mention(here, text, part.reason(name), value.status)
         elif isinstance(value, Description):
             yield from _walk(value, here)
         elif isinstance(value, tuple) and value and isinstance(value[0], Description):
             for index, item in enumerate(value):
-                yield from _walk(item, _item_path(name, index, item, path))
+                label = getattr(item, "name", "")
+                shown = {"touchdown_bearings": str(label), "unbalances": f"unbalance.{index}"}
+                yield from _walk(item, shown.get(name, f"{here}.{label if label else index + 1}"))
         elif isinstance(value, dict):
             for key, item in value.items():
                 yield from _walk(item, f"{here}.{key}")
-        else:
-            yield from _plain(part, name, value, here)
-
-
-def _item_path(name: str, index: int, item: Description, path: str) -> str:
-    label = getattr(item, "name", "")
-    if name == _BEARINGS:
-        return str(label)
-    if name == "unbalances":
-        return f"unbalance.{index}"
-    prefix = f"{path}.{name}" if path else name
-    return f"{prefix}.{label if label else index + 1}"
-
-
-def _plain(part: Description, name: str, value: Any, here: str) -> Iterator[Mention]:
-    if name in part.model_fields_set or name in _SILENT or value in (None, "", ()) or name == "node":
-        return
-    inferred = name in _PLAIN_INFERRED and getattr(part, "designation", None) is not None
-    inferred = inferred or name == "bearing"
-    text = {True: "yes", False: "no"}.get(value, str(value)) if isinstance(value, bool) else str(value)
-    yield Mention(here, text, part.reason(name), "inferred" if inferred else "default")
-
-
-def _physicals(field: Any) -> Iterator[Physical]:
-    """Find how a field is read, directly or as one member of an optional field."""
-    for metadata in field.metadata:
-        if isinstance(metadata, Physical):
-            yield metadata
-    for argument in getattr(field.annotation, "__args__", ()):
-        for metadata in getattr(argument, "__metadata__", ()):
-            if isinstance(metadata, Physical):
-                yield metadata
-
-
-def kind_of(description: type[Description], name: str) -> str | None:
-    """Name the kind of quantity of a field; None where it holds none."""
-    physical = physical_of(description, name)
-    return None if physical is None else physical.kind
-
-
-def physical_of(description: type[Description], name: str) -> Physical | None:
-    """How a field is read; None where it holds no physical value."""
-    return next(_physicals(description.model_fields[name]), None)
+        elif not (name in part.model_fields_set | _SILENT | {"node"} or value in (None, "", ())):
+            inferred = name in _PLAIN_INFERRED and getattr(part, "designation", None) is not None
+            text = {True: "yes", False: "no"}[value] if isinstance(value, bool) else str(value)
+            status: Status = "inferred" if inferred or name == "bearing" else "default"
+            yield Mention(here, text, part.reason(name), status)

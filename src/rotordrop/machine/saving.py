@@ -13,7 +13,7 @@ from rotordrop.elements.rotor import Rotor
 from rotordrop.elements.unbalance import BalanceGrade
 from rotordrop.files import write_text
 from rotordrop.known import Known
-from rotordrop.machine.machine import Machine, kind_of
+from rotordrop.machine.machine import Machine
 from rotordrop.units import KINDS, parse_quantity, si_unit
 
 _FILE_UNITS = {
@@ -61,7 +61,9 @@ def _content(part: Description) -> dict[str, Any]:
 
 def _item(owner: type[Description], name: str, value: Any) -> Any:
     if isinstance(value, Known):
-        return _Written(_value_text(value, kind_of(owner, name) or "dimensionless"))
+        return _Written(
+            _value_text(value, physical.kind if (physical := owner.physical(name)) else "dimensionless")
+        )
     if isinstance(value, Description):
         return _content(value)
     if isinstance(value, dict):

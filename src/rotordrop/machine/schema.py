@@ -10,7 +10,7 @@ from rotordrop.elements.catalog.boundary import CLASSES
 from rotordrop.elements.description import Description
 from rotordrop.elements.values import KIND_MARK, STATUSES
 from rotordrop.known import Known
-from rotordrop.machine.machine import Machine, kind_of
+from rotordrop.machine.machine import Machine
 from rotordrop.units import KINDS, format_quantity
 
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -73,7 +73,8 @@ def _describe(schema: dict[str, Any], description: type[Description]) -> None:
         meaning = meanings.get(name, said)
         words = [meaning, said if said.startswith("When left out") and "left out" not in meaning else ""]
         if isinstance(field.default, Known) and field.default.value == field.default.value:
-            value = format_quantity(field.default.value, kind_of(description, name) or "dimensionless")
+            physical = description.physical(name)
+            value = format_quantity(field.default.value, physical.kind if physical else "dimensionless")
             words = [meaning, f"Default {value}: {field.default.source}"]
         elif isinstance(standing, str | int | float | bool) and standing not in ("", "-", 0):
             entry["default"] = standing
