@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 import tomllib
-from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -33,6 +32,7 @@ _EXPECTED = {
 _DEEPEST = 40
 """Brackets or parts of a key inside one another that a machine file can need."""
 
+_UNQUOTED = re.compile(r"=\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*([A-Za-zµ°%][^#\"']*?)\s*(#.*)?$")
 _SYNTAX_PLACE = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)")
 
 
@@ -50,15 +50,14 @@ def load_machine(path: str | os.PathLike[str]) -> Machine:
         When the file cannot be used; the message holds file, line, column, the value and the way out.
     """
     file = Path(path)
-    return _loaded(_text_of(file, "machine file"), file)
+    return _loaded(_text_of(file, "machine file"), file, file.parent)
 
 
 def load_description(kind: type[D], file: Path) -> D:
     """Read a description that is no machine from a TOML file, refused with the same care."""
     text = _text_of(file, "case file")
-    raw = _parsed(text, file)
     try:
-        return kind.model_validate(raw)
+        return kind.model_validate(_parsed(text, file))
     except ValidationError as error:
         raise _located(error, TomlPositions(text), file, None) from None
 
@@ -89,10 +88,10 @@ def loads_machine(text: str, folder: str | os.PathLike[str] = ".") -> Machine:
     return _loaded(text, None, Path(folder))
 
 
-def _loaded(text: str, file: Path | None, folder: Path | None = None) -> Machine:
+def _loaded(text: str, file: Path | None, folder: Path) -> Machine:
     raw = _parsed(text, file)
     positions = TomlPositions(text)
-    table = _with_shaft_table(raw, file, folder or (file.parent if file else Path()), positions)
+    table = _with_shaft_table(raw, file, folder, positions)
     try:
         machine = Machine.model_validate(raw)
     except ValidationError as error:
@@ -103,54 +102,39 @@ def _loaded(text: str, file: Path | None, folder: Path | None = None) -> Machine
 
 
 def _parsed(text: str, file: Path | None) -> dict[str, Any]:
-    _refuse_depth(text, file)
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise _syntax_error(text, str(error), file) from None
-    except (ValueError, RecursionError) as error:
-        longest = max(text.splitlines(), key=len)
-        raise MachineFileError(
-            f"this cannot be a value of a machine: {str(error).partition(';')[0]}",
-            file=file,
-            line=text.splitlines().index(longest) + 1,
-            column=1,
-        ) from None
-
-
-def _refuse_depth(text: str, file: Path | None) -> None:
-    """Refuse keys and lists nested so deep that only a damaged or hostile file has them."""
-    for number, line in enumerate(text.splitlines(), start=1):
+    lines = text.splitlines()
+    for number, line in enumerate(lines, start=1):
+        # Only a damaged or hostile file has keys and lists nested deeply.
         key = re.match(r"[\s\[]*([\w\s.-]*)", line)
         depth = max(line.count("[") - line.count("]"), line.count("{"), key.group(1).count(".") if key else 0)
         if depth > _DEEPEST:
-            raise MachineFileError(
-                f"{depth} levels inside one another; a machine file has a handful", file=file, line=number
-            )
+            told = f"{depth} levels inside one another; a machine file has a handful"
+            raise MachineFileError(told, file=file, line=number)
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise _syntax_error(lines or [""], str(error), file) from None
+    except (ValueError, RecursionError) as error:
+        told = f"this cannot be a value of a machine: {str(error).partition(';')[0]}"
+        longest = lines.index(max(lines, key=len))
+        raise MachineFileError(told, file=file, line=longest + 1, column=1) from None
 
 
-def _syntax_error(text: str, message: str, file: Path | None) -> MachineFileError:
-    lines = text.splitlines() or [""]
+def _syntax_error(lines: list[str], message: str, file: Path | None) -> MachineFileError:
     place = _SYNTAX_PLACE.search(message)
     line = int(place.group(1)) if place and place.group(1) else len(lines)
     column = int(place.group(2)) if place and place.group(2) else len(lines[-1]) + 1
-    comma = _DECIMAL_COMMA.search(lines[min(line, len(lines)) - 1])
-    if comma:
-        value = f"{comma.group(1)},{comma.group(2)}"
-        return MachineFileError(
-            f"{value} has a decimal comma; write {value.replace(',', '.')}, in quotes with its unit, "
-            f'as in "{value.replace(",", ".")} mm"',
-            file=file,
-            line=line,
-            column=comma.start(1) + 1,
+    reason = f"not valid TOML: {_SYNTAX_PLACE.sub('', message)}"
+    if comma := _DECIMAL_COMMA.search(lines[min(line, len(lines)) - 1]):
+        point, column = f"{comma.group(1)}.{comma.group(2)}", comma.start(1) + 1
+        reason = (
+            f"{comma.group(1)},{comma.group(2)} has a decimal comma; write {point}, in quotes with its unit, "
+            f'as in "{point} mm"'
         )
-    reason = _SYNTAX_PLACE.sub("", message)
-    unquoted = re.search(
-        r"=\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*([A-Za-zµ°%][^#\"']*?)\s*(#.*)?$", lines[line - 1]
-    )
-    if unquoted:
-        reason = f'a value with a unit is a text: write "{unquoted.group(1)} {unquoted.group(2)}" in quotes'
-    return MachineFileError(f"not valid TOML: {reason}", file=file, line=line, column=column)
+    elif unquoted := _UNQUOTED.search(lines[line - 1]):
+        written = f'"{unquoted.group(1)} {unquoted.group(2)}"'
+        reason = f"not valid TOML: a value with a unit is a text: write {written} in quotes"
+    return MachineFileError(reason, file=file, line=line, column=column)
 
 
 def _with_shaft_table(
@@ -160,33 +144,22 @@ def _with_shaft_table(
     rotor = raw.get("rotor")
     if not isinstance(rotor, dict) or "shaft_table" not in rotor:
         return None
-    place = positions.value(("rotor", "shaft_table")) or (None, None)
+    line, column = positions.value(("rotor", "shaft_table")) or (None, None)
     named = rotor.pop("shaft_table")
-    if not isinstance(named, str):
-        raise MachineFileError(
-            f"shaft_table = {named!r} is not the name of a CSV file",
-            file=file,
-            line=place[0],
-            column=place[1],
-        )
     both = [key for key in ("sections", "node_positions") if key in rotor]
-    if both:
-        raise MachineFileError(
-            f"the shaft is given by 'shaft_table' and by {both[0]!r}; keep one of them",
-            file=file,
-            line=place[0],
-            column=place[1],
-        )
-    path = folder / named
+    told = f"the shaft is given by 'shaft_table' and by {both[0]!r}; keep one of them" if both else ""
+    if not isinstance(named, str):
+        told = f"shaft_table = {named!r} is not the name of a CSV file"
+    if told:
+        raise MachineFileError(told, file=file, line=line, column=column)
     try:
-        rotor.update(read_shaft_table(path))
+        rotor.update(read_shaft_table(folder / named))
     except MachineFileError as error:
         if error.line is not None:
             raise
-        raise MachineFileError(
-            f"shaft_table = {named!r}: {error.message}", file=file, line=place[0], column=place[1]
-        ) from error
-    return path, [section.pop(SECTION_LINE) for section in rotor["sections"]]
+        told = f"shaft_table = {named!r}: {error.message}"
+        raise MachineFileError(told, file=file, line=line, column=column) from error
+    return folder / named, [section.pop(SECTION_LINE) for section in rotor["sections"]]
 
 
 def _located(
@@ -207,7 +180,7 @@ def _one_error(
     entry: Any, positions: TomlPositions, file: Path | None, table: tuple[Path, list[int]] | None
 ) -> MachineFileError:
     place = tuple(_ALIASES.get(part, part) for part in entry["loc"] if part not in _UNION_TAGS)
-    message, at_key = _message(entry, place)
+    message = _message(entry, place)
     cause = entry.get("ctx", {}).get("error")
     if isinstance(cause, Misfit):
         place = (*place, *cause.place)
@@ -217,40 +190,34 @@ def _one_error(
         )
     if place and place[-1] in ("conformity_inner", "conformity_outer") and not positions.has(place):
         place = (*place[:-1], "conformity")
+    # The key rather than the value is to blame where it is not known, or not there.
+    at_key = isinstance(cause, UnknownKey) or (cause is None and entry["type"] == "missing")
     line, column = (positions.key(place) if at_key else positions.value(place)) or (1, 1)
-    return MachineFileError(
-        f"{_dotted(place)}: {message}" if place else message, file=file, line=line, column=column
-    )
+    told = f"{_dotted(place)}: {message}" if place else message
+    return MachineFileError(told, file=file, line=line, column=column)
 
 
-def _message(entry: Any, place: tuple[str | int, ...]) -> tuple[str, bool]:
-    """Say what is wrong, and whether the key rather than the value is to blame."""
-    cause = entry.get("ctx", {}).get("error")
+def _message(entry: Any, place: tuple[str | int, ...]) -> str:
+    """Say what is wrong."""
+    cause, found = entry.get("ctx", {}).get("error"), entry["input"]
     if isinstance(cause, Misfit):
-        return cause.message, isinstance(cause, UnknownKey)
+        return cause.message
     if isinstance(cause, UsageError):
-        return str(cause), False
-    if entry["type"] == "missing":
-        return _missing(place), True
-    if cause is not None:
-        return str(cause), False
-    found = entry["input"]
-    shown = (
-        "a table"
-        if isinstance(found, dict)
-        else "a list"
-        if isinstance(found, list | tuple)
-        else f"{found!r}"
-    )
-    return f"{shown} does not fit; {_EXPECTED.get(entry['type']) or _spoken(entry['msg'])}", False
-
-
-def _missing(place: tuple[str | int, ...]) -> str:
-    if isinstance(place[-1], int):
+        return str(cause)
+    if entry["type"] == "missing" and isinstance(place[-1], int):
         return f"one entry is missing; {place[-2]} needs {place[-1] + 1} at least"
-    kind = _kind_at(place)
-    example = f'for example {place[-1]} = "{KINDS[kind].example}"' if kind else "'rotordrop init' shows how"
-    return f"{place[-1]!r} is missing; add it, {example}"
+    if entry["type"] == "missing":
+        kind = _kind_at(place)
+        way_out = (
+            f'for example {place[-1]} = "{KINDS[kind].example}"' if kind else "'rotordrop init' shows how"
+        )
+        return f"{place[-1]!r} is missing; add it, {way_out}"
+    if cause is not None:
+        return str(cause)
+    many = "a list" if isinstance(found, list | tuple) else f"{found!r}"
+    shown = "a table" if isinstance(found, dict) else many
+    expected = _EXPECTED.get(entry["type"]) or entry["msg"].replace("Input should be", "expected")
+    return f"{shown} does not fit; {expected}"
 
 
 def _kind_at(place: tuple[str | int, ...]) -> str | None:
@@ -272,10 +239,6 @@ def _description_in(annotation: Any) -> type[Description] | None:
     return next((description for description in inner if description is not None), None)
 
 
-def _spoken(message: str) -> str:
-    return message.replace("Input should be", "expected")
-
-
 def _dotted(place: tuple[str | int, ...]) -> str:
     """Write a place as the file shows it; list entries count from 1."""
     text = ""
@@ -292,12 +255,24 @@ class TomlPositions:
     """Where the keys and values of a TOML text stand; lines and columns count from 1."""
 
     def __init__(self, text: str) -> None:
+        import tree_sitter_toml
+        from tree_sitter import Language, Parser
+
         self._keys: dict[Keys, Place] = {}
         self._values: dict[Keys, Place] = {}
         self._counts: dict[Keys, int] = {}
-        tree = _parser().parse(text.encode("utf-8"))
-        self._lines = text.encode("utf-8").split(b"\n")
-        self._document(tree.root_node)
+        content = text.encode("utf-8")
+        self._lines = content.split(b"\n")
+        for child in Parser(Language(tree_sitter_toml.language())).parse(content).root_node.children:
+            if child.type == "pair":
+                self._pair(child, ())
+            elif child.type in ("table", "table_array_element"):
+                header = next(part for part in child.children if part.is_named)
+                path = self._header_path(_key_parts(header), child.type == "table_array_element")
+                self._keys.setdefault(path, self._place(header))
+                for part in child.children:
+                    if part.type == "pair":
+                        self._pair(part, path)
 
     def value(self, path: Keys) -> Place | None:
         """Place of a value, or of the nearest table around it that stands in the file."""
@@ -319,28 +294,12 @@ class TomlPositions:
                 return place
         return None
 
-    def _document(self, root: Any) -> None:
-        for child in root.children:
-            if child.type == "pair":
-                self._pair(child, ())
-            elif child.type in ("table", "table_array_element"):
-                self._table(child)
-
-    def _table(self, node: Any) -> None:
-        header = next(child for child in node.children if child.is_named)
-        path = self._header_path(_key_parts(header), node.type == "table_array_element")
-        self._keys.setdefault(path, self._place(header))
-        for child in node.children:
-            if child.type == "pair":
-                self._pair(child, path)
-
     def _header_path(self, parts: list[str], opens_element: bool) -> Keys:
         path: Keys = ()
         for depth, part in enumerate(parts):
             path = (*path, part)
             if opens_element and depth == len(parts) - 1:
                 self._counts[path] = self._counts.get(path, -1) + 1
-                return (*path, self._counts[path])
             if path in self._counts:
                 path = (*path, self._counts[path])
         return path
@@ -372,11 +331,3 @@ def _key_parts(node: Any) -> list[str]:
         return [part for child in node.children if child.is_named for part in _key_parts(child)]
     text: str = node.text.decode("utf-8")
     return [text[1:-1] if node.type == "quoted_key" else text]
-
-
-@lru_cache(maxsize=1)
-def _parser() -> Any:
-    import tree_sitter_toml
-    from tree_sitter import Language, Parser
-
-    return Parser(Language(tree_sitter_toml.language()))

@@ -11,9 +11,10 @@ import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from rotordrop.elements.rotor import Rotor
 from rotordrop.errors import MachineFileError, UsageError
@@ -27,6 +28,7 @@ _SOFT = 1e-3
 """A layer with less than this share of the shaft's elastic modulus carries no load."""
 _LAYER_MODULUS = 1.0
 _COEFFICIENT = re.compile(r"[kcm](xx|xy|yx|yy|zz)|frequency")
+_DISCS = ("DiskElement", "PointMass")
 _PASSED_OVER = ("parameters", "ross_version")
 _BUILT_IN = {
     "steel": (7810.0, 211e9, 81.2e9),
@@ -35,383 +37,6 @@ _BUILT_IN = {
     "brass": (8600.0, 105e9, 39.3e9),
 }
 """Density [kg/m³], elastic and shear modulus [Pa] of materials that old files only name."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class ImportedRotor:
-    """A rotor from another program."""
-
-    rotor: Rotor
-    """Shaft, discs, materials."""
-    springs: tuple[Spring, ...]
-    """Bearings of the source."""
-    source: str
-    """Program and version that wrote it."""
-    notes: tuple[str, ...]
-    """What was changed or left out."""
-    nodes: tuple[int, ...] = ()
-    """The node here of every node of the source."""
-
-
-def read_ross(path: str | Path) -> ImportedRotor:
-    """Read a rotor from a file of ROSS; refuses a shaft that has no counterpart here."""
-    path = Path(path)
-    elements, version, damped = _elements(path)
-    shaft = [item for kind, item in elements if kind.startswith("ShaftElement")]
-    if not shaft:
-        raise MachineFileError("there is no ShaftElement in it; is it a rotor saved by ROSS?", file=path)
-    try:
-        return _imported(elements, shaft, version, damped)
-    except (KeyError, TypeError, ValueError, UsageError) as error:
-        said = f"no {error} in an element" if isinstance(error, KeyError) else str(error)
-        raise MachineFileError(f"cannot take the rotor over: {said}", file=path) from error
-
-
-def _elements(path: Path) -> tuple[list[tuple[str, dict[str, Any]]], str, bool]:
-    """Elements by kind, the version, and whether the rotor as a whole has proportional damping."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-        content = json.loads(text) if path.suffix.lower() == ".json" else tomllib.loads(text)
-    except (OSError, UnicodeDecodeError, ValueError) as error:
-        raise MachineFileError(f"cannot read it as a file of ROSS: {error}", file=path) from error
-    if not isinstance(content, dict):
-        raise MachineFileError("it is no file of ROSS: a table of elements is expected", file=path)
-    found = [
-        (name.split("_")[0], item)
-        for name, item in content.items()
-        if isinstance(item, dict) and name not in _PASSED_OVER
-    ]
-    whole = content.get("parameters")
-    damped = isinstance(whole, dict) and any(whole.get(name) for name in ("alpha", "beta"))
-    return found, str(content.get("ross_version", "before 2.0")), damped
-
-
-def _imported(
-    elements: list[tuple[str, dict[str, Any]]], shaft: list[dict[str, Any]], version: str, damped: bool
-) -> ImportedRotor:
-    notes = ["proportional damping of the rotor is left out"] if damped else []
-    spans: dict[int, list[dict[str, Any]]] = {}
-    for item in _numbered(shaft):
-        spans.setdefault(item["n"], []).append(item)
-    if sorted(spans) != list(range(len(spans))):
-        raise ValueError("the shaft elements do not follow each other from node 0 on")
-    positions, nodes = [0.0], [1]
-    sections: list[dict[str, Any]] = []
-    materials: dict[str, tuple[float, float, float]] = {}
-    for n in range(len(spans)):
-        pieces = _span(spans[n], materials, notes)
-        for piece in pieces:
-            positions.append(positions[-1] + piece.pop("length"))
-            sections.append(piece | {"nodes": [len(positions) - 1, len(positions)]})
-        nodes.append(len(positions))
-    rotor = Rotor.model_validate(
-        {
-            "material": next(iter(materials)),
-            "materials": {
-                name: {
-                    "youngs_modulus": f"{E!r} Pa",
-                    "poisson_ratio": E / (2.0 * G) - 1.0,
-                    "density": _density(rho),
-                }
-                for name, (rho, E, G) in materials.items()
-            },
-            "node_positions": tuple(positions),
-            "sections": _joined(sections),
-            "discs": [
-                _disc(kind, item, nodes) for kind, item in elements if kind in ("DiskElement", "PointMass")
-            ],
-        }
-    )
-    springs = tuple(
-        _spring(k, kind, item, nodes) for k, (kind, item) in enumerate(elements) if _is_spring(kind)
-    )
-    notes += _left_out(elements)
-    return ImportedRotor(
-        rotor=rotor,
-        springs=springs,
-        source=f"ROSS {version}",
-        notes=tuple(dict.fromkeys(notes)),
-        nodes=tuple(nodes),
-    )
-
-
-def _numbered(shaft: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Give every shaft element its node; those without one follow the one before."""
-    numbered, following = [], 0
-    for item in shaft:
-        n = following if item.get("n") is None else int(item["n"])
-        following = n + 1
-        numbered.append(item | {"n": n})
-    return numbered
-
-
-def _span(
-    around: list[dict[str, Any]], materials: dict[str, tuple[float, float, float]], notes: list[str]
-) -> list[dict[str, Any]]:
-    """Pieces of the shaft between two nodes of the source, from the elements that lie around each other."""
-    ordered = sorted(around, key=lambda item: float(item["odl"]))
-    stiff = [
-        item for item in ordered if _material(item)[1][1] > _SOFT * max(_material(i)[1][1] for i in ordered)
-    ]
-    core, layers = stiff[0], [item for item in ordered if item not in stiff]
-    cone = any(_diameters(item)[0] != _diameters(item)[1] for item in ordered)
-    for outer in stiff[1:]:
-        if _material(outer)[1] != _material(core)[1] or _gap(core, outer) > 1e-9:
-            raise ValueError(
-                f"elements of different materials lie around each other at node {core['n']}; only layers "
-                f"without stiffness can (elastic modulus below {_SOFT:g} of the shaft's)"
-            )
-        core = core | {"odl": outer["odl"], "odr": outer["odr"]}
-    name, constants = _material(core)
-    if materials.setdefault(name, constants) != constants:
-        name = f"{name}_{len(materials)}"
-        materials[name] = constants
-    _check_switches(core, notes)
-    cuts = _CONE_CUTS if cone else 1
-    if cone:
-        notes.append(f"conical elements stand as {_CONE_CUTS} cylinders each")
-    return [_piece(core, layers, (k + 0.5) / cuts, float(core["L"]) / cuts, name) for k in range(cuts)]
-
-
-def _piece(
-    core: dict[str, Any], layers: list[dict[str, Any]], at: float, length: float, material: str
-) -> dict[str, Any]:
-    inner, outer = _at(core, "id", at), _at(core, "od", at)
-    piece: dict[str, Any] = {
-        "length": length,
-        "outer_diameter": _metres(outer),
-        "inner_diameter": _metres(inner),
-        "material": material,
-    }
-    if layers:
-        top = max(_at(layer, "od", at) for layer in layers)
-        mass = sum(
-            _material(layer)[1][0] * (_at(layer, "od", at) ** 2 - _at(layer, "id", at) ** 2)
-            for layer in layers
-        )
-        if any(_at(layer, "id", at) < outer - 1e-9 for layer in layers):
-            raise ValueError(f"a layer without stiffness lies inside the shaft at node {core['n']}")
-        piece |= {"layer_diameter": _metres(top), "layer_density": _density(mass / (top**2 - outer**2))}
-    return piece
-
-
-def _at(item: Mapping[str, Any], end: str, share: float) -> float:
-    left, right = float(item[f"{end}l"]), float(item[f"{end}r"])
-    return left + share * (right - left)
-
-
-def _diameters(item: Mapping[str, Any]) -> tuple[tuple[float, float], tuple[float, float]]:
-    return (float(item["idl"]), float(item["odl"])), (float(item["idr"]), float(item["odr"]))
-
-
-def _gap(core: Mapping[str, Any], outer: Mapping[str, Any]) -> float:
-    return abs(float(outer["idl"]) - float(core["odl"]))
-
-
-def _material(item: Mapping[str, Any]) -> tuple[str, tuple[float, float, float]]:
-    """Name, and density [kg/m³], elastic and shear modulus [Pa]."""
-    told = item["material"]
-    if isinstance(told, str):
-        if told.lower() not in _BUILT_IN:
-            raise ValueError(f"the material {told!r} is only named and not known here")
-        return told, _BUILT_IN[told.lower()]
-    rho, E = float(told["rho"]), float(told["E"])
-    if told.get("G_s") is not None:
-        return _name(told), (rho, E, float(told["G_s"]))
-    return _name(told), (rho, E, E / (2.0 * (1.0 + float(told["Poisson"]))))
-
-
-def _name(material: Mapping[str, Any]) -> str:
-    """Name of a material as one word."""
-    return re.sub(r"\W+", "_", str(material["name"])).strip("_") or "material"
-
-
-def _check_switches(item: Mapping[str, Any], notes: list[str]) -> None:
-    for name in ("shear_effects", "rotary_inertia", "gyroscopic"):
-        if item.get(name) is False:
-            notes.append(f"the source switched {name.replace('_', ' ')} off; it acts here")
-    for name in ("axial_force", "torque", "alpha", "beta"):
-        if item.get(name):
-            notes.append(f"{name.replace('_', ' ')} of shaft elements is left out")
-    if item.get("shear_method_calc", "cowper") != "cowper":
-        notes.append(f"the source has shear by {item['shear_method_calc']}; here it is Cowper's")
-
-
-def _joined(sections: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Join neighbouring sections of the same shaft."""
-    joined: list[dict[str, Any]] = []
-    for section in sections:
-        rest = {key: value for key, value in section.items() if key != "nodes"}
-        if joined and {key: value for key, value in joined[-1].items() if key != "nodes"} == rest:
-            joined[-1]["nodes"][1] = section["nodes"][1]
-        else:
-            joined.append(section | {"nodes": list(section["nodes"])})
-    return joined
-
-
-def _disc(kind: str, item: Mapping[str, Any], nodes: list[int]) -> dict[str, Any]:
-    disc: dict[str, Any] = {"name": str(item.get("tag") or kind), "node": nodes[int(item["n"])]}
-    if kind == "PointMass":
-        masses = {float(item[key]) for key in ("m", "mx", "my") if item.get(key)}
-        if len(masses) != 1:
-            raise ValueError(f"the point mass at node {item['n']} differs between the directions")
-        return disc | {"mass": f"{masses.pop()!r} kg"}
-    disc["mass"] = f"{float(item['m'])!r} kg"
-    if float(item["Id"]) or float(item["Ip"]):
-        disc["polar_inertia"] = f"{float(item['Ip'])!r} kg m^2"
-        disc["diametral_inertia"] = f"{float(item['Id'])!r} kg m^2"
-    return disc
-
-
-def _is_spring(kind: str) -> bool:
-    return "Bearing" in kind or kind == "SealElement"
-
-
-def _spring(k: int, kind: str, item: Mapping[str, Any], nodes: list[int]) -> Spring:
-    # Version 3 calls the speeds of a table what they are.
-    item = {("frequency" if key == "speed" else key): value for key, value in item.items()}
-    told = {key: _numbers(item[key]) for key in item if _COEFFICIENT.fullmatch(key) and item[key] is not None}
-    told = {key: values for key, values in told.items() if values}
-    for letter in ("k", "c"):  # what is not given in y is as in x, at every speed
-        if f"{letter}xx" in told:
-            told.setdefault(f"{letter}yy", told[f"{letter}xx"])
-
-    def both(kind: str, first: str, second: str, otherwise: str) -> tuple[float, float]:
-        one = told.get(f"{kind}{first}", (0.0,))[0]
-        return one, told.get(f"{kind}{second}", (one if otherwise == "same" else 0.0,))[0]
-
-    return Spring(
-        node=nodes[int(item["n"])],
-        name=str(item.get("tag") or f"bearing {k + 1}"),
-        stiffness=both("k", "xx", "yy", "same"),
-        damping=both("c", "xx", "yy", "same"),
-        cross_stiffness=both("k", "xy", "yx", "zero"),
-        cross_damping=both("c", "xy", "yx", "zero"),
-        kind="SealElement" if kind == "SealElement" else "BearingElement",
-        told=told if _says_more(told) else {},
-    )
-
-
-def _says_more(told: Mapping[str, tuple[float, ...]]) -> bool:
-    """Whether coefficients change with speed, or act along the axis or as a mass."""
-    return any(
-        len(values) > 1 or ((key[0] == "m" or key[1:] == "zz") and any(values))
-        for key, values in told.items()
-    )
-
-
-def _numbers(value: Any) -> tuple[float, ...]:
-    return tuple(float(one) for one in value) if isinstance(value, list) else (float(value),)
-
-
-def _left_out(elements: Iterable[tuple[str, dict[str, Any]]]) -> list[str]:
-    kinds = [kind for kind, _ in elements]
-    known = ("DiskElement", "PointMass")
-    others = [k for k in kinds if not k.startswith("ShaftElement") and k not in known and not _is_spring(k)]
-    return [f"{others.count(kind)} {kind} left out" for kind in dict.fromkeys(others)]
-
-
-def _metres(value: float) -> str:
-    return f"{value!r} m"
-
-
-def _density(value: float) -> str:
-    return f"{value!r} kg/m^3"
-
-
-def write_ross(rotor: Rotor, path: str | Path, springs: Iterable[Spring] = ()) -> None:
-    """Write a rotor as a file that ROSS loads, TOML or JSON by its suffix; `read_ross` gives it back.
-
-    A layer becomes an element around the shaft that carries no load. ROSS wants materials without blanks.
-    """
-    path = Path(path)
-    content: dict[str, Any] = {"ross_version": _FORMAT_VERSION, "parameters": {}}
-    for n, element in enumerate(rotor.elements):
-        shear = element.youngs_modulus / (2.0 * (1.0 + element.poisson_ratio))
-        core = (element.material, element.density, element.youngs_modulus, shear)
-        content |= _shaft_entry(n, element.length, element.inner_diameter, element.outer_diameter, core)
-        if element.layer_diameter is not None:
-            soft = (
-                f"layer_{element.layer_density:g}",
-                element.layer_density,
-                _LAYER_MODULUS,
-                _LAYER_MODULUS / 2.6,
-            )
-            sizes = (element.outer_diameter, element.layer_diameter)
-            content |= _shaft_entry(n, element.length, *sizes, soft, " layer")
-    for k, disc in enumerate(rotor.discs):
-        tag = disc.name or f"Disk {k}"
-        content[_free(f"DiskElement_{tag}", content)] = {
-            "n": disc.node - 1,
-            "m": disc.mass.value,
-            "Id": disc.diametral_inertia.value,
-            "Ip": disc.polar_inertia.value,
-            "tag": tag,
-            "scale_factor": 1.0,
-            "color": "Firebrick",
-        }
-    for spring in springs:
-        content[_free(f"{spring.kind}_{spring.name}", content)] = {
-            "n": spring.node - 1,
-            "tag": spring.name,
-            **(
-                {key: list(values) for key, values in spring.told.items()}
-                or {
-                    "kxx": [spring.stiffness[0]],
-                    "kxy": [spring.cross_stiffness[0]],
-                    "kyx": [spring.cross_stiffness[1]],
-                    "kyy": [spring.stiffness[1]],
-                    "cxx": [spring.damping[0]],
-                    "cxy": [spring.cross_damping[0]],
-                    "cyx": [spring.cross_damping[1]],
-                    "cyy": [spring.damping[1]],
-                }
-            ),
-        }
-    write_text(path, json.dumps(content, indent=2) if path.suffix.lower() == ".json" else _toml(content))
-
-
-def _free(key: str, content: Mapping[str, Any]) -> str:
-    """The key, or one that is not taken: discs and bearings of one name are still several."""
-    return key if key not in content else f"{key}_{len(content)}"
-
-
-def _shaft_entry(
-    n: int,
-    length: float,
-    inner: float,
-    outer: float,
-    material: tuple[str, float, float, float],
-    suffix: str = "",
-) -> dict[str, Any]:
-    tag = f"Shaft Element {n}{suffix}"
-    name, rho, E, G = material
-    return {
-        f"ShaftElement_{tag}": {
-            "L": length,
-            "idl": inner,
-            "odl": outer,
-            "idr": inner,
-            "odr": outer,
-            "n": n,
-            "axial_force": 0,
-            "torque": 0,
-            "shear_effects": True,
-            "rotary_inertia": True,
-            "gyroscopic": True,
-            "shear_method_calc": "cowper",
-            "tag": tag,
-            "alpha": 0.0,
-            "beta": 0.0,
-            "material": {"name": "_".join(name.split()), "rho": rho, "E": E, "G_s": G, "color": "#525252"},
-        }
-    }
-
-
-def _toml(content: Mapping[str, Any]) -> str:
-    import tomlkit
-
-    return tomlkit.dumps(content)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -450,12 +75,12 @@ class Spring:
         if len(speeds) < 2:
             return self
 
-        def between(key: str, otherwise: float) -> float:
-            values = self.told.get(key)
-            return otherwise if values is None or len(values) < 2 else _between(speed, speeds, values)
-
         def pair(kind: str, keys: tuple[str, str], now: tuple[float, float]) -> tuple[float, float]:
-            first, second = (between(f"{kind}{key}", value) for key, value in zip(keys, now, strict=True))
+            tables = [self.told.get(f"{kind}{key}", ()) for key in keys]
+            first, second = (
+                float(np.interp(speed, speeds, values)) if len(values) > 1 else value
+                for values, value in zip(tables, now, strict=True)
+            )
             return first, second
 
         own, cross = ("xx", "yy"), ("xy", "yx")
@@ -468,18 +93,280 @@ class Spring:
         )
 
 
-def _between(at: float, places: tuple[float, ...], values: tuple[float, ...]) -> float:
-    """Value on the straight line between two of a table; the end one beyond it."""
-    for (a, u), (b, v) in pairwise(zip(places, values, strict=True)):
-        if at <= b:
-            return u if at <= a else u + (v - u) * (at - a) / (b - a)
-    return values[-1]
-
-
 def _matrix(
     own: tuple[float, float], cross: tuple[float, float]
 ) -> tuple[tuple[float, float], tuple[float, float]]:
     return (own[0], cross[0]), (cross[1], own[1])
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImportedRotor:
+    """A rotor from another program."""
+
+    rotor: Rotor
+    """Shaft, discs, materials."""
+    springs: tuple[Spring, ...]
+    """Bearings of the source."""
+    source: str
+    """Program and version that wrote it."""
+    notes: tuple[str, ...]
+    """What was changed or left out."""
+    nodes: tuple[int, ...] = ()
+    """The node here of every node of the source."""
+
+
+def read_ross(path: str | Path) -> ImportedRotor:
+    """Read a rotor from a file of ROSS; refuses a shaft that has no counterpart here."""
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+        content = json.loads(text) if path.suffix.lower() == ".json" else tomllib.loads(text)
+    except (OSError, UnicodeDecodeError, ValueError) as error:
+        raise MachineFileError(f"cannot read it as a file of ROSS: {error}", file=path) from error
+    if not isinstance(content, dict):
+        raise MachineFileError("it is no file of ROSS: a table of elements is expected", file=path)
+    elements = [
+        (name.split("_")[0], item)
+        for name, item in content.items()
+        if isinstance(item, dict) and name not in _PASSED_OVER
+    ]
+    if not any(kind.startswith("ShaftElement") for kind, _ in elements):
+        raise MachineFileError("there is no ShaftElement in it; is it a rotor saved by ROSS?", file=path)
+    whole = content.get("parameters")
+    damped = isinstance(whole, dict) and any(whole.get(name) for name in ("alpha", "beta"))
+    notes = ["proportional damping of the rotor is left out"] if damped else []
+    try:
+        return _imported(elements, str(content.get("ross_version", "before 2.0")), notes)
+    except (KeyError, TypeError, ValueError, UsageError) as error:
+        said = f"no {error} in an element" if isinstance(error, KeyError) else str(error)
+        raise MachineFileError(f"cannot take the rotor over: {said}", file=path) from error
+
+
+def _imported(elements: list[tuple[str, dict[str, Any]]], version: str, notes: list[str]) -> ImportedRotor:
+    spans: dict[int, list[dict[str, Any]]] = {}
+    following = 0
+    for kind, item in elements:
+        if kind.startswith("ShaftElement"):  # one without a node follows the one before
+            n = following if item.get("n") is None else int(item["n"])
+            following = n + 1
+            spans.setdefault(n, []).append(item | {"n": n})
+    if sorted(spans) != list(range(len(spans))):
+        raise ValueError("the shaft elements do not follow each other from node 0 on")
+    positions, nodes = [0.0], [1]
+    sections: list[dict[str, Any]] = []
+    materials: dict[str, tuple[float, float, float]] = {}
+    for n in range(len(spans)):
+        for piece in _span(spans[n], materials, notes):
+            positions.append(positions[-1] + piece.pop("length"))
+            if sections and sections[-1] == piece | {"nodes": sections[-1]["nodes"]}:
+                sections[-1]["nodes"][1] = len(positions)  # the same shaft goes on
+            else:
+                sections.append(piece | {"nodes": [len(positions) - 1, len(positions)]})
+        nodes.append(len(positions))
+    rotor = Rotor.model_validate(
+        {
+            "material": next(iter(materials)),
+            "materials": {
+                name: {
+                    "youngs_modulus": f"{E!r} Pa",
+                    "poisson_ratio": E / (2.0 * G) - 1.0,
+                    "density": f"{rho!r} kg/m^3",
+                }
+                for name, (rho, E, G) in materials.items()
+            },
+            "node_positions": tuple(positions),
+            "sections": sections,
+            "discs": [_disc(kind, item, nodes) for kind, item in elements if kind in _DISCS],
+        }
+    )
+    others = [k for k, _ in elements if not (k.startswith("ShaftElement") or k in _DISCS or _is_spring(k))]
+    notes += [f"{others.count(kind)} {kind} left out" for kind in dict.fromkeys(others)]
+    return ImportedRotor(
+        rotor=rotor,
+        springs=tuple(
+            _spring(k, kind, item, nodes) for k, (kind, item) in enumerate(elements) if _is_spring(kind)
+        ),
+        source=f"ROSS {version}",
+        notes=tuple(dict.fromkeys(notes)),
+        nodes=tuple(nodes),
+    )
+
+
+def _span(
+    around: list[dict[str, Any]], materials: dict[str, tuple[float, float, float]], notes: list[str]
+) -> list[dict[str, Any]]:
+    """Pieces of the shaft between two nodes of the source, from the elements that lie around each other."""
+    ordered = sorted(around, key=lambda item: float(item["odl"]))
+    stiffest = max(_material(item)[1][1] for item in ordered)
+    stiff = [item for item in ordered if _material(item)[1][1] > _SOFT * stiffest]
+    core, layers = stiff[0], [item for item in ordered if item not in stiff]
+    cone = any(float(item[f"{end}l"]) != float(item[f"{end}r"]) for item in ordered for end in ("id", "od"))
+    for outer in stiff[1:]:
+        gap = abs(float(outer["idl"]) - float(core["odl"]))
+        if _material(outer)[1] != _material(core)[1] or gap > 1e-9:
+            raise ValueError(
+                f"elements of different materials lie around each other at node {core['n']}; only layers "
+                f"without stiffness can (elastic modulus below {_SOFT:g} of the shaft's)"
+            )
+        core = core | {"odl": outer["odl"], "odr": outer["odr"]}
+    name, constants = _material(core)
+    if materials.setdefault(name, constants) != constants:
+        name = f"{name}_{len(materials)}"
+        materials[name] = constants
+    for switch in ("shear_effects", "rotary_inertia", "gyroscopic"):
+        if core.get(switch) is False:
+            notes.append(f"the source switched {switch.replace('_', ' ')} off; it acts here")
+    for load in ("axial_force", "torque", "alpha", "beta"):
+        if core.get(load):
+            notes.append(f"{load.replace('_', ' ')} of shaft elements is left out")
+    if core.get("shear_method_calc", "cowper") != "cowper":
+        notes.append(f"the source has shear by {core['shear_method_calc']}; here it is Cowper's")
+    cuts = _CONE_CUTS if cone else 1
+    if cone:
+        notes.append(f"conical elements stand as {_CONE_CUTS} cylinders each")
+    return [_piece(core, layers, (k + 0.5) / cuts, float(core["L"]) / cuts, name) for k in range(cuts)]
+
+
+def _piece(
+    core: dict[str, Any], layers: list[dict[str, Any]], share: float, length: float, material: str
+) -> dict[str, Any]:
+    def at(item: Mapping[str, Any], end: str) -> float:
+        left, right = float(item[f"{end}l"]), float(item[f"{end}r"])
+        return left + share * (right - left)
+
+    inner, outer = at(core, "id"), at(core, "od")
+    diameters = {"outer_diameter": f"{outer!r} m", "inner_diameter": f"{inner!r} m"}
+    piece: dict[str, Any] = {"length": length, **diameters, "material": material}
+    if layers:
+        top = max(at(layer, "od") for layer in layers)
+        mass = sum(_material(layer)[1][0] * (at(layer, "od") ** 2 - at(layer, "id") ** 2) for layer in layers)
+        if any(at(layer, "id") < outer - 1e-9 for layer in layers):
+            raise ValueError(f"a layer without stiffness lies inside the shaft at node {core['n']}")
+        density = mass / (top**2 - outer**2)
+        piece |= {"layer_diameter": f"{top!r} m", "layer_density": f"{density!r} kg/m^3"}
+    return piece
+
+
+def _material(item: Mapping[str, Any]) -> tuple[str, tuple[float, float, float]]:
+    """Name as one word, and density [kg/m³], elastic and shear modulus [Pa]."""
+    told = item["material"]
+    if isinstance(told, str):
+        if told.lower() not in _BUILT_IN:
+            raise ValueError(f"the material {told!r} is only named and not known here")
+        return told, _BUILT_IN[told.lower()]
+    name = re.sub(r"\W+", "_", str(told["name"])).strip("_") or "material"
+    rho, E, G = float(told["rho"]), float(told["E"]), told.get("G_s")
+    return name, (rho, E, E / (2.0 * (1.0 + float(told["Poisson"]))) if G is None else float(G))
+
+
+def _disc(kind: str, item: Mapping[str, Any], nodes: list[int]) -> dict[str, Any]:
+    disc: dict[str, Any] = {"name": str(item.get("tag") or kind), "node": nodes[int(item["n"])]}
+    if kind == "PointMass":
+        masses = {float(item[key]) for key in ("m", "mx", "my") if item.get(key)}
+        if len(masses) != 1:
+            raise ValueError(f"the point mass at node {item['n']} differs between the directions")
+        return disc | {"mass": f"{masses.pop()!r} kg"}
+    disc["mass"] = f"{float(item['m'])!r} kg"
+    if float(item["Id"]) or float(item["Ip"]):
+        disc["polar_inertia"] = f"{float(item['Ip'])!r} kg m^2"
+        disc["diametral_inertia"] = f"{float(item['Id'])!r} kg m^2"
+    return disc
+
+
+def _is_spring(kind: str) -> bool:
+    return "Bearing" in kind or kind == "SealElement"
+
+
+def _spring(k: int, kind: str, item: Mapping[str, Any], nodes: list[int]) -> Spring:
+    told: dict[str, tuple[float, ...]] = {}
+    for key, value in item.items():
+        key = "frequency" if key == "speed" else key  # version 3 calls the speeds of a table what they are
+        listed = value if isinstance(value, list) else [] if value is None else [value]
+        if _COEFFICIENT.fullmatch(key) and listed:
+            told[key] = tuple(map(float, listed))
+    for letter in ("k", "c"):  # what is not given in y is as in x, at every speed
+        if f"{letter}xx" in told:
+            told.setdefault(f"{letter}yy", told[f"{letter}xx"])
+
+    def pair(first: str, second: str) -> tuple[float, float]:
+        return told.get(first, (0.0,))[0], told.get(second, (0.0,))[0]
+
+    says_more = any(  # coefficients change with speed, or act along the axis or as a mass
+        len(values) > 1 or ((key[0] == "m" or key[1:] == "zz") and any(values))
+        for key, values in told.items()
+    )
+    return Spring(
+        node=nodes[int(item["n"])],
+        name=str(item.get("tag") or f"bearing {k + 1}"),
+        stiffness=pair("kxx", "kyy"),
+        damping=pair("cxx", "cyy"),
+        cross_stiffness=pair("kxy", "kyx"),
+        cross_damping=pair("cxy", "cyx"),
+        kind="SealElement" if kind == "SealElement" else "BearingElement",
+        told=told if says_more else {},
+    )
+
+
+def write_ross(rotor: Rotor, path: str | Path, springs: Iterable[Spring] = ()) -> None:
+    """Write a rotor as a file that ROSS loads, TOML or JSON by its suffix; `read_ross` gives it back.
+
+    A layer becomes an element around the shaft that carries no load. ROSS wants materials without blanks.
+    """
+    path = Path(path)
+    content: dict[str, Any] = {"ross_version": _FORMAT_VERSION, "parameters": {}}
+
+    def add(key: str, entry: dict[str, Any]) -> None:
+        # discs and bearings of one name are still several
+        content[key if key not in content else f"{key}_{len(content)}"] = entry
+
+    for n, element in enumerate(rotor.elements):
+        shear = element.youngs_modulus / (2.0 * (1.0 + element.poisson_ratio))
+        core = (element.material, element.density, element.youngs_modulus, shear)
+        rings = [("", element.inner_diameter, element.outer_diameter, core)]
+        if element.layer_diameter is not None:
+            name, density = f"layer_{element.layer_density:g}", element.layer_density
+            soft = (name, density, _LAYER_MODULUS, _LAYER_MODULUS / 2.6)
+            rings.append((" layer", element.outer_diameter, element.layer_diameter, soft))
+        for suffix, inner, outer, (name, rho, E, G) in rings:
+            tag = f"Shaft Element {n}{suffix}"
+            material = {"name": "_".join(name.split()), "rho": rho, "E": E, "G_s": G, "color": "#525252"}
+            content[f"ShaftElement_{tag}"] = {
+                "L": element.length,
+                "idl": inner,
+                "odl": outer,
+                "idr": inner,
+                "odr": outer,
+                "n": n,
+                "axial_force": 0,
+                "torque": 0,
+                "shear_effects": True,
+                "rotary_inertia": True,
+                "gyroscopic": True,
+                "shear_method_calc": "cowper",
+                "tag": tag,
+                "alpha": 0.0,
+                "beta": 0.0,
+                "material": material,
+            }
+    for k, disc in enumerate(rotor.discs):
+        tag = disc.name or f"Disk {k}"
+        inertia = {"Id": disc.diametral_inertia.value, "Ip": disc.polar_inertia.value}
+        shown = {"tag": tag, "scale_factor": 1.0, "color": "Firebrick"}
+        add(f"DiskElement_{tag}", {"n": disc.node - 1, "m": disc.mass.value, **inertia, **shown})
+    for spring in springs:
+        told: dict[str, list[float]] = {key: list(values) for key, values in spring.told.items()}
+        for letter, matrix in (("k", spring.stiffness_matrix), ("c", spring.damping_matrix)):
+            if not spring.told:
+                (xx, xy), (yx, yy) = matrix
+                values = {"xx": xx, "xy": xy, "yx": yx, "yy": yy}
+                told |= {f"{letter}{axes}": [value] for axes, value in values.items()}
+        add(f"{spring.kind}_{spring.name}", {"n": spring.node - 1, "tag": spring.name, **told})
+    if path.suffix.lower() == ".json":
+        write_text(path, json.dumps(content, indent=2))
+        return
+    import tomlkit
+
+    write_text(path, tomlkit.dumps(content))
 
 
 TABLES = (".csv", ".txt", ".tsv", ".xlsx", ".xlsm")

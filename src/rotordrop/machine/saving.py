@@ -54,43 +54,39 @@ def _content(part: Description) -> dict[str, Any]:
     """What a description writes: texts, tables and lists of tables, by key."""
     content: dict[str, Any] = {}
     for name in sorted(type(part).model_fields, key=lambda name: name != "name"):
-        if name in part.model_fields_set and (value := getattr(part, name)) is not None:
-            content[name] = _item(type(part), name, value)
+        value = getattr(part, name)
+        if name not in part.model_fields_set or value is None:
+            continue
+        if isinstance(value, Known):
+            physical = part.physical(name)
+            content[name] = _Written(_value_text(value, physical.kind if physical else "dimensionless"))
+        elif isinstance(value, Description):
+            content[name] = _content(value)
+        elif isinstance(value, dict):
+            content[name] = {key: _content(item) for key, item in value.items()}
+        elif isinstance(value, tuple) and value and isinstance(value[0], Description):
+            content[name] = [_content(item) for item in value]
+        else:
+            content[name] = _Written(_plain_text(value))
     return _shorthand(part, content)
-
-
-def _item(owner: type[Description], name: str, value: Any) -> Any:
-    if isinstance(value, Known):
-        return _Written(
-            _value_text(value, physical.kind if (physical := owner.physical(name)) else "dimensionless")
-        )
-    if isinstance(value, Description):
-        return _content(value)
-    if isinstance(value, dict):
-        return {key: _content(item) for key, item in value.items()}
-    if isinstance(value, tuple) and value and isinstance(value[0], Description):
-        return [_content(item) for item in value]
-    return _Written(_plain_text(value))
 
 
 def _shorthand(part: Description, content: dict[str, Any]) -> dict[str, Any]:
     """Write what the file says in another way than the description."""
     if isinstance(part, Rotor) and "node_positions" in content:
-        content["node_positions"] = _positions(part.node_positions)
+        texts = [_number_text(position, "length").split(" ", 1) for position in part.node_positions]
+        in_mm = all(unit == "mm" for _, unit in texts)
+        numbers = [number for number, _ in texts] if in_mm else [repr(one) for one in part.node_positions]
+        unit = _Written(_plain_text("mm" if in_mm else "m"))
+        content["node_positions"] = {"unit": unit, "values": _Written(f"[{', '.join(numbers)}]")}
     if isinstance(part, BalanceGrade):
-        grade = _Written(_plain_text(f"G {repr(part.grade_mm_s).removesuffix('.0')}"))
-        content = {"grade": grade} | {key: value for key, value in content.items() if key != "grade_mm_s"}
+        del content["grade_mm_s"]
+        grade = _plain_text(f"G {repr(part.grade_mm_s).removesuffix('.0')}")
+        content = {"grade": _Written(grade)} | content
     for field, key in part.written_as.items():
         if field in content:
             content[key] = content.pop(field)
     return content
-
-
-def _positions(positions: tuple[float, ...]) -> dict[str, Any]:
-    texts = [_number_text(position, "length").split(" ", 1) for position in positions]
-    unit = "mm" if all(unit == "mm" for _, unit in texts) else "m"
-    numbers = [number for number, _ in texts] if unit == "mm" else [repr(position) for position in positions]
-    return {"unit": _Written(_plain_text(unit)), "values": _Written(f"[{', '.join(numbers)}]")}
 
 
 def _table(content: dict[str, Any], header: str) -> Iterator[str]:
@@ -124,29 +120,23 @@ def _plain_text(value: Any) -> str:
 
 
 def _value_text(value: Known, kind: str) -> str:
-    entries = {"guess" if _is_plain_guess(value) else "value": _quoted(value.value, kind)}
+    is_guess = value.status == "guess" and value.interval_90 is None and value.standard_error is None
+    entries = {"guess" if is_guess else "value": _quoted(value.value, kind)}
     for key, pair in (("range", value.range), ("interval", value.interval_90)):
         if pair is not None:
             entries[key] = f"[{_quoted(pair[0], kind)}, {_quoted(pair[1], kind)}]"
     for key in ("standard_error", "lower", "upper"):
         if (number := getattr(value, key)) is not None:
             entries[key] = _quoted(number, kind)
+    # the status that a reader would take it for need not be written
+    read_back = "estimated" if entries.keys() & {"interval", "standard_error", "lower", "upper"} else "given"
     if value.source is not None:
         entries["source"] = _plain_text(value.source)
-    if "guess" not in entries and value.status != _status_read_back(value):
+    if not is_guess and value.status != read_back:
         entries["status"] = _plain_text(value.status)
     if set(entries) == {"value"}:
         return entries["value"]
     return "{ " + ", ".join(f"{key} = {text}" for key, text in entries.items()) + " }"
-
-
-def _is_plain_guess(value: Known) -> bool:
-    return value.status == "guess" and value.interval_90 is None and value.standard_error is None
-
-
-def _status_read_back(value: Known) -> str:
-    known = (value.interval_90, value.standard_error, value.lower, value.upper)
-    return "given" if all(number is None for number in known) else "estimated"
 
 
 def _quoted(number: float, kind: str) -> str:
@@ -163,17 +153,11 @@ def _number_text(number: float, kind: str) -> str:
         text = f"{number / factor:.12g} {unit}"
         if parse_quantity(text, kind) == number and (number == 0.0 or 1e-3 <= abs(number / factor) < 1e6):
             return text
-    return f"{_shortest(number)} {si_unit(kind)}"
-
-
-def _shortest(number: float) -> str:
-    """Write a number so that it reads back exactly, with or without exponent, whichever is shorter."""
-    plain = repr(number)
-    mantissa, exponent = f"{number:.16e}".split("e")
-    for digits in range(17):
-        candidate, exponent = f"{number:.{digits}e}".split("e")
-        if float(f"{candidate}e{exponent}") == number:
-            mantissa = candidate
-            break
+    # else in its SI unit, with or without exponent, whichever is shorter
+    plain = repr(number).removesuffix(".0")
+    candidates = (f"{number:.{digits}e}" for digits in range(17))
+    mantissa, exponent = next((one for one in candidates if float(one) == number), f"{number:.16e}").split(
+        "e"
+    )
     scientific = f"{mantissa}e{int(exponent)}"
-    return scientific if len(scientific) < len(plain.removesuffix(".0")) else plain.removesuffix(".0")
+    return f"{scientific if len(scientific) < len(plain) else plain} {si_unit(kind)}"
