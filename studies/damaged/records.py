@@ -36,7 +36,7 @@ from rotordrop.evidence.quality.channels import check_channels
 from rotordrop.evidence.quality.clock import check_blocks, check_clock
 from rotordrop.record import read_record
 from rotordrop.record.record import Record
-from rotordrop.record.unpacking import Content
+from rotordrop.record.sandbox import Content
 
 BLOCK = 250
 CUT_ROWS = 60
@@ -73,7 +73,7 @@ def damaged(content: bytes, seed: int) -> tuple[str, bytes]:
 
 def _plain(path: Path, kind: str) -> Content:
     """Unpack in this process what the program unpacks in a child."""
-    content: Content = import_module(f"rotordrop.record.unpacking.{kind}").unpacked(path)
+    content: Content = import_module(f"rotordrop.record.readers.{kind}").unpacked(path)
     return content
 
 

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from rotordrop.files import atomic_path, make_folder, write_json
 from rotordrop.record.record import Record, sha256_of
-from rotordrop.record.writers import recording_of, write_delimited, write_hdf5
+from rotordrop.record.recording import recording_of
+from rotordrop.record.writers import write_delimited, write_hdf5
 from rotordrop_bench.recording import SyntheticDrop
 
 Format = Literal["csv", "h5"]

@@ -126,8 +126,8 @@ def profile(
 
     Example: rotordrop profile record.csv
     """
+    from rotordrop.record.columns import guess_profile
     from rotordrop.record.profile import profile_of, save_profile
-    from rotordrop.record.profile_guess import guess_profile
     from rotordrop.record.readers import read_recording
 
     channels = {}
@@ -338,7 +338,6 @@ def _signal(machine: Machine, path: Path, profile: Path | None) -> tuple[CoastDo
     from rotordrop.estimate.recorded_coast_down import recorded_coast_down
     from rotordrop.estimate.simulated_coast_down import simulated_coast_down
     from rotordrop.record.record import read_record
-    from rotordrop.record.simulated import is_simulated
     from rotordrop.report.content import SIMULATED_RECORD
     from rotordrop.simulate.coast_down_file import is_coast_down
 
@@ -346,4 +345,4 @@ def _signal(machine: Machine, path: Path, profile: Path | None) -> tuple[CoastDo
         text = "Everything on this page is computed from the machine description; nothing was measured."
         return simulated_coast_down(path, machine), text
     record = read_record(path, machine, profile=profile)
-    return recorded_coast_down(machine, record), SIMULATED_RECORD if is_simulated(record) else ""
+    return recorded_coast_down(machine, record), SIMULATED_RECORD if record.is_simulated else ""

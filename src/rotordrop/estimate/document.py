@@ -18,7 +18,6 @@ from rotordrop.estimate.methods import Replay
 from rotordrop.estimate.severity_numbers import severity_values
 from rotordrop.evidence.first_contact import TimedContact
 from rotordrop.known import Known
-from rotordrop.record.event_date import event_date
 from rotordrop.simulate.fingerprint import fingerprint
 
 FORMAT = "rotordrop estimate 2"
@@ -94,7 +93,7 @@ def _heading(estimate: Estimate) -> dict[str, Any]:
         "machine": estimate.machine.name,
         "record": estimate.name if record.path is None else record.path.name,
         "record_sha256": record.sha256,
-        "recorded": event_date(record),
+        "recorded": record.event_date,
         "simulated_record": estimate.simulated_record,
         "method": "replay" if isinstance(method, Replay) else "tracked",
         "quick": not isinstance(method, Replay) and method.quick,

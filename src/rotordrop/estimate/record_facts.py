@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from rotordrop.errors import RecordError
 from rotordrop.evidence.evidence import Evidence, Missing
 from rotordrop.evidence.quality import Finding, Kind, checked, refuse_unusable
-from rotordrop.record.simulated import is_simulated
 
 NO_TAIL = "no settled tail: the air gap rests on its prior and on the contacts; give one with --tail"
 COUNTED_TWICE = (
@@ -68,4 +67,4 @@ def facts_of(evidence: Evidence) -> RecordFacts:
         same = [d.name for d in origin.drops if d.name == name or (d.sha256 and d.sha256 == record.sha256)]
         warnings += [COUNTED_TWICE.format(one) for one in same]
         warnings += [] if origin.consistent else [BESIDE]
-    return RecordFacts(findings=findings, warnings=tuple(warnings), simulated=is_simulated(record))
+    return RecordFacts(findings=findings, warnings=tuple(warnings), simulated=record.is_simulated)

@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from rotordrop.record.record import Record as Record
     from rotordrop.record.record import read_record as read_record
     from rotordrop.record.record import save_record as save_record
+    from rotordrop.record.recording import recording_of as recording_of
     from rotordrop.record.speed import SpeedAtDrop as SpeedAtDrop
     from rotordrop.record.speed import smooth_speed as smooth_speed
     from rotordrop.record.speed import speed_at_drop as speed_at_drop
-    from rotordrop.record.writers import recording_of as recording_of
     from rotordrop.record.writers import write_delimited as write_delimited
     from rotordrop.record.writers import write_hdf5 as write_hdf5
 
@@ -26,9 +26,10 @@ _PUBLIC = {
     "axes": ("sensor_planes",),
     "examples": ("example_record_names", "example_record_path"),
     "profile": ("Profile", "load_profile", "save_profile"),
+    "recording": ("recording_of",),
     "record": ("Record", "read_record", "save_record"),
     "speed": ("SpeedAtDrop", "smooth_speed", "speed_at_drop"),
-    "writers": ("recording_of", "write_delimited", "write_hdf5"),
+    "writers": ("write_delimited", "write_hdf5"),
 }
 _HOME = {name: module for module, names in _PUBLIC.items() for name in names}
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
 
@@ -27,6 +29,12 @@ def example_record_path(name: str) -> Path:
     if name not in paths:
         raise UsageError(f"no example recording {name!r}; there are {', '.join(sorted(paths))}")
     return paths[name]
+
+
+@lru_cache(maxsize=1)
+def example_hashes() -> frozenset[str]:
+    """SHA-256 of the recordings that come with the package."""
+    return frozenset(hashlib.sha256(path.read_bytes()).hexdigest() for path in _paths().values())
 
 
 def _paths() -> dict[str, Path]:

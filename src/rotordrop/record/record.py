@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotordrop.elements.sensor import Sensor
-from rotordrop.errors import RecordError
+from rotordrop.errors import RecordError, UsageError
 from rotordrop.machine import Machine
 from rotordrop.record.axes import (
     Plane,
@@ -23,24 +23,28 @@ from rotordrop.record.axes import (
     sensor_directions,
     sensor_planes,
 )
-from rotordrop.record.matching import displacement, find_pulses, find_speed, match_sensors, speed_factor
-from rotordrop.record.profile import Profile, load_profile
+from rotordrop.record.clock import at_one_rate, shared_clock
+from rotordrop.record.columns import displacement, find_pulses, find_speed, match_sensors, speed_factor
+from rotordrop.record.examples import example_hashes
+from rotordrop.record.profile import Profile, SpeedSource, load_profile
 from rotordrop.record.readers import read_recording
-from rotordrop.record.recording import MARKS, Array, Channel, Recording
+from rotordrop.record.recording import MARKS, Array, Channel, Recording, recording_of, spelled, split_unit
 from rotordrop.record.speed import readings_of_held_signal
-from rotordrop.record.tacho import Passages, passages
-from rotordrop.record.writers import recording_of, write_hdf5
-from rotordrop.units import format_quantity, parse_quantity
+from rotordrop.record.tacho import passages
+from rotordrop.record.writers import write_hdf5
+from rotordrop.units import parse_quantity
 
 SPEED_SOURCE, BY_HAND = "speed_source", "given by hand"
 """Header entry of a saved record whose speed nobody measured."""
 
+EVENT_KEYS = (
+    *("start", "event_time", "event time", "trigger_time", "trigger time", "trigger", "date", "recorded"),
+    "time",
+)
+"""Header entries of recorders that say when the drop was, the most telling first."""
 
-LEAST_REPEATED = 0.01
-"""Share of time stamps equal to their neighbour from which a clock may be a rounded one [1]."""
-
-ROUNDING_SLACK = 0.05
-"""How far a stamp may be off beyond half its resolution, for the fit of the even clock [1]."""
+_TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}
+_TIME_NAMES = ("time", "t", "zeit")
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -126,11 +130,28 @@ class Record:
         >>> record.sampling_rate
         20000.0
         """
-        from rotordrop.record.arrays import record_from_arrays
-
-        return record_from_arrays(
-            machine, time, signals, unit=unit, speed=speed, time_unit=time_unit, start=start
-        )
+        names = [sensor.name for sensor in machine.sensors]
+        columns = _columns(signals, names)
+        count = len(next(iter(columns.values())))
+        if isinstance(time, str):
+            rate = parse_quantity(time, "frequency")
+            clock = np.asarray(parse_quantity(start, "time") + np.arange(count) / rate)
+        elif time_unit not in _TIMES:
+            raise UsageError(f"time_unit is {time_unit!r}; expected one of {', '.join(_TIMES)}")
+        else:
+            clock = np.asarray(time, dtype=np.float64) * _TIMES[time_unit]
+        if clock.shape != (count,):
+            raise RecordError(
+                f"time has the shape {clock.shape} and the signals have {count} samples; give one time for "
+                "each sample, or a sampling rate such as '20 kHz'"
+            )
+        channels = []
+        for name, values in columns.items():
+            given = unit.get(name, "") if isinstance(unit, Mapping) else unit
+            if not given:
+                raise UsageError(f"the unit of {name} is {given!r}; say it, for example unit='um'")
+            channels.append(Channel(name=name, label=name, unit=spelled(given), values=values, time=clock))
+        return _record_of_channels(machine, channels, clock, speed, Profile())
 
     @classmethod
     def from_dataframe(
@@ -158,9 +179,19 @@ class Record:
         profile : Profile, optional
             Which column is which sensor, where the names differ.
         """
-        from rotordrop.record.arrays import record_from_dataframe
-
-        return record_from_dataframe(machine, frame, unit=unit, speed=speed, profile=profile)
+        clock, taken = _clock_of(frame)
+        channels = []
+        for column in frame.columns:
+            values = np.asarray(frame[column])
+            if column is taken or not np.issubdtype(values.dtype, np.number):
+                continue
+            name, label, own = split_unit(str(column))
+            by_name = unit if isinstance(unit, Mapping) else {}
+            given = by_name.get(name, by_name.get(str(column), own))
+            given = given if isinstance(unit, Mapping) else own or unit or ""
+            values = values.astype(np.float64)
+            channels.append(Channel(name=name, label=label, unit=spelled(given), values=values, time=clock))
+        return _record_of_channels(machine, channels, clock, speed, profile or Profile())
 
     def __repr__(self) -> str:
         """Name, length, rate and channels."""
@@ -194,12 +225,13 @@ class Record:
         RecordError
             When no plane is whole.
         """
-        there = [node for node in {sensor.node for sensor in self.sensors} if self._resolves(node)]
-        columns = [i for i, sensor in enumerate(self.sensors) if sensor.node in there]
+        columns = [
+            i
+            for i, sensor in enumerate(self.sensors)
+            if sees_both_directions([other for other in self.sensors if other.node == sensor.node])
+        ]
+        # without a whole plane the record stays as it is: whoever asks for its planes says what is missing
         return self if len(columns) in (0, len(self.sensors)) else self.of_channels(columns)
-
-    def _resolves(self, node: int) -> bool:
-        return sees_both_directions([sensor for sensor in self.sensors if sensor.node == node])
 
     @cached_property
     def directions(self) -> Array:
@@ -254,6 +286,19 @@ class Record:
         return self.path.stem if self.path else "record"
 
     @property
+    def event_date(self) -> str:
+        """When the recorder says the drop was; empty where its header does not tell."""
+        entries = {str(key).strip().lower(): str(value) for key, value in self.metadata.items()}
+        dates = (entries.get(key, "") for key in EVENT_KEYS)
+        return next((date[:40] for date in dates if any(sign.isdigit() for sign in date)), "")
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether it ships with rotordrop, or its header or notes say that it is simulated."""
+        words = " ".join((*self.metadata, *self.metadata.values(), *self.notes)).lower()
+        return self.sha256 in example_hashes() or "simulat" in words or "synthe" in words
+
+    @property
     def duration(self) -> float:
         """Time from the first to the last sample [s]."""
         return float(self.time[-1] - self.time[0])
@@ -274,8 +319,7 @@ class Record:
         if not keep.any():
             raise RecordError(
                 f"the record reaches from {self.time[0]:.6g} s to {self.time[-1]:.6g} s; nothing lies "
-                "between "
-                f"{start:.6g} s and {end:.6g} s"
+                f"between {start:.6g} s and {end:.6g} s"
             )
         return replace(
             self,
@@ -332,174 +376,119 @@ def record_of(
     place = str(path or "the recording")
     if not sensors:
         raise RecordError("the machine has no sensors; describe them in [[sensors]] of the machine file")
-    matched = match_sensors(recording, sensors, profile, place)
-    matched, thinned = _at_one_rate(matched)
-    time, rate = _shared_clock(matched, place)
-    rounded = (
-        ("time stamps are rounded; an even clock was put behind them",) if _repeats(matched[0].time) else ()
-    )
+    matched, notes = at_one_rate(match_sensors(recording, sensors, profile, place))
+    time, rate, rounded = shared_clock(matched, place)
     signals, words = np.empty((len(time), len(sensors))), []
     for column, (channel, sensor) in enumerate(zip(matched, sensors, strict=True)):
         signals[:, column], said = displacement(channel, sensor, recording, profile, place)
         words += said
-    pulses = _pulses(recording, matched, profile, place)
-    speed_time, speed_readings, notes = _speed(recording, matched, profile, time, place, pulses)
-    speed = None
-    if speed_time is not None and speed_readings is not None:
-        speed = np.interp(time, speed_time, speed_readings)
-    spoken = tuple(dict.fromkeys(words))
+    marks = next((c.values for c in recording.channels if c.name == MARKS and c.unit == "s"), None)
+    when: Array | None = None
+    readings: Array | None = None
+    pulses = find_pulses(recording, matched, profile, place)
+    if pulses is not None:
+        passed = passages(
+            pulses.time,
+            pulses.values,
+            per_turn=profile.speed.pulses_per_turn,
+            edge=profile.speed.edge,
+            place=f"{place}: channel {pulses.label!r}",
+        )
+        marks = passed.marks if passed.marks.size else None
+        words += passed.warnings
+    if profile.speed.constant is not None:
+        when, readings = time[[0, -1]], np.full(2, parse_quantity(profile.speed.constant, "speed"))
+        notes.append(f"speed given by hand: {profile.speed.constant}")
+    elif (channel_of_speed := find_speed(recording, matched, profile, place)) is not None:
+        when, readings = readings_of_held_signal(channel_of_speed.time, channel_of_speed.values)
+        readings = readings * speed_factor(channel_of_speed, profile, place)
+        notes.append(f"shaft speed from {channel_of_speed.label!r}")
+    elif pulses is not None:
+        when, readings = passed.time, passed.speed
+        notes.append(f"shaft speed from the pulses of {profile.speed.pulses!r}")
     return Record(
         time=time,
         signals=signals,
         sensors=sensors,
         sampling_rate=rate,
-        speed=speed,
-        speed_time=speed_time,
-        speed_readings=speed_readings,
+        speed=None if when is None or readings is None else np.interp(time, when, readings),
+        speed_time=when,
+        speed_readings=readings,
         speed_by_hand=profile.speed.constant is not None or recording.metadata.get(SPEED_SOURCE) == BY_HAND,
-        marks=_marks(recording, pulses),
+        marks=marks,
         path=path,
         sha256=sha256,
         metadata=recording.metadata,
-        notes=(*recording.notes, *thinned, *notes, *(rounded if np.all(np.diff(time) > 0.0) else ())),
-        warnings=(*recording.warnings, *spoken, *(pulses.warnings if pulses else ())),
+        notes=(*recording.notes, *notes, *rounded),
+        warnings=(*recording.warnings, *dict.fromkeys(words)),
     )
 
 
-def _at_one_rate(channels: tuple[Channel, ...]) -> tuple[tuple[Channel, ...], tuple[str, ...]]:
-    """Take every k-th sample of channels sampled k times as fast as the slowest, whose clock they share.
+def _record_of_channels(
+    machine: Machine,
+    channels: Sequence[Channel],
+    clock: Array,
+    speed: Any,
+    rules: Profile,
+) -> Record:
+    """A record of channels in memory, with the speed given by hand or as readings."""
+    if isinstance(speed, str):
+        parse_quantity(speed, "speed")
+        rules = rules.model_copy(update={"speed": SpeedSource(constant=speed)})
+    elif speed is not None:
+        if not isinstance(speed, tuple) or len(speed) != 2 or not isinstance(speed[1], str):
+            what = repr(speed) if isinstance(speed, int | float) else f"a {type(speed).__name__}"
+            raise UsageError(
+                f"speed is {what}; expected a text such as '60 Hz', or readings with their unit, "
+                "(array, 'rpm')"
+            )
+        values, name = np.asarray(speed[0], dtype=np.float64), "shaft speed"
+        if values.shape != clock.shape:
+            raise RecordError(f"the speed has the shape {values.shape}; the time has {clock.shape}")
+        of_speed = Channel(name=name, label=name, unit=spelled(speed[1]), values=values, time=clock)
+        channels = [*channels, of_speed]
+    return record_of(Recording(channels=tuple(channels)), machine.sensors, profile=rules)
 
-    Nothing is filtered or interpolated: what is kept was read. Channels whose clocks do not meet are left for
-    `_shared_clock` to refuse.
-    """
-    steps = [_step(channel.time) for channel in channels]
-    slowest = max(steps)
-    slow = channels[steps.index(slowest)].time
-    kept, notes = [], []
-    for channel, step in zip(channels, steps, strict=True):
-        times = round(slowest / step) if step > 0.0 else 1
-        thin = channel.time[::times][: len(slow)]
-        meets = len(thin) == len(slow) and float(np.max(np.abs(thin - slow), initial=0.0)) <= 1e-3 * slowest
-        if times < 2 or not meets:
-            kept.append(channel)
-            continue
-        kept.append(replace(channel, time=thin, values=channel.values[::times][: len(slow)]))
-        notes.append(
-            f"{channel.label} is sampled {times} times as fast as the slowest sensor; every {times}th sample "
-            "is used"
+
+def _columns(signals: Mapping[str, ArrayLike] | ArrayLike, names: list[str]) -> dict[str, Array]:
+    """Readings by the name of the sensor, each of shape (N,)."""
+    if isinstance(signals, Mapping):
+        columns = {str(name): np.asarray(values, dtype=np.float64) for name, values in signals.items()}
+        lengths = {name: values.shape for name, values in columns.items()}
+        shapes = set(lengths.values())
+        if len(shapes) != 1 or any(len(shape) != 1 for shape in shapes):
+            raise RecordError(f"signals must be arrays of one length each; they have the shapes {lengths}")
+        return columns
+    table = np.asarray(signals, dtype=np.float64)
+    if table.ndim != 2 or table.shape[1] != len(names):
+        raise RecordError(
+            f"signals have the shape {table.shape}; expected (samples, {len(names)}), one column for each of "
+            f"{', '.join(names)}, or a mapping from the names of sensors to arrays"
         )
-    return tuple(kept), tuple(notes)
+    return {name: table[:, k].copy() for k, name in enumerate(names)}
 
 
-def _shared_clock(channels: tuple[Channel, ...], place: str) -> tuple[Array, float]:
-    """One clock for all sensors, evenly spaced where the file means it to be."""
-    first = channels[0]
-    for other in channels[1:]:
-        if len(other.time) != len(first.time):
+def _clock_of(frame: Any) -> tuple[Array, Any]:
+    """Time [s] of the rows, from a column "time" or "t", else from the index; and the column taken."""
+    values, unit, where, taken = np.asarray(frame.index), "", "the index", None
+    for column in frame.columns:
+        name, _, written = split_unit(str(column))
+        if name.lower() in _TIME_NAMES:
+            values, unit, where, taken = np.asarray(frame[column]), written, str(column), column
+            break
+    else:
+        if np.issubdtype(values.dtype, np.integer) and frame.index.name is None:
             raise RecordError(
-                f"{place}: {first.label!r} has {len(first.time)} samples and {other.label!r} "
-                f"{len(other.time)}; the "
-                "channels must be sampled together, export them at one rate and length"
+                "the table has no column 'time' and its index only counts rows; name the time 'time [s]'"
             )
-        shift = float(np.max(np.abs(other.time - first.time), initial=0.0))
-        if shift > 1e-3 * _step(first.time):
-            raise RecordError(
-                f"{place}: the clocks of {first.label!r} and {other.label!r} differ by "
-                f"{format_quantity(shift, 'time')}; the channels must be sampled together"
-            )
-    if len(first.time) < 2:
-        raise RecordError(f"{place}: {len(first.time)} samples are no recording")
-    return _even(first.time)
-
-
-def _step(time: Array) -> float:
-    return float(np.median(np.diff(time))) if len(time) > 1 else 1.0
-
-
-def _even(time: Array) -> tuple[Array, float]:
-    """Replace times that are even but for rounding in the file by exactly even ones."""
-    count = len(time) - 1
-    step = (time[-1] - time[0]) / count
-    even = time[0] + step * np.arange(count + 1)
-    if step > 0 and float(np.max(np.abs(time - even))) <= 0.02 * step:
-        rate = float(f"{1.0 / step:.9g}")
-        return time[0] + np.arange(count + 1) / rate, rate
-    rounded = _rounded_clock(time)
-    if rounded is not None:
-        return rounded
-    usual = _step(time)
-    return time.copy(), 1.0 / usual if usual > 0 else float("nan")
-
-
-def _repeats(time: Array) -> bool:
-    return bool(np.any(np.diff(time) == 0.0))
-
-
-def _rounded_clock(time: Array) -> tuple[Array, float] | None:
-    """The even clock behind stamps that were rounded to about their step; None where there is none.
-
-    Such stamps are multiples of one resolution, many of them equal to their neighbour, and none is further
-    from the even clock than half the resolution. Rows that are there twice, or missing, drift away from it.
-    """
-    steps = np.diff(time)
-    if np.mean(steps == 0.0) < LEAST_REPEATED or np.any(steps < 0.0) or not np.any(steps > 0.0):
-        return None
-    resolution = float(np.min(steps[steps > 0.0]))
-    count = np.rint((time - time[0]) / resolution)
-    if np.max(np.abs(time - time[0] - count * resolution)) > 1e-3 * resolution:
-        return None
-    index = np.arange(len(time), dtype=np.float64)
-    slope, start = np.polyfit(index, count, 1)
-    if np.max(np.abs(count - start - slope * index)) > 0.5 + ROUNDING_SLACK:
-        return None
-    if (
-        abs(slope - 1.0) * len(time) < 1.0
-    ):  # within one step over the whole record: the step is the resolution
-        slope = 1.0
-        start = float(np.mean(count - index))
-    rate = float(f"{1.0 / (slope * resolution):.9g}")
-    return time[0] + start * resolution + index / rate, rate
-
-
-def _pulses(
-    recording: Recording, taken: tuple[Channel, ...], profile: Profile, place: str
-) -> Passages | None:
-    channel = find_pulses(recording, taken, profile, place)
-    if channel is None:
-        return None
-    rules, where = profile.speed, f"{place}: channel {channel.label!r}"
-    return passages(
-        channel.time, channel.values, per_turn=rules.pulses_per_turn, edge=rules.edge, place=where
-    )
-
-
-def _marks(recording: Recording, pulses: Passages | None) -> Array | None:
-    """Passages of a mark: from pulses, or as a record that was saved keeps them."""
-    if pulses is not None:
-        return pulses.marks if pulses.marks.size else None
-    kept = [channel.values for channel in recording.channels if channel.name == MARKS and channel.unit == "s"]
-    return kept[0] if kept else None
-
-
-def _speed(
-    recording: Recording,
-    taken: tuple[Channel, ...],
-    profile: Profile,
-    time: Array,
-    place: str,
-    pulses: Passages | None,
-) -> tuple[Array | None, Array | None, list[str]]:
-    if profile.speed.constant is not None:
-        value = parse_quantity(profile.speed.constant, "speed")
-        note = f"speed given by hand: {profile.speed.constant}"
-        return time[[0, -1]], np.array([value, value]), [note]
-    channel = find_speed(recording, taken, profile, place)
-    if channel is None and pulses is not None:
-        return pulses.time, pulses.speed, [f"shaft speed from the pulses of {profile.speed.pulses!r}"]
-    if channel is None:
-        return None, None, []
-    when, readings = readings_of_held_signal(channel.time, channel.values)
-    return when, readings * speed_factor(channel, profile, place), [f"shaft speed from {channel.label!r}"]
+        unit = split_unit(str(frame.index.name or ""))[2]
+    if np.issubdtype(values.dtype, np.datetime64):
+        values = values - values[0]
+    if np.issubdtype(values.dtype, np.timedelta64):
+        return np.asarray(values / np.timedelta64(1, "s"), dtype=np.float64), taken
+    if unit and unit not in _TIMES:
+        raise RecordError(f"{where}: {unit!r} is no unit of time; write one of {', '.join(_TIMES)}")
+    return np.asarray(values, dtype=np.float64) * _TIMES[unit or "s"], taken
 
 
 def save_record(record: Record, path: str | Path) -> None:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+SPEED_UNITS = ("Hz", "rpm", "rad/s")
+"""Units by which a channel is known to be a shaft speed."""
 
 _UNITS = {
     "m": "m", "mm": "mm", "um": "um", "µm": "um", "μm": "um", "micron": "um", "nm": "nm",
@@ -18,7 +21,9 @@ _UNITS = {
     "min^-1": "rpm", "min⁻¹": "rpm", "/min": "rpm",
     "rad/s": "rad/s", "s": "s", "sec": "s", "ms": "ms", "us": "us", "µs": "us", "μs": "us", "min": "min",
 }  # fmt: skip
+
 _LONGEST_NAME = 200
+"""Characters of a column name that are looked at (chosen): damaged files hold names of megabytes."""
 
 MARKS = "mark_passages"
 """Channel of a saved record that holds when a mark of the shaft passed [s]."""
@@ -42,10 +47,9 @@ class Channel:
 
 @dataclass(frozen=True, kw_only=True)
 class Recording:
-    """All channels of a file and what the file says about them."""
+    """All channels of a file, in its order, and what the file says about them."""
 
     channels: tuple[Channel, ...]
-    """In the order of the file."""
     metadata: Mapping[str, str] = field(default_factory=dict)
     """Header entries as written."""
     notes: tuple[str, ...] = ()
@@ -58,33 +62,75 @@ class Recording:
     """Voltage at zero displacement stated in the file [V]."""
 
 
+def recording_of(
+    time: Array,
+    signals: Array,
+    names: Sequence[str],
+    *,
+    speed_time: Array | None = None,
+    speed: Array | None = None,
+    marks: Array | None = None,
+    metadata: Mapping[str, str] | None = None,
+    notes: tuple[str, ...] = (),
+    warnings: tuple[str, ...] = (),
+) -> Recording:
+    """Make a recording of displacement readings and, where known, the shaft speed.
+
+    Parameters
+    ----------
+    time : array, shape (N,)
+        Time of the samples [s].
+    signals : array, shape (N, S)
+        Readings [m].
+    names : sequence of str, length S
+        Names of the channels.
+    speed_time, speed : array, shape (K,), optional
+        When the speed was read [s] and what was read [rad/s].
+    marks : array, shape (M,), optional
+        When a mark of the shaft passed [s].
+    metadata : mapping of str to str, optional
+        Header entries.
+    notes, warnings : tuple of str
+        Kept with the recording.
+    """
+    channels = [
+        Channel(name=name, label=name, unit="m", values=signals[:, i], time=time)
+        for i, name in enumerate(names)
+    ]
+    if speed is not None and speed_time is not None:
+        turns = np.asarray(speed) / (2 * np.pi)
+        channels.append(Channel(name="speed", label="speed", unit="Hz", values=turns, time=speed_time))
+    if marks is not None:
+        channels.append(Channel(name=MARKS, label=MARKS, unit="s", values=marks, time=marks))
+    return Recording(channels=tuple(channels), metadata=dict(metadata or {}), notes=notes, warnings=warnings)
+
+
 def known_unit(text: str) -> str | None:
     """Give a unit in this package's spelling, or None when the text is not one found in recordings."""
     return _UNITS.get(text.strip().strip("[]()").lower())
 
 
-def split_unit(written: str) -> tuple[str, str, str]:
-    """Take a column name apart: ``"S_A [um]"`` and ``"S_A_um"`` give ``("S_A", label, "um")``.
+def spelled(unit: str) -> str:
+    """A unit in this package's spelling, or as written where it is not one found in recordings."""
+    return known_unit(unit) or unit
 
-    Returns
-    -------
-    name : str
-        The name without its unit.
-    label : str
-        The name without brackets, a unit-like ending kept: ``Probe_V`` may be a vertical probe.
-    unit : str
-        The unit, empty when there is none.
+
+def split_unit(written: str) -> tuple[str, str, str]:
+    """Take a column name apart into name, label and unit (empty when there is none).
+
+    ``"S_A [um]"`` gives ``("S_A", "S_A", "um")`` and ``"S_A_um"`` gives ``("S_A", "S_A_um", "um")``: a
+    unit-like ending stays in the label, as ``Probe_V`` may be a vertical probe.
     """
     written = " ".join(written[:_LONGEST_NAME].split())
     if written.endswith((")", "]")):
         name, mark, unit = written[:-1].rpartition("[" if written[-1] == "]" else "(")
         if mark:
             name, unit = name.strip(), unit.strip()
-            return name, name, known_unit(unit) or unit
+            return name, name, spelled(unit)
     name, mark, unit = written.rpartition("/")
     if mark and name.strip() and (name[-1] == " " or unit[:1] == " ") and known_unit(unit):
-        return name.strip(), name.strip(), known_unit(unit) or ""
+        return name.strip(), name.strip(), spelled(unit)
     name, mark, unit = written.rpartition("_")
     if name and mark and unit.isalpha() and known_unit(unit):
-        return name, written, known_unit(unit) or ""
+        return name, written, spelled(unit)
     return written, written, ""

@@ -12,7 +12,6 @@ from rotordrop._version import __version__
 from rotordrop.estimate.bearing_drop import History
 from rotordrop.estimate.estimate import CrossCheck, Estimate, FittedParameter, Innovations, ReplaySteps
 from rotordrop.estimate.methods import Replay
-from rotordrop.record.event_date import event_date
 from rotordrop.report.changed_section import changed_section
 from rotordrop.report.content import (
     SIMULATED_RECORD,
@@ -129,7 +128,7 @@ def _facts(estimate: Estimate) -> tuple[tuple[str, str], ...]:
         ("machine", machine.name if path is None else f"{machine.name} ({path.name})"),
         ("record", estimate.name if record.path is None else record.path.name),
         ("SHA-256", record.sha256 or "not from a file"),
-        *((("event", event),) if (event := event_date(record)) else ()),
+        *((("event", event),) if (event := record.event_date) else ()),
         ("power-off", f"{power_off.text} in record time (90 %: {power_off.interval_text})"),
         ("method", _method(estimate)),
         *(() if estimate.replay is None else (("intervals", _draws(estimate.replay)),)),

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from rotordrop._version import __version__
 from rotordrop.estimate.bearing_drop import AirGap, BearingMotions, Motion
-from rotordrop.record.simulated import is_simulated
 from rotordrop.report.content import (
     SIMULATED_RECORD,
     Card,
@@ -53,7 +52,7 @@ def look_page(seen: Look, *, drawn: bool = True) -> ReportContent:
         title=f"A look at {record.name}",
         subtitle=f"{len(seen.drops)} drop{'s' if len(seen.drops) > 1 else ''}{speed}",
         facts=_facts(seen),
-        simulated=SIMULATED_RECORD if is_simulated(record) else "",
+        simulated=SIMULATED_RECORD if record.is_simulated else "",
         verdict=(*_verdict(seen), *quality_statements(seen.findings)),
         cards=tuple(_card(seen, number) for number in range(len(seen.planes))),
         summary=(_timeline(seen),),

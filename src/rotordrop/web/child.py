@@ -149,7 +149,7 @@ def _record_file(job: Job) -> Path:
 
 def _channels(job: Job, made: Path, told: dict[str, Any]) -> None:
     """What a recording holds, which sensors look for a channel, and what could be guessed."""
-    from rotordrop.record.profile_guess import guess_profile
+    from rotordrop.record.columns import guess_profile
     from rotordrop.record.readers import read_recording
 
     machine, given = machine_of(job), profile_of(job, told["options"])

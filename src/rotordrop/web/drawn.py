@@ -166,7 +166,6 @@ def write_waterfall(
     options: Mapping[str, Any],
 ) -> None:
     """Write the frequencies of a coast-down: waterfalls and lines, their document, and their report."""
-    from rotordrop.record.simulated import is_simulated
     from rotordrop.report.content import SIMULATED_RECORD
     from rotordrop.report.page import write_page
     from rotordrop.report.waterfall_page import waterfall_page
@@ -181,7 +180,7 @@ def write_waterfall(
             ("centre of the bearings", found.signal.centre),
             *_origin(job, options, "waterfall").facts(record.sha256),
         ),
-        simulated=SIMULATED_RECORD if is_simulated(record) else "",
+        simulated=SIMULATED_RECORD if record.is_simulated else "",
     )
     write_page(content, made / "report.html")
     write_json(made / "document.json", found.as_json())

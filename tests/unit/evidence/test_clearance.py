@@ -10,7 +10,8 @@ from rotordrop.errors import RecordError
 from rotordrop.evidence.clearance import measure_clearance, wear_between
 from rotordrop.machine import example_machine, example_path, load_machine
 from rotordrop.record.record import Record
-from rotordrop.record.writers import recording_of, write_hdf5
+from rotordrop.record.recording import recording_of
+from rotordrop.record.writers import write_hdf5
 
 RATE = 2000.0
 

@@ -12,7 +12,7 @@ from rotordrop.errors import RecordError
 from rotordrop.evidence.events import _first
 from rotordrop.evidence.look.motion import _floating
 from rotordrop.evidence.quality.motion import _strongest_line
-from rotordrop.record.unpacking import MEMORY, UNPACKED_PER_BYTE, refuse_bomb
+from rotordrop.record.sandbox import MEMORY, UNPACKED_PER_BYTE, refuse_bomb
 
 RATE = 5000.0
 

@@ -1,5 +1,7 @@
 """What is cut out of a record, and how its channels come to one clock."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -18,6 +20,19 @@ def test_a_window_holds_the_samples_at_its_bounds_whatever_their_rounding(drop):
         np.testing.assert_array_equal(cut.signals, drop.signals[first : last + 1])
     later = drop.window(drop.time[first] + 0.5 * step, drop.time[last] - 0.5 * step)
     np.testing.assert_array_equal(later.time, drop.time[first + 1 : last])
+
+
+@pytest.mark.parametrize(
+    ("metadata", "date"),
+    [
+        ({"start": "2019-10-16T13:42:07.250000Z"}, "2019-10-16T13:42:07.250000Z"),
+        ({"Trigger_Time": "16.10.2019 13:42"}, "16.10.2019 13:42"),
+        ({"start": "trigger", "date": "2019-10-16"}, "2019-10-16"),
+        ({"machine": "LP 400"}, ""),
+    ],
+)
+def test_the_date_of_the_event_comes_from_the_header(drop, metadata, date):
+    assert replace(drop, metadata=metadata).event_date == date
 
 
 def _unequal(times, shift=0.0):

@@ -8,12 +8,9 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-import pytest
-
 from rotordrop.estimate.bearing_drop import BearingDrop, simulated_bearings
 from rotordrop.estimate.later_motion import LaterMotion
 from rotordrop.known import Known
-from rotordrop.record.event_date import event_date
 from rotordrop.report.content import ReportContent
 from rotordrop.report.inspection import inspection_section, limits_section
 from rotordrop.report.origin import Origin, UsedFile, command_line
@@ -41,20 +38,6 @@ def test_the_origin_names_who_when_how_and_from_what(tmp_path: Path) -> None:
         ("arithmetic", "fingerprint 0123456789abcdef"),
     )
     assert Origin().facts() == ()
-
-
-@pytest.mark.parametrize(
-    ("metadata", "date"),
-    [
-        ({"start": "2019-10-16T13:42:07.250000Z"}, "2019-10-16T13:42:07.250000Z"),
-        ({"Trigger_Time": "16.10.2019 13:42"}, "16.10.2019 13:42"),
-        ({"start": "trigger", "date": "2019-10-16"}, "2019-10-16"),
-        ({"machine": "LP 400"}, ""),
-    ],
-)
-def test_the_date_of_the_event_comes_from_the_header(metadata: dict[str, str], date: str) -> None:
-    record: Any = SimpleNamespace(metadata=metadata)
-    assert event_date(record) == date
 
 
 def test_a_running_title_cannot_leave_its_string() -> None:

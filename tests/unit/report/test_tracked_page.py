@@ -16,7 +16,6 @@ from rotordrop.estimate.estimate import CrossCheck, Estimate, Verdict
 from rotordrop.estimate.later_motion import LaterMotion
 from rotordrop.evidence.quality.finding import Finding
 from rotordrop.known import Known
-from rotordrop.record.simulated import is_simulated
 from rotordrop.report.content import Table
 from rotordrop.report.drop_sections import drop_sections
 from rotordrop.report.estimate_page import cross_check_statements, estimate_page, spoken
@@ -72,9 +71,9 @@ def test_a_record_is_simulated_by_one_definition(estimate: Estimate) -> None:
     assert "simulated" in estimate_page(estimate).simulated
     assert estimate_document(estimate)["simulated_record"] is True
     other = replace(estimate.record, sha256="0" * 64, metadata={}, notes=())
-    assert not is_simulated(other)
-    assert is_simulated(replace(other, metadata={"source": "Simulated by X"}))
-    assert is_simulated(replace(other, notes=("made by synthesize",)))
+    assert not other.is_simulated
+    assert replace(other, metadata={"source": "Simulated by X"}).is_simulated
+    assert replace(other, notes=("made by synthesize",)).is_simulated
 
 
 def test_bands_are_as_wide_as_the_stated_intervals(estimate: Estimate) -> None:

@@ -12,10 +12,13 @@ import numpy as np
 from rotordrop.errors import RecordError
 from rotordrop.record.profile import Profile
 from rotordrop.record.readers import refuse_large
-from rotordrop.record.recording import Array, Channel, Recording, known_unit, split_unit
+from rotordrop.record.recording import Array, Channel, Recording, spelled, split_unit
 
 _FORMATS = {"BINARY": ("<i2", -(2**15)), "BINARY32": ("<i4", -(2**31)), "FLOAT32": ("<f4", None)}
-"""How an analogue sample is stored and what stands for a missing one."""
+"""How an analogue sample is stored and what stands for a missing one (IEEE C37.111)."""
+
+_SAME_DURATION = 0.01
+"""Share by which the durations by rates and by time stamps may differ [1] (chosen): stamps are rounded."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,41 +46,36 @@ def read_comtrade(path: Path, profile: Profile) -> Recording:
 
     Record time is zero at the trigger. A channel that the configuration says was sampled later (skew) has a
     clock of its own.
-
-    Raises
-    ------
-    RecordError
-        When a line of the configuration cannot be read, or the samples are not as many as it declares.
     """
     configuration = path if path.suffix.lower() == ".cfg" else _beside(path, "cfg")
-    told = _configuration(configuration)
+    rules = _configuration(configuration)
     samples = _beside(configuration, "dat")
-    numbers, stamps, table = (_ascii if told.kind == "ASCII" else _binary)(samples, told)
-    time = told.start + _seconds(numbers, stamps, told, samples)
+    numbers, stamps, table = (_ascii if rules.kind == "ASCII" else _binary)(samples, rules)
+    declared = rules.rates[-1][1]
+    if len(table) != declared:
+        raise RecordError(
+            f"{samples}: the configuration declares {declared} samples and {len(table)} are present; "
+            "the file is truncated or damaged, copy it again"
+        )
+    time = rules.start + _seconds(numbers, stamps, rules, samples)
     channels = [
         Channel(
             name=split_unit(entry.name)[0],
             label=entry.name,
-            unit=profile.units.get(entry.name, entry.unit),
+            unit=spelled(profile.units.get(entry.name, entry.unit)),
             values=table[:, i] * entry.factor + entry.offset,
             time=time + entry.skew if entry.skew else time,
         )
-        for i, entry in enumerate(told.analogue)
+        for i, entry in enumerate(rules.analogue)
     ]
-    return Recording(
-        channels=tuple(channels), metadata=told.entries, warnings=_disagreement(time, stamps, told)
-    )
-
-
-def _disagreement(time: Array, stamps: Array, told: _Configuration) -> tuple[str, ...]:
-    """Rates and time stamps say the same twice; where they do not, one of them is damaged."""
-    by_rates, by_stamps = float(time[-1] - time[0]), float(stamps[-1] - stamps[0]) * told.time_factor
-    if not by_stamps > 0.0 or by_rates <= 0.0 or abs(by_stamps / by_rates - 1.0) < 0.01:
-        return ()
-    return (
+    # rates and time stamps say the same twice; where they do not, one of them is damaged
+    by_rates, by_stamps = float(time[-1] - time[0]), float(stamps[-1] - stamps[0]) * rules.time_factor
+    words = (
         f"the samples last {by_rates:.6g} s by the sampling rates and {by_stamps:.6g} s by their time "
-        "stamps; the rates are used",
+        "stamps; the rates are used"
     )
+    agree = not by_stamps > 0.0 or by_rates <= 0.0 or abs(by_stamps / by_rates - 1.0) < _SAME_DURATION
+    return Recording(channels=tuple(channels), metadata=rules.entries, warnings=() if agree else (words,))
 
 
 def _beside(path: Path, suffix: str) -> Path:
@@ -108,7 +106,18 @@ def _configuration(path: Path) -> _Configuration:
         analogue_count, digital_count = int(counts[1].rstrip("Aa")), int(counts[2].rstrip("Dd"))
         if not 0 < analogue_count <= 1000 or not 0 <= digital_count <= 10_000:
             raise ValueError(f"{analogue_count} analogue and {digital_count} digital channels")
-        analogue = tuple(_analogue(row(10)) for _ in range(analogue_count))
+        analogue = []
+        for _ in range(analogue_count):
+            _, name, _, _, unit, factor, offset, skew, *_ = row(10)
+            analogue.append(
+                _Analogue(
+                    name=name,
+                    unit=spelled(unit),
+                    factor=float(factor),
+                    offset=float(offset),
+                    skew=1e-6 * float(skew or 0.0),
+                )
+            )
         for _ in range(digital_count):
             row(2)
         row(1)
@@ -116,29 +125,19 @@ def _configuration(path: Path) -> _Configuration:
         rates = tuple((float(rate), int(last)) for rate, last, *_ in declared)
         start, trigger = _instant(row(2)), _instant(row(2))
         kind = row(1)[0].upper()
-        factor = float(rows[number][0]) if number < len(rows) and rows[number][0].strip() else 1.0
+        time_factor = float(rows[number][0]) if number < len(rows) and rows[number][0].strip() else 1.0
     except (ValueError, IndexError) as error:
         raise RecordError(f"{path}, line {number}: {error}; the configuration is damaged") from error
     if kind != "ASCII" and kind not in _FORMATS:
         raise RecordError(f"{path}, line {number}: the format {kind!r} is not ASCII, {', '.join(_FORMATS)}")
     return _Configuration(
-        analogue=analogue,
+        analogue=tuple(analogue),
         digital=digital_count,
         rates=rates,
         start=(start[0] - trigger[0]) + (start[1] - trigger[1]),
         kind=kind,
-        time_factor=factor * 1e-6,
+        time_factor=time_factor * 1e-6,
         entries={"station": station[0], "recorder": station[1]},
-    )
-
-
-def _analogue(entries: list[str]) -> _Analogue:
-    return _Analogue(
-        name=entries[1],
-        unit=known_unit(entries[4]) or entries[4],
-        factor=float(entries[5]),
-        offset=float(entries[6]),
-        skew=1e-6 * float(entries[7] or 0.0),
     )
 
 
@@ -152,14 +151,10 @@ def _instant(entries: list[str]) -> tuple[int, float]:
     return days * 86_400 + 3600 * hour + 60 * minute + whole, rest
 
 
-def _declared_count(told: _Configuration) -> int:
-    return told.rates[-1][1]
-
-
-def _ascii(path: Path, told: _Configuration) -> tuple[Array, Array, Array]:
+def _ascii(path: Path, rules: _Configuration) -> tuple[Array, Array, Array]:
     lines = [line for line in path.read_text(encoding="latin-1").split("\n") if line.strip(" \r\x1a")]
-    wide = 2 + len(told.analogue) + told.digital
-    table = np.full((len(lines), 2 + len(told.analogue)), np.nan)
+    wide = 2 + len(rules.analogue) + rules.digital
+    table = np.full((len(lines), 2 + len(rules.analogue)), np.nan)
     for index, line in enumerate(lines):
         fields = [field.strip() for field in line.split(",")]
         if len(fields) != wide:
@@ -170,18 +165,17 @@ def _ascii(path: Path, told: _Configuration) -> tuple[Array, Array, Array]:
             raise RecordError(
                 f"{path}, line {index + 1}: {error}; repair the line or export again"
             ) from error
-    _compare(len(table), told, path)
     return table[:, 0], table[:, 1], table[:, 2:]
 
 
-def _binary(path: Path, told: _Configuration) -> tuple[Array, Array, Array]:
-    stored, missing = _FORMATS[told.kind]
-    words = -(-told.digital // 16)
+def _binary(path: Path, rules: _Configuration) -> tuple[Array, Array, Array]:
+    stored, missing = _FORMATS[rules.kind]
+    words = -(-rules.digital // 16)
     row = np.dtype(
         [
             ("number", "<u4"),
             ("stamp", "<u4"),
-            ("analogue", stored, (len(told.analogue),)),
+            ("analogue", stored, (len(rules.analogue),)),
             ("digital", "<u2", (words,)),
         ]
     )
@@ -191,7 +185,6 @@ def _binary(path: Path, told: _Configuration) -> tuple[Array, Array, Array]:
             f"{path} is truncated: {len(content)} bytes are no whole number of samples of {row.itemsize}"
         )
     table = np.frombuffer(content, row)
-    _compare(len(table), told, path)
     values = table["analogue"].astype(np.float64)
     if missing is not None:
         values[table["analogue"] == missing] = np.nan
@@ -200,15 +193,7 @@ def _binary(path: Path, told: _Configuration) -> tuple[Array, Array, Array]:
     return table["number"].astype(np.float64), stamps, values
 
 
-def _compare(present: int, told: _Configuration, path: Path) -> None:
-    if present != _declared_count(told):
-        raise RecordError(
-            f"{path}: the configuration declares {_declared_count(told)} samples and {present} are present; "
-            "the file is truncated or damaged, copy it again"
-        )
-
-
-def _seconds(numbers: Array, stamps: Array, told: _Configuration, path: Path) -> Array:
+def _seconds(numbers: Array, stamps: Array, rules: _Configuration, path: Path) -> Array:
     """Time of every sample from the first [s]: by the rates where there are any, else by the time stamps."""
     if not np.all(np.diff(numbers) == 1.0):
         at = int(np.argmax(np.diff(numbers) != 1.0))
@@ -216,13 +201,13 @@ def _seconds(numbers: Array, stamps: Array, told: _Configuration, path: Path) ->
             f"{path}: sample {numbers[at + 1]:.0f} follows sample {numbers[at]:.0f}; samples are missing or "
             "in disorder, copy the file again"
         )
-    if all(rate > 0 for rate, _ in told.rates):
+    if all(rate > 0 for rate, _ in rules.rates):
         steps, last = np.empty(len(numbers)), 0
-        for rate, end in told.rates:
+        for rate, end in rules.rates:
             steps[last:end], last = 1.0 / rate, end
-        if len(told.rates) == 1:
-            return np.arange(len(numbers), dtype=np.float64) / told.rates[0][0]
+        if len(rules.rates) == 1:
+            return np.arange(len(numbers), dtype=np.float64) / rules.rates[0][0]
         return np.concatenate([[0.0], np.cumsum(steps[1:])])
     if not np.isfinite(stamps).all():
         raise RecordError(f"{path} has neither a sampling rate nor a time stamp for every sample")
-    return np.asarray((stamps - stamps[0]) * told.time_factor)
+    return np.asarray((stamps - stamps[0]) * rules.time_factor)

@@ -1,18 +1,21 @@
-"""MATLAB files: version 5 to 7, and version 7.3."""
+"""MATLAB files: version 5 to 7 by scipy, version 7.3 as the HDF5 it is."""
 
 from __future__ import annotations
 
 import re
+import struct
+import zlib
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rotordrop.errors import RecordError
-from rotordrop.record.profile import Profile
-from rotordrop.record.recording import Array, Channel, Recording, known_unit, split_unit
-from rotordrop.record.unpacking import unpack
-from rotordrop.units import parse_quantity
+from rotordrop.record.recording import Array, Channel, Recording, known_unit, spelled, split_unit
+from rotordrop.record.sandbox import Content, Item, plain, refuse_bomb, unpack
+
+if TYPE_CHECKING:
+    from rotordrop.record.profile import Profile
 
 _RATES = ("fs", "fs_hz", "samplerate", "sampling_rate")
 _STEPS = ("dt", "dt_s", "step")
@@ -21,6 +24,10 @@ _TIMES = ("t", "time", "time_s")
 _NAMES = ("name", "label", "channel")
 _UNITS = ("unit", "units")
 
+_HEADER = 128
+_COMPRESSED = 15
+"""Bytes before the first variable, and the type of a packed one, by the definition of version 5."""
+
 
 def read_matlab(path: Path, profile: Profile) -> Recording:
     """Read a MAT file: channels as vectors, or as the columns of a matrix beside a list of names.
@@ -28,18 +35,6 @@ def read_matlab(path: Path, profile: Profile) -> Recording:
     The clock comes from a vector ``t`` or ``time`` beside the samples (in the same structure), or from ``fs``
     or ``dt`` and ``t0``. The ending of a variable name gives the unit: ``disp_um``. A structure of its own
     for every channel may hold its ``name`` and ``unit``.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    profile : Profile
-        Rules that replace guesses.
-
-    Raises
-    ------
-    RecordError
-        When the declared length of a variable is not present in the file, or no channels are found.
     """
     content = unpack(path, "matlab")
     found = {item.name: item.values for item in content.items}
@@ -48,15 +43,14 @@ def read_matlab(path: Path, profile: Profile) -> Recording:
 
 def recording_of_variables(variables: dict[str, Any], path: Path, profile: Profile) -> Recording:
     """Make a recording of named arrays, numbers, texts and lists of texts."""
-    names = next((_names(value) for value in variables.values() if _names(value)), [])
+    lists = (value for value in variables.values() if isinstance(value, list) and value)
+    texts = next((value for value in lists if all(isinstance(entry, str) for entry in value)), [])
+    names = [entry.strip() for entry in texts]
     channels: list[Channel] = []
     for key, value in variables.items():
-        folder, _, last = key.rpartition(".")
-        samples = isinstance(value, np.ndarray) and value.dtype.kind in "iuf" and value.size > 1
-        if samples and value.ndim in (1, 2) and last.lower() not in _TIMES and last != profile.time.channel:
-            channels += _channels_of(
-                key, value, names, lambda n, f=folder: _clock(variables, f, n, profile), profile, variables
-            )
+        last = key.rpartition(".")[2]
+        if _is_samples(value) and last.lower() not in _TIMES and last != profile.time.channel:
+            channels += _channels_of(key, value, names, profile, variables)
     if not channels:
         raise RecordError(
             f"{path}: found no samples with a clock among {', '.join(variables) or 'no variables'}; a vector "
@@ -66,58 +60,64 @@ def recording_of_variables(variables: dict[str, Any], path: Path, profile: Profi
     return Recording(channels=tuple(channels), metadata=entries)
 
 
-def _names(value: Any) -> list[str]:
-    """Read a cell array or character matrix of names."""
-    named = isinstance(value, list) and len(value) > 0 and all(isinstance(entry, str) for entry in value)
-    return [entry.strip() for entry in value] if named else []
+def _is_samples(value: Any) -> bool:
+    array = isinstance(value, np.ndarray) and value.dtype.kind in "iuf"
+    return array and value.ndim in (1, 2) and value.size > 1
 
 
 def _channels_of(
-    key: str, value: Any, names: list[str], clock: Any, profile: Profile, variables: dict[str, Any]
+    key: str, value: Any, names: list[str], profile: Profile, variables: dict[str, Any]
 ) -> list[Channel]:
     """Make channels of a vector, or of a matrix whose columns (or rows) are named."""
     folder, _, last = key.rpartition(".")
-    name, _label, unit = split_unit(last)
+    name, _, unit = split_unit(last)
     unit = unit or known_unit(last) or ""
     matrix = np.asarray(value, dtype=np.float64)
     if matrix.ndim == 1:
+
+        def beside(entries: tuple[str, ...]) -> str:
+            """The first text of these names in the structure of the channel."""
+            values = [variables.get(f"{folder}.{entry}") for entry in entries] if folder else []
+            return next((text for text in values if isinstance(text, str) and text), "")
+
         labels, matrix = [key], matrix[:, None]
-        own = [variables.get(f"{folder}.{name}") for name in _NAMES] if folder else []
-        told = next((text for text in own if isinstance(text, str) and text), None)
-        shown = [told or (name if not known_unit(last) else key.partition(".")[0])]
-        written = [variables.get(f"{folder}.{name}") for name in _UNITS] if folder and not unit else []
-        unit = next((known_unit(text) or text for text in written if isinstance(text, str)), unit)
+        shown = [beside(_NAMES) or (name if not known_unit(last) else key.partition(".")[0])]
+        unit = unit or spelled(beside(_UNITS))
     else:
         if matrix.shape[1] != len(names) and matrix.shape[0] == len(names):
             matrix = matrix.T
         if matrix.shape[1] != len(names):
             return []
         labels = shown = names
-    time = clock(len(matrix))
+    time = _clock(variables, folder, len(matrix), profile)
     if time is None:
         return []
     return [
-        Channel(name=n, label=t, unit=profile.units.get(t, unit), values=matrix[:, i].copy(), time=time)
+        Channel(
+            name=n, label=t, unit=spelled(profile.units.get(t, unit)), values=matrix[:, i].copy(), time=time
+        )
         for i, (n, t) in enumerate(zip(shown, labels, strict=True))
     ]
 
 
 def _clock(variables: dict[str, Any], folder: str, count: int, profile: Profile) -> Array | None:
     """Find the clock of samples: in the profile, in the same structure, then at the top of the file."""
+    from rotordrop.units import parse_quantity
+
+    index = np.arange(count, dtype=np.float64)
     if profile.time.step is not None:
         first = parse_quantity(profile.time.start or "0 s", "time")
-        return first + parse_quantity(profile.time.step, "time") * np.arange(count, dtype=np.float64)
+        return first + parse_quantity(profile.time.step, "time") * index
     times = _TIMES if profile.time.channel is None else (profile.time.channel,)
     for prefix in dict.fromkeys((f"{folder}." if folder else "", "")):
         for name in times:
             value = _get(variables, prefix, name)
             if isinstance(value, np.ndarray) and value.shape == (count,):
                 return np.asarray(value, dtype=np.float64)
-        rate = _scalar(variables, prefix, _RATES)
-        step = _scalar(variables, prefix, _STEPS) or (1.0 / rate if rate else None)
+        rate, step, start = (_scalar(variables, prefix, names) for names in (_RATES, _STEPS, _STARTS))
+        step = step or (1.0 / rate if rate else None)
         if step:
-            start = _scalar(variables, prefix, _STARTS) or 0.0
-            return start + step * np.arange(count, dtype=np.float64)
+            return (start or 0.0) + step * index
     return None
 
 
@@ -127,8 +127,102 @@ def _get(variables: dict[str, Any], prefix: str, name: str) -> Any:
 
 
 def _scalar(variables: dict[str, Any], prefix: str, names: tuple[str, ...]) -> float | None:
-    for name in names:
-        value = _get(variables, prefix, name)
-        if isinstance(value, int | float | np.number):
-            return float(value)
-    return None
+    values = (_get(variables, prefix, name) for name in names)
+    return next((float(value) for value in values if isinstance(value, int | float | np.number)), None)
+
+
+def unpacked(path: Path) -> Content:
+    """In the child: all variables, structures taken apart to dotted names; texts, numbers as attributes."""
+    content = path.read_bytes()
+    if b"MATLAB 7.3" in content[:_HEADER] or content[:8] == b"\x89HDF\r\n\x1a\n":
+        from rotordrop.record.readers import hdf5
+
+        inside = hdf5.unpacked(path)
+        return Content(
+            items=tuple(
+                Item(name=item.name.replace("/", "."), values=item.values, attributes=item.attributes)
+                for item in inside.items
+            ),
+            attributes={name.replace("/", "."): value for name, value in inside.attributes.items()},
+        )
+    _check_lengths(content, path)
+    from scipy.io.matlab import loadmat
+
+    try:
+        found = loadmat(path, struct_as_record=False, squeeze_me=True, chars_as_strings=True)
+    except Exception as error:
+        raise RecordError(f"{path} cannot be read as a MAT file: {error}; export it again") from error
+    variables = _flatten({key: value for key, value in found.items() if not key.startswith("__")})
+    items = {key: value for key, value in variables.items() if _is_samples(value)}
+    refuse_bomb(sum(value.size for value in items.values()), len(content), path)
+    return Content(
+        items=tuple(Item(name=key, values=value, attributes={}) for key, value in items.items()),
+        attributes={
+            key: [str(entry).strip() for entry in value if isinstance(entry, str)]
+            if isinstance(value, np.ndarray) and value.dtype.kind in "OU" and value.ndim == 1
+            else plain(value)
+            for key, value in variables.items()
+            if key not in items
+        },
+    )
+
+
+def _flatten(content: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Give every variable by its dotted path, structures and lists of them taken apart."""
+    flat: dict[str, Any] = {}
+    for key, value in content.items():
+        listed = isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind == "O" and len(value)
+        if hasattr(value, "_fieldnames"):
+            fields = {name: getattr(value, name) for name in value._fieldnames}
+            flat |= _flatten(fields, f"{prefix}{key}.")
+        elif listed and all(hasattr(entry, "_fieldnames") for entry in value):
+            for number, entry in enumerate(value, start=1):
+                flat |= _flatten({f"{key}({number})": entry}, prefix)
+        else:
+            single = isinstance(value, np.ndarray) and value.ndim == 0
+            flat[f"{prefix}{key}"] = value.item() if single else value
+    return flat
+
+
+def _check_lengths(content: bytes, path: Path) -> None:
+    """Compare the declared length of every variable with what is present."""
+    if content[:6] != b"MATLAB" and content[:4] != b"MATL":
+        raise RecordError(f"{path} does not begin with 'MATLAB'; it is no MAT file")
+    order = "<" if content[126:128] == b"IM" else ">"
+    at = _HEADER
+    while at < len(content):
+        if at + 8 > len(content):
+            raise RecordError(f"{path} is truncated: it ends within a header at byte {at} of {len(content)}")
+        kind, length = struct.unpack_from(f"{order}II", content, at)
+        if at + 8 + length > len(content):
+            raise RecordError(
+                f"{path} is truncated: a variable at byte {at} declares {length} bytes and "
+                f"{len(content) - at - 8} are present; copy the file again"
+            )
+        if kind == _COMPRESSED:
+            _check_packed(content[at + 8 : at + 8 + length], order, at, path)
+        at += 8 + length
+        at += 0 if kind == _COMPRESSED else -at % 8
+
+
+def _check_packed(packed: bytes, order: str, at: int, path: Path) -> None:
+    """Unpack a variable within bounds; zlib compares its checksum on the way."""
+    unpacker = zlib.decompressobj()
+    try:
+        declared = struct.unpack(f"{order}II", unpacker.decompress(packed, 8))[1]
+        refuse_bomb(declared // 8, path.stat().st_size, path)
+        present = 0
+        while not unpacker.eof and present <= declared:
+            block = unpacker.decompress(unpacker.unconsumed_tail, 2**22)
+            present += len(block)
+            if not block:
+                break
+    except (zlib.error, struct.error) as error:
+        raise RecordError(
+            f"{path}: the variable at byte {at} cannot be unpacked ({error}); copy it again"
+        ) from error
+    if present != declared or not unpacker.eof:
+        raise RecordError(
+            f"{path}: the variable at byte {at} declares {declared} bytes and unpacks to {present}; copy it "
+            "again"
+        )

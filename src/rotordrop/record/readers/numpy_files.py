@@ -5,15 +5,17 @@ from __future__ import annotations
 import zipfile
 from pathlib import Path
 from tokenize import TokenError
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
 from rotordrop.errors import RecordError
-from rotordrop.record.profile import Profile
 from rotordrop.record.readers.matlab import recording_of_variables
 from rotordrop.record.recording import Recording
-from rotordrop.record.unpacking import plain, refuse_bomb
+from rotordrop.record.sandbox import plain, refuse_bomb
+
+if TYPE_CHECKING:
+    from rotordrop.record.profile import Profile
 
 
 def read_npy(path: Path, profile: Profile) -> Recording:

@@ -9,53 +9,49 @@ import numpy as np
 
 from rotordrop.errors import RecordError
 from rotordrop.record.profile import Profile
-from rotordrop.record.recording import Array, Channel, Recording
+from rotordrop.record.recording import Array, Channel, Recording, spelled
 from rotordrop.units import split_quantity
 
 _PCM, _FLOAT, _EXTENSIBLE = 1, 3, 0xFFFE
+"""Codes of the formats of samples, by the definition of WAV; the last says its code further on."""
 
 
 def read_wav(path: Path, profile: Profile) -> Recording:
-    """Read integers of 8, 16, 24 or 32 bits or floating-point samples; channels are named in the profile.
+    """Read integers of 8, 16, 24 or 32 bits or floating-point samples.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    profile : Profile
-        ``text.names`` names the channels (else ``channel 1``, …), ``full_scale`` says what 1 stands for.
-
-    Raises
-    ------
-    RecordError
-        When blocks are cut off, or the format is another.
+    ``text.names`` of the profile names the channels (else ``channel 1``, …), ``full_scale`` says what 1 is.
     """
     content = path.read_bytes()
     blocks = _blocks(content, path)
     if b"fmt " not in blocks or b"data" not in blocks or len(blocks[b"fmt "]) < 16:
         raise RecordError(f"{path} has no format or no samples; it is no WAV file or damaged")
-    kind, channels, rate, _, align, bits = struct.unpack_from("<HHIIHH", blocks[b"fmt "])
+    kind, count, rate, _, align, bits = struct.unpack_from("<HHIIHH", blocks[b"fmt "])
     if kind == _EXTENSIBLE and len(blocks[b"fmt "]) >= 26:
         kind = struct.unpack_from("<H", blocks[b"fmt "], 24)[0]
     data = blocks[b"data"]
-    if not channels or not rate or align * 8 != channels * bits or len(data) % align:
+    if not count or not rate or align * 8 != count * bits or len(data) % align:
         raise RecordError(
-            f"{path}: {len(data)} bytes of samples do not divide into {channels} channels of {bits} bits; "
+            f"{path}: {len(data)} bytes of samples do not divide into {count} channels of {bits} bits; "
             "the file is damaged, copy it again"
         )
-    samples = _samples(data, kind, bits, path).reshape(-1, channels)
+    samples = _samples(data, kind, bits, path).reshape(-1, count)
     factor, unit = (1.0, "") if profile.full_scale is None else split_quantity(profile.full_scale)
-    names = profile.text.names or tuple(f"channel {number + 1}" for number in range(channels))
-    if len(names) != channels:
-        raise RecordError(f"{path} has {channels} channels and the profile names {len(names)}")
+    names = profile.text.names or tuple(f"channel {number + 1}" for number in range(count))
+    if len(names) != count:
+        raise RecordError(f"{path} has {count} channels and the profile names {len(names)}")
     time = np.arange(len(samples), dtype=np.float64) / rate
-    series = [
-        Channel(name=n, label=n, unit=profile.units.get(n, unit), values=samples[:, i] * factor, time=time)
+    channels = [
+        Channel(
+            name=n,
+            label=n,
+            unit=spelled(profile.units.get(n, unit)),
+            values=samples[:, i] * factor,
+            time=time,
+        )
         for i, n in enumerate(names)
     ]
-    return Recording(
-        channels=tuple(series), notes=("no trigger in the file: record time counts from the start",)
-    )
+    notes = ("no trigger in the file: record time counts from the start",)
+    return Recording(channels=tuple(channels), notes=notes)
 
 
 def _blocks(content: bytes, path: Path) -> dict[bytes, bytes]:

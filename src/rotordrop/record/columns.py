@@ -1,0 +1,288 @@
+"""Which channel of a recording is which sensor of the machine, and what one unit of it is worth.
+
+`match_sensors` reads by it; `guess_profile` writes down what it finds for a recorder nobody described.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+from rotordrop.elements.sensor import Sensor
+from rotordrop.errors import RecordError, UsageError
+from rotordrop.record.profile import Profile
+from rotordrop.record.recording import SPEED_UNITS, Array, Channel, Recording
+from rotordrop.units import format_quantity, parse_quantity
+
+_SPEED_NAMES = re.compile(
+    r"(shaft|rotor|rotational)?[ _-]*(speed|drehzahl|rpm|n|tacho|shaft)\b", re.IGNORECASE
+)
+_VOLTS = ("V", "mV")
+_DISAGREE = 5e-3
+"""Share by which sensitivities of recording and machine file may differ without a word (chosen)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Guess:
+    """A profile and what it still lacks."""
+
+    profile: Profile
+    """What was given and what could be guessed."""
+    found: tuple[str, ...]
+    """What was found, in words."""
+    missing: tuple[str, ...]
+    """What has to be said, each with the way to say it; empty when the profile is complete."""
+
+
+def _fitting(channels: Sequence[Channel], wanted: str) -> list[Channel]:
+    """Channels of a name: as the file writes it, else without its unit, else but for signs and case."""
+    rules = (
+        lambda channel: channel.label == wanted,
+        lambda channel: channel.name == wanted,
+        lambda channel: _plain(channel.name) == _plain(wanted),
+    )
+    return next((hits for rule in rules if (hits := [c for c in channels if rule(c)])), [])
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"[^a-z0-9]", "", name.lower())
+
+
+def match_sensors(
+    recording: Recording, sensors: tuple[Sensor, ...], profile: Profile, place: str
+) -> tuple[Channel, ...]:
+    """Find the channel of every sensor of the machine, in their order, by the map of the profile or by name.
+
+    Raises
+    ------
+    RecordError
+        When a sensor has no channel, or more than one, or two sensors share one; `place` names the file.
+    """
+    unknown = sorted(set(profile.channels) - {sensor.name for sensor in sensors})
+    if unknown:
+        names = ", ".join(sensor.name for sensor in sensors)
+        raise RecordError(f"the channel map names a sensor {unknown[0]!r}; the machine has {names}")
+    wanted = {sensor.name: profile.channels.get(sensor.name, sensor.name) for sensor in sensors}
+    hits = {name: _fitting(recording.channels, channel) for name, channel in wanted.items()}
+    missing = [name for name in wanted if not hits[name]]
+    if missing:
+        # all of them at once, with the lines of a profile that would map them
+        present = [channel.label for channel in recording.channels]
+        close = get_close_matches(wanted[missing[0]], present, 1, 0.5)
+        hint = f"; did you mean {close[0]!r}?" if close else "."
+        several = f" ({len(missing)} sensors have none)" if len(missing) > 1 else ""
+        lines = ", ".join(f'{name} = "..."' for name in missing)
+        raise RecordError(
+            f"{place} has no channel {wanted[missing[0]]!r} for sensor {missing[0]}{several}; it has "
+            f"{', '.join(present)}{hint} Map them in a profile: [channels] {lines}, or make one with "
+            "'rotordrop profile'"
+        )
+    taken: list[Channel] = []
+    for name, channels in hits.items():
+        if len(channels) > 1:
+            labels = ", ".join(repr(channel.label) for channel in channels)
+            raise RecordError(
+                f"{place}: sensor {name} fits the channels {labels}; choose one with the channel map of a "
+                f'profile: [channels] {name} = "..."'
+            )
+        if any(channels[0] is other for other in taken):
+            raise RecordError(
+                f"{place}: channel {channels[0].label!r} is mapped to two sensors, the second is {name}"
+            )
+        taken += channels
+    return tuple(taken)
+
+
+def find_speed(
+    recording: Recording, taken: Sequence[Channel], profile: Profile, place: str
+) -> Channel | None:
+    """Find the channel of the shaft speed, or None when the file has none.
+
+    Raises
+    ------
+    RecordError
+        When several channels could be the speed.
+    """
+    free = [channel for channel in recording.channels if all(channel is not other for other in taken)]
+    if profile.speed.channel is not None:
+        return _named(free, profile.speed.channel, "speed channel", recording, place)
+    if profile.speed.pulses is not None:
+        return None
+    in_speed_unit = [channel for channel in free if channel.unit in SPEED_UNITS]
+    candidates = in_speed_unit or [channel for channel in free if _SPEED_NAMES.match(channel.name)]
+    if len(candidates) > 1:
+        labels = ", ".join(repr(channel.label) for channel in candidates)
+        raise RecordError(
+            f"{place}: {labels} could all be the shaft speed; choose with the profile: [speed] channel = "
+            '"..."'
+        )
+    return candidates[0] if candidates else None
+
+
+def find_pulses(
+    recording: Recording, taken: Sequence[Channel], profile: Profile, place: str
+) -> Channel | None:
+    """Find the channel of tacho pulses that the profile names, or None when it names none.
+
+    Raises
+    ------
+    RecordError
+        When there is no such channel.
+    """
+    if profile.speed.pulses is None:
+        return None
+    free = [channel for channel in recording.channels if all(channel is not other for other in taken)]
+    return _named(free, profile.speed.pulses, "channel of pulses", recording, place)
+
+
+def _named(free: list[Channel], name: str, what: str, recording: Recording, place: str) -> Channel:
+    for channel in free:
+        if name in (channel.label, channel.name):
+            return channel
+    raise RecordError(
+        f"{place} has no {what} {name!r}; it has {', '.join(channel.label for channel in recording.channels)}"
+    )
+
+
+def displacement(
+    channel: Channel, sensor: Sensor, recording: Recording, profile: Profile, place: str
+) -> tuple[Array, list[str]]:
+    """Give the reading of a sensor [m], shape (N,), with a word where two sensitivities disagree.
+
+    Raises
+    ------
+    RecordError
+        When the unit is missing, is no length, or is volts without a sensitivity.
+    """
+    # a sensor may be called "S_V": the ending of its channel's name is then no unit
+    suffixed = channel.label == sensor.name and channel.name != channel.label
+    unit = profile.units.get(channel.label, "" if suffixed else channel.unit) or profile.unit or ""
+    if unit in _VOLTS:
+        volts = channel.values * parse_quantity(f"1 {unit}", "voltage") - recording.voltage_offset
+        sensitivity, words = _sensitivity(channel, sensor, recording, profile, place)
+        return volts / sensitivity, words
+    if not unit:
+        raise RecordError(
+            f'{place}: channel {channel.label!r} has no unit; name it in the profile: unit = "um"'
+        )
+    try:
+        return channel.values * parse_quantity(f"1 {unit}", "length"), []
+    except UsageError as error:
+        raise RecordError(
+            f"{place}: channel {channel.label!r} is in {unit!r}, which is neither a length nor a voltage; "
+            f'name its unit in the profile: [units] "{channel.label}" = "um"'
+        ) from error
+
+
+def _sensitivity(
+    channel: Channel, sensor: Sensor, recording: Recording, profile: Profile, place: str
+) -> tuple[float, list[str]]:
+    """Volts per metre [V/m]: of the profile, else of the recording, else of the machine file."""
+    kind = "voltage_sensitivity"
+    if profile.sensitivity is not None:
+        return parse_quantity(profile.sensitivity, kind), []
+    of_machine = None if sensor.sensitivity is None else float(sensor.sensitivity)
+    of_file = recording.sensitivity
+    if of_file is None:
+        if of_machine is None:
+            raise RecordError(
+                f"{place}: channel {channel.label!r} is in volts and neither the recording nor the machine "
+                f'file gives a sensitivity; add sensitivity = "8 mV/um" to sensor {sensor.name}'
+            )
+        return of_machine, []
+    if of_machine is not None and abs(of_machine / of_file - 1.0) > _DISAGREE:
+        return of_file, [
+            f"{sensor.name}: the recording gives {format_quantity(of_file, kind)}, the machine file "
+            f"{format_quantity(of_machine, kind)}; the recording is used: correct the machine file or name "
+            "the sensitivity in the profile"
+        ]
+    return of_file, []
+
+
+def speed_factor(channel: Channel, profile: Profile, place: str) -> float:
+    """Speed in rad/s of one unit of the speed channel.
+
+    Raises
+    ------
+    RecordError
+        When the unit is missing or is no unit of speed.
+    """
+    unit = profile.speed.unit or profile.units.get(channel.label, channel.unit)
+    if not unit:
+        raise RecordError(
+            f"{place}: the speed channel {channel.label!r} has no unit; name it in the profile: [speed] unit "
+            '= "Hz"'
+        )
+    try:
+        return parse_quantity(f"1 {unit}", "speed")
+    except UsageError as error:
+        raise RecordError(
+            f"{place}: the speed channel {channel.label!r} is in {unit!r}; expected Hz, rpm or rad/s, name "
+            f'it in the profile: [speed] unit = "rpm"; or, if it holds pulses of a tacho, pulses = '
+            f'"{channel.label}"'
+        ) from error
+
+
+def guess_profile(recording: Recording, given: Profile, sensors: Sequence[Sensor] = ()) -> Guess:
+    """Complete a profile from a recording that was read with it, for sensors that need a channel each."""
+    mapped = dict(given.channels)
+    for sensor in sensors:
+        hits = _fitting(recording.channels, sensor.name) or [
+            channel for channel in recording.channels if _plain(channel.label) == _plain(sensor.name)
+        ]
+        if sensor.name not in mapped and len(hits) == 1:
+            mapped[sensor.name] = hits[0].label
+    unmapped = [sensor.name for sensor in sensors if sensor.name not in mapped]
+    missing: list[str] = []
+    if unmapped:
+        free = [channel.label for channel in recording.channels if channel.label not in mapped.values()]
+        options = " ".join(f'--channel "{name}=..."' for name in unmapped)
+        missing.append(f"channels of {', '.join(unmapped)}: {options} (there are {', '.join(free)})")
+    used = [
+        channel
+        for channel in recording.channels
+        if (not sensors and channel.label != given.speed.pulses) or channel.label in mapped.values()
+    ]
+    profile = given.model_copy(update={"channels": mapped})
+    profile, speed = _with_speed(recording, profile, used if sensors else [])
+    if speed is None:
+        missing.append('the shaft speed: --speed-channel "...", --pulses "..." or --speed "60 Hz"')
+    units = {
+        channel.label: profile.units.get(channel.label) or channel.unit or profile.unit
+        for channel in used
+        if channel.label != speed and channel.unit not in SPEED_UNITS
+    }
+    bare = [label for label, unit in units.items() if not unit]
+    if bare:
+        missing.append(f"the unit of {', '.join(bare)}: --unit um")
+    sensitive = bool(sensors) and all(sensor.sensitivity is not None for sensor in sensors)
+    in_volts = any(unit in _VOLTS for unit in units.values())
+    if in_volts and not (recording.sensitivity or profile.sensitivity or sensitive):
+        missing.append('the sensitivity of the channels in volts: --sensitivity "8 mV/um"')
+    found = []
+    for channel in recording.channels:
+        span = f"{channel.values.min():.4g} to {channel.values.max():.4g} {channel.unit or '(no unit)'}"
+        rate = (len(channel.time) - 1) / max(float(channel.time[-1] - channel.time[0]), 1e-12)
+        found.append(f"channel {channel.label}: {len(channel.values)} samples at {rate:.6g} Hz, {span}")
+    found += [f"sensor {name}: channel {label}" for name, label in mapped.items()]
+    found += [f"shaft speed: {speed}"] if speed else []
+    return Guess(profile=profile, found=tuple(found), missing=tuple(missing))
+
+
+def _with_speed(
+    recording: Recording, profile: Profile, taken: Sequence[Channel]
+) -> tuple[Profile, str | None]:
+    """The profile with the channel of the speed, and where the speed comes from; None where nothing tells."""
+    rules = profile.speed
+    if rules.constant is not None or rules.pulses is not None:
+        return profile, rules.constant or f"pulses of {rules.pulses}"
+    try:
+        channel = find_speed(recording, taken, profile, "the recording")
+    except RecordError:
+        channel = None
+    if channel is None:
+        return profile, None
+    speed = rules.model_copy(update={"channel": channel.label})
+    return profile.model_copy(update={"speed": speed}), channel.label

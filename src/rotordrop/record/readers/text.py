@@ -1,0 +1,366 @@
+"""How a delimited text file is laid out, and what its header says of clock, trigger and sensitivity."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections import Counter
+from dataclasses import dataclass, replace
+from datetime import date
+from pathlib import Path
+from typing import Literal
+
+from rotordrop.errors import RecordError, UsageError
+from rotordrop.record.profile import TextLayout
+from rotordrop.record.recording import known_unit, split_unit
+from rotordrop.units import parse_quantity
+
+BLANKS = frozenset(("", "nan", "-", "--", "---", "n/a", "na", "null", "#n/a", "inf", "-inf", "+inf"))
+"""What recorders write where a sample is missing."""
+
+_EXPONENT = r"(?:[eE][+-]?[0-9]+)?"
+_PLAIN = {
+    ".": re.compile(rf"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+){_EXPONENT}"),
+    ",": re.compile(rf"[+-]?(?:[0-9]+,?[0-9]*|,[0-9]+){_EXPONENT}"),
+}
+_THOUSANDS = {
+    ".": re.compile(r"[+-]?[0-9]{1,3}(?:[,'’\u2009\u202f\u00a0 ][0-9]{3})+\.[0-9]+"),
+    ",": re.compile(r"[+-]?[0-9]{1,3}(?:[.'’\u2009\u202f\u00a0 ][0-9]{3})+,[0-9]+"),
+}
+"""Numbers by their decimal sign; with thousands set apart only where decimals tell which sign is which."""
+
+_STAMP = re.compile(
+    r"(?:(?:(?P<year>[0-9]{4})-(?P<month>[0-9]{1,2})-(?P<day>[0-9]{1,2})"
+    r"|(?P<first>[0-9]{1,2})(?P<sign>[./])(?P<second>[0-9]{1,2})(?P=sign)(?P<last>[0-9]{4}))(?:[T ]+|$))?"
+    r"(?:(?P<hour>[0-9]{1,2}):(?P<minute>[0-9]{2})(?::(?P<whole>[0-9]{2})(?:[.,](?P<part>[0-9]{1,12}))?)?"
+    r"(?:Z|[+-][0-9]{2}:?[0-9]{2})?)?(?<=[0-9Z])"
+)
+_A_NUMBER = re.compile(r"(^|[\s;,\"])[-+]?[.,]?\d")
+"""Where a number begins, at the start of a field."""
+
+_WIDE = (b"\xff\xfe", b"\xfe\xff")
+"""Marks at the begin of a text of two bytes per character."""
+
+_LONGEST_LINE = 1_000_000
+"""Characters of a row (chosen): two thousand channels of twenty digits are a twentieth of it."""
+
+_SEPARATORS = (";", "\t", ",", "|", " ")
+
+_SAMPLED_LINES = 60
+"""Lines by which the layout is judged (chosen): enough to outvote damaged ones, few enough for ten tries."""
+
+_LEAST_FITTING = 0.5
+"""Share of these lines that must be rows of numbers for a pair of signs to be believed (chosen)."""
+
+_MOSTLY = 0.6
+"""Share of the fields of a column that make it one of numbers or of times (chosen)."""
+
+ColumnKind = Literal["number", "time", "text"]
+
+_KEYS = {
+    "step": "dt step increment sampleinterval samplinginterval abtastintervall schrittweite",
+    "rate": "fs samplerate samplingrate samplingfrequency abtastrate abtastfrequenz rate",
+    "trigger": "triggersample triggerindex triggerposition pretriggersamples",
+    "before": "pretrigger pretriggertime vorlauf",
+    "count": "samples samplecount numberofsamples numsamples nsamples points numberofpoints recordlength "
+    "anzahlwerte anzahlmesswerte anzahlabtastwerte messwerte",
+    "start": "t0 starttime firstsample startoffset",
+}
+"""Keys of header entries in letters and digits only, as recorders write them in English and German."""
+
+_SENSITIVITY = re.compile(r"(\d+(?:[.,]\d+)?)\s*(m?V)\s*/\s*([uµμm]?m|mil)\b")
+_VOLTAGE_OFFSET = re.compile(r"offset\s*[:=]?\s*([+-]?\d+(?:[.,]\d+)?)\s*(m?V)\b", re.IGNORECASE)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Layout:
+    """Where things are in a delimited text file."""
+
+    separator: str
+    decimal: str
+    """Signs between columns and in numbers."""
+    first: int
+    """Index of the first data line, counted from 0."""
+    columns: int
+    """Number of columns of the data lines."""
+    kinds: tuple[ColumnKind, ...]
+    """What every column holds: "number", "time" (a date, a time of day or both) or "text"."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Header:
+    """What the header says."""
+
+    entries: dict[str, str]
+    """Keys and values as written."""
+    step: float | None
+    """Time between samples [s]."""
+    start: float | None
+    """Time of the first sample [s]."""
+    trigger_sample: int | None
+    """Sample at which the record time is zero."""
+    count: int | None
+    """Number of samples."""
+    sensitivity: float | None
+    """Volts per metre [V/m]."""
+    voltage_offset: float
+    """Voltage at zero displacement [V]."""
+
+
+def read_lines(path: Path, rules: TextLayout) -> tuple[list[str], bool, str]:
+    """Lines of a text of unknown encoding without line ends, whether the last is whole, and the encoding."""
+    with path.open("rb") as stream:
+        content = stream.read(_LONGEST_LINE + 1)
+        if not content.startswith(_WIDE) and not rules.encoding:
+            # what its beginning shows to be no text is refused before all of it is read
+            if b"\x00" in content:
+                raise _no_text(path, content.index(0))
+            if len(content) > _LONGEST_LINE and not any(end in content for end in (b"\n", b"\r")):
+                raise _too_long(path, 1, f"more than {_LONGEST_LINE}")
+        content += stream.read()
+    if not content:
+        raise RecordError(f"{path} is empty (0 bytes); export the recording again")
+    encoding = rules.encoding or _encoding(content)
+    try:
+        text = content.decode(encoding)
+    except (UnicodeDecodeError, LookupError) as error:
+        raise RecordError(f"{path} cannot be read as {encoding}: {error}; name another encoding") from error
+    if "\x00" in text:
+        raise _no_text(path, text.index("\x00"))
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    long = next((i for i, line in enumerate(lines) if len(line) > _LONGEST_LINE), None)
+    if long is not None:
+        raise _too_long(path, long + 1, str(len(lines[long])))
+    complete = lines[-1] == ""
+    while lines and not lines[-1].strip():
+        lines.pop()
+    return lines, complete, encoding
+
+
+def _no_text(path: Path, at: int) -> RecordError:
+    return RecordError(
+        f"{path} is not a text file: character {at + 1} is a zero byte; set 'format' in the profile"
+    )
+
+
+def _too_long(path: Path, line: int, characters: str) -> RecordError:
+    return RecordError(
+        f"{path}, line {line} has {characters} characters; no row of a recording is so long: export it "
+        "again, one row per sample"
+    )
+
+
+def _encoding(content: bytes) -> str:
+    if content.startswith(b"\xef\xbb\xbf"):
+        return "utf-8-sig"
+    if content.startswith(_WIDE):
+        return "utf-16"
+    try:
+        content.decode("utf-8")
+    except UnicodeDecodeError:
+        return "latin-1"
+    return "utf-8"
+
+
+def fields_of(line: str, separator: str) -> list[str]:
+    """Split a line into its fields, quotes and outer blanks removed; within quotes nothing separates."""
+    if separator == " ":
+        parts = line.split()
+    elif '"' in line:
+        parts = next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])
+    else:
+        parts = line.split(separator)
+    return [part.strip().strip('"').strip() for part in parts]
+
+
+def find_layout(lines: list[str], path: Path, rules: TextLayout) -> Layout:
+    """Find separator, decimal sign, what each column holds and the first data line from the lines themselves.
+
+    Raises
+    ------
+    RecordError
+        When no separator turns the lines into rows that hold numbers.
+    """
+    # spread over the file, without the header and a last line that may be cut
+    body = [line for line in lines[len(lines) // 4 : -1] if line.strip()] or lines
+    sample = body[:: max(1, len(body) // _SAMPLED_LINES)]
+    fits = [
+        fit
+        for separator in ((rules.separator,) if rules.separator else _SEPARATORS)
+        for decimal in ((rules.decimal,) if rules.decimal else (".", ","))
+        if separator != decimal and (fit := _fit(sample, separator, decimal)) is not None
+    ]
+    best = max(fits, key=lambda fit: fit[0], default=None)
+    if best is None or best[0][0] < _LEAST_FITTING * len(sample):
+        last = f"{lines[-1][:60]!r}"
+        if re.search(r"[;,\t]", lines[-1]) and not any(_A_NUMBER.search(line) for line in lines):
+            raise RecordError(
+                f"{path}: no line holds a number, the last one (line {len(lines)}) reads {last}: a header "
+                "without readings? Export the readings too"
+            )
+        raise RecordError(
+            f"{path}: found no columns of numbers with semicolon, tab, comma or blank between them (line "
+            f"{len(lines)} reads {last}); export it as a table of numbers, or name 'separator' and 'decimal' "
+            "in the profile"
+        )
+    layout = best[1]
+    if rules.first_data_line is not None:
+        return replace(layout, first=rules.first_data_line - 1)
+    rows = (index for index, line in enumerate(lines) if is_row(fields_of(line, layout.separator), layout))
+    return replace(layout, first=next(rows))
+
+
+def _fit(sample: list[str], separator: str, decimal: str) -> tuple[tuple[int, int, int], Layout] | None:
+    """How well a pair of signs fits: rows of one length, columns of numbers less those of words, columns."""
+    rows = [fields_of(line, separator) for line in sample]
+    lengths = Counter(len(row) for row in rows if len(row) > 1)
+    if not lengths:
+        return None
+    columns = lengths.most_common(1)[0][0]
+    fitting = [row for row in rows if len(row) == columns]
+    kinds = tuple(_kind([row[i] for row in fitting], decimal) for i in range(columns))
+    numbers = kinds.count("number")
+    if not numbers:
+        return None
+    layout = Layout(separator=separator, decimal=decimal, first=0, columns=columns, kinds=kinds)
+    intact = sum(is_row(row, layout) for row in fitting)
+    return (intact, numbers - kinds.count("text"), columns), layout
+
+
+def _kind(fields: list[str], decimal: str) -> ColumnKind:
+    """What the fields of a column are for the most part; a column of blanks counts as numbers."""
+    filled = [field for field in fields if field.lower() not in BLANKS]
+    most = _MOSTLY * len(filled)
+    if sum(is_number(field, decimal) for field in filled) >= most:
+        return "number"
+    return "time" if sum(_STAMP.fullmatch(field) is not None for field in filled) >= most else "text"
+
+
+def is_row(fields: list[str], layout: Layout) -> bool:
+    """Whether a line is a data row: numbers and times where they belong, samples possibly missing."""
+    if len(fields) != layout.columns:
+        return False
+    some = False
+    for field, kind in zip(fields, layout.kinds, strict=True):
+        if kind == "text" or field.lower() in BLANKS:
+            continue
+        if not (is_number(field, layout.decimal) if kind == "number" else _STAMP.fullmatch(field)):
+            return False
+        some = True
+    return some
+
+
+def is_number(field: str, decimal: str) -> bool:
+    """Whether a field is a number with the given decimal sign, thousands possibly set apart."""
+    return _PLAIN[decimal].fullmatch(field) is not None or _THOUSANDS[decimal].fullmatch(field) is not None
+
+
+def plain_number(field: str, decimal: str) -> str:
+    """A number as Python writes it."""
+    if _THOUSANDS[decimal].fullmatch(field):
+        whole, sign, part = field.rpartition(decimal)
+        field = re.sub(r"[^0-9+-]", "", whole) + sign + part
+    return field.replace(decimal, ".")
+
+
+def stamp_parts(field: str) -> tuple[int, int] | None:
+    """Whole seconds and nanoseconds of a date, a time of day or both, from one origin; None for no such."""
+    match = _STAMP.fullmatch(field)
+    if match is None:
+        return None
+    seconds = nanoseconds = 0
+    try:
+        if match["year"] or match["last"]:
+            day, month = int(match["day"] or match["first"]), int(match["month"] or match["second"])
+            if match["last"] and month > 12:
+                day, month = month, day
+            seconds = date(int(match["year"] or match["last"]), month, day).toordinal() * 86_400
+    except ValueError:
+        return None
+    if match["hour"]:
+        seconds += 3600 * int(match["hour"]) + 60 * int(match["minute"]) + int(match["whole"] or 0)
+        nanoseconds = int((match["part"] or "").ljust(9, "0")[:9])
+    return seconds, nanoseconds
+
+
+def name_and_unit_rows(header: list[list[str]], columns: int) -> tuple[list[str] | None, list[str] | None]:
+    """Find the row of column names and the row of units among the split header lines.
+
+    The first field of a row of units may be a word such as ``Unit``.
+    """
+    full = [row for row in header if len(row) == columns and sum(map(bool, row)) > columns // 2]
+    units = None
+    for row in full:
+        rest = [field for field in row[1:] if field not in ("", "-", "1")]
+        if rest and all(known_unit(field) for field in rest):
+            units = row
+            break
+    named = [row for row in full if row is not units and not any(_PLAIN["."].fullmatch(f) for f in row)]
+    return (named[-1] if named else None), units
+
+
+def read_header(lines: list[str], separator: str) -> Header:
+    """Read the comment and header lines above the columns."""
+    entries: dict[str, str] = {}
+    for line in lines:
+        _collect(line, separator, entries)
+
+    def found(kind: str) -> tuple[str, str]:
+        """Text and unit of the first entry of a kind, empty where there is none."""
+        for key, value in entries.items():
+            name, _, unit = split_unit(key)
+            if re.sub(r"[^a-z0-9]", "", name.lower()) in _KEYS[kind].split():
+                return value, unit
+        return "", ""
+
+    step, rate = _number(*found("step"), "time", "s"), _number(*found("rate"), "frequency", "Hz")
+    start, before = _number(*found("start"), "time", "s"), _number(*found("before"), "time", "s")
+    trigger, count = re.match(r"\d{1,15}(?!\d)", found("trigger")[0]), found("count")[0].strip()
+    text = "\n".join(lines)
+    sensitivity, offset = _SENSITIVITY.search(text), _VOLTAGE_OFFSET.search(text)
+    return Header(
+        entries=entries,
+        step=1.0 / rate if step is None and rate else step,
+        start=-abs(before) if start is None and before is not None else start,
+        trigger_sample=int(trigger.group()) if trigger else None,
+        # a whole number and nothing else: "Samples: 5 per channel" declares no length
+        count=int(count) if re.fullmatch(r"[1-9]\d{0,9}", count) else None,
+        sensitivity=parse_quantity(
+            f"{_point(sensitivity[1])} {sensitivity[2]}/{known_unit(sensitivity[3])}", "voltage_sensitivity"
+        )
+        if sensitivity
+        else None,
+        voltage_offset=parse_quantity(f"{_point(offset[1])} {offset[2]}", "voltage") if offset else 0.0,
+    )
+
+
+def _collect(line: str, separator: str, entries: dict[str, str]) -> None:
+    """Add the entries of a line: ``key: value;key: value`` or ``key;value;unit``."""
+    plain = line.strip().lstrip("#%/!* ").strip()
+    fields = [field.strip().strip('"').strip() for field in plain.split(separator)]
+    pairs = [
+        re.split("[:=]", field, maxsplit=1) for field in fields if re.match(r"[^:=]{2,40}[:=]\s*\S", field)
+    ]
+    if plain and pairs and not re.fullmatch(r"[\d:.\-T ]+", fields[0]):
+        entries.update((key.strip(), value.strip()) for key, value in pairs if not re.search(r"\d$", key))
+    if line.lstrip().startswith("#"):
+        if plain and not pairs:
+            entries.setdefault(f"comment {len(entries) + 1}", plain)
+    elif len(fields) > 1 and fields[0] and ":" not in fields[0]:
+        entries.setdefault(fields[0], " ".join(fields[1:3]).strip())
+
+
+def _number(value: str, unit: str, kind: str, default_unit: str) -> float | None:
+    """A header entry in SI units, None where it is no quantity of this kind."""
+    match = re.match(r"([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)\s*(\S*)", value)
+    if not match:
+        return None
+    unit = unit or known_unit(match[2]) or match[2] or default_unit
+    try:
+        return parse_quantity(f"{_point(match[1])} {unit}", kind)
+    except UsageError:
+        return None
+
+
+def _point(number: str) -> str:
+    return number.replace(",", ".")

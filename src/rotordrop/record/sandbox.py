@@ -1,0 +1,226 @@
+"""Samples out of binary files, read by foreign libraries in a process of their own.
+
+Libraries that read HDF5, MAT, TDMS, UFF and Excel files end the interpreter, loop for ever or ask for all
+memory when a file is damaged in the wrong place. So one child process per file reads it, under limits on time
+and memory that grow with the size of the file, and hands the stored samples back over a pipe. The child
+imports numpy, the one library and nothing else that is heavy: the module of a format loads profiles for its
+annotations only.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.errors import RecordError
+
+CPU_S = 4.0
+"""Time on the processor that any file may take [s] (chosen): starting and importing take less than one."""
+
+CPU_S_PER_BYTE = 5e-7
+"""What a byte of the file adds to it [s] (chosen): two megabytes per second are slow for every format."""
+
+PATIENCE = 5.0
+"""Wall time over processor time that a busy computer may need (chosen)."""
+
+MEMORY = 320 * 2**20
+"""Memory that any file may take [byte]: with the program that waits for it less than 500 MB."""
+
+MEMORY_PER_BYTE = 16
+"""What a byte of the file adds to it (chosen): packed readings unpack three to six times."""
+
+UNPACKED = 64 * 2**20
+"""Samples of a file may fill this much [byte] whatever the size of the file: a fifth of `MEMORY`, and …"""
+
+UNPACKED_PER_BYTE = 200
+"""… this many times the file when it is larger (chosen): recordings are not packed more tightly."""
+
+MOST_SERIES = 2000
+"""Series that a recording may hold (chosen): no recorder has as many channels."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Item:
+    """An array of a file with what the file says about it."""
+
+    name: str
+    """Path or name in the file."""
+    values: NDArray[Any]
+    """Samples as stored."""
+    attributes: Mapping[str, Any]
+    """Texts, numbers and lists of them."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Content:
+    """What a file holds: its arrays in their order, and its own attributes."""
+
+    items: tuple[Item, ...]
+    attributes: Mapping[str, Any]
+
+
+def unpack(path: Path, kind: str) -> Content:
+    """Read a file in a child process by `unpacked` of the module `kind` of `rotordrop.record.readers`.
+
+    Raises
+    ------
+    RecordError
+        When the child refuses the file, needs too much time or memory, or is ended by the file.
+    """
+    import subprocess
+
+    size = path.stat().st_size
+    cpu = CPU_S + CPU_S_PER_BYTE * size
+    order = {
+        "path": str(path),
+        "kind": kind,
+        "cpu_s": cpu,
+        "memory": MEMORY + MEMORY_PER_BYTE * size,
+        "sys_path": [entry for entry in sys.path if entry],
+    }
+    program = (
+        "import json, sys; order = json.loads(sys.argv[1]); sys.path[:] = order['sys_path']; "
+        "from rotordrop.record.sandbox import child; child(order)"
+    )
+    environment = os.environ | {
+        "OPENBLAS_NUM_THREADS": "1",
+        "OMP_NUM_THREADS": "1",
+        "HDF5_USE_FILE_LOCKING": "FALSE",
+    }
+    try:
+        done = subprocess.run(
+            [sys.executable, "-I", "-c", program, json.dumps(order)],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            timeout=PATIENCE * cpu,
+            env=environment,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        raise _too_long(path, PATIENCE * cpu) from None
+    code = done.returncode
+    if os.name == "posix" and code in (-signal.SIGXCPU, -signal.SIGKILL):
+        raise _too_long(path, cpu)
+    if code != 0:
+        what = f"signal {-code}" if code < 0 else f"code {code}"
+        raise RecordError(
+            f"{path} cannot be read: the library for this format was ended by {what}; the file is damaged, "
+            "copy or export it again"
+        )
+    return _content(done.stdout, path)
+
+
+def _too_long(path: Path, limit: float) -> RecordError:
+    return RecordError(
+        f"{path} cannot be read within {limit:.0f} s, a sound file of its size is read in less than one; it "
+        "is damaged: copy or export it again"
+    )
+
+
+def _content(answer: bytes, path: Path) -> Content:
+    """What the child wrote: a head in JSON on one line, then the samples of every array."""
+    line, _, _ = answer.partition(b"\n")
+    head = json.loads(line)
+    if "refused" in head:
+        raise RecordError(head["refused"])
+    if "missing" in head:
+        raise RecordError(
+            f"{path}: reading {path.suffix} files needs the package {head['missing']}; install it with "
+            "pip install 'rotordrop[io]'"
+        )
+    items, at = [], len(line) + 1
+    for entry in head["items"]:
+        kind, shape = np.dtype(entry["dtype"]), tuple(entry["shape"])
+        count = int(np.prod(shape, dtype=np.int64))
+        values = np.frombuffer(answer, dtype=kind, count=count, offset=at).reshape(shape)
+        items.append(Item(name=entry["name"], values=values, attributes=entry["attributes"]))
+        at += count * kind.itemsize
+    return Content(items=tuple(items), attributes=head["attributes"])
+
+
+def child(order: dict[str, Any]) -> None:
+    """In the child: set its limits, read one file, write what it holds, or why not, to standard output."""
+    answer = os.dup(1)
+    os.dup2(2, 1)  # what a library prints must not land among the samples
+    if os.name == "posix":
+        import resource
+
+        seconds, memory = round(order["cpu_s"]), order["memory"]
+        # RLIMIT_AS would count what libraries map and never touch; only Linux bounds RLIMIT_DATA as needed
+        of_memory = resource.RLIMIT_DATA if sys.platform == "linux" else resource.RLIMIT_AS
+        for which, limits in (
+            (resource.RLIMIT_CPU, (seconds, seconds + 1)),
+            (of_memory, (memory, memory)),
+            (resource.RLIMIT_CORE, (0, 0)),
+        ):
+            with suppress(ValueError, OSError):
+                resource.setrlimit(which, limits)
+    path, arrays = Path(order["path"]), []
+    try:
+        content = import_module(f"rotordrop.record.readers.{order['kind']}").unpacked(path)
+        if len(content.items) > MOST_SERIES:
+            raise RecordError(
+                f"{path} holds {len(content.items)} series, a recording at most {MOST_SERIES}; export the "
+                "channels that are needed"
+            )
+        arrays = [np.ascontiguousarray(item.values) for item in content.items]
+        head: dict[str, Any] = {
+            "attributes": dict(content.attributes),
+            "items": [
+                {"name": i.name, "attributes": dict(i.attributes), "dtype": a.dtype.str, "shape": a.shape}
+                for i, a in zip(content.items, arrays, strict=True)
+            ],
+        }
+    except RecordError as error:
+        head = {"refused": str(error)}
+    except ModuleNotFoundError as error:
+        head = {"missing": error.name}
+    except MemoryError:
+        limit = order["memory"] / 1e6
+        head, arrays = {"refused": f"{path} needs more than {limit:.0f} MB to be read; it is damaged"}, []
+    with os.fdopen(answer, "wb") as stream:
+        stream.write(json.dumps(head).encode() + b"\n")
+        for array in arrays:
+            stream.write(array.reshape(-1).data)
+        stream.flush()
+    os._exit(0)  # libraries that met a damaged file may crash while they clean up
+
+
+def refuse_bomb(
+    samples: int, size: int, what: object, *, most: int = UNPACKED, most_per_byte: int = UNPACKED_PER_BYTE
+) -> None:
+    """Refuse a file of `size` bytes whose samples of 8 bytes would fill far more memory than a recording's.
+
+    `most` is what any file may hold [byte], `most_per_byte` what it may hold per byte when that is more.
+    """
+    limit = max(most, most_per_byte * size)
+    if 8 * samples > limit:
+        raise RecordError(
+            f"{what} claims {samples} samples in {size} bytes; it is damaged or made to exhaust memory "
+            f"({8 * samples / 1e6:.0f} MB, at most {limit / 1e6:.0f} MB are unpacked from it)"
+        )
+
+
+def plain(value: Any) -> Any:
+    """Give an attribute as text, number or list of them, whatever type the library has for it."""
+    if isinstance(value, bytes):
+        return value.decode("utf-8", "replace")
+    if isinstance(value, np.ndarray):
+        if value.size > 4096:
+            return f"{value.size} values"
+        return plain(value.item()) if value.size == 1 else [plain(entry) for entry in value.ravel().tolist()]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    return value if isinstance(value, str | int | float) else str(value)
