@@ -9,8 +9,7 @@ from rotordrop.elements.table import rows
 from rotordrop.errors import UsageError
 from rotordrop.machine import example_machine
 from rotordrop_bench import VIOLATIONS, Violations, hidden_machine
-from rotordrop_bench.event import LARGEST_JITTER, LARGEST_ORBIT, drop_conditions
-from rotordrop_bench.random_streams import stream
+from rotordrop_bench.event import LARGEST_JITTER, LARGEST_ORBIT, drop_conditions, stream
 from rotordrop_bench.true_values import machine_truth
 
 

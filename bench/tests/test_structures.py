@@ -20,7 +20,7 @@ from rotordrop_bench.hidden_drop import _integrated, simulate_hidden
 from rotordrop_bench.hidden_rest import hidden_energy, hidden_rest
 from rotordrop_bench.settled import without_magnets
 from rotordrop_bench.structure import no_structure, structure_rows, violated
-from rotordrop_bench.violation_parts import UnbalanceJump
+from rotordrop_bench.violations import UnbalanceJump
 
 SPEED = 2.0 * np.pi * 120.0
 LEVITATED = LevitatedStart(rotor_angle=1.0, remanent_force=np.array([[2.0, 30.0], [-3.0, 20.0]]))

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+import zlib
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.elements.race_bearing import Spread, numbers_of
+from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.table import structure_rows as structure_rows_of
 from rotordrop.errors import UsageError
 from rotordrop.known import Known
@@ -16,7 +17,6 @@ from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.rotor.reduction import Reduction
 from rotordrop.simulate.case import LevitatedStart
-from rotordrop_bench.random_streams import stream
 from rotordrop_bench.structure import structure_rows, violated, without_structure
 from rotordrop_bench.violations import Violations, named_violations
 
@@ -26,10 +26,10 @@ FINER = Reduction(modes=14, attachment=True)
 """Basis of the true rotor: finer than that of any estimator."""
 
 LARGEST_ORBIT = 12e-6
-"""Largest radius of the synchronous orbit at an AMB [m]."""
+"""Largest radius of the synchronous orbit at an AMB [m]; chosen, not measured."""
 
 LARGEST_JITTER = 1e-3
-"""The true power-off lies within this time of the trigger [s]."""
+"""The true power-off lies within this time of the trigger [s]; chosen, not measured."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,7 +150,19 @@ def drop_conditions(hidden: HiddenMachine, speed: float, seed: int, *, jitter: b
 
 
 def _drawn_values(machine: Machine, random: np.random.Generator) -> dict[str, float]:
-    values = _shared_values(machine, random)
+    constant = machine.speed.aero_time_constant
+    values = {
+        "rotor.modal_damping": float(machine.rotor.modal_damping) * _log_uniform(random, 0.7, 1.3),
+        "speed.aero_time_constant": float(random.uniform(6.0, 14.0))
+        if constant is None
+        else _within(constant, _log_uniform(random, 0.75, 1.35)),
+    }
+    for index, unbalance in enumerate(machine.unbalances):
+        values[f"unbalance.{index}.amount"] = _within(unbalance.amount, _log_uniform(random, 0.5, 1.5))
+        values[f"unbalance.{index}.phase"] = float(random.uniform(-math.pi, math.pi))
+    for amb in machine.ambs:
+        values[f"ambs.{amb.name}.stiffness"] = _within(amb.stiffness, _log_uniform(random, 0.4, 1.3))
+        values[f"ambs.{amb.name}.damping"] = _within(amb.damping, _log_uniform(random, 0.6, 1.6))
     common = {
         "contact": _log_uniform(random, 0.75, 1.45),
         "dynamic": float(random.uniform(0.07, 0.15)),
@@ -188,36 +200,18 @@ def _bearing_values(
         "friction.dynamic": dynamic,
         "friction.static": dynamic * common["static"],
         "friction.stribeck_speed": _within(friction.stribeck_speed, common["stribeck"]),
-        **{spread.path: _drawn(spread, random) for spread in numbers_of(bearing).spreads()},
+        # a factor on what is described, or a value of a range
+        **{
+            spread.path: float(random.uniform(spread.low, spread.high))
+            if spread.described is None
+            else _within(spread.described, _log_uniform(random, spread.low, spread.high))
+            for spread in numbers_of(bearing).spreads()
+        },
         "race.inertia": _within(bearing.race.inertia, _log_uniform(random, 0.85, 1.2)),
         "race.mass": _within(bearing.race.mass, common["race_mass"]),
         "race.drag_coefficient": float(bearing.race.drag_coefficient) * common["drag"],
         "damping_time": _within(bearing.damping_time, common["damping_time"]),
     }
-
-
-def _drawn(spread: Spread, random: np.random.Generator) -> float:
-    """A factor on what is described, or a value of a range."""
-    if spread.described is not None:
-        return _within(spread.described, _log_uniform(random, spread.low, spread.high))
-    return float(random.uniform(spread.low, spread.high))
-
-
-def _shared_values(machine: Machine, random: np.random.Generator) -> dict[str, float]:
-    constant = machine.speed.aero_time_constant
-    values = {
-        "rotor.modal_damping": float(machine.rotor.modal_damping) * _log_uniform(random, 0.7, 1.3),
-        "speed.aero_time_constant": float(random.uniform(6.0, 14.0))
-        if constant is None
-        else _within(constant, _log_uniform(random, 0.75, 1.35)),
-    }
-    for index, unbalance in enumerate(machine.unbalances):
-        values[f"unbalance.{index}.amount"] = _within(unbalance.amount, _log_uniform(random, 0.5, 1.5))
-        values[f"unbalance.{index}.phase"] = float(random.uniform(-math.pi, math.pi))
-    for amb in machine.ambs:
-        values[f"ambs.{amb.name}.stiffness"] = _within(amb.stiffness, _log_uniform(random, 0.4, 1.3))
-        values[f"ambs.{amb.name}.damping"] = _within(amb.damping, _log_uniform(random, 0.6, 1.6))
-    return values
 
 
 def _log_uniform(random: np.random.Generator, low: float, high: float) -> float:
@@ -228,3 +222,9 @@ def _within(value: Known, factor: float) -> float:
     """A value times a factor, kept inside the range its owner states."""
     drawn = float(value) * factor
     return drawn if value.range is None else min(max(drawn, value.range[0]), value.range[1])
+
+
+def stream(seed: int, purpose: str) -> np.random.Generator:
+    """Generator (Philox) for one purpose; adding a purpose never shifts the numbers of another."""
+    sequence = np.random.SeedSequence([seed, zlib.crc32(purpose.encode())])
+    return np.random.Generator(np.random.Philox(sequence))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,60 +15,36 @@ from rotordrop.record.record import Record
 Array = NDArray[np.float64]
 
 
-def _inverted(record: Record) -> Array:
-    signals = record.signals.copy()
-    signals[:, 0] *= -1.0
-    return signals
-
-
-def _swapped_ends(record: Record) -> Array:
-    nodes = [sensor.node for sensor in record.sensors]
-    order = np.argsort([nodes[::-1].index(node) for node in nodes], kind="stable")
-    return record.signals[:, order]
-
-
-def _swapped_axes(record: Record) -> Array:
-    columns = list(range(len(record.sensors)))
-    first = [i for i in columns if record.sensors[i].node == record.sensors[0].node]
+def _swapped_axes(signals: Array, nodes: list[int]) -> Array:
+    columns = list(range(len(nodes)))
+    first = [i for i in columns if nodes[i] == nodes[0]]
     for column, other in zip(first, first[::-1], strict=True):
         columns[column] = other
-    return record.signals[:, columns]
+    return signals[:, columns]
 
 
-def _wrong_unit(record: Record) -> Array:
-    return record.signals * 25.4
-
-
-def _clipped(record: Record) -> Array:
-    limit = 0.6 * float(np.max(np.abs(record.signals)))
-    return np.clip(record.signals, -limit, limit)
-
-
-def _dead(record: Record) -> Array:
-    signals = record.signals.copy()
-    signals[:, -1] = signals[0, -1]
+def _changed(signals: Array, where: tuple[Any, Any], value: Any) -> Array:
+    signals = signals.copy()
+    signals[where] = value
     return signals
 
 
-def _missing(record: Record) -> Array:
-    signals = record.signals.copy()
-    signals[len(signals) // 2, 0] = np.nan
-    return signals
-
-
-FAULTS: dict[str, Callable[[Record], Array]] = {
-    "inverted polarity": _inverted,
-    "swapped ends": _swapped_ends,
+EVERY = slice(None)
+FAULTS: dict[str, Callable[[Array, list[int]], Array]] = {
+    "inverted polarity": lambda s, nodes: _changed(s, (EVERY, 0), -s[:, 0]),
+    "swapped ends": lambda s, nodes: s[:, np.argsort([nodes[::-1].index(n) for n in nodes], kind="stable")],
     "swapped axes": _swapped_axes,
-    "mil taken for micrometre": _wrong_unit,
-    "clipping": _clipped,
-    "dead channel": _dead,
-    "missing sample": _missing,
+    "mil taken for micrometre": lambda s, nodes: s * 25.4,
+    "clipping": lambda s, nodes: np.clip(s, -0.6 * np.max(np.abs(s)), 0.6 * np.max(np.abs(s))),
+    "dead channel": lambda s, nodes: _changed(s, (EVERY, -1), s[0, -1]),
+    "missing sample": lambda s, nodes: _changed(s, (len(s) // 2, 0), np.nan),
 }
+"""What a mistake makes of the readings (N, S) [m] of sensors at these nodes."""
 
 
 def with_fault(record: Record, fault: str) -> Record:
     """The record with a deliberate mistake, by name from `FAULTS`; the first or last channel is hit."""
     if fault not in FAULTS:
         raise UsageError(f"unknown fault {fault!r}; choose one of {', '.join(map(repr, FAULTS))}")
-    return replace(record, signals=np.ascontiguousarray(FAULTS[fault](record)))
+    nodes = [sensor.node for sensor in record.sensors]
+    return replace(record, signals=np.ascontiguousarray(FAULTS[fault](record.signals, nodes)))

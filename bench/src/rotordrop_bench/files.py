@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotordrop.files import atomic_path, make_folder, write_json
 from rotordrop.record.record import Record, sha256_of
@@ -61,7 +60,11 @@ def write_synthetic(
     write_json(paths[-1], {**drop.truth, "name": stem, "record_sha256": hashes})
     if histories:
         paths.append(folder / TRUTH_FOLDER / f"{stem}.npz")
-        _write_histories(drop.histories, paths[-1])
+        # forces and stresses in single precision, displacements in double, as in the supplied files
+        precise = ("t0", "fs", "first_250ms_t0", "bearing_displacement", "sensor_plane_displacement")
+        stored = {k: v if k in precise else v.astype(np.float32) for k, v in drop.histories.items()}
+        with atomic_path(paths[-1]) as temporary, temporary.open("wb") as stream:
+            np.savez_compressed(stream, **stored)  # type: ignore[arg-type]
     return tuple(paths)
 
 
@@ -79,13 +82,3 @@ def write_record(record: Record, path: Path) -> None:
         write_hdf5(recording, path)
     else:
         write_delimited(recording, path)
-
-
-def _write_histories(histories: Mapping[str, NDArray[np.float64]], path: Path) -> None:
-    """Store forces and stresses in single precision, displacements in double, as the supplied files do."""
-    precise = ("t0", "fs", "first_250ms_t0", "bearing_displacement", "sensor_plane_displacement")
-    stored = {
-        key: values if key in precise else values.astype(np.float32) for key, values in histories.items()
-    }
-    with atomic_path(path) as temporary, temporary.open("wb") as stream:
-        np.savez_compressed(stream, **stored)  # type: ignore[arg-type]

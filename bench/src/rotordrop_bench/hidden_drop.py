@@ -20,7 +20,7 @@ from rotordrop.simulate.levitation import start_of_drop
 from rotordrop.simulate.result import ContactLog, DropResult
 from rotordrop_bench import _hidden_rhs as H
 from rotordrop_bench._hidden_loop import integrate_hidden
-from rotordrop_bench.violation_parts import UnbalanceJump
+from rotordrop_bench.violations import UnbalanceJump
 
 Array = NDArray[np.float64]
 

@@ -23,6 +23,7 @@ from rotordrop_bench.sensor_chain import SensorChain
 from rotordrop_bench.violations import Violations
 
 DURATION = 0.3
+"""What is recorded after power-off [s]; chosen, not measured."""
 LATEST_CONTACT = 0.1
 """A drop counts when the rotor has touched every bearing within this time of power-off [s]."""
 
@@ -72,15 +73,8 @@ def make_bench(
 ) -> list[str]:
     """Make what is missing of the bench and give the names of the drops made.
 
-    Parameters
-    ----------
-    folder : path-like
-        ``drops/NAME`` gets machine file, recording and tail; ``truth/NAME.json`` the truth, written last: a
-        drop that has it is complete.
-    only : iterable of str
-        Names of drops, families or rotors; all when empty.
-    report : callable
-        Told the name of each drop and the share that is done.
+    ``drops/NAME`` gets machine file, recording and tail; ``truth/NAME.json`` the truth, written last: a drop
+    that has it is complete. ``only`` holds names of drops, families or rotors; all are made when it is empty.
     """
     folder = Path(folder)
     drops = chosen_drops(only)

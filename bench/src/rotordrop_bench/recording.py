@@ -12,11 +12,10 @@ from rotordrop._version import __version__
 from rotordrop.record.record import Record
 from rotordrop.simulate.case import DropCase
 from rotordrop.simulate.result import DropResult
-from rotordrop_bench.event import LARGEST_JITTER, DropConditions, HiddenMachine, drop_conditions
+from rotordrop_bench.event import LARGEST_JITTER, DropConditions, HiddenMachine, drop_conditions, stream
 from rotordrop_bench.hidden_drop import true_drop
 from rotordrop_bench.hidden_rest import hidden_rest
 from rotordrop_bench.motion import housing_motion, true_motion
-from rotordrop_bench.random_streams import stream
 from rotordrop_bench.sensor_chain import (
     SensorChain,
     SensorErrors,
@@ -34,9 +33,9 @@ from rotordrop_bench.true_values import true_histories, true_values
 Array = NDArray[np.float64]
 
 TRUE_TOLERANCE = 1e-8
-TAIL_DURATION = 3.0
-TAIL_RATE = 1000.0
-TAIL_START = 54.0
+"""Tolerance of the true simulation, that of the reference [1]."""
+TAIL_START, TAIL_DURATION, TAIL_RATE = 54.0, 3.0, 1000.0
+"""When the settled tail begins, how long it is [s], and its samples per second [Hz]; chosen, not measured."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,7 +95,9 @@ def synthesize_drop(
     SyntheticDrop
         Recording, tail, truth and histories.
     """
-    chain = _violated_chain(fitted_to(sensor_chain or SensorChain(), hidden.known), hidden)
+    chain = fitted_to(sensor_chain or SensorChain(), hidden.known)
+    corner = hidden.violations.sensors.anti_alias_frequency
+    chain = chain if corner is None else replace(chain, anti_alias_frequency=float(corner))
     conditions = conditions or drop_conditions(hidden, speed, seed)
     case = DropCase(
         speed=conditions.speed,
@@ -108,7 +109,12 @@ def synthesize_drop(
     errors = _true_errors(hidden, chain)
     record = _record(hidden, result, conditions, chain, errors, seed, before, duration, name)
     rest = hidden_rest(hidden.model, hidden.structure)
-    swing = _drawn_swing(hidden, stream(seed, "swing"))
+    random, count = stream(seed, "swing"), len(hidden.machine.touchdown_bearings)
+    swing = Swing(
+        amplitude=np.exp(random.uniform(np.log(0.003), np.log(0.1), count)),
+        phase=random.uniform(0.0, 2.0 * np.pi, count),
+        decay_time=float(random.uniform(2.0, 20.0)),
+    )
     truth = true_values(hidden, result, conditions, chain, errors, rest, name)
     return SyntheticDrop(
         record=record,
@@ -117,11 +123,6 @@ def synthesize_drop(
         histories=true_histories(hidden, result, conditions, chain.sampling_rate),
         result=result,
     )
-
-
-def _violated_chain(chain: SensorChain, hidden: HiddenMachine) -> SensorChain:
-    corner = hidden.violations.sensors.anti_alias_frequency
-    return chain if corner is None else replace(chain, anti_alias_frequency=float(corner))
 
 
 def _true_errors(hidden: HiddenMachine, chain: SensorChain) -> SensorErrors:
@@ -183,15 +184,6 @@ def _with_housing(hidden: HiddenMachine, errors: SensorErrors, supports: Array) 
     at = [names.index(sensor.bearing) for sensor in hidden.machine.sensors]
     along = np.einsum("nsa,sa->ns", supports[:, at], directions(hidden.machine, errors))
     return np.asarray(errors.follows_housing * along)
-
-
-def _drawn_swing(hidden: HiddenMachine, random: np.random.Generator) -> Swing:
-    count = len(hidden.machine.touchdown_bearings)
-    return Swing(
-        amplitude=np.exp(random.uniform(np.log(0.003), np.log(0.1), count)),
-        phase=random.uniform(0.0, 2.0 * np.pi, count),
-        decay_time=float(random.uniform(2.0, 20.0)),
-    )
 
 
 def _tail(

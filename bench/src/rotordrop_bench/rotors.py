@@ -8,23 +8,16 @@ from functools import lru_cache
 from rotordrop.machine import Machine, example_machine, loads_machine
 
 MASS_AT_ONE = 32.7
-"""Mass [kg] of the scaled rotor whose touchdown bearings have a bore of 60 mm."""
+"""Mass [kg] of the scaled rotor whose touchdown bearings have a bore of 60 mm, by definition of the scale."""
 
 
 def scaled_rotor(mass: float, slenderness: float, overhang: float) -> Machine:
     """A rotor with a disc and an overhung wheel, scaled to about a mass [kg].
 
     Lengths go with the cube root of the mass, speeds against it, so that stresses and speeds at the surface
-    are those of rotors that are built; the air gap goes with the root of the length.
-
-    Parameters
-    ----------
-    mass : float
-        Mass of the rotor [kg].
-    slenderness : float
-        Lengths over those of the plain rotor of this mass; diameters shrink so that the mass stays [1].
-    overhang : float
-        Share of the discs' mass that sits outside the bearings, at the DE [1].
+    are those of rotors that are built; the air gap goes with the root of the length. Slenderness is the
+    lengths over those of the plain rotor of this mass (diameters shrink so that the mass stays), overhang the
+    share of the discs' mass that sits outside the bearings, at the DE [1].
     """
     k = (mass / MASS_AT_ONE) ** (1.0 / 3.0)
     long, wide = k * slenderness, k * slenderness**-0.5

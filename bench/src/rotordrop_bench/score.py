@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,31 +18,17 @@ Array = NDArray[np.float64]
 Estimate = Mapping[str, Any]
 
 LARGE_IMPACT = 1.7
-"""Impacts are scored whose true peak exceeds this many times the mean weight on a bearing [1]."""
+"""Impacts are scored whose true peak exceeds this many times the mean weight on a bearing [1]; chosen, not
+measured."""
 
 SAME_IMPACT = 5e-4
-"""An estimated impact belongs to a true one when it peaks within it, widened by this [s]."""
+"""An estimated impact belongs to a true one when it peaks within it, widened by this [s]; chosen, not
+measured."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Score:
-    """How far one estimated value is from the truth."""
-
-    estimate: float
-    truth: float
-    """The two values (SI)."""
-    error: float
-    """Estimate minus truth."""
-    relative_error: float | None
-    """Error over truth [1]."""
-    covered: bool | None
-    """Whether the 90 % interval holds the truth; None without an interval."""
-    half_width: float | None
-    """Half the interval over the truth [1]."""
-
-    def as_json(self) -> dict[str, Any]:
-        """The fields that are known."""
-        return {name: value for name, value in vars(self).items() if value is not None}
+Score = dict[str, Any]
+"""How far one value is from the truth: ``estimate``, ``truth``, ``error`` [SI], and where they are known
+``relative_error``, ``covered`` (whether the 90 % interval holds the truth), ``half_width`` over the truth."""
 
 
 def score_estimate(
@@ -76,48 +61,57 @@ def score_estimate(
         If the estimate is none, or is one of another recording: by the hash of the file where the truth has
         it, else by its name.
     """
-    known = _truth(truth)
-    found = _one_drop(_estimate(estimate), known, drop)
-    _refuse_another_recording(found, known, drop)
-    bearings = {name: _bearing_scores(found, known, name) for name in known.bearing_names}
-    whole = _drop_scores(found, known)
-    structure = _structure_scores(found, known)
-    impacts = {name: score for name in known.bearing_names if (score := _impact_scores(found, known, name))}
-    every = [*whole.values(), *(score for scores in bearings.values() for score in scores.values())]
-    every += structure.values()
+    if not isinstance(truth, Truth):
+        truth = truth_of(truth) if isinstance(truth, Mapping) else read_truth(truth)
+    if not isinstance(estimate, Mapping):
+        estimate = _read(Path(estimate))
+    found = _one_drop(estimate, truth, drop)
+    _refuse_another_recording(found, truth, drop)
+    named = {name: found.get("bearings", {}).get(name, {}) for name in truth.bearing_names}
+    bearings = {name: _scores(fields, truth.of_bearing(name)) for name, fields in named.items()}
+    instant = found.get("drop_instant_s")
+    if not isinstance(instant, Mapping):
+        instant = {"value": instant, "interval_90": found.get("drop_instant_interval_90_s")}
+    of_drop = {"drop_instant_s": "t_off_in_record_s", "speed_Hz": "n0_hz"}
+    whole = _scores(
+        {"drop_instant_s": instant, "speed_Hz": found.get("speed_Hz")},
+        {
+            name: float(truth.values[key])
+            for name, key in of_drop.items()
+            if truth.values.get(key) is not None
+        },
+    )
+    listed = {str(entry.get("path")): entry.get("estimate") for entry in _listed(found, "parameters")}
+    structure = _scores(listed, truth.structure)
+    every = [score for scores in (whole, *bearings.values(), structure) for score in scores.values()]
     if not every:
         raise UsageError(
-            f"the estimate holds none of the quantities of the truth {known.name!r}: it has "
+            f"the estimate holds none of the quantities of the truth {truth.name!r}: it has "
             f"{', '.join(sorted(found)) or 'nothing'}; expected the JSON of 'rotordrop estimate'"
         )
+    judged = [score["covered"] for score in every if "covered" in score]
+    impacts = {name: _impact_scores(fields, truth, name) for name, fields in named.items()}
     return {
-        "name": known.name,
+        "name": truth.name,
         "method": found.get("method"),
         "consistent": found.get("consistent", _at(found, "consistency.consistent")),
-        "drop": {name: score.as_json() for name, score in whole.items()},
-        "bearings": {
-            name: {path: score.as_json() for path, score in scores.items()}
-            for name, scores in bearings.items()
-        },
+        "drop": whole,
+        "bearings": bearings,
         "named": [entry["name"] for entry in _listed(found, "structure") if "name" in entry],
-        "violated": list(known.values.get("violated", [])),
-        "structure": {path: score.as_json() for path, score in structure.items()},
-        "impacts": impacts,
-        "coverage": _coverage(every),
+        "violated": list(truth.values.get("violated", [])),
+        "structure": structure,
+        "impacts": {name: score for name, score in impacts.items() if score},
+        "coverage": {
+            "intervals": len(judged),
+            "covered": sum(judged),
+            "fraction": float(np.mean(judged)) if judged else None,
+        },
     }
 
 
-def _truth(truth: Truth | Mapping[str, Any] | str | Path) -> Truth:
-    if isinstance(truth, Truth):
-        return truth
-    return truth_of(truth) if isinstance(truth, Mapping) else read_truth(truth)
-
-
-def _estimate(estimate: Estimate | str | Path) -> Estimate:
-    if isinstance(estimate, Mapping):
-        return estimate
+def _read(estimate: Path) -> Estimate:
     try:
-        loaded = json.loads(Path(estimate).read_text(encoding="utf-8"))
+        loaded = json.loads(estimate.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise UsageError(
             f"{estimate} cannot be read as an estimate ({error}); "
@@ -166,37 +160,6 @@ def _refuse_another_recording(estimate: Estimate, truth: Truth, drop: str | None
         )
 
 
-def _bearing_scores(estimate: Estimate, truth: Truth, bearing: str) -> dict[str, Score]:
-    fields = estimate.get("bearings", {}).get(bearing, {})
-    scores = {}
-    for path, true in truth.of_bearing(bearing).items():
-        score = _score(_at(fields, path), true)
-        if score is not None:
-            scores[path] = score
-    return scores
-
-
-def _drop_scores(estimate: Estimate, truth: Truth) -> dict[str, Score]:
-    pairs = (("drop_instant_s", "t_off_in_record_s"), ("speed_Hz", "n0_hz"))
-    scores = {}
-    for name, key in pairs:
-        true = truth.values.get(key)
-        entry = estimate.get(name)
-        if name == "drop_instant_s" and not isinstance(entry, Mapping):
-            entry = {"value": entry, "interval_90": estimate.get("drop_instant_interval_90_s")}
-        score = None if true is None else _score(entry, float(true))
-        if score is not None:
-            scores[name] = score
-    return scores
-
-
-def _structure_scores(estimate: Estimate, truth: Truth) -> dict[str, Score]:
-    """Scores of structures by path, where the estimate lists them among its ``parameters``."""
-    listed = {entry.get("path"): entry.get("estimate") for entry in _listed(estimate, "parameters")}
-    scores = {path: _score(listed.get(path), true) for path, true in truth.structure.items()}
-    return {path: score for path, score in scores.items() if score is not None}
-
-
 def _listed(estimate: Estimate, key: str) -> list[Mapping[str, Any]]:
     """Entries of a list of an estimate; none where it has no such list."""
     listed = estimate.get(key)
@@ -211,25 +174,25 @@ def _at(fields: Any, path: str) -> Any:
     return fields
 
 
-def _score(entry: Any, truth: float) -> Score | None:
-    value = entry.get("value") if isinstance(entry, Mapping) else entry
-    if not isinstance(value, int | float) or not math.isfinite(value):
-        return None
-    interval = entry.get("interval_90") if isinstance(entry, Mapping) else None
-    relative = (value - truth) / truth if truth != 0.0 else None
-    covered = half = None
-    if interval is not None:
-        low, high = _ends(interval)
-        covered = low <= truth <= high
-        half = 0.5 * (high - low) / abs(truth) if truth != 0.0 else None
-    return Score(
-        estimate=float(value),
-        truth=truth,
-        error=float(value) - truth,
-        relative_error=relative,
-        covered=covered,
-        half_width=half,
-    )
+def _scores(entries: Mapping[str, Any], truths: Mapping[str, float]) -> dict[str, Score]:
+    """Score of every true value that the estimate has."""
+    scores = {}
+    for path, truth in truths.items():
+        entry = entries.get(path, _at(entries, path))
+        value, interval = entry, None
+        if isinstance(entry, Mapping):
+            value, interval = entry.get("value"), entry.get("interval_90")
+        if not isinstance(value, int | float) or not math.isfinite(value):
+            continue
+        scores[path] = {"estimate": float(value), "truth": truth, "error": float(value) - truth}
+        if truth != 0.0:
+            scores[path]["relative_error"] = (value - truth) / truth
+        if interval is not None:
+            low, high = _ends(interval)
+            scores[path]["covered"] = low <= truth <= high
+            if truth != 0.0:
+                scores[path]["half_width"] = 0.5 * (high - low) / abs(truth)
+    return scores
 
 
 def _ends(interval: Any) -> tuple[float, float]:
@@ -240,9 +203,9 @@ def _ends(interval: Any) -> tuple[float, float]:
     return float(interval[0]), float(interval[1])
 
 
-def _impact_scores(estimate: Estimate, truth: Truth, bearing: str) -> dict[str, Any]:
+def _impact_scores(fields: Mapping[str, Any], truth: Truth, bearing: str) -> dict[str, Any]:
     """Errors of the peaks of all large impacts that the estimate lists, and how many it missed."""
-    listed = estimate.get("bearings", {}).get(bearing, {}).get("impacts")
+    listed = fields.get("impacts")
     if not isinstance(listed, list):
         return {}
     true, least = truth.impacts(bearing), LARGE_IMPACT * truth.bearing_load
@@ -281,12 +244,3 @@ def _number(entry: Any, *names: str) -> float | None:
         if isinstance(value, int | float):
             return float(value)
     return None
-
-
-def _coverage(scores: list[Score]) -> dict[str, Any]:
-    judged = [score.covered for score in scores if score.covered is not None]
-    return {
-        "intervals": len(judged),
-        "covered": int(sum(judged)),
-        "fraction": float(np.mean(judged)) if judged else None,
-    }

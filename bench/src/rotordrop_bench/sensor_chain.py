@@ -15,8 +15,11 @@ from rotordrop.rotor.reduction import RotorBasis
 Array = NDArray[np.float64]
 
 USUAL_FULL_SCALE = 600e-6
+"""Largest reading of an eddy-current system [m]; chosen, not measured."""
 OVERSAMPLING = 5
+"""How much denser than the samples a signal is made before a filter or a lag; chosen, not measured."""
 FILTER_ORDER = 4
+"""Order of the Butterworth filter before the sampling; chosen, not measured."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -190,14 +193,8 @@ def readings(
 ) -> Array:
     """Readings of the sensors [m], shape (N, S), at the sampling rate.
 
-    Parameters
-    ----------
-    along : ndarray, shape (M, S)
-        True displacement along the sensors [m]; M = N without filter or lag, else five times as dense.
-    time : ndarray, shape (M,)
-        Record time [s].
-    angle : ndarray, shape (M,)
-        Rotor angle [rad].
+    From the true displacement along them (M, S) [m], M = N without filter or lag, else five times as dense,
+    at record times (M,) [s] and rotor angles (M,) [rad].
     """
     turn = np.exp(1j * angle)[:, None]
     signal = errors.gain * along + errors.offset
@@ -206,7 +203,12 @@ def readings(
     phase = random.uniform(0.0, 2.0 * np.pi, along.shape[1])
     signal = signal + chain.hum * np.cos(2.0 * np.pi * chain.hum_frequency * time[:, None] + phase)
     if chain.anti_alias_frequency is not None:
-        signal = _filtered(signal, chain)
+        from scipy.signal import butter, sosfilt, sosfilt_zi
+
+        rate = OVERSAMPLING * chain.sampling_rate
+        sections = butter(FILTER_ORDER, chain.anti_alias_frequency, fs=rate, output="sos")
+        start = sosfilt_zi(sections)[:, :, None] * signal[0]
+        signal = np.asarray(sosfilt(sections, signal, axis=0, zi=start)[0])
     signal = signal[:: oversampling(chain, errors)]
     signal = signal + chain.noise * random.standard_normal(signal.shape)
     return quantised(signal, chain)
@@ -240,16 +242,6 @@ def quantised(signal: Array, chain: SensorChain) -> Array:
     step = 2.0 * (chain.full_scale or USUAL_FULL_SCALE) / 2.0**chain.bits
     top = 2 ** (chain.bits - 1)
     return np.asarray(step * np.clip(np.round(signal / step), -top, top - 1))
-
-
-def _filtered(signal: Array, chain: SensorChain) -> Array:
-    from scipy.signal import butter, sosfilt, sosfilt_zi
-
-    assert chain.anti_alias_frequency is not None
-    rate = OVERSAMPLING * chain.sampling_rate
-    sections = butter(FILTER_ORDER, chain.anti_alias_frequency, fs=rate, output="sos")
-    start = sosfilt_zi(sections)[:, :, None] * signal[0]
-    return np.asarray(sosfilt(sections, signal, axis=0, zi=start)[0])
 
 
 def speed_readings(

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.physics.contact import contact_law, stiffness_of_exponent
 from rotordrop_bench import _hidden_rhs as H
-from rotordrop_bench.violation_parts import BearingViolations, ContactViolation
-from rotordrop_bench.violations import Violations
+from rotordrop_bench.violations import BearingViolations, ContactViolation, Violations
 
 Array = NDArray[np.float64]
 

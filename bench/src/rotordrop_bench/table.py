@@ -17,7 +17,7 @@ from rotordrop_bench.score import score_estimate
 from rotordrop_bench.truth import Truth, read_truth
 
 LOST = 0.1
-"""A peak force wrong by more than this share is lost [1]."""
+"""A peak force wrong by more than this share is lost [1]; chosen, not measured."""
 
 EVERY = "all drops"
 STRUCTURE = "structure"
@@ -112,31 +112,44 @@ def score_bench(folder: str | Path, estimates: str | Path, only: Iterable[str] =
     scores: list[Mapping[str, Any]] = []
     unscored = {}
     for drop, truth in zip(made, truths, strict=True):
-        _refuse_another_version(truth)
         found = _scored(estimates / f"{drop.name}.json", truth)
         if isinstance(found, str):
             unscored[drop.name] = found
-        scores.append({} if isinstance(found, str) else found)
+            found = {}
+        scores.append(found)
     stated = {f for scored in scores for mine in scored.get("bearings", {}).values() for f in mine}
     entries, drops = [], []
     for drop, truth, scored in zip(made, truths, scores, strict=True):
         entries += [(drop.family, *entry) for entry in _entries(scored, truth, stated)]
-        there = list(truth.values.get("violated", []))
-        drops.append(_summary(drop.name, drop.family, drop.rotor, scored) | {"violated": there})
-    return BenchScores(rows=_rows(entries), drops=tuple(drops), unscored=unscored)
+        peaks = {bearing: own.get("peak_force_N") for bearing, own in scored.get("bearings", {}).items()}
+        drops.append(
+            {
+                "name": drop.name,
+                "family": drop.family,
+                "rotor": drop.rotor,
+                "consistent": scored.get("consistent"),
+                "named": scored.get("named", []),
+                "peak_errors": {b: peak["relative_error"] for b, peak in peaks.items() if peak},
+                "violated": list(truth.values.get("violated", [])),
+            }
+        )
+    rows = []
+    for family in (EVERY, *dict.fromkeys(family for family, *_ in entries)):
+        for quantity in dict.fromkeys(quantity for _, quantity, _ in entries):
+            chosen = [score for of, q, score in entries if q == quantity and family in (EVERY, of)]
+            if chosen:
+                rows.append(_row(family, quantity, chosen))
+    return BenchScores(rows=tuple(rows), drops=tuple(drops), unscored=unscored)
 
 
-def _refuse_another_version(truth: Truth) -> None:
+def _scored(file: Path, truth: Truth) -> dict[str, Any] | str:
+    """Scores of one estimate, or why there are none."""
     version = truth.values.get("bench_version")
     if version != VERSION:
         raise UsageError(
             f"{truth.path} is of version {version!r} of the bench, this is version {VERSION!r}; make the "
             "bench again in another folder"
         )
-
-
-def _scored(file: Path, truth: Truth) -> dict[str, Any] | str:
-    """Scores of one estimate, or why there are none."""
     if not file.is_file():
         return f"there is no {file.name}"
     try:
@@ -164,34 +177,6 @@ def _entries(scored: Mapping[str, Any], truth: Truth, stated: set[str]) -> list[
                 listed += [(field, mine.get(field)), (PARAMETERS, mine.get(field))]
     listed += [(STRUCTURE, score) for score in scored.get("structure", {}).values()]
     return listed
-
-
-def _summary(name: str, family: str, rotor: str, scored: Mapping[str, Any]) -> dict[str, Any]:
-    peaks = {
-        bearing: fields["peak_force_N"]["relative_error"]
-        for bearing, fields in scored.get("bearings", {}).items()
-        if "peak_force_N" in fields
-    }
-    return {
-        "name": name,
-        "family": family,
-        "rotor": rotor,
-        "consistent": scored.get("consistent"),
-        "named": scored.get("named", []),
-        "peak_errors": peaks,
-    }
-
-
-def _rows(entries: list[tuple[str, str, Mapping[str, Any] | None]]) -> tuple[BenchRow, ...]:
-    families = [EVERY, *dict.fromkeys(family for family, *_ in entries)]
-    quantities = dict.fromkeys(quantity for _, quantity, _ in entries)
-    rows = []
-    for family in families:
-        for quantity in quantities:
-            chosen = [s for f, q, s in entries if q == quantity and family in (EVERY, f)]
-            if chosen:
-                rows.append(_row(family, quantity, chosen))
-    return tuple(rows)
 
 
 def _row(family: str, quantity: str, scores: list[Mapping[str, Any] | None]) -> BenchRow:

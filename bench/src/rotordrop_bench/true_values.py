@@ -21,8 +21,7 @@ from rotordrop_bench.event import DropConditions, HiddenMachine
 from rotordrop_bench.motion import true_motion
 from rotordrop_bench.sensor_chain import SensorChain, SensorErrors, true_places
 from rotordrop_bench.structure import support_matrices
-from rotordrop_bench.violation_parts import BearingViolations
-from rotordrop_bench.violations import Violations
+from rotordrop_bench.violations import BearingViolations, Violations
 
 Array = NDArray[np.float64]
 

@@ -75,13 +75,7 @@ class Truth:
 
 
 def read_truth(path: str | Path) -> Truth:
-    """Read a truth file, ours or a supplied one; the histories beside it (.npz) come along where they exist.
-
-    Raises
-    ------
-    UsageError
-        When the file cannot be read or is no truth file.
-    """
+    """Read a truth file, ours or a supplied one, with the histories beside it (.npz) where they exist."""
     path = Path(path)
     try:
         values = json.loads(path.read_text(encoding="utf-8"))
@@ -89,7 +83,11 @@ def read_truth(path: str | Path) -> Truth:
         raise UsageError(
             f"{path} cannot be read as a truth file ({error}); give the .json of a recording"
         ) from error
-    return truth_of(values, path=path, histories=_histories(path.with_suffix(".npz")))
+    histories = {}
+    if (beside := path.with_suffix(".npz")).is_file():
+        with np.load(beside) as stored:
+            histories = {name: stored[name] for name in stored.files}
+    return truth_of(values, path=path, histories=histories)
 
 
 def truth_of(values: Any, *, path: Path | None = None, histories: Mapping[str, Array] | None = None) -> Truth:
@@ -102,10 +100,3 @@ def truth_of(values: Any, *, path: Path | None = None, histories: Mapping[str, A
             "give the .json that 'rotordrop-bench synthesize' wrote, or a supplied truth file"
         )
     return Truth(values=values, histories=histories or {}, path=path)
-
-
-def _histories(path: Path) -> dict[str, Array]:
-    if not path.is_file():
-        return {}
-    with np.load(path) as stored:
-        return {name: stored[name] for name in stored.files}

@@ -4,23 +4,289 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from rotordrop.elements.description import Channel, Name
+from rotordrop.elements.description import Channel, Description, Misfit, Name, Node
+from rotordrop.elements.values import (
+    Angle,
+    ContactExponent,
+    Force,
+    Length,
+    Physical,
+    Positive,
+    PositiveForce,
+    PositiveLength,
+    PositiveMass,
+    PositiveTime,
+    Stiffness,
+    Time,
+    Unbalance,
+    default,
+)
 from rotordrop.errors import UsageError
+from rotordrop.known import Known
 from rotordrop.machine import Machine
 from rotordrop.machine.loading import load_description
 from rotordrop.machine.schema import description_schema
-from rotordrop_bench.violation_parts import (
-    BearingViolations,
-    ChainViolation,
-    MagnetViolation,
-    RotorViolation,
-    SensorViolation,
-    UnbalanceJump,
-)
+
+Share = Annotated[Known, Physical("dimensionless", least=0.0, most=1.0)]
+CrossAxis = Annotated[Known, Physical("dimensionless", least=-0.5, most=0.5)]
+Lift = Annotated[Known, Physical("dimensionless", least=0.0, most=0.95)]
+Frequency = Annotated[Known, Physical("frequency", above=0.0)]
+Energy = Annotated[Known, Physical("energy", above=0.0)]
+NonNegativeNumber = Annotated[Known, Physical("dimensionless", least=0.0)]
+MOST_POINTS = 9
+NO_CHANGE = "as the machine has it"
+
+
+class Violation(Description):
+    """One group of violations; what is left out is as the machine has it."""
+
+    together: ClassVar[tuple[tuple[str, ...], ...]] = ()
+    """Keys of which none says anything without the others."""
+
+    def check(self) -> None:
+        """Refuse half of what belongs together."""
+        for group in self.together:
+            given = [key for key in group if key in self.model_fields_set]
+            missing = [key for key in group if key not in self.model_fields_set]
+            if given and missing:
+                raise Misfit(
+                    f"{given[0]!r} needs {missing[0]!r} beside it; add it or leave out both", (given[0],)
+                )
+
+    def values(self) -> dict[str, Any]:
+        """What was given, by key [SI]."""
+        return {
+            key: _plain(getattr(self, key)) for key in type(self).model_fields if key in self.model_fields_set
+        }
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Violation):
+        return value.values()
+    if isinstance(value, dict):
+        return {key: _plain(entry) for key, entry in value.items()}
+    if isinstance(value, tuple):
+        return [_plain(entry) for entry in value]
+    return float(value) if isinstance(value, Known) else value
+
+
+class SupportViolation(Violation):
+    """A support that is no spring and damper alike in x and y."""
+
+    axes_angle: Angle = default(0.0, "axes horizontal and vertical")
+    """Angle from horizontal to the first principal axis of stiffness and damping [rad], from x towards y."""
+    stiffness_ratio: Positive = default(1.0, NO_CHANGE)
+    damping_ratio: Positive = default(1.0, NO_CHANGE)
+    """Factors on stiffness and damping along the first axis, which at angle zero is horizontal [1]."""
+    damping: NonNegativeNumber = default(1.0, NO_CHANGE)
+    """Factor on the damping along both axes [1]."""
+    hardening: NonNegativeNumber = default(0.0, "a linear spring")
+    """How much the spring force exceeds that of the linear spring, at the force below [1]."""
+    hardening_force: PositiveForce = default(1.0, "of no effect without hardening")
+    """Force of the linear spring at which that holds [N]."""
+    hardening_radial: bool = False
+    """Whether the whole deflection hardens both axes, instead of each axis its own."""
+    slip_force: Force = default(0.0, "no friction in the support")
+    """Friction that slips in the support [N]; it makes its force lag the deflection by a hysteresis."""
+    slip_travel: PositiveLength = default(1e-6, "of no effect without slip")
+    """Deflection over which that friction builds up [m]."""
+
+    together: ClassVar = (("hardening", "hardening_force"), ("slip_force", "slip_travel"))
+
+
+class FoundationViolation(Violation):
+    """A mode of the foundation on which the support stands."""
+
+    mass: PositiveMass | None = None
+    """Modal mass at the support [kg]."""
+    frequency: Frequency | None = None
+    """Vertical natural frequency without support [Hz]."""
+    frequency_horizontal: Frequency | None = None
+    """Horizontal natural frequency without support [Hz]; the vertical one when left out."""
+    damping_ratio: NonNegativeNumber = default(0.03, "a bolted steel frame")
+    """Damping ratio of the mode [1]."""
+
+    together: ClassVar = (("mass", "frequency"),)
+
+    def check(self) -> None:
+        """Refuse a foundation without mass or frequency."""
+        super().check()
+        if self.model_fields_set and self.mass is None:
+            raise Misfit("a foundation needs 'mass' and 'frequency'; add them or leave out the table")
+
+
+class LawPoint(Violation):
+    """A point of a contact law."""
+
+    depth: PositiveLength
+    """Indentation [m]."""
+    force: PositiveForce
+    """Normal force at rest [N]."""
+
+
+class ContactViolation(Violation):
+    """Another contact of rotor and race."""
+
+    stiffness: Positive = default(1.0, NO_CHANGE)
+    damping: NonNegativeNumber = default(1.0, NO_CHANGE)
+    """Factors on contact stiffness and contact damping [1]."""
+    exponent: ContactExponent | None = None
+    """Another exponent [1]; equally deep at five times the mean load of a bearing."""
+    law: tuple[LawPoint, ...] = ()
+    """A law through these points, straight between them where both scales are logarithmic."""
+
+    def check(self) -> None:
+        """Refuse a law that falls, has too few or too many points, or a second law beside it."""
+        super().check()
+        if not self.law:
+            return
+        if self.exponent is not None:
+            raise Misfit("the contact has both 'law' and 'exponent'; keep one of them", ("law",))
+        if not 2 <= len(self.law) <= MOST_POINTS:
+            raise Misfit(f"a law has 2 to {MOST_POINTS} points, not {len(self.law)}", ("law",))
+        for index in range(1, len(self.law)):
+            for key in ("depth", "force"):
+                low, high = (float(getattr(self.law[i], key)) for i in (index - 1, index))
+                if not high > low:
+                    raise Misfit(
+                        f"{key} {high:g} at point {index + 1} does not exceed {low:g} before it; order the "
+                        "points so that depth and force grow",
+                        ("law", index, key),
+                    )
+
+
+class RaceViolation(Violation):
+    """Another race, or one that tilts under the contact force."""
+
+    inertia: Positive = default(1.0, NO_CHANGE)
+    """Factor on its polar moment of inertia [1]."""
+    tilt_stiffness: Stiffness | None = None
+    """Stiffness of the tilt where the rotor touches, in series with the contact [N/m]."""
+    tilt_frequency: Frequency | None = None
+    """Natural frequency of the tilt [Hz]."""
+    tilt_damping_ratio: NonNegativeNumber = default(0.02, "steel on balls")
+    """Damping ratio of the tilt [1]."""
+
+    together: ClassVar = (("tilt_stiffness", "tilt_frequency"),)
+
+
+class FrictionViolation(Violation):
+    """Friction outside the range the owner states, or of another shape."""
+
+    dynamic: Positive | None = None
+    """Dynamic coefficient [1]; the static one keeps its ratio to it."""
+    static: Positive = default(1.0, NO_CHANGE)
+    stribeck_speed: Positive = default(1.0, NO_CHANGE)
+    """Factors on static coefficient and Stribeck speed [1]."""
+
+
+class GapViolation(Violation):
+    """An air gap that changes during the drop."""
+
+    drift: Length = default(0.0, "a gap that stays")
+    """Change of the gap that stays [m], at an even rate within the time below."""
+    drift_time: PositiveTime = default(1.0, "of no effect without drift")
+    """Time it takes [s]."""
+    closing: Length = default(0.0, "no growth by heat")
+    """Largest closing by the heat of friction [m]; gone when all is cold again."""
+    heat: Energy = default(1.0, "of no effect without closing")
+    """Heat of friction that closes 63 % of it [J]."""
+
+    together: ClassVar = (("drift", "drift_time"), ("closing", "heat"))
+
+
+class BallsViolation(Violation):
+    """Balls that stand elsewhere, or move on."""
+
+    first_ball_angle: Angle | None = None
+    """Where the first ball stands [rad]."""
+    turn: bool = False
+    """Whether the balls turn with the cage as the race spins up."""
+
+
+class CentreViolation(Violation):
+    """A bearing that does not stand in the line of the magnets."""
+
+    x: Length = default(0.0, "in line")
+    y: Length = default(0.0, "in line")
+    """Its centre in the axes of magnets and sensors [m]."""
+
+
+class BearingViolations(Violation):
+    """What is violated at a touchdown bearing."""
+
+    support: SupportViolation = SupportViolation()
+    """Its support."""
+    foundation: FoundationViolation = FoundationViolation()
+    """The foundation under the support."""
+    contact: ContactViolation = ContactViolation()
+    """Contact of rotor and race."""
+    race: RaceViolation = RaceViolation()
+    """The race."""
+    friction: FrictionViolation = FrictionViolation()
+    """Friction of rotor and race."""
+    gap: GapViolation = GapViolation()
+    """The air gap."""
+    balls: BallsViolation = BallsViolation()
+    """The balls."""
+    centre: CentreViolation = CentreViolation()
+    """Its centre."""
+
+
+class SensorViolation(Violation):
+    """What is violated at a sensor."""
+
+    time_constant: Time = default(0.0, "at once")
+    """Time constant of first order with which the reading follows the shaft [s]."""
+    cross_axis: CrossAxis = default(0.0, "none")
+    """Reading per motion across the sensor, a quarter turn ahead of its direction [1]. For all sensors at
+    once: its size, drawn between half and all of it with either sign."""
+    plane_shift: Length = default(0.0, "where it is stated")
+    """How much nearer to the middle of the rotor the sensor stands than stated [m]."""
+    follows_housing: Share = default(0.0, "a bracket on the ground")
+    """Share of the motion of the bearing's housing that the bracket of the sensor follows [1]."""
+
+
+class ChainViolation(SensorViolation):
+    """What is violated at all sensors."""
+
+    anti_alias_frequency: Frequency | None = None
+    """Corner of a filter before the sampling that nobody mentions [Hz]."""
+
+
+class MagnetViolation(Violation):
+    """What the magnets do after power-off."""
+
+    remanence_time: PositiveTime | None = None
+    """Time constant of the remanent lift [s]."""
+    remanent_lift: Lift | None = None
+    """Vertical remanent lift of every magnet over its share of the weight [1]."""
+
+
+class RotorViolation(Violation):
+    """A rotor that differs from its drawing."""
+
+    youngs_modulus: Positive = default(1.0, NO_CHANGE)
+    """Factor on Young's modulus of every section [1]."""
+    unbalance: Positive = default(1.0, NO_CHANGE)
+    """Factor on the drawn unbalances, which may leave the grade [1]."""
+
+
+class UnbalanceJump(Violation):
+    """Something comes off the rotor during the drop."""
+
+    node: Node
+    """Node of the new unbalance, counted from 1."""
+    amount: Unbalance
+    """Amount [kg m]."""
+    phase: Angle = default(0.0, "as any other")
+    """Phase, counted from +y at rotor angle zero [rad]."""
+    time: Time | None = None
+    """When, from power-off [s]; at the first contact when left out."""
 
 
 class Violations(BearingViolations):
@@ -104,13 +370,7 @@ VIOLATIONS: dict[str, Violations] = {
 
 
 def load_violations(path: str | os.PathLike[str]) -> Violations:
-    """Read violations from a TOML file; every refusal says where and what to do.
-
-    Raises
-    ------
-    MachineFileError
-        When the file cannot be used; the message holds file, line, column, the value and the way out.
-    """
+    """Read violations from a TOML file; every refusal says where and what to do."""
     return load_description(Violations, Path(path))
 
 
