@@ -11,7 +11,6 @@ from pydantic import Field, Strict
 
 from rotordrop.elements.catalog import (
     PRELOAD_FACTOR,
-    BallComplement,
     CatalogueBearing,
     PairRigidity,
     PreloadClass,
@@ -155,7 +154,7 @@ class BallBearing(RaceBearing):
     @classmethod
     def rewritten(cls, raw: dict[str, Any]) -> dict[str, Any]:
         """Read ``preload = "light"``, ``clearance = "C3"``, ``rows = 1``, one conformity for both races."""
-        preload = raw.get("preload")
+        preload, clearance = raw.get("preload"), raw.get("clearance")
         if preload in _PRELOAD_CLASSES:
             raw["preload_class"] = raw.pop("preload")
         elif isinstance(preload, str) and preload.isalpha():
@@ -163,14 +162,20 @@ class BallBearing(RaceBearing):
             hint = f"did you mean {close[0]!r}?" if close else f"classes are {', '.join(_PRELOAD_CLASSES)}"
             told = f'{preload!r} is no preload class; {hint} Else give a force, "100 N"'
             raise Misfit(told, ("preload",))
-        clearance = raw.get("clearance")
         if clearance in CLASSES:
             raw["clearance_class"] = raw.pop("clearance")
         elif isinstance(clearance, str) and not any(unit in clearance for unit in ("m", "in", "thou")):
             told = f"{clearance!r} is neither a length nor a clearance class ({', '.join(CLASSES)})"
             raise Misfit(f'{told}; write for example "C3" or "40 um"', ("clearance",))
         if "rows" in raw:
-            raw["arrangement"] = _arrangement(raw.pop("rows"), raw.get("arrangement"))
+            rows, arrangement = raw.pop("rows"), raw.get("arrangement")
+            if rows not in _ROWS or isinstance(rows, bool):
+                told = f"rows = {rows!r} is neither 1 nor 2; write rows = 1, or the arrangement of two rows"
+                raise Misfit(told, ("rows",))
+            if arrangement is not None and (arrangement == "single") != (rows == 1):
+                told = f"rows = {rows} does not go with arrangement = {arrangement!r}; keep one"
+                raise Misfit(told, ("rows",))
+            raw["arrangement"] = _ROWS[rows] if arrangement is None else arrangement
         if "conformity" in raw:
             both = raw.pop("conformity")
             raw = {"conformity_inner": both, "conformity_outer": both} | raw
@@ -184,22 +189,28 @@ class BallBearing(RaceBearing):
 
     def check(self) -> None:
         """Refuse a bearing that is not described, or balls that do not fit."""
-        catalogued = self.catalogue_entry()
-        missing = [name for name in self._needed() if name not in self.model_fields_set]
-        if catalogued is None and missing:
+        entry, known = self.catalogue_entry(), self.model_fields_set
+        missing = [name for name in self._needed() if name not in known]
+        if entry is None and missing:
             raise Misfit(
                 f"the bearing has no {', '.join(repr(name) for name in missing)}; give its 'designation' or "
                 "its geometry"
             )
-        if self.preload_class is not None:
-            self._check_preload_class(catalogued)
-        elif not self._has_preload(catalogued) and not self._has_clearance(catalogued):
+        listed = entry is not None and bool(entry.preload)
+        if self.preload_class is not None and "preload" in known:
+            told = "the preload is given both as a force and as a class; keep one of them"
+            raise Misfit(told, ("preload",))
+        if self.preload_class is not None and not listed:
+            raise Misfit(
+                f"preload = {self.preload_class!r} needs a 'designation' that is in the catalogue; "
+                'give the force, for example preload = "100 N"',
+                ("preload",),
+            )
+        preloaded = self.preload_class is not None or "preload" in known or listed
+        if not preloaded and not self._has_clearance(entry):
             raise Misfit(
                 'the bearing has no \'preload\'; write for example preload = "100 N", or clearance = "12 um"'
             )
-
-    def _has_preload(self, entry: CatalogueBearing | None) -> bool:
-        return "preload" in self.model_fields_set or (entry is not None and bool(entry.preload))
 
     def _has_clearance(self, entry: CatalogueBearing | None = None) -> bool:
         """Whether the rows have play: a clearance is given, or the grooves are deep."""
@@ -210,98 +221,82 @@ class BallBearing(RaceBearing):
         """What a bearing outside the catalogue must say of itself; a clearance leaves it a contact angle."""
         return _NEEDED[:-1] if self._has_clearance() else _NEEDED
 
-    def _check_preload_class(self, catalogued: CatalogueBearing | None) -> None:
-        if "preload" in self.model_fields_set:
-            raise Misfit(
-                "the preload is given both as a force and as a class; keep one of them", ("preload",)
-            )
-        if catalogued is None or not catalogued.preload:
-            raise Misfit(
-                f"preload = {self.preload_class!r} needs a 'designation' that is in the catalogue; "
-                'give the force, for example preload = "100 N"',
-                ("preload",),
-            )
-
     def catalogue_entry(self) -> CatalogueBearing | None:
         """Find the bearing in the catalogue; a bearing described by its geometry need not be there."""
         if self.designation is None:
             return None
-        known = self.model_fields_set
-        described = all(name in known for name in self._needed()) and (
-            "preload" in known or self._has_clearance()
-        )
+        known, rigidity = self.model_fields_set, None
+        if self.axial_rigidity is not None:
+            if "preload" not in known or not self.preload.value > 0.0:
+                shown = format_quantity(self.axial_rigidity.value, "stiffness")
+                told = (
+                    f"axial_rigidity = {shown} holds at a preload; add the force it is listed for, for "
+                    'example preload = "100 N"'
+                )
+                raise Misfit(told, ("axial_rigidity",))
+            hybrid = self.ball_material == "silicon nitride" if "ball_material" in known else None
+            rigidity = PairRigidity(
+                value=self.axial_rigidity.value, preload=self.preload.value, hybrid=hybrid
+            )
         ratings = {
             name: getattr(self, name).value
             for name in ("static_load_rating", "dynamic_load_rating")
             if name in known
         }
         try:
-            return find_bearing(self.designation, **ratings, rigidity=self._stated_rigidity())
+            return find_bearing(self.designation, **ratings, rigidity=rigidity)
         except LookupError as error:
+            described = known.issuperset(self._needed()) and ("preload" in known or self._has_clearance())
             if described:
                 return None
             raise Misfit(str(error), ("designation",)) from None
 
-    def _stated_rigidity(self) -> PairRigidity | None:
-        """The axial rigidity that is given, with the preload and the balls it holds for."""
-        if self.axial_rigidity is None:
-            return None
-        known = self.model_fields_set
-        if "preload" not in known or not self.preload.value > 0.0:
-            shown = format_quantity(self.axial_rigidity.value, "stiffness")
-            told = (
-                f"axial_rigidity = {shown} holds at a preload; add the force it is listed for, for example "
-                'preload = "100 N"'
-            )
-            raise Misfit(told, ("axial_rigidity",))
-        hybrid = self.ball_material == "silicon nitride" if "ball_material" in known else None
-        return PairRigidity(value=self.axial_rigidity.value, preload=self.preload.value, hybrid=hybrid)
-
     def left_out(self) -> dict[str, Any]:
         """Take what was left out from the catalogue and the material of the balls."""
-        values: dict[str, Any] = {}
-        entry = self.catalogue_entry()
+        entry, known = self.catalogue_entry(), self.model_fields_set
         if entry is not None:
             values = self._from_catalogue(entry)
         else:
             why = "a usual value for spindle bearings"
-            values |= {
-                f"conformity_{race}": Known(value=_CONFORMITY, status="default", source=why)
-                for race in ("inner", "outer")
-            }
+            usual = Known(value=_CONFORMITY, status="default", source=why)
+            values = {"conformity_inner": usual, "conformity_outer": usual}
         material = values.get("ball_material", self.ball_material)
-        if "ball_material" in self.model_fields_set:
+        if "ball_material" in known:
             material = self.ball_material
         for name, (value, unit) in _BALL_MATERIALS[material].items():
             values[name] = Known(value=value, status="default", source=f"balls of {material}", unit=unit)
-        if self._has_clearance(entry):
+        loose = self._has_clearance(entry)
+        if loose:
             values |= self._of_clearance(entry)
-        given = values | {name: getattr(self, name) for name in self.model_fields_set}
-        self._check_fill(given)
-        if self._has_clearance(entry):
+        given = values | {name: getattr(self, name) for name in known}
+        ball, pitch, count = given["ball_diameter"].value, given["pitch_diameter"].value, given["ball_count"]
+        if ball * count > 3.14159266 * pitch:
+            raise Misfit(
+                f"{count} balls of {ball * 1e3:.4g} mm do not fit on a pitch diameter of "
+                f"{pitch * 1e3:.4g} mm; at most {int(3.14159266 * pitch / ball)} do",
+                ("ball_count",),
+            )
+        if loose:
             _check_play(given)
-        return {name: value for name, value in values.items() if name not in self.model_fields_set}
+        return {name: value for name, value in values.items() if name not in known}
 
     def _of_clearance(self, entry: CatalogueBearing | None) -> dict[str, Any]:
         """Clearance of a class, and what goes without saying beside one: no preload, no contact angle."""
-        why = "a bearing with clearance has none unless it is given"
-        values: dict[str, Any] = {}
-        if "preload" not in self.model_fields_set and self.preload_class is None:
+        known, values = self.model_fields_set, dict[str, Any]()
+        preloaded = "preload" in known or self.preload_class is not None
+        if not preloaded:
+            why = "a bearing with clearance has none unless it is given"
             values["preload"] = Known(value=0.0, status="default", source=why, unit="N")
-        if entry is None and "contact_angle" not in self.model_fields_set:
+        if entry is None and "contact_angle" not in known:
             why = "deep grooves: the angle under load follows from the clearance"
             values["contact_angle"] = Known(value=0.0, status="default", source=why, unit="rad")
-        preloaded = self.preload_class is not None or "preload" in self.model_fields_set
         if entry is not None and entry.kind == "deep groove" and not preloaded:
             values["arrangement"] = "single"
-        if self.clearance_class is not None or "clearance" not in self.model_fields_set:
-            values["clearance"] = self._clearance_of_class(entry)
-        return values
-
-    def _clearance_of_class(self, entry: CatalogueBearing | None) -> Known:
+        if self.clearance_class is None and "clearance" in known:
+            return values
         said = entry.read.clearance_class if entry is not None and entry.read is not None else None
         group = self.clearance_class or said or "CN"
-        if "clearance" in self.model_fields_set:
+        if "clearance" in known:
             raise Misfit("the clearance is given both as a length and as a class; keep one", ("clearance",))
         bore = self.bore_diameter.value if self.bore_diameter else entry.bore if entry else None
         if bore is None:
@@ -317,40 +312,46 @@ class BallBearing(RaceBearing):
                 "give the clearance as a length",
                 ("clearance",),
             )
-        why = f"middle of {group} for a bore of {1e3 * bore:.4g} mm, ISO 5753-1"
-        middle = 0.5 * (bounds[0] + bounds[1])
-        return Known(value=middle, status="inferred", range=bounds, source=why, unit="m")
+        why, middle = f"middle of {group} for a bore of {1e3 * bore:.4g} mm, ISO 5753-1", 0.5 * sum(bounds)
+        return values | {
+            "clearance": Known(value=middle, status="inferred", range=bounds, source=why, unit="m")
+        }
 
     def _from_catalogue(self, entry: CatalogueBearing) -> dict[str, Any]:
-        complement = entry.complement
-        said = entry.read.preload_class if entry.read is not None else None
-        preload_class = self.preload_class or said or "light"
-        values = _inferred(entry, complement)
-        if entry.read is not None and entry.read.arrangement is not None:
-            values["arrangement"] = entry.read.arrangement
-        if not entry.preload:
-            return values
-        status: Literal["default", "inferred"] = "inferred" if self.preload_class or said else "default"
-        force = entry.preload[preload_class]
-        why, bounds = f"{entry.maker} catalogue, {preload_class} preload of {entry.designation}", None
-        if entry.preload_basis:
-            why = f"{preload_class} preload {entry.preload_basis}"
-            bounds = (force / PRELOAD_FACTOR, PRELOAD_FACTOR * force)
-        values["preload"] = Known(value=force, status=status, range=bounds, source=why, unit="N")
+        """What the catalogue, or a size alone, gives or lets infer."""
+        balls, read = entry.complement, entry.read
+        listed = f"{entry.maker} catalogue, {entry.designation}" if entry.listed else "ISO 15"
+        unsaid = "; the designation does not say it" if entry.contact_angle_range else ", the designation"
+        rows = (
+            ("ball_diameter", balls.ball_diameter, balls.diameter_range, balls.basis, "m"),
+            ("pitch_diameter", balls.pitch_diameter, None, balls.basis, "m"),
+            ("bore_diameter", entry.bore, None, listed, "m"),
+            ("width", entry.width, None, listed, "m"),
+            ("conformity_inner", balls.conformity, balls.conformity_range, balls.basis, ""),
+            ("conformity_outer", balls.conformity, balls.conformity_range, balls.basis, ""),
+            ("contact_angle", entry.contact_angle, entry.contact_angle_range, f"{listed}{unsaid}", "rad"),
+        )
+        values: dict[str, Any] = {
+            name: Known(value=value, status="inferred", range=bounds, source=why, unit=unit)
+            for name, value, bounds, why, unit in rows
+            if value is not None
+        }
+        if balls.count_range is not None:
+            values["ball_count_range"] = balls.count_range
+        values |= {"ball_count": balls.ball_count, "ball_material": entry.ball_material}
+        if read is not None and read.arrangement is not None:
+            values["arrangement"] = read.arrangement
+        if entry.preload:
+            said = self.preload_class or (None if read is None else read.preload_class)
+            status: Literal["default", "inferred"] = "inferred" if said else "default"
+            group = said or "light"
+            force, bounds = entry.preload[group], None
+            why = f"{entry.maker} catalogue, {group} preload of {entry.designation}"
+            if entry.preload_basis:
+                why = f"{group} preload {entry.preload_basis}"
+                bounds = (force / PRELOAD_FACTOR, PRELOAD_FACTOR * force)
+            values["preload"] = Known(value=force, status=status, range=bounds, source=why, unit="N")
         return values
-
-    @staticmethod
-    def _check_fill(values: dict[str, Any]) -> None:
-        """Refuse more balls than fit on the pitch circle, and balls as large as the circle itself."""
-        ball, pitch = values["ball_diameter"].value, values["pitch_diameter"].value
-        count = values["ball_count"]
-        if ball * count > 3.14159266 * pitch:
-            raise Misfit(
-                f"{count} balls of {ball * 1e3:.4g} mm do not fit on a pitch diameter of "
-                f"{pitch * 1e3:.4g} mm; "
-                f"at most {int(3.14159266 * pitch / ball)} do",
-                ("ball_count",),
-            )
 
     def numbers(self) -> BallNumbers:
         """Give the numbers that follow from it."""
@@ -415,18 +416,6 @@ class BallBearing(RaceBearing):
         return super().reason(name)
 
 
-def _arrangement(rows: Any, arrangement: Any) -> Any:
-    if rows not in _ROWS or isinstance(rows, bool):
-        raise Misfit(
-            f"rows = {rows!r} is neither 1 nor 2; write rows = 1, or the arrangement of two rows", ("rows",)
-        )
-    if arrangement is None:
-        return _ROWS[rows]
-    if (arrangement == "single") != (rows == 1):
-        raise Misfit(f"rows = {rows} does not go with arrangement = {arrangement!r}; keep one", ("rows",))
-    return arrangement
-
-
 def _check_play(values: dict[str, Any]) -> None:
     """Refuse a clearance that the grooves or the other values leave no room for."""
     play, preload = values["clearance"].value, values["preload"].value
@@ -451,32 +440,3 @@ def _check_play(values: dict[str, Any]) -> None:
             f"{f'leave at {math.degrees(angle):.4g}°' if angle > 0.0 else 'allow'}; check it",
             ("clearance",),
         )
-
-
-def _inferred(entry: CatalogueBearing, complement: BallComplement) -> dict[str, Any]:
-    """What the catalogue, or a size alone, gives or lets infer of the geometry."""
-    listed = f"{entry.maker} catalogue, {entry.designation}" if entry.listed else "ISO 15"
-    lengths = (
-        ("ball_diameter", complement.ball_diameter, complement.diameter_range, complement.basis),
-        ("pitch_diameter", complement.pitch_diameter, None, complement.basis),
-        ("bore_diameter", entry.bore, None, listed),
-        ("width", entry.width, None, listed),
-    )
-    values: dict[str, Any] = {
-        name: Known(value=value, status="inferred", range=bounds, source=why, unit="m")
-        for name, value, bounds, why in lengths
-        if value is not None
-    }
-    for race in ("inner", "outer"):
-        values[f"conformity_{race}"] = Known(
-            value=complement.conformity,
-            status="inferred",
-            range=complement.conformity_range,
-            source=complement.basis,
-        )
-    angle, angles = entry.contact_angle, entry.contact_angle_range
-    why = f"{listed}; the designation does not say it" if angles else f"{listed}, the designation"
-    values["contact_angle"] = Known(value=angle, status="inferred", range=angles, source=why, unit="rad")
-    if complement.count_range is not None:
-        values["ball_count_range"] = complement.count_range
-    return values | {"ball_count": complement.ball_count, "ball_material": entry.ball_material}
