@@ -29,6 +29,7 @@ PARAMETERS: tuple[Parameter, ...] = (
         kind="time",
         shown_as="duration",
         guess_sigma=0.7,
+        given_sigma=0.0,
         entries=(Entry(array="spin", column=L.AERO_TIME_CONSTANT),),
         truth=("tau_aero",),
     ),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, Strict
 
+from rotordrop.elements import values as V
 from rotordrop.elements.catalog import (
     PRELOAD_FACTOR,
     CatalogueBearing,
@@ -20,23 +21,7 @@ from rotordrop.elements.catalog.boundary import CLASSES, ClearanceClass, clearan
 from rotordrop.elements.description import Misfit, Text, Usual
 from rotordrop.elements.race_bearing import Oddity, RaceBearing
 from rotordrop.elements.rotor import DENSITY, ELASTIC, POISSON
-from rotordrop.elements.values import (
-    Angle,
-    Conformity,
-    ContactAngle,
-    Density,
-    Force,
-    NonNegativeLength,
-    Number,
-    PoissonRatio,
-    PositiveForce,
-    PositiveLength,
-    PositiveSpeed,
-    Pressure,
-    Stiffness,
-    default,
-    follows,
-)
+from rotordrop.elements.values import default, follows
 from rotordrop.known import Known
 from rotordrop.units import format_quantity
 
@@ -78,55 +63,55 @@ class BallBearing(RaceBearing):
     designation: Text | None = None
     """Designation, for example "XCB71914-E"; where no maker's list in the catalogue has it, the balls are
     inferred from its size."""
-    ball_diameter: PositiveLength = follows("reconstructed from the catalogue")
+    ball_diameter: V.PositiveLength = follows("reconstructed from the catalogue")
     """Ball diameter D_w and pitch diameter D_pw [m]."""
     ball_count: Annotated[int, Strict(), Field(ge=3)] = Field(default=0, validate_default=False)
     """Balls per row."""
-    pitch_diameter: PositiveLength = follows("reconstructed from the catalogue")
+    pitch_diameter: V.PositiveLength = follows("reconstructed from the catalogue")
     """Ball diameter D_w and pitch diameter D_pw [m]."""
-    contact_angle: ContactAngle = follows("from the catalogue")
+    contact_angle: V.ContactAngle = follows("from the catalogue")
     """Nominal contact angle [rad]."""
-    conformity_inner: Conformity = follows("0.53, a usual value for spindle bearings")
-    conformity_outer: Conformity = follows("0.53, a usual value for spindle bearings")
+    conformity_inner: V.Conformity = follows("0.53, a usual value for spindle bearings")
+    conformity_outer: V.Conformity = follows("0.53, a usual value for spindle bearings")
     """Groove radius over ball diameter [1]."""
     ball_material: BallMaterial = Field(
         default="silicon nitride", description="Touchdown bearings usually have ceramic balls"
     )
     """Material of the balls."""
-    ring_youngs_modulus: Pressure = default(208e9, "bearing steel")
-    ring_poisson_ratio: PoissonRatio = default(0.3, "bearing steel")
+    ring_youngs_modulus: V.Pressure = default(208e9, "bearing steel")
+    ring_poisson_ratio: V.PoissonRatio = default(0.3, "bearing steel")
     """Ring material [Pa], [1]."""
-    ball_youngs_modulus: Pressure = follows("from the ball material")
-    ball_poisson_ratio: PoissonRatio = follows("from the ball material")
-    ball_density: Density = follows("from the ball material")
+    ball_youngs_modulus: V.Pressure = follows("from the ball material")
+    ball_poisson_ratio: V.PoissonRatio = follows("from the ball material")
+    ball_density: V.Density = follows("from the ball material")
     """Ball material [Pa], [1], [kg/m³]."""
-    preload: Force = follows("that of the preload class")
+    preload: V.Force = follows("that of the preload class")
     """Axial preload force F_V of each row [N]."""
     preload_class: PreloadClass | None = None
     """Preload class of the catalogue, where the preload was given so."""
-    clearance: NonNegativeLength | None = None
+    clearance: V.NonNegativeLength | None = None
     """Radial internal clearance, from one extreme position of the inner ring to the opposite one [m]."""
     clearance_class: ClearanceClass | None = None
     """Clearance class of ISO 5753, where the clearance was given so."""
-    bore_diameter: PositiveLength | None = None
+    bore_diameter: V.PositiveLength | None = None
     """Bore of the inner ring [m], which a clearance class counts from."""
     arrangement: Literal["X", "O", "tandem", "single"] = Field(
         default="X", description="Two rows face to face, as in Neisi 2020"
     )
     """Arrangement of the rows; ``rows = 1`` writes "single", ``rows = 2`` "X"."""
-    first_ball_angle: Angle = default(0.0, "the first ball is straight up")
+    first_ball_angle: V.Angle = default(0.0, "the first ball is straight up")
     """Angle of the first ball from +y, positive with the spin [rad]."""
-    second_row_offset: Number = default(0.0, "the balls of both rows stand at the same angles")
+    second_row_offset: V.Number = default(0.0, "the balls of both rows stand at the same angles")
     """Angle by which the second row is turned, as a fraction of the ball pitch [1]."""
-    width: PositiveLength | None = None
+    width: V.PositiveLength | None = None
     """Width of one row [m]."""
-    limiting_speed: PositiveSpeed | None = None
+    limiting_speed: V.PositiveSpeed | None = None
     """Speed up to which the maker allows the bearing [rad/s]."""
-    static_load_rating: PositiveForce | None = None
+    static_load_rating: V.PositiveForce | None = None
     """Static load rating of one row."""
-    dynamic_load_rating: PositiveForce | None = None
+    dynamic_load_rating: V.PositiveForce | None = None
     """Dynamic load rating of one row."""
-    axial_rigidity: Stiffness | None = None
+    axial_rigidity: V.Stiffness | None = None
     """Axial rigidity of the pair at its preload, as a catalogue states it [N/m]; narrows them further."""
     ball_count_range: tuple[int, int] | None = None
     """90 % interval of the number of balls, where it is inferred."""

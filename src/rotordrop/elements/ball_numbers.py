@@ -260,22 +260,15 @@ NO_PRELOAD = Known(value=0.0, status="default", source="this kind of bearing has
 """What a bearing without rows to press against each other has: no unknown."""
 
 
-def _preload(bearing: TouchdownBearing) -> Known:
-    return getattr(bearing.bearing, "preload", NO_PRELOAD)
-
-
 def _by_offset(bearing: TouchdownBearing) -> Measure:
     """The preload by the axial offset of the rows, which is what the ball forces depend on."""
     balls = bearing.bearing
     constants = _constants(balls)
 
-    def offset(preload: float) -> float:
-        return bearing_constants(balls.changed(preload=Known(value=preload))).axial_offset
-
     return Measure(
         name="axial offset of the ball rows",
         start=constants.axial_offset,
-        of_value=offset,
+        of_value=lambda force: bearing_constants(balls.changed(preload=Known(value=force))).axial_offset,
         value_of=partial(preload_of_offset, constants),
     )
 
@@ -289,12 +282,11 @@ PARAMETERS: tuple[Parameter, ...] = (
         logarithmic=False,  # by the axial offset of the ball rows, which is what the ball forces depend on
         role=Role.CONSIDERED,
         guess_sigma=0.15,
-        given_sigma=0.15,
         entries=bearing_entries(L.AXIAL_OFFSET),
         step=Step.IMPACTS,
         field="preload_N",
         truth=("preload_N",),
-        read=_preload,
+        read=lambda bearing: getattr(bearing.bearing, "preload", NO_PRELOAD),
         estimated_by=_by_offset,
         taken_over="welcome",
     ),
@@ -309,32 +301,18 @@ def inferred_stress_sigma(bearing: BallBearing) -> float:
     third root. They are taken as independent, which is a little too wide: fewer balls are larger ones. Zero
     where the balls are listed.
     """
-    parts = [
-        _change(bearing, diameters=_ends(bearing.ball_diameter)),
-        _change(bearing, conformities=_ends(bearing.conformity_inner)),
-    ]
+    pitch, angle = bearing.pitch_diameter.value, bearing.contact_angle.value
+    listed = [bearing.ball_diameter.value, bearing.conformity_inner.value]
+    parts = []
+    for place, known in enumerate((bearing.ball_diameter, bearing.conformity_inner)):
+        ends = known.range if known.status == "inferred" and known.range else (known.value, known.value)
+        pairs = [[*listed[:place], end, *listed[place + 1 :]] for end in ends]
+        low, high = (
+            float(race_contact(D, pitch, share, angle, 1.0, inner=True).stress_coefficient)
+            for D, share in pairs
+        )
+        parts.append(abs(math.log(high / low)))
     if bearing.ball_count_range is not None:
         fewest, most = bearing.ball_count_range
         parts.append(math.log(most / fewest) / 3.0)
     return math.hypot(*parts) / (2.0 * NINETY)
-
-
-def _ends(value: Known) -> tuple[float, float]:
-    """Ends of the range of an inferred value; a value twice where it is not inferred."""
-    inferred = value.status == "inferred" and value.range is not None
-    return value.range if inferred and value.range else (value.value, value.value)
-
-
-def _change(
-    bearing: BallBearing,
-    diameters: tuple[float, float] | None = None,
-    conformities: tuple[float, float] | None = None,
-) -> float:
-    """Change of the logarithm of the stress of a ball under a given load between two ends [1]."""
-    D_w, f = bearing.ball_diameter.value, bearing.conformity_inner.value
-    pairs = zip(diameters or (D_w, D_w), conformities or (f, f), strict=True)
-    pitch, angle = bearing.pitch_diameter.value, bearing.contact_angle.value
-    low, high = (
-        float(race_contact(D, pitch, share, angle, 1.0, inner=True).stress_coefficient) for D, share in pairs
-    )
-    return abs(math.log(high / low))

@@ -10,16 +10,10 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements import values as V
 from rotordrop.elements.description import Description, Misfit, Usual
 from rotordrop.elements.parameter import Entry, Parameter, Role, Rule, Step, bearing_entries
-from rotordrop.elements.values import (
-    ContactDamping,
-    ContactExponent,
-    ContactStiffness,
-    PositiveLength,
-    default,
-    follows,
-)
+from rotordrop.elements.values import default, follows
 from rotordrop.known import Known
 from rotordrop.physics import columns as L
 
@@ -38,13 +32,15 @@ _UNIT_EXPONENT = re.compile(r"m\s*(?:\^|\*\*)\s*([\d.]+)\s*$")
 class Contact(Description):
     """Contact between rotor and inner race, F = K δⁿ (1 + 1.5 λ δ̇)."""
 
-    stiffness: ContactStiffness = follows("8e8 N/m^1.11, or Palmgren's line contact where 'length' is given")
+    stiffness: V.ContactStiffness = follows(
+        "8e8 N/m^1.11, or Palmgren's line contact where 'length' is given"
+    )
     """Contact stiffness K [N/m^n]."""
-    exponent: ContactExponent = default(LINE_CONTACT, "line contact (Palmgren), as in Neisi 2020")
+    exponent: V.ContactExponent = default(LINE_CONTACT, "line contact (Palmgren), as in Neisi 2020")
     """Exponent n [1]."""
-    damping: ContactDamping = default(0.08, "contact damping of steel at low speed", (0.0, 0.5))
+    damping: V.ContactDamping = default(0.08, "contact damping of steel at low speed", (0.0, 0.5))
     """Contact damping λ [s/m]."""
-    length: PositiveLength | None = None
+    length: V.PositiveLength | None = None
     """Length of the line contact [m], from which Palmgren's formula gives the stiffness."""
 
     usual: ClassVar[Mapping[str, Usual]] = {
@@ -136,7 +132,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         kind="contact_stiffness",
         measured_by="a static push with a known force at {owner}",
         guess_sigma=0.3,
-        given_sigma=0.3,
         drift=0.2,
         entries=bearing_entries(L.CONTACT_STIFFNESS),
         step=Step.IMPACTS,
@@ -152,7 +147,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         kind="dimensionless",
         measured_by="a static push with a known force at {owner}",
         guess_sigma=0.1,  # from 10/9 of a line to 3/2 of a point
-        given_sigma=0.1,
         least_sigma=0.01,  # an interval that ends at a limit may have no width, and no drop says more
         lower=1.0,
         upper=2.0,
@@ -170,7 +164,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         kind="contact_damping",
         role=Role.CONSIDERED,
         guess_sigma=0.6,
-        given_sigma=0.6,
         entries=bearing_entries(L.CONTACT_DAMPING),
         step=Step.IMPACTS,
         field="contact.damping_s_per_m",

@@ -70,6 +70,7 @@ FORCES: tuple[Parameter, ...] = (
             kind="force",
             logarithmic=False,
             guess_sigma=0.2,
+            given_sigma=0.0,
             scale="weight a magnet carries",
             entries=(Entry(array="magnet", column=column),),
         )
@@ -85,6 +86,7 @@ REMANENCE = Parameter(
     kind="time",
     shown_as="duration",
     guess_sigma=0.4,
+    given_sigma=0.0,
     entries=(Entry(array="spin", column=L.REMANENCE_TIME_CONSTANT),),
 )
 """Unknown of all magnets together, in every drop anew."""

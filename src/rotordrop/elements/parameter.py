@@ -109,9 +109,9 @@ class Parameter:
     role: Role = Role.NUISANCE
     """What the identification does with it."""
     guess_sigma: float = 0.0
-    given_sigma: float = 0.0
-    """Prior standard deviation of a guess without a range and of a given value: of the logarithm, or as a
-    share of ``scale`` [1]."""
+    given_sigma: float = math.nan
+    """Prior standard deviation of a guess without a range and of a given value, the same when left out: of
+    the logarithm, or as a share of ``scale`` [1]."""
     scale: str = ""
     """What it is a share of, where it is not that of a logarithm."""
     least_sigma: float = 1e-4
@@ -176,6 +176,10 @@ class Parameter:
     """What a sensor reads per unit of it."""
     lag: bool = False
     """Whether it is the time by which a sensor lags behind."""
+
+    def __post_init__(self) -> None:
+        if math.isnan(self.given_sigma):
+            object.__setattr__(self, "given_sigma", self.guess_sigma)
 
     @property
     def unit(self) -> str:

@@ -7,17 +7,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements import values as V
 from rotordrop.elements.description import Description
 from rotordrop.elements.parameter import Parameter, Role, Step, bearing_entries
-from rotordrop.elements.values import (
-    NonNegative,
-    PositiveInertia,
-    PositiveLength,
-    PositiveMass,
-    PositiveSpeed,
-    default,
-    follows,
-)
+from rotordrop.elements.values import default, follows
 from rotordrop.physics import columns as L
 
 Array = NDArray[np.float64]
@@ -26,17 +19,17 @@ Array = NDArray[np.float64]
 class Race(Description):
     """The inner race with everything that spins with it."""
 
-    mass: PositiveMass = follows("from the size of the bearing")
+    mass: V.PositiveMass = follows("from the size of the bearing")
     """Mass [kg]."""
-    inertia: PositiveInertia = follows("from the size of the bearing")
+    inertia: V.PositiveInertia = follows("from the size of the bearing")
     """Polar moment of inertia [kg m²]."""
-    width: PositiveLength = follows("the length of the contact, or from the size of the bearing")
+    width: V.PositiveLength = follows("the length of the contact, or from the size of the bearing")
     """Width over which the rotor lies in the race [m]; the pressure between them follows from it."""
-    drag_coefficient: NonNegative = default(
+    drag_coefficient: V.NonNegative = default(
         0.002, "rolling friction of angular-contact bearings", (0.001, 0.005)
     )
     """Drag torque over bearing force and half the pitch diameter [1]."""
-    drag_speed: PositiveSpeed = default(1.0, "small against any race speed that matters in a drop")
+    drag_speed: V.PositiveSpeed = default(1.0, "small against any race speed that matters in a drop")
     """Race speed over which the drag builds up [rad/s]."""
 
     def fill(self, row: Array) -> None:
@@ -55,7 +48,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         measured_by="a speed sensor on the inner race of {owner}",
         role=Role.CONSIDERED,
         guess_sigma=0.12,
-        given_sigma=0.12,
         reach=2.0,
         drift=0.1,
         late_drift_factor=5.0,
@@ -72,7 +64,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         label="drag coefficient of the race",
         kind="dimensionless",
         guess_sigma=0.5,
-        given_sigma=0.5,
         reach=6.0,
         drift=0.2,
         entries=bearing_entries(L.DRAG_COEFFICIENT),

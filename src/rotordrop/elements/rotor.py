@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag
 
+from rotordrop.elements import values as V
 from rotordrop.elements.description import (
     Description,
     Misfit,
@@ -24,20 +25,7 @@ from rotordrop.elements.description import (
     unknown_key,
 )
 from rotordrop.elements.parameter import Entry, Extension, Parameter, Rule, Values, guess, in_words, itself
-from rotordrop.elements.values import (
-    Density,
-    Inertia,
-    NonNegative,
-    NonNegativeLength,
-    Number,
-    Physical,
-    PoissonRatio,
-    Positive,
-    PositiveLength,
-    PositiveMass,
-    Pressure,
-    default,
-)
+from rotordrop.elements.values import default
 from rotordrop.errors import UsageError
 
 ELASTIC = Usual(least=20e9, most=700e9, kind="pressure", look="E of steel is 210 GPa; check the unit")
@@ -48,11 +36,11 @@ POISSON = Usual(least=0.05, most=0.499, kind="dimensionless", look="metals have 
 class Material(Description):
     """Elastic constants and density of a material."""
 
-    youngs_modulus: Pressure
+    youngs_modulus: V.Pressure
     """Young's modulus [Pa]."""
-    poisson_ratio: PoissonRatio
+    poisson_ratio: V.PoissonRatio
     """Poisson ratio [1]."""
-    density: Density
+    density: V.Density
     """Density [kg/m³]."""
 
     usual: ClassVar[Mapping[str, Usual]] = {
@@ -98,13 +86,13 @@ class Section(Description):
 
     part: Text = ""
     """What this piece of the shaft is."""
-    outer_diameter: PositiveLength
+    outer_diameter: V.PositiveLength
     """Outer diameter [m]."""
-    inner_diameter: NonNegativeLength = default(0.0, "a solid shaft")
+    inner_diameter: V.NonNegativeLength = default(0.0, "a solid shaft")
     """Diameter of the bore [m]."""
-    layer_diameter: PositiveLength | None = None
+    layer_diameter: V.PositiveLength | None = None
     """Outer diameter of a layer that adds mass and inertia but no stiffness."""
-    layer_density: Density | None = None
+    layer_density: V.Density | None = None
     """Density of the layer."""
     material: Name | None = None
     """Material; that of the rotor when left out."""
@@ -116,7 +104,7 @@ class Section(Description):
     def check(self) -> None:
         """Refuse diameters that do not nest."""
         outer, inner = self.outer_diameter.value, self.inner_diameter.value
-        text = Physical("length").text
+        text = V.Physical("length").text
         for key in ("outer_diameter", "layer_diameter"):
             given = getattr(self, key)
             if given is not None and not THINNEST <= given.value <= THICKEST:
@@ -143,7 +131,7 @@ class Section(Description):
 class SectionByLength(Section):
     """A shaft section given by its length, cut into equal elements."""
 
-    length: PositiveLength
+    length: V.PositiveLength
     elements: Annotated[int, Strict(), Field(ge=1, le=10_000, description="Number of equal elements")] = 1
 
 
@@ -188,10 +176,10 @@ class Disc(Placed):
 
     name: Text = ""
     """What it is."""
-    mass: PositiveMass
+    mass: V.PositiveMass
     """Mass [kg]."""
-    polar_inertia: Inertia = default(0.0, "a point mass")
-    diametral_inertia: Inertia = default(0.0, "a point mass")
+    polar_inertia: V.Inertia = default(0.0, "a point mass")
+    diametral_inertia: V.Inertia = default(0.0, "a point mass")
     """Moments of inertia [kg m²] about the shaft axis and about a diameter."""
 
     def check(self) -> None:
@@ -215,7 +203,7 @@ def _node_positions(raw: Any) -> Any:
         raise UsageError(f'{raw!r} is not a list; write {{unit = "mm", values = [0, 25, 50]}}')
     if all(isinstance(entry, float) for entry in raw) and isinstance(raw, tuple):
         return raw
-    return tuple(Physical("length").number(entry) for entry in raw)
+    return tuple(V.Physical("length").number(entry) for entry in raw)
 
 
 def _with_unit(table: Mapping[str, Any]) -> list[str]:
@@ -235,17 +223,17 @@ class Rotor(Description):
     """Name of the material of all sections that name no other."""
     materials: dict[Name, Material] = Field(default_factory=dict)
     """Materials by name."""
-    modal_damping: NonNegative = default(0.005, "0.5 % of critical on every free-free flexible mode")
+    modal_damping: V.NonNegative = default(0.005, "0.5 % of critical on every free-free flexible mode")
     """Damping ratio of the free-free flexible modes [1]."""
-    stiffness_factor: Positive | None = None
+    stiffness_factor: V.Positive | None = None
     """Bending stiffness over the one that sections and materials give [1]."""
-    mass_to_ends: Number | None = None
+    mass_to_ends: V.Number | None = None
     """Of a beam in place of a rotor: mass moved from its middle to its ends."""
-    mass_to_de: Number | None = None
+    mass_to_de: V.Number | None = None
     """Of a beam: mass moved towards the DE; its centre of mass stays."""
-    stiffness_to_de: Number | None = None
+    stiffness_to_de: V.Number | None = None
     """Of a beam: logarithm of bending stiffness, more towards the DE."""
-    stiffness_to_ends: Number | None = None
+    stiffness_to_ends: V.Number | None = None
     """Of a beam: logarithm of bending stiffness, more at the ends."""
     node_positions: NodePositions = Field(default=(), validate_default=False)
     """Distance of every node from node 1 [m], NDE to DE."""

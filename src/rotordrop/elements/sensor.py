@@ -9,18 +9,10 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
+from rotordrop.elements import values as V
 from rotordrop.elements.description import Channel, Misfit, Name, Placed, Usual
 from rotordrop.elements.parameter import Extension, Parameter, Values, guess, in_words, itself
-from rotordrop.elements.values import (
-    Angle,
-    Length,
-    NonNegativeLength,
-    Number,
-    Positive,
-    PositiveTime,
-    Sensitivity,
-    default,
-)
+from rotordrop.elements.values import default
 
 LEAST_PLANE_DISTANCE = 1e-3
 """Sensor planes closer than this [m] count as one."""
@@ -31,15 +23,15 @@ class Sensor(Placed):
 
     name: Channel
     """Name of its channel in the recording."""
-    angle: Angle
+    angle: V.Angle
     """Direction of positive reading [rad], counter-clockwise from +x (horizontal), y up, seen from the DE."""
     polarity: Literal[1, -1] = 1
     """-1 when a motion in the direction of the angle makes the reading fall."""
-    gain: Positive = default(1.0, "true displacement over reading of a calibrated sensor", (0.97, 1.03))
+    gain: V.Positive = default(1.0, "true displacement over reading of a calibrated sensor", (0.97, 1.03))
     """True displacement over reading [1]."""
-    offset: Length = default(0.0, "reads zero when the rotor is centred", (-50e-6, 50e-6))
+    offset: V.Length = default(0.0, "reads zero when the rotor is centred", (-50e-6, 50e-6))
     """Reading [m] when the rotor is centred."""
-    sensitivity: Sensitivity | None = None
+    sensitivity: V.Sensitivity | None = None
     """Volts per metre [V/m], for recordings in volts."""
     bearing: Name = Field(
         default="-",
@@ -47,15 +39,15 @@ class Sensor(Placed):
         description="Touchdown bearing at this end; the nearest when left out",
     )
     """Name of the touchdown bearing at this end; the nearest when left out."""
-    position_error: NonNegativeLength = default(1e-3, "standard uncertainty of the axial position")
+    position_error: V.NonNegativeLength = default(1e-3, "standard uncertainty of the axial position")
     """Standard uncertainty of the axial position [m]."""
-    time_constant: PositiveTime | None = None
+    time_constant: V.PositiveTime | None = None
     """Time by which the reading lags behind, first order [s]."""
-    cross_axis: Number | None = None
+    cross_axis: V.Number | None = None
     """Reading per displacement across, in the direction turned by +90° [1]."""
-    follows_housing: Number | None = None
+    follows_housing: V.Number | None = None
     """Part of the motion of the bearing housing that the bracket of the sensor makes too [1]."""
-    plane_offset: Length | None = None
+    plane_offset: V.Length | None = None
     """How far the sensor stands from its node, towards higher nodes [m]."""
     lost: bool = Field(default=False, description="A sensor without readings; left out of everything")
     """Whether the sensor gave no readings; the machine then goes without it."""
@@ -187,7 +179,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         kind="dimensionless",
         logarithmic=False,
         guess_sigma=0.01,
-        given_sigma=0.01,
         scale="one",
         least_sigma=1e-12,
     ),
@@ -198,7 +189,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         kind="length",
         logarithmic=False,
         guess_sigma=0.04,
-        given_sigma=0.04,
         scale="smallest air gap",
         least_sigma=1e-12,
     ),
@@ -217,7 +207,6 @@ EXTENSIONS: tuple[Extension, ...] = (
             kind="time",
             shown_as="short_time",
             guess_sigma=0.1,
-            given_sigma=0.1,
             reach=300.0,
             common_sigma=1.2,
         ),
@@ -255,7 +244,6 @@ EXTENSIONS: tuple[Extension, ...] = (
             kind="dimensionless",
             logarithmic=False,
             guess_sigma=0.03,
-            given_sigma=0.03,
             lower=-0.5,
             upper=1.5,
             common_sigma=0.3,
@@ -274,7 +262,6 @@ EXTENSIONS: tuple[Extension, ...] = (
             kind="length",
             logarithmic=False,
             guess_sigma=0.001,
-            given_sigma=0.001,
             scale="one",
             common_sigma=0.015,
             group="plane",

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements import values as V
 from rotordrop.elements.description import Description, Misfit
 from rotordrop.elements.parameter import (
     Entry,
@@ -25,19 +26,7 @@ from rotordrop.elements.parameter import (
     in_words,
     itself,
 )
-from rotordrop.elements.values import (
-    Coupling,
-    CubicTerm,
-    Damping,
-    NonNegative,
-    Positive,
-    PositiveMass,
-    PositiveSpeed,
-    Stiffness,
-    default,
-    follows,
-    scaled,
-)
+from rotordrop.elements.values import default, follows, scaled
 from rotordrop.known import Known
 from rotordrop.physics import columns as L
 from rotordrop.physics.blocks import SUPPORT_PRESENT
@@ -56,30 +45,30 @@ PEAK_LOADS = 10.0
 class Support(Description):
     """What carries the outer ring: mass on a spring and a damper, vertical (y) and horizontal (x)."""
 
-    mass: PositiveMass = default(
+    mass: V.PositiveMass = default(
         40.0, "the housing parts around the bearing of the reference machine", (4.0, 400.0)
     )
-    stiffness: Stiffness = default(1e8, "a first guess for a bearing housing", (1e7, 2e9))
-    damping: Damping = follows("2.5 % of critical, or from the damping ratio")
+    stiffness: V.Stiffness = default(1e8, "a first guess for a bearing housing", (1e7, 2e9))
+    damping: V.Damping = follows("2.5 % of critical, or from the damping ratio")
     """Vertical support mass [kg], stiffness [N/m] and damping [N s/m]."""
-    damping_ratio: NonNegative | None = None
+    damping_ratio: V.NonNegative | None = None
     """In place of the damping: C = 2 ζ √(K m)."""
-    mass_horizontal: PositiveMass = follows("equal to the vertical one")
-    stiffness_horizontal: Stiffness = follows("equal to the vertical one")
-    damping_horizontal: Damping = follows("from the damping ratio, or equal to the vertical one")
+    mass_horizontal: V.PositiveMass = follows("equal to the vertical one")
+    stiffness_horizontal: V.Stiffness = follows("equal to the vertical one")
+    damping_horizontal: V.Damping = follows("from the damping ratio, or equal to the vertical one")
     """The same in the horizontal direction; equal to the vertical ones when left out."""
-    damping_ratio_horizontal: NonNegative | None = None
+    damping_ratio_horizontal: V.NonNegative | None = None
     """In place of the horizontal damping."""
-    coupling: Coupling | None = None
+    coupling: V.Coupling | None = None
     """Coupling of x and y over the geometric mean of horizontal and vertical stiffness [1]: principal axes
     that are turned."""
-    cubic: CubicTerm | None = None
+    cubic: V.CubicTerm | None = None
     """Cubic term k₃ of the spring, F = K h (1 + k₃ h²) along x and along y [1/m²]."""
-    foundation_share: NonNegative | None = None
+    foundation_share: V.NonNegative | None = None
     """Support mass over modal mass of a foundation that gives way under the support [1]."""
-    foundation_frequency: PositiveSpeed | None = None
+    foundation_frequency: V.PositiveSpeed | None = None
     """Natural frequency of that foundation."""
-    foundation_damping_ratio: Positive | None = None
+    foundation_damping_ratio: V.Positive | None = None
     """Damping ratio of that foundation."""
 
     displaces: ClassVar[Mapping[str, tuple[str, ...]]] = {
@@ -251,7 +240,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         label="horizontal over vertical support stiffness",
         kind="dimensionless",
         guess_sigma=0.03,
-        given_sigma=0.03,
         entries=(Entry(array="bearing", column=L.SUPPORT_STIFFNESS_X, rule=Rule.SCALE),),
         field="support.anisotropy",
         truth=("support_anisotropy",),

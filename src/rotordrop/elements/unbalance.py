@@ -116,6 +116,7 @@ PARAMETERS: tuple[Parameter, ...] = (
             kind="unbalance",
             logarithmic=False,
             guess_sigma=1.0,
+            given_sigma=0.0,
             scale="amount described",
             entries=(Entry(array="unbalance", column=column),),
         )
