@@ -24,7 +24,7 @@ from rotordrop.elements.description import (
     place_on_nodes,
     unknown_key,
 )
-from rotordrop.elements.parameter import Entry, Extension, Parameter, Rule, Values, guess, in_words, itself
+from rotordrop.elements.parameter import Entry, Extension, Parameter, Rule, guess, in_words, itself
 from rotordrop.elements.values import default
 from rotordrop.errors import UsageError
 
@@ -80,6 +80,14 @@ class Element:
     part: str
     """What this piece of the shaft is."""
 
+    @property
+    def mass(self) -> float:
+        """Mass with the layer [kg]."""
+        area, layer = self.outer_diameter**2 - self.inner_diameter**2, 0.0
+        if self.layer_diameter is not None:
+            layer = self.layer_density * (self.layer_diameter**2 - self.outer_diameter**2)
+        return 0.25 * math.pi * self.length * (self.density * area + layer)
+
 
 class Section(Description):
     """What every shaft section has: diameters, a layer, a material."""
@@ -134,6 +142,11 @@ class SectionByLength(Section):
     length: V.PositiveLength
     elements: Annotated[int, Strict(), Field(ge=1, le=10_000, description="Number of equal elements")] = 1
 
+    @property
+    def count(self) -> int:
+        """Number of elements it is cut into."""
+        return self.elements
+
 
 class SectionByNodes(Section):
     """A shaft section from one node to another."""
@@ -158,16 +171,21 @@ class SectionByNodes(Section):
                 ("nodes",),
             )
 
-
-def _section_tag(raw: Any) -> str:
-    if isinstance(raw, Mapping):
-        return "by_nodes" if "nodes" in raw else "by_length"
-    return "by_nodes" if isinstance(raw, SectionByNodes) else "by_length"
+    @property
+    def count(self) -> int:
+        """Number of elements it is cut into."""
+        return self.nodes[1] - self.nodes[0]
 
 
 AnySection = Annotated[
     Annotated[SectionByLength, Tag("by_length")] | Annotated[SectionByNodes, Tag("by_nodes")],
-    Discriminator(_section_tag),
+    Discriminator(
+        lambda raw: (
+            "by_nodes"
+            if isinstance(raw, SectionByNodes) or (isinstance(raw, Mapping) and "nodes" in raw)
+            else "by_length"
+        )
+    ),
 ]
 
 
@@ -198,19 +216,19 @@ class Disc(Placed):
 def _node_positions(raw: Any) -> Any:
     """Read node positions: a list of lengths, or ``{unit = "mm", values = [0, 23.3, …]}``."""
     if isinstance(raw, Mapping):
-        raw = _with_unit(raw)
+        unit, values = raw.get("unit"), raw.get("values")
+        if (
+            set(raw) != {"unit", "values"}
+            or not isinstance(unit, str)
+            or not isinstance(values, list | tuple)
+        ):
+            raise UsageError("node positions as a table need exactly 'unit' and 'values'")
+        raw = [f"{value!r} {unit}" for value in values]
     if not isinstance(raw, list | tuple):
         raise UsageError(f'{raw!r} is not a list; write {{unit = "mm", values = [0, 25, 50]}}')
     if all(isinstance(entry, float) for entry in raw) and isinstance(raw, tuple):
         return raw
     return tuple(V.Physical("length").number(entry) for entry in raw)
-
-
-def _with_unit(table: Mapping[str, Any]) -> list[str]:
-    unit, values = table.get("unit"), table.get("values")
-    if set(table) != {"unit", "values"} or not isinstance(unit, str) or not isinstance(values, list | tuple):
-        raise UsageError("node positions as a table need exactly 'unit' and 'values'")
-    return [f"{value!r} {unit}" for value in values]
 
 
 NodePositions = Annotated[tuple[float, ...], BeforeValidator(_node_positions)]
@@ -267,55 +285,52 @@ class Rotor(Description):
                 ("node_positions",),
             )
         else:
-            self.__dict__["node_positions"] = _laid_out(self.sections)
-        self._check_materials()
+            positions = [0.0]
+            for section in self.sections:
+                assert isinstance(section, SectionByLength)
+                start, step = positions[-1], section.length.value / section.elements
+                positions.extend(start + step * k for k in range(1, section.elements + 1))
+            self.__dict__["node_positions"] = tuple(positions)
+        known = tuple({*self.materials, "steel"})
+        named = [(section.material, ("sections", k, "material")) for k, section in enumerate(self.sections)]
+        for name, place in [*named, (self.material, ("material",))]:
+            if name is not None and name not in known:
+                told = unknown_key(name, known).replace("key", "material", 1).removesuffix("?")
+                end = (
+                    f"{'?' if 'did you mean' in told else ''} Else describe it under [rotor.materials.{name}]"
+                )
+                raise Misfit(f"{told}{end}", place)
         place_on_nodes(self.discs, self.node_positions, "discs")
 
     def _check_nodes(self) -> None:
-        if len(self.node_positions) < 2:
-            raise Misfit(
-                "sections given by 'nodes' need 'node_positions = {unit = \"mm\", values = [0, …]}'",
-                ("sections",),
-            )
-        for number, (left, right) in enumerate(pairwise(self.node_positions), start=1):
+        positions, expected = self.node_positions, 1
+        if len(positions) < 2:
+            told = "sections given by 'nodes' need 'node_positions = {unit = \"mm\", values = [0, …]}'"
+            raise Misfit(told, ("sections",))
+        for number, (left, right) in enumerate(pairwise(positions), start=1):
             if not right > left:
                 raise Misfit(
                     f"node {number + 1} at {right * 1e3:.7g} mm does not lie beyond node {number} at "
                     f"{left * 1e3:.7g} mm; node positions must increase",
                     ("node_positions", "values", number),
                 )
-        self._check_cover()
-
-    def _check_cover(self) -> None:
-        expected = 1
         for index, section in enumerate(self.sections):
             assert isinstance(section, SectionByNodes)
             if section.nodes[0] != expected:
                 raise Misfit(
                     f"the section begins at node {section.nodes[0]}, but the one before ends at "
-                    f"node {expected}; "
-                    "sections must follow each other without gap",
+                    f"node {expected}; sections must follow each other without gap",
                     ("sections", index, "nodes"),
                 )
             expected = section.nodes[1]
-        if expected != len(self.node_positions):
-            raise Misfit(
-                f"the last section ends at node {expected}, but there are {len(self.node_positions)} nodes",
-                ("sections", len(self.sections) - 1, "nodes"),
-            )
-
-    def _check_materials(self) -> None:
-        known = tuple({*self.materials, "steel"})
-        for index, section in enumerate(self.sections):
-            if section.material is not None and section.material not in known:
-                raise Misfit(_unknown_material(section.material, known), ("sections", index, "material"))
-        if self.material not in known:
-            raise Misfit(_unknown_material(self.material, known), ("material",))
+        if expected != len(positions):
+            told = f"the last section ends at node {expected}, but there are {len(positions)} nodes"
+            raise Misfit(told, ("sections", len(self.sections) - 1, "nodes"))
 
     def material_named(self, name: str | None) -> Material:
         """Find a material; ``"steel"`` is known without being described."""
         wanted = self.material if name is None else name
-        return self.materials[wanted] if wanted in self.materials else _builtin_steel()
+        return self.materials[wanted] if wanted in self.materials else Material.model_validate(STEEL)
 
     @cached_property
     def is_beam(self) -> bool:
@@ -332,24 +347,24 @@ class Rotor(Description):
     def elements(self) -> tuple[Element, ...]:
         """Beam elements; element i joins nodes i+1 and i+2 (counted from 1)."""
         lengths = [right - left for left, right in pairwise(self.node_positions)]
-        owners = [section for section in self.sections for _ in range(element_count(section))]
-        return tuple(self._element(*pair) for pair in zip(lengths, owners, strict=True))
-
-    def _element(self, length: float, section: Section) -> Element:
-        material = self.material_named(section.material)
-        layer = section.layer_diameter
-        return Element(
-            length=length,
-            outer_diameter=section.outer_diameter.value,
-            inner_diameter=section.inner_diameter.value,
-            layer_diameter=None if layer is None else layer.value,
-            layer_density=0.0 if section.layer_density is None else section.layer_density.value,
-            material=section.material or self.material,
-            youngs_modulus=material.youngs_modulus.value,
-            poisson_ratio=material.poisson_ratio.value,
-            density=material.density.value,
-            part=section.part,
-        )
+        owners = [section for section in self.sections for _ in range(section.count)]
+        found = []
+        for length, section in zip(lengths, owners, strict=True):
+            material, layer = self.material_named(section.material), section.layer_diameter
+            element = Element(
+                length=length,
+                outer_diameter=section.outer_diameter.value,
+                inner_diameter=section.inner_diameter.value,
+                layer_diameter=None if layer is None else layer.value,
+                layer_density=0.0 if section.layer_density is None else section.layer_density.value,
+                material=section.material or self.material,
+                youngs_modulus=material.youngs_modulus.value,
+                poisson_ratio=material.poisson_ratio.value,
+                density=material.density.value,
+                part=section.part,
+            )
+            found.append(element)
+        return tuple(found)
 
     @cached_property
     def mass(self) -> float:
@@ -363,50 +378,10 @@ class Rotor(Description):
 
     def _masses(self) -> list[tuple[float, float]]:
         shaft = [
-            (element_mass(element), 0.5 * (left + right))
+            (element.mass, 0.5 * (left + right))
             for element, (left, right) in zip(self.elements, pairwise(self.node_positions), strict=True)
         ]
         return shaft + [(disc.mass.value, self.node_positions[disc.node - 1]) for disc in self.discs]
-
-
-def element_count(section: Section) -> int:
-    """Count the elements a section is cut into."""
-    if isinstance(section, SectionByNodes):
-        return section.nodes[1] - section.nodes[0]
-    assert isinstance(section, SectionByLength)
-    return section.elements
-
-
-def element_mass(element: Element) -> float:
-    """Mass of an element with its layer [kg]."""
-    area = element.outer_diameter**2 - element.inner_diameter**2
-    layer = 0.0
-    if element.layer_diameter is not None:
-        layer = element.layer_density * (element.layer_diameter**2 - element.outer_diameter**2)
-    return 0.25 * math.pi * element.length * (element.density * area + layer)
-
-
-def _laid_out(sections: tuple[Any, ...]) -> tuple[float, ...]:
-    positions = [0.0]
-    for section in sections:
-        start = positions[-1]
-        step = section.length.value / section.elements
-        positions.extend(start + step * k for k in range(1, section.elements + 1))
-    return tuple(positions)
-
-
-def _builtin_steel() -> Material:
-    return Material.model_validate(STEEL)
-
-
-def _unknown_material(name: str, known: tuple[str, ...]) -> str:
-    told = unknown_key(name, known).replace("key", "material", 1).removesuffix("?")
-    return f"{told}{'?' if 'did you mean' in told else ''} Else describe it under [rotor.materials.{name}]"
-
-
-def _bends(_rotor: Rotor, found: Values, _load: float) -> str:
-    factor = in_words(itself(found["stiffness_factor"]), "")
-    return f"the rotor bends as if its stiffness were {factor} × the described one"
 
 
 EXTENSIONS: tuple[Extension, ...] = (
@@ -415,7 +390,10 @@ EXTENSIONS: tuple[Extension, ...] = (
         owner="rotor",
         names=("stiffness_factor",),
         neutral=lambda _: {"stiffness_factor": guess(1.0)},
-        sentence=_bends,
+        sentence=lambda _, found, __: (
+            "the rotor bends as if its stiffness were "
+            f"{in_words(itself(found['stiffness_factor']), '')} × the described one"
+        ),
         rows=(
             Parameter(
                 path="stiffness_factor",
@@ -469,7 +447,7 @@ def element_factors(rotor: Rotor) -> tuple[Array, Array]:
     )
     middles = np.array([0.5 * (a + b) for a, b in pairwise(rotor.node_positions)])
     s = 2.0 * middles / rotor.node_positions[-1] - 1.0
-    masses = np.array([element_mass(element) for element in rotor.elements])
+    masses = np.array([element.mass for element in rotor.elements])
     density = 1.0 + ends * _without_moment(s**2, s, masses) + de * _without_moment(s**3, s, masses)
     if density.min() <= 0.0:
         raise UsageError(
