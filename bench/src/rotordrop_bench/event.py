@@ -50,19 +50,6 @@ class HiddenMachine:
     """Structures of its bearings that no model of a drop has; None without any, shape (B, C)."""
 
 
-def _refuse_own_structure(machine: Machine) -> None:
-    """Refuse a machine file whose own structures the kernels of violations do not have."""
-    for bearing in machine.touchdown_bearings:
-        for row in structure_rows_of("bearing"):
-            own = row.stated(bearing)
-            if own is not None and float(own) != 0.0:
-                raise UsageError(
-                    f"the machine file states {bearing.name}.{row.path} = {float(own):.4g} and the drop has "
-                    "violations too, which would take its place; leave it out of the machine file and give "
-                    "it as a violation (support.axes_angle, support.hardening or foundation)"
-                )
-
-
 @dataclass(frozen=True, kw_only=True)
 class DropConditions:
     """What differs from drop to drop of one machine."""
@@ -110,7 +97,16 @@ def hidden_machine(
     rows = structure_rows(true, broken)
     acts = broken.unbalance_jump is not None or not without_structure(rows)
     if acts:
-        _refuse_own_structure(true)
+        # the kernels of violations do not have the structures that a machine file may state
+        for bearing in true.touchdown_bearings:
+            for row in structure_rows_of("bearing"):
+                own = row.stated(bearing)
+                if own is not None and float(own) != 0.0:
+                    raise UsageError(
+                        f"the machine file states {bearing.name}.{row.path} = {float(own):.4g} and the drop "
+                        "has violations too, which would take its place; leave it out of the machine file "
+                        "and give it as a violation (support.axes_angle, support.hardening or foundation)"
+                    )
     return HiddenMachine(
         machine=true,
         known=machine,

@@ -25,7 +25,8 @@ from rotordrop_bench.violations import Violations
 DURATION = 0.3
 """What is recorded after power-off [s]; chosen, not measured."""
 LATEST_CONTACT = 0.1
-"""A drop counts when the rotor has touched every bearing within this time of power-off [s]."""
+"""A drop counts when the rotor has touched every bearing within this time of power-off [s]; chosen, not
+measured."""
 
 DROPS_FOLDER = "drops"
 TRUTH_FOLDER = "truth"
@@ -81,34 +82,30 @@ def make_bench(
     missing = [drop for drop in drops if not truth_path(folder, drop.name).is_file()]
     for i, drop in enumerate(missing):
         report(drop.name, i / len(missing))
-        _make(drop, folder)
+        made = bench_recording(drop)
+        if not happened(made):
+            raise UsageError(
+                f"{drop.name} of version {VERSION} is no drop here: a bearing was not reached within "
+                f"{LATEST_CONTACT:g} s. Your computer rounds differently (rotordrop doctor --fingerprint); "
+                "leave it out"
+            )
+        place = folder / DROPS_FOLDER / drop.name
+        make_folder(place)
+        make_folder(folder / TRUTH_FOLDER)
+        save_machine(bench_rotor(drop.rotor), place / "machine.toml")
+        write_record(made.record, place / "record.csv")
+        if made.tail is not None:
+            write_record(made.tail, place / "tail.csv")
+        truth: dict[str, Any] = made.truth | {
+            "bench_version": VERSION,
+            "family": drop.family,
+            "rotor": drop.rotor,
+            "record_sha256": {"record.csv": sha256_of(place / "record.csv")},
+        }
+        write_json(truth_path(folder, drop.name), truth)
     return [drop.name for drop in missing]
 
 
 def truth_path(folder: Path, name: str) -> Path:
     """Where the truth of a drop stands."""
     return folder / TRUTH_FOLDER / f"{name}.json"
-
-
-def _make(drop: BenchDrop, folder: Path) -> None:
-    made = bench_recording(drop)
-    if not happened(made):
-        raise UsageError(
-            f"{drop.name} of version {VERSION} is no drop here: a bearing was not reached within "
-            f"{LATEST_CONTACT:g} s. Your computer rounds differently (rotordrop doctor --fingerprint); "
-            "leave it out"
-        )
-    place = folder / DROPS_FOLDER / drop.name
-    make_folder(place)
-    make_folder(folder / TRUTH_FOLDER)
-    save_machine(bench_rotor(drop.rotor), place / "machine.toml")
-    write_record(made.record, place / "record.csv")
-    if made.tail is not None:
-        write_record(made.tail, place / "tail.csv")
-    truth: dict[str, Any] = made.truth | {
-        "bench_version": VERSION,
-        "family": drop.family,
-        "rotor": drop.rotor,
-        "record_sha256": {"record.csv": sha256_of(place / "record.csv")},
-    }
-    write_json(truth_path(folder, drop.name), truth)

@@ -25,10 +25,10 @@ from rotordrop_bench.violations import BearingViolations, Violations
 
 Array = NDArray[np.float64]
 
-WHOLE = 0.2
-SETTLING = (0.15, 0.2)
-HISTORY_BEFORE = 0.02
-CONTACT_WINDOW = 0.25
+WHOLE, SETTLING = 0.2, (0.15, 0.2)
+HISTORY_BEFORE, CONTACT_WINDOW = 0.02, 0.25
+"""Windows of loads and of the settled force, and what histories and contacts hold [s], by definition those of
+the supplied truth files."""
 MPA = 1e-6
 
 

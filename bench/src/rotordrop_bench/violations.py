@@ -38,6 +38,7 @@ Frequency = Annotated[Known, Physical("frequency", above=0.0)]
 Energy = Annotated[Known, Physical("energy", above=0.0)]
 NonNegativeNumber = Annotated[Known, Physical("dimensionless", least=0.0)]
 MOST_POINTS = 9
+"""Points of a contact law: the kernel keeps eight pieces, by definition of its columns."""
 NO_CHANGE = "as the machine has it"
 
 

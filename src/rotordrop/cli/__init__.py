@@ -5,6 +5,6 @@ A verb ``coast-down`` is the function ``coast_down`` in ``coast_down.py``; the f
 """
 
 INTERRUPTED = 130
-"""Exit code after Ctrl-C."""
+"""Exit code after Ctrl-C: 128 plus the number of the signal, the standard of shells."""
 
 STOPPED = "stopped; nothing was left half written"

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 STANDARD_OUTPUT = Path("-")
 _PLAIN_WIDTH = 110
+"""Columns of what is printed to a file or a pipe; chosen, not measured."""
 
 OUTPUTS = ("json", "report", "output")
 """Parameters of the verbs that name files to write; other paths are read."""

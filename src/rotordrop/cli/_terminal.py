@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 Result = TypeVar("Result")
 
 AGAIN_AFTER_S = 0.02
-"""Until an ignored interrupt is raised again [s]: the callback that ignored it has returned by then."""
+"""Until an ignored interrupt is raised again [s]: the callback that ignored it has returned by then; chosen,
+not measured."""
 
 _PLAIN_SIGNS = {
     "µ": "u", "μ": "u", "−": "-", "–": "-", "°": " deg", "×": "x", "·": ".", "²": "^2", "³": "^3", "ⁿ": "^n",
@@ -36,21 +37,21 @@ _PLAIN_SIGNS = {
 
 def open_streams() -> None:
     """Make standard output and error take any text, whatever their encoding, also where they are closed."""
-    codecs.register_error("plain signs", _plain_signs)
+
+    def plain_signs(error: UnicodeError) -> tuple[str, int]:
+        assert isinstance(error, UnicodeEncodeError)
+        signs = error.object[error.start : error.end]
+        without_accents = (unicodedata.normalize("NFKD", sign).encode("ascii", "ignore") for sign in signs)
+        shown = zip(signs, without_accents, strict=True)
+        return "".join(_PLAIN_SIGNS.get(sign) or plain.decode() or "?" for sign, plain in shown), error.end
+
+    codecs.register_error("plain signs", plain_signs)
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115, PTH123
         elif hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="plain signs")
-
-
-def _plain_signs(error: UnicodeError) -> tuple[str, int]:
-    assert isinstance(error, UnicodeEncodeError)
-    signs = error.object[error.start : error.end]
-    without_accents = (unicodedata.normalize("NFKD", sign).encode("ascii", "ignore") for sign in signs)
-    shown = zip(signs, without_accents, strict=True)
-    return "".join(_PLAIN_SIGNS.get(sign) or plain.decode() or "?" for sign, plain in shown), error.end
 
 
 def printable(text: str) -> str:

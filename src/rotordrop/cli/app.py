@@ -33,6 +33,7 @@ ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """Our matrices are small: threads inside linear algebra cost more than they give, above all on busy cores."""
 
 BROKEN_PIPE = 141
+"""Exit code when the reader has gone: 128 plus the number of the signal, the standard of shells."""
 
 _NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO, errno.EBADF)
 
@@ -171,7 +172,8 @@ CONTEXT = {"help_option_names": ["-h", "--help"]}
 app = typer.Typer(cls=VerbTable, add_completion=False, rich_markup_mode=None, context_settings=CONTEXT)
 
 
-def _show_version(wanted: bool) -> None:
+def show_version(wanted: bool) -> None:
+    """Print the version and stop."""
     if wanted:
         typer.echo(f"rotordrop {__version__}")
         raise typer.Exit
@@ -180,7 +182,7 @@ def _show_version(wanted: bool) -> None:
 @app.callback(invoke_without_command=False)
 def rotordrop(
     version: bool = typer.Option(
-        False, "--version", is_eager=True, callback=_show_version, help="Print the version and stop."
+        False, "--version", is_eager=True, callback=show_version, help="Print the version and stop."
     ),
 ) -> None:
     """From a recorded rotor drop to touchdown-bearing force and stress."""

@@ -6,6 +6,7 @@ import os
 import platform
 import re
 import sys
+from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 USUAL_PORT = 8737
+"""Where the page is served; chosen, not measured."""
 
 EXTRAS = {
     "io": ("recordings of TDMS, UFF and Excel, shaft tables of Excel", ("npTDMS", "pyuff", "openpyxl")),
@@ -111,12 +113,15 @@ def doctor(
 
 def examined() -> dict[str, Any]:
     """Everything the command says, ready for JSON."""
+    needed = ["numpy", "scipy", "numba", "pydantic", "pint", "h5py", "plotly", "jinja2", "typer", "rich"]
+    with suppress(PackageNotFoundError):  # run from a folder that was never installed
+        needed = [bare(text) for text in requires("rotordrop") or [] if "extra ==" not in text]
     return {
         "rotordrop": __version__,
         "python": platform.python_version(),
         "executable": sys.executable,
         "system": platform.platform(),
-        "packages": {name: _version(name) for name in _needed()},
+        "packages": {name: _version(name) for name in needed},
         "extras": {
             extra: {"for": text, "packages": {name: _version(name) for name in names}}
             for extra, (text, names) in EXTRAS.items()
@@ -125,15 +130,6 @@ def examined() -> dict[str, Any]:
         "cores": os.cpu_count() or 1,
         "threads": os.environ.get("OPENBLAS_NUM_THREADS"),
     }
-
-
-def _needed() -> list[str]:
-    """Names of the packages that rotordrop cannot do without."""
-    try:
-        stated = requires("rotordrop") or []
-    except PackageNotFoundError:
-        return ["numpy", "scipy", "numba", "pydantic", "pint", "h5py", "plotly", "jinja2", "typer", "rich"]
-    return [bare(text) for text in stated if "extra ==" not in text]
 
 
 def bare(requirement: str) -> str:

@@ -88,19 +88,8 @@ def init(
 
     Example: rotordrop init machine.toml
     """
-    given = {
-        "mass": mass,
-        "length": length,
-        "centre": centre,
-        "bearings": bearings,
-        "sensors": sensors,
-        "sensor_angle": sensor_angle,
-        "designation": designation,
-        "gap": gap,
-        "speed": speed,
-        "grade": grade,
-        "support": support,
-    }
+    options = locals()
+    given: dict[str, str | None] = {name: options[name] for name in _QUESTIONS}
     if simple:
         deliver_text(_simple_text(given, preload), target or TEMPLATE_FILE, overwrite=force)
         return
@@ -204,7 +193,9 @@ def check(
 
 
 WIDTH = 96
+"""Columns of the drawing; chosen, not measured."""
 HALF_ROWS = 3
+"""Rows above and below the axis; chosen, not measured."""
 SHAFT, LAYER, DISC = "█", "░", "┃"
 
 

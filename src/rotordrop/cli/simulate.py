@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -232,10 +231,15 @@ def coast_down(
     warning = long_run(described, 1.0, MOST_STEPS_PER_WINDOW)
     if warning is not None:
         summary_console(sys.stderr).print(f"each second: {warning}", soft_wrap=True)
-    with _resumable(output), progress_bar("coast-down") as progress:
-        result = interruptible(
-            lambda: simulate_coast_down(model, case, output=output, resume=resume, progress=progress)
-        )
+    try:
+        with progress_bar("coast-down") as progress:
+            result = interruptible(
+                lambda: simulate_coast_down(model, case, output=output, resume=resume, progress=progress)
+            )
+    except KeyboardInterrupt:
+        if output is not None:
+            console(sys.stderr).print(f"the part of {output} done so far is kept: go on with --resume")
+        raise
     assert result is not None
     certificate = None
     if certify:
@@ -250,17 +254,6 @@ def coast_down(
     if certificate is not None:
         numbers["certificate"] = certificate.as_json()
     deliver(numbers, json, coast_down_page(result, described, certificate=certificate))
-
-
-@contextmanager
-def _resumable(output: Path | None) -> Iterator[None]:
-    """Say how to go on after Ctrl-C."""
-    try:
-        yield
-    except KeyboardInterrupt:
-        if output is not None:
-            console(sys.stderr).print(f"the part of {output} done so far is kept: go on with --resume")
-        raise
 
 
 def _frequencies(machine: Machine, path: Path) -> Any:

@@ -12,9 +12,9 @@ from typing import Any
 from rotordrop.errors import OutputError, UsageError
 
 WAIT = 60.0
-"""How long a writer waits for others [s]."""
+"""How long a writer waits for others [s]; chosen, not measured."""
 PAUSE = 0.02
-"""Pause before a log that is being made is looked at again [s]."""
+"""Pause before a log that is being made is looked at again [s]; chosen, not measured."""
 
 TABLES = (
     """CREATE TABLE IF NOT EXISTS drops (

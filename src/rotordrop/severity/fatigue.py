@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 LIFE = 1e6
-"""Revolutions of the basic rating life at the basic dynamic load rating."""
+"""Revolutions of the basic rating life at the basic dynamic load rating, its definition in ISO 281."""
 LOAD_EXPONENT = 3.0
 """Power of the load with which the life of ball bearings falls [1]; ISO 281."""
 WEIBULL = 10.0 / 9.0
-"""Slope of the distribution of lives [1]: how segments add up to a ring, and rings to a bearing."""
+"""Slope of the distribution of lives [1]: how segments add up to a ring, and rings to a bearing;
+for ball bearings Lundberg and Palmgren 1947."""
 SEGMENTS = 720
 """Segments of a raceway, half a degree each; chosen, not measured."""
 

@@ -29,10 +29,10 @@ _ROUNDS = (TypeAdapter(Annotated[int, Field(strict=True, ge=0)]), "a whole numbe
 FRESH = 0x5EED
 """What is added to the seed for the drops that draw a front again."""
 STEP = 0.12
-"""Width of the steps around a front, as a share of each range [1]."""
+"""Width of the steps around a front, as a share of each range [1]; chosen, not measured."""
 OTHER = 0.25
 """Share of the candidates around a front that try any bearing of the list [1]: bearings have no order, so
-that none lies beside another."""
+that none lies beside another; chosen, not measured."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 
 FORMAT = "rotordrop study 2"
 REASON = 160
-"""Characters kept of why a drop failed."""
+"""Characters kept of why a drop failed; chosen, not measured."""
 LEASE = 120.0
 """Time after which a claim without a sign of life may be taken over [s]; drops are signs of life."""
 

@@ -20,7 +20,7 @@ from rotordrop.units import si_unit
 Array = NDArray[np.float64]
 
 SPUN_UP = 0.95
-"""Share of the rotor's surface speed from which a race counts as spun up [1]."""
+"""Share of the rotor's surface speed from which a race counts as spun up [1]; chosen, not measured."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,10 +15,11 @@ from rotordrop.study.summary import COVER, StudyResults, cells_of
 Array = NDArray[np.float64]
 
 RESAMPLED = 300
-"""Bootstrap samples behind an interval."""
+"""Bootstrap samples behind an interval; chosen, not measured."""
 DROPS_OF_A_CELL = 10
 """Drops that a cell must hold at least, where shares are read off any study."""
 MOST_CELLS = 20
+"""Cells that drops are sorted into at most; chosen, not measured."""
 
 
 @dataclass(frozen=True, kw_only=True)

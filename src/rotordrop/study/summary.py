@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 COVER = 0.90
-"""Probability with which every interval here holds [1]."""
+"""Probability with which every interval here holds [1], the standard of the package."""
 
 
 @dataclass(frozen=True, kw_only=True)

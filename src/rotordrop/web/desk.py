@@ -17,6 +17,7 @@ from rotordrop.web.running import VERBS, Runner, Verb, result_folder
 from rotordrop.web.workspace import LONGEST_OPTION, Job, TooLargeError, Workspace, labelled
 
 LARGEST_ORDER = 16 * 2**10
+"""Bytes of an order; chosen, not measured: options are short texts."""
 OPTIONS = {"gap": str, "speed": str, "planes": str, "operator": str, "method": str, "quick": bool}
 METHODS = ("tracked", "replay")
 

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 SYSTEMS: tuple[System, ...] = ("SI", "US")
 MOST_PLACES = 200
-"""Places of a line that are drawn [1]."""
+"""Places of a line that are drawn [1]; chosen, not measured."""
 SHOWN_KINDS = ("length", "force", "pressure", "speed", "velocity")
 
 

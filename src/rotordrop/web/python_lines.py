@@ -7,8 +7,39 @@ from typing import Any
 
 Files = Mapping[str, Mapping[str, Any]]
 
+_ROTOR = """from rotordrop import load_machine
 
-def _profile(files: Files, options: Mapping[str, Any]) -> list[str]:
+machine = load_machine({machine!r})
+nodes = machine.rotor.node_positions  # [m]
+bearings = {{part.name: nodes[part.node - 1] for part in machine.touchdown_bearings}}  # [m]
+sensors = {{part.name: nodes[part.node - 1] for part in machine.sensors}}  # [m]
+"""
+_WATERFALL = """from rotordrop import load_machine, read_record
+from rotordrop.estimate.recorded_coast_down import recorded_coast_down, with_found_air_gaps
+from rotordrop.spectrum.coast_down import analyse_coast_down
+from rotordrop.spectrum.machine_candidates import machine_candidates
+{rules}
+machine = load_machine({machine!r})
+record = read_record({record!r}, machine{by_rules})
+signal = recorded_coast_down(machine, record)
+planes = {{name: name for name in signal.planes}}
+candidates = machine_candidates(with_found_air_gaps(machine, signal), planes)
+found = analyse_coast_down(signal, candidates)
+lines = [(line.label, line.frequency, line.amplitude) for line in found.lines]  # [Hz], [m]
+fall = next(f for f in found.planes[{plane!r}].waterfalls if f.component == {part!r})
+time, frequency, amplitude = fall.time, fall.frequency, fall.amplitude  # [s], [Hz], [m]
+"""
+_COURSE = """import numpy as np
+line = next(line for line in found.lines if line.label == {label!r})
+path = np.interp(time, line.path.time, line.path.frequency, left=np.nan, right=np.nan)
+sides = (1, -1) if fall.component == 'full' else (1,)
+bins = [[abs(frequency - s * f).argmin() + k for s in sides for k in (-1, 0, 1)] for f in path]
+course = [amplitude[row, near].max() if np.isfinite(f) else np.nan \
+for row, (near, f) in enumerate(zip(bins, path))]  # [m]
+"""
+
+
+def _rules(files: Files, options: Mapping[str, Any]) -> list[str]:
     """Lines that make the reading rules; none where the recording speaks for itself."""
     lines = []
     if "profile" in files:
@@ -22,23 +53,9 @@ def _profile(files: Files, options: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-def _rotor_lines(files: Files) -> str:
-    return "\n".join(
-        [
-            "from rotordrop import load_machine",
-            "",
-            f"machine = load_machine({files['machine']['name']!r})",
-            "nodes = machine.rotor.node_positions  # [m]",
-            "bearings = {part.name: nodes[part.node - 1] for part in machine.touchdown_bearings}  # [m]",
-            "sensors = {part.name: nodes[part.node - 1] for part in machine.sensors}  # [m]",
-            "",
-        ]
-    )
-
-
 def look_lines(files: Files, options: Mapping[str, Any], planes: int) -> dict[str, str]:
     """Lines for every figure of a look."""
-    imports, rules = "from rotordrop import look", _profile(files, options)
+    imports, rules = "from rotordrop import look", _rules(files, options)
     given = [repr(files["record"]["name"])]
     if "machine" in files:
         imports = "from rotordrop import load_machine, look"
@@ -59,16 +76,14 @@ def look_lines(files: Files, options: Mapping[str, Any], planes: int) -> dict[st
         motion = f"time, motion = seen.motion.time, seen.motion.paths[{number}].position  # [s], [m]"
         tail |= {f"motion {number}": motion, f"orbit {number}": motion}
     found = {figure: "\n".join([*head, line, ""]) for figure, line in tail.items()}
-    return found | ({"rotor": _rotor_lines(files)} if "machine" in files else {})
+    return found | ({"rotor": _ROTOR.format(machine=files["machine"]["name"])} if "machine" in files else {})
 
 
 def estimate_lines(files: Files, options: Mapping[str, Any], bearings: Sequence[str]) -> dict[str, str]:
     """Lines for every figure of an estimate."""
     replayed = options.get("method") == "replay"
-    lines, rules = (
-        ["from rotordrop import estimate_drop, load_machine, read_record"],
-        _profile(files, options),
-    )
+    lines = ["from rotordrop import estimate_drop, load_machine, read_record"]
+    rules = _rules(files, options)
     extra, by_rules = "", ", profile=profile" if rules else ""
     if replayed or options.get("quick"):
         lines.append(f"from rotordrop.estimation import {'Replay' if replayed else 'Tracked'}")
@@ -95,38 +110,22 @@ def estimate_lines(files: Files, options: Mapping[str, Any], bearings: Sequence[
         motion = f"motions = estimate.bearing({name!r}).motions  # each .time [s] and .displacement [m]"
         last |= {f"motion {number}": motion, f"orbit {number}": motion}
     found = {figure: "\n".join([*lines, line, ""]) for figure, line in last.items()}
-    return found | {"rotor": _rotor_lines(files)}
+    return found | {"rotor": _ROTOR.format(machine=files["machine"]["name"])}
 
 
 def waterfall_lines(
     files: Files, options: Mapping[str, Any], planes: Sequence[str], parts: Sequence[str]
 ) -> dict[str, str]:
     """Lines for every waterfall of a coast-down, for its cuts, and for the course of its lines."""
-    rules = _profile(files, options)
-    head = [
-        "from rotordrop import load_machine, read_record",
-        "from rotordrop.estimate.recorded_coast_down import recorded_coast_down, with_found_air_gaps",
-        "from rotordrop.spectrum.coast_down import analyse_coast_down",
-        "from rotordrop.spectrum.machine_candidates import machine_candidates",
-        *rules,
-        "",
-        f"machine = load_machine({files['machine']['name']!r})",
-        f"record = read_record({files['record']['name']!r}, machine{', profile=profile' if rules else ''})",
-        "signal = recorded_coast_down(machine, record)",
-        "planes = {name: name for name in signal.planes}",
-        "candidates = machine_candidates(with_found_air_gaps(machine, signal), planes)",
-        "found = analyse_coast_down(signal, candidates)",
-        "lines = [(line.label, line.frequency, line.amplitude) for line in found.lines]  # [Hz], [m]",
-    ]
+    rules = _rules(files, options)
+    given = {
+        "rules": "".join(f"{line}\n" for line in rules),
+        "by_rules": ", profile=profile" if rules else "",
+        "machine": files["machine"]["name"],
+        "record": files["record"]["name"],
+    }
     return {
-        f"{number} {part}": "\n".join(
-            [
-                *head,
-                f"fall = next(f for f in found.planes[{name!r}].waterfalls if f.component == {part!r})",
-                "time, frequency, amplitude = fall.time, fall.frequency, fall.amplitude  # [s], [Hz], [m]",
-                "",
-            ]
-        )
+        f"{number} {part}": _WATERFALL.format(plane=name, part=part, **given)
         for number, name in enumerate(planes)
         for part in parts
     }
@@ -134,15 +133,4 @@ def waterfall_lines(
 
 def course_lines(label: str) -> str:
     """Lines that follow a line of a waterfall over time, after those of the waterfall."""
-    return "\n".join(
-        [
-            "import numpy as np",
-            f"line = next(line for line in found.lines if line.label == {label!r})",
-            "path = np.interp(time, line.path.time, line.path.frequency, left=np.nan, right=np.nan)",
-            "sides = (1, -1) if fall.component == 'full' else (1,)",
-            "bins = [[abs(frequency - s * f).argmin() + k for s in sides for k in (-1, 0, 1)] for f in path]",
-            "course = [amplitude[row, near].max() if np.isfinite(f) else np.nan "
-            "for row, (near, f) in enumerate(zip(bins, path))]  # [m]",
-            "",
-        ]
-    )
+    return _COURSE.format(label=label)

@@ -24,13 +24,13 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 FACTOR = 8
-"""Blocks of a level that make one of the next."""
+"""Blocks of a level that make one of the next; chosen, not measured."""
 
 MOST_POINTS = 4000
 FEWEST_POINTS = 100
 """Samples of a window that are sent at once, at most and at least; chosen, not measured."""
 MOST_COLUMNS = 12
-"""Columns that are sent at once; more than a figure shows."""
+"""Columns that are sent at once, more than a figure shows; chosen, not measured."""
 
 
 @dataclass(frozen=True, kw_only=True)

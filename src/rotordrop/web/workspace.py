@@ -26,7 +26,7 @@ Role: TypeAlias = Literal["machine", "profile", "record", "tail", "beside"]
 ROLES: tuple[Role, ...] = ("machine", "profile", "record", "tail", "beside")
 
 QUOTA = 8 * 2**30
-"""Bytes the folder may hold before uploads are refused."""
+"""Bytes the folder may hold before uploads are refused; chosen, not measured."""
 
 LARGEST: dict[str, int] = {
     "machine": 16 * 2**20,
