@@ -5,18 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from itertools import chain
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.elements.air import PARAMETERS as AERO
 from rotordrop.elements.magnet import REMANENCE, REMANENCE_TIME
-from rotordrop.elements.parameter import Entry, Measure, Parameter, Rule
+from rotordrop.elements.parameter import Entry, Measure, Owner, Parameter, Rule, guess, parts_of
 from rotordrop.elements.sensor import Sensor
 from rotordrop.elements.table import row_of, rows, structure_rows
 from rotordrop.known import NINETY, Known
-from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.machine import Machine
 from rotordrop.physics.linear_algebra import solve
 from rotordrop.rotor.parameters import DropModel
 
@@ -170,83 +171,52 @@ def bearing_unknowns(model: DropModel, index: int) -> Iterator[Unknown]:
     """
     bearing = model.machine.touchdown_bearings[index]
     for row in rows("bearing"):
-        if not row.entries or float(row.described(bearing)) == 0.0:
+        if not row.entries or float(quantity := row.described(bearing)) == 0.0:
             continue  # for a loose bearing, the air gap takes up an error of the play
         if row.estimated_by is not None:
-            yield _measured_otherwise(row, bearing, index, row.estimated_by(bearing))
-        elif row.ratio is not None:
-            yield _by_ratio(row, bearing, index)
+            measure = row.estimated_by(bearing)
+            known, published = _by_measure(row, quantity, measure), measure.value_of
+            yield _unknown(model, row, bearing.name, index, quantity, known, published=published)
+        elif row.ratio is not None:  # by its factor on the described ratio
+            wider = None if row.wider is None else row.wider(bearing)
+            known = Prior(mean=0.0, sigma=prior(row, quantity).sigma if wider is None else wider, start=0.0)
+
+            def at_ratio(theta: float, described: float = float(quantity)) -> float:
+                return described * math.exp(theta)
+
+            yield _unknown(model, row, bearing.name, index, quantity, known, published=at_ratio)
         else:
-            yield _unknown(model, row, index)
+            known = prior(row, quantity, scale=float(quantity))
+            yield _unknown(model, row, bearing.name, index, quantity, known)
 
 
-def _unknown(model: DropModel, row: Parameter, index: int) -> Unknown:
-    bearing = model.machine.touchdown_bearings[index]
-    quantity = row.described(bearing)
-    known = prior(row, quantity, scale=float(quantity))
-    return Unknown(
-        parameter=row,
-        owner=bearing.name,
-        mean=known.mean,
-        sigma=known.sigma,
-        start=known.start,
-        targets=tuple(
-            Target(entry=entry, row=index, factor=_factor(model, entry, index, float(quantity)))
-            for entry in row.entries
-        ),
-        calibrated=quantity.status == "estimated",
-    )
+def _unknown(
+    model: DropModel, row: Parameter, owner: str, index: int, quantity: Known, known: Prior, **rest: Any
+) -> Unknown:
+    def factor(entry: Entry) -> float:
+        if entry.rule is Rule.RATIO:
+            described = model.parameters.bearing[index, entry.column] if entry.array == "bearing" else 1.0
+            return float(described) / float(quantity)
+        if entry.rule is Rule.AT_TYPICAL_DEPTH:
+            contact = model.machine.touchdown_bearings[index].contact
+            return contact.typical_depth(float(np.mean(model.load_shares)))
+        return 1.0
+
+    targets = tuple(Target(entry=entry, row=index, factor=factor(entry)) for entry in row.entries)
+    calibrated = quantity.status == "estimated"
+    return Unknown(parameter=row, owner=owner, targets=targets, calibrated=calibrated, **vars(known), **rest)
 
 
-def _factor(model: DropModel, entry: Entry, index: int, value: float) -> float:
-    if entry.rule is Rule.RATIO:
-        return float(model.parameters.bearing[index, entry.column]) / value
-    if entry.rule is Rule.AT_TYPICAL_DEPTH:
-        bearing = model.machine.touchdown_bearings[index]
-        return bearing.contact.typical_depth(float(np.mean(model.load_shares)))
-    return 1.0
-
-
-def _by_ratio(row: Parameter, bearing: TouchdownBearing, index: int) -> Unknown:
-    """A ratio of two values, estimated by its factor on the described one."""
-    described = row.described(bearing)
-    wider = None if row.wider is None else row.wider(bearing)
-
-    def ratio(theta: float) -> float:
-        return float(described) * math.exp(theta)
-
-    return Unknown(
-        parameter=row,
-        owner=bearing.name,
-        mean=0.0,
-        sigma=prior(row, described).sigma if wider is None else wider,
-        targets=tuple(Target(entry=entry, row=index) for entry in row.entries),
-        published=ratio,
-    )
-
-
-def _measured_otherwise(row: Parameter, bearing: TouchdownBearing, index: int, measure: Measure) -> Unknown:
-    """A parameter estimated by another number, on which the forces depend: a preload by an axial offset.
+def _by_measure(row: Parameter, quantity: Known, measure: Measure) -> Prior:
+    """Prior of a parameter estimated by another number, on which the forces depend.
 
     The ends of the 90 % interval are those of the parameter; between them the prior is normal in the number.
     """
-    quantity = row.described(bearing)
     known = prior(row, quantity, logarithmic=True)
-    low, high = (
-        measure.of_value(math.exp(end))
-        for end in (known.mean - NINETY * known.sigma, known.mean + NINETY * known.sigma)
-    )
+    low, high = (measure.of_value(math.exp(known.mean + side * NINETY * known.sigma)) for side in (-1, 1))
     stated = quantity.interval_90 or quantity.range
-    return Unknown(
-        parameter=row,
-        owner=bearing.name,
-        mean=measure.start if stated is None else 0.5 * (low + high),
-        sigma=(high - low) / (2.0 * NINETY),
-        start=measure.start,
-        targets=tuple(Target(entry=entry, row=index) for entry in row.entries),
-        calibrated=quantity.status == "estimated",
-        published=measure.value_of,
-    )
+    middle = measure.start if stated is None else 0.5 * (low + high)
+    return Prior(mean=middle, sigma=(high - low) / (2.0 * NINETY), start=measure.start)
 
 
 def sensor_prior(row: Parameter, quantity: Known, smallest_gap: float) -> Prior:
@@ -272,35 +242,24 @@ def weight_per_magnet(machine: Machine) -> float:
 def drop_unknowns(model: DropModel) -> Iterator[Unknown]:
     """Unknowns of one drop: unbalance against an unknown mark, remanent forces, aerodynamic constant."""
     machine = model.machine
+
+    def of_drop(row: Parameter, owner: str, index: int, mean: float, sigma: float) -> Unknown:
+        targets = tuple(Target(entry=entry, row=index) for entry in row.entries)
+        return Unknown(parameter=row, owner=owner, mean=mean, sigma=sigma, targets=targets)
+
     for plane, unbalance in enumerate(machine.unbalances):
         for row in rows("unbalance"):
-            yield _of_drop(row, str(plane), 0.0, max(float(unbalance.amount), 1e-9), plane)
+            yield of_drop(row, str(plane), plane, 0.0, max(float(unbalance.amount), 1e-9))
     share = weight_per_magnet(machine)
     for a, amb in enumerate(machine.ambs):
         for row in rows("magnet"):
-            yield _of_drop(row, amb.name, 0.0, row.guess_sigma * share, a)
+            yield of_drop(row, amb.name, a, 0.0, row.guess_sigma * share)
     if machine.ambs:
-        yield _remanence_time(machine)
+        described = machine.remanence_time_constant
+        known = prior(REMANENCE, guess(REMANENCE_TIME) if described is None else described)
+        yield of_drop(REMANENCE, "", 0, known.mean, known.sigma)
     for row in AERO:
-        yield _of_drop(row, "", math.log(aero_time_constant(machine)))
-
-
-def _remanence_time(machine: Machine) -> Unknown:
-    row, described = REMANENCE, machine.remanence_time_constant
-    if described is None:
-        return _of_drop(row, "", math.log(REMANENCE_TIME))
-    known = prior(row, described)
-    return _of_drop(row, "", known.mean, known.sigma)
-
-
-def _of_drop(row: Parameter, owner: str, mean: float, sigma: float | None = None, index: int = 0) -> Unknown:
-    return Unknown(
-        parameter=row,
-        owner=owner,
-        mean=mean,
-        sigma=row.guess_sigma if sigma is None else sigma,
-        targets=tuple(Target(entry=entry, row=index) for entry in row.entries),
-    )
+        yield of_drop(row, "", 0, math.log(aero_time_constant(machine)), row.guess_sigma)
 
 
 def aero_time_constant(machine: Machine) -> float:
@@ -310,68 +269,33 @@ def aero_time_constant(machine: Machine) -> float:
 
 
 def structure_unknowns(model: DropModel) -> Iterator[Unknown]:
-    """Unknowns beyond the usual model: those that the machine description names."""
-    machine = model.machine
-    for index, bearing in enumerate(machine.touchdown_bearings):
-        for row in structure_rows("bearing"):
-            if (quantity := row.stated(bearing)) is not None:
-                yield _of_structure(row, bearing.name, quantity, index, *_scale(model, row, index))
-    for index, sensor in enumerate(machine.sensors):
-        for row in structure_rows("sensor"):
-            if (quantity := row.stated(sensor)) is not None:
-                known = _of_structure(row, sensor.name, quantity, index)
-                yield known if known.calibrated else _in_common(known, machine, sensor)
-    for row in structure_rows("rotor"):
-        if (quantity := row.stated(machine.rotor)) is not None:
-            yield _of_structure(row, "", quantity, 0)
-
-
-def _of_structure(
-    row: Parameter,
-    owner: str,
-    quantity: Known,
-    index: int,
-    scale: float = 1.0,
-    limits: tuple[float, float] | None = None,
-) -> Unknown:
-    known = prior(row, quantity, scale=scale)
-    return Unknown(
-        parameter=row,
-        owner=owner,
-        mean=known.mean,
-        sigma=known.sigma,
-        start=known.start,
-        targets=tuple(
-            Target(entry=e, row=index, factor=1.0 / float(quantity) if e.rule is Rule.RATIO else 1.0)
-            for e in row.entries
-        ),
-        calibrated=quantity.status == "estimated",
-        limits=limits,
-    )
-
-
-def _scale(model: DropModel, row: Parameter, index: int) -> tuple[float, tuple[float, float] | None]:
-    if row.scaled is None:
-        return 1.0, None
-    return row.scaled(model.machine.touchdown_bearings[index], float(np.mean(model.load_shares)))
+    """Unknowns beyond the base model: those that the machine description names."""
+    machine, load = model.machine, float(np.mean(model.load_shares))
+    owners: tuple[Owner, ...] = ("bearing", "sensor", "rotor")
+    for owner in owners:
+        for index, (name, part) in enumerate(parts_of(machine, owner)):
+            for row in structure_rows(owner):
+                if (quantity := row.stated(part)) is None:
+                    continue
+                scale, limits = (1.0, None) if row.scaled is None else row.scaled(part, load)
+                known = prior(row, quantity, scale=scale)
+                one = _unknown(model, row, name, index, quantity, known, limits=limits)
+                yield _in_common(one, machine, part) if owner == "sensor" and not one.calibrated else one
 
 
 def _in_common(one: Unknown, machine: Machine, sensor: Sensor) -> Unknown:
     """The unknown of a sensor with what is known of it and the sensors of its group together."""
     row = one.parameter
     group = [s for s in machine.sensors if row.group == "machine" or s.node == sensor.node]
-    own, count = one.sigma**2, len([s for s in group if row.stated(s) is not None])
-    common = row.common_sigma**2 - own / count
-    return replace(one, sigma=math.sqrt(own + common), common_variance=common)
+    alone, count = one.sigma**2, len([s for s in group if row.stated(s) is not None])
+    common = row.common_sigma**2 - alone / count
+    return replace(one, sigma=math.sqrt(alone + common), common_variance=common)
 
 
 def all_unknowns(model: DropModel) -> tuple[Unknown, ...]:
     """Every unknown, machine first, then those of the drop."""
-    of_bearings = (
-        unknown
-        for index in range(len(model.machine.touchdown_bearings))
-        for unknown in bearing_unknowns(model, index)
-    )
+    bearings = range(len(model.machine.touchdown_bearings))
+    of_bearings = chain.from_iterable(bearing_unknowns(model, index) for index in bearings)
     return (*of_bearings, *structure_unknowns(model), *drop_unknowns(model))
 
 
