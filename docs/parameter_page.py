@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from rotordrop.elements.parameter import Parameter
 from rotordrop.elements.table import LOADS, STRUCTURE, rows
 from rotordrop.machine import example_machine
@@ -90,7 +92,7 @@ def _limits(row: Parameter) -> str:
     if row.reach is not None:
         return f"a factor of {row.reach:g} about the prior"
     ends = (("from", row.lower), ("to", row.upper))
-    return " ".join(f"{word} {end:g}" for word, end in ends if end is not None)
+    return " ".join(f"{word} {end:g}" for word, end in ends if math.isfinite(end))
 
 
 def _published() -> list[str]:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Annotated, Any, ClassVar, Self, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, Strict, model_validator
 
 from rotordrop.elements.values import Length, Physical
@@ -84,6 +86,9 @@ class Description(BaseModel):
     written_as: ClassVar[Mapping[str, str]] = {}
     """Fields that a file writes under another key."""
 
+    columns: ClassVar[Mapping[str, int]] = {}
+    """Columns of a kernel row that fields stand in; what is left out is zero there."""
+
     reserved: ClassVar[Mapping[str, str]] = {}
     """Keys that a later version will know, with what they will hold."""
 
@@ -130,6 +135,12 @@ class Description(BaseModel):
     def left_out(self) -> dict[str, Any]:
         """Values for fields that were left out and follow from others."""
         return {}
+
+    def fill(self, row: NDArray[np.float64]) -> None:
+        """Write the columns of a kernel row."""
+        for name, column in self.columns.items():
+            value = getattr(self, name)
+            row[column] = 0.0 if value is None else float(value)
 
     def changed(self, **values: Any) -> Self:
         """Give a copy with other values; what follows from them follows again."""

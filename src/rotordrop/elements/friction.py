@@ -6,16 +6,11 @@ import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from rotordrop.elements.description import Description, Usual
 from rotordrop.elements.parameter import Parameter, Role, Step, bearing_entries
 from rotordrop.elements.values import NonNegative, Velocity, default, follows, scaled
 from rotordrop.known import Known
 from rotordrop.physics import columns as L
-
-Array = NDArray[np.float64]
 
 _STATIC_OVER_DYNAMIC = 1.3
 _RATIO_ERROR = 0.15
@@ -32,6 +27,13 @@ class Friction(Description):
     """Sliding speed over which static falls to dynamic [m/s]."""
     smoothing_speed: Velocity = default(0.02, "small against any sliding speed that matters in a drop")
     """Sliding speed below which the friction is smoothed [m/s]."""
+
+    columns: ClassVar[Mapping[str, int]] = {
+        "static": L.FRICTION_STATIC,
+        "dynamic": L.FRICTION_DYNAMIC,
+        "stribeck_speed": L.STRIBECK_SPEED,
+        "smoothing_speed": L.SMOOTHING_SPEED,
+    }
 
     usual: ClassVar[Mapping[str, Usual]] = {
         "dynamic": Usual(
@@ -72,13 +74,6 @@ class Friction(Description):
             interval_90=((1.0 - _RATIO_ERROR) * self.ratio * low, (1.0 + _RATIO_ERROR) * self.ratio * high),
             unit="1",
         )
-
-    def fill(self, row: Array) -> None:
-        """Write the columns of the friction."""
-        row[L.FRICTION_STATIC] = float(self.static)
-        row[L.FRICTION_DYNAMIC] = float(self.dynamic)
-        row[L.STRIBECK_SPEED] = float(self.stribeck_speed)
-        row[L.SMOOTHING_SPEED] = float(self.smoothing_speed)
 
 
 PARAMETERS: tuple[Parameter, ...] = (

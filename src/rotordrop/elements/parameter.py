@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, Any, Literal, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, cast
 
 from rotordrop.known import Known
 from rotordrop.units import si_unit
@@ -116,8 +116,8 @@ class Parameter:
     """What it is a share of, where it is not that of a logarithm."""
     least_sigma: float = 1e-4
     """Prior standard deviation that an interval in the machine file cannot go below."""
-    lower: float | None = None
-    upper: float | None = None
+    lower: float = -math.inf
+    upper: float = math.inf
     """Limits between which the model follows it [SI unit]."""
     reach: float | None = None
     """Factor on its prior value up to which the model follows it [1]: what no record shows drifts, and a race
@@ -202,8 +202,7 @@ class Parameter:
 
     def within(self, value: float) -> float:
         """The value, or the limit of the model it lies beyond."""
-        lowest = -math.inf if self.lower is None else self.lower
-        return min(max(value, lowest), math.inf if self.upper is None else self.upper)
+        return min(max(value, self.lower), self.upper)
 
     def stated(self, part: Any) -> Known | None:
         """The value as the description has it; None where it leaves it out."""
@@ -248,38 +247,15 @@ Values = Mapping[str, Known]
 """Values by path."""
 
 
-class Assembly(Protocol):
-    """A machine, as far as an extension looks at it."""
-
-    @property
-    def touchdown_bearings(self) -> tuple[Any, ...]:
-        """Touchdown bearings."""
-
-    @property
-    def sensors(self) -> tuple[Any, ...]:
-        """Displacement sensors."""
-
-    @property
-    def unbalances(self) -> tuple[Any, ...]:
-        """Unbalances."""
-
-    @property
-    def rotor(self) -> Any:
-        """The rotor."""
-
-    def with_values(self, values: Mapping[str, float | str | Known]) -> Self:
-        """The same machine with other values."""
+M = TypeVar("M")
+"""A machine, which stands above the elements."""
 
 
-M = TypeVar("M", bound=Assembly)
-
-
-def parts_of(machine: Assembly, owner: Owner) -> list[tuple[str, Any]]:
+def parts_of(machine: Any, owner: Owner) -> list[tuple[str, Any]]:
     """The parts of a machine that may own a parameter, with the name each has in a path."""
-    if owner == "bearing":
-        return [(bearing.name, bearing) for bearing in machine.touchdown_bearings]
-    if owner == "sensor":
-        return [(sensor.name, sensor) for sensor in machine.sensors]
+    if owner in ("bearing", "sensor"):
+        parts = machine.touchdown_bearings if owner == "bearing" else machine.sensors
+        return [(part.name, part) for part in parts]
     if owner == "unbalance":
         return [(str(i), unbalance) for i, unbalance in enumerate(machine.unbalances)]
     return [("", machine.rotor if owner == "rotor" else machine)]
@@ -288,11 +264,6 @@ def parts_of(machine: Assembly, owner: Owner) -> list[tuple[str, Any]]:
 def guess(value: float) -> Known:
     """A value to begin with."""
     return Known(value=value, status="guess")
-
-
-def nothing(_part: Any) -> dict[str, Known]:
-    """No value at all."""
-    return {}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -315,47 +286,47 @@ class Extension:
     """What stands between the words on two parts."""
     frame: str = "{}"
     """What stands around the words on all parts."""
-    base: Callable[[Any], dict[str, Known]] = nothing
+    base: Callable[[Any], dict[str, Known]] = lambda _: {}
     """Values with which a machine says what the base model says and is followed as with this extension:
     smaller process noise in the fall is no evidence of a long remanence."""
     shows_beside: bool = True
     """Whether it can show beside a base model that is consistent with the record."""
 
-    def values(self, machine: Assembly) -> dict[str, Known]:
+    def values(self, machine: Any) -> dict[str, Known]:
         """Values that a description with this extension names; none where it names some already."""
-        parts = parts_of(machine, self.owner)
-        if any(_at(part, name) is not None for _, part in parts for name in self.names):
+        parts = [part for _, part in parts_of(machine, self.owner)]
+        if any(_at(part, name) is not None for part in parts for name in self.names):
             return {}
-        return _of_parts(self.owner, parts, self.neutral)
+        return self._of_parts(machine, self.neutral)
 
-    def usual(self, machine: Assembly) -> dict[str, Known]:
+    def usual(self, machine: Any) -> dict[str, Known]:
         """Values with which the base model is followed as with this extension."""
-        return _of_parts(self.owner, parts_of(machine, self.owner), self.base)
+        return self._of_parts(machine, self.base)
+
+    def _of_parts(self, machine: Any, values: Callable[[Any], dict[str, Known]]) -> dict[str, Known]:
+        parts = parts_of(machine, self.owner)
+        return {
+            path_of(self.owner, name, key): one for name, part in parts for key, one in values(part).items()
+        }
 
     def added_to(self, machine: M) -> M:
         """The machine with this extension."""
-        return machine.with_values(self.values(machine))
+        changed: M = cast(Any, machine).with_values(self.values(machine))
+        return changed
 
     def saying_the_usual(self, machine: M) -> M:
         """The machine followed as with this extension, which says nothing."""
-        return machine.with_values(self.usual(machine))
+        changed: M = cast(Any, machine).with_values(self.usual(machine))
+        return changed
 
-    def found(self, machine: Assembly, values: Values, mean_load: float) -> str:
+    def found(self, machine: Any, values: Values, mean_load: float) -> str:
         """What the values found say, by path in the machine; in brackets 90 % intervals."""
         words = []
         for name, part in parts_of(machine, self.owner):
             prefix = path_of(self.owner, name, "")
-            inside = {
-                path.removeprefix(prefix): one for path, one in values.items() if path.startswith(prefix)
-            }
+            inside = {path[len(prefix) :]: one for path, one in values.items() if path.startswith(prefix)}
             words.append(self.sentence(part, inside, mean_load))
         return self.frame.format(self.joined.join(word for word in words if word))
-
-
-def _of_parts(
-    owner: Owner, parts: list[tuple[str, Any]], values: Callable[[Any], dict[str, Known]]
-) -> dict[str, Known]:
-    return {path_of(owner, name, key): one for name, part in parts for key, one in values(part).items()}
 
 
 def derived(function: Callable[..., float], *known: Known) -> tuple[float, float, float]:

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import math
-
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Mapping
+from typing import ClassVar
 
 from rotordrop.elements import values as V
 from rotordrop.elements.description import Description
 from rotordrop.elements.parameter import Parameter, Role, Step, bearing_entries
 from rotordrop.elements.values import default, follows
 from rotordrop.physics import columns as L
-
-Array = NDArray[np.float64]
 
 
 class Race(Description):
@@ -32,12 +29,12 @@ class Race(Description):
     drag_speed: V.PositiveSpeed = default(1.0, "small against any race speed that matters in a drop")
     """Race speed over which the drag builds up [rad/s]."""
 
-    def fill(self, row: Array) -> None:
-        """Write the columns of the race."""
-        row[L.RACE_MASS] = float(self.mass)
-        row[L.RACE_INERTIA] = float(self.inertia)
-        row[L.DRAG_COEFFICIENT] = float(self.drag_coefficient)
-        row[L.DRAG_SPEED] = float(self.drag_speed)
+    columns: ClassVar[Mapping[str, int]] = {
+        "mass": L.RACE_MASS,
+        "inertia": L.RACE_INERTIA,
+        "drag_coefficient": L.DRAG_COEFFICIENT,
+        "drag_speed": L.DRAG_SPEED,
+    }
 
 
 PARAMETERS: tuple[Parameter, ...] = (

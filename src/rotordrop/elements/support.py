@@ -35,6 +35,9 @@ Array = NDArray[np.float64]
 
 _DAMPING_RATIO = 0.025
 
+_FORM = ("coupling", "cubic", "foundation_share", "foundation_frequency", "foundation_damping_ratio")
+"""What a support may have beyond a spring and a damper on two axes."""
+
 TURNED_ANISOTROPY = 0.4
 """Prior standard deviation of the logarithm of horizontal over vertical stiffness of turned axes."""
 
@@ -71,6 +74,20 @@ class Support(Description):
     foundation_damping_ratio: V.Positive | None = None
     """Damping ratio of that foundation."""
 
+    columns: ClassVar[Mapping[str, int]] = {
+        "mass_horizontal": L.SUPPORT_MASS_X,
+        "mass": L.SUPPORT_MASS_Y,
+        "stiffness_horizontal": L.SUPPORT_STIFFNESS_X,
+        "stiffness": L.SUPPORT_STIFFNESS_Y,
+        "damping_horizontal": L.SUPPORT_DAMPING_X,
+        "damping": L.SUPPORT_DAMPING_Y,
+        "coupling": L.SUPPORT_COUPLING,
+        "cubic": L.SUPPORT_CUBIC,
+        "foundation_share": L.FOUNDATION_SHARE,
+        "foundation_frequency": L.FOUNDATION_SPEED,
+        "foundation_damping_ratio": L.FOUNDATION_DAMPING,
+    }
+
     displaces: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "damping": ("damping_ratio",),
         "damping_ratio": ("damping",),
@@ -86,7 +103,7 @@ class Support(Description):
                     f"the support has both 'damping{end}' and 'damping_ratio{end}'; keep one of them",
                     (f"damping_ratio{end}",),
                 )
-        parts = ("foundation_share", "foundation_frequency", "foundation_damping_ratio")
+        parts = _FORM[2:]
         given = [name for name in parts if getattr(self, name) is not None]
         if given and len(given) < len(parts):
             missing = next(name for name in parts if name not in given)
@@ -98,28 +115,24 @@ class Support(Description):
     def left_out(self) -> dict[str, Any]:
         """Let damping follow its ratio and the horizontal values follow the vertical ones."""
         values: dict[str, Any] = {}
-        given = self.model_fields_set
+        given, same = self.model_fields_set, "equal to the vertical one"
         for name in ("mass", "stiffness"):
             if f"{name}_horizontal" not in given:
                 vertical = getattr(self, name)
-                values[f"{name}_horizontal"] = scaled(
-                    vertical, 1.0, "equal to the vertical one", vertical.unit
-                )
+                values[f"{name}_horizontal"] = scaled(vertical, 1.0, same, vertical.unit)
         if "damping" not in given:
             values["damping"] = _from_ratio(self.damping_ratio, self.mass, self.stiffness)
-        if "damping_horizontal" not in given:
-            values["damping_horizontal"] = self._horizontal_damping(values)
-        return values
-
-    def _horizontal_damping(self, values: dict[str, Any]) -> Known:
+        if "damping_horizontal" in given:
+            return values
         mass = values.get("mass_horizontal", self.mass_horizontal)
         stiffness = values.get("stiffness_horizontal", self.stiffness_horizontal)
+        damping = scaled(self.damping, 1.0, same, "N s/m")
         if self.damping_ratio_horizontal is not None:
-            return _from_ratio(self.damping_ratio_horizontal, mass, stiffness)
-        if "damping" in self.model_fields_set:
-            return scaled(self.damping, 1.0, "equal to the vertical one", "N s/m")
-        why = "the damping ratio of the vertical direction"
-        return replace(_from_ratio(self.damping_ratio, mass, stiffness), status="default", source=why)
+            damping = _from_ratio(self.damping_ratio_horizontal, mass, stiffness)
+        elif "damping" not in given:
+            why = "the damping ratio of the vertical direction"
+            damping = replace(_from_ratio(self.damping_ratio, mass, stiffness), status="default", source=why)
+        return values | {"damping_horizontal": damping}
 
     @property
     def further_states(self) -> int:
@@ -128,22 +141,8 @@ class Support(Description):
 
     def fill(self, row: Array) -> None:
         """Write the columns of the support."""
-        row[L.SUPPORT_MASS_X] = float(self.mass_horizontal)
-        row[L.SUPPORT_MASS_Y] = float(self.mass)
-        row[L.SUPPORT_STIFFNESS_X] = float(self.stiffness_horizontal)
-        row[L.SUPPORT_STIFFNESS_Y] = float(self.stiffness)
-        row[L.SUPPORT_DAMPING_X] = float(self.damping_horizontal)
-        row[L.SUPPORT_DAMPING_Y] = float(self.damping)
-        form = {
-            L.SUPPORT_COUPLING: self.coupling,
-            L.SUPPORT_CUBIC: self.cubic,
-            L.FOUNDATION_SHARE: self.foundation_share,
-            L.FOUNDATION_SPEED: self.foundation_frequency,
-            L.FOUNDATION_DAMPING: self.foundation_damping_ratio,
-        }
-        for column, value in form.items():
-            row[column] = 0.0 if value is None else float(value)
-        row[L.SUPPORT_FORM + SUPPORT_PRESENT] = float(any(value is not None for value in form.values()))
+        super().fill(row)
+        row[L.SUPPORT_FORM + SUPPORT_PRESENT] = float(any(getattr(self, name) is not None for name in _FORM))
 
 
 def _from_ratio(ratio: Known | None, mass: Known, stiffness: Known) -> Known:
@@ -165,7 +164,8 @@ def support_sag(row: Array, load: float) -> float:
     cubic = float(row[L.SUPPORT_CUBIC])
     coupled = sag / (1.0 - float(row[L.SUPPORT_COUPLING]) ** 2)
     deflection = coupled / (1.0 + cubic * sag**2)  # next order: a few parts in ten thousand of 3 µm
-    return deflection + foundation_sag(row, load)
+    speed, share = float(row[L.FOUNDATION_SPEED]), max(float(row[L.FOUNDATION_SHARE]), 0.0)
+    return deflection + (0.0 if share == 0.0 else load * share / (float(row[L.SUPPORT_MASS_Y]) * speed**2))
 
 
 def _of_turned_axes(bearing: Any) -> float | None:
@@ -286,12 +286,6 @@ PARAMETERS: tuple[Parameter, ...] = (
 
 FOUNDATION_FREQUENCY = 0.4
 """Natural frequency of a foundation over that of the support on it, to begin with [1]."""
-
-
-def foundation_sag(row: Array, load: float) -> float:
-    """Deflection [m] of a foundation under a static load [N]."""
-    speed, share = float(row[L.FOUNDATION_SPEED]), max(float(row[L.FOUNDATION_SHARE]), 0.0)
-    return 0.0 if share == 0.0 else load * share / (float(row[L.SUPPORT_MASS_Y]) * speed**2)
 
 
 def _neutral(bearing: Any) -> dict[str, Known]:

@@ -104,11 +104,9 @@ class Unknown:
             return self.limits
         if row.reach is not None:
             return self.mean - math.log(row.reach), self.mean + math.log(row.reach)
-        low, high = (
-            end if limit is None else math.log(limit) if row.logarithmic else limit
-            for limit, end in ((row.lower, -math.inf), (row.upper, math.inf))
-        )
-        return low, high
+        if not row.logarithmic:
+            return row.lower, row.upper
+        return (math.log(row.lower) if row.lower > 0.0 else -math.inf), math.log(row.upper)
 
     def kernel_value(self, theta: float) -> float:
         """What is written into the kernel for an estimated number: within the limits of its row."""
