@@ -260,15 +260,21 @@ NO_PRELOAD = Known(value=0.0, status="default", source="this kind of bearing has
 """What a bearing without rows to press against each other has: no unknown."""
 
 
+def _preload(bearing: TouchdownBearing) -> Known:
+    return getattr(bearing.bearing, "preload", NO_PRELOAD)
+
+
+def _offset_of_preload(balls: BallBearing, force: float) -> float:
+    return bearing_constants(balls.changed(preload=Known(value=force))).axial_offset
+
+
 def _by_offset(bearing: TouchdownBearing) -> Measure:
     """The preload by the axial offset of the rows, which is what the ball forces depend on."""
-    balls = bearing.bearing
-    constants = _constants(balls)
-
+    constants = _constants(bearing.bearing)
     return Measure(
         name="axial offset of the ball rows",
         start=constants.axial_offset,
-        of_value=lambda force: bearing_constants(balls.changed(preload=Known(value=force))).axial_offset,
+        of_value=partial(_offset_of_preload, bearing.bearing),
         value_of=partial(preload_of_offset, constants),
     )
 
@@ -286,7 +292,7 @@ PARAMETERS: tuple[Parameter, ...] = (
         step=Step.IMPACTS,
         field="preload_N",
         truth=("preload_N",),
-        read=lambda bearing: getattr(bearing.bearing, "preload", NO_PRELOAD),
+        read=_preload,  # no lambda: a parameter is sent to other processes
         estimated_by=_by_offset,
         taken_over="welcome",
     ),

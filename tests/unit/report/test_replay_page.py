@@ -99,7 +99,7 @@ def drop(drop_result: DropResult, agreement: Agreement) -> Estimate:
         name="drop_060",
         path=None,
         sha256="",
-        metadata={},
+        event_date="",
         sampling_rate=20e3,
         sensors=machine.sensors,
         speed=drop_result.speed,

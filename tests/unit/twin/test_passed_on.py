@@ -227,7 +227,7 @@ def test_an_impact_lasts_from_its_first_to_its_last_indented_sample() -> None:
 
 def test_a_speed_is_written_in_turns_per_second() -> None:
     estimate: Any = SimpleNamespace(
-        record=SimpleNamespace(path=None, sha256="ab", metadata={"Date": "2024-05-06"}),
+        record=SimpleNamespace(path=None, sha256="ab", event_date="2024-05-06"),
         method=tracked_estimate.Tracked(quick=True),
         verdict=Verdict.CONSISTENT,
         consistent=True,
