@@ -59,12 +59,8 @@ def refuse_beside(option: str, others: Mapping[str, object]) -> None:
         raise UsageError(f"{option} does not go with {', '.join(given)}; leave out the one or the other")
 
 
-class Reduction(StrEnum):
-    """Presets of the reduction of the rotor."""
-
-    accurate = "accurate"
-    quick = "quick"
-    full = "full"
+Reduction = StrEnum("Reduction", ["accurate", "quick", "full"])
+"""Presets of the reduction of the rotor."""
 
 
 class Integrator(StrEnum):
@@ -74,24 +70,24 @@ class Integrator(StrEnum):
     dp5 = "dp5"
 
 
-MachineArgument = Annotated[
+Machine = Annotated[
     Path, Argument(metavar="MACHINE", help="Machine description, a .toml file.", show_default=False)
 ]
-RecordsArgument = Annotated[
+Records = Annotated[
     list[Path], Argument(metavar="RECORD...", help="Recorded drops of this machine.", show_default=False)
 ]
 PowerOffSpeed = Annotated[float, measured("speed", 'Speed at power-off, "60 Hz".')]
-LevitatedOption = Annotated[
+Levitated = Annotated[
     bool, Option("--levitated", help="Start floating in the AMBs: synchronous orbit and sag.")
 ]
-ReductionOption = Annotated[Reduction, Option(help="Modes of the rotor.")]
-ToleranceOption = Annotated[float, Option(min=1e-12, max=1e-3, help="Accuracy of a step.")]
-IntegratorOption = Annotated[Integrator, Option(help="Runge–Kutta pair.")]
-JsonOption = Annotated[
+ReductionChoice = Annotated[Reduction, Option(help="Modes of the rotor.")]
+Tolerance = Annotated[float, Option(min=1e-12, max=1e-3, help="Accuracy of a step.")]
+IntegratorChoice = Annotated[Integrator, Option(help="Runge–Kutta pair.")]
+Json = Annotated[
     Path | None,
     file_option("--json", "Write the result as JSON to FILE; '-' prints it in place of the summary."),
 ]
-DataOption = Annotated[
+Data = Annotated[
     Path | None,
     Option(
         metavar="FOLDER",
@@ -100,21 +96,21 @@ DataOption = Annotated[
         show_default=False,
     ),
 ]
-ForceOption = Annotated[bool, Option("--force", help="Overwrite what stands there already.")]
-TextFileOption = Annotated[Path | None, file_option("--output", "Write to FILE instead of printing.", "-o")]
-ReportOption = Annotated[Path | None, file_option("--report", "Write the report, one offline HTML file.")]
-ProfileOption = Annotated[Path | None, file_option("--profile", "Channel map of the recorder.")]
-TailOption = Annotated[
+Force = Annotated[bool, Option("--force", help="Overwrite what stands there already.")]
+TextFile = Annotated[Path | None, file_option("--output", "Write to FILE instead of printing.", "-o")]
+Report = Annotated[Path | None, file_option("--report", "Write the report, one offline HTML file.")]
+Profile = Annotated[Path | None, file_option("--profile", "Channel map of the recorder.")]
+Tail = Annotated[
     list[Path] | None,
     file_option("--tail", "Settled tail: one for all drops, or one for each in order."),
 ]
-TailProfileOption = Annotated[
+TailProfile = Annotated[
     Path | None, file_option("--tail-profile", "Channel map of the recorder of the tails.")
 ]
-PlanesOption = Annotated[
+Planes = Annotated[
     list[str] | None,
     Option("--map", metavar="PLANE", help='A plane and its channels: "NDE: X1 0 deg, Y1 90 deg".'),
 ]
-ThreadsOption = Annotated[
+Threads = Annotated[
     int | None, Option("--threads", min=1, metavar="N", help="Threads; all cores by default.")
 ]

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Argument, Option
 
-from rotordrop.cli._options import DataOption, JsonOption, ReportOption, measured, refuse_beside
+from rotordrop.cli import _options as options
+from rotordrop.cli._options import measured, refuse_beside
 from rotordrop.cli._output import deliver
 from rotordrop.errors import RotordropError, UsageError
 
@@ -41,9 +42,9 @@ def compare(
             help="Say what changed on the machine between two estimates of it, the earlier one first.",
         ),
     ] = False,
-    report: ReportOption = None,
-    data: DataOption = None,
-    json: JsonOption = None,
+    report: options.Report = None,
+    data: options.Data = None,
+    json: options.Json = None,
 ) -> None:
     """Compare several drops: which was worst, and how sure that is; or what changed between two.
 

@@ -15,7 +15,8 @@ import typer
 from typer import Option
 
 from rotordrop._version import __version__
-from rotordrop.cli._options import JsonOption, text_option
+from rotordrop.cli import _options as options
+from rotordrop.cli._options import text_option
 from rotordrop.cli._output import console, deliver
 
 if TYPE_CHECKING:
@@ -78,7 +79,7 @@ def doctor(
             help="Print only the hash of a short probe drop: equal where every drop has the same bits.",
         ),
     ] = False,
-    json: JsonOption = None,
+    json: options.Json = None,
 ) -> None:
     """Say what is installed, what is missing, and whether compiled code is cached.
 

@@ -12,17 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Option
 
-from rotordrop.cli._options import (
-    DataOption,
-    JsonOption,
-    MachineArgument,
-    ProfileOption,
-    RecordsArgument,
-    TailOption,
-    TailProfileOption,
-    file_option,
-    text_option,
-)
+from rotordrop.cli import _options as options
+from rotordrop.cli._options import file_option, text_option
 from rotordrop.cli._output import deliver, places_beside, progress_bar, require_places
 from rotordrop.errors import ConsistencyError, UsageError
 
@@ -35,24 +26,21 @@ if TYPE_CHECKING:
     from rotordrop.twin.calibrated import Calibration
 
 
-class Method(StrEnum):
-    """How force is found: a model that follows the record, or the paper's open-loop replay."""
-
-    tracked = "tracked"
-    replay = "replay"
+Method = StrEnum("Method", ["tracked", "replay"])
+"""How force is found: a model that follows the record, or the paper's open-loop replay."""
 
 
 def estimate(
-    machine: MachineArgument,
-    records: RecordsArgument,
-    tail: TailOption = None,
+    machine: options.Machine,
+    records: options.Records,
+    tail: options.Tail = None,
     method: Annotated[Method, Option("--method", help="How the force is found.")] = Method.tracked,
     fixed: Annotated[
         Path | None, file_option("--fixed", "Replay: use the support of this earlier estimate.")
     ] = None,
     quick: Annotated[bool, Option("--quick", help="One pass; for a calibrated machine.")] = False,
-    profile: ProfileOption = None,
-    tail_profile: TailProfileOption = None,
+    profile: options.Profile = None,
+    tail_profile: options.TailProfile = None,
     report: Annotated[
         Path | None, file_option("--report", "Write the report, one offline HTML file per drop.")
     ] = None,
@@ -68,8 +56,8 @@ def estimate(
             "-o",
         ),
     ] = None,
-    data: DataOption = None,
-    json: JsonOption = None,
+    data: options.Data = None,
+    json: options.Json = None,
 ) -> None:
     """Estimate touchdown-bearing force and stress from recorded drops.
 
@@ -189,17 +177,17 @@ def _read(
 
 
 def calibrate(
-    machine: MachineArgument,
-    records: RecordsArgument,
+    machine: options.Machine,
+    records: options.Records,
     output: Annotated[Path, file_option("--output", "Calibrated machine file to write (.toml).", "-o")],
-    tail: TailOption = None,
-    profile: ProfileOption = None,
-    tail_profile: TailProfileOption = None,
+    tail: options.Tail = None,
+    profile: options.Profile = None,
+    tail_profile: options.TailProfile = None,
     even_if_inconsistent: Annotated[
         bool,
         Option("--even-if-inconsistent", help="Write the machine file, marked, although it does not fit."),
     ] = False,
-    json: JsonOption = None,
+    json: options.Json = None,
 ) -> None:
     """Calibrate a machine on recorded drops.
 

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from typer import Argument
 
-from rotordrop.cli._options import JsonOption, measured, text_option
+from rotordrop.cli import _options as options
+from rotordrop.cli._options import measured, text_option
 from rotordrop.cli._output import console, deliver, require_places
 from rotordrop.errors import RecordError, UsageError
 
@@ -28,14 +29,8 @@ WHEN = "add: when it happened, ISO 8601; what the recorder wrote by default."
 WHAT = "add: estimate.json; remove: number of the drop; export: file of the table (.csv)."
 
 
-class Action(StrEnum):
-    """What to do with a log."""
-
-    add = "add"
-    show = "show"
-    allow = "allow"
-    remove = "remove"
-    export = "export"
+Action = StrEnum("Action", ["add", "show", "allow", "remove", "export"])
+"""What to do with a log."""
 
 
 def log(
@@ -57,7 +52,7 @@ def log(
     drops: Annotated[int | None, typer.Option(metavar="N", help="allow: number of drops.")] = None,
     seconds: Annotated[float | None, measured("time", "allow: time in all, as in '600 s'.")] = None,
     source: Annotated[str, text_option("TEXT", "allow: who agreed on it, and where.")] = "",
-    json: JsonOption = None,
+    json: options.Json = None,
 ) -> None:
     """Add a drop to the log of a machine, list what is there, and count it against an allowance.
 

@@ -13,16 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer import Argument, Option
 
-from rotordrop.cli._options import (
-    ForceOption,
-    JsonOption,
-    MachineArgument,
-    TextFileOption,
-    file_option,
-    measured,
-    refuse_beside,
-    text_option,
-)
+from rotordrop.cli import _options as options
+from rotordrop.cli._options import file_option, measured, refuse_beside, text_option
 from rotordrop.cli._output import deliver, deliver_text, require_places
 from rotordrop.errors import OutputError, UsageError
 
@@ -65,7 +57,7 @@ def init(
         str | None,
         text_option("NAME", 'Copy an example: "paper", "small", or "lp400" with a recording.'),
     ] = None,
-    force: ForceOption = False,
+    force: options.Force = False,
     simple: Annotated[
         bool, Option("--simple", help="Make it of twelve numbers; those not given are asked for.")
     ] = False,
@@ -88,8 +80,8 @@ def init(
 
     Example: rotordrop init machine.toml
     """
-    options = locals()
-    given: dict[str, str | None] = {name: options[name] for name in _QUESTIONS}
+    numbers = locals()
+    given: dict[str, str | None] = {name: numbers[name] for name in _QUESTIONS}
     if simple:
         deliver_text(_simple_text(given, preload), target or TEMPLATE_FILE, overwrite=force)
         return
@@ -153,7 +145,7 @@ def _copy_example(name: str, folder: Path, *, overwrite: bool) -> None:
 
 
 def check(
-    machine: MachineArgument,
+    machine: options.Machine,
     speed: Annotated[
         float | None,
         measured(
@@ -166,7 +158,7 @@ def check(
     report: Annotated[
         Path | None, file_option("--report", "Write the same with a drawing of the rotor as an HTML page.")
     ] = None,
-    json: JsonOption = None,
+    json: options.Json = None,
 ) -> None:
     """Check a machine file and show what it amounts to: mass, load shares, frequencies, sag, assumptions.
 
@@ -240,7 +232,7 @@ def bearings(
     designation: Annotated[
         str, Argument(metavar="DESIGNATION", help='Such as 71914, "7016 ACD/HCP4A", "6016-2Z/C3".')
     ],
-    json: JsonOption = None,
+    json: options.Json = None,
 ) -> None:
     """Search bearings by designation: size, angle, balls listed or inferred, clearance, preload.
 
@@ -257,13 +249,8 @@ def bearings(
     deliver([bearing_json(bearing) for bearing in found], json, bearing_content(designation, found))
 
 
-class Document(StrEnum):
-    """Documents with a published schema."""
-
-    machine = "machine"
-    numbers = "numbers"
-    estimate = "estimate"
-    look = "look"
+Document = StrEnum("Document", ["machine", "numbers", "estimate", "look"])
+"""Documents with a published schema."""
 
 
 def schema(
@@ -273,8 +260,8 @@ def schema(
             help="A machine file, the numbers of 'init --simple', or what 'rotordrop estimate --json' writes."
         ),
     ] = Document.machine,
-    output: TextFileOption = None,
-    force: ForceOption = False,
+    output: options.TextFile = None,
+    force: options.Force = False,
 ) -> None:
     """Print the JSON Schema of a file or of an estimate, for editors and programs.
 
@@ -293,11 +280,8 @@ def schema(
     deliver_text(text, output, overwrite=force)
 
 
-class Target(StrEnum):
-    """What a rotor is converted to."""
-
-    machine = "machine"
-    ross = "ross"
+Target = StrEnum("Target", ["machine", "ross"])
+"""What a rotor is converted to."""
 
 
 def convert(
@@ -318,8 +302,8 @@ def convert(
     ] = None,
     gap: Annotated[float | None, measured("length", "Their radial air gap; 250 um by default.")] = None,
     speed: Annotated[float | None, measured("speed", "Nominal speed; 300 Hz by default.")] = None,
-    force: ForceOption = False,
-    json: JsonOption = None,
+    force: options.Force = False,
+    json: options.Json = None,
 ) -> None:
     """Make a machine file of a rotor of ROSS or of a shaft table, or a file for ROSS of a machine.
 

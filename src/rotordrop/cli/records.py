@@ -9,18 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Argument, Option
 
-from rotordrop.cli._options import (
-    DataOption,
-    JsonOption,
-    MachineArgument,
-    PlanesOption,
-    ProfileOption,
-    ReportOption,
-    file_option,
-    measured,
-    refuse_beside,
-    text_option,
-)
+from rotordrop.cli import _options as options
+from rotordrop.cli._options import file_option, measured, refuse_beside, text_option
 from rotordrop.cli._output import console, deliver, progress_bar, require_places
 from rotordrop.errors import RecordError, UsageError
 
@@ -38,8 +28,8 @@ def look(
     ] = None,
     gap: Annotated[float | None, measured("length", 'Radial air gap, "250 um".')] = None,
     speed: Annotated[float | None, measured("speed", 'Speed at the drop, "9000 rpm".')] = None,
-    mapping: PlanesOption = None,
-    profile: ProfileOption = None,
+    mapping: options.Planes = None,
+    profile: options.Profile = None,
     split: Annotated[
         Path | None,
         Option(
@@ -48,8 +38,8 @@ def look(
             file_okay=False,
         ),
     ] = None,
-    report: ReportOption = None,
-    json: JsonOption = None,
+    report: options.Report = None,
+    json: options.Json = None,
 ) -> None:
     """Look at a recorded drop: what was read, its quality, what happened when, impacts, whirl, indices.
 
@@ -183,9 +173,9 @@ def clearance(
     output: Annotated[
         Path | None, file_option("--output", "Write the machine file with the measured gaps.", "-o")
     ] = None,
-    mapping: PlanesOption = None,
-    profile: ProfileOption = None,
-    json: JsonOption = None,
+    mapping: options.Planes = None,
+    profile: options.Profile = None,
+    json: options.Json = None,
 ) -> None:
     """Measure the air gap of every touchdown bearing by a lift check, and its wear by two.
 
@@ -250,22 +240,14 @@ class Direction(StrEnum):
     full = "full"
 
 
-class Amplitude(StrEnum):
-    """How amplitudes are given."""
-
-    zero_to_peak = "zero-to-peak"
-    peak_to_peak = "peak-to-peak"
-
-
-class Against(StrEnum):
-    """What goes upwards in a waterfall."""
-
-    time = "time"
-    speed = "speed"
+Amplitude = StrEnum("Amplitude", {"zero_to_peak": "zero-to-peak", "peak_to_peak": "peak-to-peak"})
+"""How amplitudes are given."""
+Against = StrEnum("Against", ["time", "speed"])
+"""What goes upwards in a waterfall."""
 
 
 def waterfall(
-    machine: MachineArgument,
+    machine: options.Machine,
     record: Annotated[
         Path, Argument(metavar="RECORD", help="Recorded coast-down, or one from 'coast-down --output'.")
     ],
@@ -280,13 +262,13 @@ def waterfall(
         float | None,
         measured("frequency", "Highest frequency drawn; as far as anything happens when left out."),
     ] = None,
-    profile: ProfileOption = None,
+    profile: options.Profile = None,
     output: Annotated[
         Path | None, file_option("--output", "Write waterfalls, envelopes, orders and speed as HDF5.", "-o")
     ] = None,
-    report: ReportOption = None,
-    data: DataOption = None,
-    json: JsonOption = None,
+    report: options.Report = None,
+    data: options.Data = None,
+    json: options.Json = None,
 ) -> None:
     """Find and name the frequencies of a coast-down, and say whether 0.2 s held the maximum.
 

@@ -7,7 +7,8 @@ from typing import Annotated
 
 from typer import Option
 
-from rotordrop.cli._options import DataOption, JsonOption, MachineArgument, ReportOption, measured
+from rotordrop.cli import _options as options
+from rotordrop.cli._options import measured
 from rotordrop.cli._output import deliver, progress_bar
 from rotordrop.errors import UsageError
 
@@ -17,18 +18,12 @@ BEYOND = 1.5
 """Highest speed of an unbalance response over the nominal one [1]; chosen, not measured."""
 SPEEDS = 61
 """Speeds of a Campbell diagram; chosen, not measured."""
-
-
-class Held(StrEnum):
-    """What holds the rotor."""
-
-    free_free = "free-free"
-    ambs = "AMBs"
-    touchdown_bearings = "touchdown bearings"
+Held = StrEnum("Held", {"free_free": "free-free", "ambs": "AMBs", "touchdown_bearings": "touchdown bearings"})
+"""What holds the rotor."""
 
 
 def critical_speeds(
-    machine: MachineArgument,
+    machine: options.Machine,
     top_speed: Annotated[
         float | None,
         measured("speed", "Highest speed of the Campbell diagrams; 1.1 × nominal when left out."),
@@ -36,9 +31,9 @@ def critical_speeds(
     held: Annotated[
         list[Held] | None, Option(help="What holds the rotor; all that the machine has when left out.")
     ] = None,
-    report: ReportOption = None,
-    data: DataOption = None,
-    json: JsonOption = None,
+    report: options.Report = None,
+    data: options.Data = None,
+    json: options.Json = None,
 ) -> None:
     """Show critical speeds on supports of any stiffness, and damped modes against the speed.
 
@@ -69,14 +64,14 @@ def critical_speeds(
 
 
 def unbalance_response(
-    machine: MachineArgument,
+    machine: options.Machine,
     top_speed: Annotated[
         float | None, measured("speed", "Highest speed; 1.5 × nominal when left out.")
     ] = None,
     held: Annotated[Held | None, Option(help="What holds the rotor; its AMBs where it has some.")] = None,
-    report: ReportOption = None,
-    data: DataOption = None,
-    json: JsonOption = None,
+    report: options.Report = None,
+    data: options.Data = None,
+    json: options.Json = None,
 ) -> None:
     """Show amplitude and phase under unbalance over the speed, with amplification factors and margins.
 

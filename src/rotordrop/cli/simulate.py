@@ -10,22 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Option
 
-from rotordrop.cli._options import (
-    DataOption,
-    Integrator,
-    IntegratorOption,
-    JsonOption,
-    LevitatedOption,
-    MachineArgument,
-    PowerOffSpeed,
-    Reduction,
-    ReductionOption,
-    ReportOption,
-    ToleranceOption,
-    file_option,
-    measured,
-    text_option,
-)
+from rotordrop.cli import _options as options
+from rotordrop.cli._options import file_option, measured, text_option
 from rotordrop.cli._output import console, deliver, progress_bar
 from rotordrop.cli._terminal import interruptible
 from rotordrop.errors import UsageError
@@ -52,8 +38,8 @@ class Spin(StrEnum):
 
 
 def simulate(
-    machine: MachineArgument,
-    speed: PowerOffSpeed,
+    machine: options.Machine,
+    speed: options.PowerOffSpeed,
     duration: Annotated[float, measured("time", "How long to simulate.", "0.2 s")] = 0.2,
     output_step: Annotated[float, measured("time", "Step of the histories.", "10 us")] = 1e-5,
     displacement: Annotated[
@@ -63,7 +49,7 @@ def simulate(
     velocity: Annotated[
         list[str] | None, text_option("PLACE", 'Start moving: "NDE: 0 mm/s, -5 mm/s".')
     ] = None,
-    levitated: LevitatedOption = False,
+    levitated: options.Levitated = False,
     rotor_angle: Annotated[float, measured("angle", "Levitated: rotor angle.", "0 deg")] = 0.0,
     delay: Annotated[float, measured("time", "Levitated: magnets hold on.", "0 s")] = 0.0,
     remanent_force: Annotated[
@@ -74,18 +60,18 @@ def simulate(
     spin: Annotated[
         Spin, Option(help="What brakes: drag and friction; a drag profile; friction alone; nothing.")
     ] = Spin.dynamic,
-    reduction: ReductionOption = Reduction.accurate,
-    tolerance: ToleranceOption = 1e-6,
-    integrator: IntegratorOption = Integrator.tsit5,
+    reduction: options.ReductionChoice = options.Reduction.accurate,
+    tolerance: options.Tolerance = 1e-6,
+    integrator: options.IntegratorChoice = options.Integrator.tsit5,
     certify: Annotated[
         bool, Option("--certify", help="Also measure the numerical error (three times the time).")
     ] = False,
     output: Annotated[
         Path | None, file_option("--output", "Write all histories as HDF5 (NetCDF4).", "-o")
     ] = None,
-    report: ReportOption = None,
-    data: DataOption = None,
-    json: JsonOption = None,
+    report: options.Report = None,
+    data: options.Data = None,
+    json: options.Json = None,
 ) -> None:
     """Simulate a drop and show forces, stresses and contacts of every touchdown bearing.
 
@@ -163,18 +149,18 @@ def named_pairs(texts: Sequence[str], kind: str, names: Sequence[str]) -> NDArra
 
 
 def coast_down(
-    machine: MachineArgument,
-    speed: PowerOffSpeed,
+    machine: options.Machine,
+    speed: options.PowerOffSpeed,
     until: Annotated[str, Option(metavar="END", help='"standstill", or a time such as "20 s".')] = STANDSTILL,
     rest: Annotated[float, measured("time", "Go on after standstill.", "0 s")] = 0.0,
     drag_from: Annotated[
         Path | None, text_option("RECORD", "Take the drag from the speed of a recorded coast-down.")
     ] = None,
     output_step: Annotated[float, measured("time", "Step of the samples.", "50 us")] = 5e-5,
-    levitated: LevitatedOption = False,
-    reduction: ReductionOption = Reduction.quick,
-    tolerance: ToleranceOption = 1e-6,
-    integrator: IntegratorOption = Integrator.tsit5,
+    levitated: options.Levitated = False,
+    reduction: options.ReductionChoice = options.Reduction.quick,
+    tolerance: options.Tolerance = 1e-6,
+    integrator: options.IntegratorChoice = options.Integrator.tsit5,
     certify: Annotated[
         bool, Option("--certify", help="Also repeat it at a tighter tolerance (five times the time).")
     ] = False,
@@ -182,8 +168,8 @@ def coast_down(
     resume: Annotated[
         bool, Option("--resume", help="Go on with a run to the same output that was killed.")
     ] = False,
-    report: ReportOption = None,
-    json: JsonOption = None,
+    report: options.Report = None,
+    json: options.Json = None,
 ) -> None:
     """Simulate a coast-down to standstill: statistics, peaks with their time, whirl, energy.
 

@@ -10,15 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
-from rotordrop.cli._options import (
-    DataOption,
-    JsonOption,
-    MachineArgument,
-    ReportOption,
-    ThreadsOption,
-    file_option,
-    measured,
-)
+from rotordrop.cli import _options as options
+from rotordrop.cli._options import file_option, measured
 from rotordrop.cli._output import Progress, console, deliver, progress_bar
 from rotordrop.errors import UsageError
 
@@ -57,7 +50,7 @@ def study_run(
     folder: Annotated[
         Path | None, Option(metavar="FOLDER", help="Folder of the study; the name of its file by default.")
     ] = None,
-    threads: ThreadsOption = None,
+    threads: options.Threads = None,
     claim: Annotated[
         bool,
         Option("--claim", help="Help with a study that others work on: stop when nothing is left to claim."),
@@ -69,9 +62,9 @@ def study_run(
     by: ByOption = None,
     above: AboveOption = None,
     output: DropsOption = None,
-    report: ReportOption = None,
-    data: DataOption = None,
-    json: JsonOption = None,
+    report: options.Report = None,
+    data: options.Data = None,
+    json: options.Json = None,
 ) -> None:
     """Compute what is missing of a study and show how force, stress and whirl are spread.
 
@@ -98,9 +91,9 @@ def study_show(
     by: ByOption = None,
     above: AboveOption = None,
     output: DropsOption = None,
-    report: ReportOption = None,
-    data: DataOption = None,
-    json: JsonOption = None,
+    report: options.Report = None,
+    data: options.Data = None,
+    json: options.Json = None,
 ) -> None:
     """Show what is there of a study: how force, stress and whirl are spread.
 
@@ -147,7 +140,7 @@ def _deliver_results(
 
 
 def study_repeat(
-    machine: MachineArgument,
+    machine: options.Machine,
     folder: Annotated[Path, Option(metavar="FOLDER", help="Folder of the simulated drops.")],
     estimate: Annotated[
         Path | None, Argument(metavar="[ESTIMATE]", help="Estimate of the recorded drop (.json).")
@@ -158,9 +151,9 @@ def study_repeat(
     drops: Annotated[int, Option(min=20, metavar="N", help="Drops to simulate.")] = 500,
     worst_of: Annotated[int, Option(min=2, metavar="N", help="Worst of how many drops.")] = 100,
     seed: Annotated[int, Option(min=0, metavar="N", help="Key of the random numbers.")] = 1,
-    threads: ThreadsOption = None,
-    report: ReportOption = None,
-    json: JsonOption = None,
+    threads: options.Threads = None,
+    report: options.Report = None,
+    json: options.Json = None,
 ) -> None:
     """See where a recorded drop lies among those that could have happened.
 
@@ -195,8 +188,8 @@ def study_rare(
     above: Annotated[str, Option(metavar="LIMIT", help='Limit with its unit, such as "12 kN".')],
     samples: Annotated[int, Option(metavar="N", help="Points of a level, a multiple of ten.")] = 500,
     repeats: Annotated[int, Option(metavar="N", help="Independent repeats.")] = 8,
-    threads: ThreadsOption = None,
-    json: JsonOption = None,
+    threads: options.Threads = None,
+    json: options.Json = None,
 ) -> None:
     """Find the probability that a drop exceeds a limit, where that is rare.
 
@@ -226,9 +219,9 @@ def study_design(
     folder: Annotated[
         Path | None, Option(metavar="FOLDER", help="Folder of the drops; the name of the file by default.")
     ] = None,
-    threads: ThreadsOption = None,
-    report: ReportOption = None,
-    json: JsonOption = None,
+    threads: options.Threads = None,
+    report: options.Report = None,
+    json: options.Json = None,
 ) -> None:
     """Choose values of a machine within bounds for the mildest drops.
 

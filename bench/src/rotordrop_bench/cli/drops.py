@@ -11,15 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer import Argument, Option
 
-from rotordrop.cli._options import (
-    ForceOption,
-    JsonOption,
-    MachineArgument,
-    TextFileOption,
-    measured,
-    quantity,
-    text_option,
-)
+from rotordrop.cli import _options as options
+from rotordrop.cli._options import measured, quantity, text_option
 from rotordrop.cli._output import deliver, deliver_text, progress_bar
 from rotordrop.errors import UsageError
 
@@ -34,7 +27,7 @@ OnlyOption = Annotated[
 
 
 def synthesize(
-    machine: MachineArgument,
+    machine: options.Machine,
     speed: Annotated[list[float], measured("speed", 'Speed at power-off, such as "60 Hz"; repeatable.')],
     folder: Annotated[Path, Option("--output", "-o", metavar="FOLDER", help="Where the files go.")],
     seed: Annotated[int, Option(metavar="NUMBER", min=0, help="Seed of the hidden machine.")] = 0,
@@ -59,7 +52,7 @@ def synthesize(
         str | None, text_option("NAME", "A deliberate mistake in the file; 'list' names all.")
     ] = None,
     hdf5: Annotated[bool, Option("--hdf5", help="Write the recording as HDF5 too.")] = False,
-    json: JsonOption = None,
+    json: options.Json = None,
 ) -> None:
     """Make simulated recordings of drops; the hidden truth goes into a folder of its own.
 
@@ -120,7 +113,7 @@ def _listed(choice: str | None, known: dict[str, Any]) -> bool:
     return False
 
 
-def schema(output: TextFileOption = None, force: ForceOption = False) -> None:
+def schema(output: options.TextFile = None, force: options.Force = False) -> None:
     """Print the JSON Schema of the violations that 'synthesize --violation' reads.
 
     Example: rotordrop-bench schema > violations.schema.json
@@ -131,7 +124,7 @@ def schema(output: TextFileOption = None, force: ForceOption = False) -> None:
     deliver_text(text, output, overwrite=force)
 
 
-def list_drops(only: OnlyOption = None, json: JsonOption = None) -> None:
+def list_drops(only: OnlyOption = None, json: options.Json = None) -> None:
     """Name the drops of the bench: rotor, speed, family, departures.
 
     Example: rotordrop-bench list
@@ -155,7 +148,7 @@ def list_drops(only: OnlyOption = None, json: JsonOption = None) -> None:
     deliver({"bench_version": VERSION, "drops": [vars(drop) for drop in drops]}, json, summarise)
 
 
-def make(folder: FolderArgument, only: OnlyOption = None, json: JsonOption = None) -> None:
+def make(folder: FolderArgument, only: OnlyOption = None, json: options.Json = None) -> None:
     """Make the drops that are missing in a folder; their truth goes into a folder of its own.
 
     Example: rotordrop-bench make dropbench

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Argument, Option
 
-from rotordrop.cli._options import JsonOption, text_option
+from rotordrop.cli import _options as options
+from rotordrop.cli._options import text_option
 from rotordrop.cli._output import deliver
 from rotordrop_bench.cli.drops import FolderArgument, OnlyOption
 
@@ -28,7 +29,7 @@ def score(
     drop: Annotated[
         str | None, text_option("NAME", "Which recording of an estimate of several, or its new name.")
     ] = None,
-    json: JsonOption = None,
+    json: options.Json = None,
 ) -> None:
     """Compare an estimate with the truth of a simulated recording, quantity by quantity.
 
@@ -99,7 +100,7 @@ def score_all(
     ],
     only: OnlyOption = None,
     every: Annotated[bool, Option("--all-quantities", help="Also show each parameter by itself.")] = False,
-    json: JsonOption = None,
+    json: options.Json = None,
 ) -> None:
     """Score anybody's estimates of the drops of the bench, family by family.
 
