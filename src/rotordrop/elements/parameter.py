@@ -247,8 +247,7 @@ Values = Mapping[str, Known]
 """Values by path."""
 
 
-M = TypeVar("M")
-"""A machine, which stands above the elements."""
+M = TypeVar("M")  # a machine, which stands above the elements
 
 
 def parts_of(machine: Any, owner: Owner) -> list[tuple[str, Any]]:
