@@ -24,6 +24,7 @@ from typing import Any
 
 from rotordrop.errors import RotordropError
 from rotordrop.estimate.changed import changes
+from rotordrop.estimate.published import drop_of
 from rotordrop.estimation import Tracked, estimate_drop
 from rotordrop.machine import example_machine
 from rotordrop.machine.machine import value_of_path
@@ -54,7 +55,6 @@ DROPS: tuple[tuple[str | None, float], ...] = (
 )
 """What is changed before a drop, and its speed [Hz]; the first drop is compared with the others."""
 TRUTHS = (("peak_force", "peak_force_N", 1.0), ("peak_stress", "max_stress_MPa", 1e6))
-KEPT = ("record", "machine", "consistent", "verdict", "parameters", "joint")
 
 
 def altered(hidden: HiddenMachine, part: str, path: str) -> HiddenMachine:
@@ -82,7 +82,7 @@ def estimated(seed: int, k: int) -> dict[str, Any]:
     except RotordropError as error:
         return row | {"refused": str(error)}
     whole = found.to_dict()
-    row |= {"processor_s": round(time.process_time() - began, 1)} | {key: whole[key] for key in KEPT}
+    row |= {"processor_s": round(time.process_time() - began, 1), "document": whole}
     for bearing in found.bearings:
         told = (bearing.peak_force.known, bearing.peak_stress.known)
         for (name, key, unit), known_one in zip(TRUTHS, told, strict=True):
@@ -114,7 +114,7 @@ def compared(seed: int, k: int, first: dict[str, Any], row: dict[str, Any]) -> d
     """What is said of one pair, beside the truth."""
     pair: dict[str, Any] = {"seed": seed, "drop": k, "changed": row["changed"]}
     try:
-        found = changes(first, row)
+        found = changes(*(drop_of(one["document"], f"drop {one['changed']}") for one in (first, row)))
     except (RotordropError, KeyError) as error:
         return pair | {"refused": str(error)}
     pair["named"] = [one.path for one in found.named]

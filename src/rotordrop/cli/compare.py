@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json as json_module
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,7 +11,7 @@ from typer import Argument, Option
 from rotordrop.cli import _options as options
 from rotordrop.cli._options import measured, refuse_beside
 from rotordrop.cli._output import deliver
-from rotordrop.errors import RotordropError, UsageError
+from rotordrop.errors import UsageError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -61,30 +60,26 @@ def compare(
         refuse_beside("--changes", others)
         _deliver_changes(estimates, json)
         return
+    from rotordrop.estimate.published import read_drops
     from rotordrop.report.compare_page import compare_page, rankings
     from rotordrop.report.compared_drop import ComparedDrop, left_out
     from rotordrop.report.limits import limit_statement, read_limits
 
-    documents: dict[str, dict[str, Any]] = {}
+    drops: list[ComparedDrop] = []
     for path in estimates:
-        content = read_estimate(path)
-        for name, document in content.get("drops", {path.stem: content}).items():
-            documents[name if name not in documents else f"{path.stem}: {name}"] = document
-    drops = [
-        ComparedDrop.of_document(name, document, simulated=bool(document.get("simulated_record", False)))
-        for name, document in documents.items()
-    ]
+        for name, drop in read_drops(path).items():
+            taken = any(name == other.name for other in drops)
+            drops.append(ComparedDrop.of_drop(f"{path.stem}: {name}" if taken else name, drop))
     if len(drops) < 2:
         raise UsageError(
             f"{len(drops)} drop to compare; at least two are needed. "
             "Give several estimates, or one of several drops."
         )
-    machines = {str(document.get("machine", "")) for document in documents.values()}
     drop_scatter = None if scatter is None else {"peak_force_N": scatter}
     limits = read_limits(limit or ())
     page = compare_page(
         drops,
-        machine_name=", ".join(sorted(machines - {""})),
+        machine_name=", ".join(sorted({drop.machine for drop in drops})),
         drop_scatter=drop_scatter,
         limits=limits,
         allowed=allowed,
@@ -105,30 +100,14 @@ def compare(
     deliver(numbers, json, page, report=report, data=data)
 
 
-def read_estimate(path: Path, error: type[RotordropError] = UsageError) -> dict[str, Any]:
-    """Content of a file that the estimate command wrote, of one drop or several."""
-    try:
-        content = json_module.loads(path.read_text(encoding="utf-8"))
-    except OSError as fault:
-        raise error(
-            f"{path} cannot be read ({fault.strerror}); give a file of 'rotordrop estimate --json'."
-        ) from fault
-    except ValueError as fault:
-        raise error(
-            f"{path} is not JSON ({fault}); give a file written by 'rotordrop estimate --json'."
-        ) from fault
-    if not isinstance(content, dict):
-        raise error(f"{path} holds a {type(content).__name__}; expected the object of an estimate.")
-    return content
-
-
 def _deliver_changes(estimates: list[Path], json: Path | None) -> None:
     from rotordrop.estimate.changed import changes
+    from rotordrop.estimate.published import read_drop
     from rotordrop.report.repeat_page import finite
 
     if len(estimates) != 2:
         raise UsageError(f"--changes compares two estimates, and {len(estimates)} are given; name two files.")
-    found = changes(*(read_estimate(path) for path in estimates))
+    found = changes(*(read_drop(path) for path in estimates))
     content = asdict(found) | {"sentence": found.sentence()}
     deliver(finite(content), json, lambda out: _print_changes(found, out))
 

@@ -63,9 +63,9 @@ def estimate(
 
     Example: rotordrop estimate machine.toml record.csv --tail tail.csv --report report.html
     """
-    from rotordrop.cli.compare import read_estimate
     from rotordrop.estimate.document import combined, estimate_document
     from rotordrop.estimate.histories import require_format
+    from rotordrop.estimate.published import read_drop
     from rotordrop.estimation import Replay, Tracked, estimate_drops
     from rotordrop.machine import load_machine
     from rotordrop.report.estimate_page import estimate_page, estimate_summary
@@ -77,7 +77,7 @@ def estimate(
         raise UsageError(
             "--fixed belongs to --method replay; the tracked twin uses a calibrated machine file instead."
         )
-    description, earlier = load_machine(machine), None if since is None else read_estimate(since)
+    description, earlier = load_machine(machine), None if since is None else read_drop(since)
     require_own_drops(records)
     if quick and method is Method.tracked and not is_calibrated(description):
         raise UsageError(

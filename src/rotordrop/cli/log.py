@@ -18,7 +18,7 @@ from typer import Argument
 from rotordrop.cli import _options as options
 from rotordrop.cli._options import measured, text_option
 from rotordrop.cli._output import console, deliver, require_places
-from rotordrop.errors import RecordError, UsageError
+from rotordrop.errors import UsageError
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -102,19 +102,19 @@ def log(
 
 def _drop(what: str | None, bearings: str, recorded: str, duration: float | None, cause: str) -> LoggedDrop:
     """The drop of an estimate, with what somebody knows of it."""
-    from rotordrop.cli.compare import read_estimate
+    from rotordrop.estimate.published import read_drop
     from rotordrop.ledger.book import drop_of_estimate
 
     if what is None:
         raise UsageError("nothing to add; name the JSON file of an estimate")
-    document = read_estimate(Path(what), RecordError)
+    drop = read_drop(Path(what))
     try:
         date = datetime.fromisoformat(recorded).isoformat() if recorded else ""
     except ValueError as error:
         raise UsageError(
             f"{recorded!r} is not a date; write it as 2026-03-14 or 2026-03-14T15:09:26"
         ) from error
-    return drop_of_estimate(document, bearings, recorded=date, duration=duration, cause=cause)
+    return drop_of_estimate(drop, bearings, recorded=date, duration=duration, cause=cause)
 
 
 def _export(found: Mapping[int, LoggedDrop], file: str | None) -> None:

@@ -274,7 +274,7 @@ def schema(
     elif document is Document.look:
         from rotordrop.evidence.look.schema import look_schema as schema_of
     else:
-        from rotordrop.estimate.schema import estimate_schema as schema_of
+        from rotordrop.estimate.published import estimate_schema as schema_of
 
     text = json_module.dumps(schema_of(), indent=2, ensure_ascii=False) + "\n"
     deliver_text(text, output, overwrite=force)

@@ -128,8 +128,8 @@ def named_pairs(texts: Sequence[str], kind: str, names: Sequence[str]) -> NDArra
     Examples
     --------
     >>> from rotordrop.cli.simulate import named_pairs
-    >>> named_pairs(["DE: 10 um, -20 um"], "length", ["NDE", "DE"]).tolist()
-    [[0.0, 0.0], [1e-05, -2e-05]]
+    >>> named_pairs(["DE: 0.5 mm, -0.25 mm"], "length", ["NDE", "DE"]).tolist()
+    [[0.0, 0.0], [0.0005, -0.00025]]
     """
     import numpy as np
 

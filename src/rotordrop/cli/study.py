@@ -159,26 +159,25 @@ def study_repeat(
 
     Example: rotordrop study repeat calibrated.toml drop.json --folder repeats
     """
-    from rotordrop.cli.compare import read_estimate
+    from rotordrop.estimate.published import read_drop
     from rotordrop.machine import load_machine
     from rotordrop.report.repeat_page import repeat_numbers, repeat_page
     from rotordrop.study.repeat import recorded_numbers, repeat_study, repeats
     from rotordrop.study.run import run_study
 
     described = load_machine(machine)
-    document = None if estimate is None else read_estimate(estimate)
-    # refuses what is no estimate before hours of drops
-    recorded = {} if document is None else recorded_numbers(document)
-    if document is None and speed is None:
+    drop = None if estimate is None else read_drop(estimate)
+    if drop is None and speed is None:
         raise UsageError("neither an estimate nor a speed; give one of them, as in --speed '210 Hz'")
-    omega = 2.0 * math.pi * document["speed_Hz"] if speed is None and document is not None else speed
+    omega = 2.0 * math.pi * drop.speed_Hz if speed is None and drop is not None else speed
     assert omega is not None
-    length = 0.2 if document is None else float(document["estimated_until_s"])
+    length = 0.2 if drop is None else drop.estimated_until_s
     study = repeat_study(described, omega, duration=length, drops=drops, seed=seed)
     with progress_bar(study.name) as bar:
         results = run_study(study, folder, threads=threads, report=_drops_of(bar))
     # at another speed the recorded drop is none of these
-    found = repeats(results, recorded if speed is None else {}, worst_of=worst_of)
+    recorded = {} if drop is None or speed is not None else recorded_numbers(drop)
+    found = repeats(results, recorded, worst_of=worst_of)
     deliver(repeat_numbers(results, found), json, repeat_page(results, found), report=report)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +13,15 @@ from scipy.special import ndtr, ndtri
 from rotordrop.elements.parameter import Parameter
 from rotordrop.elements.table import fitted_row, row_of, rows
 from rotordrop.errors import UsageError
+from rotordrop.estimate import published
+from rotordrop.estimate.published import Drop, Joint, Value
 from rotordrop.known import NINETY
 from rotordrop.physics.linear_algebra import solve, symmetric_eigen
 from rotordrop.units import format_chance
 
 Array = NDArray[np.float64]
+Told = Mapping[str, published.Parameter]
+"""Parameters of one estimate by path."""
 
 FALSE_ALARM = 0.01
 """Probability that anything is named of two drops between which nothing changed [1]."""
@@ -125,22 +128,13 @@ def _words(one: Change) -> str:
     return f"{1e6 * one.change:+.3g} µm, 90 %: {1e6 * low:+.3g} to {1e6 * high:+.3g} µm"
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Told:
-    """What one record says of a parameter by itself, in the measure it is estimated in."""
-
-    value: float
-    mean: float
-    sigma: float
-
-
-def changes(first: Mapping[str, Any], second: Mapping[str, Any]) -> Changes:
+def changes(first: Drop, second: Drop) -> Changes:
     """Compare the parameters of two estimates of one machine.
 
     Parameters
     ----------
-    first, second : mapping
-        Their documents, as ``rotordrop estimate --json`` writes them, made with one machine file.
+    first, second : Drop
+        As published, made with one machine file.
 
     Notes
     -----
@@ -156,42 +150,34 @@ def changes(first: Mapping[str, Any], second: Mapping[str, Any]) -> Changes:
     Raises
     ------
     UsageError
-        If the documents are not estimates of drops of one machine that fit their records.
+        If the drops are not of one machine, or a model does not fit its record.
     """
-    for document in (first, second):
-        _require(document)
-    if first["machine"] != second["machine"]:
+    for drop in (first, second):
+        if not drop.consistent:
+            raise UsageError(
+                f"{drop.record}: the model is not consistent with this record, so its parameters say "
+                "nothing of a change; expected two estimates that fit"
+            )
+    if first.machine != second.machine:
         raise UsageError(
-            f"the drops are of {first['machine']!r} and {second['machine']!r}; only drops of one machine can "
+            f"the drops are of {first.machine!r} and {second.machine!r}; only drops of one machine can "
             "show what changed"
         )
-    told = [{one["path"]: one for one in document["parameters"]} for document in (first, second)]
+    told = [{one.path: one for one in drop.parameters} for drop in (first, second)]
     paths = [path for path in told[0] if path in told[1] and _watched(path) is not None]
     pairs = {path: [_alone(one[path], row_of(path)) for one in told] for path in paths}
-    if first.get("joint") and second.get("joint"):
+    if first.joint is not None and second.joint is not None:
         # a parameter that hardly leaves its prior is one that the linearised fit knows least of
         seen = [path for path, pair in pairs.items() if None not in pair]
-        found = _jointly(first["joint"], second["joint"], told, seen, paths)
+        found = _jointly(first.joint, second.joint, told, seen, paths)
     else:
         level = _level(sum(None not in pair for pair in pairs.values()))
         found = [_compared(path, told, pair, level) for path, pair in pairs.items()]
     return Changes(
-        first=str(first.get("record", "the first")),
-        second=str(second.get("record", "the second")),
+        first=first.record,
+        second=second.record,
         found=tuple(sorted(found, key=lambda one: (-one.named, -one.probability))),
     )
-
-
-def _require(document: Mapping[str, Any]) -> None:
-    if "parameters" not in document or "machine" not in document:
-        raise UsageError(
-            "the file is no estimate of one drop; give one that 'rotordrop estimate --json' wrote"
-        )
-    if not document.get("consistent", True):
-        raise UsageError(
-            f"{document.get('record')}: the model is not consistent with this record, so its parameters say "
-            "nothing of a change; expected two estimates that fit"
-        )
 
 
 def _watched(path: str) -> float | None:
@@ -199,33 +185,33 @@ def _watched(path: str) -> float | None:
     return None if row is None else WATCHED.get(row.path)
 
 
-def _alone(entry: Mapping[str, Any], row: Parameter) -> _Told | None:
-    """What the record says beyond the prior; None where that is nothing.
+def _alone(entry: published.Parameter, row: Parameter) -> tuple[float, float] | None:
+    """Mean and deviation by the record alone, in the measure of the estimate; None where it says nothing.
 
     While a race slides, its spin-up tells (friction less drag) over inertia and none of the two alone: an
     estimate of the drag is one of the inertia's error, however sure it looks.
     """
     if row.spin_up_only:
         return None
-    value, prior = entry["estimate"], entry["prior"]
+    value, prior = entry.estimate, entry.prior
     mean, sigma = _measured(value, row)
     if prior is None:
-        return _Told(value=value["value"], mean=mean, sigma=sigma)
+        return mean, sigma
     before, width = _measured(prior, row)
     if sigma >= BY_PRIOR * width:
         return None
     own = 1.0 / (sigma**-2 - width**-2)
-    return _Told(value=value["value"], mean=own * (mean / sigma**2 - before / width**2), sigma=math.sqrt(own))
+    return own * (mean / sigma**2 - before / width**2), math.sqrt(own)
 
 
-def _measured(known: Mapping[str, Any], row: Parameter) -> tuple[float, float]:
+def _measured(known: Value, row: Parameter) -> tuple[float, float]:
     """Middle and standard deviation, of the logarithm where the parameter is logarithmic."""
-    low, high = known.get("interval_90") or (known["value"], known["value"])
+    low, high = known.interval or (known.value, known.value)
     if not row.logarithmic:
-        return known["value"], max((high - low) / (2.0 * NINETY), 1e-300)
+        return known.value, max((high - low) / (2.0 * NINETY), 1e-300)
     if low <= 0.0:
-        return math.log(known["value"]), max(math.log(high / known["value"]) / NINETY, 1e-12)
-    return math.log(known["value"]), max(math.log(high / low) / (2.0 * NINETY), 1e-12)
+        return math.log(known.value), max(math.log(high / known.value) / NINETY, 1e-12)
+    return math.log(known.value), max(math.log(high / low) / (2.0 * NINETY), 1e-12)
 
 
 def _level(count: int) -> float:
@@ -234,19 +220,19 @@ def _level(count: int) -> float:
 
 
 def _compared(
-    path: str, told: Sequence[Mapping[str, Any]], pair: Sequence[_Told | None], level: float
+    path: str, told: Sequence[Told], pair: Sequence[tuple[float, float] | None], level: float
 ) -> Change:
     one, other = pair
     if one is None or other is None:
         return _change(path, told, 0.0, math.inf, smallest=math.inf, named=False)
-    moved, sigma = other.mean - one.mean, math.hypot(one.sigma, other.sigma)
+    moved, sigma = other[0] - one[0], math.hypot(one[1], other[1])
     named = abs(moved) > level * sigma
     return _change(path, told, moved, sigma, smallest=(level + FOUND) * sigma, named=named)
 
 
 def _change(
     path: str,
-    told: Sequence[Mapping[str, Any]],
+    told: Sequence[Told],
     moved: float,
     sigma: float,
     *,
@@ -260,7 +246,7 @@ def _change(
     """
     factor, least = row_of(path).logarithmic, _watched(path)
     assert least is not None
-    before, after = (one[path]["estimate"]["value"] for one in told)
+    before, after = (one[path].estimate.value for one in told)
     smallest = 1.0 + smallest if factor else smallest
     if math.isinf(sigma):
         nothing = (0.0, math.inf) if factor else (-math.inf, math.inf)
@@ -285,9 +271,9 @@ def _change(
 
 
 def _jointly(
-    first: Mapping[str, Any],
-    second: Mapping[str, Any],
-    told: Sequence[Mapping[str, Any]],
+    first: Joint,
+    second: Joint,
+    told: Sequence[Told],
     seen: Sequence[str],
     paths: Sequence[str],
 ) -> list[Change]:
@@ -296,10 +282,10 @@ def _jointly(
     What one of them has not seen may still have changed, within its prior, and must not look like a change of
     something else.
     """
-    common = [path for path in first["paths"] if path in second["paths"]]
+    common = [path for path in first.paths if path in second.paths]
     unseen = [common.index(path) for path in paths if path in common and path not in seen]
     fit = _CommonFit([_own(one, common) for one in (first, second)], unseen)
-    scale = dict(zip(first["paths"], first["prior_standard_deviation"], strict=True))
+    scale = dict(zip(first.paths, first.prior_standard_deviation, strict=True))
     watched = [path for path in seen if path in common]
     chosen: list[str] = []
     level = _level(len(watched))
@@ -331,19 +317,19 @@ def _jointly(
     return found
 
 
-def _own(joint: Mapping[str, Any], common: Sequence[str]) -> tuple[Array, Array]:
+def _own(joint: Joint, common: Sequence[str]) -> tuple[Array, Array]:
     """What a record alone says, in standard deviations of the prior about its middle.
 
     Information matrix and information vector: posterior less prior. Published parameters are wider than the
     filter holds (`PARAMETER_WIDENING`), for what the linearised fit leaves out; that is common to two records
     of one machine and cancels in a change.
     """
-    n, at = len(joint["paths"]), [joint["paths"].index(path) for path in common]
+    n, at = len(joint.paths), [joint.paths.index(path) for path in common]
     lower = np.zeros((n, n))
-    lower[np.tril_indices(n)] = joint["covariance"]
-    sigma = np.array(joint["prior_standard_deviation"])
+    lower[np.tril_indices(n)] = joint.covariance
+    sigma = np.array(joint.prior_standard_deviation)
     whole = (lower + np.tril(lower, -1).T) / np.outer(sigma, sigma)
-    mean = (np.array(joint["mean"]) - np.array(joint["prior_mean"])) / sigma
+    mean = (np.array(joint.mean) - np.array(joint.prior_mean)) / sigma
     size, turn = symmetric_eigen(whole[np.ix_(at, at)])
     size = np.maximum(size, SURE)
     gained = np.maximum(1.0 / size - 1.0, 0.0)

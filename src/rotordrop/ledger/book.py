@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rotordrop.errors import UsageError
+from rotordrop.estimate.published import Drop
 from rotordrop.ledger._store import transaction
 
 QUANTITIES: Mapping[str, str] = {
@@ -218,45 +219,32 @@ def used_shares(where: str | Path) -> tuple[UsedShare, ...]:
     return tuple(found)
 
 
-def drop_of_estimate(document: Mapping[str, Any], bearing_set: str, **known: Any) -> LoggedDrop:
-    """A drop as the document of its estimate tells it, beside which set of touchdown bearings it was.
+def drop_of_estimate(drop: Drop, bearing_set: str, **known: Any) -> LoggedDrop:
+    """A drop as its published estimate tells it, beside which set of touchdown bearings it was.
 
     ``known`` is what the estimate does not know: ``duration`` [s], ``cause``, and ``recorded``, where its
     recorder wrote no date or a wrong one.
     """
-    if "drops" in document:
-        raise UsageError(
-            f"the file holds the estimates of {', '.join(document['drops'])}; log one after the other: "
-            "estimate them one by one"
-        )
-    missing = [
-        key for key in ("machine", "record", "record_sha256", "speed_Hz", "bearings") if key not in document
+    severity = [
+        Severity(bearing=name, quantity=quantity, unit=unit, value=found.value, lower=ends[0], upper=ends[1])
+        for name, bearing in drop.bearings.items()
+        for quantity, unit in QUANTITIES.items()
+        # a number without an interval is no evidence
+        if (found := bearing.numbers.get(quantity)) is not None and (ends := found.interval) is not None
     ]
-    if missing:
-        raise UsageError(
-            f"the file has no {missing[0]!r}; expected the JSON that 'rotordrop estimate --json' writes"
-        )
-    severity = []
-    for name, numbers in document["bearings"].items():
-        for quantity, unit in QUANTITIES.items():
-            entry = numbers.get(quantity)
-            if entry and entry.get("interval_90"):  # a number without an interval is no evidence
-                of = {"bearing": name, "quantity": quantity, "unit": unit, "value": entry.get("value")}
-                lower, upper = entry["interval_90"]
-                severity.append(Severity(**of, lower=lower, upper=upper))
     return LoggedDrop(
-        machine=document["machine"],
+        machine=drop.machine,
         bearing_set=bearing_set,
-        record=document["record"],
-        sha256=document["record_sha256"] or "",
-        speed=2.0 * math.pi * document["speed_Hz"],
-        method=document.get("method", ""),
-        verdict=str(document.get("verdict", "")),
-        simulated=bool(document.get("simulated_record")),
-        version=document.get("rotordrop_version", ""),
-        fingerprint=str(document.get("fingerprint", "")),
+        record=drop.record,
+        sha256=drop.record_sha256,
+        speed=2.0 * math.pi * drop.speed_Hz,
+        method=drop.method,
+        verdict=drop.verdict,
+        simulated=drop.simulated_record,
+        version=drop.rotordrop_version,
+        fingerprint=drop.fingerprint,
         severity=tuple(severity),
-        **{**known, "recorded": known.get("recorded") or str(document.get("recorded") or "")},
+        **{**known, "recorded": known.get("recorded") or drop.recorded},
     )
 
 

@@ -16,9 +16,10 @@ from rotordrop.elements.parameter import Step
 from rotordrop.estimate.agreement import Agreement, compare_orbits, spread_horizon
 from rotordrop.estimate.assumptions import evidence_assumptions
 from rotordrop.estimate.estimate import Estimate, ReplaySteps, Verdict
-from rotordrop.estimate.fixed_values import Document, fixed_correlations, machine_with_fixed, read_fixed
+from rotordrop.estimate.fixed_values import machine_with_fixed, read_fixed
 from rotordrop.estimate.later_motion import later_motion
 from rotordrop.estimate.methods import Replay
+from rotordrop.estimate.published import Drop
 from rotordrop.estimate.record_facts import RecordFacts
 from rotordrop.evidence.air_gap import AirGap, identify_air_gap
 from rotordrop.evidence.evidence import Evidence, known, read_evidence
@@ -115,12 +116,12 @@ def replay_drop(
     marginalised; the friction from a number; the intervals from draws.
     """
     say = progress or (lambda text, share: None)
-    document, origin = ({}, "") if method.fixed is None else read_fixed(method.fixed)
-    start = machine_with_fixed(machine, document, origin) if origin else machine
+    fixed, origin = (None, "") if method.fixed is None else read_fixed(method.fixed)
+    start = machine if fixed is None else machine_with_fixed(machine, fixed, origin)
     say("air gap, speed, initial state, first contact", 0.0)
     evidence = read_evidence(build_drop_model(start), record, tail, name=name)
     initial = known(evidence.fall)
-    impacts = _taken_over(evidence, document) if origin else _first_impacts(evidence, method, say)
+    impacts = _first_impacts(evidence, method, say) if fixed is None else _taken_over(evidence, fixed)
     gap = _steady_gap(evidence, impacts)
     say("replay of the whole drop", STAGES["replay"])
     replayed = _replay(impacts, evidence, gap, _draws(impacts, evidence, method, say))
@@ -179,12 +180,12 @@ def _steps(
     )
 
 
-def _taken_over(evidence: Evidence, document: Document) -> Impacts:
+def _taken_over(evidence: Evidence, fixed: Drop) -> Impacts:
     """Supports and friction of an earlier estimate, with their own uncertainty."""
     problem = impact_problem(build_replica(evidence, evidence.model, until=IDENTIFIED_UNTIL))
     covariance = np.diag(problem.prior_sigma**2)
     paths = problem.vector.paths
-    for pair in fixed_correlations(document):
+    for pair in fixed.correlations:
         if pair.first in paths and pair.second in paths:
             i, k = paths.index(pair.first), paths.index(pair.second)
             covariance[i, k] = covariance[k, i] = pair.value * problem.prior_sigma[i] * problem.prior_sigma[k]

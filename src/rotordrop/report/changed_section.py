@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 from rotordrop.elements.table import row_of
 from rotordrop.errors import UsageError
 from rotordrop.estimate.changed import Change, asked_for, changes
-from rotordrop.estimate.document import estimate_document
+from rotordrop.estimate.document import published_drop
 from rotordrop.estimate.estimate import Estimate
+from rotordrop.estimate.published import Drop
 from rotordrop.report.content import Cell, Section, Statement, Table
 from rotordrop.report.quantity import Quantity, written
 from rotordrop.units import format_chance
@@ -22,22 +20,22 @@ NOTE = (
 )
 
 
-def changed_section(estimate: Estimate, since: Mapping[str, Any] | None) -> Section:
+def changed_section(estimate: Estimate, since: Drop | None) -> Section:
     """Compare a drop with an earlier one.
 
     Parameters
     ----------
     estimate : Estimate
         The drop.
-    since : mapping, optional
-        Document of the earlier estimate, as ``rotordrop estimate --json`` writes it.
+    since : Drop, optional
+        The earlier estimate, as published.
     """
     if since is None:
         return Section(heading=HEADING, text=(NOTHING_GIVEN,))
     try:
-        found = changes(since, estimate_document(estimate))
+        found = changes(since, published_drop(estimate))
     except UsageError as error:
-        return Section(heading=HEADING, text=(f"{since.get('record', 'the earlier drop')}: {error}.",))
+        return Section(heading=HEADING, text=(f"{since.record}: {error}.",))
     sentence = found.sentence()
     for one in found.found:
         sentence = sentence.replace(one.path, spoken_path(one.path))

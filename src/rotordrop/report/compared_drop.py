@@ -1,4 +1,4 @@
-"""One drop of a comparison, from an estimate document."""
+"""One drop of a comparison, from a published estimate."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from rotordrop.errors import UsageError
+from rotordrop.estimate.published import Drop, Impact
 from rotordrop.report.quantity import Quantity
 from rotordrop.severity.numbers import SEVERITY
 from rotordrop.units import format_minute
@@ -63,47 +64,37 @@ class ComparedDrop:
         return format_minute(self.recorded)
 
     @classmethod
-    def of_document(cls, name: str, document: Mapping[str, Any], *, simulated: bool = False) -> ComparedDrop:
-        """Take one drop from an estimate document as the command line writes it.
-
-        Raises
-        ------
-        UsageError
-            If the document has no bearings or no speed.
-        """
-        if "bearings" not in document or "speed_Hz" not in document:
-            raise UsageError(
-                f"{name}: the document has the entries {', '.join(document) or 'none'}; expected 'speed_Hz' "
-                "and 'bearings'. Give a file written by 'rotordrop estimate --json'."
-            )
-        turns = document["speed_Hz"]
-        consistency = document.get("consistency") or {}
-        consistent = consistency.get("consistent", True) if isinstance(consistency, Mapping) else consistency
-        if not isinstance(consistent, bool):
-            raise UsageError(
-                f"{name}: 'consistency.consistent' is {consistent!r}; expected true or false. Give a file as "
-                "'rotordrop estimate --json' wrote it."
-            )
+    def of_drop(cls, name: str, drop: Drop) -> ComparedDrop:
+        """Take it from a published estimate."""
         return cls(
             name=name,
-            speed=2 * math.pi * float(turns["value"] if isinstance(turns, Mapping) else turns),
-            numbers={bearing: _numbers(values) for bearing, values in document["bearings"].items()},
-            warnings=tuple(str(warning) for warning in document.get("warnings") or ()),
-            consistent=consistent,
-            method=str(document.get("method", "")),
-            record=str(document.get("record_sha256") or ""),
-            simulated=simulated,
-            machine=str(document.get("machine", "")),
-            recorded=str(document.get("recorded", "")),
+            speed=2 * math.pi * drop.speed_Hz,
+            numbers={
+                bearing: {
+                    key: Quantity(
+                        value=found.value,
+                        kind=kind,
+                        interval_90=found.interval,
+                        standard_error=found.standard_error,
+                        status=found.status or "",
+                    )
+                    for key, _, kind in NUMBERS
+                    if (found := entry.numbers.get(key)) is not None
+                }
+                for bearing, entry in drop.bearings.items()
+            },
+            warnings=tuple(drop.warnings),
+            consistent=drop.consistent,
+            method=drop.method,
+            record=drop.record_sha256,
+            simulated=drop.simulated_record,
+            machine=drop.machine,
+            recorded=drop.recorded,
             statistics={
-                bearing: values["stress_statistics_Pa"]
-                for bearing, values in document["bearings"].items()
-                if "stress_statistics_Pa" in values
+                bearing: entry.stress_statistics_Pa.as_json() for bearing, entry in drop.bearings.items()
             },
             hardest={
-                bearing: text
-                for bearing, values in document["bearings"].items()
-                if (text := _hardest(values))
+                bearing: text for bearing, entry in drop.bearings.items() if (text := _hardest(entry.impacts))
             },
         )
 
@@ -135,35 +126,16 @@ def left_out(drops: Sequence[ComparedDrop]) -> dict[str, str]:
     return reasons
 
 
-def _numbers(values: Mapping[str, Any]) -> dict[str, Quantity]:
-    found = {}
-    for key, _, kind in NUMBERS:
-        entry: Any = values
-        for part in key.split("."):
-            entry = entry.get(part) if isinstance(entry, Mapping) else None
-        if entry is not None:
-            interval = entry.get("interval_90")
-            found[key] = Quantity(
-                value=float(entry["value"]),
-                kind=kind,
-                interval_90=None if interval is None else (float(interval[0]), float(interval[1])),
-                standard_error=entry.get("standard_error"),
-                status=str(entry.get("status", "")),
-            )
-    return found
-
-
-def _hardest(values: Mapping[str, Any]) -> str:
+def _hardest(impacts: Sequence[Impact]) -> str:
     """Which impact gave the peak, and which part of impulse and energy it made."""
-    impacts = values.get("impacts") or ()
     if not impacts:
         return ""
-    first = max(range(len(impacts)), key=lambda k: impacts[k]["peak_force_N"]["value"])
+    first = max(range(len(impacts)), key=lambda k: impacts[k].peak_force_N.value)
     hit = impacts[first]
     parts = []
     for key, name in (("impulse_N_s", "impulse"), ("dissipated_energy_J", "energy")):
-        whole = math.fsum(one[key]["value"] for one in impacts)
+        whole = math.fsum(getattr(one, key).value for one in impacts)
         if whole > 0.0:
-            parts.append(f"{hit[key]['value'] / whole:.0%} of the {name}")
-    moment = Quantity(value=hit["peak_time_s"], kind="time", digits=3).text
+            parts.append(f"{getattr(hit, key).value / whole:.0%} of the {name}")
+    moment = Quantity(value=hit.peak_time_s, kind="time", digits=3).text
     return f"impact {first + 1} of {len(impacts)} at {moment}: {' and '.join(parts)}"

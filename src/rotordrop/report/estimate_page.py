@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from rotordrop._version import __version__
 from rotordrop.estimate.bearing_drop import History
 from rotordrop.estimate.estimate import CrossCheck, Estimate, FittedParameter, Innovations, ReplaySteps
 from rotordrop.estimate.methods import Replay
+from rotordrop.estimate.published import Drop
 from rotordrop.report.changed_section import changed_section
 from rotordrop.report.content import (
     SIMULATED_RECORD,
@@ -48,7 +48,7 @@ PRIOR_NOTE = (
 
 
 def estimate_page(
-    estimate: Estimate, origin: Origin | None = None, since: Mapping[str, Any] | None = None
+    estimate: Estimate, origin: Origin | None = None, since: Drop | None = None
 ) -> ReportContent:
     """Build the report on one recorded drop, followed or replayed.
 
@@ -58,7 +58,7 @@ def estimate_page(
         Everything the page says of the drop comes from it.
     origin : Origin, optional
         Who made it, when, by which command, from which files.
-    since : mapping, optional
+    since : Drop, optional
         Document of an earlier estimate of the machine, with which this one is compared.
     """
     return replace(estimate_summary(estimate, origin), sections=_sections(estimate, since))
@@ -149,7 +149,7 @@ def _draws(steps: ReplaySteps) -> str:
     return "none" if steps.draws is None else f"{steps.draws} drops, {steps.rejected} rejected"
 
 
-def _sections(estimate: Estimate, since: Mapping[str, Any] | None) -> tuple[Section, ...]:
+def _sections(estimate: Estimate, since: Drop | None) -> tuple[Section, ...]:
     names = [bearing.name for bearing in estimate.bearings]
     steps = estimate.replay
     tables = () if steps is None else (first_contact_table(names, steps.contacts),)

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from rotordrop.estimate.bearing_drop import simulated_bearings
-from rotordrop.estimate.document import bearing_entry
+from rotordrop.estimate.document import published_bearing
 from rotordrop.simulate.result import DropResult
 
 
@@ -28,7 +28,7 @@ def simulation_numbers(result: DropResult) -> dict[str, Any]:
         "finished": result.finished,
         "certificate": _certificate(result),
         "bearings": {
-            one.name: {**bearing_entry(one), **_contact(result, index)}
+            one.name: {**published_bearing(one).as_json(), **_contact(result, index)}
             for index, one in enumerate(simulated_bearings(result))
         },
     }

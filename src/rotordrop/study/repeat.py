@@ -19,6 +19,7 @@ from scipy.special import ndtr
 from rotordrop.elements.magnet import REMANENCE_TIME
 from rotordrop.elements.table import parameter
 from rotordrop.errors import UsageError
+from rotordrop.estimate.published import Drop
 from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
 from rotordrop.rotor.unknowns import smallest_gap
@@ -158,25 +159,14 @@ def place_among(values: ArrayLike, recorded: Known) -> Known:
     return share_of(float(np.mean(ndtr((recorded.value - x) / sigma))), least, most, n)
 
 
-def recorded_numbers(document: Mapping[str, Any]) -> dict[str, Known]:
-    """Numbers of a recorded drop by column of a study, from the document of its estimate."""
-    if "bearings" not in document or "speed_Hz" not in document:
-        raise UsageError(
-            "the file is no estimate of one drop; give one that 'rotordrop estimate --json' wrote"
-        )
-    found = {}
-    for bearing, numbers in document["bearings"].items():
-        for key, column in COMPARED.items():
-            entry: Any = numbers
-            for part in key.split("."):
-                entry = entry.get(part) if isinstance(entry, Mapping) else None
-            if entry is not None and entry.get("value") is not None:
-                interval = entry.get("interval_90")
-                found[f"{bearing}.{column}"] = Known(
-                    value=float(entry["value"]),
-                    interval_90=None if interval is None else (float(interval[0]), float(interval[1])),
-                )
-    return found
+def recorded_numbers(drop: Drop) -> dict[str, Known]:
+    """Numbers of a recorded drop by column of a study, from its published estimate."""
+    return {
+        f"{name}.{column}": Known(value=found.value, interval_90=found.interval)
+        for name, bearing in drop.bearings.items()
+        for key, column in COMPARED.items()
+        if (found := bearing.numbers.get(key)) is not None
+    }
 
 
 def next_draw(recorded: Sequence[Estimate], spread: float) -> Distribution:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rotordrop.elements.parameter import Parameter
 from rotordrop.elements.table import parameter, row_of, rows, separating_measurement
 from rotordrop.errors import IdentificationError, UsageError
-from rotordrop.estimate.document import structure_json
+from rotordrop.estimate.document import published_structure
 from rotordrop.estimate.estimate import Structure
 from rotordrop.evidence.evidence import read_evidence
 from rotordrop.known import NINETY, Known, Status
@@ -409,7 +409,7 @@ def calibration_json(calibration: Calibration) -> dict[str, object]:
             for name, checks in calibration.checks.items()
         },
         "consistent": calibration.consistent,
-        "structure": structure_json(calibration.structure),
+        "structure": [one.as_json() for one in published_structure(calibration.structure)],
         "nis": {name: value if math.isfinite(value) else None for name, value in calibration.nis.items()},
         "sentence": calibration.sentence(),
     }

@@ -6,7 +6,6 @@ nobody, so that neither page nor server has to be there when it ends.
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 import time
@@ -23,6 +22,7 @@ from rotordrop.web.running import Verb, clear, publish, result_folder, state_fil
 from rotordrop.web.workspace import Job, Workspace, is_path
 
 if TYPE_CHECKING:
+    from rotordrop.estimate.published import Drop
     from rotordrop.machine import Machine
     from rotordrop.record.profile import Profile
     from rotordrop.record.record import Record
@@ -238,16 +238,18 @@ def _estimate(job: Job, made: Path, told: dict[str, Any]) -> None:
     write_estimate(estimate, job, made, options, _since(job))
 
 
-def _since(job: Job) -> dict[str, Any] | None:
-    """Document of the estimate of the last drop that came before with the same machine file."""
+def _since(job: Job) -> Drop | None:
+    """The estimate of the last drop that came before with the same machine file."""
+    from rotordrop.estimate.published import read_drop
+
     told = job.read()
     machine, before = told["files"]["machine"]["sha256"], None
     for other in Workspace(job.path.parent.parent).jobs():  # the newest first
         folder, known = result_folder(other, "estimate"), other.read()
         same = known["files"].get("machine", {}).get("sha256") == machine
         if before is None and folder is not None and same and known["created"] < told["created"]:
-            with suppress(OSError, ValueError):
-                before = json.loads((folder / "document.json").read_text(encoding="utf-8"))
+            with suppress(UsageError):
+                before = read_drop(folder / "document.json")
     return before
 
 

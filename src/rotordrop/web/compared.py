@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from contextlib import suppress
 from functools import lru_cache
@@ -11,6 +10,7 @@ from typing import Any
 
 from rotordrop.elements.table import LOADS
 from rotordrop.errors import UsageError
+from rotordrop.estimate.published import read_drop
 from rotordrop.ledger.book import LoggedDrop, drop_of_estimate, logged_drops
 from rotordrop.report.quantity import Quantity
 from rotordrop.web.drawn import quantity_json
@@ -44,8 +44,7 @@ def compared_drops(space: Workspace, log: str | None) -> list[dict[str, Any]]:
 
 @lru_cache(maxsize=512)
 def _drop_of(folder: Path) -> LoggedDrop:
-    document = json.loads((folder / "document.json").read_text(encoding="utf-8"))
-    return drop_of_estimate(document, "", recorded=document.get("recorded") or "")
+    return drop_of_estimate(read_drop(folder / "document.json"), "")
 
 
 def _told(drop: LoggedDrop) -> dict[str, Any]:

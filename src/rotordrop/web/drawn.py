@@ -25,6 +25,7 @@ from rotordrop.web.workspace import Job
 
 if TYPE_CHECKING:
     from rotordrop.estimate.estimate import Estimate
+    from rotordrop.estimate.published import Drop
     from rotordrop.evidence.look import Look
     from rotordrop.machine import Machine
     from rotordrop.record.record import Record
@@ -96,7 +97,7 @@ def write_estimate(
     job: Job,
     made: Path,
     options: Mapping[str, Any],
-    since: Mapping[str, Any] | None = None,
+    since: Drop | None = None,
 ) -> None:
     """Write what an estimate says: histories with bands, its document, its report, and its page as JSON."""
     from rotordrop.estimate.document import estimate_document

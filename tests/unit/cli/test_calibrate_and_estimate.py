@@ -15,8 +15,8 @@ import pytest
 
 from rotordrop.cli.app import INTERRUPTED, run
 from rotordrop.errors import ConsistencyError, UsageError
+from rotordrop.estimate.published import estimate_schema
 from rotordrop.estimate.record_facts import BESIDE, COUNTED_TWICE, facts_of
-from rotordrop.estimate.schema import estimate_schema
 from rotordrop.evidence.evidence import Evidence
 from rotordrop.known import Known
 from rotordrop.machine import CalibrationDrop, CalibrationOrigin, Machine, example_path, load_machine

@@ -95,12 +95,12 @@ def test_the_schema_of_an_estimate_knows_its_fields(capsys):
     schema = json.loads(capsys.readouterr().out)
     jsonschema.Draft202012Validator.check_schema(schema)
     value = {"value": 2907.0}
-    bearing = {"$defs": schema["$defs"], **schema["$defs"]["bearing"]["properties"]["peak_force_N"]}
+    bearing = {"$defs": schema["$defs"], **schema["$defs"]["Bearing"]["properties"]["peak_force_N"]}
     jsonschema.validate(value | {"time_s": 0.009, "interval_90": [2800.0, 3000.0]}, bearing)
     for broken in (2907.0, {"peek": 2907.0}, value | {"time_s": "now"}):
         with pytest.raises(jsonschema.ValidationError):
             jsonschema.validate(broken, bearing)
-    for part in ("drop", "bearing"):
+    for part in ("Drop", "Bearing"):
         assert schema["$defs"][part]["additionalProperties"] is False
 
 

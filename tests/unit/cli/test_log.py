@@ -8,22 +8,19 @@ import json
 from pathlib import Path
 
 import pytest
+from tests.published import bearing, published, value
 
 from rotordrop.cli.app import run
 
 
 @pytest.fixture
 def estimate(tmp_path):
-    numbers = {"value": 3300.0, "interval_90": [3200.0, 3400.0]}
-    document = {
-        "machine": "LP-400",
-        "record": "drop.h5",
-        "record_sha256": "c" * 64,
-        "speed_Hz": 60.0,
-        "bearings": {"NDE": {"peak_force_N": numbers}, "DE": {"peak_force_N": numbers}},
-    }
+    peaks = {"peak_force_N": value(3300.0, 3200.0, 3400.0), "peak_stress_Pa": value(1.5e9)}
+    document = published(
+        machine="LP-400", record_sha256="c" * 64, bearings={"NDE": bearing(peaks), "DE": bearing(peaks)}
+    )
     file = tmp_path / "estimate.json"
-    file.write_text(json.dumps(document))
+    file.write_text(json.dumps(document.as_json()))
     return str(file)
 
 
@@ -87,7 +84,7 @@ def test_an_allowance_for_a_machine_of_another_name_is_told(tmp_path, estimate, 
     [
         (["show", "{log}"], 64, "is not there; 'rotordrop log add' makes a log"),
         (["add", "{log}"], 64, "nothing to add"),
-        (["add", "{log}", "{log}"], 3, "cannot be read (No such file or directory); give a file"),
+        (["add", "{log}", "{log}"], 64, "cannot be read (No such file or directory). Give a file"),
         (["add", "{log}", "{estimate}", "--recorded", "14.3.2026"], 64, "'14.3.2026' is not a date"),
         (["export", "{log}", "{log}"], 64, "is the log itself; name another file"),
         (["remove", "{log}", "first"], 64, "'first' is not the number of a drop"),

@@ -6,9 +6,11 @@ import math
 
 import numpy as np
 import pytest
+from tests.published import published
 
 from rotordrop.errors import UsageError
 from rotordrop.estimate.changed import WATCHED, changes
+from rotordrop.estimate.published import Joint, Parameter, Value
 from rotordrop.known import NINETY
 
 TRUTH = {
@@ -46,7 +48,7 @@ def entry(path, mean, sigma):
     linear = path.endswith("air_gap")
     ends = [mean - NINETY * sigma, mean, mean + NINETY * sigma]
     low, value, high = ends if linear else [math.exp(end) for end in ends]
-    return {"value": value, "interval_90": [low, high]}
+    return Value(value=value, interval_90=[low, high])
 
 
 def document(random, truth, name, spread=1.0):
@@ -61,14 +63,14 @@ def document(random, truth, name, spread=1.0):
             mean = (own * ERROR[path] ** -2 + before * PRIOR[path] ** -2) / precision
             full = f"{end}.{path}"
             parameters.append(
-                {
-                    "path": full,
-                    "scope": "machine",
-                    "prior": entry(full, before, PRIOR[path]),
-                    "estimate": entry(full, mean, spread * precision**-0.5),
-                }
+                Parameter(
+                    path=full,
+                    scope="machine",
+                    prior=entry(full, before, PRIOR[path]),
+                    estimate=entry(full, mean, spread * precision**-0.5),
+                )
             )
-    return {"machine": "m", "record": name, "consistent": True, "parameters": parameters}
+    return published(record=name, parameters=parameters)
 
 
 def test_unchanged_pairs_give_few_false_alarms():
@@ -122,9 +124,8 @@ def test_a_drag_is_not_judged_however_sure_it_looks():
 def test_what_no_record_shows_is_not_judged():
     random = np.random.default_rng(9)
     one, other = document(random, TRUTH, "a"), document(random, TRUTH, "b")
-    for entry_ in one["parameters"]:
-        entry_["estimate"] = entry_["prior"]
-    found = changes(one, other)
+    blind = [part.model_copy(update={"estimate": part.prior}) for part in one.parameters]
+    found = changes(one.model_copy(update={"parameters": blind}), other)
     assert not found.named and not any(change.determined for change in found.found)
     assert found.sentence().count(" of any size") == len(found.found) == 2 * len(WATCHED)
 
@@ -133,11 +134,9 @@ def test_other_machines_and_estimates_beside_their_record_are_refused():
     random = np.random.default_rng(1)
     one = document(random, TRUTH, "a")
     with pytest.raises(UsageError, match=r"'m' and 'n'; only drops of one machine"):
-        changes(one, {**one, "machine": "n"})
+        changes(one, one.model_copy(update={"machine": "n"}))
     with pytest.raises(UsageError, match=r"a: the model is not consistent with this record"):
-        changes({**one, "consistent": False}, one)
-    with pytest.raises(UsageError, match=r"is no estimate of one drop"):
-        changes({"drops": {}}, one)
+        changes(one.model_copy(update={"consistent": False}), one)
 
 
 CONFOUNDED = ("NDE.air_gap", "NDE.support.stiffness", "NDE.friction.dynamic", "sensors.X.gain")
@@ -156,21 +155,20 @@ def joint_document(random, truth, name):
     covariance = np.linalg.inv(seen.T @ seen + np.diag(BEFORE**-2))
     mean = MIDDLE + covariance @ (seen.T @ read)
     values = {"NDE.air_gap": mean[0], **dict(zip(CONFOUNDED[1:3], np.exp(mean[1:3]), strict=True))}
-    return {
-        "machine": "m",
-        "record": name,
-        "parameters": [
-            {"path": path, "prior": None, "estimate": {"value": value, "interval_90": None}}
+    return published(
+        record=name,
+        parameters=[
+            Parameter(path=path, scope="machine", prior=None, estimate=Value(value=value))
             for path, value in values.items()
         ],
-        "joint": {
-            "paths": list(CONFOUNDED),
-            "mean": mean.tolist(),
-            "covariance": covariance[np.tril_indices(4)].tolist(),
-            "prior_mean": MIDDLE.tolist(),
-            "prior_standard_deviation": BEFORE.tolist(),
-        },
-    }
+        joint=Joint(
+            paths=list(CONFOUNDED),
+            mean=mean.tolist(),
+            covariance=covariance[np.tril_indices(4)].tolist(),
+            prior_mean=MIDDLE.tolist(),
+            prior_standard_deviation=BEFORE.tolist(),
+        ),
+    )
 
 
 def hidden_truth(random):
@@ -189,7 +187,7 @@ def test_what_both_records_confound_alike_does_not_blur_a_change():
         gap = next(one for one in after.found if one.path == "NDE.air_gap")
         held += gap.interval_90[0] <= 10e-6 <= gap.interval_90[1]
     covariance = np.zeros((4, 4))
-    covariance[np.tril_indices(4)] = first["joint"]["covariance"]
+    covariance[np.tril_indices(4)] = first.joint.covariance
     assert math.sqrt(covariance[0, 0]) > 5e-6
     assert found >= 0.9 * 400
     assert alarms <= 10  # one in a hundred, and what chance adds
@@ -206,17 +204,20 @@ def test_two_changes_at_once_are_both_named():
     assert stiffness.interval_90[0] < math.exp(-0.15) < stiffness.interval_90[1]
 
 
+def blind_to_friction(drop):
+    n, joint = len(CONFOUNDED), drop.joint
+    covariance = np.zeros((n, n))
+    covariance[np.tril_indices(n)] = joint.covariance
+    covariance[2, :], covariance[:, 2] = 0.0, 0.0
+    covariance[2, 2] = BEFORE[2] ** 2
+    mean = [*joint.mean[:2], MIDDLE[2], *joint.mean[3:]]
+    changed = {"covariance": covariance[np.tril_indices(n)].tolist(), "mean": mean}
+    return drop.model_copy(update={"joint": joint.model_copy(update=changed)})
+
+
 def test_a_joint_record_that_says_nothing_of_a_parameter_says_nothing_of_its_change():
     random = np.random.default_rng(10)
-    first, second = (joint_document(random, MIDDLE, name) for name in "ab")
-    for one in (first, second):
-        n = len(CONFOUNDED)
-        covariance = np.zeros((n, n))
-        covariance[np.tril_indices(n)] = one["joint"]["covariance"]
-        covariance[2, :], covariance[:, 2] = 0.0, 0.0
-        covariance[2, 2] = BEFORE[2] ** 2
-        one["joint"]["covariance"] = covariance[np.tril_indices(n)].tolist()
-        one["joint"]["mean"][2] = MIDDLE[2]
+    first, second = (blind_to_friction(joint_document(random, MIDDLE, name)) for name in "ab")
     friction = next(one for one in changes(first, second).found if one.path == "NDE.friction.dynamic")
     assert not friction.determined
 
@@ -227,10 +228,20 @@ def test_what_a_record_by_itself_says_nothing_of_is_not_named():
     first = joint_document(random, MIDDLE, "a")
     second = joint_document(random, MIDDLE + np.array([0.0, 0.0, 1.0, 0.0]), "b")
     assert [one.path for one in changes(first, second).named] == ["NDE.friction.dynamic"]
-    wide = {"value": 0.1, "interval_90": [0.05, 0.2]}
-    for document_ in (first, second):
-        entry_ = next(one for one in document_["parameters"] if one["path"] == "NDE.friction.dynamic")
-        entry_["prior"] = entry_["estimate"] = wide
+    wide = Value(value=0.1, interval_90=[0.05, 0.2])
+    first, second = (
+        drop.model_copy(
+            update={
+                "parameters": [
+                    one.model_copy(update={"prior": wide, "estimate": wide})
+                    if one.path == "NDE.friction.dynamic"
+                    else one
+                    for one in drop.parameters
+                ]
+            }
+        )
+        for drop in (first, second)
+    )
     found = changes(first, second)
     assert not found.named
     friction = next(one for one in found.found if one.path == "NDE.friction.dynamic")

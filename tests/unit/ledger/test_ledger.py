@@ -15,6 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from tests.published import bearing, published, value
 
 from rotordrop.errors import OutputError, UsageError
 from rotordrop.ledger import LoggedDrop, Severity, add_drop, allow, logged_drops, used_shares
@@ -114,29 +115,18 @@ def test_a_write_that_fails_leaves_nothing(log):
 
 
 def test_a_drop_from_the_document_of_an_estimate():
-    document = {
-        "machine": "LP-400",
-        "record": "drop.h5",
-        "record_sha256": "c" * 64,
-        "speed_Hz": 60.0,
-        "method": "tracked",
-        "verdict": "fine",
-        "simulated_record": "This record is simulated.",
-        "bearings": {
-            "NDE": {
-                "peak_force_N": {"value": 3300.0, "interval_90": [3200.0, 3400.0]},
-                "peak_stress_Pa": {"value": 1.8e9, "interval_90": None},
-            }
-        },
-    }
-    drop = drop_of_estimate(document, "2026", cause="test")
+    numbers = {"peak_force_N": value(3300.0, 3200.0, 3400.0), "peak_stress_Pa": value(1.8e9)}
+    estimate = published(
+        machine="LP-400",
+        record_sha256="c" * 64,
+        verdict="fine",
+        simulated_record=True,
+        bearings={"NDE": bearing(numbers)},
+    )
+    drop = drop_of_estimate(estimate, "2026", cause="test")
     assert drop.severity == (PEAK,)
     assert drop.speed == pytest.approx(376.991, abs=1e-3)
     assert drop.simulated and drop.cause == "test"
-    with pytest.raises(UsageError, match="has no 'speed_Hz'"):
-        drop_of_estimate({k: v for k, v in document.items() if k != "speed_Hz"}, "2026")
-    with pytest.raises(UsageError, match="holds the estimates of a, b"):
-        drop_of_estimate({"drops": {"a": document, "b": document}}, "2026")
 
 
 WRITER = """

@@ -18,8 +18,8 @@ from rotordrop.cli.app import run
 from rotordrop.errors import IdentificationError, UsageError
 from rotordrop.estimate.document import estimate_document
 from rotordrop.estimate.estimate import Estimate, Verdict
-from rotordrop.estimate.fixed_values import fixed_correlations, read_fixed
-from rotordrop.estimate.schema import estimate_schema
+from rotordrop.estimate.fixed_values import read_fixed
+from rotordrop.estimate.published import estimate_schema
 from rotordrop.estimation import Replay, estimate_drop
 from rotordrop.evidence.speed import SpeedFit
 from rotordrop.known import Known
@@ -225,17 +225,16 @@ def test_fixed_takes_supports_and_friction_with_their_errors(
             assert value.status == "taken over"
             assert value.interval_90 == pytest.approx(part["interval_90"], rel=1e-6), (name, path)
     assert estimate_document(again)["fixed"] == "an earlier estimate"
-    pairs = {(pair.first, pair.second): pair.value for pair in fixed_correlations(document)}
+    pairs = {(pair.first, pair.second): pair.value for pair in read_fixed(document)[0].correlations}
     assert pairs["NDE.support.stiffness", "NDE.support.mass"] > 0.5
 
 
-def test_correlations_of_another_form_are_refused() -> None:
+def test_correlations_of_another_form_are_refused(document: dict[str, Any]) -> None:
     """They were passed over, and intervals that rest on them came out others without a word."""
-    document = {"bearings": {}, "identification": {"support": {"correlations": {"K ~ M": 0.9}}}}
-    with pytest.raises(
-        UsageError, match=r"an earlier estimate holds the correlations \{'K ~ M': 0.9\}; .*'first'"
-    ):
-        read_fixed(document)
+    changed = json.loads(json.dumps(document))
+    changed["identification"]["support"]["correlations"] = {"K ~ M": 0.9}
+    with pytest.raises(UsageError, match=r"an earlier estimate: identification\.support\.correlations is"):
+        read_fixed(changed)
 
 
 def test_an_unknown_method_is_named(known: Machine, synthetic: SyntheticDrop) -> None:

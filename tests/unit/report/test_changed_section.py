@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import copy
 
-from rotordrop.estimate.document import estimate_document
+from rotordrop.estimate.document import estimate_document, published_drop
 from rotordrop.estimate.estimate import Estimate
+from rotordrop.estimate.published import drop_of
 from rotordrop.report.changed_section import HEADING, NOTHING_GIVEN, changed_section
 from rotordrop.report.estimate_page import estimate_page
 from rotordrop.report.machine_sections import spoken_key
@@ -17,8 +18,7 @@ def test_without_an_earlier_estimate_it_says_so(estimate: Estimate) -> None:
 
 
 def test_the_same_drop_twice_shows_no_change_and_names_no_path(estimate: Estimate) -> None:
-    document = copy.deepcopy(estimate_document(estimate))
-    section = changed_section(estimate, document)
+    section = changed_section(estimate, published_drop(estimate))
     assert "no parameter changed beyond chance" in section.statements[0].text
     names = [str(row[0]) for row in section.tables[0].rows]
     assert "NDE: air gap" in names
@@ -32,15 +32,15 @@ def test_a_wider_gap_before_is_named_in_words(estimate: Estimate) -> None:
             known = one["estimate"]
             known["value"] -= 60e-6
             known["interval_90"] = [end - 60e-6 for end in known["interval_90"]]
-    document.pop("joint", None)
-    section = changed_section(estimate, document)
+    document["joint"] = None
+    section = changed_section(estimate, drop_of(document, "before.json"))
     assert section.statements[0].level == "warning"
     assert "NDE: air gap (" in section.statements[0].text
 
 
 def test_another_machine_is_a_sentence(estimate: Estimate) -> None:
-    document = {**estimate_document(estimate), "machine": "another"}
-    assert "only drops of one machine can" in changed_section(estimate, document).text[0]
+    before = published_drop(estimate).model_copy(update={"machine": "another"})
+    assert "only drops of one machine can" in changed_section(estimate, before).text[0]
 
 
 def test_keys_of_the_machine_file_are_words() -> None:

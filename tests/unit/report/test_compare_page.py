@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.special import ndtr
+from tests.published import bearing, published, value
 
 from rotordrop.errors import UsageError
+from rotordrop.estimate.published import Drop, Impact, Value
 from rotordrop.report.compare_page import compare_page, rankings
 from rotordrop.report.compared_drop import ComparedDrop, left_out
 from rotordrop.report.comparison import comparison_figure
@@ -18,20 +19,22 @@ from rotordrop.report.quantity import Quantity
 from rotordrop.severity.ranking import DropSeverity, rank_drops
 
 
-def number(value: float, half: float | None) -> dict[str, Any]:
-    return {"value": value} if half is None else {"value": value, "interval_90": [value - half, value + half]}
+def number(at: float, half: float | None) -> Value:
+    return value(at) if half is None else value(at, at - half, at + half)
 
 
 def drop(name: str, speed: float, nde: float, de: float, half: float | None = 150.0) -> ComparedDrop:
-    document = {
-        "speed_Hz": speed,
-        "warnings": ["the tail does not reach standstill"] if name == "c" else [],
-        "bearings": {
-            bearing: {"peak_force_N": number(force, half), "peak_stress_Pa": number(1.5e9, 2e7)}
-            for bearing, force in (("NDE", nde), ("DE", de))
+    estimate = published(
+        machine="",
+        speed_Hz=speed,
+        simulated_record=name == "a",
+        warnings=["the tail does not reach standstill"] if name == "c" else [],
+        bearings={
+            end: bearing({"peak_force_N": number(force, half), "peak_stress_Pa": number(1.5e9, 2e7)})
+            for end, force in (("NDE", nde), ("DE", de))
         },
-    }
-    return ComparedDrop.of_document(name, document, simulated=name == "a")
+    )
+    return ComparedDrop.of_drop(name, estimate)
 
 
 def marked(name: str, *, consistent: bool = True, method: str = "tracked", record: str = "") -> ComparedDrop:
@@ -112,13 +115,6 @@ def test_drops_of_different_machines_are_refused() -> None:
         compare_page((DROPS[0], other))
 
 
-def test_a_document_of_another_kind_is_refused_with_its_entries() -> None:
-    with pytest.raises(
-        UsageError, match=r"truth: the document has the entries name, fs; expected 'speed_Hz'"
-    ):
-        ComparedDrop.of_document("truth", {"name": "drop_060", "fs": 20000})
-
-
 def test_an_estimate_beside_its_record_is_shown_but_takes_no_part_in_the_ranking() -> None:
     drops = (*DROPS, marked("lost", consistent=False))
     ranked = rankings(drops, ("NDE", "DE"), {})
@@ -156,28 +152,8 @@ def test_a_third_estimate_of_one_recording_in_the_same_way_is_refused_too() -> N
         left_out((one, second, third))
 
 
-@pytest.mark.parametrize("consistency", [None, {}, {"consistent": True}])
-def test_an_estimate_that_says_nothing_of_consistency_counts(consistency: Any) -> None:
-    document = {"speed_Hz": 60.0, "bearings": {}, "consistency": consistency, "warnings": None}
-    assert ComparedDrop.of_document("x", document).consistent
-
-
-@pytest.mark.parametrize("consistency", ["false", {"consistent": "false"}])
-def test_consistency_must_be_true_or_false(consistency: Any) -> None:
-    document = {"speed_Hz": 60.0, "bearings": {}, "consistency": consistency}
-    with pytest.raises(UsageError, match=r"x: 'consistency\.consistent' is 'false'; expected"):
-        ComparedDrop.of_document("x", document)
-
-
 def test_consistency_and_recording_are_read_from_the_estimate() -> None:
-    document = {
-        "speed_Hz": 60.0,
-        "method": "tracked",
-        "record_sha256": "4f",
-        "consistency": {"consistent": False},
-        "bearings": {},
-    }
-    found = ComparedDrop.of_document("x", document)
+    found = ComparedDrop.of_drop("x", published(consistent=False, record_sha256="4f"))
     assert (found.consistent, found.method, found.record) == (False, "tracked", "4f")
 
 
@@ -205,25 +181,24 @@ def test_the_ranking_says_how_much_worse_than_the_next() -> None:
 
 
 def test_severity_of_a_document_is_compared_with_its_worst_impact() -> None:
-    def known(value: float) -> dict[str, object]:
-        return {"value": value, "interval_90": [0.95 * value, 1.05 * value]}
+    def known(at: float) -> Value:
+        return value(at, 0.95 * at, 1.05 * at)
 
-    def document(peak: float) -> dict[str, object]:
+    def estimate(peak: float) -> Drop:
         impacts = [
-            {
-                "peak_force_N": known(p),
-                "impulse_N_s": known(i),
-                "dissipated_energy_J": known(e),
-                "peak_time_s": t,
-            }
+            Impact.model_construct(
+                peak_force_N=known(p), impulse_N_s=known(i), dissipated_energy_J=known(e), peak_time_s=t
+            )
             for p, i, e, t in ((900.0, 1.0, 2.0, 0.008), (peak, 3.0, 6.0, 0.02))
         ]
-        severity = {"static_safety": known(1e10 / peak**2), "impulse_N_s": known(4.0)}
-        entry = {"peak_force_N": known(peak), "severity": severity, "impacts": impacts}
-        recorded = "2026-03-14T08:05:30.25Z"
-        return {"speed_Hz": 60.0, "recorded": recorded, "machine": "m", "bearings": {"NDE": entry}}
+        numbers = {
+            "peak_force_N": known(peak),
+            "severity.static_safety": known(1e10 / peak**2),
+            "severity.impulse_N_s": known(4.0),
+        }
+        return published(recorded="2026-03-14T08:05:30.25Z", bearings={"NDE": bearing(numbers, impacts)})
 
-    drops = [ComparedDrop.of_document(name, document(p)) for name, p in (("a", 3000.0), ("b", 4000.0))]
+    drops = [ComparedDrop.of_drop(name, estimate(p)) for name, p in (("a", 3000.0), ("b", 4000.0))]
     assert drops[0].label == "a, 2026-03-14 08:05, 60.0 Hz"
     content = compare_page(drops)
     table = next(t for t in content.sections[0].tables if t.caption == "NDE: severity of every drop")

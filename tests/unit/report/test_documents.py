@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.published import bearing as published_bearing
+from tests.published import published, value
 
 from rotordrop.cli.app import run
 from rotordrop.machine import example_machine
@@ -78,21 +80,18 @@ def test_every_number_of_the_map_is_that_of_the_rotor_on_springs() -> None:
 
 
 def estimate(name: str, speed: float, peaks: dict[str, float]) -> dict[str, Any]:
-    return {
-        "speed_Hz": speed,
-        "machine": "one machine",
-        "record_sha256": name,
-        "consistency": {"consistent": True},
-        "bearings": {
-            bearing: {
-                "peak_force_N": {"value": peak, "interval_90": [0.95 * peak, 1.05 * peak]},
-                "mean_force_0p15_0p2_N": {"value": 0.1 * peak, "interval_90": [0.09 * peak, 0.11 * peak]},
-                "peak_stress_Pa": {"value": 1e9 + 2e5 * peak, "interval_90": [1e9, 1e9 + 4e5 * peak]},
-                "mean_stress_Pa": {"value": 1e9 + peak, "interval_90": [1e9, 1e9 + 2.0 * peak]},
+    bearings = {
+        bearing_name: published_bearing(
+            {
+                "peak_force_N": value(peak, 0.95 * peak, 1.05 * peak),
+                "mean_force_0p15_0p2_N": value(0.1 * peak, 0.09 * peak, 0.11 * peak),
+                "peak_stress_Pa": value(1e9 + 2e5 * peak, 1e9, 1e9 + 4e5 * peak),
+                "mean_stress_Pa": value(1e9 + peak, 1e9, 1e9 + 2.0 * peak),
             }
-            for bearing, peak in peaks.items()
-        },
+        )
+        for bearing_name, peak in peaks.items()
     }
+    return published(speed_Hz=speed, record_sha256=name, bearings=bearings).as_json()
 
 
 def test_the_comparison_ranks_every_number_of_every_bearing(tmp_path: Path) -> None:

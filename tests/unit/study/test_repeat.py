@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 from scipy.stats import kstest
+from tests.published import bearing, published, value
 
 from rotordrop import example_machine, save_machine
 from rotordrop.cli.app import run
@@ -18,17 +19,12 @@ from rotordrop.study.repeat import place_among, recorded_numbers, repeat_study, 
 from rotordrop.study.summary import StudyResults
 
 MACHINE = example_machine("lp400")
-DOCUMENT = {
-    "speed_Hz": 100.0,
-    "estimated_until_s": 0.009,
-    "bearings": {
-        "NDE": {
-            "peak_force_N": {"value": 2500.0, "interval_90": [2450.0, 2550.0]},
-            "severity": {"impulse_N_s": {"value": 2.0}},
-        },
-        "DE": {},
-    },
-}
+PEAKS = {"peak_force_N": value(2500.0, 2450.0, 2550.0), "peak_stress_Pa": value(1.5e9)}
+DROP = published(
+    speed_Hz=100.0,
+    estimated_until_s=0.009,
+    bearings={"NDE": bearing({**PEAKS, "severity.impulse_N_s": value(2.0)}), "DE": bearing(PEAKS)},
+)
 
 
 def test_a_further_draw_lies_anywhere_with_equal_probability():
@@ -80,12 +76,11 @@ def test_the_worst_of_a_hundred():
 
 
 def test_numbers_of_an_estimate_are_found_by_their_column():
-    found = recorded_numbers(DOCUMENT)
+    found = recorded_numbers(DROP)
     assert found["NDE.peak_force"] == Known(value=2500.0, interval_90=(2450.0, 2550.0))
     assert found["NDE.impulse"] == Known(value=2.0)
-    assert set(found) == {"NDE.peak_force", "NDE.impulse"}
-    with pytest.raises(UsageError, match="is no estimate of one drop"):
-        recorded_numbers({"drops": {}})
+    peaks = {f"{end}.peak_{what}" for end in ("NDE", "DE") for what in ("force", "stress")}
+    assert set(found) == {"NDE.impulse", *peaks}
 
 
 def test_chances_are_those_of_a_drop():
@@ -113,7 +108,7 @@ def test_chances_are_those_of_a_drop():
 
 def test_the_verb(tmp_path, capsys):
     save_machine(MACHINE, tmp_path / "machine.toml")
-    (tmp_path / "drop.json").write_text(json.dumps(DOCUMENT))
+    (tmp_path / "drop.json").write_text(json.dumps(DROP.as_json()))
     call = ["study", "repeat", str(tmp_path / "machine.toml"), str(tmp_path / "drop.json"), "--threads", "1"]
     out = tmp_path / "r.json"
     assert run([*call, "--drops", "20", "--folder", str(tmp_path / "study"), "--json", str(out)]) == 0

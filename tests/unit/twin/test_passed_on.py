@@ -15,7 +15,6 @@ from rotordrop.elements.table import parameter
 from rotordrop.estimate import simulated_coast_down
 from rotordrop.estimate.bearing_drop import Motion, deepest
 from rotordrop.estimate.bearing_values import equivalent_stiffness
-from rotordrop.estimate.document import _heading
 from rotordrop.estimate.estimate import Verdict
 from rotordrop.estimate.later_motion import RESOLVED, later_motion
 from rotordrop.known import Known
@@ -223,26 +222,6 @@ def test_an_impact_lasts_from_its_first_to_its_last_indented_sample() -> None:
         assert impact.dissipated_energy.value == pytest.approx(0.01 * total)
         assert force[strongest, 0] + 5.0 <= impact.peak_force.value < 1.2 * (force[strongest, 0] + 5.0)
         assert impact.peak_time == pytest.approx(time[strongest], abs=2.6e-5)
-
-
-def test_a_speed_is_written_in_turns_per_second() -> None:
-    estimate: Any = SimpleNamespace(
-        record=SimpleNamespace(path=None, sha256="ab", event_date="2024-05-06"),
-        method=tracked_estimate.Tracked(quick=True),
-        verdict=Verdict.CONSISTENT,
-        consistent=True,
-        machine=SimpleNamespace(name="machine"),
-        name="drop",
-        simulated_record=False,
-        drop_instant=SimpleNamespace(value=0.25, interval_90=(0.24, 0.26)),
-        speed=2.0 * math.pi * 60.0,
-        until=0.2,
-    )
-    written = _heading(estimate)
-    assert written["speed_Hz"] == pytest.approx(60.0)
-    assert written["drop_instant_interval_90_s"] == [0.24, 0.26]
-    assert (written["method"], written["quick"], written["record"]) == ("tracked", True, "drop")
-    assert written["recorded"] == "2024-05-06"
 
 
 @pytest.mark.parametrize(

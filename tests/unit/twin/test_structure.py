@@ -15,7 +15,7 @@ from rotordrop.elements.parameter import derived
 from rotordrop.elements.support import soft_axis, soft_over_stiff
 from rotordrop.elements.table import EXTENSIONS
 from rotordrop.errors import IdentificationError
-from rotordrop.estimate.document import structure_json
+from rotordrop.estimate.document import published_structure
 from rotordrop.estimate.estimate import Verdict
 from rotordrop.known import Known
 from rotordrop.machine import Machine, example_machine, load_machine, save_machine
@@ -235,7 +235,7 @@ def test_every_extension_says_what_was_found_with_its_interval(lp400, extension)
     }
     said = structure_of(Accepted(extension=extension, gain=math.inf), machine, values)
     assert said.sentence.startswith("Found: ") and " to " in said.sentence
-    assert structure_json([said]) == [
+    assert [one.as_json() for one in published_structure([said])] == [
         {"name": extension.name, "log_likelihood_rise": None, "sentence": said.sentence}
     ]
 

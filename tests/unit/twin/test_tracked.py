@@ -21,8 +21,8 @@ from rotordrop.estimate.allowances import MODEL_FORCE_SIGMA
 from rotordrop.estimate.bearing_drop import Origin
 from rotordrop.estimate.document import combined, estimate_document
 from rotordrop.estimate.estimate import Estimate, Verdict
+from rotordrop.estimate.published import Drop, estimate_schema
 from rotordrop.estimate.record_facts import RecordFacts, facts_of
-from rotordrop.estimate.schema import estimate_schema
 from rotordrop.estimation import Tracked, estimate_drop, estimate_drops
 from rotordrop.evidence.evidence import Evidence, Missing, read_evidence
 from rotordrop.evidence.power_off import PowerOff
@@ -155,7 +155,14 @@ def test_document_follows_the_published_schema(tracked: Estimate, calibrated: Ma
         assert not validator.is_valid({**one, wrong: 1.0}), wrong
         bearings = {name: {**entry, wrong: 1.0} for name, entry in one["bearings"].items()}
         assert not validator.is_valid({**one, "bearings": bearings}), wrong
-    assert one["method"] == "tracked"
+    assert (one["method"], one["record"]) == ("tracked", "hidden_060")
+    assert one["speed_Hz"] == pytest.approx(60.0, rel=1e-3)
+    instant = tracked.drop_instant
+    assert (one["drop_instant_s"], one["drop_instant_interval_90_s"]) == (
+        instant.value,
+        [*instant.interval_90],
+    )
+    assert Drop.of(one, "here", "a test").as_json() == one
     for name in BEARINGS:
         for impact in one["bearings"][name]["impacts"]:
             for field in ("peak_force_N", "impulse_N_s", "dissipated_energy_J"):

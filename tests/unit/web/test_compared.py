@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+from tests.published import bearing, published, value
 from tests.unit.web.serving import Served
 
 from rotordrop.ledger.book import LoggedDrop, Severity, add_drop
@@ -16,11 +17,9 @@ def estimated(server: Served, name: str, sha256: str, peak: float) -> str:
     job = server.space.job(number)
     made = job.path / "estimate.made"
     made.mkdir()
-    document = {
-        "machine": "LP-400", "record": name, "record_sha256": sha256, "speed_Hz": 60.0, "method": "tracked",
-        "bearings": {"DE": {"peak_force_N": {"value": peak, "interval_90": [0.9 * peak, 1.1 * peak]}}},
-    }  # fmt: skip
-    (made / "document.json").write_text(json.dumps(document))
+    peaks = {"peak_force_N": value(peak, 0.9 * peak, 1.1 * peak), "peak_stress_Pa": value(1e9)}
+    document = published(machine="LP-400", record=name, record_sha256=sha256, bearings={"DE": bearing(peaks)})
+    (made / "document.json").write_text(json.dumps(document.as_json()))
     publish(job, "estimate", "0" * 16, made)
     return str(number)
 

@@ -1,0 +1,89 @@
+"""Documents: types declared once, from which JSON, its JSON Schema and reading back follow."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
+from pydantic_core import core_schema
+
+from rotordrop.errors import UsageError
+from rotordrop.json_schema import DIALECT
+
+ABSENT: Any = None
+"""Default of a field that may be left out. It is then not written, and null is refused in its place."""
+
+Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
+
+
+class Schema(GenerateJsonSchema):
+    """JSON Schema without what a reader of documents has no use for: titles of fields, defaults."""
+
+    def default_schema(self, schema: core_schema.WithDefaultSchema) -> JsonSchemaValue:
+        """The schema of the value alone."""
+        return self.generate_inner(schema["schema"])
+
+    def field_title_should_be_set(self, schema: Any) -> bool:
+        """No: the key says what the title would."""
+        return False
+
+
+class Document(BaseModel):
+    """A frozen part of a document; it refuses unknown keys, NaN, infinity and values of another type."""
+
+    # a number given as text, or a flag as 1, is a document that somebody else wrote
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, strict=True, allow_inf_nan=False, use_attribute_docstrings=True
+    )
+
+    def as_json(self) -> dict[str, Any]:
+        """The document ready for JSON; what was left out stays out."""
+        return self.model_dump(exclude_unset=True)
+
+    @classmethod
+    def of(cls, content: Any, place: str, made_by: str) -> Self:
+        """The document that a mapping holds.
+
+        Raises
+        ------
+        UsageError
+            If it holds something else; names the place, the first fault in it and who writes such documents.
+        """
+        try:
+            return cls.model_validate(content)
+        except ValidationError as error:
+            fault = error.errors(include_url=False)[0]
+            where = ".".join(str(part) for part in fault["loc"]) or "the document"
+            found = "" if fault["type"] == "missing" else f" is {str(fault['input'])[:60]!r}"
+            raise UsageError(
+                f"{place}: {where}{found}: {fault['msg']}. Give a file that '{made_by}' wrote."
+            ) from None
+
+    @classmethod
+    def schema_of(cls, title: str, description: str) -> dict[str, Any]:
+        """The published JSON Schema."""
+        made = cls.model_json_schema(schema_generator=Schema, mode="validation")
+        return {"$schema": DIALECT, **made, "title": title, "description": description}
+
+
+def read_json(path: Path, made_by: str) -> dict[str, Any]:
+    """The object that a JSON file holds.
+
+    Raises
+    ------
+    UsageError
+        If it cannot be read, is no JSON, or holds something else than an object.
+    """
+    way_out = f"Give a file that '{made_by}' wrote."
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as fault:
+        raise UsageError(f"{path} cannot be read ({fault.strerror}). {way_out}") from fault
+    except ValueError as fault:
+        raise UsageError(f"{path} is not JSON ({fault}). {way_out}") from fault
+    if not isinstance(content, dict):
+        raise UsageError(f"{path} holds a {type(content).__name__}; expected an object. {way_out}")
+    return content

@@ -1,0 +1,539 @@
+"""The published document of an estimate, declared; it is written from these types and read back into them.
+
+Times are from power-off, all numbers in SI units, the unit stands in the key.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import (
+    ModelWrapValidatorHandler,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
+
+from rotordrop.document import ABSENT, Document, Pair, Schema, read_json
+from rotordrop.elements.table import LOADS, published
+from rotordrop.errors import UsageError
+from rotordrop.json_schema import DIALECT, closed
+from rotordrop.known import Known
+from rotordrop.severity.numbers import SEVERITY
+from rotordrop.units import si_unit
+
+FORMAT = "rotordrop estimate 2"
+MADE_BY = "rotordrop estimate --json"
+
+
+class Value(Document):
+    """A number with what is known of it."""
+
+    value: float
+    """Value in the unit of the field name."""
+    status: str = ABSENT
+    """Verdict, or why there is no interval."""
+    standard_error: float = ABSENT
+    """Standard error in the same unit."""
+    interval_90: Pair = ABSENT
+    """Interval that holds the true value with 90 % probability."""
+    allowance_90: float = ABSENT
+    """Half width of the interval by what the model leaves out alone."""
+    lower: float = ABSENT
+    """Lower limit set by the record."""
+    upper: float = ABSENT
+    """Upper limit set by the record."""
+    start: float = ABSENT
+    """Where the search began."""
+    bounds: Pair = ABSENT
+    """Limits of the search."""
+    unit: str = ABSENT
+    time_s: float = ABSENT
+    """When, from power-off."""
+
+    @classmethod
+    def of_known(cls, known: Known, time: float | None = None) -> Value:
+        """As a result states it, with the time [s] of a peak."""
+        when = {} if time is None else {"time_s": time}
+        return cls.model_validate({**known.as_json(), **when})
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """The 90 % interval, where there is one."""
+        ends: list[float] | None = self.interval_90
+        return None if ends is None else (ends[0], ends[1])
+
+
+class Impact(Document):
+    """One impact at one bearing."""
+
+    start_s: float
+    end_s: float | None
+    peak_time_s: float
+    azimuth_rad: float
+    peak_force_N: Value
+    impulse_N_s: Value
+    dissipated_energy_J: Value
+
+
+class Statistics(Document):
+    """Distribution of the stress [Pa]."""
+
+    rule: str
+    weighted_by_time: bool
+    count: int
+    mean: float
+    median: float
+    lower_quartile: float
+    upper_quartile: float
+    lower_whisker: float
+    upper_whisker: float
+    standard_deviation: float
+    minimum: float
+    maximum: float
+    beyond_whiskers: int
+    above_three_sigma: int
+    three_sigma_limit: float
+    preload_stress: float = ABSENT
+    preload_share: float = ABSENT
+
+
+def described() -> dict[str, str]:
+    """Every number that a bearing may have, by its path in the document, with label and unit."""
+    found = {field: f"{row.label} [{row.unit}]" for field, row in published().items()}
+    found |= {load.field: f"{load.label} [{si_unit(load.kind)}]" for load in LOADS}
+    return found | {one.field: f"{one.label} [{si_unit(one.kind) or '1'}]" for one in SEVERITY}
+
+
+class Bearing(Document):
+    """What happened at one touchdown bearing.
+
+    Its ``numbers`` are known by their paths (``"support.mass_kg"``) and stand in the document one within the
+    other.
+    """
+
+    origin: str
+    """Who found force and stress of this bearing."""
+    numbers: dict[str, Value]
+    stress_statistics_Pa: Statistics
+    impacts: list[Impact]
+    not_stated: dict[str, str] = ABSENT
+    """Numbers that are not stated, and why."""
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _from_json(cls, content: Any, handler: ModelWrapValidatorHandler[Bearing]) -> Bearing:
+        if not isinstance(content, Mapping) or "numbers" in content:
+            return handler(content)
+        groups = {path.partition(".")[0] for path in described()}
+        numbers = {key: value for key, value in content.items() if key in groups}
+        return handler(
+            {key: value for key, value in content.items() if key not in groups}
+            | {"numbers": dict(_flat(numbers))}
+        )
+
+    @model_validator(mode="after")
+    def _known_numbers(self) -> Bearing:
+        unknown = self.numbers.keys() - described().keys()
+        missing = {"peak_force_N", "peak_stress_Pa"} - self.numbers.keys()
+        if unknown:
+            raise ValueError(f"{min(unknown)} is no number of a bearing")
+        if missing:
+            raise ValueError(f"{min(missing)} is missing")
+        return self
+
+    @model_serializer(mode="wrap")
+    def _to_json(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        made = handler(self)
+        numbers = made.pop("numbers")
+        severity = {path: value for path, value in numbers.items() if path.startswith("severity.")}
+        rest = {path: value for path, value in numbers.items() if path not in severity}
+        return {"origin": made.pop("origin"), **nested(rest), **made, **nested(severity)}
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: Any, handler: Any) -> dict[str, Any]:
+        """The numbers one within the other, each with its label and unit."""
+        schema: dict[str, Any] = handler.resolve_ref_schema(handler(core))
+        entry = schema["properties"].pop("numbers")["additionalProperties"]
+        tree = nested({path: {**entry, "description": text} for path, text in described().items()})
+        for name, branch in tree.items():
+            schema["properties"][name] = branch if "$ref" in branch else closed(branch)
+        needed = [name for name in schema["required"] if name != "numbers"]
+        schema["required"] = [*needed, "peak_force_N", "peak_stress_Pa"]
+        return schema
+
+
+def nested(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Numbers by path one within the other: ``support.mass_kg`` becomes ``support: {mass_kg: …}``."""
+    tree: dict[str, Any] = {}
+    for path, value in values.items():
+        group, _, leaf = path.rpartition(".")
+        (tree.setdefault(group, {}) if group else tree)[leaf] = value
+    return tree
+
+
+def _flat(tree: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    known = described()
+    for name, branch in tree.items():
+        if name in known or not isinstance(branch, Mapping):
+            yield name, branch
+        else:
+            yield from ((f"{name}.{leaf}", value) for leaf, value in branch.items())
+
+
+class Check(Document):
+    """One check of consistency."""
+
+    name: str
+    passed: bool
+    message: str
+    note: str
+
+
+class Consistency(Document):
+    """What model and record say of each other."""
+
+    consistent: bool
+    sentence: str
+    nis: float | None
+    process_noise_factor: float | None
+    checks: list[Check]
+
+
+class Structure(Document):
+    """Something the machine has beyond the base model."""
+
+    name: str
+    log_likelihood_rise: float | None
+    """Of the readings, by it; null where the model without it needed larger impulses."""
+    sentence: str
+
+
+class Advice(Document):
+    """What to measure of the machine."""
+
+    measurement: str
+    paths: list[str]
+    half_widths_N: dict[str, float]
+    """Half the 90 % interval of the peak force by bearing."""
+    narrowed_N: dict[str, float]
+    """The same once the measurement is known."""
+    sentence: str
+
+
+class CrossCheck(Document):
+    """One number found in two ways."""
+
+    name: str
+    estimate: float
+    cross_check: float
+    known_relative_accuracy: float
+    agrees: bool
+    replaced: bool
+    """Whether the cross-check stands in place of the estimate."""
+
+
+class LaterMotion(Document):
+    """How far the rotor went after the estimated part [m, s]."""
+
+    bearing: str
+    first: float
+    first_time: float
+    later: float
+    later_time: float
+    resolved: float
+    larger: bool
+    """Whether the rotor went further out after the estimated part."""
+
+
+class Parameter(Document):
+    """One unknown."""
+
+    path: str
+    scope: str
+    prior: Value | None
+    estimate: Value
+
+
+class Joint(Document):
+    """How the errors of what belongs to the machine hang together."""
+
+    paths: list[str]
+    mean: list[float]
+    """In the measures of the estimate, mostly logarithms."""
+    covariance: list[float]
+    """Lower triangle, row by row, of the errors of the mean."""
+    prior_mean: list[float]
+    prior_standard_deviation: list[float]
+
+
+class Sensor(Document):
+    """What was found of one sensor."""
+
+    gain_error: Value
+    offset_m: Value
+    noise_m: float
+
+
+class Unbalance(Document):
+    """Unbalance of one plane."""
+
+    node: int
+    """Node of the plane, counted from 1."""
+    amount_kg_m: Value
+    phase_rad: Value | None
+    """Heavy spot when the mark of the shaft passes, from +y, positive with the spin; null where the record
+    has no mark or tells no direction."""
+    sentence: str
+
+
+class Speed(Document):
+    """Speed in a replay."""
+
+    aero_time_constant_s: Value | None
+    profile_time_constant_s: float | None
+    friction_loss_Hz: float
+    simulated_end_Hz: float
+
+
+class Expansion(Document):
+    """Start by modal expansion (the paper's), by bearing."""
+
+    displacement_m: dict[str, list[float]]
+    velocity_m_per_s: dict[str, list[float]]
+
+
+class InitialState(Document):
+    """Start of a replay, by bearing."""
+
+    displacement_m: dict[str, list[float]]
+    velocity_m_per_s: dict[str, list[float]]
+    remanent_force_N: list[Any]
+    remanence_time_constant_s: float
+    misfit: float
+    modal_expansion: Expansion
+
+
+class Correlation(Document):
+    """How the errors of two parameters correlate."""
+
+    first: str
+    second: str
+    value: float
+
+
+class Supports(Document):
+    """The search for the supports."""
+
+    starts: int
+    agreeing: int
+    windows_s: list[float]
+    misfit: float
+    simulations: int
+    ended_early: str | None
+    correlations: list[Correlation]
+
+
+class FrictionSweep(Document):
+    """The sweep of the friction coefficient."""
+
+    dynamic: list[float]
+    disagreement_m: list[float]
+    window_s: Pair
+
+
+class Draws(Document):
+    """Draws behind the intervals."""
+
+    count: int
+    rejected: int
+
+
+class Identification(Document):
+    """What a replay searched for."""
+
+    support: Supports = ABSENT
+    friction_sweep: FrictionSweep = ABSENT
+    draws: Draws = ABSENT
+
+
+class Settled(Document):
+    """The settled rest at one bearing."""
+
+    radius_m: float
+    sideways_m: float
+    sway_m: float
+    indentation_m: float
+    race_deflection_m: float
+    support_deflection_m: float
+    vertical_zero_sigma_m: float
+
+
+class FirstContact(Document):
+    """The first contact of one bearing in the record (Neisi 2020, eq. 17)."""
+
+    start_s: float
+    end_s: float
+    duration_s: float
+    timing_error_s: float
+    impact_speed_m_per_s: float
+    indentation_m: float
+    mass_kg: float
+    half_period_stiffness_N_per_m: float
+    half_period_stiffness_error_N_per_m: float
+    gravity_corrected_stiffness_N_per_m: float
+
+
+class Window(Document):
+    """Root mean square distance of replay and record in a window [m, s], by bearing."""
+
+    name: str
+    start: float
+    end: float
+    rms: dict[str, float]
+
+
+class BearingAgreement(Document):
+    """How far the replay follows the record at one bearing."""
+
+    measured_contacts_s: list[Pair]
+    simulated_contacts_s: list[Pair]
+    measured_bounce_m: float | None
+    simulated_bounce_m: float | None
+    horizon_s: float
+
+
+class Agreement(Document):
+    """How far the replay follows the record."""
+
+    windows: list[Window]
+    bearings: dict[str, BearingAgreement]
+    orbit_disagreement_m: float
+    expected_horizon_s: float | None
+
+
+class Drop(Document):
+    """The estimate of one drop."""
+
+    format: str
+    verdict: str
+    """What model and record say of each other, in a sentence."""
+    consistent: bool
+    """Whether single numbers hold within their intervals."""
+    rotordrop_version: str
+    fingerprint: str
+    """Hash of a probe drop as this computer computes it."""
+    machine: str
+    record: str
+    record_sha256: str
+    recorded: str
+    """When the recorder says the drop was; empty where it does not."""
+    simulated_record: bool
+    """Whether the record is known to be simulated."""
+    method: Literal["tracked", "replay"]
+    quick: bool
+    drop_instant_s: float
+    """Power-off in record time."""
+    drop_instant_interval_90_s: Pair
+    speed_Hz: float
+    """Rotor speed at power-off."""
+    estimated_until_s: float
+    """End of the part that the numbers are of."""
+    warnings: list[str]
+    notes: list[str]
+    consistency: Consistency
+    bearings: dict[str, Bearing]
+    structure: list[Structure]
+    advice: list[Advice]
+    cross_check: list[CrossCheck]
+    later_motion: list[LaterMotion]
+    parameters: list[Parameter]
+    joint: Joint | None
+    """How the errors of what belongs to the machine hang together."""
+    sensors: dict[str, Sensor]
+    unbalance: list[Unbalance]
+    fixed: str | None = ABSENT
+    """Where supports and friction of a replay were taken from; null where they were identified."""
+    speed: Speed = ABSENT
+    initial_state: InitialState = ABSENT
+    identification: Identification = ABSENT
+    settled: dict[str, Settled] = ABSENT
+    first_contact: dict[str, FirstContact] = ABSENT
+    agreement: Agreement = ABSENT
+
+    @property
+    def correlations(self) -> list[Correlation]:
+        """How the errors of support values correlate; empty where a method did not search for them."""
+        found = self.model_fields_set
+        if "identification" not in found or "support" not in self.identification.model_fields_set:
+            return []
+        return self.identification.support.correlations
+
+
+class Drops(Document):
+    """The estimates of several drops of one machine."""
+
+    format: str
+    rotordrop_version: str
+    fingerprint: str
+    machine: str
+    drops: dict[str, Drop]
+
+
+def drops_of(content: Mapping[str, Any], place: str) -> dict[str, Drop]:
+    """The estimates that an object holds, by name; one of a single drop has the name of its place.
+
+    Raises
+    ------
+    UsageError
+        If it is no document of an estimate, or one of another version.
+    """
+    if (found := content.get("format")) != FORMAT:
+        raise UsageError(
+            f"{place}: the format is {found!r}; expected {FORMAT!r}. Give a file that '{MADE_BY}' of this "
+            "version wrote, or estimate the drop anew."
+        )
+    if "drops" in content:
+        return Drops.of(content, place, MADE_BY).drops
+    return {Path(place).stem: Drop.of(content, place, MADE_BY)}
+
+
+def drop_of(content: Mapping[str, Any], place: str) -> Drop:
+    """The estimate of the one drop that an object holds.
+
+    Raises
+    ------
+    UsageError
+        If it is no document of an estimate, one of another version, or one of several drops.
+    """
+    drops = drops_of(content, place)
+    if len(drops) > 1:
+        raise UsageError(
+            f"{place} holds the drops {', '.join(drops)}; expected one. Write that drop to a file of its own."
+        )
+    return next(iter(drops.values()))
+
+
+def read_drops(path: Path) -> dict[str, Drop]:
+    """The estimates that a file holds, by name."""
+    return drops_of(read_json(path, MADE_BY), str(path))
+
+
+def read_drop(path: Path) -> Drop:
+    """The estimate of the one drop that a file holds."""
+    return drop_of(read_json(path, MADE_BY), str(path))
+
+
+def estimate_schema() -> dict[str, Any]:
+    """JSON Schema of the document that ``rotordrop estimate --json`` writes; times are from power-off."""
+    made = Drops.model_json_schema(schema_generator=Schema)
+    definitions = made.pop("$defs")
+    return {
+        "$schema": DIALECT,
+        "title": "rotordrop estimate",
+        "description": "Force and stress of touchdown bearings from one or several recorded drops.",
+        "oneOf": [{"$ref": "#/$defs/Drop"}, made],
+        "$defs": definitions,
+    }
