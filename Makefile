@@ -41,8 +41,8 @@ lint: $(READY) ## check style, types and layers
 
 docs: $(READY) ## build the documentation and run its examples
 	@$(BIN)/python docs/generate_validation.py
-	@$(BIN)/python -m sphinx -q -W --keep-going -b doctest docs docs/_build/doctest
-	@NUMBA_DISABLE_JIT=1 $(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build/html
+	@NUMBA_DISABLE_JIT=1 $(BIN)/python -m sphinx -q -W --keep-going -d docs/_build/read -b html docs docs/_build/html
+	@$(BIN)/python -m sphinx -q -W --keep-going -d docs/_build/read -b doctest docs docs/_build/doctest
 	@echo "The documentation is $(CURDIR)/docs/_build/html/index.html"
 
 audit: $(READY) ## look the locked versions up in a database of known vulnerabilities

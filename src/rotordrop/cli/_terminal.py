@@ -78,11 +78,11 @@ def interruptions_kept() -> Iterator[Callable[[], bool]]:
         raise KeyboardInterrupt
 
     def raise_again(ignored: UnraisableHookArgs) -> None:
-        if ignored.exc_type is not KeyboardInterrupt:
+        if ignored.exc_type is KeyboardInterrupt:
+            timers.append(Timer(AGAIN_AFTER_S, interrupt_main))
+            timers[-1].start()
+        elif not pressed.is_set():  # what an interrupt left half built complains when it is deleted
             print_ignored(ignored)
-            return
-        timers.append(Timer(AGAIN_AFTER_S, interrupt_main))
-        timers[-1].start()
 
     if handler is signal.default_int_handler:
         signal.signal(signal.SIGINT, interrupt)

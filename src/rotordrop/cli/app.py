@@ -241,12 +241,13 @@ def main(program: typer.Typer = app, name: str = "rotordrop") -> None:
                 raise
             typer.echo(f"{name}: {STOPPED}", err=True)
             code = INTERRUPTED
-    if code == INTERRUPTED:
-        # Python remembers a KeyboardInterrupt that passed through an exec, as in imports that build classes,
-        # and then kills itself with SIGINT although it was caught: what is registered for the end runs here.
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-        atexit._run_exitfuncs()
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(INTERRUPTED)
+        if code == INTERRUPTED:
+            # Python remembers a KeyboardInterrupt that passed through an exec, as in imports that build
+            # classes, and then kills itself with SIGINT although it was caught: what is registered for the
+            # end runs here.
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+            atexit._run_exitfuncs()
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(INTERRUPTED)
     sys.exit(code)
