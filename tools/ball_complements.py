@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from rotordrop.elements.catalog import CatalogueBearing, ball_size, designations, find_bearing
+from rotordrop.elements.catalog.lookup import CatalogueBearing, ball_size, designations, find_bearing
 from rotordrop.physics.ball_bearing import row_approach, row_axial_force, row_axial_stiffness
 from rotordrop.physics.hertz import compliance, contacts_in_series, race_contact
 

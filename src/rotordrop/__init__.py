@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rotordrop._version import __version__
 
 if TYPE_CHECKING:
-    from rotordrop.elements.catalog import find_bearing as find_bearing
+    from rotordrop.elements.catalog.lookup import find_bearing as find_bearing
     from rotordrop.errors import RotordropError as RotordropError
     from rotordrop.estimation import Replay as Replay
     from rotordrop.estimation import Tracked as Tracked
@@ -60,7 +60,7 @@ _PUBLIC = {
     "check_record": "rotordrop.evidence",
     "estimate_drop": "rotordrop.estimation",
     "estimate_drops": "rotordrop.estimation",
-    "find_bearing": "rotordrop.elements.catalog",
+    "find_bearing": "rotordrop.elements.catalog.lookup",
     "example_machine": "rotordrop.machine",
     "example_record_path": "rotordrop.record",
     "format_quantity": "rotordrop.units",

@@ -16,8 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from rotordrop.elements.catalog import CatalogueBearing, designations, find_bearing, read_designation
-from rotordrop.elements.catalog.lookup import infer_from_designation
+from rotordrop.elements.catalog.designation import read_designation
+from rotordrop.elements.catalog.lookup import (
+    CatalogueBearing,
+    designations,
+    find_bearing,
+    infer_from_designation,
+)
 from rotordrop.physics.ball_bearing import BearingConstants, axial_rigidity, bearing_constants
 from rotordrop.physics.ball_bearing_geometry import BallBearingGeometry
 from rotordrop.physics.ball_set import ball_set_entries, ball_set_load, balls_of, static_deflection

@@ -29,11 +29,12 @@ from typing import Any
 
 import numpy as np
 
-from rotordrop.elements.catalog import PairRigidity, read_designation
 from rotordrop.elements.catalog.boundary import DIMENSION_SERIES
+from rotordrop.elements.catalog.designation import read_designation
 from rotordrop.elements.catalog.inference import (
     USUAL_GROOVE,
     InferredBalls,
+    PairRigidity,
     dynamic_rating,
     groove_factors,
     infer_balls,

@@ -21,7 +21,7 @@ from tests.reference.ball_bearing_catalogue import (
 )
 from tests.reference.closed_forms import bearing_equilibrium, lift_off_force
 
-from rotordrop.elements.catalog import CatalogueBearing, designations, find_bearing
+from rotordrop.elements.catalog.lookup import CatalogueBearing, designations, find_bearing
 from rotordrop.physics import hertz
 from rotordrop.physics.ball_bearing import BearingConstants, axial_rigidity, bearing_constants
 from rotordrop.physics.ball_bearing_geometry import BallBearingGeometry

@@ -238,7 +238,7 @@ def bearings(
 
     Example: rotordrop bearings "7016 ACD/HCP4A"
     """
-    from rotordrop.elements.catalog import find_bearing, search_bearings
+    from rotordrop.elements.catalog.lookup import find_bearing, search_bearings
     from rotordrop.report.bearing_content import bearing_content, bearing_json
 
     try:

@@ -5,28 +5,32 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, Strict
 
 from rotordrop.elements import values as V
-from rotordrop.elements.catalog import (
+from rotordrop.elements.catalog.boundary import (
+    CLASSES,
     PRELOAD_FACTOR,
-    CatalogueBearing,
-    PairRigidity,
+    ClearanceClass,
     PreloadClass,
-    find_bearing,
+    clearance_range,
 )
-from rotordrop.elements.catalog.boundary import CLASSES, ClearanceClass, clearance_range
 from rotordrop.elements.description import Misfit, Text, Usual
+from rotordrop.elements.parameter import Measure, Parameter, Role, Step, bearing_entries
 from rotordrop.elements.race_bearing import Oddity, RaceBearing
 from rotordrop.elements.rotor import DENSITY, ELASTIC, POISSON
 from rotordrop.elements.values import default, follows
 from rotordrop.known import Known
+from rotordrop.physics import columns as L
 from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
     from rotordrop.elements.ball_numbers import BallNumbers
+    from rotordrop.elements.catalog.lookup import CatalogueBearing
+    from rotordrop.elements.touchdown_bearing import TouchdownBearing
 
 BallMaterial = Literal["silicon nitride", "steel"]
 
@@ -210,6 +214,9 @@ class BallBearing(RaceBearing):
         """Find the bearing in the catalogue; a bearing described by its geometry need not be there."""
         if self.designation is None:
             return None
+        from rotordrop.elements.catalog.inference import PairRigidity  # a thousand lines, for whom they serve
+        from rotordrop.elements.catalog.lookup import find_bearing
+
         known, rigidity = self.model_fields_set, None
         if self.axial_rigidity is not None:
             if "preload" not in known or not self.preload.value > 0.0:
@@ -425,3 +432,49 @@ def _check_play(values: dict[str, Any]) -> None:
             f"{f'leave at {math.degrees(angle):.4g}°' if angle > 0.0 else 'allow'}; check it",
             ("clearance",),
         )
+
+
+NO_PRELOAD = Known(value=0.0, status="default", source="this kind of bearing has none", unit="N")
+"""What a bearing without rows to press against each other has: no unknown."""
+
+
+def _preload(bearing: TouchdownBearing) -> Known:
+    return getattr(bearing.bearing, "preload", NO_PRELOAD)
+
+
+def _offset_of_preload(balls: BallBearing, force: float) -> float:
+    return balls.changed(preload=Known(value=force)).numbers().constants.axial_offset
+
+
+def _by_offset(bearing: TouchdownBearing) -> Measure:
+    """The preload by the axial offset of the rows, which is what the ball forces depend on."""
+    from rotordrop.physics.ball_bearing import preload_of_offset  # compiled, as the numbers are
+
+    constants = bearing.bearing.numbers().constants
+    return Measure(
+        name="axial offset of the ball rows",
+        start=constants.axial_offset,
+        of_value=partial(_offset_of_preload, bearing.bearing),
+        value_of=partial(preload_of_offset, constants),
+    )
+
+
+PARAMETERS: tuple[Parameter, ...] = (
+    Parameter(
+        path="preload",
+        label="preload",
+        kind="force",
+        measured_by="the preload of the bearing at {owner}, from its drawing",
+        logarithmic=False,  # by the axial offset of the ball rows, which is what the ball forces depend on
+        role=Role.CONSIDERED,
+        guess_sigma=0.15,
+        entries=bearing_entries(L.AXIAL_OFFSET),
+        step=Step.IMPACTS,
+        field="preload_N",
+        truth=("preload_N",),
+        read=_preload,  # no lambda: a parameter is sent to other processes
+        estimated_by=_by_offset,
+        taken_over="welcome",
+    ),
+)
+"""Unknowns of a ball bearing."""

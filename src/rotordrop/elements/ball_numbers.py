@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from rotordrop.elements.ball_bearing import STATIC_STRESS, BallBearing
 from rotordrop.elements.catalog.inference import dynamic_rating, static_rating
-from rotordrop.elements.parameter import Measure, Parameter, Role, Step, bearing_entries
 from rotordrop.elements.race_bearing import (
     BearingFigure,
     BearingNumbers,
@@ -23,12 +22,10 @@ from rotordrop.elements.race_bearing import (
     Spread,
 )
 from rotordrop.known import NINETY, Known
-from rotordrop.physics import columns as L
 from rotordrop.physics.ball_bearing import (
     BearingConstants,
     ball_centrifugal_force,
     bearing_constants,
-    preload_of_offset,
 )
 from rotordrop.physics.ball_bearing_response import bearing_response, simple_radial_stiffness
 from rotordrop.physics.ball_loads import ball_loads, displacement_under
@@ -38,7 +35,6 @@ from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
     from rotordrop.elements.ball_bearing import BallBearing
-    from rotordrop.elements.touchdown_bearing import TouchdownBearing
 
 Array = NDArray[np.float64]
 
@@ -254,50 +250,6 @@ class BallNumbers(BearingNumbers):
 
 def _figure(field: str, label: str, kind: str, value: float, described: Known | None = None) -> BearingFigure:
     return BearingFigure(field=field, label=label, kind=kind, value=value, described=described)
-
-
-NO_PRELOAD = Known(value=0.0, status="default", source="this kind of bearing has none", unit="N")
-"""What a bearing without rows to press against each other has: no unknown."""
-
-
-def _preload(bearing: TouchdownBearing) -> Known:
-    return getattr(bearing.bearing, "preload", NO_PRELOAD)
-
-
-def _offset_of_preload(balls: BallBearing, force: float) -> float:
-    return bearing_constants(balls.changed(preload=Known(value=force))).axial_offset
-
-
-def _by_offset(bearing: TouchdownBearing) -> Measure:
-    """The preload by the axial offset of the rows, which is what the ball forces depend on."""
-    constants = _constants(bearing.bearing)
-    return Measure(
-        name="axial offset of the ball rows",
-        start=constants.axial_offset,
-        of_value=partial(_offset_of_preload, bearing.bearing),
-        value_of=partial(preload_of_offset, constants),
-    )
-
-
-PARAMETERS: tuple[Parameter, ...] = (
-    Parameter(
-        path="preload",
-        label="preload",
-        kind="force",
-        measured_by="the preload of the bearing at {owner}, from its drawing",
-        logarithmic=False,  # by the axial offset of the ball rows, which is what the ball forces depend on
-        role=Role.CONSIDERED,
-        guess_sigma=0.15,
-        entries=bearing_entries(L.AXIAL_OFFSET),
-        step=Step.IMPACTS,
-        field="preload_N",
-        truth=("preload_N",),
-        read=_preload,  # no lambda: a parameter is sent to other processes
-        estimated_by=_by_offset,
-        taken_over="welcome",
-    ),
-)
-"""Unknowns of a ball bearing."""
 
 
 def inferred_stress_sigma(bearing: BallBearing) -> float:

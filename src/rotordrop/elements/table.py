@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 from rotordrop.elements import (
     air,
-    ball_numbers,
+    ball_bearing,
     contact,
     friction,
     magnet,
@@ -32,7 +32,7 @@ TABLE: tuple[Parameter, ...] = (
     *friction.PARAMETERS,
     *race.PARAMETERS,
     *touchdown_bearing.DAMPING,
-    *ball_numbers.PARAMETERS,
+    *ball_bearing.PARAMETERS,
     *sensor.PARAMETERS,
     *unbalance.PARAMETERS,
     *magnet.FORCES,

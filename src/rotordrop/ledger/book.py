@@ -279,8 +279,6 @@ def trends(where: str | Path, *, machine: str | None = None) -> tuple[Trend, ...
 
     Source: Kendall 1938; exact for few drops. Five drops at least, and one in a hundred by chance.
     """
-    from scipy.stats import kendalltau
-
     series: dict[tuple[str, str, str, str], list[float]] = {}
     for drop in logged_drops(where, machine=machine).values():
         for one in drop.severity:
@@ -291,6 +289,8 @@ def trends(where: str | Path, *, machine: str | None = None) -> tuple[Trend, ...
     for (name, bearings, bearing, quantity), values in series.items():
         if len(values) < FEWEST_FOR_TREND:
             continue
+        from scipy.stats import kendalltau  # half a second, for those who have that many drops
+
         tau, chance = kendalltau(range(len(values)), values)
         if chance < BY_CHANCE:
             found.append(

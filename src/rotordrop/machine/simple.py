@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from rotordrop.elements.catalog import find_bearing
+from rotordrop.elements.catalog.lookup import find_bearing
 from rotordrop.elements.rotor import Rotor
 from rotordrop.errors import UsageError
 from rotordrop.machine.machine import Machine

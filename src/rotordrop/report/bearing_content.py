@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from rotordrop.elements.catalog import CatalogueBearing
 from rotordrop.elements.catalog.boundary import clearance_range
+from rotordrop.elements.catalog.lookup import CatalogueBearing
 from rotordrop.report.content import Cell, ReportContent, Statement, Table
 
 _COLUMNS = ("listed bearings of this size", "angle", "balls", "preload light / medium / heavy", "balls are")

@@ -15,9 +15,8 @@ from rotordrop.report.comparison import comparison_figure
 from rotordrop.report.content import Cell, Figure, ReportContent, Section, Statement, Table
 from rotordrop.report.limits import limit_statement
 from rotordrop.report.quantity import Quantity
-from rotordrop.report.severity_section import NOTE
 from rotordrop.report.stress_box import StressBox, stress_box_figure, stress_table
-from rotordrop.severity.numbers import SEVERITY
+from rotordrop.severity.numbers import NOTE, SEVERITY
 from rotordrop.severity.ranking import DropSeverity, Ranking, rank_drops
 from rotordrop.severity.statistics import StressStatistics
 

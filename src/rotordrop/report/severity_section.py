@@ -7,14 +7,7 @@ from rotordrop.estimate.estimate import Estimate
 from rotordrop.estimate.severity_numbers import severity_values
 from rotordrop.report.content import Cell, Section, Table
 from rotordrop.report.quantity import Quantity
-from rotordrop.severity.numbers import SEVERITY
-
-NOTE = (
-    "Static safety (ISO 76): by the peak stress, which counts the preload, against 4 200 MPa; by C0 over the "
-    "peak force. Shares of the basic rating life (at one a tenth of new bearings fails): finite segments of "
-    "the raceways (after Menck 2023), ISO/TS 16281 at every instant, rainflow of the most loaded ball; the "
-    "first two as if the race turned with the rotor from the first impact on, as upper ends. None is a limit."
-)
+from rotordrop.severity.numbers import NOTE, SEVERITY
 
 
 def severity_section(estimate: Estimate) -> Section:

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import html
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
-from rotordrop.estimate.bearing_drop import AirGap, Band, History, Role
 from rotordrop.report.decimation import block_envelope, peak_indices
+
+if TYPE_CHECKING:
+    from rotordrop.estimate.bearing_drop import AirGap, Band, History, Role
 
 Array = NDArray[np.float64]
 

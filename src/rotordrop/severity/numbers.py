@@ -49,6 +49,14 @@ SEVERITY: tuple[SeverityNumber, ...] = (
 )
 """Severity of a drop at a bearing, in the order in which it is shown."""
 
+NOTE = (
+    "Static safety (ISO 76): by the peak stress, which counts the preload, against 4 200 MPa; by C0 over the "
+    "peak force. Shares of the basic rating life (at one a tenth of new bearings fails): finite segments of "
+    "the raceways (after Menck 2023), ISO/TS 16281 at every instant, rainflow of the most loaded ball; the "
+    "first two as if the race turned with the rotor from the first impact on, as upper ends. None is a limit."
+)
+"""What stands beneath a table of these numbers."""
+
 
 def static_safety_of_stress(stress: float) -> float:
     """Static safety factor s0 of a largest Hertz stress [Pa], ``(4200 MPa / σ)³`` [1].

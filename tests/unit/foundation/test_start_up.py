@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
@@ -9,6 +10,7 @@ import sys
 import time
 
 import pytest
+from tests.published import bearing, published, value
 
 HEAVY = {
     "scipy",
@@ -52,6 +54,21 @@ def test_it_starts_fast(arguments):
         if times[-1] < LIMIT_S:
             break
     assert min(times) < LIMIT_S
+
+
+@pytest.mark.parametrize("words", [["compare", "A", "B"], ["log", "add", "LOG", "A"]], ids=["compare", "log"])
+def test_what_reads_estimates_loads_neither_compiler_nor_scipy(words, tmp_path):
+    places = {"LOG": tmp_path / "log.db", "A": tmp_path / "a.json", "B": tmp_path / "b.json"}
+    for name, speed in (("A", 60.0), ("B", 75.0)):
+        numbers = {"peak_force_N": value(speed, 0.9 * speed, 1.1 * speed), "peak_stress_Pa": value(1e9)}
+        drop = published(record=f"{name}.h5", speed_Hz=speed, bearings={"DE": bearing(numbers)})
+        places[name].write_text(json.dumps(drop.as_json()))
+    program = (
+        "import sys\nfrom rotordrop.cli.app import run\n"
+        f"assert run({[str(places.get(word, word)) for word in words]!r}) == 0\n"
+        "assert not {'numba', 'scipy'} & set(sys.modules)\n"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True, stdout=subprocess.DEVNULL)
 
 
 def test_public_names_are_loaded_on_first_use():

@@ -5,8 +5,7 @@ import math
 import pytest
 from tests.reference.closed_forms import lift_off_force
 
-from rotordrop.elements.catalog import designations, find_bearing
-from rotordrop.elements.catalog.lookup import ball_size
+from rotordrop.elements.catalog.lookup import ball_size, designations, find_bearing
 from rotordrop.machine import loads_machine
 from rotordrop.physics.ball_bearing import axial_rigidity, bearing_constants
 from rotordrop.physics.ball_bearing_geometry import BallBearingGeometry

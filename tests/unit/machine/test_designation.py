@@ -4,7 +4,8 @@ import math
 
 import pytest
 
-from rotordrop.elements.catalog import find_bearing, read_designation, search_bearings
+from rotordrop.elements.catalog.designation import read_designation
+from rotordrop.elements.catalog.lookup import find_bearing, search_bearings
 
 # written; series and bore; contact angle [°] (D: deep groove, ?: not said); h: hybrid, s: small balls;
 # clearance class, preload or arrangement

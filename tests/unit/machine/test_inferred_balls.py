@@ -5,9 +5,16 @@ import math
 import pytest
 
 from rotordrop.elements.ball_numbers import inferred_stress_sigma
-from rotordrop.elements.catalog import PairRigidity, designations, find_bearing, read_designation
 from rotordrop.elements.catalog.boundary import DIMENSION_SERIES, boundary_dimensions
-from rotordrop.elements.catalog.inference import dynamic_rating, infer_balls, pair_rigidity, static_rating
+from rotordrop.elements.catalog.designation import read_designation
+from rotordrop.elements.catalog.inference import (
+    PairRigidity,
+    dynamic_rating,
+    infer_balls,
+    pair_rigidity,
+    static_rating,
+)
+from rotordrop.elements.catalog.lookup import designations, find_bearing
 from rotordrop.errors import MachineFileError
 from rotordrop.machine import loads_machine
 from rotordrop.physics.ball_bearing import axial_rigidity, bearing_constants

@@ -10,7 +10,7 @@ import pytest
 
 from rotordrop import example_machine, save_machine
 from rotordrop.cli.app import run
-from rotordrop.elements.catalog import find_bearing
+from rotordrop.elements.catalog.lookup import find_bearing
 from rotordrop.errors import UsageError
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.study.design import Aim, best_designs, front_of, read_design

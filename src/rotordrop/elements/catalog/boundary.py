@@ -1,8 +1,12 @@
-"""Boundary dimensions of radial ball bearings."""
+"""Boundary dimensions and classes of radial ball bearings."""
 
 from __future__ import annotations
 
 from typing import Literal
+
+PreloadClass = Literal["light", "medium", "heavy"]
+PRELOAD_FACTOR = 2.0
+"""Factor to which the preload of a class of one maker is known from that of others [1]."""
 
 # Bore, outside diameter, width [mm] by dimension series of ISO 15. Widths of series 18, 19 and 10 are those
 # of width series 1, those of series 02 of width series 0.

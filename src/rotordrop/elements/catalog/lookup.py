@@ -11,16 +11,18 @@ from functools import lru_cache
 from importlib.resources import files
 from typing import Any, Literal
 
-from rotordrop.elements.catalog.boundary import DIMENSION_SERIES, boundary_dimensions, known_bores
+from rotordrop.elements.catalog.boundary import (
+    DIMENSION_SERIES,
+    PreloadClass,
+    boundary_dimensions,
+    known_bores,
+)
 from rotordrop.elements.catalog.designation import Designation, Kind, read_designation
 from rotordrop.elements.catalog.inference import PairRigidity, infer_balls
 from rotordrop.known import NINETY
 
-PreloadClass = Literal["light", "medium", "heavy"]
 _CLASSES: tuple[PreloadClass, ...] = ("light", "medium", "heavy")
 _UNSAID_ANGLE, _UNSAID_ANGLES = math.radians(25.0), (math.radians(15.0), math.radians(30.0))
-PRELOAD_FACTOR = 2.0
-"""Factor to which the preload of a class of one maker is known from that of others [1]."""
 _FAMILIES = ("B", "HCB", "XCB", "HS", "HC", "XC")
 _HYBRID_PRELOAD = 0.6
 """Preload of hybrid over steel bearings of one class in the catalogue [1]."""
