@@ -10,7 +10,6 @@ Bryson–Frazier smoother: it needs no inverse of a covariance.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +17,6 @@ from numpy.typing import NDArray
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import kernel, lean_kernel
 from rotordrop.physics.columns import KernelParameters
-from rotordrop.physics.elementary import exp, sine_cosine
 from rotordrop.simulate._loop import remember
 from rotordrop.track._covariance import is_covariance, pack, symmetrise, unpack
 from rotordrop.track._propagation import (
@@ -28,6 +26,7 @@ from rotordrop.track._propagation import (
     apply_parameters,
     propagate,
 )
+from rotordrop.track.sensor_form import SensorForm, lag_step, measurement_row
 
 Array = NDArray[np.float64]
 Compact = NDArray[np.float32]
@@ -37,94 +36,6 @@ IntArray = NDArray[np.int64]
 LARGEST_DEFLECTION = 4.0
 """Way of a race or a support from its place, over the air gap, from which a filter has diverged [1]."""
 SIGN_WIDTH = math.sqrt(0.5 * math.pi)
-
-
-class SensorForm(NamedTuple):
-    """What sensors do beyond gain, offset and runout; T terms, G sensors that lag behind, s dynamic.
-
-    A sensor sees ``(its row + Σ value of the unknown · row of the term) · state``: ``term`` (T, 2) holds
-    sensor and unknown, ``term_row`` (T, s) its row. ``lag`` (G, 2) holds for each sensor the state with what
-    it has got to and the unknown that is the logarithm of its time constant, between ``shortest`` and
-    ``longest`` (G,); ``lag_row`` (G, s) is what it sees. All are empty for plain sensors.
-    """
-
-    term: IntArray
-    term_row: Array
-    lag: IntArray
-    lag_row: Array
-    shortest: Array
-    longest: Array
-
-
-@lean_kernel
-def seen_by(c: int, at: Array, sensor_row: Array, form: SensorForm, s: int) -> float:
-    """Displacement [m] that sensor ``c`` sees of a state, with the terms of its form."""
-    seen = 0.0
-    for j in range(s):
-        seen += sensor_row[j] * at[j]
-    for t in range(form.term.shape[0]):
-        if form.term[t, 0] == c:
-            along = 0.0
-            for j in range(s):
-                along += form.term_row[t, j] * at[j]
-            seen += at[s + form.term[t, 1]] * along
-    return seen
-
-
-@kernel
-def lag_step(before: Array, after: Array, form: SensorForm, dt: float, F: Array) -> None:
-    """Advance what the sensors have got to by one sample, in ``after`` (s + P,) and ``F`` (s, s + P).
-
-    A first-order lag follows a straight line between two samples exactly, so that no time constant, however
-    short, asks for a shorter step. ``before`` (s + P,) is state and unknowns at the sample before.
-    """
-    s = F.shape[0]
-    for c in range(form.lag.shape[0]):
-        i, k = form.lag[c, 0], form.lag[c, 1]
-        q = dt / exp(min(max(before[s + k], form.shortest[c]), form.longest[c]))
-        a = exp(-q)
-        b = (1.0 - a) / q
-        first = seen_by(c, before, form.lag_row[c], form, s)
-        last = seen_by(c, after, form.lag_row[c], form, s)
-        F[i, :] = 0.0
-        _add_seen(c, i, before, form, b - a, F)
-        _add_seen_after(c, i, after, form, 1.0 - b, F)
-        F[i, i] += a
-        F[i, s + k] += a * q * before[i] + (b - a - a * q) * first - (b - a) * last
-        after[i] = a * before[i] + (b - a) * first + (1.0 - b) * last
-
-
-@lean_kernel
-def _add_seen(c: int, i: int, at: Array, form: SensorForm, weight: float, F: Array) -> None:
-    """Add to row ``i`` of ``F`` the derivative of what sensor ``c`` saw at the sample before."""
-    s = F.shape[0]
-    for j in range(s):
-        F[i, j] += weight * form.lag_row[c, j]
-    for t in range(form.term.shape[0]):
-        if form.term[t, 0] == c:
-            along = 0.0
-            for j in range(s):
-                F[i, j] += weight * at[s + form.term[t, 1]] * form.term_row[t, j]
-                along += form.term_row[t, j] * at[j]
-            F[i, s + form.term[t, 1]] += weight * along
-
-
-@kernel
-def _add_seen_after(c: int, i: int, at: Array, form: SensorForm, weight: float, F: Array) -> None:
-    """Add to row ``i`` of ``F`` the derivative of what sensor ``c`` sees now, by way of the state now."""
-    s, columns = F.shape
-    row = form.lag_row[c].copy()
-    for t in range(form.term.shape[0]):
-        if form.term[t, 0] == c:
-            along = 0.0
-            for j in range(s):
-                row[j] += at[s + form.term[t, 1]] * form.term_row[t, j]
-                along += form.term_row[t, j] * at[j]
-            F[i, s + form.term[t, 1]] += weight * along
-    for j in range(s):
-        if row[j] != 0.0:
-            for e in range(columns):
-                F[i, e] += weight * row[j] * F[j, e]
 
 
 @lean_kernel
@@ -162,43 +73,6 @@ def scalar_update(
         gain[i] /= S
         mean[i] += gain[i] * innovation
     return S
-
-
-@lean_kernel
-def measurement_row(
-    c: int, at: Array, angle: float, sensor_row: Array, first: int, n_c: int, form: SensorForm, row: Array
-) -> float:
-    """Reading of sensor ``c`` predicted at an estimate [m] and its derivative ``row`` (n,).
-
-    The reading is ``(1 + gain error) · (sensor row · state) + offset + runout at the rotor angle``. The gains
-    begin at ``first``, the offsets, cosines and sines follow, ``n_c`` of each. A sensor that lags behind
-    reads its own state, and its terms act on what it lags behind of.
-    """
-    row[:] = 0.0
-    k = first + c
-    sine, cosine = sine_cosine(angle)
-    seen = 0.0
-    for j in range(sensor_row.shape[0]):
-        seen += sensor_row[j] * at[j]
-    growth = 1.0 + at[k]
-    for j in range(sensor_row.shape[0]):
-        row[j] = growth * sensor_row[j]
-    if form.lag.shape[0] == 0:
-        s = sensor_row.shape[0]
-        for t in range(form.term.shape[0]):
-            if form.term[t, 0] == c:
-                along, unknown = 0.0, s + form.term[t, 1]
-                for j in range(s):
-                    along += form.term_row[t, j] * at[j]
-                    row[j] += growth * at[unknown] * form.term_row[t, j]
-                row[unknown] = growth * along
-                seen += at[unknown] * along
-    row[k] = seen
-    row[k + n_c] = 1.0
-    row[k + 2 * n_c] = cosine
-    row[k + 3 * n_c] = sine
-    predicted: float = growth * seen + at[k + n_c] + at[k + 2 * n_c] * cosine + at[k + 3 * n_c] * sine
-    return predicted
 
 
 @lean_kernel

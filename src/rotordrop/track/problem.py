@@ -17,7 +17,7 @@ from rotordrop.series import noise_by_differences
 from rotordrop.track import _filter as F
 from rotordrop.track import _propagation as P
 from rotordrop.track.prior import fall_time, prior_at_power_off, start_of
-from rotordrop.track.sensor_form import rest_terms, sensor_form
+from rotordrop.track.sensor_form import SensorForm, rest_terms, sensor_form
 from rotordrop.track.unknowns import parameter_targets
 
 Array = NDArray[np.float64]
@@ -95,7 +95,7 @@ class DropProblem:
     """Where the first pass begins: the prior mean with the guesses of the machine file, shape (n,)."""
     covariance: Array
     """Prior at the first sample."""
-    sensor_form: F.SensorForm
+    sensor_form: SensorForm
     """What the sensors do beyond gain, offset and runout."""
     fall: Fall | None = None
     """The fall, where the lift of the magnets may last longer than usual."""

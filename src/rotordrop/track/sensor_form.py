@@ -1,23 +1,126 @@
-"""What sensors do beyond gain, offset and runout: lag, cross-axis sensitivity, moving bracket, plane."""
+"""What sensors do beyond gain, offset and runout: a reading, its derivative, its lag and further terms."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.elements.support import support_sag
 from rotordrop.errors import UsageError
+from rotordrop.physics._compile import kernel, lean_kernel
+from rotordrop.physics.elementary import exp, sine_cosine
 from rotordrop.rotor.layout import StateLayout
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.unknowns import Unknown
-from rotordrop.track._filter import SensorForm
 
 Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 CATCHING_UP_SIGMA = 1e-6
 """How far [m] a sensor may lag behind at power-off."""
+
+
+class SensorForm(NamedTuple):
+    """What sensors do beyond gain, offset and runout; T terms, G sensors that lag behind, s dynamic.
+
+    A sensor sees ``(its row + Σ value of the unknown · row of the term) · state``: ``term`` (T, 2) holds
+    sensor and unknown, ``term_row`` (T, s) its row. ``lag`` (G, 2) holds for each sensor the state with what
+    it has got to and the unknown that is the logarithm of its time constant, between ``shortest`` and
+    ``longest`` (G,); ``lag_row`` (G, s) is what it sees. All are empty for plain sensors.
+    """
+
+    term: IntArray
+    term_row: Array
+    lag: IntArray
+    lag_row: Array
+    shortest: Array
+    longest: Array
+
+
+@lean_kernel
+def add_seen(
+    c: int, at: Array, sensor_row: Array, form: SensorForm, s: int, weight: float, row: Array
+) -> float:
+    """Add ``weight`` times the derivative of what sensor ``c`` sees to ``row``; returns what it sees [m].
+
+    ``at`` and ``row`` begin with the dynamic state (s,), its unknowns follow.
+    """
+    seen = 0.0
+    for j in range(s):
+        seen += sensor_row[j] * at[j]
+        row[j] += weight * sensor_row[j]
+    for t in range(form.term.shape[0]):
+        if form.term[t, 0] == c:
+            along, unknown = 0.0, s + form.term[t, 1]
+            for j in range(s):
+                along += form.term_row[t, j] * at[j]
+                row[j] += weight * at[unknown] * form.term_row[t, j]
+            row[unknown] += weight * along
+            seen += at[unknown] * along
+    return seen
+
+
+@kernel
+def lag_step(before: Array, after: Array, form: SensorForm, dt: float, F: Array) -> None:
+    """Advance what the sensors have got to by one sample, in ``after`` (s + P,) and ``F`` (s, s + P).
+
+    A first-order lag follows a straight line between two samples exactly, so that no time constant, however
+    short, asks for a shorter step. ``before`` (s + P,) is state and unknowns at the sample before.
+    """
+    s, columns = F.shape
+    by_state = np.empty(columns)
+    for c in range(form.lag.shape[0]):
+        i, k = form.lag[c, 0], form.lag[c, 1]
+        q = dt / exp(min(max(before[s + k], form.shortest[c]), form.longest[c]))
+        a = exp(-q)
+        b = (1.0 - a) / q
+        F[i, :] = 0.0
+        first = add_seen(c, before, form.lag_row[c], form, s, b - a, F[i])
+        by_state[:] = 0.0
+        last = add_seen(c, after, form.lag_row[c], form, s, 1.0, by_state)
+        # What it sees now depends on the sample before by way of the state now.
+        for e in range(s, columns):
+            F[i, e] += (1.0 - b) * by_state[e]
+        for j in range(s):
+            if by_state[j] != 0.0:
+                for e in range(columns):
+                    F[i, e] += (1.0 - b) * by_state[j] * F[j, e]
+        F[i, i] += a
+        F[i, s + k] += a * q * before[i] + (b - a - a * q) * first - (b - a) * last
+        after[i] = a * before[i] + (b - a) * first + (1.0 - b) * last
+
+
+@lean_kernel
+def measurement_row(
+    c: int, at: Array, angle: float, sensor_row: Array, first: int, n_c: int, form: SensorForm, row: Array
+) -> float:
+    """Reading of sensor ``c`` predicted at an estimate [m] and its derivative ``row`` (n,).
+
+    The reading is ``(1 + gain error) · (sensor row · state) + offset + runout at the rotor angle``. The gains
+    begin at ``first``, the offsets, cosines and sines follow, ``n_c`` of each. A sensor that lags behind
+    reads its own state, and its terms act on what it lags behind of.
+    """
+    row[:] = 0.0
+    k = first + c
+    sine, cosine = sine_cosine(angle)
+    growth = 1.0 + at[k]
+    s = sensor_row.shape[0]
+    if form.lag.shape[0] == 0:
+        seen = add_seen(c, at, sensor_row, form, s, growth, row)
+    else:
+        seen = 0.0
+        for j in range(s):
+            seen += sensor_row[j] * at[j]
+            row[j] = growth * sensor_row[j]
+    row[k] = seen
+    row[k + n_c] = 1.0
+    row[k + 2 * n_c] = cosine
+    row[k + 3 * n_c] = sine
+    predicted: float = growth * seen + at[k + n_c] + at[k + 2 * n_c] * cosine + at[k + 3 * n_c] * sine
+    return predicted
 
 
 def sensor_form(model: DropModel, unknowns: tuple[Unknown, ...], rows: Array) -> SensorForm:

@@ -27,8 +27,8 @@ from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns
 from rotordrop.simulate.case import DropCase
 from rotordrop.simulate.drop import simulate_drop
-from rotordrop.track._filter import lag_step
 from rotordrop.track.problem import DropProblem
+from rotordrop.track.sensor_form import add_seen, lag_step
 from rotordrop.twin.problems import COARSE_BASIS, drop_problem
 
 STRUCTURE = {
@@ -247,9 +247,8 @@ def test_sensors_read_as_their_form_says(lp400, prepared):
     c, s = math.cos(float(sensor.angle)), math.sin(float(sensor.angle))
     expected = c * (x - 0.3 * hx) + s * (y - 0.3 * hy) + 0.02 * (-s * plain_x + c * plain_y)
     estimate = np.concatenate([state, [u.begin for u in problem.unknowns]])
-    from rotordrop.track._filter import seen_by
-
-    seen = seen_by(0, estimate, problem.sensor_rows[0], problem.sensor_form, problem.n_dynamic)
+    row = np.zeros_like(estimate)
+    seen = add_seen(0, estimate, problem.sensor_rows[0], problem.sensor_form, problem.n_dynamic, 1.0, row)
     assert seen == pytest.approx(expected, rel=1e-9)
 
 
