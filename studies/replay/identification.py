@@ -28,9 +28,9 @@ from common import (
 )
 from numpy.typing import NDArray
 
-from rotordrop.evidence.air_gap import identify_air_gap
 from rotordrop.evidence.evidence import Evidence, read_evidence
 from rotordrop.evidence.evidence import known as present
+from rotordrop.evidence.rest import identify_air_gap
 from rotordrop.identification.replica import build_replica
 from rotordrop.identification.support import (
     LONGEST_WINDOW,

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rotordrop.evidence.power_off import find_power_off
+from rotordrop.evidence.events import find_power_off
 from rotordrop.machine import example_machine
 from rotordrop_bench import hidden_machine, synthesize_drop
 

@@ -272,7 +272,7 @@ def schema(
     elif document is Document.numbers:
         from rotordrop.machine.simple import simple_schema as schema_of
     elif document is Document.look:
-        from rotordrop.evidence.look.schema import look_schema as schema_of
+        from rotordrop.evidence.look import look_schema as schema_of
     else:
         from rotordrop.estimate.published import estimate_schema as schema_of
 

@@ -74,7 +74,7 @@ def _loaded(machine: Path | None) -> Machine | None:
 
 def _split(record: Path, machine: Machine, folder: Path, profile: Path | None) -> None:
     """Cut a recording with several drops into one record for each; no sample is changed."""
-    from rotordrop.evidence.splitting import split_drops
+    from rotordrop.evidence.paths import split_drops
     from rotordrop.files import make_folder
     from rotordrop.record.record import read_record, save_record
 

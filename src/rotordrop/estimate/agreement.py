@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.evidence.first_contact import contact_intervals
+from rotordrop.evidence.contacts import contact_intervals
 from rotordrop.identification.friction import orbit_disagreement
 
 Array = NDArray[np.float64]

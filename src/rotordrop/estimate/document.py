@@ -17,7 +17,7 @@ from rotordrop.estimate.estimate import Estimate, Structure
 from rotordrop.estimate.methods import Replay
 from rotordrop.estimate.published import FORMAT, Value
 from rotordrop.estimate.severity_numbers import severity_values
-from rotordrop.evidence.first_contact import TimedContact
+from rotordrop.evidence.contacts import TimedContact
 from rotordrop.known import Known
 from rotordrop.simulate.fingerprint import fingerprint
 

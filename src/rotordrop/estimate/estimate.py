@@ -25,9 +25,8 @@ from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.estimate.later_motion import LaterMotion
 from rotordrop.estimate.methods import Method
 from rotordrop.estimate.unbalance import PlaneUnbalance
-from rotordrop.evidence.events import DropInstant
-from rotordrop.evidence.first_contact import TimedContact as TimedContact
-from rotordrop.evidence.power_off import PowerOff
+from rotordrop.evidence.contacts import TimedContact as TimedContact
+from rotordrop.evidence.events import DropInstant, PowerOff
 from rotordrop.evidence.quality.finding import Finding
 from rotordrop.evidence.speed import SpeedFit
 from rotordrop.files import write_json

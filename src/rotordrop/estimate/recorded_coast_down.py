@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import IdentificationError, RecordError
-from rotordrop.evidence.air_gap import AirGap, identify_air_gap, rest_at_end
 from rotordrop.evidence.evidence import Evidence, Missing, known, read_evidence
+from rotordrop.evidence.rest import AirGap, identify_air_gap, rest_at_end
 from rotordrop.evidence.sensing import Sensing
 from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine

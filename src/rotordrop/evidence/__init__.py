@@ -10,24 +10,23 @@ if TYPE_CHECKING:
     from rotordrop.evidence.contacts import FirstForce as FirstForce
     from rotordrop.evidence.contacts import early_forces as early_forces
     from rotordrop.evidence.contacts import first_forces as first_forces
+    from rotordrop.evidence.contacts import local_polynomial as local_polynomial
     from rotordrop.evidence.events import DropInstant as DropInstant
     from rotordrop.evidence.events import find_drop_instant as find_drop_instant
     from rotordrop.evidence.levitated import LevitatedModel as LevitatedModel
     from rotordrop.evidence.levitated import fit_levitated as fit_levitated
-    from rotordrop.evidence.preprocess import local_polynomial as local_polynomial
     from rotordrop.evidence.quality import Finding as Finding
     from rotordrop.evidence.quality import check_record as check_record
     from rotordrop.evidence.quality import refuse_unusable as refuse_unusable
-    from rotordrop.evidence.settled import SettledTail as SettledTail
-    from rotordrop.evidence.settled import settled_tail as settled_tail
+    from rotordrop.evidence.rest import SettledTail as SettledTail
+    from rotordrop.evidence.rest import settled_tail as settled_tail
 
 _PUBLIC = {
-    "contacts": ("EarlyForces", "FirstForce", "early_forces", "first_forces"),
+    "contacts": ("EarlyForces", "FirstForce", "early_forces", "first_forces", "local_polynomial"),
     "events": ("DropInstant", "find_drop_instant"),
     "levitated": ("LevitatedModel", "fit_levitated"),
-    "preprocess": ("local_polynomial",),
     "quality": ("Finding", "check_record", "refuse_unusable"),
-    "settled": ("SettledTail", "settled_tail"),
+    "rest": ("SettledTail", "settled_tail"),
 }
 _HOME = {name: module for module, names in _PUBLIC.items() for name in names}
 

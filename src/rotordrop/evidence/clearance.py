@@ -13,8 +13,8 @@ import numpy as np
 
 from rotordrop.errors import RecordError
 from rotordrop.evidence.quality.channels import check_channels
-from rotordrop.evidence.quality.clock import check_clock
 from rotordrop.evidence.quality.finding import refuse_unusable
+from rotordrop.evidence.quality.recorder import check_clock
 from rotordrop.known import NINETY
 from rotordrop.record.arrangement import arrangement_of
 from rotordrop.record.profile import Profile, load_profile

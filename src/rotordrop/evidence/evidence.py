@@ -11,7 +11,6 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError, RecordError, RotordropError
 from rotordrop.evidence.events import (
@@ -25,24 +24,24 @@ from rotordrop.evidence.events import (
     of_whole,
 )
 from rotordrop.evidence.levitated import LevitatedModel
-from rotordrop.evidence.settled import resting_record
+from rotordrop.evidence.rest import resting_record
 from rotordrop.record.axes import along_sensors, sensor_polarity
 from rotordrop.record.record import Record
+from rotordrop.record.recording import Array
 from rotordrop.record.speed import RotorAngle, rotor_angle
 
 if TYPE_CHECKING:
-    from rotordrop.evidence.air_gap import AirGap, SettledRest
+    from rotordrop.evidence.contacts import TimedContact
+    from rotordrop.evidence.events import PowerOff
     from rotordrop.evidence.fall import Fall
-    from rotordrop.evidence.first_contact import TimedContact
     from rotordrop.evidence.initial_state import InitialState
-    from rotordrop.evidence.power_off import PowerOff
     from rotordrop.evidence.quality.flight import Weighed
+    from rotordrop.evidence.rest import AirGap, SettledRest
     from rotordrop.evidence.sensing import Sensing
     from rotordrop.evidence.speed import SpeedFit
     from rotordrop.machine import Machine
     from rotordrop.rotor.parameters import DropModel
 
-Array = NDArray[np.float64]
 Fact = TypeVar("Fact")
 
 
@@ -141,7 +140,7 @@ class Evidence:
         RecordError
             When the rotor does not fall in the record, or the record begins in the middle of the fall.
         """
-        from rotordrop.evidence.power_off import begins_with_fall, power_off_of_fall
+        from rotordrop.evidence.events import begins_with_fall, power_off_of_fall
 
         if begins_with_fall(self.record, self.machine):
             return power_off_of_fall(self.record, self.machine)
@@ -206,7 +205,7 @@ class Evidence:
     @cached_property
     def rest(self) -> SettledRest | Missing:
         """Where the rotor rests in the tail."""
-        from rotordrop.evidence.air_gap import find_rest
+        from rotordrop.evidence.rest import find_rest
 
         return sought(lambda: find_rest(known(self.still), known(self.sensing)))
 
@@ -228,14 +227,14 @@ class Evidence:
     @cached_property
     def gap(self) -> AirGap | Missing:
         """Air gaps with the sag of the machine's supports."""
-        from rotordrop.evidence.air_gap import identify_air_gap
+        from rotordrop.evidence.rest import identify_air_gap
 
         return sought(lambda: identify_air_gap(known(self.rest), self.base, known(self.sensing)))
 
     @cached_property
     def _landing(self) -> tuple[InitialState | Missing, tuple[TimedContact, ...] | Missing]:
         """Fall and first contacts: from the first seconds after the fall, or from all of a record."""
-        from rotordrop.evidence.first_contact import identify_first_contacts
+        from rotordrop.evidence.contacts import identify_first_contacts
         from rotordrop.evidence.initial_state import fit_initial_state
 
         def fall_in(part: Record) -> InitialState:

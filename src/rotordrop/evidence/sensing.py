@@ -5,17 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotordrop.elements.sensor import Sensor
 from rotordrop.elements.table import parameter
 from rotordrop.errors import IdentificationError
 from rotordrop.record.axes import sensor_directions
+from rotordrop.record.recording import Array
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.statics import settled_sag
 from rotordrop.rotor.unknowns import sensor_prior, smallest_gap
-
-Array = NDArray[np.float64]
 
 WEAKEST_DIRECTION = 0.05
 """Smallest ratio of singular values with which four rigid motions count as resolved [1]."""

@@ -11,13 +11,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotordrop.known import NINETY, Known
 from rotordrop.record.record import Record
+from rotordrop.record.recording import Array
 from rotordrop.record.speed import SpeedAtDrop, require_speed, speed_at_drop
-
-Array = NDArray[np.float64]
 
 LONGEST = 2.0
 """Part of the record after the drop that is fitted [s]; the law in time holds for about a second."""

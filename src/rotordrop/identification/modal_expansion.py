@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError
-from rotordrop.evidence.preprocess import local_polynomial
+from rotordrop.evidence.contacts import local_polynomial
 from rotordrop.evidence.sensing import Sensing
 from rotordrop.rotor.parameters import DropModel
 

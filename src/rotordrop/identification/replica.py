@@ -9,8 +9,13 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError
 from rotordrop.evidence.evidence import Evidence, known
-from rotordrop.evidence.free_fall import MAGNET_FORCES, FreeFall, build_free_fall, kernel_state
-from rotordrop.evidence.initial_state import InitialState
+from rotordrop.evidence.initial_state import (
+    MAGNET_FORCES,
+    FreeFall,
+    InitialState,
+    build_free_fall,
+    kernel_state,
+)
 from rotordrop.evidence.sensing import Sensing, build_sensing
 from rotordrop.identification.parameter_vector import ParameterVector, with_bearing
 from rotordrop.physics import aerodynamics

@@ -21,9 +21,9 @@ from rotordrop.estimate.later_motion import later_motion
 from rotordrop.estimate.methods import Replay
 from rotordrop.estimate.published import Drop
 from rotordrop.estimate.record_facts import RecordFacts
-from rotordrop.evidence.air_gap import AirGap, identify_air_gap
 from rotordrop.evidence.evidence import Evidence, known, read_evidence
 from rotordrop.evidence.initial_state import InitialState
+from rotordrop.evidence.rest import AirGap, identify_air_gap
 from rotordrop.identification.friction import FrictionSweep, sweep_friction
 from rotordrop.identification.replica import build_replica
 from rotordrop.identification.support import (

@@ -25,8 +25,8 @@ from rotordrop.estimate.bearing_drop import (
 )
 from rotordrop.estimate.bearing_values import equivalent_stiffness, published_values
 from rotordrop.estimate.estimate import FittedParameter
-from rotordrop.evidence.air_gap import AirGap as IdentifiedGap
 from rotordrop.evidence.evidence import Evidence, known
+from rotordrop.evidence.rest import AirGap as IdentifiedGap
 from rotordrop.identification.friction import FrictionSweep
 from rotordrop.identification.modal_expansion import expand_initial_state
 from rotordrop.identification.support import SupportFit

@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError
-from rotordrop.evidence.free_fall import kernel_state
-from rotordrop.evidence.initial_state import covariance_root
+from rotordrop.evidence.initial_state import covariance_root, kernel_state
 from rotordrop.identification.parameter_vector import with_bearing
 from rotordrop.identification.replica import drop_parameters
 from rotordrop.identification.support import WIDENING, ImpactFit

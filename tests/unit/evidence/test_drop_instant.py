@@ -8,7 +8,7 @@ import pytest
 from rotordrop.errors import RecordError
 from rotordrop.evidence import EarlyForces, find_drop_instant, first_forces
 from rotordrop.evidence.events import coarse_drop
-from rotordrop.evidence.release import GRID, free_rotor, response_at, tabulate_response
+from rotordrop.evidence.fall import GRID, free_rotor, response_at, tabulate_response
 from rotordrop.known import Known
 from rotordrop.machine import example_machine
 from rotordrop.record.axes import sensor_planes

@@ -10,11 +10,12 @@ from rotordrop.errors import RecordError
 from rotordrop.evidence import check_record, refuse_unusable
 from rotordrop.evidence.events import Beginning, beginning_of, find_fall
 from rotordrop.evidence.levitated import fit_levitated
-from rotordrop.evidence.quality import Finding, Kind, sensing, standing
+from rotordrop.evidence.quality import Finding, Kind, standing
+from rotordrop.evidence.quality import fall as quality_fall
 from rotordrop.evidence.quality.arrangement import check_planes
-from rotordrop.evidence.quality.clock import check_clock
-from rotordrop.evidence.quality.ends import fell_as_described
+from rotordrop.evidence.quality.fall import fell_as_described
 from rotordrop.evidence.quality.motion import check_rotation_line, first_motion
+from rotordrop.evidence.quality.recorder import check_clock
 from rotordrop.known import Known
 from rotordrop.record.axes import sensor_planes
 from rotordrop_bench import hidden_machine, synthesize_drop
@@ -321,7 +322,7 @@ class TestUnits:
             def gained(fault, *_, size=size):
                 return (1e4, size) if fault.kind == "wrong gain" and len(fault.channels) == 1 else (0.0, 0.0)
 
-            monkeypatch.setattr(sensing, "_gain", gained)
+            monkeypatch.setattr(quality_fall, "_gain", gained)
             assert len(findings(drop, machine, kind="wrong gain")) == named
 
     def test_a_tail_without_its_level_is_coupled_and_not_in_another_unit(self, drop, tail, machine, edited):

@@ -7,9 +7,9 @@ import pytest
 
 from rotordrop.evidence import check_record
 from rotordrop.evidence.events import coarse_drop
+from rotordrop.evidence.fall import GRID, FallResponses, free_rotor, tabulate_response
 from rotordrop.evidence.levitated import fit_levitated
 from rotordrop.evidence.quality.flight import check_flights, weighed
-from rotordrop.evidence.release import GRID, FallResponses, free_rotor, tabulate_response
 from rotordrop.record.axes import sensor_planes
 from rotordrop_bench import hidden_machine, synthesize_drop
 

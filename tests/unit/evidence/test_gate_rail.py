@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rotordrop.evidence import check_record
-from rotordrop.evidence.quality.rail import check_rail
+from rotordrop.evidence.quality.channels import check_rail
 
 
 @pytest.mark.parametrize("share", [0.5, 0.7, 0.85])

@@ -10,8 +10,7 @@ import pytest
 
 from rotordrop.cli.app import run
 from rotordrop.errors import RecordError, UsageError
-from rotordrop.evidence.look import look
-from rotordrop.evidence.look.schema import look_schema
+from rotordrop.evidence.look import look, look_schema
 from rotordrop.machine import example_path
 from rotordrop.record import example_record_path
 

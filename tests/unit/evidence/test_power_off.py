@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import RecordError
-from rotordrop.evidence.events import find_drop_instant, sinking
-from rotordrop.evidence.power_off import PowerOff, find_power_off
+from rotordrop.evidence.events import PowerOff, find_drop_instant, find_power_off, sinking
 from rotordrop.machine import example_machine, load_machine
 from rotordrop_bench import hidden_machine, synthesize_drop
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rotordrop.cli.app import run
-from rotordrop.evidence.splitting import split_drops
+from rotordrop.evidence.paths import split_drops
 from rotordrop.machine import example_machine, example_path
 from rotordrop.record.examples import example_record_path
 from rotordrop.record.record import read_record, save_record

@@ -10,7 +10,7 @@ import pytest
 
 from rotordrop.errors import RecordError
 from rotordrop.evidence.events import _first
-from rotordrop.evidence.look.motion import _floating
+from rotordrop.evidence.paths import _floating
 from rotordrop.evidence.quality.motion import _strongest_line
 from rotordrop.record.sandbox import MEMORY, UNPACKED_PER_BYTE, refuse_bomb
 

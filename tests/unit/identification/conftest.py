@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rotordrop.evidence.air_gap import SettledRest
 from rotordrop.evidence.evidence import Evidence, known, read_evidence
 from rotordrop.evidence.initial_state import InitialState
+from rotordrop.evidence.rest import SettledRest
 from rotordrop.evidence.sensing import Sensing, build_sensing
 from rotordrop.identification.replica import Replica, build_replica
 from rotordrop.identification.support import ImpactFit, impact_problem

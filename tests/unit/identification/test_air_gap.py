@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import IdentificationError, RecordError
-from rotordrop.evidence.air_gap import SettledRest, find_rest, identify_air_gap
+from rotordrop.evidence.rest import SettledRest, find_rest, identify_air_gap, resting_record
 from rotordrop.evidence.sensing import Sensing
-from rotordrop.evidence.settled import resting_record
 from rotordrop.machine import Machine
 from rotordrop.record.axes import sensor_directions
 from rotordrop.record.record import Record

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rotordrop.evidence.fall_fit import FallFit, FallReadings
-from rotordrop.evidence.initial_state import InitialState
+from rotordrop.evidence.initial_state import FallFit, FallReadings, InitialState
 from rotordrop.evidence.sensing import Sensing
 from rotordrop.rotor.parameters import DropModel
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import IdentificationError
-from rotordrop.evidence.first_contact import (
+from rotordrop.evidence.contacts import (
     contact_intervals,
     corrected_stiffness,
     equivalent_stiffness,

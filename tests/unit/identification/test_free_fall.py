@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from tests.reference.rotor_shapes import bending_part
 
-from rotordrop.evidence.free_fall import build_free_fall, kernel_state, sagging_amplitudes
+from rotordrop.evidence.initial_state import build_free_fall, kernel_state, sagging_amplitudes
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.statics import levitated_sag
 from rotordrop.simulate.case import DropCase, LevitatedStart, StateStart

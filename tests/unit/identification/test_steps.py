@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import IdentificationError
-from rotordrop.evidence.air_gap import LARGEST_SWAY, _rest
+from rotordrop.evidence.rest import LARGEST_SWAY, _rest
 from rotordrop.identification.friction import TENFOLD, orbit_disagreement
 from rotordrop.identification.search import Schedule, _Searching
 from rotordrop.identification.support import identified_values

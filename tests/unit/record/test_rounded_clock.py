@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rotordrop.evidence.quality.clock import check_clock
+from rotordrop.evidence.quality.recorder import check_clock
 from rotordrop.machine import example_machine
 from rotordrop.record.record import read_record
 

@@ -24,8 +24,8 @@ from rotordrop.estimate.estimate import Estimate, Verdict
 from rotordrop.estimate.published import Drop, estimate_schema
 from rotordrop.estimate.record_facts import RecordFacts, facts_of
 from rotordrop.estimation import Tracked, estimate_drop, estimate_drops
+from rotordrop.evidence.events import PowerOff
 from rotordrop.evidence.evidence import Evidence, Missing, read_evidence
-from rotordrop.evidence.power_off import PowerOff
 from rotordrop.known import Known
 from rotordrop.machine import Machine, example_machine, load_machine
 from rotordrop.record.examples import example_record_path

@@ -17,9 +17,8 @@ from rotordrop.errors import NoDropError, RecordError
 from rotordrop.evidence.evidence import Evidence, Missing, known
 from rotordrop.evidence.levitated import LevitatedModel, fit_levitated
 from rotordrop.evidence.quality.arrangement import check_planes, fall_of
-from rotordrop.evidence.quality.channels import check_channels
-from rotordrop.evidence.quality.clock import check_blocks, check_clock
-from rotordrop.evidence.quality.ends import check_ends, fell_as_described
+from rotordrop.evidence.quality.channels import check_channels, check_rail
+from rotordrop.evidence.quality.fall import check_ends, fell_as_described
 from rotordrop.evidence.quality.finding import Finding, Kind, Severity, ranked, refuse_unusable, stops
 from rotordrop.evidence.quality.flight import check_flights, gains_hold
 from rotordrop.evidence.quality.motion import (
@@ -31,8 +30,13 @@ from rotordrop.evidence.quality.motion import (
     first_motion,
     no_drop,
 )
-from rotordrop.evidence.quality.rail import check_rail
-from rotordrop.evidence.quality.recorder import check_again, check_filters, check_speed_signal
+from rotordrop.evidence.quality.recorder import (
+    check_again,
+    check_blocks,
+    check_clock,
+    check_filters,
+    check_speed_signal,
+)
 from rotordrop.evidence.quality.tail import check_tail
 
 if TYPE_CHECKING:

@@ -2,7 +2,7 @@
 
 A fall shows where down is; the levitated 1X orbit runs with the spin. Together they tell an inverted sensor
 from exchanged or turned ones in every plane. Which end is which shows only in how the rotor leaves its
-levitated shape, see `rotordrop.evidence.quality.ends`.
+levitated shape, see `rotordrop.evidence.quality.fall`.
 """
 
 from __future__ import annotations

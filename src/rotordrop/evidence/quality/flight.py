@@ -17,15 +17,15 @@ import numpy as np
 
 from rotordrop.elements.magnet import REMANENCE_TIME
 from rotordrop.evidence.levitated import LevitatedModel
+from rotordrop.evidence.quality.fall import WRONG_GAIN
 from rotordrop.evidence.quality.finding import Finding, Kind
-from rotordrop.evidence.quality.sensing import WRONG_GAIN
 from rotordrop.known import NINETY
 from rotordrop.record.axes import planar_of
 from rotordrop.record.recording import Array
 from rotordrop.series import runs_of
 
 if TYPE_CHECKING:
-    from rotordrop.evidence.release import FreeRotor
+    from rotordrop.evidence.fall import FreeRotor
     from rotordrop.machine import Machine
     from rotordrop.record.record import Record
 
@@ -99,7 +99,7 @@ class _Fall:
 
 def weighed(record: Record, machine: Machine, levitated: LevitatedModel, drop: float) -> Weighed | None:
     """Weigh the rotor in its flights; None where it never flew."""
-    from rotordrop.evidence.release import free_rotor
+    from rotordrop.evidence.fall import free_rotor
 
     if len({amb.node for amb in machine.ambs}) < 2 or record.speed is None or float(machine.gravity) <= 0.0:
         return None
@@ -241,7 +241,7 @@ def _fitted(
     residual : array, shape (T, S)
         Residual over the noise, scaled by the degrees of freedom [1].
     """
-    from rotordrop.evidence.release import response_at, response_to_start
+    from rotordrop.evidence.fall import response_at, response_to_start
 
     assert record.speed is not None
     since = record.time[inside] - record.time[inside.start]

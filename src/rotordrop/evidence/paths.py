@@ -1,0 +1,447 @@
+"""The path of the shaft in its clearance circle, and what happens on it: told from displacement alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.errors import RecordError
+from rotordrop.evidence.events import FALLEN_SHARE, fall_accelerations
+from rotordrop.evidence.rest import STANDSTILL
+from rotordrop.physics.whirl_spells import whirl_spells
+from rotordrop.record.record import Record
+from rotordrop.record.recording import Array
+from rotordrop.series import noise_by_differences, runs_of
+
+GRAVITY = 9.81
+_SLOWEST_FALL = 0.2
+"""Share of gravity with which the fastest end of a dropped rotor falls at least [1]."""
+
+SMOOTHING = 1e-3
+"""Window of velocities [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Path:
+    """Where the shaft is in one sensor plane."""
+
+    name: str
+    """Plane, by its touchdown bearing or by the names of its channels."""
+    position: Array
+    """Displacement from the centre of the clearance circle [m], y up, shape (N, 2)."""
+    levitated: Array
+    """Mean levitated position [m], shape (2,)."""
+    gap: float
+    """Radius of the clearance circle [m]."""
+    noise: float
+    """Standard deviation of the readings beside their motion [m]."""
+
+    @property
+    def radius(self) -> Array:
+        """Distance from the centre [m], shape (N,)."""
+        return np.hypot(self.position[:, 0], self.position[:, 1])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motion:
+    """The paths in all planes, and what had to be guessed."""
+
+    time: Array
+    rate: float
+    paths: tuple[Path, ...]
+    floats: NDArray[np.bool_]
+    notes: tuple[str, ...]
+
+
+def motion_of(record: Record, *, gaps: tuple[float | None, ...], angles_known: bool) -> Motion:
+    """Find down, centre and gap in every plane.
+
+    Parameters
+    ----------
+    record : Record
+        Readings in metres.
+    gaps : tuple of float or None, length P
+        Air gap of every plane [m]; None where it has to come from the record: the depth at which the rotor
+        rests below where it floated, taken as the centre.
+    angles_known : bool
+        Whether the angles of the sensors are known. Where not, the fall shows where down is, and which way
+        round the plane is seen follows from the orbit before it, taken as running counter-clockwise.
+
+    Raises
+    ------
+    RecordError
+        When nothing falls.
+    """
+    planes, raw = record.planes, record.motion
+    begin, sunk = _first_fall(raw, record.sampling_rate)
+    notes: list[str] = []
+    rest = np.median(raw[_rest_from(raw, sunk, record) :], axis=0)
+    levitated = np.mean(raw[:begin], axis=0)
+    paths = []
+    for number, plane in enumerate(planes):
+        position, low, floated = raw[:, number], rest[number], levitated[number]
+        if not angles_known:
+            turn = _upright(position[:begin], low - floated)
+            position, low, floated = position @ turn.T, turn @ low, turn @ floated
+        depth = float(np.hypot(*(low - floated)))
+        given = gaps[number]
+        gap = given if given is not None else depth
+        centre = low + np.array([0.0, gap])
+        if given is None:
+            centre = floated
+            notes.append(
+                f"{plane.bearing}: air gap {1e6 * gap:.0f} µm taken from where the rotor floated to where "
+                "it lies; give it with --gap"
+            )
+        paths.append(
+            Path(
+                name=plane.bearing,
+                position=position - centre,
+                levitated=floated - centre,
+                gap=gap,
+                noise=_noise(position),
+            )
+        )
+    if not angles_known:
+        notes.append("down is where the rotor fell; counter-clockwise is how it ran before the fall")
+    floats = _floating(paths, record.sampling_rate)
+    return Motion(
+        time=record.time, rate=record.sampling_rate, paths=tuple(paths), floats=floats, notes=tuple(notes)
+    )
+
+
+def _first_fall(raw: Array, rate: float) -> tuple[int, int]:
+    """Last sample of the levitated part and first sample by which the rotor lies away from it.
+
+    No gap is known yet: every plane is scaled by how far it strays in all.
+    """
+    first = max(int(0.01 * rate), 8)
+    away = np.linalg.norm(raw - np.mean(raw[:first], axis=0), axis=2)
+    reach = np.percentile(away, 98, axis=0)
+    usual = np.max(away[:first], axis=0)
+    if np.any(reach < 4.0 * usual) or np.any(reach < 5e-6):
+        raise RecordError(
+            f"nothing falls in the record: the shaft strays by {1e6 * float(np.min(reach)):.3g} µm and moved "
+            f"by {1e6 * float(np.max(usual)):.3g} µm in its first 10 ms; check that it begins before the drop"
+        )
+    moved = np.min(away / reach, axis=1) > FALLEN_SHARE
+    sunk = int(np.argmax(moved))
+    fastest = max(fall_accelerations(path, far, rate).max() for path, far in zip(away.T, reach, strict=True))
+    if fastest < _SLOWEST_FALL * GRAVITY:
+        raise RecordError(
+            f"nothing falls in the record: the shaft moves away by {1e6 * float(np.max(reach)):.3g} µm, but "
+            f"with {fastest:.2g} m/s², a rotor falls with up to {GRAVITY:g} m/s²; a rotor that lies on its "
+            "bearings swings like that: give the recording of the drop (a settled tail belongs to "
+            "'estimate --tail'), or check unit and sampling rate"
+        )
+    back = int(np.sqrt(2.0 * float(np.max(reach)) / GRAVITY) * rate) + int(3e-3 * rate)
+    return max(sunk - back, first), sunk
+
+
+def _rest_from(raw: Array, sunk: int, record: Record) -> int:
+    """First sample of the part that shows where the rotor lies: the last quarter after the fall."""
+    return sunk + max(3 * (len(raw) - sunk) // 4, 1) if len(raw) - sunk > 8 else len(raw) - 1
+
+
+def _upright(levitated: Array, fall: Array) -> Array:
+    """Rotation, or rotation with reflection, that brings the fall down and the levitated orbit forward."""
+    down = fall / np.hypot(*fall)
+    turn = np.array([[-down[1], down[0]], [-down[0], -down[1]]])
+    path = (levitated - np.mean(levitated, axis=0)) @ turn.T
+    swept = float(np.sum(path[:-1, 0] * np.diff(path[:, 1]) - path[:-1, 1] * np.diff(path[:, 0])))
+    return turn if swept >= 0 else np.diag([-1.0, 1.0]) @ turn
+
+
+def _noise(position: Array) -> float:
+    """Scatter of neighbouring samples about the parabola through them [m]."""
+    return noise_by_differences(position, 3)
+
+
+def _floating(paths: list[Path], rate: float) -> NDArray[np.bool_]:
+    """Samples at which all planes stay near where they floated for longer than any flight between impacts."""
+    near = np.ones(len(paths[0].position), dtype=np.bool_)
+    for path in paths:
+        size = max(0.5 * path.gap, 2.0 * float(np.hypot(*path.levitated)) if path.gap else 0.0)
+        away = np.hypot(*(path.position - path.levitated).T)
+        near &= away < min(size, 0.7 * path.gap)
+    flight = 2.0 * np.sqrt(8.0 * max(path.gap for path in paths) / GRAVITY)
+    for start, length in zip(*runs_of(near), strict=True):
+        if start > 0 and length < flight * rate:
+            near[start : start + length] = False
+    return near
+
+
+def slope(values: Array, rate: float) -> Array:
+    """Velocity by a straight line through `SMOOTHING` around every sample [m/s], shape of the values."""
+    half = max(int(0.5 * SMOOTHING * rate), 1)
+    index = np.arange(-half, half + 1)
+    weights = -index * rate / float(np.sum(index**2))  # numpy turns the kernel round
+    columns = [
+        np.convolve(np.pad(column, half, mode="edge"), weights, mode="valid")
+        for column in np.atleast_2d(values.T)
+    ]
+    return np.stack(columns, axis=-1).reshape(values.shape)
+
+
+_NEAR = 0.85
+"""An impact turns the rotor back at this share of the gap or beyond."""
+
+_FOLLOWED = 2e-4
+"""Time between the angles by which a whirl is followed [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Impact:
+    """The rotor thrown back by its touchdown bearing."""
+
+    plane: str
+    """Sensor plane."""
+    time: float
+    """Deepest point [s]."""
+    azimuth: float
+    """Direction of the contact from the centre [rad], counter-clockwise from +x."""
+    depth: float
+    """How far beyond the air gap the rotor went, negative for short of it [m]."""
+    approach: float
+    rebound: float
+    """Largest radial velocity in the 2 ms before and after, by straight lines over 1 ms and so up to 5 mm/s
+    too small [m/s], both positive."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Whirl:
+    """A spell in which the rotor runs round the bearing by two turns or more."""
+
+    plane: str
+    """Sensor plane."""
+    start: float
+    end: float
+    """When [s]."""
+    turns: float
+    """Turns, positive for forward whirl (with the spin), negative for backward."""
+    frequency: float
+    """Mean frequency [Hz]."""
+
+    @property
+    def sense(self) -> str:
+        """Forward (with the spin) or backward."""
+        return "forward" if self.turns > 0 else "backward"
+
+    @property
+    def words(self) -> str:
+        """The spell in words."""
+        turns = abs(self.turns)
+        return f"{self.sense} whirl at {self.plane}, {self.frequency:.3g} Hz, {turns:.1f} turns"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drop:
+    """One fall from levitation, to the next levitation or the end of the record."""
+
+    release: float
+    """When the rotor began to fall [s], to about 2 ms."""
+    end: float
+    """When it was lifted again, or the record ends [s]."""
+    permanent_contact: float | None
+    """From when on it no longer left its bearings until `end` [s]."""
+    lifted: bool
+    """Whether it was lifted again in the record."""
+
+
+def drops_of(motion: Motion) -> tuple[Drop, ...]:
+    """Every fall in the record: the ends of levitated spells."""
+    floats = motion.floats
+    ends = np.flatnonzero(floats[:-1] & ~floats[1:]) + 1
+    begins = np.flatnonzero(~floats[:-1] & floats[1:]) + 1
+    found = []
+    for start in ends:
+        later = begins[begins > start]
+        stop = int(later[0]) if len(later) else len(floats)
+        release = _release(motion, int(start), stop)
+        if release is None:
+            continue
+        found.append(
+            Drop(
+                release=release,
+                end=float(motion.time[stop - 1]),
+                permanent_contact=_permanent(motion, int(start), stop),
+                lifted=bool(len(later)),
+            )
+        )
+    return tuple(found)
+
+
+def _release(motion: Motion, start: int, stop: int) -> float | None:
+    """When a fall of gravity began that reached a share of the gap where it did; None where nothing fell."""
+    begun = []
+    for path in motion.paths:
+        sunk = path.levitated[1] - path.position[start - 1 : stop, 1] > FALLEN_SHARE * path.gap
+        if not sunk.any():
+            return None
+        fallen = float(motion.time[start - 1 + int(np.argmax(sunk))])
+        begun.append(fallen - float(np.sqrt(2.0 * FALLEN_SHARE * path.gap / GRAVITY)))
+    return max(min(begun), float(motion.time[0]))
+
+
+def _permanent(motion: Motion, start: int, stop: int) -> float | None:
+    """Time after the last sample at which any plane was off its race, if the rotor stayed there for 50 ms."""
+    free = np.zeros(stop - start, dtype=np.bool_)
+    for path in motion.paths:
+        free |= path.radius[start:stop] < path.gap - max(0.1 * path.gap, 5.0 * path.noise)
+    last = np.flatnonzero(free)
+    first = start + (int(last[-1]) + 1 if len(last) else 0)
+    return float(motion.time[first]) if (stop - first) > 0.05 * motion.rate else None
+
+
+def impacts_of(motion: Motion, drop: Drop) -> tuple[Impact, ...]:
+    """Find every impact of a drop, first to last."""
+    found = [impact for path in motion.paths for impact in _impacts(motion, path, drop)]
+    return tuple(sorted(found, key=lambda impact: impact.time))
+
+
+def _impacts(motion: Motion, path: Path, drop: Drop) -> list[Impact]:
+    inside = (motion.time >= drop.release) & (motion.time <= drop.end)
+    first = int(np.argmax(inside))
+    radius = path.radius[inside]
+    least = max(0.04 * path.gap, 6.0 * path.noise)
+    speed = slope(radius, motion.rate)
+    reach = max(int(2e-3 * motion.rate), 1)
+    impacts = []
+    for at in _peaks(radius, _NEAR * path.gap, least):
+        x, y = path.position[first + at]
+        before, after = speed[max(at - reach, 0) : at + 1], speed[at : at + reach + 1]
+        impacts.append(
+            Impact(
+                plane=path.name,
+                time=float(motion.time[first + at]),
+                azimuth=float(np.arctan2(y, x)),
+                depth=float(radius[at] - path.gap),
+                approach=max(float(np.max(before)), 0.0),
+                rebound=max(float(-np.min(after)), 0.0),
+            )
+        )
+    return impacts
+
+
+def _peaks(values: Array, floor: float, least: float) -> list[int]:
+    """Maxima above a floor between which the values fall by at least `least`."""
+    peaks: list[int] = []
+    best, lowest, rising = 0, float(values[0]), True
+    for i, value in enumerate(values.tolist()):
+        if rising:
+            if value > values[best]:
+                best = i
+            elif values[best] - value > least:
+                if values[best] >= floor:
+                    peaks.append(best)
+                rising, lowest = False, value
+        elif value < lowest:
+            lowest = value
+        elif value - lowest > least:
+            rising, best = True, i
+    return peaks
+
+
+def whirls_of(motion: Motion, drop: Drop) -> tuple[Whirl, ...]:
+    """Find the spells of a drop in which the rotor runs round, in every plane."""
+    found = [whirl for path in motion.paths for whirl in _whirls(motion, path, drop)]
+    return tuple(sorted(found, key=lambda whirl: whirl.start))
+
+
+def _whirls(motion: Motion, path: Path, drop: Drop) -> list[Whirl]:
+    inside = np.flatnonzero((motion.time >= drop.release) & (motion.time <= drop.end))
+    chosen = inside[:: max(int(_FOLLOWED * motion.rate), 1)]
+    spells = whirl_spells(motion.time[chosen], path.position[chosen], path.gap)
+    return [
+        Whirl(plane=path.name, start=s.start, end=s.end, turns=s.turns, frequency=abs(s.frequency))
+        for s in spells
+    ]
+
+
+def standstill_of(record: Record) -> float | None:
+    """When the shaft came to rest by its speed readings [s]; None where it did not or nothing tells."""
+    if record.speed_time is None or record.speed_readings is None:
+        return None
+    slow = np.abs(record.speed_readings) <= STANDSTILL
+    if not slow[-1] or slow.all():
+        return None
+    return float(record.speed_time[int(np.flatnonzero(~slow)[-1]) + 1])
+
+
+LYING = 0.7
+"""Share of the air gap below which a rotor that lay on its bearings is being lifted [1]."""
+
+
+def split_drops(record: Record) -> tuple[Record, ...]:
+    """Cut a record into its drops, each with the levitated part before it.
+
+    A drop ends where the rotor is lifted off its bearings again; while it is lifted, no sample belongs to any
+    drop. No sample is changed.
+
+    Parameters
+    ----------
+    record : Record
+        The record.
+
+    Returns
+    -------
+    tuple of Record
+        One record per drop, named ``..._drop1`` and so on; the record itself where it holds one drop only.
+
+    Raises
+    ------
+    RecordError
+        When nothing falls in the record.
+    """
+    motion = motion_of(record, gaps=(None,) * len(record.planes), angles_known=True)
+    drops = drops_of(motion)
+    if not drops:
+        raise RecordError(f"{record.name}: the rotor does not fall from where it floated; there is no drop")
+    if len(drops) == 1:
+        return (record,)
+    starts = [float(record.time[0]), *(_floats_again(motion, drop) for drop in drops[:-1])]
+    return tuple(
+        _cut(record, number, start, _lifted(motion, drop), len(drops))
+        for number, (start, drop) in enumerate(zip(starts, drops, strict=True), start=1)
+    )
+
+
+def _floats_again(motion: Motion, drop: Drop) -> float:
+    """When the rotor is back where it floated, the controller calm: the first sample of the next drop."""
+    return float(motion.time[np.searchsorted(motion.time, drop.end) + 1])
+
+
+def _lifted(motion: Motion, drop: Drop) -> float:
+    """The last time the rotor lay on its bearings in a drop [s]."""
+    if not drop.lifted:
+        return drop.end
+    inside = (motion.time >= drop.release) & (motion.time <= drop.end)
+    lies = np.all([path.radius[inside] > LYING * path.gap for path in motion.paths], axis=0)
+    at = np.flatnonzero(lies)
+    return float(motion.time[inside][at[-1]]) if len(at) else drop.end
+
+
+def _cut(record: Record, number: int, start: float, end: float, count: int) -> Record:
+    part = record.window(start, end)
+    path = record.path
+    return replace(
+        part,
+        speed_time=_inside(record.speed_time, record.speed_time, start, end),
+        speed_readings=_inside(record.speed_readings, record.speed_time, start, end),
+        marks=_inside(record.marks, record.marks, start, end),
+        path=None if path is None else path.with_name(f"{path.stem}_drop{number}{path.suffix}"),
+        metadata={**record.metadata, "split_from": f"{record.name}, drop {number} of {count}"},
+        notes=(*record.notes, f"drop {number} of {count} in {record.name}, {start:.6g} to {end:.6g} s"),
+    )
+
+
+def _inside(values: Array | None, time: Array | None, start: float, end: float) -> Array | None:
+    """What was read between two times; where nothing was, the reading before them."""
+    if values is None or time is None:
+        return None
+    chosen = np.flatnonzero((time >= start) & (time <= end))
+    if not len(chosen):
+        chosen = np.array([max(int(np.searchsorted(time, start)) - 1, 0)])
+    return values[chosen]
