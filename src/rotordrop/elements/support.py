@@ -28,12 +28,19 @@ from rotordrop.elements.parameter import (
 )
 from rotordrop.elements.values import default, follows, scaled
 from rotordrop.known import Known
+from rotordrop.physics import blocks
 from rotordrop.physics import columns as L
-from rotordrop.physics.blocks import SUPPORT_PRESENT
 
 Array = NDArray[np.float64]
 
 _DAMPING_RATIO = 0.025
+
+_PRESENT = L.SUPPORT_FORM + blocks.SUPPORT_PRESENT
+_COUPLING = L.SUPPORT_FORM + blocks.SUPPORT_COUPLING
+_CUBIC = L.SUPPORT_FORM + blocks.SUPPORT_CUBIC
+_SHARE = L.SUPPORT_FORM + blocks.SUPPORT_FOUNDATION_SHARE
+_SPEED = L.SUPPORT_FORM + blocks.SUPPORT_FOUNDATION_SPEED
+_DAMPING = L.SUPPORT_FORM + blocks.SUPPORT_FOUNDATION_DAMPING
 
 _FORM = ("coupling", "cubic", "foundation_share", "foundation_frequency", "foundation_damping_ratio")
 """What a support may have beyond a spring and a damper on two axes."""
@@ -81,11 +88,11 @@ class Support(Description):
         "stiffness": L.SUPPORT_STIFFNESS_Y,
         "damping_horizontal": L.SUPPORT_DAMPING_X,
         "damping": L.SUPPORT_DAMPING_Y,
-        "coupling": L.SUPPORT_COUPLING,
-        "cubic": L.SUPPORT_CUBIC,
-        "foundation_share": L.FOUNDATION_SHARE,
-        "foundation_frequency": L.FOUNDATION_SPEED,
-        "foundation_damping_ratio": L.FOUNDATION_DAMPING,
+        "coupling": _COUPLING,
+        "cubic": _CUBIC,
+        "foundation_share": _SHARE,
+        "foundation_frequency": _SPEED,
+        "foundation_damping_ratio": _DAMPING,
     }
 
     displaces: ClassVar[Mapping[str, tuple[str, ...]]] = {
@@ -142,7 +149,7 @@ class Support(Description):
     def fill(self, row: Array) -> None:
         """Write the columns of the support."""
         super().fill(row)
-        row[L.SUPPORT_FORM + SUPPORT_PRESENT] = float(any(getattr(self, name) is not None for name in _FORM))
+        row[_PRESENT] = float(any(getattr(self, name) is not None for name in _FORM))
 
 
 def _from_ratio(ratio: Known | None, mass: Known, stiffness: Known) -> Known:
@@ -159,12 +166,12 @@ def _from_ratio(ratio: Known | None, mass: Known, stiffness: Known) -> Known:
 def support_sag(row: Array, load: float) -> float:
     """Deflection [m] of a support under a static load [N], its foundation included."""
     sag = load / float(row[L.SUPPORT_STIFFNESS_Y])
-    if row[L.SUPPORT_FORM + SUPPORT_PRESENT] == 0.0:
+    if row[_PRESENT] == 0.0:
         return sag
-    cubic = float(row[L.SUPPORT_CUBIC])
-    coupled = sag / (1.0 - float(row[L.SUPPORT_COUPLING]) ** 2)
+    cubic = float(row[_CUBIC])
+    coupled = sag / (1.0 - float(row[_COUPLING]) ** 2)
     deflection = coupled / (1.0 + cubic * sag**2)  # next order: a few parts in ten thousand of 3 µm
-    speed, share = float(row[L.FOUNDATION_SPEED]), max(float(row[L.FOUNDATION_SHARE]), 0.0)
+    speed, share = float(row[_SPEED]), max(float(row[_SHARE]), 0.0)
     return deflection + (0.0 if share == 0.0 else load * share / (float(row[L.SUPPORT_MASS_Y]) * speed**2))
 
 
@@ -325,7 +332,7 @@ EXTENSIONS: tuple[Extension, ...] = (
                 given_sigma=0.05,
                 lower=-0.85,
                 upper=0.85,
-                entries=bearing_entries(L.SUPPORT_COUPLING),
+                entries=bearing_entries(_COUPLING),
             ),
         ),
     ),
@@ -350,7 +357,7 @@ EXTENSIONS: tuple[Extension, ...] = (
                 given_sigma=0.1,
                 scale="one over the deflection under ten mean loads, squared",
                 scaled=_cubic_scale,
-                entries=bearing_entries(L.SUPPORT_CUBIC),
+                entries=bearing_entries(_CUBIC),
             ),
         ),
     ),
@@ -369,7 +376,7 @@ EXTENSIONS: tuple[Extension, ...] = (
                 guess_sigma=0.06,
                 given_sigma=0.01,
                 lower=0.0,
-                entries=bearing_entries(L.FOUNDATION_SHARE),
+                entries=bearing_entries(_SHARE),
             ),
             Parameter(
                 path="support.foundation_frequency",
@@ -378,7 +385,7 @@ EXTENSIONS: tuple[Extension, ...] = (
                 guess_sigma=0.3,
                 given_sigma=0.05,
                 reach=5.0,
-                entries=bearing_entries(L.FOUNDATION_SPEED),
+                entries=bearing_entries(_SPEED),
             ),
             Parameter(
                 path="support.foundation_damping_ratio",
@@ -387,7 +394,7 @@ EXTENSIONS: tuple[Extension, ...] = (
                 guess_sigma=0.5,
                 given_sigma=0.2,
                 reach=8.0,
-                entries=bearing_entries(L.FOUNDATION_DAMPING),
+                entries=bearing_entries(_DAMPING),
             ),
         ),
     ),

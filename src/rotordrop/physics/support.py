@@ -29,8 +29,8 @@ LARGEST_SOFTENING = 0.3
 @inner_kernel
 def support_force(
     form: Array, k_x: float, k_y: float, c_x: float, c_y: float, x: float, y: float, v_x: float, v_y: float
-) -> tuple[float, float]:
-    """Force [N] of spring and damper of a support against a deflection.
+) -> tuple[float, float, float]:
+    """Force [N] of spring and damper of a support against a deflection, and the power that it takes [W].
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def support_force(
     Returns
     -------
     tuple of float
-        Force along x and y [N].
+        Force along x and y [N], power lost [W].
 
     Notes
     -----
@@ -55,7 +55,7 @@ def support_force(
     k_c = form[COUPLING] * math.sqrt(k_x * k_y)
     f_x = k_x * x * (1.0 + cubic_share(form[CUBIC], x)) + k_c * y + c_x * v_x
     f_y = k_y * y * (1.0 + cubic_share(form[CUBIC], y)) + k_c * x + c_y * v_y
-    return f_x, f_y
+    return f_x, f_y, c_x * v_x * v_x + c_y * v_y * v_y
 
 
 @inner_kernel
@@ -68,13 +68,16 @@ def cubic_share(cubic: float, u: float) -> float:
 
 
 @inner_kernel
-def support_tangent(form: Array, k_x: float, k_y: float, x: float, y: float) -> tuple[float, float, float]:
-    """Slope [N/m] of the force of a support along x, across, and along y, at a deflection [m].
+def support_tangent(
+    form: Array, k_x: float, k_y: float, c_x: float, c_y: float, x: float, y: float, v_x: float, v_y: float
+) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Slope of the force of a support by deflection [N/m] and by its rate [N s/m]: along x, across, along y.
 
     Source: `support_force`, differentiated.
     """
     k_c = form[COUPLING] * math.sqrt(k_x * k_y)
-    return k_x * _cubic_slope(form[CUBIC], x), k_c, k_y * _cubic_slope(form[CUBIC], y)
+    stiffness = k_x * _cubic_slope(form[CUBIC], x), k_c, k_y * _cubic_slope(form[CUBIC], y)
+    return stiffness, (c_x, 0.0, c_y)
 
 
 @inner_kernel

@@ -198,7 +198,7 @@ def add_magnet_forces(t: float, y: Array, p: KernelParameters, dy: Array) -> flo
 def add_support_form(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
     """Add what the form of a support changes: its force, and the motion of its foundation.
 
-    Returns what is dissipated beyond the dampers of the plain support [W].
+    Returns what support and foundation dissipate [W].
     """
     n_q, h, own = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.BEARING_OWN]
     row = p.bearing[b]
@@ -206,11 +206,10 @@ def add_support_form(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
     k_x, k_y = row[L.SUPPORT_STIFFNESS_X], row[L.SUPPORT_STIFFNESS_Y]
     c_x, c_y = row[L.SUPPORT_DAMPING_X], row[L.SUPPORT_DAMPING_Y]
     form = row[L.SUPPORT_FORM : L.SUPPORT_FORM_END]
-    F_x, F_y = support.support_force(form, k_x, k_y, c_x, c_y, x, z, vx, vz)
+    F_x, F_y, dissipated = support.support_force(form, k_x, k_y, c_x, c_y, x, z, vx, vz)
     sx, sy = y[n_q + h], y[n_q + h + 1]
     dy[n_q + h] += (c_x * sx + k_x * y[h] - F_x) / row[L.SUPPORT_MASS_X]
     dy[n_q + h + 1] += (c_y * sy + k_y * y[h + 1] - F_y) / row[L.SUPPORT_MASS_Y]
-    dissipated: float = c_x * (vx * vx - sx * sx) + c_y * (vz * vz - sy * sy)
     if own < 0:
         return dissipated
     speed, share = form[blocks.SUPPORT_FOUNDATION_SPEED], max(form[blocks.SUPPORT_FOUNDATION_SHARE], 0.0)
@@ -315,7 +314,7 @@ def bearing_accelerations(
         L.SUPPORT_MASS_Y
     ]
     if row[L.SUPPORT_FORM + blocks.SUPPORT_PRESENT] != 0.0:
-        by_support += add_support_form(b, y, p, dy)
+        by_support = add_support_form(b, y, p, dy)
     # Written together and last: each write makes the compiler read the arrays of the bearing again.
     power = work.power[b]
     power[SLIDING], power[IN_CONTACT] = sliding, lost

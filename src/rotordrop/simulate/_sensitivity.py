@@ -28,6 +28,7 @@ from rotordrop.simulate._rhs import (
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+Slopes = tuple[float, float, float]
 PRESCRIBED = aerodynamics.PRESCRIBED_SPEED
 OF_SPEED = aerodynamics.FUNCTION_OF_SPEED
 
@@ -100,19 +101,17 @@ def _contact_jacobian(c: int, g: Array, p: KernelParameters, J: Array) -> None:
 
 
 @lean_kernel
-def _couple(
-    J: Array, place: int, weight: float, at: int, rate: int, i: int, k: tuple[float, float, float], c: float
-) -> None:
-    """Add to an acceleration along axis ``i`` what springs ``k_xx, k_xy, k_yy`` and a damper make of a body.
+def _couple(J: Array, place: int, weight: float, at: int, rate: int, i: int, k: Slopes, c: Slopes) -> None:
+    """Add to an acceleration along axis ``i`` what springs ``k_xx, k_xy, k_yy`` and dampers make of a body.
 
     The body's displacement stands at ``at``, its velocity at ``rate``, x before y.
     """
     for j in range(2):
-        stiffness = k[1]
+        stiffness, damping = k[1], c[1]
         if i == j:
-            stiffness = k[0] if i == 0 else k[2]
+            stiffness, damping = (k[0], c[0]) if i == 0 else (k[2], c[2])
         J[place, at + j] += weight * stiffness
-    J[place, rate + i] += weight * c
+        J[place, rate + j] += weight * damping
 
 
 @lean_kernel
@@ -123,7 +122,7 @@ def _race_jacobian(b: int, y: Array, p: KernelParameters, J: Array) -> None:
     row = p.bearing[b]
     dx, dy = race_deflection(b, y, p)
     F_x, F_y, k_xx, k_xy, k_yy = ball_set_gradient(row[L.BALL_SET : L.BALL_SET_END], p.balls[b], dx, dy)
-    k, c = (k_xx, k_xy, k_yy), row[L.BEARING_DAMPING]
+    k, c = (k_xx, k_xy, k_yy), (row[L.BEARING_DAMPING], 0.0, row[L.BEARING_DAMPING])
     for i in range(2):
         m_h = row[L.SUPPORT_MASS_X + i]
         _couple(J, n_q + r + i, -1.0 / row[L.RACE_MASS], r, n_q + r, i, k, c)
@@ -148,12 +147,14 @@ def _support_jacobian(b: int, y: Array, p: KernelParameters, J: Array) -> None:
     n_q, h, own = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.BEARING_OWN]
     row = p.bearing[b]
     form = row[L.SUPPORT_FORM : L.SUPPORT_FORM_END]
-    k = (row[L.SUPPORT_STIFFNESS_X], 0.0, row[L.SUPPORT_STIFFNESS_Y])
+    k_x, k_y = row[L.SUPPORT_STIFFNESS_X], row[L.SUPPORT_STIFFNESS_Y]
+    c_x, c_y = row[L.SUPPORT_DAMPING_X], row[L.SUPPORT_DAMPING_Y]
+    k, c = (k_x, 0.0, k_y), (c_x, 0.0, c_y)
     if form[blocks.SUPPORT_PRESENT] != 0.0:
-        x, z, _vx, _vz = support_deflection(b, y, p)
-        k = support.support_tangent(form, row[L.SUPPORT_STIFFNESS_X], row[L.SUPPORT_STIFFNESS_Y], x, z)
+        x, z, vx, vz = support_deflection(b, y, p)
+        k, c = support.support_tangent(form, k_x, k_y, c_x, c_y, x, z, vx, vz)
     for i in range(2):
-        m_h, c = row[L.SUPPORT_MASS_X + i], row[L.SUPPORT_DAMPING_X + i]
+        m_h = row[L.SUPPORT_MASS_X + i]
         _couple(J, n_q + h + i, -1.0 / m_h, h, n_q + h, i, k, c)
         if own < 0:
             continue

@@ -79,14 +79,14 @@ def test_a_support_turned_by_an_angle_is_stiff_along_its_own_axes():
     form = form_of(COUPLING=(k_1 - k_2) * s * c / math.sqrt(k_x * k_y))
     for stiffness, (x, y) in ((k_1, (c, s)), (k_2, (-s, c))):
         force = support.support_force(form, k_x, k_y, 0.0, 0.0, 1e-5 * x, 1e-5 * y, 0.0, 0.0)
-        assert force == pytest.approx((1e-5 * stiffness * x, 1e-5 * stiffness * y), rel=1e-12)
+        assert force[:2] == pytest.approx((1e-5 * stiffness * x, 1e-5 * stiffness * y), rel=1e-12)
 
 
 @pytest.mark.parametrize("entries", [{"COUPLING": 0.4}, {"CUBIC": 4e8}, {"CUBIC": -1e8, "COUPLING": -0.3}])
 def test_force_is_the_slope_of_the_energy_and_tangent_that_of_the_force(entries):
     form, k_x, k_y, at = form_of(**entries), 0.7e8, 1e8, np.array([21e-6, -33e-6])
     force = support.support_force(form, k_x, k_y, 0.0, 0.0, at[0], at[1], 0.0, 0.0)
-    k_xx, k_xy, k_yy = support.support_tangent(form, k_x, k_y, at[0], at[1])
+    (k_xx, k_xy, k_yy), _ = support.support_tangent(form, k_x, k_y, 0.0, 0.0, at[0], at[1], 0.0, 0.0)
     step = 1e-9
     for axis, slope in enumerate(((k_xx, k_xy), (k_xy, k_yy))):
         ends = [at + sign * step * np.eye(2)[axis] for sign in (1.0, -1.0)]
@@ -94,7 +94,18 @@ def test_force_is_the_slope_of_the_energy_and_tangent_that_of_the_force(entries)
         assert (energy[0] - energy[1]) / (2 * step) == pytest.approx(force[axis], rel=1e-6)
         forces = [support.support_force(form, k_x, k_y, 0.0, 0.0, *end, 0.0, 0.0) for end in ends]
         found = (np.array(forces[0]) - np.array(forces[1])) / (2 * step)
-        assert found == pytest.approx(slope, rel=1e-6)
+        assert found[:2] == pytest.approx(slope, rel=1e-6)
+
+
+def test_a_support_loses_what_its_force_does_beyond_that_of_its_springs():
+    springs, rate = (form_of(COUPLING=0.4, CUBIC=4e8), 0.7e8, 1e8), np.array([0.02, -0.05])
+    place, dampers = (21e-6, -33e-6), (3e3, 5e3)
+    *still, lost_at_rest = support.support_force(*springs, *dampers, *place, 0.0, 0.0)
+    *moving, lost = support.support_force(*springs, *dampers, *place, *rate)
+    assert lost_at_rest == 0.0
+    assert lost == pytest.approx((np.array(moving) - still) @ rate, rel=1e-9)
+    _, (c_xx, c_xy, c_yy) = support.support_tangent(*springs, *dampers, *place, *rate)
+    assert np.array([[c_xx, c_xy], [c_xy, c_yy]]) @ rate == pytest.approx(np.array(moving) - still, rel=1e-9)
 
 
 def test_a_softening_spring_never_pulls():
