@@ -5,14 +5,17 @@ A followed record, a replayed one and a simulated drop end here, so that pages a
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
 from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.estimate import published
+from rotordrop.estimate.published import Value
 from rotordrop.known import Known
 from rotordrop.severity.statistics import StressStatistics, stress_statistics
 from rotordrop.simulate.certificate import refined_peak
@@ -300,3 +303,37 @@ def mean_late(force: History) -> float | None:
         return None
     late = force.between(*LATE).values
     return float(np.mean(late)) if len(late) else None
+
+
+def published_bearing(bearing: BearingDrop, severity: dict[str, Known] | None = None) -> published.Bearing:
+    """What is published of one bearing, found from a record or simulated."""
+    numbers = {
+        "peak_force_N": Value.of_known(bearing.peak_force.known, bearing.peak_force.time),
+        "peak_stress_Pa": Value.of_known(bearing.peak_stress.known, bearing.peak_stress.time),
+    }
+    for path, known in {**bearing.values, **(severity or {})}.items():
+        numbers[path] = Value.of_known(known)
+    statistics = {k: v for k, v in asdict(bearing.statistics).items() if v is not None}
+    return published.Bearing(
+        origin=bearing.peak_force.origin.value,
+        numbers=numbers,
+        stress_statistics_Pa=published.Statistics(**statistics),
+        impacts=[
+            published.Impact(
+                start_s=impact.start,
+                end_s=finite(impact.end),
+                peak_time_s=impact.peak_time,
+                azimuth_rad=impact.azimuth,
+                peak_force_N=Value.of_known(impact.peak_force),
+                impulse_N_s=Value.of_known(impact.impulse),
+                dissipated_energy_J=Value.of_known(impact.dissipated_energy),
+            )
+            for impact in bearing.impacts
+        ],
+        **({"not_stated": dict(bearing.missing)} if bearing.missing else {}),
+    )
+
+
+def finite(value: float | None) -> float | None:
+    """The number, or None where it is not finite: JSON has no NaN."""
+    return None if value is None or not math.isfinite(value) else float(value)

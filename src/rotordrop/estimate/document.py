@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
@@ -12,7 +11,7 @@ import numpy as np
 from rotordrop._version import __version__
 from rotordrop.estimate import published
 from rotordrop.estimate.agreement import Agreement
-from rotordrop.estimate.bearing_drop import BearingDrop, Peak
+from rotordrop.estimate.bearing_drop import finite, published_bearing
 from rotordrop.estimate.estimate import Estimate, Structure
 from rotordrop.estimate.methods import Replay
 from rotordrop.estimate.published import FORMAT, Value
@@ -47,7 +46,7 @@ def published_drop(estimate: Estimate) -> published.Drop:
         consistency=published.Consistency(
             consistent=estimate.consistent,
             sentence=estimate.sentence,
-            nis=_finite(estimate.nis),
+            nis=finite(estimate.nis),
             process_noise_factor=estimate.noise_factor,
             checks=[published.Check(**asdict(check)) for check in estimate.checks],
         ),
@@ -135,42 +134,12 @@ def combined(documents: Sequence[dict[str, Any]], names: Sequence[str]) -> dict[
     }
 
 
-def published_bearing(bearing: BearingDrop, severity: dict[str, Known] | None = None) -> published.Bearing:
-    """What is published of one bearing, found from a record or simulated."""
-    numbers = {"peak_force_N": _peak(bearing.peak_force), "peak_stress_Pa": _peak(bearing.peak_stress)}
-    for path, known in {**bearing.values, **(severity or {})}.items():
-        numbers[path] = Value.of_known(known)
-    statistics = {k: v for k, v in asdict(bearing.statistics).items() if v is not None}
-    return published.Bearing(
-        origin=bearing.peak_force.origin.value,
-        numbers=numbers,
-        stress_statistics_Pa=published.Statistics(**statistics),
-        impacts=[
-            published.Impact(
-                start_s=impact.start,
-                end_s=_finite(impact.end),
-                peak_time_s=impact.peak_time,
-                azimuth_rad=impact.azimuth,
-                peak_force_N=Value.of_known(impact.peak_force),
-                impulse_N_s=Value.of_known(impact.impulse),
-                dissipated_energy_J=Value.of_known(impact.dissipated_energy),
-            )
-            for impact in bearing.impacts
-        ],
-        **({"not_stated": dict(bearing.missing)} if bearing.missing else {}),
-    )
-
-
 def published_structure(structure: Sequence[Structure]) -> list[published.Structure]:
     """What a machine has beyond the base model."""
     return [
-        published.Structure(name=one.name, log_likelihood_rise=_finite(one.gain), sentence=one.sentence)
+        published.Structure(name=one.name, log_likelihood_rise=finite(one.gain), sentence=one.sentence)
         for one in structure
     ]
-
-
-def _peak(peak: Peak) -> Value:
-    return Value.of_known(peak.known, peak.time)
 
 
 def _value(known: Known | None) -> Value | None:
@@ -214,8 +183,8 @@ def _agreement(agreement: Agreement, names: Sequence[str]) -> published.Agreemen
         name: published.BearingAgreement(
             measured_contacts_s=one.measured_contacts.tolist(),
             simulated_contacts_s=one.simulated_contacts.tolist(),
-            measured_bounce_m=_finite(one.measured_bounce),
-            simulated_bounce_m=_finite(one.simulated_bounce),
+            measured_bounce_m=finite(one.measured_bounce),
+            simulated_bounce_m=finite(one.simulated_bounce),
             horizon_s=one.horizon,
         )
         for name, one in zip(names, agreement.bearings, strict=True)
@@ -230,7 +199,3 @@ def _agreement(agreement: Agreement, names: Sequence[str]) -> published.Agreemen
         orbit_disagreement_m=agreement.disagreement,
         expected_horizon_s=agreement.expected_horizon,
     )
-
-
-def _finite(value: float | None) -> float | None:
-    return None if value is None or not math.isfinite(value) else float(value)

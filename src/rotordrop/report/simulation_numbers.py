@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from rotordrop.estimate.bearing_drop import simulated_bearings
-from rotordrop.estimate.document import published_bearing
+from rotordrop.estimate.bearing_drop import published_bearing, simulated_bearings
 from rotordrop.simulate.result import DropResult
 
 
