@@ -101,6 +101,10 @@ class OutputError(RotordropError):
     exit_code: ClassVar[int] = 6
 
 
+class DamagedFileError(OutputError):
+    """A file that rotordrop wrote is not what it wrote."""
+
+
 class ConsistencyError(RotordropError):
     """Model and record do not agree: what was asked for was made, but its single numbers do not hold."""
 

@@ -5,9 +5,11 @@ A device, a pipe or a link that stands at the place is kept: what was written go
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import re
+import shutil
 import stat
 import zlib
 from collections.abc import Iterator
@@ -16,7 +18,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from rotordrop.errors import OutputError
+from rotordrop.errors import DamagedFileError, OutputError
 
 _LONGEST_STEM = 40
 """Characters of a file name that its temporary name keeps: file systems end names at 255 bytes."""
@@ -49,7 +51,7 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
         with _through(target) as temporary:
             yield temporary
         return
-    _clear_after_killed_runs(target)
+    clear_after_killed_runs(target.parent, target.stem[:_LONGEST_STEM])
     temporary = _temporary_beside(target)
     try:
         yield temporary
@@ -71,7 +73,6 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
 @contextmanager
 def _through(target: Path) -> Iterator[Path]:
     """Write for a device or a pipe: collected in a temporary file first, then copied into it."""
-    import shutil
     import tempfile
 
     with tempfile.TemporaryDirectory() as folder:
@@ -82,6 +83,19 @@ def _through(target: Path) -> Iterator[Path]:
                 shutil.copyfileobj(content, stream)
         except OSError as error:
             raise _cannot_write(target, error) from error
+
+
+@contextmanager
+def atomic_folder(path: Path) -> Iterator[Path]:
+    """Give a new folder to fill; it stands at `path` when the block ends well, and nowhere otherwise."""
+    temporary = _temporary_beside(path)
+    temporary.mkdir()
+    try:
+        yield temporary
+        temporary.rename(path)
+    except BaseException:
+        shutil.rmtree(temporary, ignore_errors=True)
+        raise
 
 
 def _temporary_beside(target: Path) -> Path:
@@ -103,21 +117,24 @@ def _system() -> str:
     return f"{zlib.crc32('/'.join(marks).encode()):08x}"
 
 
-def _clear_after_killed_runs(target: Path) -> None:
-    """Remove what processes of this computer that no longer run left behind for the same file."""
+def clear_after_killed_runs(folder: Path, stem: str | None = None) -> None:
+    """Remove what processes of this computer that no longer run left half written, for one stem or for all."""
     if os.name != "posix":
         return  # elsewhere there is no harmless way to ask whether a process runs
-    stem = target.stem[:_LONGEST_STEM]
     with suppress(OSError):
-        for name in os.listdir(target.parent):  # noqa: PTH208 - names are matched before paths are made
+        for name in os.listdir(folder):  # noqa: PTH208 - names are matched before paths are made
             left = _PART.fullmatch(name)
-            if left and left["stem"] == stem and left["system"] == _system() and not _runs(left["process"]):
-                (target.parent / name).unlink(missing_ok=True)
+            if left and left["system"] == _system() and not process_runs(int(left["process"])):
+                if stem is None and (folder / name).is_dir():
+                    shutil.rmtree(folder / name, ignore_errors=True)
+                elif stem in (None, left["stem"]):
+                    (folder / name).unlink(missing_ok=True)
 
 
-def _runs(process: str) -> bool:
+def process_runs(process: int) -> bool:
+    """Whether a process of this computer runs; on POSIX systems only."""
     try:
-        os.kill(int(process), 0)
+        os.kill(process, 0)
     except ProcessLookupError:
         return False
     except (OSError, OverflowError):
@@ -166,21 +183,54 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
         temporary.write_text(text, encoding="utf-8", errors="replace", newline="\n")
 
 
-def write_json(path: str | os.PathLike[str], content: Any) -> None:
+def write_json(path: str | os.PathLike[str], content: Any, *, sealed: bool = False) -> None:
     """Write a JSON file in UTF-8, complete or not at all.
 
-    Numbers that JSON cannot hold (NaN, infinity) are refused before anything is written.
+    Numbers that JSON cannot hold (NaN, infinity) are refused before anything is written. A sealed table ends
+    with the digest of the whole file, for `read_sealed`.
     """
     try:
-        text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
+        whole = {**content, "sha256": _NO_DIGEST.decode()} if sealed else content
+        text = json.dumps(whole, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     except (TypeError, ValueError) as error:
         raise OutputError(f"cannot write {path} as JSON: {error}") from error
-    write_text(path, text + "\n")
+    raw = text.encode("utf-8", errors="replace")
+    if sealed:
+        raw = raw[:_DIGEST.start] + hashlib.sha256(raw).hexdigest().encode() + raw[_DIGEST.stop :]
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(raw)
+
+
+_DIGEST = slice(-68, -4)
+"""Where a sealed file has its digest: before the quotation mark, the line end, the brace and the line end."""
+_NO_DIGEST = b"0" * 64
+
+
+def read_sealed(path: str | os.PathLike[str], remedy: str) -> dict[str, Any]:
+    """Read a sealed JSON table; one of which a single bit has changed is refused with the way out."""
+    raw = Path(path).read_bytes()
+    empty = raw[: _DIGEST.start] + _NO_DIGEST + raw[_DIGEST.stop :]
+    if hashlib.sha256(empty).hexdigest().encode() != raw[_DIGEST]:
+        raise DamagedFileError(f"{path} is damaged: it is not what rotordrop wrote; {remedy}")
+    content: dict[str, Any] = json.loads(raw)
+    del content["sha256"]
+    return content
+
+
+def digest_of_file(path: str | os.PathLike[str]) -> str:
+    """SHA-256 of a file."""
+    with Path(path).open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def require_place(path: str | os.PathLike[str]) -> None:
     """Refuse a place where no file can be written, before a long computation rather than after it."""
-    target = Path(os.path.realpath(path))
+    try:
+        target = Path(os.path.realpath(path))
+    except FileNotFoundError:
+        raise OutputError(
+            f"cannot write {path}: the folder you are in has been deleted; go to another one"
+        ) from None
     try:
         mode = target.stat().st_mode
     except FileNotFoundError:

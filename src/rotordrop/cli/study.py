@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -121,6 +122,11 @@ def _deliver_results(
     from rotordrop.study.summary import save_results
     from rotordrop.units import parse_quantity
 
+    if results.aside:
+        console(sys.stderr).print(
+            f"note: {len(results.aside)} damaged shards were computed again; kept aside: "
+            f"{', '.join(results.aside)}"
+        )
     if not len(results):
         console().print(f"{place}: no drop is finished yet")
         return

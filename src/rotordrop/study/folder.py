@@ -2,17 +2,20 @@
 
 A shard is claimed by making a file that must not exist yet, and published by renaming a whole file. Claims
 only save work: a shard computed twice has the same bits, so that a lost or stolen claim can spoil nothing.
+Plan and shards carry digests: what has changed on the disk is named, kept aside and computed again.
 """
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
 import os
+import re
 import secrets
 import socket
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,8 +25,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop._version import __version__
-from rotordrop.errors import OutputError, UsageError
-from rotordrop.files import atomic_path, write_json, write_text
+from rotordrop.errors import DamagedFileError, OutputError, UsageError
+from rotordrop.files import (
+    atomic_path,
+    digest_of_file,
+    process_runs,
+    read_sealed,
+    write_json,
+    write_text,
+)
 from rotordrop.machine import load_machine
 from rotordrop.machine.saving import machine_text
 from rotordrop.study.plan import Study, planned_study
@@ -31,11 +41,16 @@ from rotordrop.study.quantities import columns_of
 
 Array = NDArray[np.float64]
 
-FORMAT = "rotordrop study 2"
+FORMAT = "rotordrop study 3"
+WITHOUT_DIGESTS = "rotordrop study 2"
 REASON = 160
 """Characters kept of why a drop failed; chosen, not measured."""
 LEASE = 120.0
 """Time after which a claim without a sign of life may be taken over [s]; drops are signs of life."""
+
+
+_SHARD = re.compile(r"[0-9]{6}|[1-9][0-9]{6,}")
+_SEAL = hashlib.sha256().digest_size
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,22 +89,21 @@ class StudyFolder:
 
     def finished(self) -> list[int]:
         """Numbers of the finished shards, rising."""
-        return sorted(int(file.stem) for file in self.shards.glob("[0-9]*.npy"))
+        return sorted(int(file.stem) for file in self.shards.glob("*.npy") if _SHARD.fullmatch(file.stem))
+
+    def aside(self) -> list[str]:
+        """Names of the damaged shards that were kept."""
+        return sorted(file.name for file in self.shards.glob("*.damaged"))
 
 
 def open_folder(study: Study, path: str | Path) -> StudyFolder:
-    """Make the folder of a study, or continue in one that holds the same study."""
+    """Make the folder of a study, or continue in one that holds the same study.
+
+    A folder without digests, as older versions made them, is given some. One of another version is refused
+    unless all its drops are there: numbers may differ between versions.
+    """
     folder = StudyFolder(Path(path))
     existing = folder.path / "plan.json"
-    if existing.exists():
-        there = read_plan(folder.path)
-        if there["digest"] != study.digest:
-            raise UsageError(
-                f"{folder.path} holds another study ({there['study'].get('name')!r}, digest "
-                f"{there['digest'][:12]}; this one has {study.digest[:12]}); name another folder, or "
-                "undo the change of study or machine"
-            )
-        return folder
     plan = {
         "format": FORMAT,
         "rotordrop": __version__,
@@ -99,13 +113,31 @@ def open_folder(study: Study, path: str | Path) -> StudyFolder:
             {"name": q.name, "unit": q.unit, "meaning": q.meaning} for q in columns_of(study.machine)
         ],
     }
-    try:
-        for part in (folder.path, folder.shards, folder.claims):
-            part.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{folder.path}: cannot make the study folder: {error.strerror}") from error
-    write_text(folder.path / "machine.toml", machine_text(study.machine))
-    write_json(existing, plan)  # last: a folder with a plan is complete
+    if existing.exists():
+        there = read_plan(folder.path)
+        if there["digest"] != study.digest:
+            raise UsageError(
+                f"{folder.path} holds another study ({there['study'].get('name')!r}, digest "
+                f"{there['digest'][:12]}; this one has {study.digest[:12]}); name another folder, or "
+                "undo the change of study or machine"
+            )
+        if len(folder.finished()) < study.shards:
+            require_same_version(there, folder.path)
+        if there["format"] == FORMAT:
+            return folder
+        for shard in folder.finished():
+            raw = folder.shard_path(shard).read_bytes()
+            if raw[-_SEAL:] != _seal(study, raw[:-_SEAL]):
+                _write_sealed(folder.shard_path(shard), study, raw)
+    else:
+        try:
+            for part in (folder.path, folder.shards, folder.claims):
+                part.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(f"{folder.path}: cannot make the study folder: {error.strerror}") from error
+        write_text(folder.path / "machine.toml", machine_text(study.machine))
+    plan["machine_sha256"] = digest_of_file(folder.path / "machine.toml")
+    write_json(existing, plan, sealed=True)  # last: a folder with a plan is complete
     return folder
 
 
@@ -113,28 +145,52 @@ def read_plan(path: str | Path) -> dict[str, Any]:
     """Plan of a study folder; refuses what is none."""
     file = Path(path) / "plan.json"
     try:
-        plan = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        return read_sealed(
+            file, "remove it, and run the study again with its study file: finished shards stay"
+        )
+    except OSError as error:
         raise UsageError(
             f"{Path(path)} is not a study folder ({file.name}: {error}); name a folder that 'rotordrop study "
             "run' has made"
         ) from error
-    if not isinstance(plan, dict) or plan.get("format") != FORMAT:
-        raise UsageError(f"{file} has format {plan.get('format')!r}; expected {FORMAT!r}")
-    return plan
+    except DamagedFileError:
+        plan = None
+        with suppress(ValueError):
+            plan = json.loads(file.read_bytes())
+        # what has a digest was not written without one
+        if not isinstance(plan, dict) or plan.get("format") != WITHOUT_DIGESTS or "sha256" in plan:
+            raise
+        return plan
+
+
+def require_same_version(plan: Mapping[str, Any], path: Path) -> None:
+    """Refuse to compute drops for a study that another version of rotordrop began."""
+    if plan["rotordrop"] != __version__:
+        raise UsageError(
+            f"{path} was begun by rotordrop {plan['rotordrop']}, and this is {__version__}: numbers may differ "
+            "between versions. Go on with that version, or name another folder"
+        )
 
 
 def study_of(path: str | Path) -> Study:
     """The study that a folder holds, for whoever joins the work with nothing but the folder."""
-    plan = read_plan(path)
-    machine = load_machine(Path(path) / "machine.toml")
-    study = planned_study(plan["study"], machine)
-    if study.digest != plan["digest"]:
-        raise UsageError(
-            f"{Path(path)}: plan and machine file do not belong together (digest {study.digest[:12]}, "
-            f"expected {plan['digest'][:12]}); one of them was changed after the study began"
+    plan, file = read_plan(path), Path(path) / "machine.toml"
+    if plan["format"] == FORMAT and digest_of_file(file) != plan["machine_sha256"]:
+        raise DamagedFileError(
+            f"{file} is damaged, or was changed after the study began: plan and machine file do not belong "
+            f"together; remove {file.name} and plan.json, and run the study again with its study file"
         )
-    return study
+    machine = load_machine(file)
+    try:
+        study = planned_study(plan["study"], machine)
+        if study.digest == plan["digest"]:
+            return study
+    except (KeyError, TypeError, ValueError):  # of a version that knew other settings
+        pass
+    raise UsageError(
+        f"{Path(path)} was begun by rotordrop {plan.get('rotordrop')}, and this is {__version__}, which makes "
+        "another study of its plan and machine file; use that version, or run the study in another folder"
+    )
 
 
 def publish(folder: StudyFolder, study: Study, shard: int, found: Shard) -> None:
@@ -149,8 +205,18 @@ def publish(folder: StudyFolder, study: Study, shard: int, found: Shard) -> None
         left.unlink(missing_ok=True)
     content = io.BytesIO()  # numpy's own way into a file drops the error of a full disk, and what did not fit
     np.lib.format.write_array(content, table, allow_pickle=False)
-    with atomic_path(target) as temporary, temporary.open("wb") as file:
-        file.write(content.getbuffer())
+    _write_sealed(target, study, content.getvalue())
+
+
+def _write_sealed(target: Path, study: Study, content: bytes) -> None:
+    """Write a shard with its digest behind it, where readers of such files do not look."""
+    with atomic_path(target) as temporary:
+        temporary.write_bytes(content + _seal(study, content))
+
+
+def _seal(study: Study, content: bytes) -> bytes:
+    """Digest of the values of a shard and of all that decides them."""
+    return hashlib.sha256(study.digest.encode() + content).digest()
 
 
 def shard_type(study: Study) -> np.dtype[Any]:
@@ -165,20 +231,45 @@ def shard_type(study: Study) -> np.dtype[Any]:
     )
 
 
-def read_shard(folder: StudyFolder, study: Study, shard: int) -> NDArray[Any]:
-    """A finished shard; one that does not fit the plan is refused by name."""
-    file = folder.shard_path(shard)
-    try:
-        table = np.load(file, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise OutputError(f"{file} cannot be read ({error}); delete it, and run the study again") from error
-    drops = study.drops_of(shard)
-    if table.dtype != shard_type(study) or not np.array_equal(table["drop"], np.asarray(drops)):
-        raise OutputError(
-            f"{file} does not hold drops {drops.start} to {drops.stop - 1} of this study; delete it, and run "
-            "the study again"
-        )
-    return np.asarray(table)
+def read_shards(
+    folder: StudyFolder, study: Study, shards: Sequence[int]
+) -> Iterator[tuple[int, NDArray[Any] | DamagedFileError]]:
+    """Finished shards one after the other; for one that is not what was computed the error that names it.
+
+    The values that vary are drawn again, all at once: a Sobol sequence begins at its first point every time.
+    """
+    begin = study.drops_of(min(shards, default=0)).start
+    drawn = study.values(begin, max(study.drops_of(max(shards, default=-1)).stop, begin))
+    for shard in shards:
+        file, drops, problem = folder.shard_path(shard), study.drops_of(shard), ""
+        try:
+            raw = file.read_bytes()
+        except OSError as error:
+            raise OutputError(f"{file} cannot be read: {error.strerror}") from error
+        content = raw[:-_SEAL]
+        if raw[-_SEAL:] != _seal(study, content):
+            problem = "is damaged: it is not what was computed"
+        else:
+            table = np.load(io.BytesIO(content), allow_pickle=False)
+            fits = table.dtype == shard_type(study) and np.array_equal(table["drop"], np.asarray(drops))
+            if not fits:
+                problem = f"does not hold drops {drops.start} to {drops.stop - 1} of this study"
+            elif not np.array_equal(table["varied"], drawn[drops.start - begin : drops.stop - begin]):
+                problem = "holds other values than this version of rotordrop draws"
+        if problem:
+            remedy = f"'rotordrop study run {folder.path}' keeps it aside and computes its drops again"
+            yield shard, DamagedFileError(f"{file} {problem}; {remedy}")
+        else:
+            yield shard, table
+
+
+def put_damaged_aside(folder: StudyFolder, study: Study) -> None:
+    """Rename finished shards that are not what was computed, so that they are computed again."""
+    for shard, found in read_shards(folder, study, folder.finished()):
+        if isinstance(found, DamagedFileError):
+            file = folder.shard_path(shard)
+            with suppress(FileNotFoundError):  # another process did
+                file.rename(file.with_name(f"{file.name}.{secrets.token_hex(4)}.damaged"))
 
 
 def tidy(folder: StudyFolder) -> None:
@@ -246,17 +337,11 @@ def _abandoned(file: Path) -> bool:
         owner = json.loads(file.read_text(encoding="utf-8"))
     except FileNotFoundError:
         return False
-    except ValueError:  # killed between making and writing
+    except (ValueError, RecursionError):  # killed between making and writing
+        owner = None
+    process = owner.get("process") if isinstance(owner, dict) else None
+    if not isinstance(process, int):
         return age > 5.0
-    if age > LEASE:
-        return True
     # elsewhere than on POSIX there is no harmless way to ask whether a process runs: only the lease tells
-    if os.name != "posix" or owner.get("host") != socket.gethostname():
-        return False
-    try:
-        os.kill(int(owner.get("process", 0)), 0)
-    except ProcessLookupError:
-        return True
-    except PermissionError:
-        pass
-    return False
+    here = os.name == "posix" and owner.get("host") == socket.gethostname()
+    return age > LEASE or (here and not process_runs(process))

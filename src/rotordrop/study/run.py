@@ -29,7 +29,9 @@ from rotordrop.study.folder import (
     claimed,
     open_folder,
     publish,
+    put_damaged_aside,
     read_plan,
+    require_same_version,
     study_of,
     tidy,
 )
@@ -93,9 +95,11 @@ def run_study(
     Notes
     -----
     Several processes may run the same study in the same folder at once, on one computer or many. The numbers
-    do not depend on who computed what.
+    do not depend on who computed what. A finished shard that has changed on the disk is kept under another
+    name and computed again.
     """
     place = open_folder(study, folder)
+    put_damaged_aside(place, study)
     wanted = _missing(study, place)
     watch = _Watch(study, place, report)
     if dask is not None:
@@ -201,7 +205,9 @@ def one_drop(study: Study, model: DropModel, values: dict[str, float]) -> tuple[
 
 def work_on(folder: str | Path, shard: int) -> bool:
     """Compute and publish one shard of the study in a folder, unless another one does; for Dask workers."""
-    digest = read_plan(folder)["digest"]  # another study may have taken the place of the one before
+    plan = read_plan(folder)  # another study may have taken the place of the one before
+    require_same_version(plan, Path(folder))
+    digest = plan["digest"]
     if digest not in _OPEN:
         study = study_of(folder)
         _OPEN[digest] = (study, build_drop_model(study.machine, study.reduction))

@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.stats import beta, binom
 
 from rotordrop.elements.description import unknown_key
-from rotordrop.errors import OutputError, UsageError
+from rotordrop.errors import DamagedFileError, OutputError, UsageError
 from rotordrop.known import Known
-from rotordrop.study.folder import StudyFolder, read_shard, study_of
+from rotordrop.study.folder import FORMAT, StudyFolder, read_plan, read_shards, study_of
 from rotordrop.study.plan import Study
 from rotordrop.study.quantities import Quantity, columns_of
 
@@ -44,6 +44,8 @@ class StudyResults:
     """Quantities [SI] by column, NaN where a drop has none, shape (N,)."""
     reasons: tuple[str, ...]
     """Why a drop failed; empty where it did not."""
+    aside: tuple[str, ...] = ()
+    """Files of damaged shards that were kept and computed again."""
 
     def __len__(self) -> int:
         return len(self.drop)
@@ -168,9 +170,19 @@ def load_results(folder: str | Path) -> StudyResults:
     Of a study that ended early only the drops that ended it: which others were finished by then is chance.
     """
     study, place = study_of(folder), StudyFolder(Path(folder))
+    if (written := read_plan(folder)["format"]) != FORMAT:
+        raise UsageError(
+            f"{place.path} has format {written!r}, which has no digests; 'rotordrop study run {place.path}' "
+            "gives it some"
+        )
     enough = EarlyEnd(study, place).shards()
-    shards = place.finished() if enough is None else range(enough)
-    tables = [read_shard(place, study, shard) for shard in shards]
+    shards = place.finished() if enough is None else list(range(enough))
+    found = [table for _, table in read_shards(place, study, shards)]
+    damaged = [table for table in found if isinstance(table, DamagedFileError)]
+    if damaged:
+        more = f" (and {len(damaged) - 1} more)" if len(damaged) > 1 else ""
+        raise DamagedFileError(f"{damaged[0]}{more}")
+    tables = [table for table in found if not isinstance(table, DamagedFileError)]
     varied = [table["varied"] for table in tables] or [np.zeros((0, len(study.varied)))]
     columns = columns_of(study.machine)
     numbers = [table["numbers"] for table in tables] or [np.zeros((0, len(columns)))]
@@ -181,6 +193,7 @@ def load_results(folder: str | Path) -> StudyResults:
         varied={name: drawn[:, j] for j, name in enumerate(study.varied)},
         numbers={q.name: together[:, j] for j, q in enumerate(columns)},
         reasons=tuple(text.decode() for table in tables for text in table["reason"]),
+        aside=tuple(place.aside()),
     )
 
 
@@ -205,12 +218,15 @@ class EarlyEnd:
             return self._needed
         column = [q.name for q in columns_of(study.machine)].index(until.column)
         while (k := len(self._values)) < study.shards and self._place.shard_path(k).exists():
-            self._values.append(read_shard(self._place, study, k)["numbers"][:, column])
+            ((_, found),) = read_shards(self._place, study, [k])
+            if isinstance(found, DamagedFileError):
+                raise found
+            self._values.append(found["numbers"][:, column])
             if k + 1 < self._next_look:
                 continue
             self._next_look = max(self._next_look + 1, self._next_look * 9 // 8)
-            found = quantile(np.concatenate(self._values), until.quantile)
-            if 0.5 * (found.high - found.low) <= until.within * abs(found.value):
+            known = quantile(np.concatenate(self._values), until.quantile)
+            if 0.5 * (known.high - known.low) <= until.within * abs(known.value):
                 self._needed = k + 1
                 break
         return self._needed

@@ -15,9 +15,10 @@ import numpy as np
 import pytest
 
 from rotordrop import DropCase, example_machine, simulate_drop
-from rotordrop.errors import OutputError, UsageError
+from rotordrop.errors import DamagedFileError, OutputError, UsageError
+from rotordrop.files import write_json
 from rotordrop.rotor.parameters import build_drop_model
-from rotordrop.study.folder import StudyFolder, claimed, open_folder, read_shard, study_of
+from rotordrop.study.folder import StudyFolder, claimed, open_folder, read_shards, study_of
 from rotordrop.study.plan import Study, load_study, read_study
 from rotordrop.study.quantities import columns_of
 from rotordrop.study.run import compute_shard, one_drop, run_study, work_on
@@ -136,15 +137,98 @@ def test_another_study_in_the_place_of_one_before_is_the_one_computed(tmp_path):
     other = study_with(seed=5)
     open_folder(other, place)
     assert work_on(place, 0)
-    np.testing.assert_array_equal(read_shard(StudyFolder(place), other, 0)["varied"], other.values(0, 5))
+    ((_, found),) = read_shards(StudyFolder(place), other, [0])
+    np.testing.assert_array_equal(found["varied"], other.values(0, 5))
 
 
 def test_a_changed_machine_file_is_noticed(serial, tmp_path):
     open_folder(study_with(), tmp_path / "study")
     file = tmp_path / "study" / "machine.toml"
     file.write_text(file.read_text().replace('"LP-400', '"LP-401', 1))
-    with pytest.raises(UsageError, match="plan and machine file do not belong together"):
+    with pytest.raises(DamagedFileError, match=r"plan and machine file do not belong together; remove"):
         study_of(tmp_path / "study")
+
+
+def bit_flipped(file, bit):
+    raw = bytearray(file.read_bytes())
+    raw[bit // 8 % len(raw)] ^= 1 << bit % 8
+    file.write_bytes(raw)
+
+
+@pytest.mark.parametrize("part", ["shards/000001.npy", "plan.json", "machine.toml"])
+def test_one_bit_changed_anywhere_is_named(serial, tmp_path, part):
+    random = np.random.default_rng(26)
+    for bit in random.integers(0, 8 * (serial[0] / part).stat().st_size, 25).tolist():
+        place = shutil.copytree(serial[0], tmp_path / f"{bit}")
+        bit_flipped(place / part, bit)
+        with pytest.raises(DamagedFileError, match=rf"{part.split('/')[-1]} is damaged"):
+            load_results(place)
+
+
+def test_a_damaged_shard_is_computed_again_and_kept(serial, tmp_path):
+    place = shutil.copytree(serial[0], tmp_path / "study")
+    bit_flipped(place / "shards" / "000001.npy", 40_001)
+    damaged = (place / "shards" / "000001.npy").read_bytes()
+    results = run_study(study_with(), place, threads=1)
+    (kept,) = results.aside
+    assert (place / "shards" / kept).read_bytes() == damaged
+    (place / "shards" / kept).unlink()
+    same_shards(serial[0], place)
+
+
+def test_a_folder_without_digests_is_given_some_by_the_next_run(serial, tmp_path):
+    place = shutil.copytree(serial[0], tmp_path / "study")
+    plan = json.loads((place / "plan.json").read_text())
+    del plan["sha256"], plan["machine_sha256"]
+    (place / "plan.json").write_text(json.dumps(plan | {"format": "rotordrop study 2"}))
+    for file in (place / "shards").iterdir():
+        file.write_bytes(file.read_bytes()[:-32])
+    with pytest.raises(UsageError, match=r"has format 'rotordrop study 2', which has no digests; .* gives"):
+        load_results(place)
+    run_study(study_of(place), place, threads=1)
+    same_shards(serial[0], place)
+
+
+def test_another_version_shows_a_study_and_does_not_go_on_with_it(serial, tmp_path):
+    place = shutil.copytree(serial[0], tmp_path / "study")
+    plan = json.loads((place / "plan.json").read_text())
+    write_json(place / "plan.json", plan | {"rotordrop": "0.0.9"}, sealed=True)
+    assert len(run_study(study_with(), place, threads=1)) == 12
+    (place / "shards" / "000001.npy").unlink()
+    for go_on in (lambda: run_study(study_with(), place), lambda: work_on(place, 1)):
+        with pytest.raises(UsageError, match=r"begun by rotordrop 0\.0\.9, and this is .* Go on with"):
+            go_on()
+    del plan["study"]
+    write_json(place / "plan.json", plan | {"rotordrop": "0.0.9"}, sealed=True)
+    with pytest.raises(UsageError, match=r"begun by rotordrop 0\.0\.9.* makes another study of its plan"):
+        study_of(place)
+
+
+@pytest.mark.parametrize("content", [b"[]", b"{}", b'{"format": "rotordrop study 3", "study": 1}'])
+def test_a_plan_that_is_none_is_named(serial, tmp_path, content):
+    place = shutil.copytree(serial[0], tmp_path / "study")
+    (place / "plan.json").write_bytes(content)
+    with pytest.raises(DamagedFileError, match=r"plan\.json is damaged.*remove it, and run the study again"):
+        load_results(place)
+    (place / "plan.json").unlink()
+    run_study(study_with(), place, threads=1)
+    same_shards(serial[0], place)
+
+
+def test_a_file_that_is_no_shard_is_left_alone(serial, tmp_path):
+    place = shutil.copytree(serial[0], tmp_path / "study")
+    (place / "shards" / "7x.npy").write_bytes(b"mine")
+    assert len(load_results(place)) == 12
+
+
+@pytest.mark.parametrize("content", ["[]", '{"process": "x"}', "7", '{"process": 1%s}' % ("0" * 30), "{"])
+def test_a_damaged_claim_lapses(content, tmp_path):
+    folder = open_folder(study_with(), tmp_path / "study")
+    file = folder.claims / "000000.json"
+    file.write_text(content)
+    os.utime(file, (time.time() - 3600.0,) * 2)
+    with claimed(folder, 0) as taken:
+        assert taken is not None
 
 
 def test_a_drop_that_fails_is_a_result_with_its_reason(monkeypatch):
@@ -178,7 +262,7 @@ def test_a_damaged_shard_is_named(serial, tmp_path):
     whole = file.read_bytes()
     for damaged in (whole[:-10], b"", serial[0].joinpath("shards", "000001.npy").read_bytes()):
         file.write_bytes(damaged)
-        with pytest.raises(OutputError, match=r"000000\.npy .*delete it"):
+        with pytest.raises(OutputError, match=r"000000\.npy .*'rotordrop study run .* keeps it aside"):
             load_results(tmp_path / "study")
 
 
@@ -240,8 +324,7 @@ def test_killed_runs_lose_no_finished_shard_and_change_no_bit(serial, tmp_path):
         child.wait()
         assert finished <= set(place.finished())
         finished = set(place.finished())
-        for shard in finished:
-            read_shard(place, study, shard)
+        assert all(len(table) == 2 for _, table in read_shards(place, study, sorted(finished)))
     resumed = run_study(study, place.path, threads=2)
     same_shards(tmp_path / "whole", place.path)
     np.testing.assert_array_equal(resumed.drop, expected.drop)
@@ -311,10 +394,10 @@ def test_the_end_is_looked_for_without_reading_a_shard_twice(tmp_path, monkeypat
     end, read = EarlyEnd(study, place), []
 
     def counted(*arguments):
-        read.append(arguments[-1])
-        return read_shard(*arguments)
+        read.extend(arguments[-1])
+        return read_shards(*arguments)
 
-    monkeypatch.setattr(summary, "read_shard", counted)
+    monkeypatch.setattr(summary, "read_shards", counted)
     for shard in (0, 2, 1):
         work_on(place.path, shard)
         for _ in range(3):
