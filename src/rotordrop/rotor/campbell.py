@@ -164,6 +164,8 @@ def _crossings(speed: Array, frequency: Array, damping_ratio: Array, whirl: Arra
 
 LEAST_FACTOR = 2.5
 """Amplification factor below which a mode counts as critically damped and needs no margin [1]."""
+MOST_MARGIN = 0.16
+"""Most that API 617 asks for below the operating range, reached at an amplification factor of 18.5 [1]."""
 HALF_POWER = 0.5 * math.sqrt(2.0)
 
 
@@ -176,12 +178,12 @@ def required_margin(factor: float, *, above: bool) -> float:
     """Separation margin required of a critical speed, as a share of the operating speed [1].
 
     ``above``: the critical speed lies above the operating range, else below it.
-    Source: API 617 (8th edition, part 1), ``17 (1 − 1/(AF − 1.5))`` % below, 10 % more above; none up to an
-    amplification factor of 2.5.
+    Source: API 617 (8th edition, part 1), ``17 (1 − 1/(AF − 1.5))`` % and at most 16 % below, 10 % more
+    above; none up to an amplification factor of 2.5.
     """
     if factor < LEAST_FACTOR:
         return 0.0
-    share = 0.17 * (1.0 - 1.0 / (factor - 1.5))
+    share = min(0.17 * (1.0 - 1.0 / (factor - 1.5)), MOST_MARGIN)
     return share + 0.10 if above else share
 
 

@@ -10,6 +10,7 @@ from rotordrop.elements.catalog.designation import read_designation
 from rotordrop.elements.catalog.inference import (
     PairRigidity,
     dynamic_rating,
+    groove_factors,
     infer_balls,
     pair_rigidity,
     static_rating,
@@ -196,6 +197,14 @@ def test_a_rigidity_narrows_what_size_and_ratings_leave_open():
     assert alone.conformity == (0.53, 0.011)
     assert known.conformity[1] < 0.9 * alone.conformity[1]
     assert abs(known.conformity[0] - conformity) < abs(alone.conformity[0] - conformity)
+
+
+def test_grooves_of_deep_groove_bearings_are_those_of_the_rating_tables():
+    """At 0.52 the tables of ISO 281 hold as they stand, so that a dynamic rating needs no correction."""
+    balls = infer_balls(kind="deep groove", dimension_series="10", bore=0.08, outside_diameter=0.125)
+    row = (balls.ball_count, balls.ball_diameter, balls.pitch_diameter, 0.0)
+    assert balls.conformity[0] == 0.52
+    assert groove_factors(row, balls.conformity[0]) == pytest.approx((1.0, 1.0), abs=1e-12)
 
 
 def test_a_rigidity_in_the_file_narrows_the_grooves_and_needs_its_preload(small_text):
