@@ -36,7 +36,7 @@ _QUESTIONS = {
     "gap": 'radial air gap, "0.25 mm"',
     "speed": 'nominal speed, "9000 rpm"',
     "grade": 'balance grade, "G 2.5"',
-    "support": 'support of the touchdown bearings: "stiff", "soft" or a stiffness, "1e8 N/m"',
+    "support": 'support of the touchdown bearings: "stiff", "soft", "1e8 N/m", or two: "8e7 N/m, 5e8 N/m"',
 }
 
 

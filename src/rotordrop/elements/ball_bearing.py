@@ -337,11 +337,14 @@ class BallBearing(RaceBearing):
             said = self.preload_class or (None if read is None else read.preload_class)
             status: Literal["default", "inferred"] = "inferred" if said else "default"
             group = said or "light"
-            force, bounds = entry.preload[group], None
+            force, spread = entry.preload[group], 1.0
             why = f"{entry.maker} catalogue, {group} preload of {entry.designation}"
             if entry.preload_basis:
-                why = f"{group} preload {entry.preload_basis}"
-                bounds = (force / PRELOAD_FACTOR, PRELOAD_FACTOR * force)
+                why, spread = f"{group} preload {entry.preload_basis}", PRELOAD_FACTOR
+            if not said:  # whoever mounted the pair chose a class, and the designation does not say which
+                why = f"{why}, if not heavier"
+            most = force if said else max(entry.preload.values())
+            bounds = None if most == force and spread == 1.0 else (force / spread, spread * most)
             values["preload"] = Known(value=force, status=status, range=bounds, source=why, unit="N")
         return values
 

@@ -24,6 +24,9 @@ others goes with their length, by the third root of the mass."""
 _SUPPORT_REACH = 7.0
 """Factor to either side within which such a support lies."""
 _GAP_RANGE, _SUPPORT_RANGE = 1.2, 2.0
+_ONE_FOR_BOTH = 5.0
+"""Factor to either side within which a support lies where one stiffness is given for both ends: those of one
+machine differ by up to a factor of 7 (the supplied records)."""
 _SUPPORT_MASS = (0.5, 0.1, 2.5)
 """Guess and range of the mass of a support as a share of the rotor's mass [1]."""
 _STIFFNESS = (0.4, 0.16, 1.0)
@@ -67,7 +70,8 @@ class SimpleMachine:
     grade: str
     """Balance grade, such as "G 2.5"."""
     support: Literal["stiff", "soft"] | str
-    """Support of the touchdown bearings: "stiff", "soft" or a stiffness such as "1e8 N/m"."""
+    """Support of the touchdown bearings: "stiff", "soft", a stiffness such as "1e8 N/m", or one for each end,
+    "8e7 N/m, 5e8 N/m"."""
     preload: str | None = None
     """Preload of the bearings, where their designation leaves it open."""
     name: str = "my machine"
@@ -152,8 +156,8 @@ def drafted_machine(
         "air_gap": _guess(known.gap, known.gap / _GAP_RANGE, known.gap * _GAP_RANGE, "m"),
         "bore_radius": f"{0.5 * entry.bore!r} m",
         "bearing": bearing,
-        "support": _support(known.support, rotor.mass),
     }
+    supports = _supports(known.support, rotor.mass, len(bearings))
     degrees = math.degrees(known.sensor_angle)
     return Machine.model_validate(
         {
@@ -165,7 +169,10 @@ def drafted_machine(
                 "grade": known.grade,
                 "at_speed": f"{known.speed / (2.0 * math.pi):.12g} Hz",
             },
-            "touchdown_bearings": [described | {"name": name, "node": node} for name, node in bearings],
+            "touchdown_bearings": [
+                described | {"name": name, "node": node, "support": support}
+                for (name, node), support in zip(bearings, supports, strict=True)
+            ],
             "ambs": [{"name": name, "node": node} for name, node in sensors],
             "sensors": [
                 {"name": f"{name}_{letter}", "node": node, "angle": f"{degrees - turn:.12g} deg"}
@@ -227,18 +234,28 @@ def _beam(known: SimpleMachine, positions: list[float]) -> dict[str, Any]:
     }
 
 
-def _support(said: str, mass: float) -> dict[str, Any]:
-    if said in _SUPPORTS:
-        guess = _SUPPORTS[said] * (mass / 60.0) ** (1.0 / 3.0)
-        low, high = guess / _SUPPORT_REACH, guess * _SUPPORT_REACH
-    else:
-        guess = in_si(said, "stiffness", "support")
-        low, high = guess / _SUPPORT_RANGE, guess * _SUPPORT_RANGE
+def _supports(said: str, mass: float, ends: int) -> list[dict[str, Any]]:
+    """The support of each bearing; one stiffness for all is known less well than one for each."""
+    texts = [text.strip() for text in said.split(",")]
+    if len(texts) not in (1, ends):
+        raise UsageError(
+            f"support = {said!r} has {len(texts)} values; give one, or one for each of {ends} ends"
+        )
     share, lowest, highest = _SUPPORT_MASS
-    return {
-        "stiffness": _guess(guess, low, high, "N/m"),
-        "mass": _guess(share * mass, lowest * mass, highest * mass, "kg"),
-    }
+    supports = []
+    for text in texts * (ends // len(texts)):
+        if text in _SUPPORTS:
+            guess, factor = _SUPPORTS[text] * (mass / 60.0) ** (1.0 / 3.0), _SUPPORT_REACH
+        else:
+            guess = in_si(text, "stiffness", "support")
+            factor = _ONE_FOR_BOTH if len(texts) < ends else _SUPPORT_RANGE
+        supports.append(
+            {
+                "stiffness": _guess(guess, guess / factor, guess * factor, "N/m"),
+                "mass": _guess(share * mass, lowest * mass, highest * mass, "kg"),
+            }
+        )
+    return supports
 
 
 def _guess(value: float, low: float, high: float, unit: str) -> dict[str, Any]:

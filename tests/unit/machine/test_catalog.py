@@ -130,6 +130,13 @@ def test_a_machine_says_what_it_took_from_the_catalogue(small_text):
     assert defaults["NDE.bearing.preload"][0] == "96.0 N"
 
 
+def test_a_preload_that_nobody_stated_is_light_to_heavy(small_text):
+    """The designation leaves the class open, so that the prior reaches from the lightest to the heaviest."""
+    unsaid, said = (bearing.bearing.preload for bearing in loads_machine(small_text).touchdown_bearings)
+    assert (unsaid.value, unsaid.range) == (96.0, (96.0, 1026.0))
+    assert (said.value, said.range) == (1026.0, None)
+
+
 def test_what_is_given_goes_before_the_catalogue(changed):
     text = changed(
         ('preload = "heavy"', 'preload = "300 N", ball_diameter = "8.731 mm", ball_material = "steel"')

@@ -84,9 +84,19 @@ def test_a_support_without_a_number_goes_with_the_size_of_the_rotor():
     assert large.range == pytest.approx((2e8 / 7.0, 1.4e9), rel=1e-5)
 
 
+def test_one_stiffness_for_both_ends_is_known_less_well_than_one_for_each():
+    def ranges(support):
+        machine = simple_machine(SimpleMachine(**(TWELVE_NUMBERS | {"support": support})))
+        return [bearing.support.stiffness.range for bearing in machine.touchdown_bearings]
+
+    assert ranges("1e8 N/m") == [pytest.approx((2e7, 5e8))] * 2
+    assert ranges("8e7 N/m, 5e8 N/m") == [pytest.approx((4e7, 1.6e8)), pytest.approx((2.5e8, 1e9))]
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
+        ({"support": "1e8 N/m, 1e8 N/m, 1e8 N/m"}, r"has 3 values; give one, or one for each of 2 ends"),
         (
             {"bearings": ("980 mm", "110 mm")},
             r"bearings: 980 mm and 110 mm are no two planes of a rotor of 1\.10 m",
