@@ -21,6 +21,7 @@ Status = (
         "known from the calibration",
         "the model does not fit the record",
         "of the cross-check: the model does not fit the record",
+        "the estimated part ends during this contact",
         "taken over",
     ]
 )

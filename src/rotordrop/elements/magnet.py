@@ -108,8 +108,6 @@ def _decay(_machine: Any, found: Values, _load: float) -> str:
     time = itself(found["remanence.time_constant"])
     usual = f"the usual {1e3 * REMANENCE_TIME:g} ms"
     side = f"longer than {usual}" if time[1] > REMANENCE_TIME else f"shorter than {usual}"
-    if time[1] <= REMANENCE_TIME <= time[2]:
-        side = f"not to be told from {usual}"
     return f"the lift of the magnets decays in {in_words(time, 'ms', 1e-3)}, {side}"
 
 
@@ -119,6 +117,7 @@ EXTENSIONS: tuple[Extension, ...] = (
         owner="drop",
         names=("remanence_time_constant",),
         neutral=_long,
+        nothing={"remanence.time_constant": REMANENCE_TIME},
         sentence=_decay,
         base=_as_in_the_base_model,
     ),

@@ -285,6 +285,8 @@ class Extension:
     """What stands between the words on two parts."""
     frame: str = "{}"
     """What stands around the words on all parts."""
+    nothing: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    """Values found, by field below the part, with which the extension says what the base model says."""
     base: Callable[[Any], dict[str, Known]] = lambda _: {}
     """Values with which a machine says what the base model says and is followed as with this extension:
     smaller process noise in the fall is no evidence of a long remanence."""
@@ -318,6 +320,16 @@ class Extension:
         changed: M = cast(Any, machine).with_values(self.usual(machine))
         return changed
 
+    def says_nothing(self, machine: Any, values: Values) -> bool:
+        """Whether all values found, by path in the machine, hold the ones that say nothing."""
+        held = [
+            (values[path], nothing)
+            for name, _ in parts_of(machine, self.owner)
+            for field, nothing in self.nothing.items()
+            if (path := path_of(self.owner, name, field)) in values
+        ]
+        return bool(held) and all(known.low <= nothing <= known.high for known, nothing in held)
+
     def found(self, machine: Any, values: Values, mean_load: float) -> str:
         """What the values found say, by path in the machine; in brackets 90 % intervals."""
         words = []
@@ -328,8 +340,13 @@ class Extension:
         return self.frame.format(self.joined.join(word for word in words if word))
 
 
-def derived(function: Callable[..., float], *known: Known) -> tuple[float, float, float]:
-    """A number that follows from values, with its 90 % interval; their errors count as independent."""
+def derived(
+    function: Callable[..., float], *known: Known, least: float = -math.inf, most: float = math.inf
+) -> tuple[float, float, float]:
+    """A number that follows from values, with its 90 % interval; their errors count as independent.
+
+    The interval ends where the number must, at ``least`` and ``most``.
+    """
     middle = [one.value for one in known]
     square = 0.0
     for k, one in enumerate(known):
@@ -337,17 +354,37 @@ def derived(function: Callable[..., float], *known: Known) -> tuple[float, float
         ends = [function(*middle[:k], end, *middle[k + 1 :]) for end in (low, high)]
         square += (0.5 * (ends[1] - ends[0])) ** 2
     value, half = function(*middle), math.sqrt(square)
-    return value, value - half, value + half
+    return value, max(value - half, least), min(value + half, most)
 
 
 def itself(known: Known) -> tuple[float, float, float]:
-    """A value with its 90 % interval, made symmetric."""
-    return derived(float, known)
+    """A value with its 90 % interval."""
+    return known.value, known.low, known.high
+
+
+def quotient(above: Known, below: Known) -> tuple[float, float, float]:
+    """The quotient of two positive values with its 90 % interval, which has no upper end where zero is not
+    excluded below.
+
+    By logarithms: a straight line through the values would cross zero where the lower one is not known well.
+    """
+
+    def reach(one: Known, end: float) -> float:
+        return abs(math.log(end / one.value)) if end > 0.0 < one.value else math.inf
+
+    value = above.value / below.value if below.value > 0.0 else math.inf
+    down = math.hypot(reach(above, above.low), reach(below, below.high))
+    up = math.hypot(reach(above, above.high), reach(below, below.low))
+    if math.isinf(value):  # at the limit itself only a least value can be told
+        return value, above.low / below.high if below.high > 0.0 else math.inf, math.inf
+    return value, value * math.exp(-down), value * math.exp(up)
 
 
 def in_words(number: tuple[float, float, float], unit: str, scale: float = 1.0) -> str:
     """A number with its interval, in a unit of a size [SI], with as many digits as the interval leaves."""
     value, low, high = (one / scale for one in number)
     gap = "" if unit in ("", "°") else " "
+    if math.isinf(high):
+        return f"more than {low:.2g}{gap}{unit}"
     digits = max(0, min(4, 1 - math.floor(math.log10(max(high - low, 1e-12)))))
     return f"{value:.{digits}f}{gap}{unit} ({low:.{digits}f} to {high:.{digits}f})"

@@ -390,6 +390,7 @@ EXTENSIONS: tuple[Extension, ...] = (
         owner="rotor",
         names=("stiffness_factor",),
         neutral=lambda _: {"stiffness_factor": guess(1.0)},
+        nothing={"stiffness_factor": 1.0},
         sentence=lambda _, found, __: (
             "the rotor bends as if its stiffness were "
             f"{in_words(itself(found['stiffness_factor']), '')} × the described one"

@@ -25,6 +25,7 @@ from rotordrop.elements.parameter import (
     guess,
     in_words,
     itself,
+    quotient,
 )
 from rotordrop.elements.values import default, follows, scaled
 from rotordrop.known import Known
@@ -205,7 +206,7 @@ def soft_over_stiff(ratio: float, coupling: float) -> float:
 
 def _axes(bearing: Any, found: Values, _load: float) -> str:
     both = found["support.anisotropy"], found["support.coupling"]
-    angle, ratio = derived(soft_axis, *both), derived(soft_over_stiff, *both)
+    angle, ratio = derived(soft_axis, *both), derived(soft_over_stiff, *both, least=0.0, most=1.0)
     return (
         f"the soft axis of the {bearing.name} support stands {in_words(angle, '°')} from horizontal, with "
         f"{in_words(ratio, '')} × the stiffness across"
@@ -306,9 +307,7 @@ def _neutral(bearing: Any) -> dict[str, Known]:
 
 def _mode(bearing: Any, found: Values, _load: float) -> str:
     frequency = itself(found["support.foundation_frequency"])
-    modal = derived(
-        lambda m, part: m / max(part, 1e-9), found["support.mass"], found["support.foundation_share"]
-    )
+    modal = quotient(found["support.mass"], found["support.foundation_share"])
     return (
         f"under {bearing.name} a foundation mode at {in_words(frequency, 'Hz', 2.0 * math.pi)} with a modal "
         f"mass of {in_words(modal, 'kg')}"
@@ -321,6 +320,7 @@ EXTENSIONS: tuple[Extension, ...] = (
         owner="bearing",
         names=("support.coupling",),
         neutral=lambda _: {"support.coupling": guess(0.0)},
+        nothing={"support.coupling": 0.0},
         sentence=_axes,
         rows=(
             Parameter(
@@ -341,6 +341,7 @@ EXTENSIONS: tuple[Extension, ...] = (
         owner="bearing",
         names=("support.cubic",),
         neutral=lambda _: {"support.cubic": guess(0.0)},
+        nothing={"support.cubic": 0.0},
         sentence=_growth,
         joined=", ",
         frame=(
@@ -366,6 +367,7 @@ EXTENSIONS: tuple[Extension, ...] = (
         owner="bearing",
         names=("support.foundation_share", "support.foundation_damping_ratio"),
         neutral=_neutral,
+        nothing={"support.foundation_share": 0.0},
         sentence=_mode,
         rows=(
             Parameter(

@@ -135,7 +135,7 @@ def _neutral(unbalance: Unbalance) -> dict[str, Known]:
 
 
 def _amount(unbalance: Unbalance, found: Values, _load: float) -> str:
-    amount = derived(math.hypot, found["cosine"], found["sine"])
+    amount = derived(math.hypot, found["cosine"], found["sine"], least=0.0)
     return f"{in_words(amount, 'g mm', 1e-6)} at node {unbalance.node}"
 
 

@@ -23,6 +23,10 @@ from rotordrop.rotor.parameters import DropModel
 
 Scope = Literal["machine", "drop"]
 
+LEAST_SHARE = 0.01
+"""Share of the described value down to which one that is estimated by another number is followed [1]: rows of
+balls without any preload carry a small load in another way (chosen, not measured)."""
+
 CENTRED = 1e-6
 """Distance of value and middle of its range, in standard deviations, below which they are one [1]."""
 
@@ -109,12 +113,15 @@ class Unknown:
         return (math.log(row.lower) if row.lower > 0.0 else -math.inf), math.log(row.upper)
 
     def kernel_value(self, theta: float) -> float:
-        """What is written into the kernel for an estimated number: within the limits of its row."""
-        return self.parameter.within(math.exp(theta) if self.logarithmic else theta)
+        """What is written into the kernel for an estimated number: within its bounds."""
+        within = min(max(theta, self.bounds[0]), self.bounds[1])
+        return math.exp(within) if self.logarithmic else within
 
     def value_of(self, theta: float) -> float:
-        """Published SI value of an estimated number."""
-        return self.kernel_value(theta) if self.published is None else self.published(theta)
+        """Published SI value of an estimated number, within its bounds."""
+        if self.published is None:
+            return self.kernel_value(theta)
+        return self.published(min(max(theta, self.bounds[0]), self.bounds[1]))
 
     def standard_error(self, theta: float, sigma: float) -> float:
         """Standard error of the published value for that of an estimated number."""
@@ -173,8 +180,12 @@ def bearing_unknowns(model: DropModel, index: int) -> Iterator[Unknown]:
             continue  # for a loose bearing, the air gap takes up an error of the play
         if row.estimated_by is not None:
             measure = row.estimated_by(bearing)
-            known, published = _by_measure(row, quantity, measure), measure.value_of
-            yield _unknown(model, row, bearing.name, index, quantity, known, published=published)
+            known = _by_measure(row, quantity, measure)
+            least = measure.of_value(LEAST_SHARE * float(quantity))
+            limits = (least, math.inf) if least < measure.start else (-math.inf, least)
+            yield _unknown(
+                model, row, bearing.name, index, quantity, known, published=measure.value_of, limits=limits
+            )
         elif row.ratio is not None:  # by its factor on the described ratio
             wider = None if row.wider is None else row.wider(bearing)
             known = Prior(mean=0.0, sigma=prior(row, quantity).sigma if wider is None else wider, start=0.0)

@@ -27,7 +27,6 @@ from rotordrop.track.smoother import Smoothed, parameter_sample
 from rotordrop.track.unknown_impulses import likeliest_noise, with_noise
 from rotordrop.twin.joint_spread import joint_spread
 from rotordrop.twin.search import CALIBRATION_SCHEDULE, track_drops
-from rotordrop.twin.structure_sentence import structure_of
 from rotordrop.twin.tracked_loads import INCONSISTENT_WIDENING
 from rotordrop.twin.tracked_parameters import NOT_DETERMINED, identified, model_error, parameter_widening
 
@@ -171,7 +170,7 @@ def calibrate_machine(
         checks=checks,
         consistent=consistent,
         nis=dict(zip(stems, usual.nis, strict=True)),
-        structure=tuple(structure_of(one, machine, said) for one in found.accepted),
+        structure=tuple(one.structure(machine, said, believed=consistent) for one in found.accepted),
     )
 
 

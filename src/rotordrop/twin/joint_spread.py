@@ -45,7 +45,8 @@ def joint_spread(
     chosen = [
         (problem.n_dynamic + k, unknown)
         for k, unknown in enumerate(problem.unknowns)
-        if is_of_a_bearing(unknown)
+        # a value that came out as zero has no logarithm to correlate
+        if is_of_a_bearing(unknown) and not (is_logarithmic(unknown) and known[unknown.path].value <= 0.0)
     ]
     places, unknowns = [place for place, _ in chosen], [unknown for _, unknown in chosen]
     logs = [is_logarithmic(unknown) for unknown in unknowns]

@@ -17,11 +17,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.elements.parameter import Extension
+from rotordrop.elements.parameter import Extension, Values
 from rotordrop.elements.table import EXTENSIONS
 from rotordrop.errors import IdentificationError
+from rotordrop.estimate.estimate import Structure
 from rotordrop.evidence.evidence import Evidence
 from rotordrop.machine import Machine
+from rotordrop.rotor.statics import bearing_load_shares
 from rotordrop.track.calibration import (
     BLIND_SCHEDULE,
     CALIBRATED_SCHEDULE,
@@ -43,6 +45,7 @@ from rotordrop.track.smoother import forward
 from rotordrop.track.transfer import transferred
 from rotordrop.twin.problems import Drops, recorded_drop, tail_first
 from rotordrop.twin.rotor_search import with_found_rotor
+from rotordrop.twin.tracked_parameters import parameters
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -101,6 +104,15 @@ class Accepted:
 
     extension: Extension
     gain: float
+
+    def structure(self, machine: Machine, values: Values, *, believed: bool) -> Structure:
+        """What it says of the machine, with 90 % intervals; no numbers of a model that is not believed."""
+        if not believed:
+            sentence = f"Tried beyond the base model, and not enough: {self.extension.name}."
+        else:
+            load = float(sum(bearing_load_shares(machine))) / len(machine.touchdown_bearings)
+            sentence = f"Found: {self.extension.found(machine, values, load)}."
+        return Structure(name=self.extension.name, gain=self.gain, sentence=sentence)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -204,7 +216,7 @@ def track_drops(
         if not followed:
             return search.not_lost(search.refine(other))  # says where it was lost
         found = min(followed, key=lambda one: one.score)
-    return search.not_lost(found)
+    return search.not_lost(search.without_silent(found, machine))
 
 
 def score_of(fit: TrackedDrops) -> Score:
@@ -441,6 +453,29 @@ class Search:
             references = converged(fine, schedule[0], references).trajectories
         fit = track(fine, schedule, references=references, progress=self.progress)
         return replace(first, fit=fit)
+
+    def without_silent(self, found: Candidate, described: Machine) -> Candidate:
+        """The candidate without the extensions whose values all hold the one that says nothing.
+
+        Such an extension has led to a better start. The model without it is refined from there; should that
+        one not follow the record as well, the unknowns stay for the width they give, and nothing is said.
+        """
+        if not found.accepted:
+            return found
+        stated = parameters(found.fit.problems[-1], found.fit.smoothed[-1], fits=True, widening=1.0)
+        values = {one.path: one.estimate for one in stated}
+        telling = [one for one in found.accepted if not one.extension.says_nothing(found.machine, values)]
+        if len(telling) == len(found.accepted):
+            return found
+        machine = described
+        for one in telling:
+            machine = one.extension.added_to(machine)
+        silent = replace(found, accepted=tuple(telling))
+        with suppress(IdentificationError):
+            without = self.refine(replace(silent, machine=machine))
+            if gain_of(found, without) < LEAST_RISE:
+                return without
+        return silent
 
     def refine_if_followed(self, first: Candidate) -> Candidate | None:
         """The same; None where the finer basis loses a record beside which the coarse one ended."""

@@ -29,7 +29,6 @@ from rotordrop.known import Known
 from rotordrop.track.consistency import NIS_RANGE, Check
 from rotordrop.track.input_state import InputEstimate, at_bearings
 from rotordrop.twin.narrowing import DRAWING, narrowing
-from rotordrop.twin.structure_sentence import structure_of
 from rotordrop.twin.tracked import TrackedDrop
 from rotordrop.twin.tracked_loads import (
     INCONSISTENT_WIDENING,
@@ -183,7 +182,7 @@ def _unbalance(drop: TrackedDrop, judged: _Judgement) -> tuple[PlaneUnbalance, .
 def _structure(drop: TrackedDrop, judged: _Judgement) -> tuple[Structure, ...]:
     values = {parameter.path: parameter.estimate for parameter in judged.parameters}
     machine = drop.problem.model.machine
-    return tuple(structure_of(accepted, machine, values) for accepted in drop.accepted)
+    return tuple(one.structure(machine, values, believed=judged.fits) for one in drop.accepted)
 
 
 def _cross_checked(drop: TrackedDrop, method: Tracked) -> tuple[TrackedDrop, InputEstimate | None]:
@@ -284,7 +283,7 @@ def _loads(drop: TrackedDrop, judged: _Judgement, b: int) -> Loads:
         return twin
     if judged.given_way[b]:
         return loads_of_cross_check(judged.check, b)
-    return holding_cross_check(twin, drop.forces, judged.check, b)
+    return holding_cross_check(twin, judged.check, b)
 
 
 def _twin(drop: TrackedDrop, judged: _Judgement, b: int) -> Loads:

@@ -53,6 +53,8 @@ INCONSISTENT: Status = "the model does not fit the record"
 """Status of a number whose interval had to be widened to hold the cross-check."""
 OF_CROSS_CHECK: Status = "of the cross-check: the model does not fit the record"
 """Status of a number that does not rest on the twin, because the twin lost the record."""
+CUT: Status = "the estimated part ends during this contact"
+"""Status of the numbers of an impact that goes on behind the end of the window."""
 NO_LATE_MEAN = f"the estimated part ends before {1e3 * LATE[1]:.0f} ms"
 
 
@@ -226,7 +228,7 @@ def _over_check(peak: float, check: InputEstimate, b: int) -> float:
     return peak / found if math.isfinite(found) and found > 0.0 and peak > 0.0 else 1.0
 
 
-def holding_cross_check(loads: Loads, forces: ForceHistory, check: InputEstimate, b: int) -> Loads:
+def holding_cross_check(loads: Loads, check: InputEstimate, b: int) -> Loads:
     """Force and stress where model and record disagree, with intervals that hold the cross-check.
 
     The error of the twin's own numbers is not known then: up to 340 % where a support is stiffer in one
@@ -236,10 +238,11 @@ def holding_cross_check(loads: Loads, forces: ForceHistory, check: InputEstimate
     stress_ratio = float(check.peak_stress[b]) / max(loads.peak_stress.value, 1e-9)
     peak_error, stress_error = float(check.peak_error[b]), float(check.stress_error[b])
     ratios = {"mean_stress_Pa": (stress_ratio, stress_error)}
-    if np.isfinite(check.mean_late[b]):
-        late = (forces.time >= LATE[0]) & (forces.time <= LATE[1])
-        vector = forces.force[late, b].mean(axis=0)
-        ratio = float(check.mean_late[b] / max(np.hypot(*vector), 1e-9))
+    late = loads.means.get("mean_force_0p15_0p2_N")
+    if late is not None and np.isfinite(check.mean_magnitude_late[b]):
+        # Mean magnitude with mean magnitude: where the force turns, the mean vector is a fraction of it, and
+        # the ratio of two mean vectors says nothing of the stated number.
+        ratio = float(check.mean_magnitude_late[b]) / max(late.value, 1e-9)
         ratios["mean_force_0p15_0p2_N"] = (ratio, MEAN_ERROR)
     peak_force = replace(loads.peak_force, known=holding(loads.peak_force.known, force_ratio, peak_error))
     peak_stress = replace(
@@ -334,6 +337,7 @@ def bearing_drop(
         widening = 1.0 if cross_check is None else INCONSISTENT_WIDENING
         impacts = twin_impacts(forces, b, widening, cross_check)
     first = impacts[0] if impacts else None
+    ends = math.nan if first is None else float(np.nan_to_num(first.end, nan=forces.time[-1]))
     return BearingDrop(
         name=name,
         motions=(shown, estimated) if loads.peak_force.origin is Origin.TWIN else (shown,),
@@ -350,7 +354,7 @@ def bearing_drop(
         missing=loads.missing,
         impacts=impacts,
         impact_force="bearing force",
-        first_contact=None if first is None else deepest(estimated, first.start, first.end, gap.value),
+        first_contact=None if first is None else deepest(estimated, first.start, ends, gap.value),
     )
 
 
@@ -369,6 +373,7 @@ def twin_impacts(
 
 def _impact(forces: ForceHistory, b: int, first: int, last: int, widening: float) -> Impact:
     window = slice(max(first - 1, 0), min(last + 2, len(forces.time)))
+    cut = last == len(forces.time)
     peak, moment = refined_peak(forces.time[window], forces.magnitude[window, b])
     at = window.start + int(np.argmax(forces.magnitude[window, b]))
     relative = math.hypot(float(forces.magnitude_sigma[at, b]) / max(peak, 1e-9), MODEL_FORCE_SIGMA)
@@ -376,14 +381,20 @@ def _impact(forces: ForceHistory, b: int, first: int, last: int, widening: float
     impulse = dt * float(np.sum(forces.contact_force[first:last, b]))
     lost = dt * float(np.sum(forces.contact_power[first:last, b]))
     middle = first + int(np.argmax(forces.contact_force[first:last, b]))
+
+    def known(value: float, error: float, unit: str) -> Known:
+        whole = with_interval(value, error, widening, unit)
+        # What is still to come of a contact that goes on is not known: the whole impact has at least this.
+        return Known(value=value, status=CUT, lower=whole.low, unit=unit) if cut else whole
+
     return Impact(
         start=float(forces.time[first]),
-        end=float(forces.time[last - 1]),
+        end=math.nan if cut else float(forces.time[last - 1]),
         azimuth=float(forces.azimuth[middle, b]),
         peak_time=moment,
-        peak_force=with_interval(peak, relative * peak, widening, "N"),
-        impulse=with_interval(impulse, relative * impulse, widening, "N s"),
-        dissipated_energy=with_interval(lost, 2.0 * relative * abs(lost), widening, "J"),
+        peak_force=known(peak, relative * peak, "N"),
+        impulse=known(impulse, relative * impulse, "N s"),
+        dissipated_energy=known(lost, 2.0 * relative * abs(lost), "J"),
     )
 
 

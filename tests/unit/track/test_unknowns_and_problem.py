@@ -89,6 +89,18 @@ def test_the_preload_is_estimated_by_the_axial_offset_it_belongs_to(lp400):
     assert ends == pytest.approx([370.0, 760.0], rel=1e-6)
 
 
+def test_a_ratio_is_stated_as_a_ratio(lp400):
+    anisotropy = unknown_of(lp400, "NDE.support.anisotropy")
+    assert anisotropy.value_of(0.0) == pytest.approx(1.0)
+    assert anisotropy.value_of(math.log(1.1)) == pytest.approx(1.1)
+
+
+def test_a_number_beyond_its_bounds_is_stated_as_the_model_took_it(lp400):
+    """A race inertia is followed up to twice what was inferred; what lies beyond has no effect."""
+    inertia = unknown_of(lp400, "DE.race.inertia")
+    assert inertia.value_of(inertia.mean + 3.0) == pytest.approx(2.0 * math.exp(inertia.mean))
+
+
 def test_what_a_drop_owns_is_not_shared(flight):
     scopes = {u.path: u.scope for u in flight.unknowns}
     assert scopes["unbalance.0.cosine"] == scopes["NDE.remanent_force.y"] == "drop"

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rotordrop.known import NINETY
+from rotordrop.known import NINETY, Known
 from rotordrop.machine import example_machine
 from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin
 from rotordrop.rotor.parameters import build_drop_model
@@ -62,6 +62,27 @@ def test_spreads_are_those_of_the_intervals(problem, covariance):
         k = spread.paths.index(path)
         width = np.log(high / low) if spread.logarithmic[k] else high - low
         assert sigma[k] == pytest.approx(width / (2.0 * NINETY), rel=1e-6)
+
+
+def test_a_value_that_came_out_as_zero_is_left_out(problem, covariance):
+    known = stated(problem, covariance, 1.0)
+    known["DE.support.damping"] = Known(value=0.0, interval_90=(0.0, 500.0))
+    spread = joint_spread(problem, middle(problem), covariance, known)
+    assert "DE.support.damping" not in spread.paths and "NDE.support.damping" in spread.paths
+    assert np.all(np.isfinite(spread.matrix))
+
+
+def test_a_preload_far_below_its_prior_stays_above_zero(problem, covariance):
+    """Eight deviations below its prior the rows of balls would part: a fit of a wrong model went there."""
+    k = next(k for k, one in enumerate(problem.unknowns) if one.path == "DE.preload")
+    preload = problem.unknowns[k]
+    theta = preload.mean - 12.0 * preload.sigma
+    known = stated(problem, covariance, 1.0) | {"DE.preload": identified(preload, theta, 0.3 * preload.sigma)}
+    described = float(problem.model.machine.touchdown_bearings[1].bearing.preload)
+    assert known["DE.preload"].value == pytest.approx(0.01 * described, rel=1e-6)
+    mean = middle(problem)
+    mean[3 + k] = theta
+    assert np.all(np.isfinite(joint_spread(problem, mean, covariance, known).matrix))
 
 
 def test_correlations_are_those_of_the_fit(problem, covariance):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -17,23 +18,28 @@ from rotordrop.elements.table import EXTENSIONS
 from rotordrop.errors import IdentificationError
 from rotordrop.estimate.document import published_structure
 from rotordrop.estimate.estimate import Verdict
+from rotordrop.evidence.evidence import read_evidence
 from rotordrop.known import Known
 from rotordrop.machine import Machine, example_machine, load_machine, save_machine
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns
+from rotordrop.track.calibration import track
 from rotordrop.twin.calibrated import _with_unbalance
+from rotordrop.twin.problems import Drops
 from rotordrop.twin.search import (
+    CALIBRATION_SCHEDULE,
     CONSISTENT_RISE,
     FIRST_OTHER_START,
     LEAST_RISE,
     Accepted,
     Candidate,
     Checkpoint,
+    Search,
     best_structure,
     extension_when_consistent,
     score_of,
 )
-from rotordrop.twin.structure_sentence import structure_of
+from rotordrop_bench import SyntheticDrop
 
 
 @pytest.fixture(scope="module")
@@ -233,7 +239,7 @@ def test_every_extension_says_what_was_found_with_its_interval(lp400, extension)
         u.path: Known(value=u.value_of(u.begin), interval_90=(0.9 * u.begin, 1.1 * u.begin + 1e-6))
         for u in all_unknowns(build_drop_model(machine, "quick"))
     }
-    said = structure_of(Accepted(extension=extension, gain=math.inf), machine, values)
+    said = Accepted(extension=extension, gain=math.inf).structure(machine, values, believed=True)
     assert said.sentence.startswith("Found: ") and " to " in said.sentence
     assert [one.as_json() for one in published_structure([said])] == [
         {"name": extension.name, "log_likelihood_rise": None, "sentence": said.sentence}
@@ -272,4 +278,81 @@ def test_the_lift_of_the_magnets_is_longer_or_shorter_and_not_both(lp400, low, h
     middle = 0.5 * (low + high)
     value = Known(value=middle, interval_90=(low, high))
     accepted = Accepted(extension=extension, gain=50.0)
-    assert words in structure_of(accepted, lp400, {"remanence.time_constant": value}).sentence
+    assert words in accepted.structure(lp400, {"remanence.time_constant": value}, believed=True).sentence
+
+
+def sentence_of(machine: Machine, name: str, values: dict[str, Known], *, believed: bool = True) -> str:
+    extension = next(one for one in EXTENSIONS if one.name == name)
+    return Accepted(extension=extension, gain=50.0).structure(machine, values, believed=believed).sentence
+
+
+def foundation(low: float, middle: float, high: float) -> dict[str, Known]:
+    """Values of a foundation mode with such a share of the support mass in that of the foundation."""
+    found = {}
+    for name in ("NDE", "DE"):
+        found |= {
+            f"{name}.support.mass": Known(value=50.0, interval_90=(49.0, 51.0)),
+            f"{name}.support.foundation_frequency": Known(value=500.0, interval_90=(450.0, 560.0)),
+            f"{name}.support.foundation_share": Known(value=middle, interval_90=(low, high)),
+        }
+    return found
+
+
+def test_a_modal_mass_has_no_interval_through_infinity(lp400):
+    """ "400 kg (-16763129503 to 16763130303)" came of a straight line through a share of zero."""
+    words = sentence_of(lp400, "foundation mode", foundation(0.1, 0.125, 0.15))
+    mass, low, high = map(float, re.findall(r"modal mass of (\d+) kg \((\d+) to (\d+)\)", words)[0])
+    assert (mass, low, high) == pytest.approx((400.0, 50.0 / 0.15, 50.0 / 0.1), rel=0.02)
+    assert "modal mass of more than" in sentence_of(lp400, "foundation mode", foundation(0.0, 0.0, 0.15))
+    assert "modal mass of more than" in sentence_of(lp400, "foundation mode", foundation(0.0, 0.125, 0.15))
+
+
+def test_the_interval_of_a_time_ends_above_zero(lp400):
+    """ "Decays in 4900 ms (-200 to 9999)" came of an interval made symmetric."""
+    value = Known(value=4.9, interval_90=(2.0, 11.0))
+    words = sentence_of(lp400, "long remanence", {"remanence.time_constant": value})
+    assert "decays in 4900 ms (2000 to 11000)" in words
+
+
+def test_no_number_of_a_model_that_is_not_believed_is_said(lp400):
+    words = sentence_of(lp400, "foundation mode", foundation(0.1, 0.125, 0.15), believed=False)
+    assert words == "Tried beyond the base model, and not enough: foundation mode."
+
+
+@pytest.mark.parametrize("name", [one.name for one in EXTENSIONS if one.nothing])
+def test_values_that_hold_the_neutral_one_say_nothing(lp400, name):
+    """Four brackets at 0.1 % (-0.6 to 0.7), 0.3 % (-0.3 to 1.0), ... were said to be found."""
+    extension = next(one for one in EXTENSIONS if one.name == name)
+    machine = extension.added_to(lp400)
+    unknowns = {u.path: u for u in all_unknowns(build_drop_model(machine, "quick"))}
+    (nothing,) = set(extension.nothing.values())
+    values = {
+        path: Known(value=nothing, interval_90=(nothing - 1e-3, nothing + 1e-3))
+        for path in unknowns
+        if path.endswith(tuple(extension.nothing))
+    }
+    assert values and extension.says_nothing(machine, values)
+    one = next(iter(values))
+    telling = values | {one: Known(value=nothing + 3e-3, interval_90=(nothing + 1e-3, nothing + 5e-3))}
+    assert not extension.says_nothing(machine, telling)
+
+
+@pytest.mark.slow
+def test_an_extension_that_says_nothing_is_taken_off_and_the_rest_refined(
+    calibrated: Machine, synthetic: SyntheticDrop
+) -> None:
+    """On a drop of a machine whose brackets stand still."""
+    extension = next(one for one in EXTENSIONS if one.name == "brackets that follow the housing")
+    machine = extension.added_to(calibrated)
+    item = read_evidence(build_drop_model(calibrated), synthetic.record, synthetic.tail, name="hidden_060")
+    drops = Drops(evidence=(item,), calibrate_only=True)
+    search = Search(drops=drops, progress=None)
+    fit = track(drops.fine(machine), drops.scaled(machine, (replace(CALIBRATION_SCHEDULE[0], passes=1),)))
+    found = Candidate(machine=machine, fit=fit, accepted=(Accepted(extension=extension, gain=60.0),))
+    without = search.without_silent(found, calibrated)
+    assert without.accepted == () and without.machine == calibrated
+    assert (
+        without.fit.problems[0].n_dynamic + len(without.fit.problems[0].unknowns)
+        < len(fit.problems[0].unknowns) + fit.problems[0].n_dynamic
+    )
+    assert not without.inconsistent
