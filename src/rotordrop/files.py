@@ -118,7 +118,7 @@ def _system() -> str:
 
 
 def clear_after_killed_runs(folder: Path, stem: str | None = None) -> None:
-    """Remove what processes of this computer that no longer run left half written, for one stem or for all."""
+    """Remove what processes of this computer that no longer run left half written, of one stem or all."""
     if os.name != "posix":
         return  # elsewhere there is no harmless way to ask whether a process runs
     with suppress(OSError):
@@ -196,7 +196,7 @@ def write_json(path: str | os.PathLike[str], content: Any, *, sealed: bool = Fal
         raise OutputError(f"cannot write {path} as JSON: {error}") from error
     raw = text.encode("utf-8", errors="replace")
     if sealed:
-        raw = raw[:_DIGEST.start] + hashlib.sha256(raw).hexdigest().encode() + raw[_DIGEST.stop :]
+        raw = raw[: _DIGEST.start] + hashlib.sha256(raw).hexdigest().encode() + raw[_DIGEST.stop :]
     with atomic_path(path) as temporary:
         temporary.write_bytes(raw)
 

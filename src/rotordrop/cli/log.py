@@ -5,7 +5,9 @@ from __future__ import annotations
 import csv
 import io
 import math
+import sys
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import asdict
 from datetime import datetime
 from enum import StrEnum
@@ -18,7 +20,7 @@ from typer import Argument
 from rotordrop.cli import _options as options
 from rotordrop.cli._options import measured, text_option
 from rotordrop.cli._output import console, deliver, require_places
-from rotordrop.errors import UsageError
+from rotordrop.errors import RotordropError, UsageError
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -60,6 +62,7 @@ def log(
     """
     from rotordrop.ledger import book
 
+    _say_what_has_no_digest(where)
     if action is Action.export and what is not None:
         if Path(what).resolve() == Path(where).resolve():
             raise UsageError(f"{what} is the log itself; name another file for the table")
@@ -98,6 +101,17 @@ def log(
     }
     said = [*(share.sentence() for share in shares), *(one.sentence() for one in rising)]
     deliver(content, json, lambda out: out.print(_table(found), *said, book.STATEMENT, sep="\n"))
+
+
+def _say_what_has_no_digest(where: str) -> None:
+    from rotordrop.ledger.book import read_log
+
+    with suppress(RotordropError):  # a log that is not there yet, or damaged
+        if older := read_log(where).unsealed:
+            console(sys.stderr).print(
+                f"note: an older rotordrop added {', '.join(older)} to this log, without a digest; the next "
+                "drop or allowance that is added gives them one"
+            )
 
 
 def _drop(what: str | None, bearings: str, recorded: str, duration: float | None, cause: str) -> LoggedDrop:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
+import secrets
 from collections.abc import Mapping
-from dataclasses import astuple, dataclass, field, fields
+from dataclasses import astuple, dataclass, field, fields, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from rotordrop.errors import UsageError
+from rotordrop.errors import DamagedFileError, UsageError
 from rotordrop.estimate.published import Drop
-from rotordrop.ledger._store import transaction
+from rotordrop.ledger._store import Transaction, name_of, transaction
 
 QUANTITIES: Mapping[str, str] = {
     "peak_force_N": "N",
@@ -51,7 +54,7 @@ class LoggedDrop:
     """Which machine, and which set of touchdown bearings it had."""
     record: str
     sha256: str
-    """The recording and the digest of its file."""
+    """The recording and the digest of its file, empty where that is not known."""
     recorded: str = ""
     added: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
     """When it happened, and when it was logged (ISO 8601); ``recorded`` may be empty."""
@@ -76,6 +79,77 @@ class LoggedDrop:
 COLUMNS = tuple(item.name for item in fields(LoggedDrop) if item.name != "severity")
 SEVERITY = tuple(item.name for item in fields(Severity))
 """What a log keeps of a drop beside its severity, and of that."""
+_NO_SHA256 = "none "
+"""Before a number that stands in the log for the digest of a file that is not known: such records are no
+doubles of each other."""
+MOST_DROPS = 2**31 - 1
+"""What PostgreSQL counts up to."""
+
+
+def _text(name: str, value: Any) -> str:
+    """A text that every data base takes."""
+    if not isinstance(value, str) or "\0" in value or any("\ud800" <= sign <= "\udfff" for sign in value):
+        raise UsageError(f"{name} = {value!r}; expected a text without NUL and lone surrogates")
+    return value
+
+
+def _number(name: str, value: Any, least: float = -math.inf) -> float:
+    """A finite number from a least one on."""
+    real = isinstance(value, int | float) and not isinstance(value, bool)
+    if not real or not abs(value) < math.inf or value < least:
+        start = "" if least == -math.inf else f" from {least:g} on"
+        raise UsageError(f"{name} = {value!r}; expected a finite number{start}")
+    return float(value)
+
+
+def _checked(drop: LoggedDrop) -> LoggedDrop:
+    """A drop whose values a log may hold; refuses others by name."""
+    texts = {name: _text(name, getattr(drop, name)) for name in COLUMNS if name not in _NO_TEXT}
+    for name in ("recorded", "added"):
+        try:
+            if texts[name]:
+                datetime.fromisoformat(texts[name])
+        except ValueError:
+            raise UsageError(
+                f"{name} = {texts[name]!r}; expected a date such as 2026-03-14T15:09:26, or nothing"
+            ) from None
+    if not isinstance(drop.simulated, bool):
+        raise UsageError(f"simulated = {drop.simulated!r}; expected True or False")
+    severity = []
+    for one in drop.severity:
+        who = f"{one.quantity} at {one.bearing}"
+        for name in ("bearing", "quantity", "unit"):
+            _text(name, getattr(one, name))
+        lower, upper = _number(f"{who}: lower", one.lower), _number(f"{who}: upper", one.upper)
+        value = None if one.value is None else _number(f"{who}: value", one.value)
+        if lower > upper:
+            raise UsageError(f"{who} runs from {lower:g} to {upper:g}; expected the smaller end first")
+        severity.append(replace(one, value=value, lower=lower, upper=upper))
+    stated = [(one.bearing, one.quantity) for one in severity]
+    for bearing, quantity in stated:
+        if stated.count((bearing, quantity)) > 1:
+            raise UsageError(f"{quantity} at {bearing} is stated twice; leave one of them out")
+    return replace(
+        drop,
+        speed=_number("speed", drop.speed, 0.0),
+        duration=None if drop.duration is None else _number("duration", drop.duration, 0.0),
+        severity=tuple(sorted(severity, key=lambda one: (one.bearing, one.quantity))),
+    )
+
+
+_NO_TEXT = ("speed", "duration", "simulated")
+
+
+def _digest(*values: Any) -> str:
+    """Digest of what stands in a log; of what nobody put there a text that is no digest."""
+    try:
+        return hashlib.sha256(json.dumps(values).encode()).hexdigest()
+    except TypeError as error:
+        return str(error)
+
+
+def _of_drop(drop: LoggedDrop) -> str:
+    return _digest([getattr(drop, name) for name in COLUMNS], [astuple(one) for one in drop.severity])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,15 +187,18 @@ class UsedShare:
 
 def add_drop(where: str | Path, drop: LoggedDrop) -> int:
     """Add a drop to a log and give its number; a recording that is in the log already is refused."""
-    values = [getattr(drop, name) for name in COLUMNS]
+    drop = _checked(drop)
+    kept = replace(drop, sha256=drop.sha256 or f"{_NO_SHA256}{secrets.token_hex(8)}")
+    values = [getattr(kept, name) for name in COLUMNS]
     with transaction(where, writing=True) as log:
-        key = (drop.machine, drop.bearing_set, drop.sha256)
+        key = (kept.machine, kept.bearing_set, kept.sha256)
         there = log.run("SELECT id FROM drops WHERE machine = ? AND bearing_set = ? AND sha256 = ?", key)
         if there:
             raise UsageError(
                 f"{drop.record} is in the log already, as drop {there[0][0]} of {drop.machine} with bearings "
                 f"{drop.bearing_set}; a recording counts once. Remove that entry first to replace it"
             )
+        _seal_what_has_none(log)
         number = int(
             log.run(
                 f"INSERT INTO drops ({', '.join(COLUMNS)}) VALUES ({', '.join('?' * len(values))}) "
@@ -129,44 +206,98 @@ def add_drop(where: str | Path, drop: LoggedDrop) -> int:
                 values,
             )[0][0]
         )
-        for one in drop.severity:
+        for one in kept.severity:
             log.run("INSERT INTO severity VALUES (?, ?, ?, ?, ?, ?, ?)", (number, *astuple(one)))
+        log.seal(f"drop {number}", _of_drop(drop))
     return number
 
 
 def remove_drop(where: str | Path, number: int) -> None:
-    """Take a drop out of a log by its number."""
+    """Take a drop out of a log by its number, whether it is damaged or not."""
     with transaction(where, writing=True) as log:
-        if not log.run("SELECT id FROM drops WHERE id = ?", (number,)):
+        known = f"drop {number}" in log.seals
+        if not known and not log.run("SELECT id FROM drops WHERE id = ?", (number,)):
             raise UsageError(f"the log has no drop {number}; 'rotordrop log show' lists them")
         log.run("DELETE FROM severity WHERE drop_id = ?", (number,))
         log.run("DELETE FROM drops WHERE id = ?", (number,))
+        log.seal(f"drop {number}", None)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Log:
+    """All that a log holds."""
+
+    drops: Mapping[int, LoggedDrop]
+    """Drops by number, in the order they happened."""
+    allowances: Mapping[tuple[str, str], tuple[int | None, float | None, str]]
+    """Drops, seconds and source by machine and set of bearings."""
+    unsealed: tuple[str, ...]
+    """What has no digest: an older rotordrop added it."""
+
+
+def read_log(where: str | Path) -> Log:
+    """Everything in a log, compared with its digests; what is damaged or gone is named."""
+    with transaction(where, writing=False) as log:
+        found, seals = _read(log), log.seals
+    there = _digests(found)
+    wrong = [
+        f"{what} is not what was logged" for what in there if seals.get(what, there[what]) != there[what]
+    ]
+    wrong += [f"{what} is gone" for what in seals.keys() - there]
+    if wrong:
+        raise DamagedFileError(
+            f"{name_of(where)} is damaged: {', '.join(sorted(wrong))}. Take a damaged drop out with "
+            "'rotordrop log remove' and add its estimate again; state a damaged allowance again"
+        )
+    return replace(found, unsealed=tuple(what for what in there if what not in seals))
+
+
+def _read(log: Transaction) -> Log:
+    """What stands in a log, whole or not. Nothing is looked for by an index, which may be damaged too."""
+    of_drop: dict[Any, list[Severity]] = {}
+    for number, *severity in log.run(f"SELECT drop_id, {', '.join(SEVERITY)} FROM severity"):
+        of_drop.setdefault(number, []).append(Severity(**dict(zip(SEVERITY, severity, strict=True))))
+    drops = {}
+    for number, *row in log.run(f"SELECT id, {', '.join(COLUMNS)} FROM drops"):
+        values = dict(zip(COLUMNS, row, strict=True))
+        if values["simulated"] in (0, 1):
+            values["simulated"] = bool(values["simulated"])  # SQLite keeps 0 and 1
+        if str(values["sha256"]).startswith(_NO_SHA256):
+            values["sha256"] = ""
+        severity = sorted(of_drop.pop(number, []), key=lambda one: (str(one.bearing), str(one.quantity)))
+        drops[number] = LoggedDrop(**values, severity=tuple(severity))
+    rows = log.run("SELECT machine, bearing_set, drops, seconds, source FROM allowances")
+    return Log(
+        drops=dict(sorted(drops.items(), key=lambda e: (str(e[1].recorded or e[1].added), e[0]))),
+        allowances={(row[0], row[1]): row[2:] for row in rows},
+        unsealed=(),
+    )
+
+
+def _digests(found: Log) -> dict[str, str]:
+    """Digest of every drop and every allowance, by what it is of."""
+    return {f"drop {number}": _of_drop(drop) for number, drop in found.drops.items()} | {
+        f"allowance of {machine}, bearings {bearing_set}": _digest(*allowed)
+        for (machine, bearing_set), allowed in found.allowances.items()
+    }
+
+
+def _seal_what_has_none(log: Transaction) -> None:
+    """Give digests to what an older rotordrop added."""
+    for what, digest in _digests(_read(log)).items():
+        if what not in log.seals:
+            log.seal(what, digest)
 
 
 def logged_drops(
     where: str | Path, *, machine: str | None = None, bearing_set: str | None = None
 ) -> dict[int, LoggedDrop]:
     """Drops of a log by number, in the order they happened."""
-    wanted = [(name, value) for name, value in (("machine", machine), ("bearing_set", bearing_set)) if value]
-    condition = " AND ".join(f"{name} = ?" for name, _ in wanted)
-    with transaction(where, writing=False) as log:
-        rows = log.run(
-            f"SELECT id, {', '.join(COLUMNS)} FROM drops {'WHERE ' + condition if wanted else ''} "
-            "ORDER BY CASE WHEN recorded = '' THEN added ELSE recorded END, id",
-            [value for _, value in wanted],
-        )
-        severities = log.run(
-            f"SELECT drop_id, {', '.join(SEVERITY)} FROM severity ORDER BY drop_id, bearing, quantity"
-        )
-    of_drop: dict[int, list[Severity]] = {}
-    for number, *severity in severities:
-        of_drop.setdefault(number, []).append(Severity(**dict(zip(SEVERITY, severity, strict=True))))
-    found = {}
-    for number, *row in rows:
-        values = dict(zip(COLUMNS, row, strict=True))
-        values["simulated"] = bool(values["simulated"])  # SQLite keeps 0 and 1
-        found[number] = LoggedDrop(**values, severity=tuple(of_drop.get(number, ())))
-    return found
+    return {
+        number: drop
+        for number, drop in read_log(where).drops.items()
+        if machine in (None, drop.machine) and bearing_set in (None, drop.bearing_set)
+    }
 
 
 def allow(
@@ -181,30 +312,30 @@ def allow(
     """State how many drops or how many seconds a set of touchdown bearings may take, and who says so."""
     if drops is None and seconds is None:
         raise UsageError("an allowance needs a number of drops or of seconds")
-    if (drops is not None and drops < 1) or (seconds is not None and not seconds > 0.0):
-        raise UsageError(f"allowed are {drops} drops and {seconds} s; expected numbers above zero")
-    if not source.strip():
+    if drops is not None and (type(drops) is not int or not 1 <= drops <= MOST_DROPS):
+        raise UsageError(f"allowed are {drops!r} drops; expected a whole number from 1 to {MOST_DROPS}")
+    seconds = None if seconds is None else _number("seconds", seconds, math.ulp(0.0))
+    if not _text("source", source).strip():
         raise UsageError("an allowance needs its source: who agreed on it, in which document")
+    key = (_text("machine", machine), _text("bearing_set", bearing_set))
     with transaction(where, writing=True) as log:
-        log.run("DELETE FROM allowances WHERE machine = ? AND bearing_set = ?", (machine, bearing_set))
-        values = (machine, bearing_set, drops, seconds, source)
-        log.run("INSERT INTO allowances VALUES (?, ?, ?, ?, ?)", values)
+        _seal_what_has_none(log)
+        log.run("DELETE FROM allowances WHERE machine = ? AND bearing_set = ?", key)
+        log.run("INSERT INTO allowances VALUES (?, ?, ?, ?, ?)", (*key, drops, seconds, source))
+        log.seal(f"allowance of {machine}, bearings {bearing_set}", _digest(drops, seconds, source))
 
 
 def used_shares(where: str | Path) -> tuple[UsedShare, ...]:
     """How much every machine and set of bearings has used of what it is allowed."""
-    with transaction(where, writing=False) as log:
-        durations = log.run("SELECT machine, bearing_set, duration FROM drops")
-        allowances = log.run("SELECT machine, bearing_set, drops, seconds, source FROM allowances")
-    logged: dict[tuple[str, str], list[float | None]] = {(row[0], row[1]): [] for row in allowances}
-    for machine, bearings, duration in durations:
-        logged.setdefault((machine, bearings), []).append(duration)
-    allowed = {(row[0], row[1]): row[2:] for row in allowances}
-    found = []
+    found = read_log(where)
+    logged: dict[tuple[str, str], list[float | None]] = {key: [] for key in found.allowances}
+    for drop in found.drops.values():
+        logged.setdefault((drop.machine, drop.bearing_set), []).append(drop.duration)
+    shares = []
     for key, lasted in sorted(logged.items()):
-        drops, seconds, source = allowed.get(key, (None, None, ""))
+        drops, seconds, source = found.allowances.get(key, (None, None, ""))
         known = [one for one in lasted if one is not None]
-        found.append(
+        shares.append(
             UsedShare(
                 machine=key[0],
                 bearing_set=key[1],
@@ -216,7 +347,7 @@ def used_shares(where: str | Path) -> tuple[UsedShare, ...]:
                 source=source,
             )
         )
-    return tuple(found)
+    return tuple(shares)
 
 
 def drop_of_estimate(drop: Drop, bearing_set: str, **known: Any) -> LoggedDrop:

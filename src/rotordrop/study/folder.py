@@ -167,8 +167,8 @@ def require_same_version(plan: Mapping[str, Any], path: Path) -> None:
     """Refuse to compute drops for a study that another version of rotordrop began."""
     if plan["rotordrop"] != __version__:
         raise UsageError(
-            f"{path} was begun by rotordrop {plan['rotordrop']}, and this is {__version__}: numbers may differ "
-            "between versions. Go on with that version, or name another folder"
+            f"{path} was begun by rotordrop {plan['rotordrop']}, and this is {__version__}: numbers may "
+            "differ between versions. Go on with that version, or name another folder"
         )
 
 
@@ -188,8 +188,8 @@ def study_of(path: str | Path) -> Study:
     except (KeyError, TypeError, ValueError):  # of a version that knew other settings
         pass
     raise UsageError(
-        f"{Path(path)} was begun by rotordrop {plan.get('rotordrop')}, and this is {__version__}, which makes "
-        "another study of its plan and machine file; use that version, or run the study in another folder"
+        f"{Path(path)} was begun by rotordrop {plan.get('rotordrop')}, and this is {__version__}, which "
+        "makes another study of its plan and machine file; use that version, or another folder"
     )
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import csv
 import io
 import json
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -96,3 +98,23 @@ def test_a_wrong_call_says_what_was_expected(tmp_path, estimate, capsys, argumen
     assert run(["log", *(argument.format(**names) for argument in arguments)]) == code
     assert message in capsys.readouterr().err
     assert not (tmp_path / "drops.db").exists()
+
+
+def test_what_has_no_digest_and_what_is_damaged_is_said(tmp_path, estimate, capsys):
+    log = str(tmp_path / "drops.db")
+    assert run(["log", "add", log, estimate]) == 0
+    with closing(sqlite3.connect(log)) as connection, connection:
+        connection.execute("DROP TABLE seals")
+    capsys.readouterr()
+    for note in ("an older rotordrop added drop 1 to this log, without a digest", ""):
+        assert run(["log", "show", log]) == 0
+        assert note in " ".join(capsys.readouterr().err.split())
+        assert run(["log", "allow", log, "--machine", "LP-400", "--drops", "3", "--source", "x"]) == 0
+    with closing(sqlite3.connect(log)) as connection, connection:
+        connection.execute("UPDATE drops SET speed = 1")
+    capsys.readouterr()
+    assert run(["log", "show", log]) == 6
+    assert "drop 1 is not what was logged. Take a damaged drop out with 'rotordrop log remove'" in " ".join(
+        capsys.readouterr().err.split()
+    )
+    assert run(["log", "remove", log, "1"]) == 0

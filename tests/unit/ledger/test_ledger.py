@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
 import signal
@@ -11,16 +12,17 @@ import subprocess
 import sys
 import tempfile
 import time
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from tests.published import bearing, published, value
 
-from rotordrop.errors import OutputError, UsageError
-from rotordrop.ledger import LoggedDrop, Severity, add_drop, allow, logged_drops, used_shares
-from rotordrop.ledger._store import _make_wal
-from rotordrop.ledger.book import drop_of_estimate, remove_drop
+from rotordrop.errors import DamagedFileError, OutputError, RotordropError, UsageError
+from rotordrop.ledger import LoggedDrop, Severity, add_drop, allow, logged_drops, trends, used_shares
+from rotordrop.ledger._store import Transaction, _make_wal
+from rotordrop.ledger.book import drop_of_estimate, read_log, remove_drop
 
 PEAK = Severity(bearing="NDE", quantity="peak_force_N", unit="N", value=3300.0, lower=3200.0, upper=3400.0)
 DROP = LoggedDrop(
@@ -108,10 +110,143 @@ def test_what_is_no_log_is_named(tmp_path):
         add_drop(tmp_path / "no folder" / "drops.db", DROP)
 
 
-def test_a_write_that_fails_leaves_nothing(log):
-    with pytest.raises(sqlite3.IntegrityError):
-        add_drop(log, replace(DROP, severity=(PEAK, PEAK)))
-    assert logged_drops(log) == {}
+def test_a_write_that_fails_leaves_nothing(log, monkeypatch):
+    add_drop(log, DROP)
+    monkeypatch.setattr(Transaction, "seal", lambda *_: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        add_drop(log, replace(DROP, sha256="b" * 64))
+    assert list(logged_drops(log).values()) == [DROP]
+
+
+WRONG = [
+    ({"speed": math.nan}, "speed = nan; expected a finite number from 0 on"),
+    ({"speed": math.inf}, "speed = inf"),
+    ({"speed": "fast"}, "speed = 'fast'; expected a finite number"),
+    ({"speed": True}, "speed = True"),
+    ({"duration": -5.0}, r"duration = -5\.0; expected a finite number from 0 on"),
+    ({"duration": "5 s"}, "duration = '5 s'"),
+    ({"cause": "\ud800"}, "cause = .* without NUL and lone surrogates"),
+    ({"machine": "a\0b"}, "machine = .* without NUL"),
+    ({"record": None}, "record = None; expected a text"),
+    ({"recorded": "yesterday"}, "recorded = 'yesterday'; expected a date such as 2026-03-14"),
+    ({"simulated": "no"}, "simulated = 'no'; expected True or False"),
+    ({"severity": (PEAK, PEAK)}, "peak_force_N at NDE is stated twice"),
+    ({"severity": (replace(PEAK, lower=math.nan),)}, "peak_force_N at NDE: lower = nan"),
+    ({"severity": (replace(PEAK, lower=5000.0),)}, "runs from 5000 to 3400; expected the smaller end first"),
+]
+
+
+@pytest.mark.parametrize(("values", "message"), WRONG)
+def test_what_no_drop_can_have_is_refused_at_the_door(log, values, message):
+    with pytest.raises(UsageError, match=message):
+        add_drop(log, replace(DROP, **values))
+    assert not log.exists()
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"drops": 2.5}, r"allowed are 2\.5 drops; expected a whole number from 1 to 2147483647"),
+        ({"drops": 2**63}, "allowed are 9223372036854775808 drops"),
+        ({"seconds": math.inf}, "seconds = inf; expected a finite number"),
+        ({"seconds": 0.0}, r"seconds = 0\.0"),
+        ({"drops": 3, "source": "\ud800"}, "source = .* lone surrogates"),
+    ],
+)
+def test_what_nobody_can_allow_is_refused_at_the_door(log, settings, message):
+    with pytest.raises(UsageError, match=message):
+        allow(log, "LP-400", "2026", **{"source": "contract", **settings})
+
+
+def test_records_without_a_digest_are_no_doubles(log):
+    for record in ("a.csv", "b.csv"):
+        add_drop(log, replace(DROP, record=record, sha256=""))
+    assert [(drop.record, drop.sha256) for drop in logged_drops(log).values()] == [
+        ("a.csv", ""),
+        ("b.csv", ""),
+    ]
+
+
+CHANGES = [
+    ("UPDATE severity SET upper = upper + 1e-9 WHERE drop_id = 1", "drop 1 is not what was logged"),
+    ("UPDATE drops SET cause = 'other' WHERE id = 2", "drop 2 is not what was logged"),
+    ("UPDATE drops SET machine = x'80' WHERE id = 2", "drop 2 is not what was logged"),
+    ("DELETE FROM severity WHERE drop_id = 2", "drop 2 is not what was logged"),
+    ("DELETE FROM drops WHERE id = 1", "drop 1 is gone"),
+    ("UPDATE allowances SET drops = 99", "allowance of LP-400, bearings 2026 is not what was logged"),
+    ("DELETE FROM allowances", "allowance of LP-400, bearings 2026 is gone"),
+    ("UPDATE seals SET digest = 'x' WHERE sealed = 'version'", "it has no version"),
+]
+
+
+@pytest.mark.parametrize(("change", "named"), CHANGES)
+def test_what_has_changed_in_a_log_is_named_and_can_be_taken_out(log, change, named):
+    for digest in ("a" * 64, "b" * 64):
+        add_drop(log, replace(DROP, sha256=digest))
+    allow(log, "LP-400", "2026", drops=12, source="contract")
+    with closing(sqlite3.connect(log)) as connection, connection:
+        connection.execute(change)
+    for reading in (logged_drops, used_shares, trends):
+        with pytest.raises(DamagedFileError, match=rf"drops\.db is damaged: {named}"):
+            reading(log)
+    if "drop " in named:
+        remove_drop(log, int(named.split()[1]))
+        assert len(logged_drops(log)) == 1
+    if "allowance" in named:
+        allow(log, "LP-400", "2026", drops=12, source="contract")
+        assert len(logged_drops(log)) == 2
+
+
+def test_a_log_of_an_older_version_is_read_and_given_digests(log):
+    add_drop(log, DROP)
+    with closing(sqlite3.connect(log)) as connection, connection:
+        connection.execute("DROP TABLE seals")
+    assert read_log(log).unsealed == ("drop 1",)
+    add_drop(log, replace(DROP, sha256="b" * 64))
+    assert read_log(log).unsealed == ()
+    with closing(sqlite3.connect(log)) as connection, connection:  # what the older one goes on to add
+        connection.execute(
+            "INSERT INTO drops SELECT 3, machine, bearing_set, record, 'c', recorded, added, speed, "
+            "duration, cause, method, verdict, simulated, version, fingerprint FROM drops WHERE id = 1"
+        )
+    assert read_log(log).unsealed == ("drop 3",)
+
+
+def test_a_log_of_a_later_version_is_refused(log):
+    add_drop(log, DROP)
+    with closing(sqlite3.connect(log)) as connection, connection:
+        connection.execute("UPDATE seals SET digest = '3' WHERE sealed = 'version'")
+    for use in (logged_drops, lambda log: add_drop(log, replace(DROP, sha256="b" * 64))):
+        with pytest.raises(UsageError, match="written by a later rotordrop: its tables have version 3"):
+            use(log)
+
+
+READER = """
+import os, sys
+from dataclasses import replace
+from rotordrop.ledger import add_drop, logged_drops
+from tests.unit.ledger.test_ledger import DROP
+os.setgid(65534); os.setuid(65534)
+assert logged_drops(sys.argv[1])[1].severity == DROP.severity
+try:
+    add_drop(sys.argv[1], replace(DROP, sha256="z"))
+except Exception as error:
+    print(type(error).__name__, error)
+"""
+
+
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() != 0, reason="another user is needed")
+@pytest.mark.parametrize("modes", [(0o555, 0o444), (0o777, 0o444), (0o555, 0o666)])
+def test_who_may_only_read_a_log_reads_it(modes):
+    folder = Path(tempfile.mkdtemp(prefix="log"))  # the folders of pytest are closed to other users
+    log = folder / "drops.db"
+    add_drop(log, DROP)
+    for path, mode in zip((folder, log), modes, strict=True):
+        path.chmod(mode)
+    command = [sys.executable, "-c", READER, str(log)]
+    said = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert said.stdout.startswith("OutputError"), said.stderr
+    shutil.rmtree(folder)
 
 
 def test_a_drop_from_the_document_of_an_estimate():
@@ -218,6 +353,69 @@ def test_the_same_log_in_postgresql(postgresql):
     assert len(logged_drops(postgresql, machine="LP-400")) == 100
 
 
+def test_a_role_that_may_only_read_reads_and_writes_nothing(postgresql):
+    import psycopg
+
+    number = add_drop(postgresql, replace(DROP, machine="other", sha256="r" * 64))
+    with psycopg.connect(postgresql) as connection:
+        connection.execute("CREATE ROLE reader LOGIN")
+        connection.execute("GRANT SELECT ON ALL TABLES IN SCHEMA public TO reader")
+    reader = postgresql.replace("rotordrop@", "reader@")
+    assert number in logged_drops(reader)
+    for write in (lambda: add_drop(reader, DROP), lambda: remove_drop(reader, number)):
+        with pytest.raises(OutputError, match=r"127\.0\.0\.1:\d+/postgres cannot be used: permission denied"):
+            write()
+    with psycopg.connect(postgresql) as connection:
+        connection.execute("UPDATE drops SET speed = 1 WHERE id = %s", (number,))
+    with pytest.raises(DamagedFileError, match=f"drop {number} is not what was logged"):
+        logged_drops(reader)
+    remove_drop(postgresql, number)
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        "ALTER TABLE drops DROP COLUMN cause",
+        "DROP TABLE severity",
+        "DROP TABLE allowances",
+        "DROP TABLE drops CASCADE",
+    ],
+)
+def test_a_postgresql_that_holds_other_tables_is_said(postgresql, damage):
+    import psycopg
+
+    with psycopg.connect(postgresql, autocommit=True) as connection:
+        connection.execute("DROP DATABASE IF EXISTS other")
+        connection.execute("CREATE DATABASE other")
+    other = postgresql.replace("/postgres", "/other")
+    with pytest.raises(UsageError, match="holds no log of drops; 'rotordrop log add' makes one"):
+        logged_drops(other)
+    add_drop(other, DROP)
+    with psycopg.connect(other) as connection:
+        connection.execute(damage)
+    for use in (logged_drops, lambda log: add_drop(log, replace(DROP, sha256="b" * 64))):
+        with pytest.raises(RotordropError, match=r":\d+/other (cannot be used|holds no log)"):
+            use(other)
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        "postgresql://rotordrop@127.0.0.1/postgres?foo=bar",
+        "postgresql://rotordrop@127.0.0.1/a%00b",
+        "postgresql://rotordrop@[::1/postgres",
+        "postgresql://rotordrop@127.0.0.1/a\0b",
+        "postgresql://rotordrop@127.0.0.1/\ud800",
+        "postgresql://rotordrop@127.0.0.1:99999/postgres",
+    ],
+)
+def test_an_address_that_is_none_is_said(url):
+    pytest.importorskip("psycopg")
+    for use in (logged_drops, lambda log: add_drop(log, DROP)):
+        with pytest.raises(RotordropError, match=r"the log at .* cannot be used"):
+            use(url)
+
+
 def test_a_postgresql_that_is_not_there_is_named():
     pytest.importorskip("psycopg")
     with pytest.raises(OutputError, match=r"the log at 127\.0\.0\.1:1/none cannot be used"):
@@ -253,8 +451,6 @@ def test_a_log_that_others_are_making_is_waited_for():
 
 
 def test_a_trend_is_told_and_chance_is_not(log):
-    from rotordrop.ledger import trends
-
     steady = (5.0, 3.0, 6.0, 2.0, 7.0, 4.0, 5.5, 3.5)
     for k in range(8):
         severity = (
