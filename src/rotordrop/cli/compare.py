@@ -69,7 +69,7 @@ def compare(
     for path in estimates:
         for name, drop in read_drops(path).items():
             taken = any(name == other.name for other in drops)
-            drops.append(ComparedDrop.of_drop(f"{path.stem}: {name}" if taken else name, drop))
+            drops.append(ComparedDrop(f"{path.stem}: {name}" if taken else name, drop))
     if len(drops) < 2:
         raise UsageError(
             f"{len(drops)} drop to compare; at least two are needed. "
@@ -79,13 +79,13 @@ def compare(
     limits = read_limits(limit or ())
     page = compare_page(
         drops,
-        machine_name=", ".join(sorted({drop.machine for drop in drops})),
+        machine_name=", ".join(sorted({one.drop.machine for one in drops})),
         drop_scatter=drop_scatter,
         limits=limits,
         allowed=allowed,
     )
     ranked: dict[str, Any] = {}
-    for (bearing, key), ranking in rankings(drops, list(drops[0].numbers), drop_scatter or {}).items():
+    for (bearing, key), ranking in rankings(drops, list(drops[0].drop.bearings), drop_scatter or {}).items():
         condition = ranking.worst_condition
         ranked.setdefault(bearing, {})[key] = {
             "worst_first": list(ranking.names),
@@ -103,7 +103,7 @@ def compare(
 def _deliver_changes(estimates: list[Path], json: Path | None) -> None:
     from rotordrop.estimate.changed import changes
     from rotordrop.estimate.published import read_drop
-    from rotordrop.report.repeat_page import finite
+    from rotordrop.report.spread import finite
 
     if len(estimates) != 2:
         raise UsageError(f"--changes compares two estimates, and {len(estimates)} are given; name two files.")

@@ -7,18 +7,24 @@ from collections.abc import Sequence
 
 from rotordrop.elements.catalog.boundary import clearance_range
 from rotordrop.elements.catalog.lookup import CatalogueBearing
-from rotordrop.report.content import Cell, ReportContent, Statement, Table
-
-_COLUMNS = ("listed bearings of this size", "angle", "balls", "preload light / medium / heavy", "balls are")
+from rotordrop.report.content import Column, ReportContent, Statement, Table, table
+from rotordrop.report.machine_content import named_values
 
 
 def bearing_content(written: str, found: Sequence[CatalogueBearing]) -> ReportContent:
     """Put the bearings that a designation may mean into a report, the most likely one first."""
-    others = tuple(_row(bearing) for bearing in (found if found[0].listed else found[1:]))
+    others = found if found[0].listed else found[1:]
+    columns = (
+        Column("listed bearings of this size", lambda one: f"{one.maker} {one.designation}"),
+        Column("angle", _angle),
+        Column("balls", _balls),
+        Column("preload light / medium / heavy", _forces),
+        Column("balls are", lambda one: "published" if one.maker == "GMN" else "reconstructed"),
+    )
     return ReportContent(
         title=f"Bearings: {written}",
         verdict=tuple(_statements(written, found[0])),
-        summary=(_meant(found[0]), *((Table(columns=_COLUMNS, rows=others),) if others else ())),
+        summary=(_meant(found[0]), *((table(others, columns),) if others else ())),
     )
 
 
@@ -59,29 +65,28 @@ def clearance_of(bearing: CatalogueBearing) -> tuple[float, float] | None:
 
 
 def _statements(written: str, first: CatalogueBearing) -> list[Statement]:
-    balls, said = first.complement, []
+    balls = first.complement
     if first.listed:
         text = f"{written} is listed: {first.maker} {first.designation}. Balls: {balls.basis}"
-        said.append(Statement(text=text, level="good"))
+        said = [Statement(text, "good")]
     else:
-        text = f"no list in the catalogue has {written}: size by ISO 15, balls {balls.basis}"
-        said.append(Statement(text=text, level="notice"))
+        said = [Statement(f"no list in the catalogue has {written}: size by ISO 15, balls {balls.basis}")]
     if first.contact_angle_range is not None:
         low, high = (math.degrees(angle) for angle in first.contact_angle_range)
         text = f"{written} does not say its contact angle: {low:.0f}° to {high:.0f}° are usual; give it"
-        said.append(Statement(text=text, level="warning"))
+        said.append(Statement(text, "warning"))
     if not first.preload and first.kind == "angular contact":
         text = "no bearing of this size is listed, so no preload is known; give it as a force"
-        said.append(Statement(text=text, level="warning"))
+        said.append(Statement(text, "warning"))
     elif first.preload_basis:
-        said.append(Statement(text=f"the preload is {first.preload_basis}", level="notice"))
+        said.append(Statement(f"the preload is {first.preload_basis}"))
     return said
 
 
 def _meant(bearing: CatalogueBearing) -> Table:
     balls, play = bearing.complement, clearance_of(bearing)
     width = "" if bearing.width is None else f" × {1e3 * bearing.width:g}"
-    rows: list[tuple[Cell, ...]] = [
+    rows: list[tuple[str, object]] = [
         ("bore × outside × width", f"{1e3 * bearing.bore:g} × {1e3 * bearing.outside_diameter:g}{width} mm"),
         ("kind", bearing.kind),
         ("balls per row", _with_range(balls.ball_count, balls.count_range, "")),
@@ -95,7 +100,7 @@ def _meant(bearing: CatalogueBearing) -> Table:
         rows.append(("preload light / medium / heavy", _forces(bearing)))
     if play is not None:
         rows.append(("radial clearance", f"{1e6 * play[0]:.0f} to {1e6 * play[1]:.0f} µm"))
-    return Table(columns=(bearing.designation, ""), rows=tuple(rows))
+    return named_values(bearing.designation, rows)
 
 
 def _with_range(value: float, bounds: tuple[float, float] | None, unit: str) -> str:
@@ -118,13 +123,7 @@ def _forces(bearing: CatalogueBearing) -> str:
     return f"{' / '.join(forces)} N" if forces else "not known"
 
 
-def _row(bearing: CatalogueBearing) -> tuple[Cell, ...]:
+def _balls(bearing: CatalogueBearing) -> str:
     balls = bearing.complement
     material = "" if bearing.ball_material == "steel" else f", {bearing.ball_material}"
-    return (
-        f"{bearing.maker} {bearing.designation}",
-        _angle(bearing),
-        f"{balls.ball_count} × {1e3 * balls.ball_diameter:.4g} mm{material}",
-        _forces(bearing),
-        "published" if bearing.maker == "GMN" else "reconstructed",
-    )
+    return f"{balls.ball_count} × {1e3 * balls.ball_diameter:.4g} mm{material}"

@@ -1,102 +1,88 @@
-"""One drop of a comparison, from a published estimate."""
+"""One drop of a comparison: a published estimate under a name of its own."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
 
 from rotordrop.errors import UsageError
-from rotordrop.estimate.published import Drop, Impact
-from rotordrop.report.quantity import Quantity
+from rotordrop.estimate.published import Drop
+from rotordrop.report.quantity import Quantity, shown
 from rotordrop.severity.numbers import SEVERITY
 from rotordrop.units import format_minute
 
-NUMBERS = (
-    ("peak_force_N", "peak bearing force", "force"),
-    ("mean_force_0p15_0p2_N", "mean force, 150 to 200 ms", "force"),
-    ("peak_stress_Pa", "peak Hertz stress", "pressure"),
-    ("mean_stress_Pa", "mean Hertz stress", "pressure"),
-    *((one.field, one.label, one.kind) for one in SEVERITY),
+
+class Number(NamedTuple):
+    """A number of an estimate document that is compared: path, name for people, kind."""
+
+    field: str
+    label: str
+    kind: str
+    more_is_worse: bool = True
+
+
+LOADS = (
+    Number("peak_force_N", "peak bearing force", "force"),
+    Number("mean_force_0p15_0p2_N", "mean force, 150 to 200 ms", "force"),
+    Number("peak_stress_Pa", "peak Hertz stress", "pressure"),
+    Number("mean_stress_Pa", "mean Hertz stress", "pressure"),
 )
-"""Numbers of an estimate document that are compared: key, name, kind."""
-LESS_IS_WORSE = frozenset(one.field for one in SEVERITY if not one.more_is_worse)
+"""Force and stress, which every estimate states."""
+NUMBERS = (*LOADS, *(Number(one.field, one.label, one.kind, one.more_is_worse) for one in SEVERITY))
+"""Every number that is compared."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class ComparedDrop:
     """One drop of a comparison."""
 
     name: str
-    """Name of the drop."""
-    speed: float
-    """Speed at power-off [rad/s]."""
-    numbers: Mapping[str, Mapping[str, Quantity]]
-    """By bearing and name of the number in an estimate file (``"peak_force_N"``, …), with intervals."""
-    warnings: tuple[str, ...] = ()
-    """What the estimate warns of."""
-    consistent: bool = True
-    """Whether the estimate's own checks found the model consistent with the record."""
-    method: str = ""
-    """How it was estimated."""
-    record: str = ""
-    """SHA-256 of the recording, to know a drop that is given twice."""
-    simulated: bool = False
-    """Whether the record is known to be simulated."""
-    machine: str = ""
-    recorded: str = ""
-    """Name of the machine, and when the recorder says the drop was."""
-    statistics: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    """By bearing, the statistics of the stress as the document has them."""
-    hardest: Mapping[str, str] = field(default_factory=dict)
-    """By bearing, what its worst impact was and how much of the whole it made, in words."""
+    drop: Drop
+    """Its estimate."""
 
     @property
     def label(self) -> str:
         """Record, date and speed, for a table."""
-        speed = Quantity(value=self.speed / (2.0 * math.pi), kind="frequency", digits=3).text
-        return ", ".join(part for part in (self.name, self.minute, speed) if part)
+        return ", ".join(
+            part for part in (self.name, self.minute, shown(self.drop.speed_Hz, "frequency", 3)) if part
+        )
 
     @property
     def minute(self) -> str:
         """When the recorder says the drop was, without seconds."""
-        return format_minute(self.recorded)
+        return format_minute(self.drop.recorded)
 
-    @classmethod
-    def of_drop(cls, name: str, drop: Drop) -> ComparedDrop:
-        """Take it from a published estimate."""
-        return cls(
-            name=name,
-            speed=2 * math.pi * drop.speed_Hz,
-            numbers={
-                bearing: {
-                    key: Quantity(
-                        value=found.value,
-                        kind=kind,
-                        interval_90=found.interval,
-                        standard_error=found.standard_error,
-                        status=found.status or "",
-                    )
-                    for key, _, kind in NUMBERS
-                    if (found := entry.numbers.get(key)) is not None
-                }
-                for bearing, entry in drop.bearings.items()
-            },
-            warnings=tuple(drop.warnings),
-            consistent=drop.consistent,
-            method=drop.method,
-            record=drop.record_sha256,
-            simulated=drop.simulated_record,
-            machine=drop.machine,
-            recorded=drop.recorded,
-            statistics={
-                bearing: entry.stress_statistics_Pa.as_json() for bearing, entry in drop.bearings.items()
-            },
-            hardest={
-                bearing: text for bearing, entry in drop.bearings.items() if (text := _hardest(entry.impacts))
-            },
+    def number(self, bearing: str, number: Number) -> Quantity:
+        """A number at a bearing with its interval; a dash where the estimate does not state it."""
+        found = self.drop.bearings[bearing].numbers.get(number.field)
+        if found is None:
+            return Quantity(value=math.nan, kind=number.kind)
+        return Quantity(
+            value=found.value,
+            kind=number.kind,
+            interval_90=found.interval,
+            standard_error=found.standard_error,
+            status=found.status or "",
         )
+
+    def hardest(self, bearing: str) -> str:
+        """Which impact gave the peak at a bearing, and which part of impulse and energy it made."""
+        impacts = self.drop.bearings[bearing].impacts
+        if not impacts:
+            return "–"
+        first = max(range(len(impacts)), key=lambda k: impacts[k].peak_force_N.value)
+        hit, parts = impacts[first], []
+        for part, all_of_it, name in (
+            (hit.impulse_N_s, [one.impulse_N_s for one in impacts], "impulse"),
+            (hit.dissipated_energy_J, [one.dissipated_energy_J for one in impacts], "energy"),
+        ):
+            whole = math.fsum(one.value for one in all_of_it)
+            if whole > 0.0:
+                parts.append(f"{part.value / whole:.0%} of the {name}")
+        moment = shown(hit.peak_time_s, "time", 3)
+        return f"impact {first + 1} of {len(impacts)} at {moment}: {' and '.join(parts)}"
 
 
 def left_out(drops: Sequence[ComparedDrop]) -> dict[str, str]:
@@ -110,32 +96,17 @@ def left_out(drops: Sequence[ComparedDrop]) -> dict[str, str]:
     reasons: dict[str, str] = {}
     counted: dict[str, ComparedDrop] = {}
     seen: dict[tuple[str, str], ComparedDrop] = {}
-    for drop in sorted(drops, key=lambda one: not one.consistent):
-        twin = counted.setdefault(drop.record, drop) if drop.record else drop
-        same = seen.setdefault((drop.record, drop.method), drop) if drop.record else drop
-        if same is not drop:
+    for one in sorted(drops, key=lambda one: not one.drop.consistent):
+        record, method = one.drop.record_sha256, one.drop.method
+        twin = counted.setdefault(record, one) if record else one
+        same = seen.setdefault((record, method), one) if record else one
+        if same is not one:
             raise UsageError(
-                f"{same.name} and {drop.name} are estimates of the same recording; expected another drop in "
+                f"{same.name} and {one.name} are estimates of the same recording; expected another drop in "
                 "each. Leave one of them out."
             )
-        if not drop.consistent:
-            reasons[drop.name] = "its model is not consistent with its record"
-        elif twin is not drop:
-            way = drop.method or "another way"
-            reasons[drop.name] = f"the same recording as {twin.name}, estimated by {way}"
+        if not one.drop.consistent:
+            reasons[one.name] = "its model is not consistent with its record"
+        elif twin is not one:
+            reasons[one.name] = f"the same recording as {twin.name}, estimated by {method}"
     return reasons
-
-
-def _hardest(impacts: Sequence[Impact]) -> str:
-    """Which impact gave the peak, and which part of impulse and energy it made."""
-    if not impacts:
-        return ""
-    first = max(range(len(impacts)), key=lambda k: impacts[k].peak_force_N.value)
-    hit = impacts[first]
-    parts = []
-    for key, name in (("impulse_N_s", "impulse"), ("dissipated_energy_J", "energy")):
-        whole = math.fsum(getattr(one, key).value for one in impacts)
-        if whole > 0.0:
-            parts.append(f"{getattr(hit, key).value / whole:.0%} of the {name}")
-    moment = Quantity(value=hit.peak_time_s, kind="time", digits=3).text
-    return f"impact {first + 1} of {len(impacts)} at {moment}: {' and '.join(parts)}"

@@ -1,9 +1,11 @@
-"""What a report says, before it becomes a page or a terminal summary: plain frozen data."""
+"""What a report says before it is shown: verdict, headline numbers, sections, and tables as declared."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from rotordrop.report.quantity import Quantity
 
@@ -20,7 +22,11 @@ SIMULATED_RECORD = (
 """What every report on a bundled record says."""
 
 
-@dataclass(frozen=True, kw_only=True)
+SIMULATED_MACHINE = "Everything on this page is computed from the machine description; nothing was measured."
+"""What every report on a simulation says."""
+
+
+@dataclass(frozen=True)
 class Statement:
     """One sentence the reader can act on, and how serious it is."""
 
@@ -28,7 +34,7 @@ class Statement:
     level: Level = "notice"
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class KeyFigure:
     """One headline number of a card, with a few words on when or how."""
 
@@ -37,7 +43,12 @@ class KeyFigure:
     note: str = ""
 
 
-@dataclass(frozen=True, kw_only=True)
+def fact(label: str, value: object, kind: str, digits: int = 4, note: str = "") -> KeyFigure:
+    """A headline number of a value [SI] of a kind."""
+    return KeyFigure(label, Quantity.of(value, kind, digits), note)
+
+
+@dataclass(frozen=True)
 class Card:
     """The headline numbers of one bearing."""
 
@@ -45,9 +56,29 @@ class Card:
     figures: tuple[KeyFigure, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
+class Column:
+    """One column of a table: its heading, where its value stands in a typed row, and how it is shown."""
+
+    label: str
+    value: str | Callable[[Any], object]
+    """Name of a field of the row, with dots for a field of a field, or a function of the row."""
+    kind: str = ""
+    """Kind of quantity; empty for text. What is a quantity or a text already stays as it is."""
+    digits: int = 4
+    """Significant digits where no interval says how many are meant."""
+
+    def cell(self, row: object) -> Cell:
+        """What the column shows of a row."""
+        found = attrgetter(self.value)(row) if isinstance(self.value, str) else self.value(row)
+        if isinstance(found, Quantity | str) or not self.kind:
+            return found if isinstance(found, Quantity) else str(found)
+        return Quantity.of(found, self.kind, self.digits)
+
+
+@dataclass(frozen=True)
 class Table:
-    """A table; cells are text or quantities."""
+    """A table as it is shown on a page, in a terminal and as CSV; cells are text or quantities."""
 
     columns: tuple[str, ...]
     """Headings."""
@@ -67,7 +98,13 @@ class Table:
                 )
 
 
-@dataclass(frozen=True, kw_only=True)
+def table(rows: Iterable[object], columns: Sequence[Column], caption: str = "", note: str = "") -> Table:
+    """Make a table of typed rows by its declared columns."""
+    cells = tuple(tuple(column.cell(row) for column in columns) for row in rows)
+    return Table(tuple(column.label for column in columns), cells, caption, note)
+
+
+@dataclass(frozen=True)
 class Figure:
     """A plotly figure with the sentence that tells what is to be seen in it, and a name to ask for it by."""
 
@@ -76,7 +113,7 @@ class Figure:
     name: str = ""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Section:
     """One part of the report: heading, text, figures, tables, in this order."""
 
@@ -104,7 +141,7 @@ class ReportContent:
     """Headline numbers per bearing."""
     summary: tuple[Table, ...] = ()
     """Tables that belong beside the verdict and into the terminal."""
-    sections: tuple[Section, ...] = field(default=())
+    sections: tuple[Section, ...] = ()
     """Figures and tables."""
 
     @property

@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rotordrop._version import __version__
-from rotordrop.report.content import Card, Figure, KeyFigure, ReportContent, Section, Statement, Table
+from rotordrop.report.content import (
+    Card,
+    Column,
+    Figure,
+    ReportContent,
+    Section,
+    Statement,
+    Table,
+    fact,
+    table,
+)
 from rotordrop.report.critical_speeds_figure import (
     campbell_figure,
     critical_speed_figure,
@@ -17,9 +27,10 @@ from rotordrop.report.critical_speeds_figure import (
     stability_figure,
 )
 from rotordrop.report.machine_sections import defaults_section
-from rotordrop.report.quantity import Quantity
+from rotordrop.report.style import TURN
 from rotordrop.rotor.campbell import (
     CampbellDiagram,
+    Crossing,
     Separation,
     StabilityMap,
     amplification_factor,
@@ -30,8 +41,8 @@ from rotordrop.rotor.critical_speeds import CriticalSpeedMap
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
 
-TURN = 2.0 * math.pi
 HIGHEST = 1000.0
+"""Highest frequency of a Campbell diagram [Hz]; chosen, not measured."""
 SHAPES = 6
 AT_LINES = {
     "tangent": "bearings' tangent stiffness, supports without mass",
@@ -44,6 +55,16 @@ _WHIRL_WORDS = {
     "forward": "forward critical speeds",
     "backward": "backward critical speeds",
 }
+_WORST_FIRST = ("bad", "good", "warning", "notice")
+CLEAR = "No critical speed of the held rotor is nearer to the nominal speed than API 617 asks for."
+WITH_MASS = (
+    "Right: the support's mass sits between bearing and support spring; it adds modes of its own and ends "
+    "where the bearing alone would be softer than the equivalent stiffness."
+)
+CROSSINGS_NOTE = (
+    "Unbalance excites forward modes, and backward ones only on unequal supports. Amplification 1/(2ζ); "
+    "margin from the nominal speed as a share of it; required by API 617, part 1."
+)
 
 
 def critical_speeds_page(
@@ -54,16 +75,8 @@ def critical_speeds_page(
 ) -> ReportContent:
     """Build the report on critical speeds.
 
-    Parameters
-    ----------
-    machine : Machine
-        The machine.
-    maps : mapping of str to CriticalSpeedMap
-        By whirl: "standstill" as in the paper, "forward", "backward".
-    diagrams : mapping of str to CampbellDiagram
-        By what holds the rotor.
-    stability : sequence of StabilityMap
-        One for each suspension that has one.
+    Maps by whirl ("standstill" as in the paper, "forward", "backward"), Campbell diagrams by what holds the
+    rotor, and a stability map for each suspension that has one.
     """
     return ReportContent(
         title=f"Critical speeds of {machine.name}",
@@ -78,6 +91,160 @@ def critical_speeds_page(
             *defaults_section(machine),
         ),
     )
+
+
+def _verdict(
+    machine: Machine, found: CriticalSpeedMap, diagrams: Mapping[str, CampbellDiagram]
+) -> tuple[Statement, ...]:
+    massless, massive = (
+        ", ".join(f"{frequency:.1f}" for frequency in found.at_lines[name][:4] if np.isfinite(frequency))
+        for name in ("tangent", "with support mass")
+    )
+    text = (
+        "Settled in the touchdown bearings, with supports without mass as in the paper, the rotor has "
+        f"natural frequencies of {massless} Hz; with the mass of the supports {massive} Hz. The paper's map "
+        "leaves that mass out."
+    )
+    said = [Statement(text)]
+    top = float(machine.speed.nominal)
+    for name, diagram in diagrams.items():
+        forward = [c for c in diagram.crossings if c.direction != "backward" and c.speed <= top]
+        if forward:
+            speeds = ", ".join(f"{c.speed / TURN:.1f}" for c in forward)
+            text = f"{_held(name)}: forward or mixed modes meet the rotor's own speed at {speeds} Hz"
+            said.append(Statement(f"{text}, up to the nominal speed."))
+        said += [_too_near(name, one, top) for one in separations(diagram, top, top) if not one.met]
+    if not any(one.level == "bad" for one in said):
+        said.append(Statement(CLEAR, "good"))
+    return tuple(sorted(said, key=lambda one: _WORST_FIRST.index(one.level)))
+
+
+def _too_near(name: str, one: Separation, nominal: float) -> Statement:
+    """A critical speed that is nearer to the nominal speed than API 617 asks for."""
+    crossing = one.crossing
+    text = (
+        f"{_held(name)}: a {crossing.direction} mode meets the rotor's own speed at "
+        f"{_speed_text(crossing.speed)}, {one.margin:.1%} from the nominal speed of {_speed_text(nominal)}, "
+        f"with a damping ratio of {crossing.damping_ratio:.2%} and an amplification factor of "
+        f"{one.factor:.1f}; API 617 asks for {one.required:.1%}."
+    )
+    return Statement(text, "warning" if name == "free-free" else "bad")
+
+
+def _speed_text(speed: float) -> str:
+    return f"{speed / TURN:.1f} Hz ({60.0 * speed / TURN:.0f} rpm)"
+
+
+def _held(name: str) -> str:
+    return "Free-free" if name == "free-free" else f"In its {name}"
+
+
+def _cards(found: CriticalSpeedMap) -> tuple[Card, ...]:
+    return tuple(
+        Card(
+            f"{part.bearing} touchdown bearing",
+            (
+                fact("Static load", part.load, "force"),
+                fact("Ball bearing, tangent", part.tangent, "stiffness"),
+                fact("Ball bearing, simple formula", part.simple, "stiffness"),
+                fact("Support", part.support, "stiffness"),
+                fact("Equivalent, tangent", part.equivalent("tangent"), "stiffness"),
+                fact("Equivalent, simple formula", part.equivalent("simple"), "stiffness"),
+            ),
+        )
+        for part in found.lines
+    )
+
+
+def line_table(found: CriticalSpeedMap) -> Table:
+    """Frequencies with every bearing at its own stiffness, by every way to reckon it."""
+
+    def line(k: int) -> Column:
+        def text(name: str) -> str:
+            value = found.at_lines[name][k]
+            return f"{value:.1f}" if np.isfinite(value) else "–"
+
+        return Column(f"line {k + 1} [Hz]", text)
+
+    count = len(found.at_lines["tangent"])
+    columns = (Column("every bearing at its own stiffness", AT_LINES.get), *(line(k) for k in range(count)))
+    return table(AT_LINES, columns, f"Where the map meets the machine: {_WHIRL_WORDS[found.whirl]}")
+
+
+def crossing_table(diagrams: Mapping[str, CampbellDiagram], nominal: float) -> Table:
+    """Critical speeds with damping, amplification factor and margin from the nominal speed [rad/s]."""
+
+    def rows() -> Iterable[tuple[str, Crossing, Separation | None]]:
+        for name, diagram in diagrams.items():
+            judged = {id(one.crossing): one for one in separations(diagram, nominal, nominal)}
+            for crossing in diagram.crossings:
+                yield name, crossing, judged.get(id(crossing))
+
+    columns = (
+        Column("rotor held by", lambda row: row[0]),
+        Column("critical speed", lambda row: row[1].speed, "speed"),
+        Column("direction", lambda row: row[1].direction),
+        Column("damping ratio", lambda row: f"{100.0 * row[1].damping_ratio:.2f} %"),
+        Column("amplification", lambda row: f"{amplification_factor(row[1].damping_ratio):.1f}"),
+        Column("margin", lambda row: f"{100.0 * row[2].margin:.1f} %" if row[2] else "–"),
+        Column("required", lambda row: f"{100.0 * row[2].required:.1f} %" if row[2] else "–"),
+        Column("API 617", lambda row: row[2].verdict if row[2] else "–"),
+    )
+    return table(rows(), columns, "Critical speeds with damping and separation margins", CROSSINGS_NOTE)
+
+
+def _map_section(found: CriticalSpeedMap) -> Section:
+    words = _WHIRL_WORDS[found.whirl]
+    caption = (
+        f"Undamped {words} against the equivalent stiffness of bearing and support in series, equal at all "
+        "bearings (Neisi 2020, Fig. 19). Vertical: the machine's own stiffness, full by the tangent of the "
+        "ball forces with preload, dashed by the simple formula."
+    )
+    figure = Figure(critical_speed_figure(found), caption, f"map {found.whirl}")
+    return Section(
+        f"Critical speed map: {words}", (WITH_MASS,), figures=(figure,), tables=(line_table(found),)
+    )
+
+
+def _campbell_section(machine: Machine, diagram: CampbellDiagram) -> Section:
+    nodes, name = machine.rotor.node_positions, diagram.suspension
+    bearings = [(b.name, nodes[b.node - 1]) for b in machine.touchdown_bearings]
+    lines = Figure(
+        campbell_figure(diagram, HIGHEST, float(machine.speed.nominal)),
+        "Damped frequencies and damping ratios against the rotor speed; circles: critical speeds; dashed "
+        "upright: nominal speed.",
+        f"campbell {name}",
+    )
+    shapes = Figure(
+        mode_shape_figure(diagram, bearings, SHAPES),
+        "Shapes of the lowest modes at the lowest speed, in the plane of the largest deflection.",
+        f"shapes {name}",
+    )
+    return Section(f"{_held(name)}: Campbell diagram and shapes", figures=(lines, shapes))
+
+
+def _stability_section(machine: Machine, stability: Sequence[StabilityMap]) -> tuple[Section, ...]:
+    text = (
+        f"A cross-coupled stiffness at node {stability[0].node}, in the middle of the bearings, stands for "
+        f"what seals and impellers do to the rotor at {_speed_text(float(machine.speed.nominal))}: so API "
+        "617, part 1, screens it. What yours do is not known here; it asks for a decrement of at least 0.1 "
+        "with them."
+    )
+    columns = (
+        Column("held by", "suspension"),
+        Column("decrement without coupling", lambda one: f"{one.decrement[0]:.3g}"),
+        Column(
+            "coupling at the limit",
+            lambda one: one.limit if math.isfinite(one.limit) else "none found",
+            "stiffness",
+        ),
+    )
+    caption = (
+        "Least logarithmic decrement against cross-coupled stiffness; below zero the rotor whirls by itself."
+    )
+    figure = Figure(stability_figure(stability), caption, "stability")
+    found = table(stability, columns, "Stability at the nominal speed")
+    return (Section("Stability map", (text,), figures=(figure,), tables=(found,)),)
 
 
 def critical_speeds_json(
@@ -95,212 +262,19 @@ def critical_speeds_json(
                 "node": one.node,
                 "coupling_N_m": one.coupling.tolist(),
                 "logarithmic_decrement": one.decrement.tolist(),
-                "limit_N_m": one.limit if math.isfinite(one.limit) else None,
+                "limit_N_m": _finite(one.limit),
             }
             for one in stability
         },
     }
 
 
-_WORST_FIRST = ("bad", "good", "warning", "notice")
-
-
-def _verdict(
-    machine: Machine, found: CriticalSpeedMap, diagrams: Mapping[str, CampbellDiagram]
-) -> tuple[Statement, ...]:
-    massless, massive = found.at_lines["tangent"], found.at_lines["with support mass"]
-    statements = [
-        Statement(
-            text="Settled in the touchdown bearings, with supports without mass as in the paper, the rotor "
-            f"has natural frequencies of {_listed(massless)} Hz; with the mass of the supports "
-            f"{_listed(massive)} Hz. The paper's map leaves that mass out."
-        )
-    ]
-    top = float(machine.speed.nominal)
-    for name, diagram in diagrams.items():
-        forward = [c for c in diagram.crossings if c.direction != "backward" and c.speed <= top]
-        if forward:
-            speeds = ", ".join(f"{c.speed / TURN:.1f}" for c in forward)
-            text = f"{_held(name)}: forward or mixed modes meet the rotor's own speed at {speeds} Hz"
-            statements.append(Statement(text=f"{text}, up to the nominal speed."))
-        statements += _margins(name, diagram, top)
-    if not any(one.level == "bad" for one in statements):
-        clear = "No critical speed of the held rotor is nearer to the nominal speed than API 617 asks for."
-        statements.append(Statement(text=clear, level="good"))
-    return tuple(sorted(statements, key=lambda one: _WORST_FIRST.index(one.level)))
-
-
-def _margins(name: str, diagram: CampbellDiagram, nominal: float) -> list[Statement]:
-    """One problem per critical speed that is nearer to the nominal speed than API 617 asks for."""
-    return [_too_near(name, one, nominal) for one in separations(diagram, nominal, nominal) if not one.met]
-
-
-def _too_near(name: str, one: Separation, nominal: float) -> Statement:
-    crossing = one.crossing
-    return Statement(
-        text=f"{_held(name)}: a {crossing.direction} mode meets the rotor's own speed at "
-        f"{_speed_text(crossing.speed)}, {one.margin:.1%} from the nominal speed of {_speed_text(nominal)}, "
-        f"with a damping ratio of {crossing.damping_ratio:.2%} and an amplification factor of "
-        f"{one.factor:.1f}; API 617 asks for {one.required:.1%}.",
-        level="warning" if name == "free-free" else "bad",
-    )
-
-
-def _speed_text(speed: float) -> str:
-    return f"{speed / TURN:.1f} Hz ({60.0 * speed / TURN:.0f} rpm)"
-
-
-def _held(name: str) -> str:
-    return "Free-free" if name == "free-free" else f"In its {name}"
-
-
-def _listed(frequencies: Any) -> str:
-    return ", ".join(f"{frequency:.1f}" for frequency in frequencies[:4] if np.isfinite(frequency))
-
-
-def _cards(found: CriticalSpeedMap) -> tuple[Card, ...]:
-    cards = []
-    for part in found.lines:
-        values = (
-            ("Static load", part.load, "force"),
-            ("Ball bearing, tangent", part.tangent, "stiffness"),
-            ("Ball bearing, simple formula", part.simple, "stiffness"),
-            ("Support", part.support, "stiffness"),
-            ("Equivalent, tangent", part.equivalent("tangent"), "stiffness"),
-            ("Equivalent, simple formula", part.equivalent("simple"), "stiffness"),
-        )
-        figures = tuple(
-            KeyFigure(label=label, value=Quantity(value=value, kind=kind, digits=4))
-            for label, value, kind in values
-        )
-        cards.append(Card(title=f"{part.bearing} touchdown bearing", figures=figures))
-    return tuple(cards)
-
-
-def line_table(found: CriticalSpeedMap) -> Table:
-    """Frequencies with every bearing at its own stiffness, by every way to reckon it."""
-    count = len(found.at_lines["tangent"])
-    rows = tuple(
-        (
-            AT_LINES[name],
-            *(f"{value:.1f}" if np.isfinite(value) else "–" for value in found.at_lines[name]),
-        )
-        for name in AT_LINES
-    )
-    return Table(
-        columns=("every bearing at its own stiffness", *(f"line {k + 1} [Hz]" for k in range(count))),
-        rows=rows,
-        caption=f"Where the map meets the machine: {_WHIRL_WORDS[found.whirl]}",
-    )
-
-
-def crossing_table(diagrams: Mapping[str, CampbellDiagram], nominal: float) -> Table:
-    """Critical speeds with damping, amplification factor and margin from the nominal speed [rad/s]."""
-    rows = []
-    for name, diagram in diagrams.items():
-        judged = {id(one.crossing): one for one in separations(diagram, nominal, nominal)}
-        for crossing in diagram.crossings:
-            one = judged.get(id(crossing))
-            rows.append(
-                (
-                    name,
-                    Quantity(value=crossing.speed, kind="speed", digits=4),
-                    crossing.direction,
-                    f"{100.0 * crossing.damping_ratio:.2f} %",
-                    f"{amplification_factor(crossing.damping_ratio):.1f}",
-                    "–" if one is None else f"{100.0 * one.margin:.1f} %",
-                    "–" if one is None else f"{100.0 * one.required:.1f} %",
-                    "–" if one is None else one.verdict,
-                )
-            )
-    return Table(
-        columns=(
-            *("rotor held by", "critical speed", "direction", "damping ratio"),
-            *("amplification", "margin", "required", "API 617"),
-        ),
-        rows=tuple(rows),
-        caption="Critical speeds with damping and separation margins",
-        note="Unbalance excites forward modes, and backward ones only on unequal supports. Amplification "
-        "1/(2ζ); margin from the nominal speed as a share of it; required by API 617, part 1.",
-    )
-
-
-def _map_section(found: CriticalSpeedMap) -> Section:
-    figure = Figure(
-        chart=critical_speed_figure(found),
-        caption=f"Undamped {_WHIRL_WORDS[found.whirl]} against the equivalent stiffness of bearing and "
-        "support in series, equal at all bearings (Neisi 2020, Fig. 19). Vertical: the machine's own "
-        "stiffness, full by the tangent of the ball forces with preload, dashed by the simple formula.",
-        name=f"map {found.whirl}",
-    )
-    text = (
-        "Right: the support's mass sits between bearing and support spring; it adds modes of its own and "
-        "ends where the bearing alone would be softer than the equivalent stiffness."
-    )
-    return Section(
-        heading=f"Critical speed map: {_WHIRL_WORDS[found.whirl]}",
-        text=(text,),
-        figures=(figure,),
-        tables=(line_table(found),),
-    )
-
-
-def _campbell_section(machine: Machine, diagram: CampbellDiagram) -> Section:
-    nodes = machine.rotor.node_positions
-    bearings = [(b.name, nodes[b.node - 1]) for b in machine.touchdown_bearings]
-    figures = (
-        Figure(
-            chart=campbell_figure(diagram, HIGHEST, float(machine.speed.nominal)),
-            caption="Damped frequencies and damping ratios against the rotor speed; circles: critical "
-            "speeds; dashed upright: nominal speed.",
-            name=f"campbell {diagram.suspension}",
-        ),
-        Figure(
-            chart=mode_shape_figure(diagram, bearings, SHAPES),
-            caption="Shapes of the lowest modes at the lowest speed, in the plane of the largest deflection.",
-            name=f"shapes {diagram.suspension}",
-        ),
-    )
-    return Section(heading=f"{_held(diagram.suspension)}: Campbell diagram and shapes", figures=figures)
-
-
-def _stability_section(machine: Machine, stability: Sequence[StabilityMap]) -> tuple[Section, ...]:
-    node, speed = stability[0].node, _speed_text(float(machine.speed.nominal))
-    text = (
-        f"A cross-coupled stiffness at node {node}, in the middle of the bearings, stands for what seals and "
-        f"impellers do to the rotor at {speed}: so API 617, part 1, screens it. What yours do is not known "
-        "here; it asks for a decrement of at least 0.1 with them."
-    )
-    rows = tuple(
-        (
-            one.suspension,
-            f"{one.decrement[0]:.3g}",
-            Quantity(value=one.limit, kind="stiffness", digits=4)
-            if math.isfinite(one.limit)
-            else "none found",
-        )
-        for one in stability
-    )
-    figure = Figure(
-        chart=stability_figure(stability),
-        caption="Least logarithmic decrement against cross-coupled stiffness; below zero the rotor whirls "
-        "by itself.",
-        name="stability",
-    )
-    table = Table(
-        caption="Stability at the nominal speed",
-        columns=("held by", "decrement without coupling", "coupling at the limit"),
-        rows=rows,
-    )
-    return (Section(heading="Stability map", text=(text,), figures=(figure,), tables=(table,)),)
-
-
 def _map_json(found: CriticalSpeedMap) -> dict[str, Any]:
     return {
         "whirl": found.whirl,
         "stiffness_N_m": found.stiffness.tolist(),
-        "massless_Hz": _table(found.massless),
-        "with_support_mass_Hz": _table(found.with_support_mass),
+        "massless_Hz": _lists(found.massless),
+        "with_support_mass_Hz": _lists(found.with_support_mass),
         "bearings": {
             part.bearing: {
                 "load_N": part.load,
@@ -313,7 +287,7 @@ def _map_json(found: CriticalSpeedMap) -> dict[str, Any]:
             }
             for part in found.lines
         },
-        "at_the_machine_Hz": {name: _table(values) for name, values in found.at_lines.items()},
+        "at_the_machine_Hz": {name: _lists(values) for name, values in found.at_lines.items()},
     }
 
 
@@ -321,11 +295,11 @@ def _campbell_json(diagram: CampbellDiagram) -> dict[str, Any]:
     shapes = diagram.shapes[0]
     return {
         "speed_Hz": (diagram.speed / TURN).tolist(),
-        "frequency_Hz": _table(diagram.frequency),
-        "damping_ratio": _table(diagram.damping_ratio),
-        "whirl": _table(diagram.whirl),
+        "frequency_Hz": _lists(diagram.frequency),
+        "damping_ratio": _lists(diagram.damping_ratio),
+        "whirl": _lists(diagram.whirl),
         "node_positions_m": [float(z) for z in diagram.node_positions],
-        "shapes_at_lowest_speed": {"real": _table(shapes.real), "imaginary": _table(shapes.imag)},
+        "shapes_at_lowest_speed": {"real": _lists(shapes.real), "imaginary": _lists(shapes.imag)},
         "critical_speeds": [
             {
                 "speed_Hz": crossing.speed / TURN,
@@ -343,8 +317,8 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _table(values: Any) -> Any:
+def _lists(values: Any) -> Any:
     """Nested lists with None for NaN."""
-    table = np.asarray(values).astype(object)
-    table[~np.isfinite(values)] = None
-    return table.tolist()
+    found = np.asarray(values).astype(object)
+    found[~np.isfinite(values)] = None
+    return found.tolist()

@@ -14,17 +14,7 @@ DRAWN_BLOCKS = 900
 def peak_indices(*signals: Array, blocks: int = DRAWN_BLOCKS) -> NDArray[np.int64]:
     """Choose samples to draw: the first, the last, and in every block the extremes of every signal.
 
-    Parameters
-    ----------
-    *signals : ndarray, shape (T,)
-        Signals drawn over the same samples; the peaks of all of them stay.
-    blocks : int
-        Number of blocks.
-
-    Returns
-    -------
-    ndarray of int
-        Indices in ascending order; all of them when decimation would not save anything.
+    All of them where that would not save anything; the peaks of all signals stay.
     """
     count = len(signals[0])
     if count <= 2 * blocks * len(signals):
@@ -49,20 +39,7 @@ def block_extremes(values: Array, edges: NDArray[np.int64]) -> NDArray[np.int64]
 def block_envelope(
     lower: Array, upper: Array, blocks: int = DRAWN_BLOCKS
 ) -> tuple[NDArray[np.int64], Array, Array]:
-    """Reduce a band so that the drawn band contains the whole one.
-
-    Parameters
-    ----------
-    lower, upper : ndarray, shape (T,)
-        Limits of the band.
-    blocks : int
-        Number of blocks.
-
-    Returns
-    -------
-    tuple
-        Indices at which the limits are drawn, and the lowest and highest limit of each block there.
-    """
+    """Indices at which a thinned band is drawn, and its limits there, which contain the whole band."""
     count = len(lower)
     if count <= 2 * blocks:
         return np.arange(count, dtype=np.int64), lower, upper

@@ -8,13 +8,13 @@ from collections.abc import Mapping, Sequence
 from rotordrop.elements.description import unknown_key
 from rotordrop.errors import UsageError
 from rotordrop.known import NINETY
-from rotordrop.report.compared_drop import LESS_IS_WORSE, NUMBERS, ComparedDrop
+from rotordrop.report.compared_drop import NUMBERS, ComparedDrop, Number
 from rotordrop.report.content import Level, Statement
-from rotordrop.report.quantity import Quantity
+from rotordrop.report.quantity import Quantity, shown
 from rotordrop.units import format_chance, parse_quantity
 
 SURE = 0.95
-"""Probability from which a limit counts as kept, or as passed [1]."""
+"""Probability from which a limit counts as kept, or as passed [1]; chosen, not measured."""
 _UNITS = ("_N_s", "_N", "_Pa", "_J")
 
 
@@ -32,7 +32,7 @@ def read_limits(written: Sequence[str]) -> dict[str, float]:
     UsageError
         If there is no such number, or its limit has another unit.
     """
-    known = {_short(field): (field, kind) for field, _, kind in NUMBERS}
+    known = {_short(number.field): number for number in NUMBERS}
     found = {}
     for text in written:
         name, equals, limit = (part.strip() for part in text.partition("="))
@@ -40,8 +40,7 @@ def read_limits(written: Sequence[str]) -> dict[str, float]:
             raise UsageError(f'limit {text!r}; expected a number and its limit, "peak_stress=2.5 GPa"')
         if name not in known:
             raise UsageError(f"limit: {unknown_key(name, tuple(known))}")
-        field, kind = known[name]
-        found[field] = parse_quantity(limit, kind)
+        found[known[name].field] = parse_quantity(limit, known[name].kind)
     return found
 
 
@@ -50,46 +49,46 @@ def limit_statement(
 ) -> Statement:
     """The verdict: which limits are kept, passed or open, by the intervals of the drops."""
     if not limits and allowed is None:
-        return Statement(text="No limit given: the numbers are compared with each other alone.")
+        return Statement("No limit given: the numbers are compared with each other alone.")
     parts: list[str] = []
     found: list[bool | None] = []
     if allowed is not None:
         parts.append(f"{len(drops)} of {allowed} drops allowed")
         found.append(len(drops) <= allowed)
+    known = {number.field: number for number in NUMBERS}
     for field, limit in limits.items():
-        text, kept = _against(drops, field, limit)
+        text, kept = _against(drops, known[field], limit)
         parts.append(text)
         found.append(kept)
     level: Level = "bad" if False in found else "warning" if None in found else "good"
-    return Statement(text=f"By the limits given: {'; '.join(parts)}.", level=level)
+    return Statement(f"By the limits given: {'; '.join(parts)}.", level)
 
 
-def _against(drops: Sequence[ComparedDrop], field: str, limit: float) -> tuple[str, bool | None]:
+def _against(drops: Sequence[ComparedDrop], number: Number, limit: float) -> tuple[str, bool | None]:
     """What to say of one limit, and whether it is kept; None while that is open."""
-    name, kind = next((label, kind) for key, label, kind in NUMBERS if key == field)
-    shown = f"{name} {Quantity(value=limit, kind=kind).text}"
+    words = f"{number.label} {shown(limit, number.kind)}"
     beyond = [
-        (probability, f"{drop.name} at {bearing}")
-        for drop in drops
-        for bearing, numbers in drop.numbers.items()
-        if (probability := _beyond(numbers.get(field), limit, less=field in LESS_IS_WORSE)) is not None
+        (probability, f"{one.name} at {bearing}")
+        for one in drops
+        for bearing in one.drop.bearings
+        if (probability := _beyond(one.number(bearing, number), limit, number)) is not None
     ]
     if not beyond:
-        return f"{shown}: no drop states it with an interval", None
+        return f"{words}: no drop states it with an interval", None
     over = [f"{who} ({format_chance(p)})" for p, who in beyond if p >= SURE]
     if over:
-        return f"{shown}: passed by {', '.join(over)}", False
+        return f"{words}: passed by {', '.join(over)}", False
     worst, who = max(beyond)
     if worst > 1.0 - SURE:
-        return f"{shown}: open, passed by {who} with a probability of {format_chance(worst)}", None
-    return f"{shown}: kept by all drops (passed by {who} with {worst:.1%} at most)", True
+        return f"{words}: open, passed by {who} with a probability of {format_chance(worst)}", None
+    return f"{words}: kept by all drops (passed by {who} with {worst:.1%} at most)", True
 
 
-def _beyond(quantity: Quantity | None, limit: float, *, less: bool) -> float | None:
+def _beyond(quantity: Quantity, limit: float, number: Number) -> float | None:
     """Probability that a number lies beyond its limit, by its interval [1]; None without one."""
-    if quantity is None or quantity.interval_90 is None or not math.isfinite(quantity.value):
+    if quantity.interval_90 is None or not math.isfinite(quantity.value):
         return None
     low, high = quantity.interval_90
     sigma = max((high - low) / (2.0 * NINETY), 1e-12 * max(abs(quantity.value), 1e-300))
     above = 0.5 * math.erfc((limit - quantity.value) / (math.sqrt(2.0) * sigma))  # scipy takes longer to load
-    return 1.0 - above if less else above
+    return above if number.more_is_worse else 1.0 - above

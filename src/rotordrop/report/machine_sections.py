@@ -1,65 +1,86 @@
-"""The parts of a report that describe the machine: friction law, weight shares, defaults in use."""
+"""The parts of a report that describe the machine: drawing, friction law, weight shares, defaults in use."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rotordrop.report.content import Figure, Section, Table
-from rotordrop.report.friction_curve import FrictionLaw, friction_curve_figure
+import numpy as np
+import plotly.graph_objects as go
+
+from rotordrop.physics.friction import stribeck_coefficient
+from rotordrop.report.content import Column, Figure, Section, table
+from rotordrop.report.style import SERIES, axis_title, curve, fit_legend, panels
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
 
+POINTS = 801
+NOT_GIVEN = "These values were not in the machine file. Give them there if they are known."
+DRAWN = "The rotor to scale. Bearings, AMBs and sensors stand at their nodes."
+FRICTION = "Friction between rotor and race; a cubic replaces the jump at zero speed (Neisi 2020, Fig. 2)."
+
 
 def machine_sections(machine: Machine) -> tuple[Section, ...]:
     """Friction law, and the values that were not given."""
-    return (friction_section(machine), *defaults_section(machine))
+    figure = Figure(friction_curve_figure(machine), FRICTION)
+    return (Section("Friction law", figures=(figure,)), *defaults_section(machine))
 
 
-def friction_section(machine: Machine) -> Section:
-    """Friction law of every bearing (Neisi 2020, Fig. 2); equal laws share one curve."""
+def friction_curve_figure(machine: Machine) -> go.Figure:
+    """Draw friction over the relative surface speed (Neisi 2020, Fig. 2); equal laws share one curve.
+
+    Left the whole law, right the smoothed passage through zero.
+    """
     laws: dict[tuple[float, float, float, float], list[str]] = {}
     for bearing in machine.touchdown_bearings:
-        friction = bearing.friction
-        numbers = (friction.static, friction.dynamic, friction.stribeck_speed, friction.smoothing_speed)
-        key = (float(numbers[0]), float(numbers[1]), float(numbers[2]), float(numbers[3]))
+        rub = bearing.friction
+        numbers = (rub.static, rub.dynamic, rub.stribeck_speed, rub.smoothing_speed)
+        static, dynamic, stribeck, smoothing = map(float, numbers)
+        key = (static, dynamic, stribeck, smoothing)
         laws.setdefault(key, []).append(bearing.name)
-    curves = [
-        FrictionLaw(
-            label=", ".join(names),
-            static=law[0],
-            dynamic=law[1],
-            stribeck_speed=law[2],
-            smoothing_speed=law[3],
-        )
-        for law, names in laws.items()
-    ]
-    caption = "Friction between rotor and race; a cubic replaces the jump at zero speed (Neisi 2020, Fig. 2)."
-    figure = Figure(chart=friction_curve_figure(curves), caption=caption)
-    return Section(heading="Friction law", figures=(figure,))
+    whole = 5.0 * max(stribeck for _, _, stribeck, _ in laws)
+    near = 4.0 * max(smoothing for *_, smoothing in laws)
+    figure = panels(("whole law", "near zero speed"))
+    for index, ((static, dynamic, stribeck, smoothing), names) in enumerate(laws.items()):
+        law = (static, dynamic, stribeck, max(smoothing, 1e-12))
+        for column, reach in enumerate((whole, near), start=1):
+            speed = np.linspace(-reach, reach, POINTS)
+            curve(
+                figure,
+                speed,
+                np.array([stribeck_coefficient(float(v), *law) for v in speed]),
+                ", ".join(names),
+                column=column,
+                colour=SERIES[index % len(SERIES)],
+                width=1.7,
+                legend=column == 1,
+                hover="%{x:.4~g} m/s: %{y:.3f}",
+            )
+    figure.update_xaxes(title_text=axis_title("relative surface speed", "m/s"))
+    figure.update_yaxes(title_text=axis_title("friction coefficient", "1"), col=1)
+    return fit_legend(figure)
 
 
 def drawing_section(machine: Machine) -> Section:
     """The rotor to scale with everything that sits on it."""
     from rotordrop.report.rotor_drawing import rotor_figure
 
-    caption = "The rotor to scale. Bearings, AMBs and sensors stand at their nodes."
-    return Section(heading="Rotor", figures=(Figure(chart=rotor_figure(machine), caption=caption),))
+    return Section("Rotor", figures=(Figure(rotor_figure(machine), DRAWN),))
 
 
 def defaults_section(machine: Machine) -> tuple[Section, ...]:
     """Values of the machine that were defaulted or inferred, with the reason; empty where all were given."""
+    columns = (
+        Column("value of the machine", lambda row: spoken_key(row[0])),
+        Column("used", lambda row: row[1]),
+        Column("why", lambda row: row[2]),
+    )
     tables = tuple(
-        Table(
-            columns=("value of the machine", "used", "why"),
-            rows=tuple((spoken_key(key), *told) for key, *told in found),
-            caption=caption,
-        )
+        table(found, columns, caption)
         for caption, found in (("Defaults in use", machine.defaults_in_use), ("Inferred", machine.inferred))
         if found
     )
-    text = "These values were not in the machine file. Give them there if they are known."
-    return (Section(heading="Values that were not given", text=(text,), tables=tables),) if tables else ()
+    return (Section("Values that were not given", (NOT_GIVEN,), tables=tables),) if tables else ()
 
 
 def spoken_key(key: str) -> str:

@@ -53,6 +53,7 @@ ALL_OF_IT = 0.01
 PLACES_OF_SCIENCE = (-4, 7)
 FIXED_PLACES = {"count": 0, "probability": 1}
 THIN_SPACE = "\u202f"
+_OF_KNOWN = ("value", "interval_90", "allowance_90", "standard_error", "lower", "upper", "status")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,35 +89,24 @@ class Quantity:
             )
 
     @classmethod
-    def of(
-        cls,
-        known: Known | float | None,
-        kind: str,
-        digits: int = 4,
-        *,
-        range_only: bool = False,
-    ) -> Quantity:
+    def of(cls, known: object, kind: str, digits: int = 4, *, range_only: bool = False) -> Quantity:
         """Take over a value of a machine or an identification with all that is known about it."""
-        if known is None or isinstance(known, int | float):
-            return cls(value=math.nan if known is None else float(known), kind=kind, digits=digits)
-        return cls(
-            value=known.value,
-            kind=kind,
-            interval_90=known.interval_90,
-            allowance_90=known.allowance_90,
-            standard_error=known.standard_error,
-            lower=known.lower,
-            upper=known.upper,
-            status=known.status,
-            digits=digits,
-            range_only=range_only,
-        )
+        if not isinstance(known, Known):
+            value = math.nan if known is None else float(known)  # type: ignore[arg-type]
+            return cls(value=value, kind=kind, digits=digits)
+        shared = {name: getattr(known, name) for name in _OF_KNOWN}
+        return cls(kind=kind, digits=digits, range_only=range_only, **shared)
 
     @property
     def si_unit(self) -> str:
         """SI unit of the value; empty for a pure number."""
         own = {"dimension": "m", "duration": "s", "short_time": "s"}.get(self.kind)
         return own or (si_unit(self.kind) if self.kind in KINDS else "")
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Ends of the interval; the value itself where there is none."""
+        return self.interval_90 or (self.value, self.value)
 
     @property
     def unit(self) -> str:
@@ -126,7 +116,7 @@ class Quantity:
     @property
     def number(self) -> str:
         """The number alone, in the shown unit."""
-        return written(self._shown(self.value), self._places())
+        return written(self._in_unit(self.value), self._places())
 
     @property
     def text(self) -> str:
@@ -151,7 +141,7 @@ class Quantity:
         if self.standard_error is not None:
             return (
                 "± "
-                + self._with_unit(written(self._shown(self.standard_error), self._places()))
+                + self._with_unit(written(self._in_unit(self.standard_error), self._places()))
                 + " (standard error)"
             )
         return ""
@@ -172,19 +162,19 @@ class Quantity:
         return self._with_unit(" to ".join(self._at(limit) for limit in self.interval_90 or ()))
 
     def _at(self, value: float) -> str:
-        return written(self._shown(value), self._places())
+        return written(self._in_unit(value), self._places())
 
     def _with_unit(self, number: str) -> str:
         if number == "–" or not self.unit:
             return number
         return f"{number}{self.unit}" if self.unit == "°" else f"{number} {self.unit}"
 
-    def _shown(self, value: float) -> float:
+    def _in_unit(self, value: float) -> float:
         return value / display_unit(self.kind, self.system)[0]
 
     def _places(self) -> int | None:
         """Decimal places: two digits of the error if there is one, else the significant digits asked for."""
-        value = self._shown(self.value)
+        value = self._in_unit(self.value)
         if not math.isfinite(value):
             return 0
         if self.kind in FIXED_PLACES:
@@ -198,10 +188,15 @@ class Quantity:
 
     def _error(self) -> float:
         if self.interval_90 is not None:
-            return 0.5 * abs(self._shown(self.interval_90[1] - self.interval_90[0]))
+            return 0.5 * abs(self._in_unit(self.interval_90[1] - self.interval_90[0]))
         if self.standard_error is not None:
-            return abs(self._shown(self.standard_error))
+            return abs(self._in_unit(self.standard_error))
         return 0.0
+
+
+def shown(value: object, kind: str, digits: int = 4) -> str:
+    """A value [SI] in words: number and unit."""
+    return Quantity.of(value, kind, digits).text
 
 
 def display_unit(kind: str, system: System = "SI") -> tuple[float, str]:

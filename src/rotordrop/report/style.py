@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -38,7 +39,9 @@ SERIES = ("#0b62b8", "#d9780a", "#1a8f6f", "#8e44ad", "#b3261e", "#5d6d1e", "#00
 FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', 'Liberation Sans', Arial, sans-serif"
 MILLI = 1e3
 MICRO = 1e6
+TURN = 2.0 * math.pi
 TIME_TITLE = "time from power-off [ms]"
+FROM_POWER_OFF = "time from power-off [s]"
 PANEL_HEIGHT = 300
 VISIBLE_GAP = 1.0
 """Difference of two limits [µm] from which they are drawn as a strip."""
@@ -72,23 +75,11 @@ def panels(
     rows: int = 1,
     columns: int | None = None,
     height: int = PANEL_HEIGHT,
-    share_time: bool = True,
     spacing: float = 0.085,
 ) -> go.Figure:
-    """An empty figure with one titled panel per bearing (or per axis and bearing).
+    """An empty figure with a grid of titled panels of a height [px], row by row.
 
-    Parameters
-    ----------
-    titles : sequence of str
-        Titles of the panels, row by row; names from files are made harmless here.
-    rows, columns : int
-        Grid; as many columns as titles by default.
-    height : int
-        Height of one panel [pixels].
-    share_time : bool
-        Panels of one column zoom together in time.
-    spacing : float
-        Horizontal space between panels as a share of the width [1]; more where both have an axis title.
+    Panels of one column zoom together in time. The horizontal space between them is a share of the width [1].
     """
     columns = columns or len(titles)
     plot_height = rows * height
@@ -96,7 +87,7 @@ def panels(
         rows=rows,
         cols=columns,
         subplot_titles=[plain(title) for title in titles],
-        shared_xaxes="columns" if share_time and rows > 1 else False,
+        shared_xaxes="columns" if rows > 1 else False,
         horizontal_spacing=spacing if columns > 1 else 0.0,
         vertical_spacing=58 / plot_height if rows > 1 else 0.0,
     )
@@ -145,11 +136,7 @@ def in_seconds(figure: go.Figure) -> None:
     for mark in figure.layout.annotations:
         if mark.xref and "domain" not in mark.xref and mark.xref != "paper":
             mark.x /= MILLI
-    figure.for_each_xaxis(
-        lambda axis: (
-            axis.title.update(text=axis_title("time from power-off", "s")) if axis.title.text else None
-        )
-    )
+    figure.for_each_xaxis(lambda axis: axis.title.update(text=FROM_POWER_OFF) if axis.title.text else None)
 
 
 def line_style(role: Role, index: int | None = None) -> dict[str, Any]:
@@ -171,6 +158,69 @@ def faded(colour: str, share: float) -> str:
     return f"rgba({red}, {green}, {blue}, {share})"
 
 
+def curve(
+    figure: go.Figure,
+    x: Any,
+    y: Any,
+    name: str = "",
+    *,
+    row: int = 1,
+    column: int = 1,
+    colour: str = SERIES[0],
+    width: float = 1.5,
+    dash: str | None = None,
+    mode: str = "lines",
+    hover: str | None = "",
+    legend: bool | None = None,
+    **more: Any,
+) -> None:
+    """Draw one curve or a set of marks into a panel; curves of one name are switched together by the legend.
+
+    ``hover`` is what is shown at a point, before the name; None for nothing. A curve without a name is not
+    in the legend. ``more`` goes to plotly as it is.
+    """
+    label = plain(name)
+    if "line" not in more and "lines" in mode:
+        more["line"] = {"color": colour, "width": width, **({"dash": dash} if dash else {})}
+    if hover is None:
+        more["hoverinfo"] = "skip"
+    elif hover:
+        more["hovertemplate"] = f"{hover}<extra>{label}</extra>"
+    trace = go.Scatter(
+        x=x if isinstance(x, list) else single(x),
+        y=y if isinstance(y, list) else single(y),
+        mode=mode,
+        name=label or None,
+        legendgroup=label or None,
+        showlegend=bool(name) if legend is None else legend,
+        **more,
+    )
+    figure.add_trace(trace, row=row, col=column)
+
+
+def upright(figure: go.Figure, x: float, colour: str = LIMIT, dash: str = "dash", **more: Any) -> None:
+    """Draw a thin upright line, through all panels or one of them."""
+    width = 1.2 if colour == LIMIT else 1.0
+    figure.add_vline(x=x, line={"color": colour, "width": width, "dash": dash}, **more)
+
+
+def bars(ends: Sequence[tuple[float, float, float]], size: float, **style: Any) -> dict[str, Any]:
+    """Error bars from value, lower and upper end [SI] in a unit of some size; an open end has none."""
+
+    def reach(length: float) -> float:
+        return length / size if np.isfinite(length) else 0.0
+
+    above = [reach(high - value) for value, _, high in ends]
+    return {"array": above, "arrayminus": [reach(value - low) for value, low, _ in ends], **style}
+
+
+def square(figure: go.Figure, column: int, reach: float) -> None:
+    """Show as much of both axes of a panel, from minus to plus a reach, at one scale."""
+    anchor = "x" if column == 1 else f"x{column}"
+    figure.update_yaxes(scaleanchor=anchor, constrain="domain", range=[-reach, reach], col=column)
+    figure.update_xaxes(constrain="domain", range=[-reach, reach], col=column)
+
+
 def add_history(
     figure: go.Figure,
     history: History,
@@ -181,43 +231,19 @@ def add_history(
     column: int = 1,
     legend: bool = True,
     line: dict[str, Any] | None = None,
-    group: str | None = None,
 ) -> None:
-    """Draw a history over time in milliseconds, with as few points as show all its peaks.
-
-    Parameters
-    ----------
-    figure : Figure
-        Figure to draw into.
-    history : History
-        Time [s] and values in SI units.
-    scale : float
-        Factor from SI units to the shown unit.
-    unit : str
-        Shown unit, for the hover text.
-    row, column : int
-        Panel.
-    legend : bool
-        Whether the history gets an entry in the legend.
-    line : dict, optional
-        Line in place of the one of its role.
-    group : str, optional
-        Histories of one group are switched together by the legend; the label by default.
-    """
+    """Draw a history over time in milliseconds, with as few points as show all its peaks."""
     chosen = peak_indices(history.values)
-    figure.add_trace(
-        go.Scatter(
-            x=single(MILLI * history.time[chosen]),
-            y=single(scale * history.values[chosen]),
-            mode="lines",
-            name=plain(history.label),
-            legendgroup=group or plain(history.label),
-            showlegend=legend,
-            line=line or line_style(history.role),
-            hovertemplate=f"%{{x:.2f}} ms: %{{y:.4~g}} {unit}<extra>{plain(history.label)}</extra>",
-        ),
+    curve(
+        figure,
+        MILLI * history.time[chosen],
+        scale * history.values[chosen],
+        history.label,
         row=row,
-        col=column,
+        column=column,
+        legend=legend,
+        line=line or line_style(history.role),
+        hover=f"%{{x:.2f}} ms: %{{y:.4~g}} {unit}",
     )
 
 
@@ -233,25 +259,12 @@ def add_band(
 ) -> None:
     """Draw a band between two limits; thinned out, the drawn band still contains the whole one."""
     index, lower, upper = block_envelope(band.lower, band.upper)
-    time = single(MILLI * band.time[index])
-    shared = {"mode": "lines", "line": BAND_EDGE, "legendgroup": plain(band.label), "x": time}
-    label = plain(band.label)
-    figure.add_trace(
-        go.Scatter(y=single(scale * lower), showlegend=False, hoverinfo="skip", **shared), row=row, col=column
-    )
-    figure.add_trace(
-        go.Scatter(
-            y=single(scale * upper),
-            fill="tonexty",
-            fillcolor=BAND_FILL,
-            name=label,
-            showlegend=legend,
-            hovertemplate=f"%{{x:.2f}} ms: up to %{{y:.4~g}} {unit}<extra>{label}</extra>",
-            **shared,
-        ),
-        row=row,
-        col=column,
-    )
+    time = MILLI * band.time[index]
+    place: dict[str, Any] = {"row": row, "column": column}
+    curve(figure, time, scale * lower, band.label, **place, legend=False, hover=None, line=BAND_EDGE)
+    hover = f"%{{x:.2f}} ms: up to %{{y:.4~g}} {unit}"
+    filled: dict[str, Any] = {"fill": "tonexty", "fillcolor": BAND_FILL, "line": BAND_EDGE}
+    curve(figure, time, scale * upper, band.label, **place, legend=legend, hover=hover, **filled)
 
 
 def add_gap_limits(

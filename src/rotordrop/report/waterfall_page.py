@@ -8,10 +8,27 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotordrop._version import __version__
-from rotordrop.report.coast_down_figures import displacement_history_figure, speed_law_figure
-from rotordrop.report.content import Card, Figure, KeyFigure, ReportContent, Section, Statement, Table
-from rotordrop.report.quantity import Quantity, with_error, written
-from rotordrop.report.waterfall_figure import highest_shown, order_figure, waterfall_figure
+from rotordrop.known import Known
+from rotordrop.report.content import (
+    Card,
+    Column,
+    Figure,
+    ReportContent,
+    Section,
+    Statement,
+    Table,
+    fact,
+    table,
+)
+from rotordrop.report.quantity import shown, with_error, written
+from rotordrop.report.style import TURN
+from rotordrop.report.waterfall_figure import (
+    displacement_history_figure,
+    highest_shown,
+    order_figure,
+    speed_law_figure,
+    waterfall_figure,
+)
 from rotordrop.spectrum.coast_down import RACES_SPUN_UP, SENSOR_NOISE, SHORTEST_LAW
 from rotordrop.spectrum.indentation import held_maximum
 
@@ -28,6 +45,13 @@ SHORT_SPEED = (
     "speed law."
 )
 AS_READ = f" The simulated motion was given the noise of a usual sensor, {1e6 * SENSOR_NOISE:g} µm rms."
+NO_WATERFALL = "The signal is shorter than one frame; there is no waterfall."
+LINES_NOTE = (
+    "Amplitudes are those in the direction and plane where they are largest, root mean square over the time "
+    "the line was seen. ± is one standard error, never less than what a line seen that long can be told "
+    "apart by: one over that time (for an order, one over the turns in it), divided by √12. X is the order, "
+    "the multiple of the rotor's speed."
+)
 LINES = "Lines"
 NO_BREAK = "\u00a0"
 _COMPONENTS = {
@@ -48,20 +72,8 @@ def waterfall_page(
 ) -> ReportContent:
     """Build the report on the frequencies of a coast-down.
 
-    Parameters
-    ----------
-    analysis : CoastDownAnalysis
-        What was found.
-    title : str
-        Whose coast-down this is.
-    facts : tuple of (str, str)
-        Machine and record.
-    simulated : str
-        Sentence that says the record is simulated; empty for a measured one.
-    against : {"time", "speed"}
-        What goes upwards in the waterfalls.
-    highest : float, optional
-        Highest frequency drawn [Hz]; as far as anything happens by default.
+    Waterfalls go upwards with the time or the speed (``against``), as far as anything happens, or up to a
+    ``highest`` frequency [Hz].
     """
     return ReportContent(
         title=title,
@@ -81,106 +93,88 @@ def frequency_sections(
     analysis: CoastDownAnalysis, against: str = "time", highest: float | None = None
 ) -> tuple[Section, ...]:
     """Displacement, waterfalls, lines, orders with the resonances they pass, and the speed law."""
-    sections = [
-        _displacement_section(analysis),
+    role = "measured" if analysis.signal.recorded else "simulated"
+    histories = {name: plane.history for name, plane in analysis.planes.items()}
+    displacement = Figure(
+        displacement_history_figure(histories, role),
+        f"Distance of the rotor from the bearing centre over the whole coast-down, {role}, with the "
+        "air-gap window (Neisi 2020, Fig. 17).",
+    )
+    reasons = tuple(f"{line.label}: {line.reason}." for line in analysis.lines)
+    tracked = any(plane.track is not None for plane in analysis.planes.values())
+    return (
+        Section("Displacement over the coast-down", figures=(displacement,)),
         _waterfall_section(analysis, against, highest),
-        _line_section(analysis),
-    ]
-    if any(plane.track is not None for plane in analysis.planes.values()):
-        sections.append(_order_section(analysis))
-    if analysis.speed_law is not None:
-        sections.append(_law_section(analysis, analysis.speed_law))
-    return tuple(sections)
+        Section(LINES, reasons, tables=(line_table(analysis),)),
+        *((_order_section(analysis),) if tracked else ()),
+        *(() if analysis.speed_law is None else (_law_section(analysis, analysis.speed_law, role),)),
+    )
 
 
 def _verdict(analysis: CoastDownAnalysis) -> tuple[Statement, ...]:
-    statements = []
+    said = []
     for name, plane in analysis.planes.items():
         held = held_maximum(plane.history)
-        statements.append(
-            Statement(text=f"{name}: {plane.history.statement}", level="good" if held else "warning")
-        )
-        statements.append(
-            Statement(
-                text=f"{name}: {plane.settling.statement}",
-                level="good" if plane.settling.settled else "notice",
-            )
-        )
-    unnamed = sum(not line.named for line in analysis.lines)
+        said.append(Statement(f"{name}: {plane.history.statement}", "good" if held else "warning"))
+        said.append(settling_statement(name, plane))
+    count, unnamed = len(analysis.lines), sum(not line.named for line in analysis.lines)
     which = "it" if unnamed == 1 else "them"
     why = f": nothing in the machine description or the mains explains {which} well enough" if unnamed else ""
-    count = len(analysis.lines)
-    statements.append(
-        Statement(text=f"{count} lines found, {count - unnamed} named, {unnamed} without a name{why}.")
-    )
-    statements += [Statement(text=text) for text in analysis.force_statements()]
+    said.append(Statement(f"{count} lines found, {count - unnamed} named, {unnamed} without a name{why}."))
+    said += [Statement(text) for text in analysis.force_statements()]
     if analysis.signal.profile is None:
-        statements.append(Statement(text=NO_SPEED, level="warning"))
-    elif analysis.speed_law is None:
-        statements.append(Statement(text=SHORT_SPEED))
+        said.append(Statement(NO_SPEED, "warning"))
     else:
-        statements.append(Statement(text=_standstill(analysis.speed_law)))
-    return tuple(statements)
+        law = analysis.speed_law
+        said.append(Statement(SHORT_SPEED if law is None else _standstill(law.standstill)))
+    return tuple(said)
 
 
-def _standstill(law: SpeedLaw) -> str:
-    stop = law.standstill
+def settling_statement(name: str, plane: PlaneAnalysis) -> Statement:
+    """When the rotor came to lie in its bearing for good."""
+    settled = plane.settling.settled
+    return Statement(f"{name}: {plane.settling.statement}", "good" if settled else "notice")
+
+
+def _standstill(stop: Known) -> str:
     if stop.status != "determined":
         turned = stop.value if stop.lower is None else stop.lower
         return f"When the rotor stopped is open: {stop.status}. It turned until {turned:.1f} s at least."
     if stop.interval_90 is None:
         return f"The rotor stopped {stop.value:.2f} s after power-off."
-    low, high = stop.interval_90
-    return f"The rotor stopped {stop.value:.1f} s after power-off (90 %: {low:.1f} to {high:.1f} s)."
+    return (
+        f"The rotor stopped {stop.value:.1f} s after power-off (90 %: {stop.low:.1f} to {stop.high:.1f} s)."
+    )
 
 
 def _card(name: str, plane: PlaneAnalysis) -> Card:
     history = plane.history
-    figures = [
-        KeyFigure(
-            label="Largest displacement",
-            value=Quantity(value=history.largest, kind="length"),
-            note=f"at {Quantity(value=history.largest_time, kind='duration', digits=3).text}",
-        ),
-        KeyFigure(
-            label="Beyond the air gap",
-            value=Quantity(value=history.largest_indentation, kind="length", digits=3),
-        ),
-        KeyFigure(
-            label="Largest after 0.2 s", value=Quantity(value=history.largest_later, kind="length", digits=4)
-        ),
-        KeyFigure(
-            label="Last lift-off",
-            value=Quantity(value=plane.settling.last_lift_off, kind="duration", digits=3),
-        ),
-    ]
-    return Card(title=f"{name} plane", figures=tuple(figures))
+    at = f"at {shown(history.largest_time, 'duration', 3)}"
+    figures = (
+        fact("Largest displacement", history.largest, "length", note=at),
+        fact("Beyond the air gap", history.largest_indentation, "length", 3),
+        fact("Largest after 0.2 s", history.largest_later, "length"),
+        fact("Last lift-off", plane.settling.last_lift_off, "duration", 3),
+    )
+    return Card(f"{name} plane", figures)
 
 
 def line_table(analysis: CoastDownAnalysis) -> Table:
     """Every line with frequency or order, amplitude, width, confidence and the reason for its name."""
-    rows = []
-    for line in analysis.lines:
-        rows.append(
-            (
-                line.label,
-                where_of(line),
-                Quantity(value=line.amplitude, kind="length", digits=3),
-                f"{line.ratio:.0f}",
-                "below resolution" if line.width == 0.0 else f"{line.width:.2f} Hz",
-                f"{line.first_seen:.0f} to {line.last_seen:.0f} s".replace(" ", NO_BREAK),
-                Quantity(value=line.confidence if line.named else np.nan, kind="probability"),
-            )
-        )
-    return Table(
-        columns=("name", "where", "amplitude, zero-to-peak", "× floor", "width", "seen", "confidence"),
-        rows=tuple(rows),
-        caption="Lines found, strongest first",
-        note="Amplitudes are those in the direction and plane where they are largest, root mean "
-        "square over the time the line was seen. ± is one standard error, never less than what a line "
-        "seen that long can be told apart by: one over that time (for an order, one over the turns in it), "
-        "divided by √12. X is the order, the multiple of the rotor's speed.",
+
+    def seen(line: Line) -> str:
+        return f"{line.first_seen:.0f} to {line.last_seen:.0f} s".replace(" ", NO_BREAK)
+
+    columns = (
+        Column("name", "label"),
+        Column("where", where_of),
+        Column("amplitude, zero-to-peak", "amplitude", "length", 3),
+        Column("× floor", lambda line: f"{line.ratio:.0f}"),
+        Column("width", lambda line: f"{line.width:.2f} Hz" if line.width else "below resolution"),
+        Column("seen", seen),
+        Column("confidence", lambda line: line.confidence if line.named else None, "probability"),
     )
+    return table(analysis.lines, columns, "Lines found, strongest first", LINES_NOTE)
 
 
 def where_of(line: Line) -> str:
@@ -193,127 +187,103 @@ def where_of(line: Line) -> str:
     return with_error(line.order, line.order_error, "X").replace(" ", NO_BREAK)
 
 
-def _displacement_section(analysis: CoastDownAnalysis) -> Section:
-    role = "measured" if analysis.signal.recorded else "simulated"
-    histories = {name: plane.history for name, plane in analysis.planes.items()}
-    figure = Figure(
-        chart=displacement_history_figure(histories, role),
-        caption=f"Distance of the rotor from the bearing centre over the whole coast-down, {role}, with the "
-        "air-gap window (Neisi 2020, Fig. 17).",
-    )
-    return Section(heading="Displacement over the coast-down", figures=(figure,))
-
-
 def _waterfall_section(analysis: CoastDownAnalysis, against: str, highest: float | None) -> Section:
     figures = []
-    shown = highest_shown(analysis) if highest is None else highest
+    top = highest_shown(analysis) if highest is None else highest
     for name, plane in analysis.planes.items():
+        lines = [line for line in analysis.lines if name in line.forward and line.named]
         for fall in plane.waterfalls:
-            lines = [line for line in analysis.lines if name in line.forward and line.named]
-            figures.append(
-                Figure(
-                    chart=waterfall_figure(fall, name, lines, against=against, highest=shown),
-                    caption=f"{name}, {_COMPONENTS[fall.component]}: amplitude {fall.amplitude_kind} of "
-                    f"frames of {fall.settings.points} points, Hann window, "
-                    f"{100 * fall.settings.overlap:.0f} % overlap, lines "
-                    f"{fall.resolution:.3f} Hz apart (Neisi 2020, Fig. 18). A falling speed "
-                    "smears the orders here; their true amplitude is below.",
-                )
+            caption = (
+                f"{name}, {_COMPONENTS[fall.component]}: amplitude {fall.amplitude_kind} of frames of "
+                f"{fall.settings.points} points, Hann window, {100 * fall.settings.overlap:.0f} % overlap, "
+                f"lines {fall.resolution:.3f} Hz apart (Neisi 2020, Fig. 18). A falling speed smears the "
+                "orders here; their true amplitude is below."
             )
+            chart = waterfall_figure(fall, name, lines, against=against, highest=top)
+            figures.append(Figure(chart, caption))
     if not figures:
-        short = Statement(text="The signal is shorter than one frame; there is no waterfall.", level="notice")
-        return Section(heading="Waterfall", statements=(short,))
-    return Section(heading="Waterfall", figures=tuple(figures))
-
-
-def _line_section(analysis: CoastDownAnalysis) -> Section:
-    reasons = tuple(f"{line.label}: {line.reason}." for line in analysis.lines)
-    return Section(heading=LINES, text=reasons, tables=(line_table(analysis),))
+        return Section("Waterfall", statements=(Statement(NO_WATERFALL),))
+    return Section("Waterfall", figures=tuple(figures))
 
 
 def _order_section(analysis: CoastDownAnalysis) -> Section:
-    figures, rows, crossed = [], [], 0
+    heading, figures = "Orders and resonances", []
     for name, plane in analysis.planes.items():
-        if plane.track is None:
-            continue
-        figures.append(
-            Figure(
-                chart=order_figure(plane.track, name),
-                caption=f"{name}: amplitude of the orders, zero-to-peak, tracked in the angle the rotor "
-                "really turned through. Gaps: a steady line lies too close to tell it from the order."
-                + ("" if analysis.signal.recorded else AS_READ),
+        if plane.track is not None:
+            caption = (
+                f"{name}: amplitude of the orders, zero-to-peak, tracked in the angle the rotor really "
+                "turned through. Gaps: a steady line lies too close to tell it from the order."
             )
-        )
-        rows += [
-            (
-                name,
-                f"{r.order:g}X",
-                f"{r.frequency:.1f} ± {r.frequency_error:.1f} Hz",
-                f"{r.speed / (2 * np.pi):.1f} Hz",
-                Quantity(value=r.amplitude, kind="length", digits=3),
-                f"{r.rise:.1f}",
-                r.name.label,
-            )
-            for r in plane.resonances
-            if r.certain
-        ]
-        crossed += sum(not r.certain for r in plane.resonances)
-    table = Table(
-        columns=("plane", "order", "excited at", "rotor speed", "amplitude, zero-to-peak", "rise", "mode"),
-        rows=tuple(rows),
-        caption="Resonances passed on the way down",
-    )
+            chart = order_figure(plane.track, name)
+            figures.append(Figure(chart, caption + ("" if analysis.signal.recorded else AS_READ)))
+    tracked = [(name, plane) for name, plane in analysis.planes.items() if plane.track is not None]
+    found = [(name, resonance) for name, plane in tracked for resonance in plane.resonances]
+    rows = [row for row in found if row[1].certain]
+    crossed = len(found) - len(rows)
     if not rows:
-        none = "No order rises above its surroundings on the way down"
         but = f", but where it crosses a steady line ({crossed} times)" if crossed else ""
-        left_out = (Statement(text=f"{none}{but}."),)
-        return Section(heading="Orders and resonances", statements=left_out, figures=tuple(figures))
-    text: tuple[str, ...] = ()
-    if crossed:
-        words = "a steady line crosses the order there and makes part of them"
-        text = (f"{crossed} more rises are left out: {words}.",)
-    return Section(heading="Orders and resonances", text=text, figures=tuple(figures), tables=(table,))
+        none = Statement(f"No order rises above its surroundings on the way down{but}.")
+        return Section(heading, statements=(none,), figures=tuple(figures))
+    columns = (
+        Column("plane", lambda row: row[0]),
+        Column("order", lambda row: f"{row[1].order:g}X"),
+        Column("excited at", lambda row: f"{row[1].frequency:.1f} ± {row[1].frequency_error:.1f} Hz"),
+        Column("rotor speed", lambda row: f"{row[1].speed / TURN:.1f} Hz"),
+        Column("amplitude, zero-to-peak", lambda row: row[1].amplitude, "length", 3),
+        Column("rise", lambda row: f"{row[1].rise:.1f}"),
+        Column("mode", lambda row: row[1].name.label),
+    )
+    passed = table(rows, columns, "Resonances passed on the way down")
+    left_out = (
+        f"{crossed} more rises are left out: a steady line crosses the order there and makes part of them."
+    )
+    return Section(heading, (left_out,) if crossed else (), figures=tuple(figures), tables=(passed,))
 
 
-def _law_rows(law: SpeedLaw) -> list[tuple[str, ...]]:
+def law_table(law: SpeedLaw) -> Table:
     """Time constant, what each drag takes from the speed per second, and standstill, with their intervals."""
-    drag, turn = law.drag, 2.0 * np.pi
+    drag = law.drag
     speed = drag.initial_speed.value
-    at = f"slowing at {speed / turn:.1f} Hz"
-    values = (
+    at = f"slowing at {speed / TURN:.1f} Hz"
+    rows = (
         ("time constant of the exponential fit", law.exponential.time_constant, 1.0, "s"),
-        (f"dry drag (balls and races): {at}", drag.constant, 1.0 / turn, "Hz/s"),
-        (f"linear drag: {at}", drag.linear, speed / turn, "Hz/s"),
-        (f"quadratic drag: {at}", drag.quadratic, speed**2 / turn, "Hz/s"),
+        (f"dry drag (balls and races): {at}", drag.constant, 1.0 / TURN, "Hz/s"),
+        (f"linear drag: {at}", drag.linear, speed / TURN, "Hz/s"),
+        (f"quadratic drag: {at}", drag.quadratic, speed**2 / TURN, "Hz/s"),
         ("standstill", law.standstill, 1.0, "s"),
     )
-    rows: list[tuple[str, ...]] = []
-    for label, value, scale, unit in values:
-        number, interval = value.value * scale, value.interval_90
-        if interval is None:
-            rows.append((label, f"{written(number, 2)} {unit}", "–", value.status))
-            continue
-        low, high = (limit * scale for limit in interval)
-        half = max(0.5 * (high - low), 1e-4)
-        places = max(0, 1 - int(np.floor(np.log10(half))))
-        limits = f"{written(low, places)} to {written(high, places)} {unit}"
-        rows.append((label, f"{written(number, places)} {unit}", limits, value.status))
-    return rows
+
+    def places(known: Known, scale: float) -> int:
+        half = max(0.5 * scale * (known.high - known.low), 1e-4)
+        return 2 if known.interval_90 is None else max(0, 1 - int(np.floor(np.log10(half))))
+
+    def value(row: tuple[str, Known, float, str]) -> str:
+        _, known, scale, unit = row
+        return f"{written(scale * known.value, places(known, scale))} {unit}"
+
+    def interval(row: tuple[str, Known, float, str]) -> str:
+        _, known, scale, unit = row
+        if known.interval_90 is None:
+            return "–"
+        low, high = (written(scale * end, places(known, scale)) for end in known.interval_90)
+        return f"{low} to {high} {unit}"
+
+    columns = (
+        Column("quantity", lambda row: row[0]),
+        Column("value", value),
+        Column("90 % interval", interval),
+        Column("verdict", lambda row: row[1].status),
+    )
+    return table(rows, columns, "Speed law")
 
 
-def _law_section(analysis: CoastDownAnalysis, law: SpeedLaw) -> Section:
+def _law_section(analysis: CoastDownAnalysis, law: SpeedLaw, role: str) -> Section:
     time, speed = analysis.signal.speed_time, analysis.signal.speed
     assert time is not None and speed is not None
-    role = "measured" if analysis.signal.recorded else "simulated"
     figure = Figure(
-        chart=speed_law_figure(time, speed, law, role),
-        caption="Speed with the exponential fit of the paper and a fit of dry, linear and quadratic drag; "
+        speed_law_figure(time, speed, law, role),
+        "Speed with the exponential fit of the paper and a fit of dry, linear and quadratic drag; "
         "below what each leaves over.",
     )
-    table = Table(
-        columns=("quantity", "value", "90 % interval", "verdict"),
-        rows=tuple(_law_rows(law)),
-        caption="Speed law",
-    )
     text = (law.exponential.statement, law.drag.statement)
-    return Section(heading="Speed law", text=text, figures=(figure,), tables=(table,))
+    return Section("Speed law", text, figures=(figure,), tables=(law_table(law),))

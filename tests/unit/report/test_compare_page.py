@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,9 +12,8 @@ from tests.published import bearing, published, value
 
 from rotordrop.errors import UsageError
 from rotordrop.estimate.published import Drop, Impact, Value
-from rotordrop.report.compare_page import compare_page, rankings
-from rotordrop.report.compared_drop import ComparedDrop, left_out
-from rotordrop.report.comparison import comparison_figure
+from rotordrop.report.compare_page import compare_page, comparison_figure, rankings
+from rotordrop.report.compared_drop import LOADS, ComparedDrop, left_out
 from rotordrop.report.quantity import Quantity
 from rotordrop.severity.ranking import DropSeverity, rank_drops
 
@@ -34,12 +33,17 @@ def drop(name: str, speed: float, nde: float, de: float, half: float | None = 15
             for end, force in (("NDE", nde), ("DE", de))
         },
     )
-    return ComparedDrop.of_drop(name, estimate)
+    return ComparedDrop(name, estimate)
 
 
 def marked(name: str, *, consistent: bool = True, method: str = "tracked", record: str = "") -> ComparedDrop:
     one = drop(name, 150, 9000, 9000)
-    return replace(one, consistent=consistent, method=method, record=record)
+    return another(one, consistent=consistent, method=method, record_sha256=record)
+
+
+def another(one: ComparedDrop, name: str = "", **told: Any) -> ComparedDrop:
+    """The same drop with something else of its estimate."""
+    return ComparedDrop(name or one.name, one.drop.model_copy(update=told))
 
 
 DROPS = (drop("a", 60, 3300, 3600), drop("b", 100, 3100, 3300), drop("c", 210, 2500, 4200))
@@ -93,7 +97,7 @@ def test_warnings_and_simulated_records_are_named() -> None:
 
 
 def test_points_and_intervals_of_the_figure_are_the_numbers() -> None:
-    values = {"NDE": [DROPS[0].numbers["NDE"]["peak_stress_Pa"], Quantity(value=1.7e9, kind="pressure")]}
+    values = {"NDE": [DROPS[0].number("NDE", LOADS[2]), Quantity(value=1.7e9, kind="pressure")]}
     chart = comparison_figure(("a", "b"), values, "peak Hertz stress")
     assert_allclose(chart.data[0].y, (1500.0, 1700.0))
     assert_allclose(chart.data[0].error_y.array, (20.0, 0.0))
@@ -108,7 +112,7 @@ def test_a_single_drop_cannot_be_compared() -> None:
 
 
 def test_drops_of_different_machines_are_refused() -> None:
-    other = ComparedDrop(name="x", speed=1.0, numbers={"front": {}, "rear": {}})
+    other = another(drop("x", 1.0, 1.0, 1.0), bearings={"front": bearing({}), "rear": bearing({})})
     with pytest.raises(
         UsageError, match="x has the bearings front, rear, a has NDE, DE; only drops of one machine"
     ):
@@ -137,30 +141,25 @@ def test_one_recording_estimated_twice_is_refused_or_counts_once() -> None:
     one, same = marked("one", record="4f"), marked("same", record="4f")
     with pytest.raises(UsageError, match="one and same are estimates of the same recording; expected"):
         compare_page((one, same))
-    other = replace(same, method="replay")
+    other = another(same, method="replay")
     assert left_out((one, other, DROPS[0])) == {"same": "the same recording as one, estimated by replay"}
     assert left_out((marked("x"), marked("y"))) == {}
-    lost = replace(one, consistent=False)
+    lost = another(one, consistent=False)
     assert set(left_out((lost, other, DROPS[0]))) == {"one"}
 
 
 def test_a_third_estimate_of_one_recording_in_the_same_way_is_refused_too() -> None:
     one = marked("one", record="4f")
     second = marked("second", record="4f", method="replay", consistent=False)
-    third = replace(second, name="third")
+    third = another(second, "third")
     with pytest.raises(UsageError, match="second and third are estimates of the same recording"):
         left_out((one, second, third))
 
 
-def test_consistency_and_recording_are_read_from_the_estimate() -> None:
-    found = ComparedDrop.of_drop("x", published(consistent=False, record_sha256="4f"))
-    assert (found.consistent, found.method, found.record) == (False, "tracked", "4f")
-
-
 def test_machines_are_never_mixed_unsaid() -> None:
-    one, *others = (replace(drop, machine="LP-400") for drop in DROPS)
+    one, *others = (another(drop, machine="LP-400") for drop in DROPS)
     assert not any("machines" in s.text for s in compare_page((one, *others)).verdict)
-    mixed = compare_page((replace(one, machine="HP-90"), *others))
+    mixed = compare_page((another(one, machine="HP-90"), *others))
     (said,) = (s for s in mixed.verdict if "machines" in s.text)
     assert said.level == "warning"
     assert said.text.startswith("These are drops of 2 machines, HP-90: a; LP-400: b, c")
@@ -198,7 +197,7 @@ def test_severity_of_a_document_is_compared_with_its_worst_impact() -> None:
         }
         return published(recorded="2026-03-14T08:05:30.25Z", bearings={"NDE": bearing(numbers, impacts)})
 
-    drops = [ComparedDrop.of_drop(name, estimate(p)) for name, p in (("a", 3000.0), ("b", 4000.0))]
+    drops = [ComparedDrop(name, estimate(p)) for name, p in (("a", 3000.0), ("b", 4000.0))]
     assert drops[0].label == "a, 2026-03-14 08:05, 60.0 Hz"
     content = compare_page(drops)
     table = next(t for t in content.sections[0].tables if t.caption == "NDE: severity of every drop")

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from rotordrop.elements.friction import Friction
 from rotordrop.estimate.bearing_drop import (
     AirGap,
     Band,
@@ -24,14 +26,27 @@ from rotordrop.estimate.bearing_drop import (
 from rotordrop.known import Known
 from rotordrop.report.drop_sections import displacement_figure, drop_sections, speed_figure
 from rotordrop.report.first_contact import first_contact_figure
-from rotordrop.report.friction_curve import FrictionLaw, friction_curve_figure
 from rotordrop.report.innovations import innovations_figure, nis_figure, whiteness_figure
+from rotordrop.report.machine_sections import friction_curve_figure
 from rotordrop.report.orbit import orbit_figure
 from rotordrop.report.time_panels import Panel, time_panels
 
 TIME = np.linspace(0.0, 0.1, 1001)
 SINGLE = 2e-7
-LAW = FrictionLaw(label="NDE", static=0.13, dynamic=0.10, stribeck_speed=0.2, smoothing_speed=0.02)
+
+
+def rubbing(name: str, static: float, dynamic: float, stribeck_speed: float, smoothing_speed: float) -> Any:
+    """A machine of which only the friction of one bearing is known."""
+    friction = Friction(
+        static=static,
+        dynamic=dynamic,
+        stribeck_speed=f"{stribeck_speed} m/s",
+        smoothing_speed=f"{smoothing_speed} m/s",
+    )
+    return SimpleNamespace(touchdown_bearings=[SimpleNamespace(name=name, friction=friction)])
+
+
+LAW = rubbing("NDE", 0.13, 0.10, 0.2, 0.02)
 
 
 def motion(label: str, role: Any = "simulated", phase: float = 0.0) -> Motion:
@@ -98,7 +113,7 @@ def shapes(figure: Any, panel: int = 1) -> list[Any]:
 
 
 ALL_FIGURES = {
-    "friction curve": lambda: friction_curve_figure([LAW]),
+    "friction curve": lambda: friction_curve_figure(LAW),
     "displacement": lambda: displacement_figure(bearings()[0]),
     "displacement pair": lambda: charts()["side by side"],
     "first contact": lambda: first_contact_figure(bearings()),
@@ -244,7 +259,7 @@ def test_speeds_are_in_hertz() -> None:
 
 
 def test_the_friction_curve_is_odd_with_the_static_value_at_the_end_of_the_smoothing() -> None:
-    drawn = friction_curve_figure([LAW])
+    drawn = friction_curve_figure(LAW)
     whole, near = trace(drawn, "NDE"), trace(drawn, "NDE", 2)
     assert_allclose(whole.y, -np.asarray(whole.y)[::-1], atol=1e-7)
     assert whole.y[-1] == pytest.approx(0.10 + 0.03 * np.exp(-(1.0 - 0.02) / 0.2), rel=1e-6)
@@ -298,7 +313,7 @@ def test_a_history_of_two_million_points_is_drawn_with_few_and_all_its_peaks() -
 EVIL = "<a href='https://example.org'>x</a>"
 EVIL_HISTORY = History(label=EVIL, time=TIME, values=TIME)
 EVIL_DROP = drop(EVIL, AirGap.of(1e-4), label=EVIL, force=EVIL_HISTORY)
-EVIL_LAW = FrictionLaw(label=EVIL, static=0.2, dynamic=0.1, stribeck_speed=1.0, smoothing_speed=0.1)
+EVIL_LAW = rubbing(EVIL, 0.2, 0.1, 1.0, 0.1)
 EVIL_FIGURES = {
     "orbit": lambda: orbit_figure([EVIL_DROP]),
     "radial": lambda: charts(EVIL_DROP)["Distance of"],
@@ -306,7 +321,7 @@ EVIL_FIGURES = {
     "displacement pair": lambda: charts(EVIL_DROP)["side by side"],
     "first contact": lambda: first_contact_figure([EVIL_DROP]),
     "force": lambda: charts(EVIL_DROP)["ball force"],
-    "friction curve": lambda: friction_curve_figure([EVIL_LAW]),
+    "friction curve": lambda: friction_curve_figure(EVIL_LAW),
     "innovations": lambda: innovations_figure(TIME, np.zeros((1001, 1)), (EVIL,)),
     "whiteness": lambda: whiteness_figure(np.eye(200)[:, :1], (EVIL,), 5e-5),
 }

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import pytest
+from tests.published import bearing, published, value
 
 from rotordrop.errors import UsageError
 from rotordrop.report.compared_drop import ComparedDrop
 from rotordrop.report.limits import limit_statement, read_limits
-from rotordrop.report.quantity import Quantity
 
 
 def drop(name, stress, half, safety=8.0):
-    quantity = Quantity(value=stress, kind="pressure", interval_90=(stress - half, stress + half))
-    safe = Quantity(value=safety, kind="dimensionless", interval_90=(safety - 0.1, safety + 0.1))
-    numbers = {"peak_stress_Pa": quantity, "severity.static_safety": safe}
-    return ComparedDrop(name=name, speed=400.0, numbers={"NDE": numbers})
+    numbers = {
+        "peak_stress_Pa": value(stress, stress - half, stress + half),
+        "severity.static_safety": value(safety, safety - 0.1, safety + 0.1),
+    }
+    return ComparedDrop(name, published(bearings={"NDE": bearing(numbers)}))
 
 
 DROPS = (drop("a", 1.9e9, 2e7), drop("b", 2.0e9, 2e7, safety=2.0))

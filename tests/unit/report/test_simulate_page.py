@@ -10,7 +10,7 @@ import pytest
 from rotordrop.estimate.bearing_drop import simulated_bearings, simulated_gap
 from rotordrop.machine import example_machine
 from rotordrop.report.content import ReportContent
-from rotordrop.report.machine_sections import defaults_section, friction_section, spoken_key, weight_shares
+from rotordrop.report.machine_sections import defaults_section, machine_sections, spoken_key, weight_shares
 from rotordrop.report.page import render_page
 from rotordrop.report.simulate_page import simulate_page
 from rotordrop.simulate.result import DropResult
@@ -104,9 +104,9 @@ def test_a_page_with_the_machine_shows_weight_friction_and_defaults(drop_result:
 
 def test_equal_friction_laws_share_a_curve() -> None:
     machine = example_machine("paper")
-    assert len(friction_section(machine).figures[0].chart.data) == 2
+    assert len(machine_sections(machine)[0].figures[0].chart.data) == 2
     changed = machine.with_values({"NDE.friction.dynamic": 0.05})
-    assert len(friction_section(changed).figures[0].chart.data) == 4
+    assert len(machine_sections(changed)[0].figures[0].chart.data) == 4
 
 
 def test_a_name_in_the_machine_file_stays_text(drop_result: DropResult) -> None:

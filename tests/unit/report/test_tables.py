@@ -20,7 +20,7 @@ from rotordrop.report.parameters import ParameterRow, parameter_figure, paramete
 from rotordrop.report.quantity import Quantity
 from rotordrop.report.record_quality import record_quality_section
 from rotordrop.report.stress_box import StressBox, stress_box, stress_box_figure, stress_table, thinned
-from rotordrop.report.waterfall_page import _law_rows
+from rotordrop.report.waterfall_page import law_table
 from rotordrop.severity.statistics import stress_statistics
 from rotordrop.simulate.result import DropResult
 
@@ -96,7 +96,7 @@ def test_a_drag_is_shown_as_the_slowing_it_causes_in_hertz_per_second() -> None:
     )
     exponential = SimpleNamespace(time_constant=Known(value=9.0))
     law: Any = SimpleNamespace(exponential=exponential, drag=drag, standstill=Known(value=50.0))
-    found = [row[1:3] for row in _law_rows(law)[1:4]]
+    found = [row[1:3] for row in law_table(law).rows[1:4]]
     assert found == [
         ("1.00 Hz/s", "0.90 to 1.10 Hz/s"),
         ("6.00 Hz/s", "5.40 to 6.60 Hz/s"),

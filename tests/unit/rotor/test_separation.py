@@ -9,9 +9,10 @@ import pytest
 from rotordrop.cli.app import run
 from rotordrop.errors import UsageError
 from rotordrop.machine import example_machine, example_path
-from rotordrop.report.unbalance_page import _judged
+from rotordrop.report.unbalance_page import PlanePeak
 from rotordrop.rotor.campbell import (
     Crossing,
+    ResponsePeak,
     amplification_factor,
     required_margin,
     response_peaks,
@@ -138,6 +139,11 @@ def test_a_sharp_peak_has_the_height_and_width_of_a_grid_thirty_times_finer():
 
 
 def test_a_peak_without_a_factor_is_not_called_met():
-    assert _judged(math.nan, 0.01, 0.0) == ("–", "factor not known")
-    assert _judged(2.0, 0.01, 0.0) == ("none", "critically damped")
-    assert _judged(10.0, 0.10, 0.15) == ("15.0 %", "not met")
+    def judged(factor, apart, needed):
+        peak = ResponsePeak(speed=100.0, amplitude=1e-6, factor=factor)
+        one = PlanePeak("NDE", 3, peak, apart, needed)
+        return one.required, one.verdict
+
+    assert judged(math.nan, 0.01, 0.0) == ("–", "factor not known")
+    assert judged(2.0, 0.01, 0.0) == ("none", "critically damped")
+    assert judged(10.0, 0.10, 0.15) == ("15.0 %", "not met")
