@@ -243,5 +243,5 @@ def print_calibration(result: Calibration, out: Console) -> None:
     for name, checks in result.checks.items():
         for check in checks:
             if not check.passed:
-                out.print(f"{name}: {check.message}")
+                out.print(f"{name}: {check.said()}")
     out.print(result.sentence())

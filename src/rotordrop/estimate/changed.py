@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -111,13 +111,15 @@ class Changes:
         """Parameters that changed beyond chance."""
         return tuple(one for one in self.found if one.named)
 
-    def sentence(self) -> str:
-        """The outcome in words."""
-        hidden = ", ".join(f"{one.path} {one.smallest_text}" for one in self.found if one.may_hide)
+    def sentence(self, name_of: Callable[[str], str] = str) -> str:
+        """The outcome in words, with parameters by their paths or by other names."""
+        hidden = ", ".join(f"{name_of(one.path)} {one.smallest_text}" for one in self.found if one.may_hide)
         beside = f" Smaller changes than these may hide: {hidden}." if hidden else ""
         if not self.named:
             return f"Between {self.first} and {self.second} no parameter changed beyond chance.{beside}"
-        parts = [f"{one.path} ({_words(one)}, {format_chance(one.probability)})" for one in self.named]
+        parts = [
+            f"{name_of(one.path)} ({_words(one)}, {format_chance(one.probability)})" for one in self.named
+        ]
         return f"Between {self.first} and {self.second} changed: {', '.join(parts)}.{beside}"
 
 

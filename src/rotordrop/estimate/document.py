@@ -48,7 +48,10 @@ def published_drop(estimate: Estimate) -> published.Drop:
             sentence=estimate.sentence,
             nis=finite(estimate.nis),
             process_noise_factor=estimate.noise_factor,
-            checks=[published.Check(**asdict(check)) for check in estimate.checks],
+            checks=[
+                published.Check(name=one.name, passed=one.passed, message=one.said(), note=one.noted())
+                for one in estimate.checks
+            ],
         ),
         bearings={
             bearing.name: published_bearing(bearing, severity_values(estimate, bearing))

@@ -7,7 +7,7 @@ is made.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from html import escape
@@ -265,7 +265,11 @@ class Estimate:
     @property
     def sentence(self) -> str:
         """The verdict, with what failed."""
-        failed = "; ".join(check.message for check in self.checks if not check.passed)
+        return self.verdict_in(str)
+
+    def verdict_in(self, name_of: Callable[[str], str]) -> str:
+        """The verdict, with what failed and with unknowns by the names that are given for their paths."""
+        failed = "; ".join(check.said(name_of) for check in self.checks if not check.passed)
         said = " ".join((self.verdict.value, *(one.sentence for one in self.structure)))
         return f"{said} {failed[:1].upper()}{failed[1:]}." if failed else said
 

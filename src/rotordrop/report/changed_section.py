@@ -8,7 +8,7 @@ from rotordrop.estimate.changed import Change, asked_for, changes
 from rotordrop.estimate.document import published_drop
 from rotordrop.estimate.estimate import Estimate
 from rotordrop.estimate.published import Drop
-from rotordrop.report.content import Cell, Section, Statement, Table
+from rotordrop.report.content import Column, Section, Statement, table
 from rotordrop.report.quantity import Quantity, written
 from rotordrop.units import format_chance
 
@@ -21,32 +21,24 @@ NOTE = (
 
 
 def changed_section(estimate: Estimate, since: Drop | None) -> Section:
-    """Compare a drop with an earlier one.
-
-    Parameters
-    ----------
-    estimate : Estimate
-        The drop.
-    since : Drop, optional
-        The earlier estimate, as published.
-    """
+    """Compare a drop with an earlier estimate of the machine, as published."""
     if since is None:
-        return Section(heading=HEADING, text=(NOTHING_GIVEN,))
+        return Section(HEADING, (NOTHING_GIVEN,))
     try:
         found = changes(since, published_drop(estimate))
     except UsageError as error:
-        return Section(heading=HEADING, text=(f"{since.record}: {error}.",))
-    sentence = found.sentence()
-    for one in found.found:
-        sentence = sentence.replace(one.path, spoken_path(one.path))
-    table = Table(
-        columns=("parameter", "before", "now", "change (90 % interval)", "changed that much", "found from"),
-        rows=tuple(_row(one) for one in found.found),
-        caption=f"Changes since {found.first}",
-        note=NOTE,
+        return Section(HEADING, (f"{since.record}: {error}.",))
+    columns = (
+        Column("parameter", lambda one: spoken_path(one.path)),
+        Column("before", lambda one: Quantity.of(one.before, row_of(one.path).display_kind)),
+        Column("now", lambda one: Quantity.of(one.after, row_of(one.path).display_kind)),
+        Column("change (90 % interval)", _change),
+        Column("changed that much", lambda one: format_chance(one.probability) if one.determined else "–"),
+        Column("found from", "found_from"),
     )
-    statement = Statement(text=sentence, level="warning" if found.named else "good")
-    return Section(heading=HEADING, statements=(statement,), tables=(table,) if found.found else ())
+    tables = (table(found.found, columns, f"Changes since {found.first}", NOTE),) if found.found else ()
+    statement = Statement(found.sentence(spoken_path), "warning" if found.named else "good")
+    return Section(HEADING, statements=(statement,), tables=tables)
 
 
 def spoken_path(path: str) -> str:
@@ -54,15 +46,10 @@ def spoken_path(path: str) -> str:
     return f"{path.partition('.')[0]}: {row_of(path).label}"
 
 
-def _row(one: Change) -> tuple[Cell, ...]:
-    kind = row_of(one.path).display_kind
-    before, after = (Quantity(value=value, kind=kind) for value in (one.before, one.after))
+def _change(one: Change) -> str:
     if not one.determined:
-        return (spoken_path(one.path), before, after, "the records do not say", "–", one.found_from)
+        return "the records do not say"
     low, high = one.interval_90
     if one.factor:
-        text = f"× {one.change:.3g} ({low:.3g} to {high:.3g})"
-    else:
-        ends = (written(1e6 * end, 1) for end in (one.change, low, high))
-        text = "{} µm ({} to {} µm)".format(*ends)
-    return (spoken_path(one.path), before, after, text, format_chance(one.probability), one.found_from)
+        return f"× {one.change:.3g} ({low:.3g} to {high:.3g})"
+    return "{} µm ({} to {} µm)".format(*(written(1e6 * end, 1) for end in (one.change, low, high)))

@@ -98,7 +98,7 @@ class Table:
                 )
 
 
-def table(rows: Iterable[object], columns: Sequence[Column], caption: str = "", note: str = "") -> Table:
+def table(rows: Iterable[Any], columns: Sequence[Column], caption: str = "", note: str = "") -> Table:
     """Make a table of typed rows by its declared columns."""
     cells = tuple(tuple(column.cell(row) for column in columns) for row in rows)
     return Table(tuple(column.label for column in columns), cells, caption, note)

@@ -80,8 +80,8 @@ def _text(cell: Cell, with_unit: bool) -> str:
 
 
 def _end(cell: Cell, k: int) -> str:
-    known = isinstance(cell, Quantity) and cell.interval_90 is not None
-    return f"{cell.interval_90[k]:.9g}" if known else ""  # type: ignore[union-attr, index]
+    known = cell.interval_90 if isinstance(cell, Quantity) else None
+    return "" if known is None else f"{known[k]:.9g}"
 
 
 def _figure(chart: Any) -> list[list[str]]:

@@ -5,7 +5,6 @@ A further figure of a drop is one function here, or one file and a line here.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 
 from rotordrop.elements.ball_bearing import STATIC_STRESS
@@ -14,22 +13,21 @@ from rotordrop.report.content import Figure, Section, Statement, Table
 from rotordrop.report.first_contact import first_contact_figure
 from rotordrop.report.impacts import impact_figure, impact_table
 from rotordrop.report.orbit import orbit_figure
-from rotordrop.report.quantity import Quantity
+from rotordrop.report.quantity import Quantity, shown
 from rotordrop.report.stress_box import StressBox, stress_box, stress_box_figure, stress_table
-from rotordrop.report.style import MICRO
+from rotordrop.report.style import MICRO, TURN
 from rotordrop.report.time_panels import Panel, time_panels
 
 EARLY = 0.04
-"""Window [s] around the first contacts that gets figures of its own."""
+"""Window [s] around the first contacts that gets figures of its own; that of the paper."""
 AROUND_PEAK = (2e-3, 4e-3)
-"""Stretch before and after a peak [s] that gets a figure of its own."""
-
+"""Stretch before and after a peak [s] that gets a figure of its own; chosen, not measured."""
 MEGA = 1e-6
-PER_TURN = 1.0 / (2.0 * math.pi)
 CARRIED = (
     "The measured motion is carried from the planes of the sensors to the bearings along the straight line "
     "through them; the bending in between, a few micrometres, is left out."
 )
+NO_IMPACT = "The rotor did not touch a bearing in this window."
 
 
 def drop_sections(
@@ -42,25 +40,21 @@ def drop_sections(
 ) -> tuple[Section, ...]:
     """Force, stress, impacts, motion, first contact and orbit of a drop, in this order.
 
-    Parameters
-    ----------
-    bearings : sequence of BearingDrop
-        The drop, bearing by bearing.
-    origin : str
-        What is drawn, for example "measured and estimated".
-    speed : float
-        Speed at power-off [rad/s]; names the drop.
-    static_loads : mapping, optional
-        Share of the weight by bearing [N].
-    contact_tables : tuple of Table
-        Further tables on the first contact.
+    The origin says what is drawn, as "measured and estimated"; the speed at power-off [rad/s] names the
+    drop; static loads are the share of the weight by bearing [N].
     """
+    contact = Figure(
+        first_contact_figure(bearings),
+        "Vertical displacement around the first contact: t₁ first touch, t₂ lift-off, T the time "
+        "between; indentation counts from the air gap, support included (Neisi 2020, Fig. 10).",
+        "first contact",
+    )
     return (
         _force(bearings, static_loads or {}),
         _stress(bearings, speed),
         _impacts(bearings),
         motion_section(bearings, origin),
-        _first_contact(bearings, contact_tables),
+        Section("First contact", figures=(contact,), tables=contact_tables),
         orbit_section(bearings),
     )
 
@@ -90,53 +84,42 @@ def stress_panel(bearing: BearingDrop) -> Panel:
 
 
 def _force(bearings: Sequence[BearingDrop], loads: Mapping[str, float]) -> Section:
-    rows = [[force_panel(bearing, loads)] for bearing in bearings]
-    figures = [
-        Figure(
-            chart=time_panels(rows, 1.0, "N", from_zero=True),
-            caption="Magnitude of the ball force on the race, instantaneous (Neisi 2020, Fig. 15).",
-            name="force",
-        )
-    ]
+    panels = [force_panel(bearing, loads) for bearing in bearings]
+
+    def figure(caption: str, name: str, drawn: Sequence[Panel], *, from_power_off: bool = True) -> Figure:
+        rows = [[panel] for panel in drawn]
+        chart = time_panels(rows, 1.0, "N", from_zero=True, from_power_off=from_power_off)
+        return Figure(chart, caption, name)
+
+    whole = "Magnitude of the ball force on the race, instantaneous (Neisi 2020, Fig. 15)."
+    figures = [figure(whole, "force", panels)]
     if max(bearing.force.time[-1] for bearing in bearings) > EARLY:
-        early = [[panel.until(EARLY) for panel in row] for row in rows]
-        figures.append(
-            Figure(
-                chart=time_panels(early, 1.0, "N", from_zero=True),
-                caption=f"The same force in the first {1e3 * EARLY:.0f} ms.",
-                name="force, first contacts",
-            )
-        )
-        hardest = [[row[0].around(*AROUND_PEAK)] for row in rows]
-        figures.append(
-            Figure(
-                chart=time_panels(hardest, 1.0, "N", from_zero=True, from_power_off=False),
-                caption="The same force around its peak, where the 90 % interval can be seen.",
-                name="force, around its peak",
-            )
-        )
-    return Section(heading="Bearing force", figures=tuple(figures))
+        first = f"The same force in the first {1e3 * EARLY:.0f} ms."
+        figures.append(figure(first, "force, first contacts", [panel.until(EARLY) for panel in panels]))
+        near = [panel.around(*AROUND_PEAK) for panel in panels]
+        caption = "The same force around its peak, where the 90 % interval can be seen."
+        figures.append(figure(caption, "force, around its peak", near, from_power_off=False))
+    return Section("Bearing force", figures=tuple(figures))
 
 
 def _stress(bearings: Sequence[BearingDrop], speed: float) -> Section:
-    rows = [[stress_panel(bearing)] for bearing in bearings]
     boxes = stress_boxes(bearings, speed)
     history = Figure(
-        chart=time_panels(rows, MEGA, "MPa"),
-        caption="Largest Hertz stress of all balls at the inner race, instantaneous.",
-        name="stress",
+        time_panels([[stress_panel(bearing)] for bearing in bearings], MEGA, "MPa"),
+        "Largest Hertz stress of all balls at the inner race, instantaneous.",
+        "stress",
     )
     box = Figure(
-        chart=stress_box_figure(boxes),
-        caption="Distribution of the stress within the drop; dashed in the box: mean (Neisi 2020, Fig. 16).",
-        name="stress distribution",
+        stress_box_figure(boxes),
+        "Distribution of the stress within the drop; dashed in the box: mean (Neisi 2020, Fig. 16).",
+        "stress distribution",
     )
-    return Section(heading="Hertz stress", figures=(history, box), tables=(stress_table(boxes),))
+    return Section("Hertz stress", figures=(history, box), tables=(stress_table(boxes),))
 
 
 def stress_boxes(bearings: Sequence[BearingDrop], speed: float) -> tuple[StressBox, ...]:
     """Distribution of the stress at every bearing, under the speed of the drop."""
-    label = Quantity(value=speed * PER_TURN, kind="frequency", digits=3).text
+    label = shown(speed / TURN, "frequency", 3)
     return tuple(
         stress_box(label, bearing.name, bearing.stress.values, bearing.statistics) for bearing in bearings
     )
@@ -144,33 +127,31 @@ def stress_boxes(bearings: Sequence[BearingDrop], speed: float) -> tuple[StressB
 
 def _impacts(bearings: Sequence[BearingDrop]) -> Section:
     reasons = tuple(
-        Statement(text=f"{bearing.name}: no impacts are listed, because {bearing.missing['impacts']}.")
+        Statement(f"{bearing.name}: no impacts are listed, because {bearing.missing['impacts']}.")
         for bearing in bearings
         if "impacts" in bearing.missing
     )
     hit = [bearing for bearing in bearings if bearing.impacts]
     if not hit:
-        none = Statement(text="The rotor did not touch a bearing in this window.", level="notice")
-        return Section(heading="Impacts", statements=reasons or (none,))
+        return Section("Impacts", statements=reasons or (Statement(NO_IMPACT),))
     force = hit[0].impact_force
     figure = Figure(
-        chart=impact_figure(hit, force=force),
-        caption=f"Peak {force} of every impact where it hit the race, seen from the last bearing; −90° is "
+        impact_figure(hit, force=force),
+        f"Peak {force} of every impact where it hit the race, seen from the last bearing; −90° is "
         "the bottom, the distance from the centre is the force, the bar its 90 % interval.",
-        name="impacts",
+        "impacts",
     )
-    table = impact_table(hit, force=force)
-    return Section(heading="Impacts", statements=reasons, figures=(figure,), tables=(table,))
+    return Section("Impacts", (), reasons, (figure,), (impact_table(hit, force=force),))
 
 
 def motion_section(bearings: Sequence[BearingMotions | BearingDrop], origin: str, *text: str) -> Section:
     """Displacement against time: every bearing for itself, and all side by side."""
     figures = [
         Figure(
-            chart=displacement_figure(bearing),
-            caption=f"Displacement of the rotor in the {bearing.name} touchdown bearing, {origin}; "
+            displacement_figure(bearing),
+            f"Displacement of the rotor in the {bearing.name} touchdown bearing, {origin}; "
             "vertical above, horizontal below (Neisi 2020, Figs 7 and 8).",
-            name=f"displacement {bearing.name}",
+            f"displacement {bearing.name}",
         )
         for bearing in bearings
     ]
@@ -178,13 +159,12 @@ def motion_section(bearings: Sequence[BearingMotions | BearingDrop], origin: str
         [_sideways(bearing, "displacement", ()), _upwards(bearing, "displacement")] for bearing in bearings
     ]
     pair = Figure(
-        chart=time_panels(rows, MICRO, "µm", height=250, together=True),
-        caption="All bearings side by side; the panels zoom together (Neisi 2020, Fig. 13).",
-        name="displacement",
+        time_panels(rows, MICRO, "µm", height=250, together=True),
+        "All bearings side by side; the panels zoom together (Neisi 2020, Fig. 13).",
+        "displacement",
     )
     carried = any(isinstance(b, BearingDrop) and b.motions[0].role == "measured" for b in bearings)
-    text = (*text, *((CARRIED,) if carried else ()))
-    return Section(heading="Displacement", text=text, figures=(*figures, pair))
+    return Section("Displacement", (*text, *((CARRIED,) if carried else ())), figures=(*figures, pair))
 
 
 def displacement_figure(bearing: BearingMotions | BearingDrop) -> object:
@@ -216,27 +196,16 @@ def _sideways(bearing: BearingMotions | BearingDrop, axis: str, signs: tuple[flo
     )
 
 
-def _first_contact(bearings: Sequence[BearingDrop], tables: tuple[Table, ...]) -> Section:
-    figure = Figure(
-        chart=first_contact_figure(bearings),
-        caption="Vertical displacement around the first contact: t₁ first touch, t₂ lift-off, T the time "
-        "between; indentation counts from the air gap, support included (Neisi 2020, Fig. 10).",
-        name="first contact",
-    )
-    return Section(heading="First contact", figures=(figure,), tables=tables)
-
-
 def orbit_section(
     bearings: Sequence[BearingMotions | BearingDrop], early: Sequence[BearingMotions] = (), until: str = ""
 ) -> Section:
     """Orbits in the clearance circle, of an early part alone where one is given, and radial displacement."""
     orbit = Figure(
-        chart=orbit_figure(early or bearings),
-        caption=f"Path of the rotor centre against the clearance circle{until}; x to the right, y up, seen "
+        orbit_figure(early or bearings),
+        f"Path of the rotor centre against the clearance circle{until}; x to the right, y up, seen "
         "from the last bearing (Neisi 2020, Fig. 12).",
-        name="orbit",
+        "orbit",
     )
-    limits = any(bearing.at_gap_limits for bearing in bearings)
     rows = [
         [
             Panel(
@@ -249,37 +218,35 @@ def orbit_section(
         for bearing in bearings
     ]
     radial = Figure(
-        chart=time_panels(rows, MICRO, "µm", from_zero=True),
-        caption="Radial displacement, simulated for both limits of the air gap (Neisi 2020, Fig. 14)."
-        if limits
+        time_panels(rows, MICRO, "µm", from_zero=True),
+        "Radial displacement, simulated for both limits of the air gap (Neisi 2020, Fig. 14)."
+        if any(bearing.at_gap_limits for bearing in bearings)
         else "Distance of the rotor from the bearing centre; above the air gap the rotor indents the race "
         "(Neisi 2020, Fig. 14).",
-        name="radial displacement",
+        "radial displacement",
     )
-    return Section(heading="Orbit", figures=(orbit, radial))
+    return Section("Orbit", figures=(orbit, radial))
 
 
 def speed_figure(rotor: Sequence[History], races: Sequence[History] = ()) -> object:
     """Draw the speed of the rotor, and of the inner races beside it [rad/s], in Hz; × 60 in rpm."""
     row = [Panel(title="rotor", axis="speed, × 60 in rpm", histories=tuple(rotor))]
     if races:
-        row.append(
-            Panel(title="inner races", axis="race speed, × 60 in rpm", histories=tuple(races), series=True)
-        )
-    return time_panels([row], PER_TURN, "Hz", height=250)
+        axis = "race speed, × 60 in rpm"
+        row.append(Panel(title="inner races", axis=axis, histories=tuple(races), series=True))
+    return time_panels([row], 1.0 / TURN, "Hz", height=250)
 
 
 def static_limit_statement(bearing: BearingDrop, *, certain: bool = True) -> Statement:
     """Set a peak stress beside the stress of the static load rating, as information."""
     peak = Quantity.of(bearing.peak_stress.known, "pressure", range_only=not certain)
-    limit = Quantity(value=STATIC_STRESS, kind="pressure").text
-    stress = bearing.peak_stress.value
-    low, high = bearing.peak_stress.interval_90 or (stress, stress)
+    stress, (low, high) = peak.value, peak.ends
     share = f"{100.0 * stress / STATIC_STRESS:.0f} %"
     if not certain:
         share = f"{100.0 * low / STATIC_STRESS:.0f} to {100.0 * high / STATIC_STRESS:.0f} %"
-    return Statement(
-        text=f"{bearing.name}: the peak stress of {peak.text} is {share} of the {limit} at which ISO 76 "
-        "defines the static load rating of ball bearings (information, not an acceptance limit).",
-        level="notice" if (high if not certain else stress) < STATIC_STRESS else "warning",
+    text = (
+        f"{bearing.name}: the peak stress of {peak.text} is {share} of the "
+        f"{shown(STATIC_STRESS, 'pressure')} at which ISO 76 defines the static load rating of ball "
+        "bearings (information, not an acceptance limit)."
     )
+    return Statement(text, "notice" if (stress if certain else high) < STATIC_STRESS else "warning")

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from rotordrop.elements.parameter import Role
+from rotordrop.elements.parameter import Parameter, Role
 from rotordrop.elements.table import LOADS, published
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.known import Known
-from rotordrop.report.content import Card, Cell, KeyFigure, Table
-from rotordrop.report.quantity import Quantity
+from rotordrop.report.content import Card, Column, KeyFigure, Table, table
+from rotordrop.report.quantity import Quantity, shown
 
 MEANS = (
     "A mean force is the mean of the magnitude; the magnitude of the mean force would be smaller where its "
@@ -22,12 +22,7 @@ MEANS = (
 def headline_card(bearing: BearingDrop, *, certain: bool = True) -> Card:
     """Headline numbers of one bearing, peaks first, each with its time, or the reason why it is missing.
 
-    Parameters
-    ----------
-    bearing : BearingDrop
-        The bearing.
-    certain : bool
-        Whether single numbers hold; else only ranges are shown.
+    Single numbers are shown where they are certain, else ranges.
     """
     known: dict[str, Known] = {
         **bearing.values,
@@ -42,49 +37,39 @@ def headline_card(bearing: BearingDrop, *, certain: bool = True) -> Card:
         if field not in known and not reason:
             continue
         value = Quantity.of(known.get(field), load.kind, range_only=not certain)
-        words = [reason]
-        if field in times and certain:
-            words.insert(0, f"at {Quantity(value=times[field], kind='time', digits=3).text}")
-        note = "; ".join(word for word in words if word)
-        figures.append(KeyFigure(label=label if certain else f"{label}, range", value=value, note=note))
+        at = f"at {shown(times[field], 'time', 3)}" if field in times and certain else ""
+        note = "; ".join(filter(None, (at, reason)))
+        figures.append(KeyFigure(label if certain else f"{label}, range", value, note))
     source = f"by the {bearing.peak_force.origin.value}"
-    return Card(title=f"{bearing.name} touchdown bearing, {source}", figures=tuple(figures))
+    return Card(f"{bearing.name} touchdown bearing, {source}", tuple(figures))
 
 
 def identified_table(bearings: Sequence[BearingDrop], *, taken_over: str = "", certain: bool = True) -> Table:
     """Identified values of every bearing side by side, each with its interval and verdict.
 
-    Parameters
-    ----------
-    bearings : sequence of BearingDrop
-        The drop.
-    taken_over : str
-        File from which supports and friction were taken over; empty when they were identified.
-    certain : bool
-        Whether single numbers hold; else only ranges are shown.
+    Supports and friction may be taken over from a file; single numbers are shown where they are certain.
     """
-    rows: list[tuple[Cell, ...]] = []
-    for row in published().values():
-        sought = row.role in (Role.SOUGHT, Role.DERIVED)
-        if sought and any(row.field in bearing.values for bearing in bearings):
-            cells: list[Cell] = []
-            for bearing in bearings:
-                value = bearing.values.get(row.field)
-                shown = Quantity.of(value, row.display_kind, range_only=not certain)
-                cells += [shown, _status(value, taken_over)]
-            rows.append((row.label, *cells))
-    columns = [text for bearing in bearings for text in (bearing.name, f"{bearing.name}: verdict")]
-    return Table(
-        columns=("identified", *columns),
-        rows=tuple(rows),
-        caption="Identified values",
-        note=f"Below a value: its 90 % interval, or the limits the record itself sets. {MEANS}",
-    )
 
+    def of(bearing: BearingDrop) -> tuple[Column, Column]:
+        def value(row: Parameter) -> Quantity:
+            found = bearing.values.get(row.field)
+            return Quantity.of(found, row.display_kind, range_only=not certain)
 
-def _status(value: Known | None, taken_over: str) -> str:
-    if value is None:
-        return "not estimated"
-    if taken_over and value.status == "taken over":
-        return f"taken over from {Path(taken_over).name}"
-    return value.status
+        def verdict(row: Parameter) -> str:
+            known = bearing.values.get(row.field)
+            if known is None:
+                return "not estimated"
+            if taken_over and known.status == "taken over":
+                return f"taken over from {Path(taken_over).name}"
+            return known.status
+
+        return Column(bearing.name, value), Column(f"{bearing.name}: verdict", verdict)
+
+    rows = [
+        row
+        for row in published().values()
+        if row.role in (Role.SOUGHT, Role.DERIVED) and any(row.field in b.values for b in bearings)
+    ]
+    columns = (Column("identified", "label"), *(column for bearing in bearings for column in of(bearing)))
+    note = f"Below a value: its 90 % interval, or the limits the record itself sets. {MEANS}"
+    return table(rows, columns, "Identified values", note)

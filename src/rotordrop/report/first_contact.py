@@ -20,6 +20,7 @@ from rotordrop.report.style import (
     axis_title,
     fit_legend,
     panels,
+    upright,
 )
 
 SHOWN = 0.04
@@ -31,12 +32,7 @@ CONTACT_FILL = "rgba(217, 120, 10, 0.13)"
 def first_contact_figure(bearings: Sequence[BearingDrop], *, until: float = SHOWN) -> go.Figure:
     """Draw the vertical displacement at the first contact with t1, t2 and indentation (Neisi 2020, Fig. 10).
 
-    Parameters
-    ----------
-    bearings : sequence of BearingDrop
-        One panel per bearing; one that was not touched is drawn without marks.
-    until : float
-        End of the window [s].
+    A bearing that was not touched is drawn without marks; the window ends at a time [s].
     """
     figure = panels([b.name for b in bearings])
     for column, bearing in enumerate(bearings, start=1):
@@ -56,7 +52,7 @@ def _mark(figure: go.Figure, contact: FirstContact, bearing: BearingDrop, column
     start, end = MILLI * contact.start, MILLI * contact.end
     figure.add_vrect(x0=start, x1=end, fillcolor=CONTACT_FILL, line_width=0, row=1, col=column)
     for value in (start, end):
-        figure.add_vline(x=value, line={"color": MUTED, "width": 1, "dash": "dot"}, row=1, col=column)
+        upright(figure, value, MUTED, "dot", row=1, col=column)
     figure.add_annotation(
         x=end,
         y=1.0,

@@ -4,60 +4,39 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
 
 from rotordrop.estimate.bearing_drop import BearingDrop, Impact
-from rotordrop.report.content import Table
-from rotordrop.report.quantity import Quantity
-from rotordrop.report.style import MUTED, axis_title, panels, single
+from rotordrop.report.content import Column, Table, table
+from rotordrop.report.style import MUTED, axis_title, curve, panels, square
 
 LISTED = 24
 LATE, EARLY, INTERVAL, RING = "#9cc3e8", "#0b3d73", "#5b6875", "#cbd4dc"
 
 
 def impact_table(bearings: Sequence[BearingDrop], *, force: str, listed: int = LISTED) -> Table:
-    """List the strongest impacts in the order of time.
-
-    Parameters
-    ----------
-    bearings : sequence of BearingDrop
-        The drop.
-    force : str
-        Name of the force whose peak is stated.
-    listed : int
-        Number of impacts in the table; the strongest are kept.
-    """
+    """List the strongest impacts in the order of time, with the name of the force whose peak is stated."""
     impacts = [(bearing.name, impact) for bearing in bearings for impact in bearing.impacts]
     strongest = sorted(impacts, key=lambda item: -item[1].peak_force.value)[:listed]
-    rows = tuple(
-        (
-            name,
-            Quantity(value=impact.peak_time, kind="time"),
-            Quantity(value=impact.azimuth, kind="angle", digits=3),
-            Quantity.of(impact.peak_force, "force"),
-            Quantity.of(impact.impulse, "impulse", digits=3),
-            Quantity.of(impact.dissipated_energy, "energy", digits=3),
-            Quantity(value=impact.end - impact.start, kind="time", digits=3),
-        )
-        for name, impact in sorted(strongest, key=lambda item: item[1].peak_time)
-    )
-    left_out = len(impacts) - len(rows)
+    left_out = len(impacts) - len(strongest)
     rest = f" {left_out} weaker ones are left out." if left_out else ""
-    return Table(
-        columns=(
-            "bearing",
-            "time of peak",
-            "azimuth",
-            f"peak {force}",
-            "impulse",
-            "dissipated energy",
-            "duration",
-        ),
-        rows=rows,
-        caption=f"Impacts ({len(rows)} of {len(impacts)})",
-        note=f"Azimuth counter-clockwise from +x, −90° is the bottom.{rest}",
+    columns = (
+        Column("bearing", lambda row: row[0]),
+        Column("time of peak", lambda row: row[1].peak_time, "time"),
+        Column("azimuth", lambda row: row[1].azimuth, "angle", 3),
+        Column(f"peak {force}", lambda row: row[1].peak_force, "force"),
+        Column("impulse", lambda row: row[1].impulse, "impulse", 3),
+        Column("dissipated energy", lambda row: row[1].dissipated_energy, "energy", 3),
+        Column("duration", lambda row: row[1].end - row[1].start, "time", 3),
+    )
+    return table(
+        sorted(strongest, key=lambda item: item[1].peak_time),
+        columns,
+        f"Impacts ({len(strongest)} of {len(impacts)})",
+        f"Azimuth counter-clockwise from +x, −90° is the bottom.{rest}",
     )
 
 
@@ -69,28 +48,21 @@ def impact_figure(bearings: Sequence[BearingDrop], *, force: str) -> go.Figure:
     figure = panels([bearing.name for bearing in bearings], height=420, spacing=0.1)
     impacts = [impact for bearing in bearings for impact in bearing.impacts]
     latest = max(impact.peak_time for impact in impacts)
-    highest = max((impact.peak_force.interval_90 or (0.0, impact.peak_force.value))[1] for impact in impacts)
-    rings = ring_forces(highest)
+    rings = ring_forces(max(impact.peak_force.high for impact in impacts))
     for column, bearing in enumerate(bearings, start=1):
         _add_rings(figure, rings, column)
         _add_impacts(figure, bearing.impacts, column)
-        reach = 1.12 * rings[-1]
-        anchor = "x" if column == 1 else f"x{column}"
-        figure.update_yaxes(scaleanchor=anchor, constrain="domain", range=[-reach, reach], col=column)
-        figure.update_xaxes(constrain="domain", range=[-reach, reach], col=column)
+        square(figure, column, 1.12 * rings[-1])
     bare = {"showticklabels": False, "ticks": "", "showgrid": False, "showline": False}
     figure.update_xaxes(title_text=axis_title(f"peak {force}, from the centre", "N"), **bare)
     figure.update_yaxes(**bare)
+    heading = {"text": "time [ms]", "font": {"size": 13}}
     figure.update_layout(
         coloraxis={
             "colorscale": [[0.0, EARLY], [1.0, LATE]],
             "cmin": 0.0,
             "cmax": 1e3 * latest,
-            "colorbar": {
-                "title": {"text": "time [ms]", "font": {"size": 13}},
-                "thickness": 12,
-                "outlinewidth": 0,
-            },
+            "colorbar": {"title": heading, "thickness": 12, "outlinewidth": 0},
         }
     )
     return figure
@@ -106,28 +78,19 @@ def ring_forces(highest: float) -> list[float]:
 def _add_rings(figure: go.Figure, rings: Sequence[float], column: int) -> None:
     """Rings of equal force with their numbers, and azimuths every 45 degrees."""
     axes = {"xref": "x" if column == 1 else f"x{column}", "yref": "y" if column == 1 else f"y{column}"}
-    line = {"color": RING, "width": 1}
+    words: dict[str, Any] = {"showarrow": False}
+    line: dict[str, Any] = {"line": {"color": RING, "width": 1}, "layer": "below"}
     at = math.radians(67.5)  # between two azimuths, where no number stands
     for force in rings:
         ends = {"x0": -force, "x1": force, "y0": -force, "y1": force}
-        figure.add_shape(type="circle", line=line, layer="below", **ends, **axes)
-        place = {"x": force * math.cos(at), "y": force * math.sin(at)}
-        words = f"{force:,.6g}".replace(",", "\u202f")
-        figure.add_annotation(text=words, showarrow=False, font={"size": 11, "color": MUTED}, **place, **axes)
+        figure.add_shape(type="circle", **ends, **line, **axes)
+        place = {"x": force * math.cos(at), "y": force * math.sin(at), "font": {"size": 11, "color": MUTED}}
+        figure.add_annotation(text=f"{force:,.6g}".replace(",", "\u202f"), **place, **words, **axes)
     for degrees in range(0, 360, 45):
-        x, y = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
-        figure.add_shape(
-            type="line", x0=0, y0=0, x1=rings[-1] * x, y1=rings[-1] * y, line=line, layer="below", **axes
-        )
-        words = f"{degrees if degrees <= 180 else degrees - 360}°".replace("-", "−")
-        figure.add_annotation(
-            x=1.06 * rings[-1] * x,
-            y=1.06 * rings[-1] * y,
-            text=words,
-            showarrow=False,
-            font={"size": 11},
-            **axes,
-        )
+        x, y = rings[-1] * math.cos(math.radians(degrees)), rings[-1] * math.sin(math.radians(degrees))
+        figure.add_shape(type="line", x0=0, y0=0, x1=x, y1=y, **line, **axes)
+        text = f"{degrees if degrees <= 180 else degrees - 360}°".replace("-", "−")
+        figure.add_annotation(x=1.06 * x, y=1.06 * y, text=text, font={"size": 11}, **words, **axes)
 
 
 def _add_impacts(figure: go.Figure, impacts: Sequence[Impact], column: int) -> None:
@@ -141,36 +104,24 @@ def _add_impacts(figure: go.Figure, impacts: Sequence[Impact], column: int) -> N
             bars.append([math.nan, math.nan])
     if bars:
         limit, at = np.array(bars).T
-        figure.add_trace(
-            go.Scatter(
-                x=single(limit * np.cos(at)),
-                y=single(limit * np.sin(at)),
-                mode="lines",
-                line={"color": INTERVAL, "width": 1.4},
-                showlegend=False,
-                hoverinfo="skip",
-                name="90 % interval",
-            ),
-            row=1,
-            col=column,
-        )
-    figure.add_trace(
-        go.Scatter(
-            x=single(force * np.cos(azimuth)),
-            y=single(force * np.sin(azimuth)),
-            mode="markers",
-            marker={
-                "color": single(time),
-                "coloraxis": "coloraxis",
-                "size": 8,
-                "line": {"color": "#ffffff", "width": 0.6},
-            },
-            customdata=np.stack([force, np.degrees(azimuth), time], axis=1).astype(np.float32),
-            showlegend=False,
-            name="impacts",
-            hovertemplate="%{customdata[0]:.0f} N at %{customdata[1]:.0f}°, "
-            "%{customdata[2]:.2f} ms<extra></extra>",
-        ),
-        row=1,
-        col=column,
+        x, y = limit * np.cos(at), limit * np.sin(at)
+        grey: dict[str, Any] = {"colour": INTERVAL, "width": 1.4, "legend": False, "hover": None}
+        curve(figure, x, y, "90 % interval", column=column, **grey)
+    marker = {
+        "color": time.astype(np.float32),
+        "coloraxis": "coloraxis",
+        "size": 8,
+        "line": {"color": "#ffffff", "width": 0.6},
+    }
+    curve(
+        figure,
+        force * np.cos(azimuth),
+        force * np.sin(azimuth),
+        "impacts",
+        column=column,
+        mode="markers",
+        marker=marker,
+        customdata=np.stack([force, np.degrees(azimuth), time], axis=1).astype(np.float32),
+        legend=False,
+        hover="%{customdata[0]:.0f} N at %{customdata[1]:.0f}°, %{customdata[2]:.2f} ms",
     )

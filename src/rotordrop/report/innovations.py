@@ -9,7 +9,9 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 
 from rotordrop.estimate.bearing_drop import History
+from rotordrop.estimate.estimate import Innovations
 from rotordrop.known import NINETY
+from rotordrop.report.content import Figure
 from rotordrop.report.style import (
     LIMIT,
     MICRO,
@@ -17,11 +19,10 @@ from rotordrop.report.style import (
     SERIES,
     add_history,
     axis_title,
+    curve,
     fit_legend,
     label_time,
     panels,
-    plain,
-    single,
 )
 
 Array = NDArray[np.float64]
@@ -32,22 +33,34 @@ SHOWN_SHARE = 0.995
 """Share of the innovations inside the drawn range [1]; the first ones, before anything is known, are huge."""
 
 
+def innovation_figures(found: Innovations) -> tuple[Figure, ...]:
+    """Innovations by channel, their size over what is expected, and their autocorrelation."""
+    normalised = found.values / found.deviation
+    square = np.nan_to_num(np.nanmean(normalised**2, axis=1), nan=1.0)
+    step = float(found.time[1] - found.time[0])
+    return (
+        Figure(
+            innovations_figure(found.time, found.values, found.channels, found.deviation),
+            "What each reading says beyond the prediction from all readings before it.",
+            "innovations",
+        ),
+        Figure(
+            nis_figure(found.time, square, found.limits),
+            "Innovations squared over what the filter expects: one where model and noise are right.",
+            "innovations squared",
+        ),
+        Figure(
+            whiteness_figure(np.nan_to_num(normalised), found.channels, step),
+            "Autocorrelation of the innovations; a correct model leaves none.",
+            "whiteness",
+        ),
+    )
+
+
 def innovations_figure(
     time: Array, innovations: Array, channels: Sequence[str], standard_deviation: Array | None = None
 ) -> go.Figure:
-    """Draw the innovation of every channel with the band in which 90 % of it should lie.
-
-    Parameters
-    ----------
-    time : ndarray, shape (N,)
-        Time from power-off [s].
-    innovations : ndarray, shape (N, S)
-        Reading minus prediction [m].
-    channels : sequence of str
-        Names of the channels.
-    standard_deviation : ndarray, shape (N, S), optional
-        What the filter expects [m].
-    """
+    """Draw the innovation of every channel (N, S) [m] with the band in which 90 % of it should lie."""
     rows = -(-len(channels) // 2)
     figure = panels(channels, rows=rows, columns=min(2, len(channels)), height=190)
     for index in range(len(channels)):
@@ -59,8 +72,8 @@ def innovations_figure(
             half = NINETY * standard_deviation[:, index]
             for sign in (1.0, -1.0):
                 limit = History(label=EXPECTED, time=time, values=sign * half)
-                shown = legend and sign > 0.0
-                add_history(figure, limit, MICRO, "µm", row=row, column=column, legend=shown, line=LIMIT_LINE)
+                named = legend and sign > 0.0
+                add_history(figure, limit, MICRO, "µm", row=row, column=column, legend=named, line=LIMIT_LINE)
         reach = 1.1 * MICRO * float(np.nanquantile(np.abs(innovations[:, index]), SHOWN_SHARE)) or 1.0
         figure.update_yaxes(range=[-reach, reach], row=row, col=column)
     label_time(figure, row=rows)
@@ -71,23 +84,14 @@ def innovations_figure(
 def nis_figure(
     time: Array, normalised_square: Array, limits: tuple[float, float], *, window: float = 2e-3
 ) -> go.Figure:
-    """Draw the normalised innovation squared per channel as a running mean; it should be about one.
+    """Draw the normalised innovation squared per channel (N,) [1] as a running mean over a window [s].
 
-    Parameters
-    ----------
-    time : ndarray, shape (N,)
-        Time from power-off [s].
-    normalised_square : ndarray, shape (N,)
-        Normalised innovation squared divided by the number of channels [1].
-    limits : tuple of float
-        Limits within which its mean over the whole drop counts as consistent [1].
-    window : float
-        Length of the running mean [s].
+    It should be about one; its mean over the whole drop counts as consistent between the limits [1].
     """
     count = max(1, round(window / float(np.median(np.diff(time)))))
-    window_of_ones = np.ones(min(count, len(time)))
-    summed = np.convolve(normalised_square, window_of_ones, mode="same")
-    mean = summed / np.convolve(np.ones(len(time)), window_of_ones, mode="same")
+    ones = np.ones(min(count, len(time)))
+    summed = np.convolve(normalised_square, ones, mode="same")
+    mean = summed / np.convolve(np.ones(len(time)), ones, mode="same")
     figure = panels(("normalised innovation squared",), height=230)
     history = History(label=f"mean over {MILLI * window:.3g} ms", time=time, values=mean, role="estimated")
     add_history(figure, history, 1.0, "")
@@ -105,39 +109,28 @@ def nis_figure(
 
 
 def whiteness_figure(innovations: Array, channels: Sequence[str], sample_interval: float) -> go.Figure:
-    """Draw the autocorrelation of every channel's innovation; beyond lag zero it should stay in the strip.
+    """Draw the autocorrelation of every channel's normalised innovation (N, S), at samples so far apart [s].
 
-    Parameters
-    ----------
-    innovations : ndarray, shape (N, S)
-        Innovations divided by their expected standard deviation [1].
-    channels : sequence of str
-        Names of the channels.
-    sample_interval : float
-        Time between samples [s].
+    Beyond lag zero it should stay in the strip.
     """
     lags = np.arange(1, min(61, len(innovations) // 4))
     figure = panels(("autocorrelation of the innovations",), height=230)
     for index, channel in enumerate(channels):
-        figure.add_trace(
-            go.Scatter(
-                x=single(np.asarray(MILLI * sample_interval * lags, dtype=np.float64)),
-                y=single(autocorrelation(innovations[:, index], lags)),
-                mode="lines+markers",
-                marker={"size": 3},
-                line={"width": 1, "color": SERIES[index % len(SERIES)]},
-                name=plain(channel),
-                hovertemplate=f"%{{x:.2f}} ms: %{{y:.3f}}<extra>{plain(channel)}</extra>",
-            )
+        curve(
+            figure,
+            MILLI * sample_interval * lags,
+            autocorrelation(innovations[:, index], lags),
+            channel,
+            mode="lines+markers",
+            marker={"size": 3},
+            width=1,
+            colour=SERIES[index % len(SERIES)],
+            hover="%{x:.2f} ms: %{y:.3f}",
         )
     half = NINETY / np.sqrt(len(innovations))
+    line = {"color": LIMIT, "width": 1, "dash": "dash"}
     for value in (-half, half):
-        figure.add_hline(
-            y=value,
-            line={"color": LIMIT, "width": 1, "dash": "dash"},
-            name="90 % of white noise",
-            showlegend=bool(value > 0.0),
-        )
+        figure.add_hline(y=value, line=line, name="90 % of white noise", showlegend=bool(value > 0.0))
     figure.update_xaxes(title_text=axis_title("lag", "ms"))
     figure.update_yaxes(title_text=axis_title("autocorrelation", "1"))
     return fit_legend(figure)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from rotordrop.elements.ball_bearing import STATIC_STRESS
-from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.estimate.estimate import Estimate
-from rotordrop.report.content import Section, Statement, Table
-from rotordrop.report.quantity import Quantity
+from rotordrop.report.content import Column, Section, Statement, table
+from rotordrop.report.quantity import Quantity, shown
 
 SCOPE = (
     "A suggestion from this drop alone. How many drops a set of touchdown bearings may take, and what is "
@@ -15,68 +14,46 @@ SCOPE = (
 )
 
 
+SETTLE_FIRST = (
+    "Before anything is concluded from force or stress: check machine file and record against each other "
+    "(data quality, sensors, air gap), and estimate again. The loads of this drop are known as ranges only."
+)
+
+
 def inspection_section(estimate: Estimate) -> Section:
     """Suggest the next step of inspection, the gravest reason first."""
-    return Section(
-        heading="Suggested inspection",
-        text=(SCOPE,),
-        statements=(*_reasons(estimate), _lift_check(estimate)),
-    )
-
-
-def _reasons(estimate: Estimate) -> list[Statement]:
-    found = []
-    if not estimate.consistent:
-        found.append(
-            Statement(
-                level="bad",
-                text="Before anything is concluded from force or stress: check machine file and record "
-                "against each other (data quality, sensors, air gap), and estimate again. The loads of this "
-                "drop are known as ranges only.",
+    said = [] if estimate.consistent else [Statement(SETTLE_FIRST, "bad")]
+    for bearing in estimate.bearings:
+        highest = bearing.peak_stress.known.high
+        if highest >= STATIC_STRESS:
+            text = (
+                f"{bearing.name}: look at balls and raceways for indentations before the next start. The "
+                f"peak stress may be as high as {shown(highest, 'pressure', 3)}; from "
+                f"{shown(STATIC_STRESS, 'pressure')} on ISO 76 expects a permanent indentation of a "
+                "ten-thousandth of the ball diameter."
             )
-        )
-    found += [_indented(bearing) for bearing in estimate.bearings if _highest(bearing) >= STATIC_STRESS]
-    found += [
-        Statement(
-            level="warning",
-            text=f"{one.bearing}: look at the rest of the record before the next start. The rotor went "
-            f"further out at {one.later_time:.3g} s than in the part that was estimated, so that the largest "
-            "load may not be among these numbers.",
-        )
-        for one in estimate.later
-        if one.larger
-    ]
-    return found
-
-
-def _highest(bearing: BearingDrop) -> float:
-    return (bearing.peak_stress.interval_90 or (0.0, bearing.peak_stress.value))[1]
-
-
-def _indented(bearing: BearingDrop) -> Statement:
-    highest = Quantity(value=_highest(bearing), kind="pressure", digits=3).text
-    limit = Quantity(value=STATIC_STRESS, kind="pressure").text
-    return Statement(
-        level="warning",
-        text=f"{bearing.name}: look at balls and raceways for indentations before the next start. The peak "
-        f"stress may be as high as {highest}; from {limit} on ISO 76 expects a permanent indentation of a "
-        "ten-thousandth of the ball diameter.",
-    )
-
-
-def _lift_check(estimate: Estimate) -> Statement:
+            said.append(Statement(text, "warning"))
+    for one in estimate.later:
+        if one.larger:
+            text = (
+                f"{one.bearing}: look at the rest of the record before the next start. The rotor went "
+                f"further out at {one.later_time:.3g} s than in the part that was estimated, so that the "
+                "largest load may not be among these numbers."
+            )
+            said.append(Statement(text, "warning"))
     gaps = "; ".join(
-        f"{bearing.name} {Quantity.of(bearing.values['air_gap_m'], 'length').text}"
+        f"{bearing.name} {shown(bearing.values['air_gap_m'], 'length')}"
         if "air_gap_m" in bearing.values
         else f"{bearing.name} {1e6 * bearing.air_gap.upper:.0f} µm"
         for bearing in estimate.bearings
         if bearing.air_gap is not None
     )
-    return Statement(
-        text="At the next standstill: a lift check (push the rotor round its touchdown bearings, record it, "
+    text = (
+        "At the next standstill: a lift check (push the rotor round its touchdown bearings, record it, "
         f"'rotordrop clearance'). A gap that differs from the one found here ({gaps}) is wear or a sensor "
         "that has moved; turning each bearing by hand shows whether it still runs."
     )
+    return Section("Suggested inspection", (SCOPE,), (*said, Statement(text)))
 
 
 def limits_section(estimate: Estimate) -> Section:
@@ -84,7 +61,7 @@ def limits_section(estimate: Estimate) -> Section:
     rows = [
         (
             "stress at which ISO 76 defines the static load rating of ball bearings",
-            Quantity(value=STATIC_STRESS, kind="pressure"),
+            Quantity.of(STATIC_STRESS, "pressure"),
             "information; no acceptance limit was given",
         )
     ]
@@ -100,14 +77,18 @@ def limits_section(estimate: Estimate) -> Section:
     rows += [
         (
             f"difference from the independent cross-check, {check.name}",
-            Quantity(value=check.accuracy, kind="share", digits=2),
+            Quantity.of(check.accuracy, "share", 2),
             "its known accuracy; beyond it a warning is given",
         )
         for check in estimate.cross_check
         if not check.replaced
     ]
-    table = Table(columns=("limit", "value", "what it decides"), rows=tuple(rows), caption="Limits used")
-    return Section(heading="Limits used", tables=(table,))
+    columns = (
+        Column("limit", lambda row: row[0]),
+        Column("value", lambda row: row[1]),
+        Column("what it decides", lambda row: row[2]),
+    )
+    return Section("Limits used", tables=(table(rows, columns, "Limits used"),))
 
 
 ASSUMED = (
@@ -124,4 +105,4 @@ ASSUMED = (
 
 def assumptions_section() -> Section:
     """What the estimate takes for granted."""
-    return Section(heading="Assumptions", statements=tuple(Statement(text=text) for text in ASSUMED))
+    return Section("Assumptions", statements=tuple(map(Statement, ASSUMED)))

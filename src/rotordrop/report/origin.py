@@ -7,13 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from rotordrop._version import __version__
 from rotordrop.record.record import sha256_of
-
-if TYPE_CHECKING:
-    from rotordrop.study.plan import Study
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,30 +40,17 @@ class Origin:
     fingerprint: str = ""
     """That of the arithmetic of this computer; empty where it was not taken."""
 
-    def facts(self, told_of: str = "") -> tuple[tuple[str, str], ...]:
-        """Lines for a report; what is not known is left out, and the file of a hash that was told of."""
-        told = [("report made", self.made), ("by", self.operator), ("command", self.command)]
-        told += [
-            (file.role, f"{file.name}, SHA-256 {file.sha256}")
-            for file in self.files
-            if file.sha256 != told_of
-        ]
-        told.append(("arithmetic", f"fingerprint {self.fingerprint[:16]}" if self.fingerprint else ""))
-        return tuple((name, text) for name, text in told if text)
+    def facts(self, stated: str = "") -> tuple[tuple[str, str], ...]:
+        """Lines for a report; what is not known is left out, and a file whose hash is stated already."""
+        facts = [("report made", self.made), ("by", self.operator), ("command", self.command)]
+        files = (file for file in self.files if file.sha256 != stated)
+        facts += [(file.role, f"{file.name}, SHA-256 {file.sha256}") for file in files]
+        facts.append(("arithmetic", f"fingerprint {self.fingerprint[:16]}" if self.fingerprint else ""))
+        return tuple((name, text) for name, text in facts if text)
 
 
 def origin_here(arguments: Sequence[str], files: Sequence[tuple[str, Path]], operator: str = "") -> Origin:
-    """What a report says of a result that a command makes here and now.
-
-    Parameters
-    ----------
-    arguments : sequence of str
-        Of the command.
-    files : sequence of (str, Path)
-        What was read: what for, and where it lies.
-    operator : str
-        Who made it.
-    """
+    """What a report says of a result that a command makes here and now from files, each with what for."""
     from rotordrop.simulate.fingerprint import fingerprint
 
     return Origin(
@@ -77,16 +59,6 @@ def origin_here(arguments: Sequence[str], files: Sequence[tuple[str, Path]], ope
         operator=operator,
         made=now(),
         fingerprint=fingerprint(),
-    )
-
-
-def study_facts(study: Study) -> tuple[tuple[str, str], ...]:
-    """Lines for a report on simulated drops: what makes the same ones again."""
-    return (
-        ("machine", study.machine.name),
-        ("seed", str(study.seed)),
-        ("digest", study.digest),
-        ("rotordrop", __version__),
     )
 
 

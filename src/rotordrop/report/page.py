@@ -25,13 +25,6 @@ LEVEL_WORDS = {"good": "good", "notice": "note", "warning": "warning", "bad": "p
 def write_page(content: ReportContent, path: str | os.PathLike[str]) -> None:
     """Write a report as one HTML file that needs no network; complete or not at all.
 
-    Parameters
-    ----------
-    content : ReportContent
-        What the report says.
-    path : path-like
-        File to write.
-
     Raises
     ------
     OutputError
@@ -92,17 +85,16 @@ def _numbered_sections(content: ReportContent) -> list[dict[str, Any]]:
     """Sections with an anchor each and their figures as JSON with a number through the whole page."""
     numbered, count = [], 0
     for index, section in enumerate(content.sections, start=1):
-        figures = []
-        for figure in section.figures:
-            count += 1
-            figures.append(
-                {
-                    "number": count,
-                    "caption": figure.caption,
-                    "json": chart_json(figure.chart),
-                    "height": int(figure.chart.layout.height or 400),
-                }
-            )
+        figures = [
+            {
+                "number": number,
+                "caption": figure.caption,
+                "json": chart_json(figure.chart),
+                "height": int(figure.chart.layout.height or 400),
+            }
+            for number, figure in enumerate(section.figures, start=count + 1)
+        ]
+        count += len(figures)
         numbered.append({"anchor": f"section-{index}", "section": section, "figures": figures})
     return numbered
 

@@ -272,7 +272,6 @@ def add_gap_limits(
 ) -> None:
     """Draw the air gap as a horizontal limit, or as a strip where its limits differ visibly."""
     lower, upper = sorted((sign * MICRO * gap.lower, sign * MICRO * gap.upper))
-    place = {"row": row, "col": column}
     if upper - lower >= VISIBLE_GAP:
         figure.add_hrect(
             y0=lower,
@@ -281,16 +280,17 @@ def add_gap_limits(
             line_width=0,
             name="air gap, lower to upper limit",
             showlegend=legend,
-            **place,
+            row=row,
+            col=column,
         )
     else:
-        add_level(figure, 0.5 * (lower + upper), "air gap", legend=legend, **place)
+        add_level(figure, 0.5 * (lower + upper), "air gap", row=row, column=column, legend=legend)
 
 
-def add_level(figure: go.Figure, value: float, name: str, *, row: int, col: int, legend: bool) -> None:
+def add_level(figure: go.Figure, value: float, name: str, *, row: int, column: int, legend: bool) -> None:
     """Draw a horizontal limit with an entry in the legend."""
     line = {"color": LIMIT, "width": 1, "dash": "dash"}
-    figure.add_hline(y=value, line=line, name=plain(name), showlegend=legend, row=row, col=col)
+    figure.add_hline(y=value, line=line, name=plain(name), showlegend=legend, row=row, col=column)
 
 
 def fit_legend(figure: go.Figure) -> go.Figure:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import IO, TYPE_CHECKING
 from unicodedata import category
 
-from rotordrop.report.content import Cell, Level, ReportContent, Statement, Table
+from rotordrop.report.content import Card, Cell, Column, Level, ReportContent, Statement, Table, table
 from rotordrop.report.quantity import THIN_SPACE, Quantity
 
 if TYPE_CHECKING:
@@ -20,17 +20,10 @@ MARKS: dict[Level, tuple[str, str]] = {
 
 
 def print_summary(content: ReportContent, console: Console | None = None) -> None:
-    """Print title, verdict, headline numbers and summary tables of a report.
+    """Print title, verdict, headline numbers and summary tables of a report, by default on standard output.
 
     Colours follow the terminal: none with ``NO_COLOR`` set or when the output is not a terminal. Names from
     files cannot switch colours on.
-
-    Parameters
-    ----------
-    content : ReportContent
-        What the report says.
-    console : rich.console.Console, optional
-        Where to print; standard output by default.
     """
     console = console or summary_console()
     for part in _parts(content):
@@ -64,16 +57,13 @@ def _parts(content: ReportContent) -> list[RenderableType]:
 
 def _cards(content: ReportContent) -> RenderableType:
     """Headline numbers, one column per bearing."""
-    labels = list(dict.fromkeys(figure.label for card in content.cards for figure in card.figures))
-    rows = []
-    for label in labels:
-        cells: list[Cell] = [label]
-        for card in content.cards:
-            found = next((figure.value for figure in card.figures if figure.label == label), "")
-            cells.append(found)
-        rows.append(tuple(cells))
-    columns = ("", *(card.title for card in content.cards))
-    return _table(Table(columns=columns, rows=tuple(rows)))
+
+    def of(card: Card) -> Column:
+        values: dict[str, Cell] = {figure.label: figure.value for figure in card.figures}
+        return Column(card.title, lambda label: values.get(label, ""))
+
+    labels = dict.fromkeys(figure.label for card in content.cards for figure in card.figures)
+    return _table(table(labels, (Column("", str), *map(of, content.cards))))
 
 
 def _statement(statement: Statement) -> RenderableType:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
@@ -85,22 +86,10 @@ def time_panels(
     together: bool = False,
     from_power_off: bool = True,
 ) -> go.Figure:
-    """Draw panels in rows and columns against the time from power-off.
+    """Draw rows of panels of a height [px] against the time from power-off, scaled from SI to a unit.
 
-    Parameters
-    ----------
-    rows : sequence of sequence of Panel
-        As many panels in each row.
-    scale, unit : float, str
-        Factor from SI units to the shown unit, and the unit.
-    height : int
-        Height of one panel [pixels].
-    from_zero : bool
-        Whether the vertical axes begin at zero.
-    together : bool
-        Whether all panels zoom together in time, and not only those of a column.
-    from_power_off : bool
-        Whether the time axes begin at power-off; else every panel at its own first sample.
+    The vertical axes begin at zero with ``from_zero``; all panels zoom ``together`` in time, else those of a
+    column; without ``from_power_off`` every panel begins at its own first sample.
     """
     columns = len(rows[0])
     titles = [panel.title for row in rows for panel in row]
@@ -132,22 +121,21 @@ def _draw(
         legend.add(name)
         return new
 
+    place: dict[str, Any] = {"row": row, "column": column}
     if panel.band is not None:
-        add_band(figure, panel.band, scale, unit, row=row, column=column, legend=first(panel.band.label))
+        add_band(figure, panel.band, scale, unit, **place, legend=first(panel.band.label))
     compared = len({history.role for history in panel.histories}) > 1
     ordered = sorted(enumerate(panel.histories), key=lambda entry: compared and entry[1].role == "measured")
     for index, history in ordered:
         line = line_style(history.role, index + 4 * (column - 1)) if panel.series else None
         if compared and not panel.series:
             line = compared_style(history.role)
-        add_history(
-            figure, history, scale, unit, row=row, column=column, legend=first(history.label), line=line
-        )
+        add_history(figure, history, scale, unit, **place, legend=first(history.label), line=line)
     if panel.air_gap is not None:
         for sign in panel.gap_signs:
-            add_gap_limits(figure, panel.air_gap, sign=sign, row=row, column=column, legend=first("air gap"))
+            add_gap_limits(figure, panel.air_gap, sign=sign, **place, legend=first("air gap"))
     for name, level in panel.levels:
-        add_level(figure, scale * level, name, row=row, col=column, legend=first(name))
+        add_level(figure, scale * level, name, **place, legend=first(name))
     if panel.peak is not None:
         _mark(figure, panel.peak, scale, unit, row, column)
     figure.update_yaxes(title_text=axis_title(panel.axis, unit), row=row, col=column)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,15 +34,24 @@ LEAST_SECOND_DIRECTION = 0.05
 
 @dataclass(frozen=True, kw_only=True)
 class Check:
-    """One consistency check: what was compared, whether it passed, and what to look at when it did not.
-
-    ``note`` tells what is worth knowing although it passed; empty where there is nothing.
-    """
+    """One consistency check: what was compared, whether it passed, and what to look at when it did not."""
 
     name: str
     passed: bool
     message: str
+    """What was compared; of one unknown it is said what that unknown does."""
     note: str = ""
+    """What is worth knowing although it passed; empty where there is nothing."""
+    path: str = ""
+    """The unknown that message and note are about, where they are about one."""
+
+    def said(self, name_of: Callable[[str], str] = str) -> str:
+        """What was compared, with the unknown by its path or by another name."""
+        return f"{name_of(self.path)} {self.message}" if self.path else self.message
+
+    def noted(self, name_of: Callable[[str], str] = str) -> str:
+        """What is worth knowing, with the unknown by its path or by another name."""
+        return f"{name_of(self.path)} {self.note}" if self.note and self.path else self.note
 
 
 def judged_by(problem: DropProblem, likeliest: Forward, usual: Forward) -> Forward:
@@ -170,7 +180,8 @@ def direction_check(problem: DropProblem, smoothed: Smoothed) -> Check:
 def _parameter_check(problem: DropProblem, smoothed: Smoothed) -> Check:
     """Parameters of the machine against what was known of them."""
     path, departure = _farthest(problem, smoothed, "machine")
-    return Check(name="parameters", passed=departure < PARAMETER_LIMIT, message=_departs(path, departure))
+    passed = departure < PARAMETER_LIMIT
+    return Check(name="parameters", passed=passed, message=_departs(departure), path=path)
 
 
 def _nuisance_check(problem: DropProblem, smoothed: Smoothed, white: bool) -> Check:
@@ -181,9 +192,9 @@ def _nuisance_check(problem: DropProblem, smoothed: Smoothed, white: bool) -> Ch
     """
     path, departure = _farthest(problem, smoothed, "drop")
     usual = departure < PARAMETER_LIMIT
-    message = _departs(path, departure)
+    message = _departs(departure)
     note = "" if usual or not white else f"{message}; the readings are followed all the same"
-    return Check(name="unknowns of the drop", passed=usual or white, message=message, note=note)
+    return Check(name="unknowns of the drop", passed=usual or white, message=message, note=note, path=path)
 
 
 def _remanence_check(problem: DropProblem, smoothed: Smoothed) -> Check:
@@ -221,5 +232,5 @@ def _farthest(problem: DropProblem, smoothed: Smoothed, scope: str) -> tuple[str
     return path, float(departure)
 
 
-def _departs(path: str, departure: float) -> str:
-    return f"{path} departs by {departure:.1f} prior standard deviations (limit {PARAMETER_LIMIT:g})"
+def _departs(departure: float) -> str:
+    return f"departs by {departure:.1f} prior standard deviations (limit {PARAMETER_LIMIT:g})"

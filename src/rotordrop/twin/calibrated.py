@@ -404,7 +404,7 @@ def calibration_json(calibration: Calibration) -> dict[str, object]:
             for c in calibration.confounded
         ],
         "checks": {
-            name: [{"name": c.name, "passed": c.passed, "message": c.message} for c in checks]
+            name: [{"name": c.name, "passed": c.passed, "message": c.said()} for c in checks]
             for name, checks in calibration.checks.items()
         },
         "consistent": calibration.consistent,

@@ -127,7 +127,7 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
         ),
         notes=(
             *twin_assumptions(evidence, problem),
-            *(check.note for check in drop.checks if check.note),
+            *(check.noted() for check in drop.checks if check.note),
             *(f"a further number: {one.sentence()}" for one in advice),
             *unbalance_notes(unbalance),
             *(quick if method.quick else ()),
@@ -245,7 +245,7 @@ def _refuse_unchecked(drop: TrackedDrop) -> None:
         return
     raise IdentificationError(
         f"the model does not fit the record {drop.evidence.name} "
-        f"({'; '.join(check.message for check in failed)}), and "
+        f"({'; '.join(check.said() for check in failed)}), and "
         "nothing can check its force; expected a model that fits, or both directions in two planes. "
         "Calibrate on drops with all sensors, estimate without --quick, or leave this drop out."
     )

@@ -24,7 +24,7 @@ from rotordrop.report.estimate_numbers import identified_table
 from rotordrop.report.estimate_page import estimate_page
 from rotordrop.report.page import render_page
 from rotordrop.report.quantity import Quantity
-from rotordrop.report.replay_tables import (
+from rotordrop.report.replay_sections import (
     contact_time_table,
     correlation_table,
     first_contact_table,

@@ -54,7 +54,7 @@ def test_the_head_names_the_drop(
     assert judged["nis"] == workshop.judged.nis
     assert judged["process_noise_factor"] == workshop.noise_factor
     assert [(c["name"], c["passed"], c["message"]) for c in judged["checks"]] == [
-        (c.name, c.passed, c.message) for c in workshop.checks
+        (c.name, c.passed, c.said()) for c in workshop.checks
     ]
     assert document["verdict"] == tracked.verdict.value and judged["sentence"] == tracked.sentence
 
