@@ -99,17 +99,19 @@ Data = Annotated[
 Force = Annotated[bool, Option("--force", help="Overwrite what stands there already.")]
 TextFile = Annotated[Path | None, file_option("--output", "Write to FILE instead of printing.", "-o")]
 Report = Annotated[Path | None, file_option("--report", "Write the report, one offline HTML file.")]
-Profile = Annotated[Path | None, file_option("--profile", "Channel map of the recorder.")]
+Profile = Annotated[Path | None, file_option("--profile", "Profile of the recorder, for its tails too.")]
 Tail = Annotated[
     list[Path] | None,
     file_option("--tail", "Settled tail: one for all drops, or one for each in order."),
 ]
-TailProfile = Annotated[
-    Path | None, file_option("--tail-profile", "Channel map of the recorder of the tails.")
-]
+TailProfile = Annotated[Path | None, file_option("--tail-profile", "Another profile for the tails.")]
 Planes = Annotated[
     list[str] | None,
-    Option("--map", metavar="PLANE", help='A plane and its channels: "NDE: X1 0 deg, Y1 90 deg".'),
+    Option(
+        "--map",
+        metavar="TEXT",
+        help='Channels of a plane, "NDE: X1 0 deg, Y1 90 deg", or of a sensor, "S_NDE_A=X1"; repeatable.',
+    ),
 ]
 Threads = Annotated[
     int | None, Option("--threads", min=1, metavar="N", help="Threads; all cores by default.")

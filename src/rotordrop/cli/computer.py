@@ -26,7 +26,7 @@ USUAL_PORT = 8737
 """Where the page is served; chosen, not measured."""
 
 EXTRAS = {
-    "io": ("recordings of TDMS, UFF and Excel, shaft tables of Excel", ("npTDMS", "pyuff", "openpyxl")),
+    "io": ("recordings of TDMS and Excel, shaft tables of Excel", ("npTDMS", "openpyxl")),
     "xarray": ("to_xarray(), to_dataframe()", ("xarray", "h5netcdf")),
     "parquet": ("histories as Parquet", ("pyarrow",)),
     "postgres": ("a log of drops in PostgreSQL", ("psycopg",)),

@@ -39,6 +39,7 @@ def estimate(
         Path | None, file_option("--fixed", "Replay: use the support of this earlier estimate.")
     ] = None,
     quick: Annotated[bool, Option("--quick", help="One pass; for a calibrated machine.")] = False,
+    mapping: options.Planes = None,
     profile: options.Profile = None,
     tail_profile: options.TailProfile = None,
     report: Annotated[
@@ -89,7 +90,7 @@ def estimate(
     if output is not None:
         require_format(output)
     require_places(json, *reports, *outputs)
-    read, tails = _read(description, records, tail or [], profile, tail_profile)
+    read, tails = _read(description, records, tail or [], mapping or (), profile, tail_profile)
     chosen = Tracked(quick=quick) if method is Method.tracked else Replay(fixed=fixed)
     with progress_bar("estimating") as progress:
         estimates = estimate_drops(description, read, tails, method=chosen, progress=progress)
@@ -158,20 +159,28 @@ def _read(
     machine: Machine,
     records: Sequence[Path],
     tails: Sequence[Path],
+    mapping: Sequence[str],
     profile: Path | None,
     tail_profile: Path | None,
 ) -> tuple[list[Record], list[Record | None]]:
     """Every record and its settled tail: one for all, one for each in order, or none."""
     from rotordrop.record.record import read_record
 
-    read = [read_record(path, machine, profile=profile) for path in records]
+    read = [read_record(path, machine, profile=profile, mapping=mapping) for path in records]
     if len(tails) not in (0, 1, len(records)):
         raise UsageError(
             f"{len(tails)} tails for {len(records)} records; expected one for all, one for each, or none. "
             "Repeat --tail in the order of the records."
         )
     found: list[Record | None] = [
-        read_record(path, machine, profile=tail_profile or profile) for path in tails
+        read_record(
+            path,
+            machine,
+            profile=tail_profile or profile,
+            mapping=() if tail_profile else mapping,
+            tail=True,
+        )
+        for path in tails
     ]
     return read, found if len(found) == len(read) else (found or [None]) * len(read)
 
@@ -181,6 +190,7 @@ def calibrate(
     records: options.Records,
     output: Annotated[Path, file_option("--output", "Calibrated machine file to write (.toml).", "-o")],
     tail: options.Tail = None,
+    mapping: options.Planes = None,
     profile: options.Profile = None,
     tail_profile: options.TailProfile = None,
     even_if_inconsistent: Annotated[
@@ -200,7 +210,7 @@ def calibrate(
 
     require_own_drops(records)
     description = load_machine(machine)
-    read, tails = _read(description, records, tail or [], profile, tail_profile)
+    read, tails = _read(description, records, tail or [], mapping or (), profile, tail_profile)
     for record, rest in zip(read, tails, strict=True):
         refuse_unusable(check_record(record, description, rest), record.name)
     with progress_bar("calibrating") as report:

@@ -15,7 +15,7 @@ from typer import Argument, Option
 
 from rotordrop.cli import _options as options
 from rotordrop.cli._options import file_option, measured, refuse_beside, text_option
-from rotordrop.cli._output import deliver, deliver_text, require_places
+from rotordrop.cli._output import STANDARD_OUTPUT, console, deliver, deliver_text, require_places
 from rotordrop.errors import OutputError, UsageError
 
 if TYPE_CHECKING:
@@ -83,7 +83,10 @@ def init(
     numbers = locals()
     given: dict[str, str | None] = {name: numbers[name] for name in _QUESTIONS}
     if simple:
-        deliver_text(_simple_text(given, preload), target or TEMPLATE_FILE, overwrite=force)
+        made = target or TEMPLATE_FILE
+        deliver_text(_simple_text(given, preload), made, overwrite=force)
+        if made != STANDARD_OUTPUT:
+            console(sys.stderr).print(f"next: rotordrop look RECORD {made}", soft_wrap=True)
         return
     if any(value is not None for value in (*given.values(), preload)):
         raise UsageError("numbers of a machine belong to --simple; add it")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -50,11 +51,11 @@ def look(
             "--split needs the machine file too: rotordrop look both.h5 machine.toml --split parts"
         )
     if split is not None:
-        others = {"--gap": gap, "--speed": speed, "--map": mapping, "--report": report, "--json": json}
+        others = {"--gap": gap, "--speed": speed, "--report": report, "--json": json}
         refuse_beside("--split", others)
     described = _loaded(machine)
     if split is not None and described is not None:
-        _split(record, described, split, profile)
+        _split(record, described, split, mapping or (), profile)
         return
     from rotordrop.evidence.look import look as look_at
     from rotordrop.report.look_page import look_page
@@ -72,13 +73,15 @@ def _loaded(machine: Path | None) -> Machine | None:
     return None if machine is None else load_machine(machine)
 
 
-def _split(record: Path, machine: Machine, folder: Path, profile: Path | None) -> None:
+def _split(
+    record: Path, machine: Machine, folder: Path, mapping: Sequence[str], profile: Path | None
+) -> None:
     """Cut a recording with several drops into one record for each; no sample is changed."""
     from rotordrop.evidence.paths import split_drops
     from rotordrop.files import make_folder
     from rotordrop.record.record import read_record, save_record
 
-    parts = split_drops(read_record(record, machine, profile=profile))
+    parts = split_drops(read_record(record, machine, profile=profile, mapping=mapping))
     places = [folder / f"{part.name}.h5" for part in parts]
     if len(parts) == 1:
         console().print(f"{record} holds one drop; nothing to split.")
@@ -96,8 +99,9 @@ def profile(
     machine: Annotated[Path | None, file_option("--machine", "Machine whose sensors need a channel.")] = None,
     channel: Annotated[
         list[str] | None,
-        text_option("SENSOR=CHANNEL", "Channel of a sensor of the machine; repeatable."),
+        text_option("SENSOR=CHANNEL", "Channel of a sensor of the machine, as by --map; repeatable."),
     ] = None,
+    mapping: options.Planes = None,
     unit: Annotated[str | None, Option(help="Unit of displacements that name none, um.")] = None,
     sensitivity: Annotated[str | None, Option(help='Volts per length, "8 mV/um".')] = None,
     full_scale: Annotated[str | None, Option(help='Full scale of a WAV file, "500 um".')] = None,
@@ -117,18 +121,11 @@ def profile(
     Example: rotordrop profile record.csv
     """
     from rotordrop.record.columns import guess_profile
-    from rotordrop.record.profile import profile_of, save_profile
+    from rotordrop.record.profile import profile_of, rules_of, save_profile
     from rotordrop.record.readers import read_recording
 
-    channels = {}
-    for text in channel or []:
-        sensor, equals, name = text.partition("=")
-        if not equals:
-            raise UsageError(f'{text!r} is not SENSOR=CHANNEL; write for example --channel "S_NDE_A=X1"')
-        channels[sensor.strip()] = name.strip()
     entries: dict[str, Any] = {
         "format": file_format,
-        "channels": channels,
         "unit": unit,
         "sensitivity": sensitivity,
         "full_scale": full_scale,
@@ -148,7 +145,7 @@ def profile(
         for key, entry in entries.items()
         if entry is not None
     }
-    given = profile_of(told, "the options")
+    given = rules_of(profile_of(told, "the options"), [*(channel or []), *(mapping or [])])
     described = _loaded(machine)
     guess = guess_profile(
         read_recording(record, given), given, () if described is None else described.sensors
@@ -262,6 +259,7 @@ def waterfall(
         float | None,
         measured("frequency", "Highest frequency drawn; as far as anything happens when left out."),
     ] = None,
+    mapping: options.Planes = None,
     profile: options.Profile = None,
     output: Annotated[
         Path | None, file_option("--output", "Write waterfalls, envelopes, orders and speed as HDF5.", "-o")
@@ -284,7 +282,7 @@ def waterfall(
     from rotordrop.spectrum.waterfall import WaterfallSettings
 
     described = load_machine(machine)
-    signal, simulated = _signal(described, record, profile)
+    signal, simulated = _signal(described, record, mapping or (), profile)
     if against is Against.speed and signal.profile is None:
         raise UsageError(f"--against speed: {record} has no rotor speed; use --against time")
     choice = WaterfallChoice(
@@ -315,7 +313,9 @@ def waterfall(
     deliver(found.as_json(), json, page, report=report, data=data)
 
 
-def _signal(machine: Machine, path: Path, profile: Path | None) -> tuple[CoastDownSignal, str]:
+def _signal(
+    machine: Machine, path: Path, mapping: Sequence[str], profile: Path | None
+) -> tuple[CoastDownSignal, str]:
     """Open a recording or a simulated file, with the sentence that says it is simulated."""
     from rotordrop.estimate.recorded_coast_down import recorded_coast_down
     from rotordrop.estimate.simulated_coast_down import simulated_coast_down
@@ -326,5 +326,5 @@ def _signal(machine: Machine, path: Path, profile: Path | None) -> tuple[CoastDo
     if is_coast_down(path):
         text = "Everything on this page is computed from the machine description; nothing was measured."
         return simulated_coast_down(path, machine), text
-    record = read_record(path, machine, profile=profile)
+    record = read_record(path, machine, profile=profile, mapping=mapping)
     return recorded_coast_down(machine, record), SIMULATED_RECORD if record.is_simulated else ""

@@ -16,10 +16,8 @@ from rotordrop.evidence.quality.channels import check_channels
 from rotordrop.evidence.quality.finding import refuse_unusable
 from rotordrop.evidence.quality.recorder import check_clock
 from rotordrop.known import NINETY
-from rotordrop.record.arrangement import arrangement_of
-from rotordrop.record.profile import Profile, load_profile
-from rotordrop.record.readers import read_recording
-from rotordrop.record.record import Record, record_of, sha256_of
+from rotordrop.record.profile import Profile, rules_of
+from rotordrop.record.record import Record, open_record
 from rotordrop.record.recording import Array
 from rotordrop.series import noise_by_differences
 
@@ -129,7 +127,7 @@ def measure_clearance(
     machine : Machine, optional
         Carries the motion along the straight line through the sensor planes to the touchdown bearings.
     mapping : sequence of str
-        Planes with channels and angles, ``"NDE: X1 0 deg, Y1 90 deg"``, where there is no machine.
+        Planes with channels and angles, ``"NDE: X1 0 deg, Y1 90 deg"``, or sensors, ``"S_NDE_A = X1"``.
     profile : Profile or path-like, optional
         Reading rules of the recorder.
 
@@ -142,7 +140,8 @@ def measure_clearance(
     -----
     Not validated: the weight bends and tilts the shaft between the pushes, which is left out.
     """
-    read = record if isinstance(record, Record) else _read(Path(record), machine, mapping, profile)
+    rules = rules_of(profile, mapping)
+    read = record if isinstance(record, Record) else open_record(record, machine, profile=rules)[0]
     refuse_unusable([*check_clock(read, drop=False), *check_channels(read)], read.name)
     path = _averaged(read.motion, read.sampling_rate)
     names = [plane.bearing for plane in read.planes]
@@ -173,15 +172,6 @@ def _wear(before: Clearance, after: Clearance) -> Wear:
         interval_90=(growth - reach, growth + reach),
         moved=after.centre - before.centre,
     )
-
-
-def _read(
-    path: Path, machine: Machine | None, mapping: Sequence[str], profile: Profile | str | Path | None
-) -> Record:
-    rules = profile if isinstance(profile, Profile) else load_profile(profile) if profile else Profile()
-    recording = read_recording(path, rules)
-    sensors = machine.sensors if machine is not None else arrangement_of(recording, mapping).sensors
-    return record_of(recording, sensors, profile=rules, path=path, sha256=sha256_of(path))
 
 
 def _averaged(path: Array, rate: float) -> Array:

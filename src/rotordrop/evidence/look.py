@@ -29,10 +29,9 @@ from rotordrop.evidence.quality.finding import ranked
 from rotordrop.evidence.quality.recorder import check_blocks, check_clock
 from rotordrop.evidence.synchronous import Synchronous, synchronous_motion
 from rotordrop.json_schema import DIALECT, FLAG, MAYBE, NUMBER, PAIR, TEXT, TEXTS, closed, listed
-from rotordrop.record.arrangement import Arrangement, arrangement_of
-from rotordrop.record.profile import Profile, SpeedSource, load_profile
-from rotordrop.record.readers import read_recording
-from rotordrop.record.record import Record, record_of, sha256_of
+from rotordrop.record.arrangement import Arrangement
+from rotordrop.record.profile import Profile, SpeedSource, rules_of
+from rotordrop.record.record import Record, open_record
 from rotordrop.units import in_si
 
 if TYPE_CHECKING:
@@ -225,7 +224,7 @@ def look(
     speed : float or str, optional
         Shaft speed before the drop [rad/s], or a text such as "60 Hz", where the recording has none.
     mapping : sequence of str
-        Planes with channels and angles, ``"NDE: X1 0 deg, Y1 90 deg"``.
+        Planes with channels and angles, ``"NDE: X1 0 deg, Y1 90 deg"``, or sensors, ``"S_NDE_A = X1"``.
     profile : Profile or path-like, optional
         Reading rules of the recorder.
 
@@ -283,16 +282,10 @@ def _read(
 ) -> tuple[Record, Arrangement | None]:
     if isinstance(record, Record):
         return record, None
-    path = FilePath(record)
-    rules = profile if isinstance(profile, Profile) else load_profile(profile) if profile else Profile()
+    rules = rules_of(profile, mapping)
     if speed is not None:
         rules = rules.model_copy(update={"speed": SpeedSource(constant=f"{speed!r} rad/s")})
-    recording = read_recording(path, rules)
-    arrangement = None if machine is not None else arrangement_of(recording, mapping)
-    sensors = machine.sensors if machine is not None else arrangement.sensors if arrangement else ()
-    if machine is None:
-        rules = rules.model_copy(update={"channels": {}})
-    return record_of(recording, sensors, profile=rules, path=path, sha256=sha256_of(path)), arrangement
+    return open_record(record, machine, profile=rules)
 
 
 def _checked(record: Record, machine: Machine | None) -> tuple[Finding, ...]:

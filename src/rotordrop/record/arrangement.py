@@ -1,21 +1,56 @@
-"""Which channels of a recording look at the shaft in which plane, with nothing known of the machine."""
+"""Which channels of a recording look at the shaft in which plane, by their names or as it was said."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import RecordError, UsageError
 from rotordrop.known import Known
-from rotordrop.record.recording import Channel, Recording
+from rotordrop.record.profile import Profile
+from rotordrop.record.recording import FULL_SCALE, Channel, Recording, listed
 from rotordrop.units import parse_quantity
 
-_LENGTHS = ("m", "mm", "um", "nm", "mil", "in", "V", "mV", "")
-_AXES = ("XY", "AB", "HV", "UW", "VW", "12")
-_ENTRY = re.compile(r"\s*(?P<channel>.+?)\s+(?P<angle>[+-]?[0-9.]+\s*(?:°|deg|rad))\s*")
+_LENGTHS = ("m", "mm", "um", "nm", "mil", "in", "V", "mV", FULL_SCALE, "")
+_AXES = ("XY", "HV", "UW", "VW", "LR", "+-", "AB", "12")
+"""Letters of two axes, the surest first: A and B may be bearings, 1 and 2 anything."""
+
+_WORDS = {
+    "H": r"horiz(?:ontal)?|hor|waager?echt|waagrecht",
+    "V": r"vert(?:ical|ikal)?|ver|senkrecht",
+    "L": r"left|links",
+    "R": r"right|rechts",
+}
+_SPOKEN = {
+    letter: re.compile(rf"(?<![^\W_])(?:{words})(?![^\W_])", re.IGNORECASE)
+    for letter, words in _WORDS.items()
+}
+
+_COUNTER = re.compile(
+    r"^(?:(?:channel|chan|ch|kanal|input|in|ai|voie|trace|#)[ _.#:-]*)?"
+    r"[(\[]?\d{1,3}[)\]]?[ _.:;/|-]+(?=.*[^\W\d_])",
+    re.IGNORECASE,
+)
+"""A number of the channel in front of its tag, as in "Ch1 VE-101X", "3:NDE X", "[2] X"."""
+
+_SENSOR = re.compile(r"^(?:S|P|CH|SENSOR|PROBE)[ _-]", re.IGNORECASE)
+_ONLY_COUNTED = re.compile(
+    r"(?:channel|chan|ch|kanal|c|ai|input|in|voie|trace|column)[ _.-]*(?:\d{1,3}|[a-d])", re.IGNORECASE
+)
+"""A name that only counts channels: CH1, C2, Channel A."""
+
+_NO_READING = re.compile(
+    r"(status|state|flags?|alarm|trigger|valid|quality|counter|index|event)\b", re.IGNORECASE
+)
+_KKS = re.compile(r"[A-Z]{3}\d{2} ?C[A-Z]\d{2}$", re.IGNORECASE)
+"""End of a tag of a power station (KKS) before the last digit of its measuring point, "10MKA11CY01"."""
+
+_ENTRY = re.compile(r"\s*(?P<channel>.+?)(?:\s+(?P<angle>[+-]?[0-9.]+\s*(?:°|deg|rad)))?\s*")
+_SAME_ANGLE = math.radians(3.0)
+"""How far a given angle and that of the machine may differ to be the same sensor (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,55 +59,70 @@ class Arrangement:
 
     sensors: tuple[Sensor, ...]
     """One per channel used; the node numbers the plane, counted from 1."""
+    channels: Mapping[str, str]
+    """Name of a sensor -> label of its channel."""
     angles_known: bool
     """Whether the angles were given; else two sensors of a plane are taken as perpendicular."""
     notes: tuple[str, ...]
     """Guesses in words."""
 
 
-def arrangement_of(recording: Recording, given: Sequence[str] = ()) -> Arrangement:
+def arrangement_of(recording: Recording, profile: Profile) -> Arrangement:
     """Pair the displacement channels of a recording into planes.
 
     Parameters
     ----------
     recording : Recording
         The channels.
-    given : sequence of str
-        One text per plane, ``"NDE: X1 0 deg, Y1 90 deg"``; where empty, names that differ in one letter only
-        (X and Y, A and B, H and V, 1 and 2) are a pair.
+    profile : Profile
+        Its planes, else its names for the channels; where it has neither, names that differ in one letter or
+        word only (X and Y, A and B, H and V, left and right) are a pair.
 
     Raises
     ------
     RecordError
         When no pair is found.
     UsageError
-        When a text cannot be read.
+        When a plane of the profile cannot be read.
     """
-    if given:
-        planes = [_given_plane(text, recording) for text in given]
-        sensors = [
-            _sensor(channel, name, number, angle)
-            for number, (name, entries) in enumerate(planes, start=1)
-            for channel, angle in entries
-        ]
-        return Arrangement(sensors=tuple(sensors), angles_known=True, notes=())
-    pairs = _pairs([channel for channel in recording.channels if channel.unit in _LENGTHS])
-    if not pairs:
-        names = ", ".join(channel.label for channel in recording.channels)
+    known = False
+    notes: tuple[str, ...] = ()
+    if profile.planes:
+        planes = given_planes(recording, profile)
+        known = all(angle is not None for _, entries in planes for _, angle in entries)
+    else:
+        named = {name: fitting(recording.channels, label) for name, label in profile.channels.items()}
+        called = {id(hits[0]): name for name, hits in named.items() if len(hits) == 1}
+        pairs, guessed = pairs_of(recording.channels, lambda channel: called.get(id(channel), channel.name))
+        planes = [(name, [(channel, None) for channel in pair]) for name, pair in pairs]
+        spoken = "; ".join(f"{name}: {pair[0].label} and {pair[1].label}" for name, pair in pairs)
+        notes = (f"planes by the {guessed} of the channels ({spoken}), their sensors taken as perpendicular",)
+    if not planes:
+        labels = [channel.label for channel in recording.channels if _may_read(channel)]
+        if len(labels) < 2:
+            have = listed(f"{channel.label} in {channel.unit or '?'}" for channel in recording.channels)
+            raise RecordError(
+                f"the recording holds {len(labels)} channels that can be displacements (in a unit of length "
+                f"or in volts); a plane needs two. It has {have}: export two of a plane together"
+            )
         raise RecordError(
-            f"no two channels of {names} are a pair by their names (X and Y, A and B, H and V); name them, "
-            'for example --map "NDE: X1 0 deg, Y1 90 deg"'
+            f"no two channels of {listed(channel.label for channel in recording.channels)} are a pair by "
+            "their names (X and Y, A and B, H and V, left and right); say which look at one plane, for "
+            f'example --map "NDE: {labels[0]} 0 deg, {labels[1]} 90 deg"'
         )
     sensors = [
-        _sensor(channel, name, number, angle)
-        for number, (name, pair) in enumerate(pairs, start=1)
-        for channel, angle in zip(pair, (0.0, math.pi / 2), strict=True)
+        _sensor(channel, name, number, place * math.pi / 2 if angle is None else angle)
+        for number, (name, entries) in enumerate(planes, start=1)
+        for place, (channel, angle) in enumerate(entries)
     ]
-    spoken = "; ".join(f"{name}: {pair[0].label} and {pair[1].label}" for name, pair in pairs)
+    labels = [channel.label for _, entries in planes for channel, _ in entries]
+    if len({sensor.name for sensor in sensors}) < len(sensors):  # "X" of one plane and "X" of the next
+        sensors = [s.model_copy(update={"name": label}) for s, label in zip(sensors, labels, strict=True)]
     return Arrangement(
         sensors=tuple(sensors),
-        angles_known=False,
-        notes=(f"planes by the names of the channels ({spoken}), their sensors taken as perpendicular",),
+        channels={sensor.name: label for sensor, label in zip(sensors, labels, strict=True)},
+        angles_known=known,
+        notes=notes,
     )
 
 
@@ -91,46 +141,133 @@ def _sensor(channel: Channel, plane: str, number: int, angle: float) -> Sensor:
     )
 
 
-def _given_plane(text: str, recording: Recording) -> tuple[str, list[tuple[Channel, float]]]:
-    name, colon, rest = text.partition(":")
-    entries = [_ENTRY.fullmatch(entry) for entry in rest.split(",")]
-    if not colon or len(entries) < 2 or not all(entries):
-        raise UsageError(
-            f'{text!r} is not "PLANE: CHANNEL angle, CHANNEL angle"; write for example '
-            '"NDE: X1 0 deg, Y1 90 deg"'
-        )
-    found = []
-    for entry in entries:
-        assert entry is not None
-        hits = [c for c in recording.channels if entry["channel"] in (c.label, c.name)]
-        if len(hits) != 1:
-            known = ", ".join(channel.label for channel in recording.channels)
-            raise UsageError(f"{text!r}: there is no channel {entry['channel']!r}; there are {known}")
-        found.append((hits[0], parse_quantity(entry["angle"], "angle")))
-    return name.strip(), found
+def given_planes(
+    recording: Recording, profile: Profile
+) -> list[tuple[str, list[tuple[Channel, float | None]]]]:
+    """The planes of a profile: their names, and each channel with its angle [rad] where that is given."""
+    planes = []
+    for name, text in profile.planes.items():
+        entries = [_ENTRY.fullmatch(entry) for entry in text.split(",")]
+        found: list[tuple[Channel, float | None]] = []
+        for entry in entries:
+            hits = fitting(recording.channels, entry["channel"]) if entry else []
+            if entry is None or len(hits) != 1 or len(entries) < 2:
+                have = listed(channel.label for channel in recording.channels)
+                what = (
+                    f"there is no channel {entry['channel']!r}" if entry and not hits else "it is not clear"
+                )
+                raise UsageError(
+                    f'the plane "{name}: {text}": {what}; write "PLANE: CHANNEL angle, CHANNEL angle", as '
+                    f'"NDE: X1 0 deg, Y1 90 deg"; there are {have}'
+                )
+            found.append((hits[0], parse_quantity(entry["angle"], "angle") if entry["angle"] else None))
+        planes.append((name, found))
+    return planes
 
 
-def _pairs(channels: Sequence[Channel]) -> list[tuple[str, tuple[Channel, Channel]]]:
-    """Channels whose names differ only in one letter that names an axis, in the order of the file."""
+def sensors_of_planes(recording: Recording, sensors: Sequence[Sensor], profile: Profile) -> dict[str, str]:
+    """Channel of each sensor of the machine by the planes of a profile: by angle, or in their order.
+
+    Raises
+    ------
+    UsageError
+        When the machine has no such plane or its sensors stand at other angles.
+    """
+    mapped: dict[str, str] = {}
+    for name, entries in given_planes(recording, profile):
+        members = [sensor for sensor in sensors if (sensor.bearing or "").lower() == name.lower()]
+        stand = ", ".join(f"{s.name} at {math.degrees(float(s.angle)):.4g} deg" for s in members)
+        if len(members) != len(entries):
+            known = listed(dict.fromkeys(sensor.bearing or "" for sensor in sensors))
+            raise UsageError(
+                f"the plane {name!r} names {len(entries)} channels; the machine has "
+                + (f"{len(members)} sensors there ({stand})" if members else f"the planes {known}")
+            )
+        for place, (channel, angle) in enumerate(entries):
+            sensor = members[place]
+            if angle is not None:
+                apart = [abs(math.remainder(angle - float(s.angle), 2 * math.pi)) for s in members]
+                sensor = members[apart.index(min(apart))]
+                if min(apart) > _SAME_ANGLE or sensor.name in mapped:
+                    raise UsageError(
+                        f"the plane {name!r}: {channel.label} at {math.degrees(angle):.4g} deg is none of "
+                        f"the sensors of the machine ({stand}); correct one of them, or leave out "
+                        "the angles where the order is the same"
+                    )
+            mapped[sensor.name] = channel.label
+    return mapped
+
+
+def fitting(channels: Sequence[Channel], wanted: str) -> list[Channel]:
+    """Channels of a name: as the file writes it, without its unit, but for signs, case, counter, prefix."""
+    rules: tuple[Callable[[Channel], bool], ...] = (
+        lambda channel: channel.label == wanted,
+        lambda channel: channel.name == wanted,
+        lambda channel: plain(channel.name) == plain(wanted),
+        lambda channel: plain(_tag(channel.name)) == plain(_tag(wanted)),
+    )
+    return next((hits for rule in rules if (hits := [c for c in channels if rule(c)])), [])
+
+
+def plain(name: str) -> str:
+    """A name without signs and case."""
+    return re.sub(r"[^a-z0-9]", "", name.lower())
+
+
+def _tag(name: str) -> str:
+    """A name without the counter of the channel and without "sensor" in front."""
+    return _SENSOR.sub("", _COUNTER.sub("", name))
+
+
+def _may_read(channel: Channel) -> bool:
+    """Whether a channel can be a displacement: by its unit, and no status or counter by its name."""
+    return channel.unit in _LENGTHS and not _NO_READING.match(channel.name)
+
+
+def pairs_of(
+    channels: Sequence[Channel], called: Callable[[Channel], str] = lambda channel: channel.name
+) -> tuple[list[tuple[str, tuple[Channel, Channel]]], str]:
+    """Channels that look at one plane, in the order of the file, and whether by their names or their order.
+
+    Names of a pair differ only in a letter or word for an axis, once as they are, once without counters.
+    Names that only count (CH1, CH2, …) are taken two by two.
+    """
+    left = [channel for channel in channels if _may_read(channel)]
+    if left and len(left) % 2 == 0 and all(_ONLY_COUNTED.fullmatch(called(channel)) for channel in left):
+        pairs = zip(left[::2], left[1::2], strict=True)
+        return [(f"plane {k}", pair) for k, pair in enumerate(pairs, start=1)], "order"
     found: list[tuple[str, tuple[Channel, Channel]]] = []
-    left = list(channels)
-    for first in channels:
-        for second in channels:
-            if first in left and second in left and (name := _common(first.name, second.name)) is not None:
-                found.append((name or f"plane {len(found) + 1}", (first, second)))
-                left = [channel for channel in left if channel is not first and channel is not second]
-    return found
+    for strip in (False, True):
+        names = {id(channel): _spoken(called(channel), strip) for channel in left}
+        for axes in _AXES:
+            for first in list(left):
+                for second in list(left):
+                    if not any(first is c for c in left) or not any(second is c for c in left):
+                        continue
+                    if (name := _common(names[id(first)], names[id(second)], axes)) is not None:
+                        found.append((name, (first, second)))
+                        left = [c for c in left if c is not first and c is not second]
+    order = {id(channel): place for place, channel in enumerate(channels)}
+    found.sort(key=lambda entry: min(order[id(channel)] for channel in entry[1]))
+    return [(name or f"plane {number}", pair) for number, (name, pair) in enumerate(found, start=1)], "names"
 
 
-def _common(first: str, second: str) -> str | None:
+def _spoken(name: str, strip: bool) -> str:
+    """A name whose words for an axis are letters, on request without the counter of the channel."""
+    name = _COUNTER.sub("", name) if strip else name
+    for letter, words in _SPOKEN.items():
+        name = words.sub(letter, name)
+    return name
+
+
+def _common(first: str, second: str, axes: str) -> str | None:
     """What two names have in common where they differ in the letters of two axes only."""
     if len(first) != len(second) or first == second:
         return None
     places = [i for i, (a, b) in enumerate(zip(first, second, strict=True)) if a != b]
-    letters = "".join((first[i] + second[i]).upper() for i in places)
-    if len(places) != 1 or letters not in _AXES:
+    if len(places) != 1 or (first[places[0]] + second[places[0]]).upper() != axes:
         return None
-    if letters == "12" and re.search(r"[0-9]", first[: places[0]] + first[places[0] + 1 :]):
+    before, behind = first[: places[0]], first[places[0] + 1 :]
+    if axes == "12" and re.search(r"[0-9]", before + behind) and not _KKS.search(before):
         return None
-    plain = first[: places[0]] + first[places[0] + 1 :]
-    return re.sub(r"^(S|P|CH|SENSOR|PROBE)[ _-]|[ _-]+$|^[ _-]+", "", plain, flags=re.IGNORECASE).strip(" _-")
+    return _SENSOR.sub("", before + behind).strip(" _-")

@@ -9,11 +9,13 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
+from pathlib import Path
 
 from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import RecordError, UsageError
+from rotordrop.record.arrangement import fitting, pairs_of, plain, sensors_of_planes
 from rotordrop.record.profile import Profile
-from rotordrop.record.recording import SPEED_UNITS, Array, Channel, Recording
+from rotordrop.record.recording import FULL_SCALE, SPEED_UNITS, Array, Channel, Recording, listed
 from rotordrop.units import format_quantity, parse_quantity
 
 _SPEED_NAMES = re.compile(
@@ -36,20 +38,6 @@ class Guess:
     """What has to be said, each with the way to say it; empty when the profile is complete."""
 
 
-def _fitting(channels: Sequence[Channel], wanted: str) -> list[Channel]:
-    """Channels of a name: as the file writes it, else without its unit, else but for signs and case."""
-    rules = (
-        lambda channel: channel.label == wanted,
-        lambda channel: channel.name == wanted,
-        lambda channel: _plain(channel.name) == _plain(wanted),
-    )
-    return next((hits for rule in rules if (hits := [c for c in channels if rule(c)])), [])
-
-
-def _plain(name: str) -> str:
-    return re.sub(r"[^a-z0-9]", "", name.lower())
-
-
 def match_sensors(
     recording: Recording, sensors: tuple[Sensor, ...], profile: Profile, place: str
 ) -> tuple[Channel, ...]:
@@ -64,20 +52,20 @@ def match_sensors(
     if unknown:
         names = ", ".join(sensor.name for sensor in sensors)
         raise RecordError(f"the channel map names a sensor {unknown[0]!r}; the machine has {names}")
-    wanted = {sensor.name: profile.channels.get(sensor.name, sensor.name) for sensor in sensors}
-    hits = {name: _fitting(recording.channels, channel) for name, channel in wanted.items()}
+    said = profile.channels | sensors_of_planes(recording, sensors, profile)
+    wanted = {sensor.name: said.get(sensor.name, sensor.name) for sensor in sensors}
+    hits = {name: fitting(recording.channels, channel) for name, channel in wanted.items()}
     missing = [name for name in wanted if not hits[name]]
     if missing:
-        # all of them at once, with the lines of a profile that would map them
+        # all of them at once, with what would map them
         present = [channel.label for channel in recording.channels]
         close = get_close_matches(wanted[missing[0]], present, 1, 0.5)
         hint = f"; did you mean {close[0]!r}?" if close else "."
         several = f" ({len(missing)} sensors have none)" if len(missing) > 1 else ""
-        lines = ", ".join(f'{name} = "..."' for name in missing)
         raise RecordError(
             f"{place} has no channel {wanted[missing[0]]!r} for sensor {missing[0]}{several}; it has "
-            f"{', '.join(present)}{hint} Map them in a profile: [channels] {lines}, or make one with "
-            "'rotordrop profile'"
+            f"{listed(present)}{hint} Say which is which, {_likeliest(recording, sensors, missing)}, or keep "
+            "it in a profile with 'rotordrop profile'"
         )
     taken: list[Channel] = []
     for name, channels in hits.items():
@@ -93,6 +81,21 @@ def match_sensors(
             )
         taken += channels
     return tuple(taken)
+
+
+def _likeliest(recording: Recording, sensors: Sequence[Sensor], missing: Sequence[str]) -> str:
+    """Options that would map the sensors without a channel: planes in their order where as many are pairs."""
+    pairs, _ = pairs_of(recording.channels)
+    planes = list(dict.fromkeys(sensor.bearing for sensor in sensors))
+    members = [[sensor for sensor in sensors if sensor.bearing == plane] for plane in planes]
+    if len(pairs) == len(planes) and all(len(found) == 2 for found in members):
+        options = [
+            f'--map "{plane}: {first.label}, {second.label}"'
+            for plane, (_, (first, second)), found in zip(planes, pairs, members, strict=True)
+            if any(sensor.name in missing for sensor in found)
+        ]
+        return f"likeliest {' '.join(options)}"
+    return " ".join(f'--map "{name}=..."' for name in missing[:8])
 
 
 def find_speed(
@@ -141,9 +144,7 @@ def _named(free: list[Channel], name: str, what: str, recording: Recording, plac
     for channel in free:
         if name in (channel.label, channel.name):
             return channel
-    raise RecordError(
-        f"{place} has no {what} {name!r}; it has {', '.join(channel.label for channel in recording.channels)}"
-    )
+    raise RecordError(f"{place} has no {what} {name!r}; it has {listed(c.label for c in recording.channels)}")
 
 
 def displacement(
@@ -163,6 +164,11 @@ def displacement(
         volts = channel.values * parse_quantity(f"1 {unit}", "voltage") - recording.voltage_offset
         sensitivity, words = _sensitivity(channel, sensor, recording, profile, place)
         return volts / sensitivity, words
+    if channel.unit == FULL_SCALE:
+        raise RecordError(
+            f"{place} holds shares of a full scale, from -1 to 1, and does not tell it: say what it is with "
+            f"'rotordrop profile {Path(place).name} --full-scale \"500 um\" -o recorder.toml'"
+        )
     if not unit:
         raise RecordError(
             f'{place}: channel {channel.label!r} has no unit; name it in the profile: unit = "um"'
@@ -227,10 +233,10 @@ def speed_factor(channel: Channel, profile: Profile, place: str) -> float:
 
 def guess_profile(recording: Recording, given: Profile, sensors: Sequence[Sensor] = ()) -> Guess:
     """Complete a profile from a recording that was read with it, for sensors that need a channel each."""
-    mapped = dict(given.channels)
+    mapped = given.channels | sensors_of_planes(recording, sensors, given)
     for sensor in sensors:
-        hits = _fitting(recording.channels, sensor.name) or [
-            channel for channel in recording.channels if _plain(channel.label) == _plain(sensor.name)
+        hits = fitting(recording.channels, sensor.name) or [
+            channel for channel in recording.channels if plain(channel.label) == plain(sensor.name)
         ]
         if sensor.name not in mapped and len(hits) == 1:
             mapped[sensor.name] = hits[0].label
@@ -238,14 +244,22 @@ def guess_profile(recording: Recording, given: Profile, sensors: Sequence[Sensor
     missing: list[str] = []
     if unmapped:
         free = [channel.label for channel in recording.channels if channel.label not in mapped.values()]
-        options = " ".join(f'--channel "{name}=..."' for name in unmapped)
-        missing.append(f"channels of {', '.join(unmapped)}: {options} (there are {', '.join(free)})")
+        options = _likeliest(recording, sensors, unmapped)
+        missing.append(f"channels of {listed(unmapped)}: {options} (there are {listed(free)})")
+    pairs = [] if sensors else pairs_of(recording.channels)[0]
+    planes = given.planes or {name: f"{one.label}, {other.label}" for name, (one, other) in pairs}
+    paired = [channel.label for _, pair in pairs for channel in pair]
     used = [
         channel
         for channel in recording.channels
-        if (not sensors and channel.label != given.speed.pulses) or channel.label in mapped.values()
+        if (
+            not sensors
+            and channel.label in (paired or [channel.label])
+            and channel.label != given.speed.pulses
+        )
+        or channel.label in mapped.values()
     ]
-    profile = given.model_copy(update={"channels": mapped})
+    profile = given.model_copy(update={"channels": mapped, "planes": {} if sensors else planes})
     profile, speed = _with_speed(recording, profile, used if sensors else [])
     if speed is None:
         missing.append('the shaft speed: --speed-channel "...", --pulses "..." or --speed "60 Hz"')
@@ -256,7 +270,9 @@ def guess_profile(recording: Recording, given: Profile, sensors: Sequence[Sensor
     }
     bare = [label for label, unit in units.items() if not unit]
     if bare:
-        missing.append(f"the unit of {', '.join(bare)}: --unit um")
+        missing.append(f"the unit of {listed(bare)}: --unit um")
+    if any(channel.unit == FULL_SCALE for channel in used):
+        missing.append('what full scale is: --full-scale "500 um"')
     sensitive = bool(sensors) and all(sensor.sensitivity is not None for sensor in sensors)
     in_volts = any(unit in _VOLTS for unit in units.values())
     if in_volts and not (recording.sensitivity or profile.sensitivity or sensitive):
@@ -267,6 +283,7 @@ def guess_profile(recording: Recording, given: Profile, sensors: Sequence[Sensor
         rate = (len(channel.time) - 1) / max(float(channel.time[-1] - channel.time[0]), 1e-12)
         found.append(f"channel {channel.label}: {len(channel.values)} samples at {rate:.6g} Hz, {span}")
     found += [f"sensor {name}: channel {label}" for name, label in mapped.items()]
+    found += [f"plane {name}: {text}" for name, text in planes.items() if not sensors]
     found += [f"shaft speed: {speed}"] if speed else []
     return Guess(profile=profile, found=tuple(found), missing=tuple(missing))
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
+from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -70,6 +72,8 @@ class Profile(_Section):
     """Name of the reader, when the suffix of the file does not tell it."""
     channels: dict[str, str] = Field(default_factory=dict)
     """Sensor name of the machine file -> channel name in the recording."""
+    planes: dict[str, str] = Field(default_factory=dict)
+    """Plane -> its channels, with their angles where they are known: ``NDE = "X1 0 deg, Y1 90 deg"``."""
     units: dict[str, str] = Field(default_factory=dict)
     """Channel name in the recording -> unit."""
     unit: str | None = None
@@ -139,6 +143,7 @@ def _told(entry: Any) -> str:
 _SECTIONS: dict[str, type[BaseModel]] = {"text": TextLayout, "time": Clock, "speed": SpeedSource}
 _EXPECTED = {
     "channels": 'expected a table, [channels] S_NDE_A = "X1"',
+    "planes": 'expected a table, [planes] NDE = "X1 0 deg, Y1 90 deg"',
     "units": 'expected a table, [units] "X1" = "um"',
     "separator": "expected one sign, such as ';'",
     "decimal": "expected '.' or ','",
@@ -147,6 +152,37 @@ _EXPECTED = {
     "edge": "expected 'rising' or 'falling'",
     "names": 'expected a list of names, ["Time [s]", ...]',
 }
+
+
+def rules_of(profile: Profile | str | Path | None, mapping: Sequence[str] = ()) -> Profile:
+    """The reading rules of a profile or its file, with what texts such as those of ``--map`` add.
+
+    Parameters
+    ----------
+    profile : Profile or path-like, optional
+        The rules of the recorder.
+    mapping : sequence of str
+        ``"SENSOR = CHANNEL"`` or ``"PLANE: CHANNEL angle, CHANNEL angle"``.
+
+    Raises
+    ------
+    UsageError
+        When a text is neither.
+    """
+    rules = profile if isinstance(profile, Profile) else load_profile(profile) if profile else Profile()
+    channels, planes = dict(rules.channels), {} if mapping else dict(rules.planes)
+    for text in mapping:
+        match = _SAID.fullmatch(text)
+        if match is None:
+            raise UsageError(
+                f'{text!r} is neither "SENSOR=CHANNEL" nor "PLANE: CHANNEL angle, CHANNEL angle"; write for '
+                'example "S_NDE_A=X1" or "NDE: X1 0 deg, Y1 90 deg"'
+            )
+        (channels if match["sign"] == "=" else planes)[match["name"]] = match["said"]
+    return rules.model_copy(update={"channels": channels, "planes": planes})
+
+
+_SAID = re.compile(r"\s*(?P<name>[^:=]*[^:=\s])\s*(?P<sign>[:=])\s*(?P<said>.*\S)\s*")
 
 
 def save_profile(profile: Profile, path: str | Path) -> None:

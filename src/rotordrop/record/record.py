@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import RecordError, UsageError
 from rotordrop.machine import Machine
+from rotordrop.record.arrangement import Arrangement, arrangement_of
 from rotordrop.record.axes import (
     Plane,
     along_sensors,
@@ -26,7 +27,7 @@ from rotordrop.record.axes import (
 from rotordrop.record.clock import at_one_rate, shared_clock
 from rotordrop.record.columns import displacement, find_pulses, find_speed, match_sensors, speed_factor
 from rotordrop.record.examples import example_hashes
-from rotordrop.record.profile import Profile, SpeedSource, load_profile
+from rotordrop.record.profile import Profile, SpeedSource, rules_of
 from rotordrop.record.readers import read_recording
 from rotordrop.record.recording import MARKS, Array, Channel, Recording, recording_of, spelled, split_unit
 from rotordrop.record.speed import readings_of_held_signal
@@ -334,6 +335,8 @@ def read_record(
     machine: Machine,
     *,
     profile: Profile | str | Path | None = None,
+    mapping: Sequence[str] = (),
+    tail: bool = False,
 ) -> Record:
     """Read the recording of a drop and match its channels to the sensors of the machine.
 
@@ -345,16 +348,37 @@ def read_record(
         Names the sensors to look for.
     profile : Profile or path-like, optional
         Channel map and reading rules where the file does not speak for itself.
+    mapping : sequence of str
+        Channels of sensors, ``"S_NDE_A = X1"``, or of planes, ``"NDE: X1, Y1"``, beside those of the profile.
+    tail : bool
+        Whether it is the settled tail of a record: it needs no speed, even where the profile names one.
 
     Raises
     ------
     RecordError
         When the file cannot be read, or a sensor has no channel, or a channel no unit.
     """
+    return open_record(path, machine, profile=rules_of(profile, mapping), tail=tail)[0]
+
+
+def open_record(
+    path: str | Path, machine: Machine | None, *, profile: Profile, tail: bool = False
+) -> tuple[Record, Arrangement | None]:
+    """Read a recording for the sensors of a machine, or without one for those that its channels make."""
     path = Path(path)
-    rules = profile if isinstance(profile, Profile) else load_profile(profile) if profile else Profile()
-    recording = read_recording(path, rules)
-    return record_of(recording, machine.sensors, profile=rules, path=path, sha256=sha256_of(path))
+    recording = read_recording(path, profile)
+    arrangement, sensors = None, () if machine is None else machine.sensors
+    if machine is None:
+        arrangement = arrangement_of(recording, profile)
+        sensors, said = arrangement.sensors, {"channels": dict(arrangement.channels), "planes": {}}
+        profile = profile.model_copy(update=said)
+    if tail:
+        names = {name for channel in recording.channels for name in (channel.label, channel.name)}
+        absent = {
+            key: None for key in ("channel", "pulses") if getattr(profile.speed, key) not in (None, *names)
+        }
+        profile = profile.model_copy(update={"speed": profile.speed.model_copy(update=absent)})
+    return record_of(recording, sensors, profile=profile, path=path, sha256=sha256_of(path)), arrangement
 
 
 def sha256_of(path: Path) -> str:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,16 +15,20 @@ SPEED_UNITS = ("Hz", "rpm", "rad/s")
 """Units by which a channel is known to be a shaft speed."""
 
 _UNITS = {
-    "m": "m", "mm": "mm", "um": "um", "µm": "um", "μm": "um", "micron": "um", "nm": "nm",
-    "mil": "mil", "mils": "mil", "in": "in", "inch": "in",
-    "v": "V", "volt": "V", "mv": "mV",
-    "hz": "Hz", "rpm": "rpm", "1/min": "rpm", "u/min": "rpm", "r/min": "rpm", "min-1": "rpm",
+    "m": "m", "mm": "mm", "um": "um", "µm": "um", "μm": "um", "micron": "um", "microns": "um", "nm": "nm",
+    "micrometer": "um", "mikrometer": "um", "mil": "mil", "mils": "mil", "in": "in", "inch": "in",
+    "v": "V", "volt": "V", "volts": "V", "mv": "mV", "second": "s", "seconds": "s", "sekunden": "s",
+    "hz": "Hz", "hertz": "Hz", "rpm": "rpm", "1/min": "rpm", "u/min": "rpm", "r/min": "rpm", "min-1": "rpm",
     "min^-1": "rpm", "min⁻¹": "rpm", "/min": "rpm",
     "rad/s": "rad/s", "s": "s", "sec": "s", "ms": "ms", "us": "us", "µs": "us", "μs": "us", "min": "min",
 }  # fmt: skip
 
+_SPACED_UNIT = re.compile(r"(.*[^\s,]),?\s(µm|μm|um|mm|mil|mils|rpm|1/min|min-1|Hz|mV)", re.IGNORECASE)
 _LONGEST_NAME = 200
 """Characters of a column name that are looked at (chosen): damaged files hold names of megabytes."""
+
+FULL_SCALE = "of full scale"
+"""Unit of readings that a file holds as shares of a full scale it does not tell."""
 
 MARKS = "mark_passages"
 """Channel of a saved record that holds when a mark of the shaft passed [s]."""
@@ -105,9 +110,19 @@ def recording_of(
     return Recording(channels=tuple(channels), metadata=dict(metadata or {}), notes=notes, warnings=warnings)
 
 
+def listed(names: Iterable[str], most: int = 8) -> str:
+    """Names in a message: eight of them and how many more there are."""
+    known = list(names)
+    more = f" and {len(known) - most} more" if len(known) > most else ""
+    return ", ".join(known[:most]) + more
+
+
 def known_unit(text: str) -> str | None:
     """Give a unit in this package's spelling, or None when the text is not one found in recordings."""
-    return _UNITS.get(text.strip().strip("[]()").lower())
+    bare = text.strip()
+    if bare[:1] in ("[", "(") and bare[-1:] in ("]", ")"):
+        bare = bare[1:-1].strip()
+    return _UNITS.get(bare.lower())
 
 
 def spelled(unit: str) -> str:
@@ -122,6 +137,8 @@ def split_unit(written: str) -> tuple[str, str, str]:
     unit-like ending stays in the label, as ``Probe_V`` may be a vertical probe.
     """
     written = " ".join(written[:_LONGEST_NAME].split())
+    if spaced := _SPACED_UNIT.fullmatch(written):  # "VE-101X um"; a V or s there may be part of the name
+        return spaced[1], spaced[1], spelled(spaced[2])
     if written.endswith((")", "]")):
         name, mark, unit = written[:-1].rpartition("[" if written[-1] == "]" else "(")
         if mark:

@@ -1,6 +1,6 @@
 """Samples out of binary files, read by foreign libraries in a process of their own.
 
-Libraries that read HDF5, MAT, TDMS, UFF and Excel files end the interpreter, loop for ever or ask for all
+Libraries that read HDF5, MAT, TDMS and Excel files end the interpreter, loop for ever or ask for all
 memory when a file is damaged in the wrong place. So one child process per file reads it, under limits on time
 and memory that grow with the size of the file, and hands the stored samples back over a pipe. The child
 imports numpy, the one library and nothing else that is heavy: the module of a format loads profiles for its

@@ -134,7 +134,8 @@ def record_of(job: Job, machine: Machine, role: str, options: dict[str, Any]) ->
     file = job.file(role)
     if file is None:
         return None
-    return named(read_record(file, machine, profile=profile_of(job, options)), job, role)
+    record = read_record(file, machine, profile=profile_of(job, options), tail=role == "tail")
+    return named(record, job, role)
 
 
 def named(record: Record, job: Job, role: str) -> Record:

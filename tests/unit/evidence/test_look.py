@@ -144,9 +144,9 @@ def test_channels_are_named_where_their_names_do_not_tell(tmp_path):
         look(file, gap=GAP)
     seen = look(file, gap=GAP, mapping=["left: alpha 0 deg, bravo 90 deg", "right: c 0 deg, d 90 deg"])
     assert [plane.plane for plane in seen.planes] == ["left", "right"]
-    with pytest.raises(UsageError, match=r"there is no channel 'e'; there are alpha, bravo"):
+    with pytest.raises(UsageError, match=r"there is no channel 'e'; write \"PLANE: .*there are alpha, bravo"):
         look(file, mapping=["left: e 0 deg, alpha 90 deg"])
-    with pytest.raises(UsageError, match=r'is not "PLANE: CHANNEL angle, CHANNEL angle"'):
+    with pytest.raises(UsageError, match=r"'alpha' is neither \"SENSOR=CHANNEL\" nor \"PLANE: CHANNEL angle"):
         look(file, mapping=["alpha"])
 
 

@@ -28,15 +28,29 @@ def job(served, files) -> str:
     return str(number)
 
 
-def test_what_a_record_holds_is_told_with_what_is_missing(served, job):
-    served.order(f"/api/jobs/{job}/look")
-    assert "has no channel 'NDE_A' for sensor NDE_A" in served.settled(job, "look")["error"]
+def test_the_sensors_of_twelve_numbers_find_their_channels(served, job):
     served.order(f"/api/jobs/{job}/channels")
     assert served.settled(job, "channels")["state"] == "done"
     told = served.ask("GET", f"/api/jobs/{job}/channels/page").told
     held = {one["label"].split("/")[-1] for one in told["channels"] if one["unit"] == "m"}
     assert held == set(SENSORS.values())
     assert [sensor["name"] for sensor in told["sensors"]] == list(SENSORS)
+    assert told["missing"] == []
+    found = {sensor: label.split("/")[-1] for sensor, label in told["profile"]["channels"].items()}
+    assert found == SENSORS
+
+
+def test_what_a_record_does_not_tell_is_asked(served, tmp_path):
+    rows = [f"{i * 5e-5:.5f};" + ";".join("0.001" for _ in range(4)) for i in range(50)]
+    path = tmp_path / "drop.csv"
+    path.write_text("\n".join(["Time [s];VE-1X [mm];VE-1Y [mm];VE-2X [mm];VE-2Y [mm]", *rows]) + "\n")
+    number = served.new_job({"record": path})
+    served.order(f"/api/jobs/{number}/numbers", {k: v for k, v in EXAMPLES.items() if k != "preload"})
+    served.order(f"/api/jobs/{number}/look")
+    assert "has no channel 'NDE_A' for sensor NDE_A" in served.settled(number, "look")["error"]
+    served.order(f"/api/jobs/{number}/channels")
+    assert served.settled(number, "channels")["state"] == "done"
+    told = served.ask("GET", f"/api/jobs/{number}/channels/page").told
     assert "channels of NDE_A, NDE_B, DE_A, DE_B" in told["missing"][0]
 
 

@@ -33,6 +33,7 @@ LARGEST = 2**30
 
 _FORMATS = {
     "csv txt tsv asc dat log prn": "delimited:read_delimited",
+    "lvm": "lvm:read_lvm",
     "h5 hdf5": "hdf5:read_hdf5",
     "mat": "matlab:read_matlab",
     "tdms": "tdms:read_tdms",
@@ -40,7 +41,7 @@ _FORMATS = {
     "wav": "wav:read_wav",
     "npy": "numpy_files:read_npy",
     "npz": "numpy_files:read_npz",
-    "cfg comtrade": "comtrade:read_comtrade",
+    "cfg cff comtrade": "comtrade:read_comtrade",
     "xlsx xlsm": "excel:read_excel",
 }
 """Names of a format and where its reader is: a module is loaded when a file asks for it."""

@@ -17,6 +17,12 @@ from rotordrop.record.recording import Array, Channel, Recording, spelled, split
 _FORMATS = {"BINARY": ("<i2", -(2**15)), "BINARY32": ("<i4", -(2**31)), "FLOAT32": ("<f4", None)}
 """How an analogue sample is stored and what stands for a missing one (IEEE C37.111)."""
 
+_SECTION = re.compile(
+    rb"^--- *file type: *(?P<kind>[A-Z]{3})[ A-Z0-9]*(?:: *(?P<bytes>[0-9]{1,10}))? *---[ \t]*\r?\n",
+    re.MULTILINE | re.IGNORECASE,
+)
+"""The line before a part of a .cff; that of binary samples tells their bytes."""
+
 _SAME_DURATION = 0.01
 """Share by which the durations by rates and by time stamps may differ [1] (chosen): stamps are rounded."""
 
@@ -42,15 +48,20 @@ class _Configuration:
 
 
 def read_comtrade(path: Path, profile: Profile) -> Recording:
-    """Read a recording by its configuration (.cfg); the samples (.dat) lie beside it.
+    """Read a recording by its configuration (.cfg); the samples (.dat) lie beside it, or both in one .cff.
 
     Record time is zero at the trigger. A channel that the configuration says was sampled later (skew) has a
     clock of its own.
     """
-    configuration = path if path.suffix.lower() == ".cfg" else _beside(path, "cfg")
-    rules = _configuration(configuration)
-    samples = _beside(configuration, "dat")
-    numbers, stamps, table = (_ascii if rules.kind == "ASCII" else _binary)(samples, rules)
+    if path.suffix.lower() == ".cff":
+        configuration = samples = path
+        text, content = _sections(path)
+    else:
+        configuration = path if path.suffix.lower() == ".cfg" else _beside(path, "cfg")
+        text, samples = configuration.read_bytes(), _beside(configuration, "dat")
+        content = samples.read_bytes()
+    rules = _configuration(text, configuration)
+    numbers, stamps, table = (_ascii if rules.kind == "ASCII" else _binary)(content, rules, samples)
     declared = rules.rates[-1][1]
     if len(table) != declared:
         raise RecordError(
@@ -78,6 +89,31 @@ def read_comtrade(path: Path, profile: Profile) -> Recording:
     return Recording(channels=tuple(channels), metadata=rules.entries, warnings=() if agree else (words,))
 
 
+def _sections(path: Path) -> tuple[bytes, bytes]:
+    """Configuration and samples of a single file, whose parts begin with a line that names them."""
+    parts: dict[str, bytes] = {}
+    content = path.read_bytes()
+    found = list(_SECTION.finditer(content))
+    for number, mark in enumerate(found):
+        end = found[number + 1].start() if number + 1 < len(found) else len(content)
+        body = content[mark.end() : end]
+        if mark["bytes"]:  # binary samples may hold anything, line ends and such marks too
+            body = content[mark.end() : mark.end() + int(mark["bytes"])]
+            if len(body) < int(mark["bytes"]):
+                raise RecordError(
+                    f"{path} is truncated: its samples declare {int(mark['bytes'])} bytes and {len(body)} "
+                    "are present; copy the file again"
+                )
+        parts.setdefault(mark["kind"].decode().upper(), body)
+    for kind in ("CFG", "DAT"):
+        if kind not in parts:
+            have = ", ".join(parts) or "none"
+            raise RecordError(
+                f"{path} has no section {kind} (it has {have}); it is cut off or no COMTRADE file"
+            )
+    return parts["CFG"], parts["DAT"]
+
+
 def _beside(path: Path, suffix: str) -> Path:
     for name in (suffix, suffix.upper(), suffix.capitalize()):
         if (found := path.with_suffix(f".{name}")).is_file():
@@ -86,8 +122,12 @@ def _beside(path: Path, suffix: str) -> Path:
     raise RecordError(f"{path} needs {path.with_suffix('.' + suffix).name} beside it; copy both files")
 
 
-def _configuration(path: Path) -> _Configuration:
-    rows = [line.split(",") for line in path.read_text(encoding="latin-1").splitlines()]
+def _configuration(text: bytes, path: Path) -> _Configuration:
+    try:
+        lines = text.decode("utf-8-sig").splitlines()  # as the edition of 2013 has it
+    except UnicodeDecodeError:
+        lines = text.decode("latin-1").splitlines()
+    rows = [line.split(",") for line in lines]
     number = 0
 
     def row(least: int) -> list[str]:
@@ -151,8 +191,8 @@ def _instant(entries: list[str]) -> tuple[int, float]:
     return days * 86_400 + 3600 * hour + 60 * minute + whole, rest
 
 
-def _ascii(path: Path, rules: _Configuration) -> tuple[Array, Array, Array]:
-    lines = [line for line in path.read_text(encoding="latin-1").split("\n") if line.strip(" \r\x1a")]
+def _ascii(content: bytes, rules: _Configuration, path: Path) -> tuple[Array, Array, Array]:
+    lines = [line for line in content.decode("latin-1").split("\n") if line.strip(" \r\x1a")]
     wide = 2 + len(rules.analogue) + rules.digital
     table = np.full((len(lines), 2 + len(rules.analogue)), np.nan)
     for index, line in enumerate(lines):
@@ -168,7 +208,7 @@ def _ascii(path: Path, rules: _Configuration) -> tuple[Array, Array, Array]:
     return table[:, 0], table[:, 1], table[:, 2:]
 
 
-def _binary(path: Path, rules: _Configuration) -> tuple[Array, Array, Array]:
+def _binary(content: bytes, rules: _Configuration, path: Path) -> tuple[Array, Array, Array]:
     stored, missing = _FORMATS[rules.kind]
     words = -(-rules.digital // 16)
     row = np.dtype(
@@ -179,7 +219,6 @@ def _binary(path: Path, rules: _Configuration) -> tuple[Array, Array, Array]:
             ("digital", "<u2", (words,)),
         ]
     )
-    content = path.read_bytes()
     if len(content) % row.itemsize:
         raise RecordError(
             f"{path} is truncated: {len(content)} bytes are no whole number of samples of {row.itemsize}"

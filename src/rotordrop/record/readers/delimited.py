@@ -9,26 +9,23 @@ import numpy as np
 
 from rotordrop.errors import RecordError
 from rotordrop.record.profile import Profile
+from rotordrop.record.readers.head import TIME_NAMES, Head, read_head
 from rotordrop.record.readers.text import (
     BLANKS,
-    Header,
     Layout,
     fields_of,
     find_layout,
     is_number,
-    name_and_unit_rows,
     plain_number,
-    read_header,
     read_lines,
     stamp_parts,
 )
-from rotordrop.record.recording import Array, Channel, Recording, known_unit, spelled, split_unit
+from rotordrop.record.recording import Array, Channel, Recording, listed, spelled, split_unit
 from rotordrop.units import parse_quantity
 
-_LONGEST_HEADER_LINE = 500
-"""Characters of a header line that are looked at (chosen)."""
+_UNEVEN = 0.1
+"""Share of a step by which the steps of a column without a name may differ for a time (chosen): rounding."""
 
-_TIME_NAMES = re.compile(r"(time|zeit|t|temps|tempo|tiempo|timestamp|x_value)\b", re.IGNORECASE)
 _COUNTERS = re.compile(
     r"(sample|index|idx|channel|point|punkt|scan|count|row|zeile|nr|no|n|i|#)\b", re.IGNORECASE
 )
@@ -42,7 +39,27 @@ _DAY = 86_400
 def read_delimited(path: Path, profile: Profile) -> Recording:
     """Read a text file of columns, whatever its separator, decimal sign, header and time column."""
     lines, complete, encoding = read_lines(path, profile.text)
+    lines = _without_head_beside(lines)
     return recording_of_lines(lines, complete, f"text in {encoding}", path, profile)
+
+
+def _without_head_beside(lines: list[str]) -> list[str]:
+    """Put a head that stands beside the readings above them, as oscilloscopes of Tektronix write it.
+
+    Each channel has five columns: key, value, a third for a unit, time, reading.
+    """
+    first = fields_of(lines[0], ",")
+    beside = [i for i, field in enumerate(first) if field == "Record Length" and len(first) > i + 4]
+    if not beside or not is_number(first[beside[0] + 3], ".") or not is_number(first[beside[0] + 4], "."):
+        return lines
+    rows = [fields_of(line, ",") for line in lines]
+    labels = []
+    for i in beside:
+        head = {row[i]: row[i + 1] for row in rows if len(row) > i + 1 and row[i]}
+        labels.append(f"Time [{head.get('Horizontal Units', 's')}]")
+        labels.append(f"{head.get('Source', f'CH{i // 5 + 1}')} [{head.get('Vertical Units', '')}]")
+    kept = [i + offset for i in beside for offset in (3, 4)]
+    return [",".join(labels), *(",".join(row[i] for i in kept if i < len(row)) for row in rows)]
 
 
 def recording_of_lines(
@@ -50,79 +67,47 @@ def recording_of_lines(
 ) -> Recording:
     """Make a recording of lines of text, whose `origin` is a word for the report."""
     layout = find_layout(lines, path, profile.text)
-    labels, unused = _column_labels(lines[: layout.first], layout, profile, path)
-    header = read_header([line[:_LONGEST_HEADER_LINE] for line in unused], layout.separator)
+    head = read_head(lines[: layout.first], layout, profile, path)
     rows, notes, warnings = _intact_rows(lines, complete, layout, path)
-    columns = [split_unit(label) for label in labels]
+    columns = [split_unit(label) for label in head.labels]
     table = {
         i: _numbers([row[i] for row in rows], label, layout, path)
-        for i, (label, kind) in enumerate(zip(labels, layout.kinds, strict=True))
-        if kind == "number"
+        for i, (label, kind) in enumerate(zip(head.labels, layout.kinds, strict=True))
+        if kind == "number" or (kind == "blank" and any(row[i] for row in rows))
     }
     stamped = _stamped_seconds(rows, layout, path)
-    time, used, words = _clock(table, columns, stamped, header, profile, path)
-    channels = tuple(
-        Channel(
-            name=name, label=label, unit=spelled(profile.units.get(label, unit)), values=table[i], time=time
+    times, used, words = _clock(table, columns, stamped, head, profile, path)
+    channels = []
+    for i in sorted(set(table) - set(used)):
+        name, label, unit = columns[i]
+        unit, time = spelled(profile.units.get(label, unit)), times[max(k for k in times if k <= i)]
+        # side by side, captures may differ in length: the shorter ends in blanks
+        there = np.isfinite(time) if len(used) > 1 else np.ones(len(time), dtype=bool)
+        channels.append(
+            Channel(
+                name=name or f"column {i + 1}",
+                label=label or f"column {i + 1}",
+                unit=unit,
+                values=table[i][there],
+                time=time if there.all() else time[there],
+            )
         )
-        for i, (name, label, unit) in enumerate(columns)
-        if i in table and i != used
-    )
-    texts = [label for label, kind in zip(labels, layout.kinds, strict=True) if kind == "text"]
+    texts = [label for label, kind in zip(head.labels, layout.kinds, strict=True) if kind == "text"]
     notes += [f"left out, no numbers: {', '.join(texts)}"] if texts else []
-    if header.count is not None and len(rows) < header.count:
+    if head.count is not None and len(rows) < head.count:
         warnings.append(
-            f"the header declares {header.count} samples and {len(rows)} are present: the file is truncated"
+            f"the header declares {head.count} samples and {len(rows)} are present: the file is truncated"
         )
     sign = _SIGNS.get(layout.separator, repr(layout.separator))
     decimal = "decimal comma" if layout.decimal == "," else "decimal point"
     return Recording(
-        channels=channels,
-        metadata=header.entries,
+        channels=tuple(channels),
+        metadata=head.entries,
         notes=(f"{origin}, {sign} between {layout.columns} columns, {decimal}", *notes, *words),
         warnings=tuple(warnings),
-        sensitivity=header.sensitivity,
-        voltage_offset=header.voltage_offset,
+        sensitivity=head.sensitivity,
+        voltage_offset=head.voltage_offset,
     )
-
-
-def _column_labels(
-    header: list[str], layout: Layout, profile: Profile, path: Path
-) -> tuple[list[str], list[str]]:
-    """Name the columns, with the unit of a units row in brackets; give the other header lines too."""
-    given = profile.text.names
-    if given is not None and len(given) != layout.columns:
-        raise RecordError(f"{path} has {layout.columns} columns and the profile names {len(given)}")
-    rows = [fields_of(line if given else line.lstrip("# "), layout.separator) for line in header]
-    names, units = (None, None) if given else name_and_unit_rows(rows, layout.columns)
-    # rows that stand where the samples begin and are none: left out, the record would start later
-    last = max((i for i, row in enumerate(rows) if row in (names, units) and row), default=-1)
-    damaged = [i for i in range(last + 1, len(rows)) if _was_a_row(header[i], rows[i], layout, last >= 0)]
-    if damaged:
-        raise RecordError(
-            f"{path}, line {damaged[0] + 1} is damaged ({header[damaged[0]][:60]!r}; {len(damaged)} such "
-            "lines before the first intact row); repair the line or export again"
-        )
-    if given:
-        return list(given), header
-    if names is None:
-        line = f"the line above the numbers reads {header[-1][:60]!r}" if header else "there is no header"
-        raise RecordError(
-            f"{path}: no row names the {layout.columns} columns ({line}); name them in the profile, "
-            f'text.names = ["Time [s]", ...]'
-        )
-    unused = [line for line, row in zip(header, rows, strict=True) if row not in (names, units)]
-    pairs = zip(names, units or names, strict=True)
-    return [f"{name} [{unit}]" if units and known_unit(unit) else name for name, unit in pairs], unused
-
-
-def _was_a_row(line: str, fields: list[str], layout: Layout, below_names: bool) -> bool:
-    """Whether a line that is no row begins like one: no comment, no word in front, numbers among the rest."""
-    if not line.strip() or line.lstrip()[0] in "#%!*" or re.match(r'\s*"?[^\W\d_]{2}', line):
-        return False
-    numbers = sum(is_number(field, layout.decimal) for field in fields)
-    whole = 2 * abs(len(fields) - layout.columns) <= layout.columns
-    return numbers > 0 and (below_names or whole)
 
 
 def _intact_rows(
@@ -205,38 +190,45 @@ def _clock(
     table: dict[int, Array],
     columns: list[tuple[str, str, str]],
     stamped: Array | None,
-    header: Header,
+    head: Head,
     profile: Profile,
     path: Path,
-) -> tuple[Array, int | None, list[str]]:
-    """The time of every row [s] by a time column, or start and step; the column it took, and notes."""
-    at = _time_column(columns, table, stamped is not None, profile, path)
-    if at is not None:
-        unit = profile.time.unit or columns[at][2]
-        notes = [] if unit else ["time column taken in seconds"]
-        return table[at] * parse_quantity(f"1 {unit or 's'}", "time"), at, notes
-    step = parse_quantity(profile.time.step, "time") if profile.time.step else header.step
+) -> tuple[dict[int, Array], list[int], list[str]]:
+    """The time of every row [s] by the column from which on it holds, the columns it took, and notes.
+
+    Several columns of one name give the time of the columns behind each.
+    """
+    step = parse_quantity(profile.time.step, "time") if profile.time.step else head.step
+    at = _time_columns(columns, table, stamped is not None, step, profile, path)
+    if at:
+        units = [profile.time.unit or columns[i][2] or head.time_unit for i in at]
+        notes = [] if all(units) else ["time column taken in seconds"]
+        times = {
+            i: table[i] * parse_quantity(f"1 {unit or 's'}", "time")
+            for i, unit in zip(at, units, strict=True)
+        }
+        return {0: times[at[0]], **times}, at, notes
     # stamps of whole seconds say less than a sampling interval
     if stamped is not None and not (step and stamped[-1] - stamped[0] < 0.5 * step * len(stamped)):
-        return stamped, None, []
+        return {0: stamped}, [], []
     if step is None or step <= 0:
         raise RecordError(
-            f"{path} has no time column among {', '.join(label for _, label, _ in columns)} and no sampling "
+            f"{path} has no time column among {listed(label for _, label, _ in columns)} and no sampling "
             'interval; name it in the profile, time.channel = "..." or time.step = "50 us"'
         )
     start, notes = 0.0, []
     if profile.time.start is not None:
         start = parse_quantity(profile.time.start, "time")
-    elif header.trigger_sample is not None:
-        start = -header.trigger_sample * step
-    elif header.start is not None:
-        start = header.start
+    elif head.trigger_sample is not None:
+        start = -head.trigger_sample * step
+    elif head.start is not None:
+        start = head.start
     else:
         notes = ["no trigger in the file: record time counts from the first sample"]
     counter = next(iter(table))
     if _is_counter(table[counter], columns[counter][0]):
-        return start + step * table[counter], counter, notes
-    return start + step * np.arange(len(table[counter]), dtype=np.float64), None, notes
+        return {0: start + step * table[counter]}, [counter], notes
+    return {0: start + step * np.arange(len(table[counter]), dtype=np.float64)}, [], notes
 
 
 def _is_counter(values: Array, name: str) -> bool:
@@ -247,19 +239,31 @@ def _is_counter(values: Array, name: str) -> bool:
     return ones == 1.0 or ones > (0.5 if _COUNTERS.match(name) else 0.9)
 
 
-def _time_column(
-    columns: list[tuple[str, str, str]], table: dict[int, Array], stamped: bool, profile: Profile, path: Path
-) -> int | None:
-    """The column of the time: the one that the profile names, else by its name where no stamps are."""
+def _time_columns(
+    columns: list[tuple[str, str, str]],
+    table: dict[int, Array],
+    stamped: bool,
+    step: float | None,
+    profile: Profile,
+    path: Path,
+) -> list[int]:
+    """The columns of the time: the one that the profile names, else by name, unit or even steps."""
     wanted = profile.time.channel
-    for i, (name, label, unit) in enumerate(columns):
-        if wanted is None and not stamped:
-            fits = bool(_TIME_NAMES.match(name)) and unit in ("", "s", "ms", "us", "min")
-        else:
-            fits = wanted in (name, label)
-        if fits and i in table:
-            return i
     if wanted is not None:
-        labels = ", ".join(label for _, label, _ in columns)
+        for i, (name, label, _) in enumerate(columns):
+            if wanted in (name, label) and i in table:
+                return [i]
+        labels = listed(label for _, label, _ in columns)
         raise RecordError(f"{path} has no time column {wanted!r}; its columns are {labels}")
-    return None
+    if stamped:
+        return []
+    named = [
+        i for i in table if TIME_NAMES.match(columns[i][0]) and columns[i][2] in ("", "s", "ms", "us", "min")
+    ] or [i for i in table if columns[i][2] in ("s", "ms", "us")]
+    if named:
+        return [i for i in named if columns[i][0] == columns[named[0]][0]]
+    first = next(iter(table))
+    # a scope that names its channels only: the first column has no name and grows evenly
+    steps = np.diff(table[first])
+    even = len(steps) > 1 and np.min(steps) > 0.0 and np.ptp(steps) <= _UNEVEN * np.median(steps)
+    return [first] if not columns[first][0] and even and not (step and np.all(steps == 1.0)) else []

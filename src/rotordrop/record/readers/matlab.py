@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotordrop.errors import RecordError
-from rotordrop.record.recording import Array, Channel, Recording, known_unit, spelled, split_unit
+from rotordrop.record.recording import Array, Channel, Recording, known_unit, listed, spelled, split_unit
 from rotordrop.record.sandbox import Content, Item, plain, refuse_bomb, unpack
 
 if TYPE_CHECKING:
@@ -24,6 +24,9 @@ _TIMES = ("t", "time", "time_s")
 _NAMES = ("name", "label", "channel")
 _UNITS = ("unit", "units")
 
+_TESTLAB = ".y_values.values"
+"""Where a structure of Simcenter Testlab holds its samples."""
+
 _HEADER = 128
 _COMPRESSED = 15
 """Bytes before the first variable, and the type of a packed one, by the definition of version 5."""
@@ -34,7 +37,7 @@ def read_matlab(path: Path, profile: Profile) -> Recording:
 
     The clock comes from a vector ``t`` or ``time`` beside the samples (in the same structure), or from ``fs``
     or ``dt`` and ``t0``. The ending of a variable name gives the unit: ``disp_um``. A structure of its own
-    for every channel may hold its ``name`` and ``unit``.
+    for every channel may hold its ``name`` and ``unit``; those of Simcenter Testlab hold several channels.
     """
     content = unpack(path, "matlab")
     found = {item.name: item.values for item in content.items}
@@ -49,15 +52,60 @@ def recording_of_variables(variables: dict[str, Any], path: Path, profile: Profi
     channels: list[Channel] = []
     for key, value in variables.items():
         last = key.rpartition(".")[2]
-        if _is_samples(value) and last.lower() not in _TIMES and last != profile.time.channel:
+        if key.endswith(_TESTLAB):
+            channels += _testlab_channels(key.removesuffix(_TESTLAB), value, profile, variables, path)
+        elif _is_samples(value) and last.lower() not in _TIMES and last != profile.time.channel:
             channels += _channels_of(key, value, names, profile, variables)
     if not channels:
         raise RecordError(
-            f"{path}: found no samples with a clock among {', '.join(variables) or 'no variables'}; a vector "
+            f"{path}: found no samples with a clock among {listed(variables) or 'no variables'}; a vector "
             "'t', or 'fs' and 't0', must stand beside the channels, or time.step in the profile"
         )
     entries = {key: str(value) for key, value in variables.items() if isinstance(value, str | int | float)}
     return Recording(channels=tuple(channels), metadata=entries)
+
+
+def _testlab_channels(
+    signal: str, value: Any, profile: Profile, variables: dict[str, Any], path: Path
+) -> list[Channel]:
+    """Channels of a structure of Simcenter Testlab: samples (N,) or (N, C) of one rate, in SI units.
+
+    They are stored in SI units; times its factor they are in the unit of the label that users see.
+    """
+
+    def found(name: str, default: Any = None) -> Any:
+        return variables.get(f"{signal}.{name}", default)
+
+    step, start = found("x_values.increment"), found("x_values.start_value", 0.0)
+    declared = found("x_values.number_of_values")
+    if not isinstance(step, int | float) or not step > 0 or not isinstance(start, int | float):
+        raise RecordError(f"{path}: {signal} has the increment {step!r}; a time signal has a positive one")
+    abscissa = str(found("x_values.quantity.label", "s"))
+    if known_unit(abscissa) != "s":
+        return []  # a spectrum
+    table = np.asarray(value, dtype=np.float64).reshape(len(value), -1)
+    if isinstance(declared, int | float) and len(table) != declared:
+        raise RecordError(
+            f"{path}: {signal} declares {declared:.0f} samples and {len(table)} are present; export it again"
+        )
+    unit = str(found("y_values.quantity.label", "")).strip()
+    factor = found("y_values.quantity.unit_transformation.factor", 1.0)
+    offset = found("y_values.quantity.unit_transformation.offset", 0.0)
+    names = found("function_record.name", signal)
+    names = [str(name).strip() for name in (names if isinstance(names, list) else [names])]
+    if len(names) != table.shape[1]:
+        names = [f"{names[0] if len(names) == 1 else signal} ({k + 1})" for k in range(table.shape[1])]
+    time = start + step * np.arange(len(table), dtype=np.float64)
+    return [
+        Channel(
+            name=name,
+            label=name,
+            unit=spelled(profile.units.get(name, unit)),
+            values=table[:, i] * float(factor) + float(offset),
+            time=time,
+        )
+        for i, name in enumerate(names)
+    ]
 
 
 def _is_samples(value: Any) -> bool:

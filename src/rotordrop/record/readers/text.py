@@ -1,4 +1,4 @@
-"""How a delimited text file is laid out, and what its header says of clock, trigger and sensitivity."""
+"""How a delimited text file is laid out: its lines, signs, columns and numbers."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from datetime import date
 from pathlib import Path
 from typing import Literal
 
-from rotordrop.errors import RecordError, UsageError
+from rotordrop.errors import RecordError
 from rotordrop.record.profile import TextLayout
-from rotordrop.record.recording import known_unit, split_unit
-from rotordrop.units import parse_quantity
 
-BLANKS = frozenset(("", "nan", "-", "--", "---", "n/a", "na", "null", "#n/a", "inf", "-inf", "+inf"))
+BLANKS = frozenset(
+    ("", "nan", "-", "--", "---", "n/a", "na", "null", "#n/a", "inf", "-inf", "+inf", "∞", "-∞", "infinity")
+)
 """What recorders write where a sample is missing."""
 
 _EXPONENT = r"(?:[eE][+-]?[0-9]+)?"
@@ -55,21 +55,7 @@ _LEAST_FITTING = 0.5
 _MOSTLY = 0.6
 """Share of the fields of a column that make it one of numbers or of times (chosen)."""
 
-ColumnKind = Literal["number", "time", "text"]
-
-_KEYS = {
-    "step": "dt step increment sampleinterval samplinginterval abtastintervall schrittweite",
-    "rate": "fs samplerate samplingrate samplingfrequency abtastrate abtastfrequenz rate",
-    "trigger": "triggersample triggerindex triggerposition pretriggersamples",
-    "before": "pretrigger pretriggertime vorlauf",
-    "count": "samples samplecount numberofsamples numsamples nsamples points numberofpoints recordlength "
-    "anzahlwerte anzahlmesswerte anzahlabtastwerte messwerte",
-    "start": "t0 starttime firstsample startoffset",
-}
-"""Keys of header entries in letters and digits only, as recorders write them in English and German."""
-
-_SENSITIVITY = re.compile(r"(\d+(?:[.,]\d+)?)\s*(m?V)\s*/\s*([uµμm]?m|mil)\b")
-_VOLTAGE_OFFSET = re.compile(r"offset\s*[:=]?\s*([+-]?\d+(?:[.,]\d+)?)\s*(m?V)\b", re.IGNORECASE)
+ColumnKind = Literal["number", "time", "text", "blank"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,27 +70,7 @@ class Layout:
     columns: int
     """Number of columns of the data lines."""
     kinds: tuple[ColumnKind, ...]
-    """What every column holds: "number", "time" (a date, a time of day or both) or "text"."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Header:
-    """What the header says."""
-
-    entries: dict[str, str]
-    """Keys and values as written."""
-    step: float | None
-    """Time between samples [s]."""
-    start: float | None
-    """Time of the first sample [s]."""
-    trigger_sample: int | None
-    """Sample at which the record time is zero."""
-    count: int | None
-    """Number of samples."""
-    sensitivity: float | None
-    """Volts per metre [V/m]."""
-    voltage_offset: float
-    """Voltage at zero displacement [V]."""
+    """What every column holds: "number", "time" (a date, a time of day or both), "text", or nothing."""
 
 
 def read_lines(path: Path, rules: TextLayout) -> tuple[list[str], bool, str]:
@@ -182,7 +148,8 @@ def find_layout(lines: list[str], path: Path, rules: TextLayout) -> Layout:
         When no separator turns the lines into rows that hold numbers.
     """
     # spread over the file, without the header and a last line that may be cut
-    body = [line for line in lines[len(lines) // 4 : -1] if line.strip()] or lines
+    begin = len(lines) // 4 if rules.first_data_line is None else rules.first_data_line - 1
+    body = [line for line in lines[begin:-1] if line.strip()] or lines
     sample = body[:: max(1, len(body) // _SAMPLED_LINES)]
     fits = [
         fit
@@ -228,8 +195,10 @@ def _fit(sample: list[str], separator: str, decimal: str) -> tuple[tuple[int, in
 
 
 def _kind(fields: list[str], decimal: str) -> ColumnKind:
-    """What the fields of a column are for the most part; a column of blanks counts as numbers."""
+    """What the fields of a column are for the most part."""
     filled = [field for field in fields if field.lower() not in BLANKS]
+    if not filled:
+        return "blank"
     most = _MOSTLY * len(filled)
     if sum(is_number(field, decimal) for field in filled) >= most:
         return "number"
@@ -244,7 +213,7 @@ def is_row(fields: list[str], layout: Layout) -> bool:
     for field, kind in zip(fields, layout.kinds, strict=True):
         if kind == "text" or field.lower() in BLANKS:
             continue
-        if not (is_number(field, layout.decimal) if kind == "number" else _STAMP.fullmatch(field)):
+        if not (_STAMP.fullmatch(field) if kind == "time" else is_number(field, layout.decimal)):
             return False
         some = True
     return some
@@ -281,86 +250,3 @@ def stamp_parts(field: str) -> tuple[int, int] | None:
         seconds += 3600 * int(match["hour"]) + 60 * int(match["minute"]) + int(match["whole"] or 0)
         nanoseconds = int((match["part"] or "").ljust(9, "0")[:9])
     return seconds, nanoseconds
-
-
-def name_and_unit_rows(header: list[list[str]], columns: int) -> tuple[list[str] | None, list[str] | None]:
-    """Find the row of column names and the row of units among the split header lines.
-
-    The first field of a row of units may be a word such as ``Unit``.
-    """
-    full = [row for row in header if len(row) == columns and sum(map(bool, row)) > columns // 2]
-    units = None
-    for row in full:
-        rest = [field for field in row[1:] if field not in ("", "-", "1")]
-        if rest and all(known_unit(field) for field in rest):
-            units = row
-            break
-    named = [row for row in full if row is not units and not any(_PLAIN["."].fullmatch(f) for f in row)]
-    return (named[-1] if named else None), units
-
-
-def read_header(lines: list[str], separator: str) -> Header:
-    """Read the comment and header lines above the columns."""
-    entries: dict[str, str] = {}
-    for line in lines:
-        _collect(line, separator, entries)
-
-    def found(kind: str) -> tuple[str, str]:
-        """Text and unit of the first entry of a kind, empty where there is none."""
-        for key, value in entries.items():
-            name, _, unit = split_unit(key)
-            if re.sub(r"[^a-z0-9]", "", name.lower()) in _KEYS[kind].split():
-                return value, unit
-        return "", ""
-
-    step, rate = _number(*found("step"), "time", "s"), _number(*found("rate"), "frequency", "Hz")
-    start, before = _number(*found("start"), "time", "s"), _number(*found("before"), "time", "s")
-    trigger, count = re.match(r"\d{1,15}(?!\d)", found("trigger")[0]), found("count")[0].strip()
-    text = "\n".join(lines)
-    sensitivity, offset = _SENSITIVITY.search(text), _VOLTAGE_OFFSET.search(text)
-    return Header(
-        entries=entries,
-        step=1.0 / rate if step is None and rate else step,
-        start=-abs(before) if start is None and before is not None else start,
-        trigger_sample=int(trigger.group()) if trigger else None,
-        # a whole number and nothing else: "Samples: 5 per channel" declares no length
-        count=int(count) if re.fullmatch(r"[1-9]\d{0,9}", count) else None,
-        sensitivity=parse_quantity(
-            f"{_point(sensitivity[1])} {sensitivity[2]}/{known_unit(sensitivity[3])}", "voltage_sensitivity"
-        )
-        if sensitivity
-        else None,
-        voltage_offset=parse_quantity(f"{_point(offset[1])} {offset[2]}", "voltage") if offset else 0.0,
-    )
-
-
-def _collect(line: str, separator: str, entries: dict[str, str]) -> None:
-    """Add the entries of a line: ``key: value;key: value`` or ``key;value;unit``."""
-    plain = line.strip().lstrip("#%/!* ").strip()
-    fields = [field.strip().strip('"').strip() for field in plain.split(separator)]
-    pairs = [
-        re.split("[:=]", field, maxsplit=1) for field in fields if re.match(r"[^:=]{2,40}[:=]\s*\S", field)
-    ]
-    if plain and pairs and not re.fullmatch(r"[\d:.\-T ]+", fields[0]):
-        entries.update((key.strip(), value.strip()) for key, value in pairs if not re.search(r"\d$", key))
-    if line.lstrip().startswith("#"):
-        if plain and not pairs:
-            entries.setdefault(f"comment {len(entries) + 1}", plain)
-    elif len(fields) > 1 and fields[0] and ":" not in fields[0]:
-        entries.setdefault(fields[0], " ".join(fields[1:3]).strip())
-
-
-def _number(value: str, unit: str, kind: str, default_unit: str) -> float | None:
-    """A header entry in SI units, None where it is no quantity of this kind."""
-    match = re.match(r"([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)\s*(\S*)", value)
-    if not match:
-        return None
-    unit = unit or known_unit(match[2]) or match[2] or default_unit
-    try:
-        return parse_quantity(f"{_point(match[1])} {unit}", kind)
-    except UsageError:
-        return None
-
-
-def _point(number: str) -> str:
-    return number.replace(",", ".")

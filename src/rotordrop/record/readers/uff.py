@@ -2,139 +2,159 @@
 
 from __future__ import annotations
 
+import re
+from contextlib import suppress
+from itertools import accumulate, pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rotordrop.errors import RecordError
-from rotordrop.record.recording import Channel, Recording, spelled, split_unit
-from rotordrop.record.sandbox import Content, Item, refuse_bomb, unpack
+from rotordrop.record.recording import Array, Channel, Recording, spelled, split_unit
+from rotordrop.record.sandbox import refuse_bomb
 
 if TYPE_CHECKING:
     from rotordrop.record.profile import Profile
 
-_DELIMITER = b"-1"
-_HEADER_LINES = 11
-"""Lines of a dataset 58 before its samples, by the definition of the format."""
+_ONLY = rb"[ \t]*-1[ \t]*\r?(?:\n|\Z)"
+_DELIMITER, _NEXT_DELIMITER = re.compile(_ONLY), re.compile(rb"(?<=\n)" + _ONLY)
+"""A line that holds only -1; some pad it with blanks, and the last one may have no line end."""
 
-_BYTES = {2: 4, 4: 8, 5: 8, 6: 16}
-"""Bytes per sample by ordinate data type: real and complex, single and double."""
+_HEAD_LINES = 11
+"""Lines of a dataset 58 before its samples: five of text, the degrees of freedom, the form, four axes."""
 
-_ABSCISSA_BYTES = {2: 4, 4: 8, 5: 4, 6: 8}
-"""Bytes per time stamp where the samples are not evenly spaced."""
+_FORM = {2: ("f4", 13, 13), 4: ("f8", 20, 13)}
+"""Real ordinates by their code: how one is stored, its width in text, and the width of a time stamp."""
+
+_FREQUENCY = 18
+"""Code of an abscissa that is no time."""
 
 
 def read_uff(path: Path, profile: Profile) -> Recording:
     """Read the time histories of a universal file; channels are named in the first identification line."""
-    content = unpack(path, "uff")
-    channels = []
-    for item, time in zip(content.items[::2], content.items[1::2], strict=True):
-        name, label, unit = split_unit(item.name)
-        unit = str(item.attributes["unit"]) or unit
-        unit = profile.units.get(label, "" if unit.upper() == "NONE" else unit)
-        channels.append(
-            Channel(
-                name=name,
-                label=label,
-                unit=spelled(unit),
-                values=item.values.astype(np.float64),
-                time=time.values.astype(np.float64),
-            )
-        )
-    entries = {key: str(value) for key, value in content.attributes.items()}
-    return Recording(channels=tuple(channels), metadata=entries)
-
-
-def unpacked(path: Path) -> Content:
-    """In the child: the samples of every time history, then its time stamps under the same name."""
-    import pyuff
-
-    counts = _declared_samples(path)
-    refuse_bomb(sum(counts), path.stat().st_size, path)
-    try:
-        sets = pyuff.UFF(str(path)).read_sets()
-    except MemoryError:
-        raise
-    except Exception as error:
-        raise RecordError(f"{path} cannot be read as a universal file: {error}; export it again") from error
-    sets = [item for item in (sets if isinstance(sets, list) else [sets]) if item.get("type") == 58]
-    if len(sets) != len(counts):
-        raise RecordError(
-            f"{path} holds {len(counts)} datasets of type 58 but {len(sets)} could be read; export it again"
-        )
-    items: list[Item] = []
-    for found, declared in zip(sets, counts, strict=True):
-        label = str(found["id1"]).strip()
-        values, time = np.asarray(found["data"]), np.asarray(found["x"], dtype=np.float64)
-        if values.dtype.kind == "c" or len(values) != declared or len(time) != declared:
-            raise RecordError(
-                f"{path}: dataset {label!r} declares {declared} samples and {len(values)} {values.dtype} "
-                "samples were read; a real time history is expected"
-            )
-        unit = str(found.get("ordinate_axis_units_lab", "")).strip()
-        items.append(Item(name=label, values=values, attributes={"unit": unit}))
-        items.append(Item(name=label, values=time, attributes={"of": "time"}))
-    if not items:
-        raise RecordError(f"{path} holds no dataset of type 58 (time history)")
-    return Content(items=tuple(items), attributes={"id2": str(sets[0].get("id2", "")).strip()})
-
-
-def _declared_samples(path: Path) -> list[int]:
-    """Compare declared with present lengths; give the declared number of samples of each dataset 58."""
     content = path.read_bytes()
-    counts: list[int] = []
+    channels: list[Channel] = []
+    others: list[str] = []
+    entries: dict[str, str] = {}
     at = 0
-    while (begin := _find_delimiter(content, at)) is not None:
-        kind_end = content.find(b"\n", begin)
-        kind = content[begin:kind_end]
-        end = kind_end
-        if kind.split()[:1] and kind.split()[0][:2] == b"58":
-            count, end = _walk_58(content, kind, kind_end + 1, path)
-            counts.append(count)
-        closing = _find_delimiter(content, end)
+    while (opening := _delimiter(content, at)) is not None:
+        line_end = content.find(b"\n", opening.end())
+        kind = content[opening.end() : line_end if line_end >= 0 else len(content)].split()
+        at = line_end + 1 if line_end >= 0 else len(content)
+        if kind and kind[0] in (b"58", b"58b"):
+            head, at = _head(content, at, path)
+            time, values, at = _samples(content, at, kind, head, path)
+            name, label, unit = split_unit(head[0].strip())
+            unit = unit if head[8][47:69].strip() in ("", "NONE") else head[8][47:69].strip()
+            if values is None:
+                others.append(label)
+            else:
+                unit = spelled(profile.units.get(label, unit))
+                channels.append(Channel(name=name, label=label, unit=unit, values=values, time=time))
+                entries.setdefault("id2", head[1].strip())
+        closing = _delimiter(content, at)
         if closing is None:
             raise RecordError(
-                f"{path} is truncated: dataset {len(counts)} has no closing -1 (the file has {len(content)} "
-                "bytes); export it again"
+                f"{path} is truncated: dataset {len(channels) + len(others)} has no closing -1 (the file has "
+                f"{len(content)} bytes); export it again"
             )
-        at = closing
-    return counts
+        at = closing.end()
+    if not channels:
+        what = f"only spectra: {', '.join(map(repr, others[:8]))}" if others else "no dataset of type 58"
+        raise RecordError(f"{path} holds {what}; a real time history is expected, export the time signals")
+    notes = (f"left out, no time histories: {', '.join(others)}",) if others else ()
+    return Recording(channels=tuple(channels), metadata=entries, notes=notes)
 
 
-def _find_delimiter(content: bytes, at: int) -> int | None:
-    """Give the position after the next line that holds only -1."""
-    while at < len(content):
+def _delimiter(content: bytes, at: int) -> re.Match[bytes] | None:
+    """The delimiter that begins there, as behind binary samples, or the next that is a line of its own."""
+    return _DELIMITER.match(content, at) or _NEXT_DELIMITER.search(content, at)
+
+
+def _head(content: bytes, at: int, path: Path) -> tuple[list[str], int]:
+    """The lines before the samples, whose fields stand at fixed columns, and where they end."""
+    lines = []
+    for _ in range(_HEAD_LINES):
         end = content.find(b"\n", at)
-        end = len(content) if end < 0 else end
-        if end - at < 20 and content[at:end].strip() == _DELIMITER:
-            return end + 1
+        if end < 0:
+            raise RecordError(f"{path} is truncated: it ends within the header of a dataset; export it again")
+        lines.append(content[at:end].rstrip(b"\r"))
         at = end + 1
-    return None
-
-
-def _walk_58(content: bytes, kind: bytes, at: int, path: Path) -> tuple[int, int]:
-    """Read the declared length of a dataset 58 and give it with the position where its samples end."""
-    lines = content[at : at + 2000].split(b"\n")[:_HEADER_LINES]
-    name = lines[0].decode("latin-1").strip()
     try:
-        data_type, count, even = (int(part) for part in lines[6].split()[:3])
+        return [line.decode("utf-8") for line in lines], at
+    except UnicodeDecodeError:
+        return [line.decode("latin-1") for line in lines], at
+
+
+def _samples(
+    content: bytes, at: int, kind: list[bytes], head: list[str], path: Path
+) -> tuple[Array, Array | None, int]:
+    """Time [s] and samples, no samples where they are those of a spectrum, and where they end."""
+    name = head[0].strip()
+    try:
+        code, count, even = (int(part) for part in head[6].split()[:3])
+        start, step = (float(part.replace("D", "E")) for part in head[6].split()[3:5])
+        abscissa = int(head[7].split()[0])
     except (ValueError, IndexError) as error:
         raise RecordError(
-            f"{path}: dataset {name!r} has no readable line 7 (type, count, spacing)"
+            f"{path}: dataset {name!r} has no readable line 7 (type, count, spacing, start, step)"
         ) from error
-    start = at + sum(len(line) + 1 for line in lines)
-    if not kind.split()[0].endswith(b"b"):
-        return count, start
-    try:
-        declared = int(kind.split()[4])
-    except (ValueError, IndexError) as error:
-        raise RecordError(f"{path}: dataset {name!r} does not declare its bytes ({kind!r})") from error
-    expected = count * (_BYTES.get(data_type, 0) + (0 if even else _ABSCISSA_BYTES.get(data_type, 0)))
-    present = min(declared, len(content) - start)
-    if declared != expected or present < declared:
-        raise RecordError(
-            f"{path}: dataset {name!r} declares {count} samples ({expected} bytes) in {declared} bytes and "
-            f"{present} bytes are present; the file is truncated or damaged, export it again"
+    if code not in (2, 4, 5, 6) or count < 0:
+        raise RecordError(f"{path}: dataset {name!r} declares {count} samples of the unknown type {code}")
+    refuse_bomb(count * (1 if even else 2), len(content), path)
+    stored, wide, wide_time = _FORM[2 if code in (2, 5) else 4]
+    parts = 2 if code in (5, 6) else 1
+    time = start + step * np.arange(count, dtype=np.float64)
+    spectrum = parts == 2 or abscissa == _FREQUENCY
+    if kind[0] == b"58b":
+        row = np.dtype(
+            [("time", "f4" if code in (2, 5) else "f8", (0 if even else 1,)), ("y", stored, (parts,))]
         )
-    return count, start + declared
+        try:
+            order, declared = int(kind[1]), int(kind[4])
+        except (ValueError, IndexError) as error:
+            raise RecordError(
+                f"{path}: dataset {name!r} does not declare its bytes ({b' '.join(kind)!r})"
+            ) from error
+        present = min(declared, len(content) - at)
+        if declared != count * row.itemsize or present < declared:
+            raise RecordError(
+                f"{path}: dataset {name!r} declares {count} samples ({count * row.itemsize} bytes) in "
+                f"{declared} bytes and {present} bytes are present; the file is truncated or damaged, export "
+                "it again"
+            )
+        table = np.frombuffer(content, row.newbyteorder("<" if order == 1 else ">"), count, at)
+        values = table["y"][:, 0].astype(np.float64)
+        time = time if even else table["time"][:, 0].astype(np.float64)
+        return time, None if spectrum else values, at + declared
+    closing = _delimiter(content, at)
+    end = len(content) if closing is None else closing.start()
+    if spectrum:
+        return time, None, end
+    widths = [wide] * (80 // wide) if even else [wide_time, wide] * (80 // (wide_time + wide))
+    expected = count * (1 if even else 2)
+    try:
+        numbers = _numbers(content[at:end].decode("latin-1").replace("D", "E"), expected, widths)
+    except ValueError as error:
+        raise RecordError(
+            f"{path}: dataset {name!r}: {error}; the file is damaged, export it again"
+        ) from error
+    present = len(numbers) // (1 if even else 2)
+    if len(numbers) != expected:
+        raise RecordError(
+            f"{path}: dataset {name!r} declares {count} samples and {present} are present; the file is "
+            "truncated or damaged, export it again"
+        )
+    return (time, numbers, end) if even else (numbers[::2], numbers[1::2], end)
+
+
+def _numbers(text: str, expected: int, widths: list[int]) -> Array:
+    """Numbers with blanks between them, else those at fixed columns, where a sign may follow a digit."""
+    with suppress(ValueError):
+        numbers = np.array(text.split(), dtype=np.float64)
+        if len(numbers) == expected:
+            return numbers
+    edges = list(pairwise([0, *accumulate(widths)]))
+    cut = (line[first:last] for line in text.splitlines() for first, last in edges)
+    return np.array([field for field in cut if field.strip()], dtype=np.float64)

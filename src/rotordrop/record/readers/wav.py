@@ -9,7 +9,7 @@ import numpy as np
 
 from rotordrop.errors import RecordError
 from rotordrop.record.profile import Profile
-from rotordrop.record.recording import Array, Channel, Recording, spelled
+from rotordrop.record.recording import FULL_SCALE, Array, Channel, Recording, spelled
 from rotordrop.units import split_quantity
 
 _PCM, _FLOAT, _EXTENSIBLE = 1, 3, 0xFFFE
@@ -35,7 +35,7 @@ def read_wav(path: Path, profile: Profile) -> Recording:
             "the file is damaged, copy it again"
         )
     samples = _samples(data, kind, bits, path).reshape(-1, count)
-    factor, unit = (1.0, "") if profile.full_scale is None else split_quantity(profile.full_scale)
+    factor, unit = (1.0, FULL_SCALE) if profile.full_scale is None else split_quantity(profile.full_scale)
     names = profile.text.names or tuple(f"channel {number + 1}" for number in range(count))
     if len(names) != count:
         raise RecordError(f"{path} has {count} channels and the profile names {len(names)}")
@@ -44,7 +44,7 @@ def read_wav(path: Path, profile: Profile) -> Recording:
         Channel(
             name=n,
             label=n,
-            unit=spelled(profile.units.get(n, unit)),
+            unit=spelled(unit if unit == FULL_SCALE else profile.units.get(n, unit)),
             values=samples[:, i] * factor,
             time=time,
         )

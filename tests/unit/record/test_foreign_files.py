@@ -1,0 +1,197 @@
+"""What other recorders write: damage and doubt are said with their true reason and the way out."""
+
+import re
+
+import numpy as np
+import pytest
+import scipy.io
+from tests.unit.record.exports import (
+    COUNT,
+    EXPORTS,
+    MICRONS,
+    START,
+    STEP,
+    TIME,
+    VOLTS,
+    comtrade,
+    labview,
+    universal,
+)
+
+from rotordrop.errors import RecordError
+from rotordrop.record import Profile, read_record
+from rotordrop.record.profile import TextLayout
+from rotordrop.record.readers import read_recording
+from rotordrop.record.record import open_record
+from rotordrop.record.recording import known_unit, split_unit
+
+
+def read(path, **rules):
+    return read_recording(path, Profile(**rules))
+
+
+def export(form):
+    return next(one for one in EXPORTS if one.form == form)
+
+
+def test_segments_that_do_not_follow_are_told_and_chosen(tmp_path):
+    path = tmp_path / "drop.lvm"
+    path.write_bytes(labview("No", segments=(range(25), range(25, COUNT)), gap=3.0))
+    recording = read(path)
+    (told,) = recording.warnings
+    assert "holds 2 segments that do not follow each other; the first is read (first_data_line = " in told
+    np.testing.assert_allclose(recording.channels[0].values, VOLTS[:25, 0], atol=1e-9)
+    line = int(told.split("first_data_line = ")[1].split(" ")[0])
+    second = read(path, text=TextLayout(first_data_line=line))
+    assert second.warnings == ()
+    np.testing.assert_allclose(second.channels[0].values, VOLTS[25:, 0], atol=1e-9)
+
+
+def test_a_segment_shorter_than_its_head_says_is_told(tmp_path):
+    path = tmp_path / "drop.lvm"
+    lines = labview("One").decode().split("\r\n")
+    path.write_text("\n".join(lines[:-12]) + "\n")
+    (told,) = read(path).warnings
+    assert f"declares {COUNT} samples and {COUNT - 10} are present" in told
+
+
+def test_a_damaged_row_of_a_second_segment_is_named_by_its_line(tmp_path):
+    path = tmp_path / "drop.lvm"
+    text = labview("No", segments=(range(25), range(25, COUNT))).decode()
+    wrong = f"{VOLTS[30, 1]:.6f}"
+    path.write_text(text.replace(wrong, "4.5x"))
+    line = text.replace("\r\n", "\n").split(wrong)[0].count("\n") + 1
+    with pytest.raises(RecordError, match=rf"line {line}, column 'NDE Y.*': '4\.5x' is not a number"):
+        read(path)
+
+
+@pytest.mark.parametrize("kind", ["ASCII", "BINARY32"])
+def test_a_single_comtrade_file_that_was_cut_is_refused(kind, tmp_path):
+    path = tmp_path / "drop.cff"
+    comtrade(kind, single=True)(path)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) - 500])
+    with pytest.raises(
+        RecordError, match=r"truncated: its samples declare \d+ bytes|entries where|declares 60 samp"
+    ):
+        read(path)
+    path.write_bytes(whole[: whole.index(b"--- file type: DAT")])
+    with pytest.raises(RecordError, match=r"has no section DAT \(it has CFG, INF, HDR\)"):
+        read(path)
+
+
+@pytest.mark.parametrize("binary", ["", "<", ">"])
+@pytest.mark.parametrize("padded", [True, False])
+@pytest.mark.parametrize("last_end", [True, False])
+def test_universal_files_are_those_that_another_reader_sees(binary, padded, last_end, tmp_path):
+    pyuff = pytest.importorskip("pyuff")
+    path = tmp_path / "drop.uff"
+    path.write_bytes(universal(binary=binary, padded=padded))
+    sets = pyuff.UFF(str(path)).read_sets()
+    path.write_bytes(universal(binary=binary, padded=padded, last_end=last_end))
+    for channel, other in zip(read(path).channels, sets, strict=True):
+        np.testing.assert_array_equal(channel.values, other["data"])
+        np.testing.assert_allclose(channel.time, other["x"], atol=1e-9)
+        assert (channel.label, channel.unit) == (
+            other["id1"].strip(),
+            other["ordinate_axis_units_lab"].strip(),
+        )
+
+
+def test_universal_text_without_blanks_between_numbers(tmp_path):
+    path = tmp_path / "drop.uff"
+    text = universal().decode()
+    for value in np.unique(MICRONS):
+        text = text.replace(f"{value:13.5e}", f"{value:13.6e}")  # a minus sign then follows a digit
+    assert re.search(r"\d-\d\.", text)
+    path.write_text(text)
+    np.testing.assert_allclose(read(path).channels[1].values, MICRONS[:, 1], rtol=1e-6)
+
+
+def test_uneven_times_and_spectra_of_universal_files(tmp_path):
+    text = universal(names=["NDE X"], padded=False).decode()
+    head, _, rest = text.partition(f"{2:10d}{COUNT:10d}{1:10d}")
+    tail = rest.split("\n")
+    body = "".join(f"{TIME[i]:13.5e}{MICRONS[i, 0]:13.5e}" + "\n" * (i % 3 == 2) for i in range(COUNT))
+    path = tmp_path / "drop.uff"
+    path.write_text(head + f"{2:10d}{COUNT:10d}{0:10d}" + "\n".join(tail[:5]) + "\n" + body + f"{-1:6d}")
+    (channel,) = read(path).channels
+    np.testing.assert_allclose(channel.time, TIME, atol=1e-8)
+    np.testing.assert_allclose(channel.values, MICRONS[:, 0], rtol=1e-5)
+    path.write_text(text.replace(f"{17:10d}{0:5d}", f"{18:10d}{0:5d}", 1))
+    with pytest.raises(RecordError, match=r"holds only spectra: 'NDE X'; a real time history is expected"):
+        read(path)
+
+
+def test_testlab_structures_must_be_whole_and_in_time(tmp_path):
+    path = export("Testlab MAT, channels apart").written(tmp_path)
+    held = scipy.io.loadmat(path, simplify_cells=True)
+    content = {key: value for key, value in held.items() if key.startswith("Signal")}
+    content["Signal_0"]["x_values"]["number_of_values"] = 99.0
+    scipy.io.savemat(path, content)
+    with pytest.raises(RecordError, match=r"Signal_0 declares 99 samples and 60 are present"):
+        read(path)
+    content["Signal_0"]["x_values"] |= {"number_of_values": 60.0, "increment": 0.0}
+    scipy.io.savemat(path, content)
+    with pytest.raises(
+        RecordError, match=r"Signal_0 has the increment 0\.0; a time signal has a positive one"
+    ):
+        read(path)
+
+
+def test_a_wav_file_asks_for_its_full_scale_whatever_unit_is_given(tmp_path):
+    path = export("WAV").written(tmp_path)
+    asked = r"holds shares of a full scale, from -1 to 1, .*--full-scale \"500 um\""
+    for rules in (Profile(), Profile(unit="um"), Profile(units={"channel 1": "um"})):
+        with pytest.raises(RecordError, match=asked):
+            open_record(path, None, profile=rules)
+    record, _ = open_record(path, None, profile=Profile(full_scale="500 um"))
+    np.testing.assert_allclose(record.signals, MICRONS * 1e-6, atol=1e-8)
+
+
+def test_rates_that_differ_between_channels_are_not_taken_for_one(tmp_path):
+    text = export("SampleRate").content.decode().replace("20000.000,20000.000", "20000.000,10000.000", 1)
+    path = tmp_path / "drop.csv"
+    path.write_text(text)
+    with pytest.raises(RecordError, match=r"no time column among .* and no sampling interval"):
+        read(path)
+
+
+def test_captures_of_other_length_side_by_side_keep_their_own_times(tmp_path):
+    rows = [f"{START + i * STEP:.6f},{MICRONS[i, 0]}," for i in range(COUNT)]
+    rows = [row + (f"{2 * i * STEP:.6f},{MICRONS[i, 1]}" if i < 30 else ",") for i, row in enumerate(rows)]
+    path = tmp_path / "drop.csv"
+    path.write_text("\n".join(["Time [s],A [um],Time [s],B [um]", *rows]) + "\n")
+    first, second = read(path).channels
+    np.testing.assert_allclose(first.time, TIME, atol=1e-9)
+    np.testing.assert_allclose(second.time, 2 * STEP * np.arange(30), atol=1e-9)
+    np.testing.assert_allclose(second.values, MICRONS[:30, 1])
+
+
+@pytest.mark.parametrize("wrong", ["(" * 20_000 + "m", "(m", "m)", "[[m]]", ")m("])
+def test_brackets_that_do_not_match_are_no_unit(wrong):
+    assert known_unit(wrong) is None
+    assert known_unit("(m)") == known_unit("[m]") == known_unit(" m ") == "m"
+
+
+@pytest.mark.parametrize(
+    ("written", "name", "unit"),
+    [
+        ("VE-101X um", "VE-101X", "um"),
+        ("X1, µm", "X1", "um"),
+        ("Probe V", "Probe V", ""),
+        ("n 1/min", "n", "rpm"),
+    ],
+)
+def test_a_unit_behind_a_blank(written, name, unit):
+    assert split_unit(written)[::2] == (name, unit)
+
+
+def test_messages_name_eight_channels_at_most(machine, tmp_path):
+    names = [f"T{k} [degC]" for k in range(30)]
+    path = tmp_path / "drop.csv"
+    path.write_text(
+        "\n".join([",".join(["Time [s]", *names]), *(f"{i * STEP:.5f}" + ",1.0" * 30 for i in range(9))])
+    )
+    with pytest.raises(RecordError, match=r"it has T0, T1, T2, T3, T4, T5, T6, T7 and 22 more"):
+        read_record(path, machine)
