@@ -26,7 +26,7 @@ test: $(READY) ## run the tests
 
 NUMERIC := tests/unit/physics tests/unit/rotor tests/unit/simulate tests/validation
 FITTED := tests/unit/track/test_filter_and_smoother.py tests/unit/track/test_propagation.py \
-	tests/unit/identification/test_support.py
+	tests/unit/replay/test_first_impacts.py
 
 arithmetic: $(READY) ## run the numeric tests with the arithmetic of other processors
 	@OPENBLAS_CORETYPE=Prescott $(BIN)/python -m pytest -q -m "not slow" $(NUMERIC) $(FITTED)

@@ -22,9 +22,9 @@ from pathlib import Path
 from typing import Any
 
 from rotordrop.evidence.evidence import Evidence, read_evidence
-from rotordrop.identification.replica import build_replica
-from rotordrop.identification.support import SupportFit, fit_support, impact_problem
 from rotordrop.machine import example_machine
+from rotordrop.replay.first_impacts import first_impacts
+from rotordrop.replay.support_and_friction import SupportFit, fit_support
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop_bench import hidden_machine, synthesize_drop
 
@@ -44,7 +44,7 @@ def fallen() -> Evidence:
 def fit(evidence: Evidence, threads: int) -> SupportFit:
     """One fit as the replay makes it."""
     coarse, fine = (
-        impact_problem(build_replica(evidence, model, until=UNTIL))
+        first_impacts(evidence, model, until=UNTIL)
         for model in (build_drop_model(evidence.model.machine, "quick"), evidence.model)
     )
     return fit_support(coarse, fine, evidence.latest_first_contact, starts=STARTS, threads=threads)

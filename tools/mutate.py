@@ -46,7 +46,7 @@ PACKAGE = ROOT / "src" / "rotordrop"
 KEPT = ROOT / "tests" / "mutation" / "mutants.json"
 WORK = ROOT / "build" / "mutation"
 SEED = 2026
-WANTED = dict.fromkeys(("evidence", "identification", "track", "twin", "spectrum"), 26)
+WANTED = dict.fromkeys(("evidence", "replay", "track", "twin", "spectrum"), 26)
 OTHERS = 20
 LIMIT = 60.0
 """Processor time for a fault [s]."""
@@ -505,9 +505,7 @@ def attempt_with(files: list[str], fault: Mutation, copies: Copies, limit: float
 
 def warm(copies: Copies, compiled: Tests) -> None:
     """Fill the cache of machine code, and see that the tests pass where there is no fault."""
-    kept = [
-        name for name in compiled.ran if name.startswith(("tests/unit/track/", "tests/unit/identification/"))
-    ]
+    kept = [name for name in compiled.ran if name.startswith(("tests/unit/track/", "tests/unit/replay/"))]
     pass_without_fault(kept, copies, compiled)
 
 

@@ -31,17 +31,15 @@ from numpy.typing import NDArray
 from rotordrop.evidence.evidence import Evidence, read_evidence
 from rotordrop.evidence.evidence import known as present
 from rotordrop.evidence.rest import identify_air_gap
-from rotordrop.identification.replica import build_replica
-from rotordrop.identification.support import (
+from rotordrop.known import Known
+from rotordrop.replay.first_impacts import FirstImpacts, first_impacts
+from rotordrop.replay.support_and_friction import (
     LONGEST_WINDOW,
-    ImpactFit,
     SupportFit,
     fit_support,
     identified_values,
-    impact_problem,
     refit_with_friction,
 )
-from rotordrop.known import Known
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop_bench import hidden_machine, synthesize_drop
 
@@ -50,15 +48,13 @@ Array = NDArray[np.float64]
 UNTIL = 0.06
 
 
-def supports_of(evidence: Evidence) -> tuple[SupportFit, dict[str, Known], ImpactFit, Array]:
+def supports_of(evidence: Evidence) -> tuple[SupportFit, dict[str, Known], FirstImpacts, Array]:
     """Supports as the replay finds them, but for the sweep of the friction, which is known here."""
     quick = build_drop_model(evidence.model.machine, "quick")
-    coarse, fine = (
-        impact_problem(build_replica(evidence, model, until=UNTIL)) for model in (quick, evidence.model)
-    )
+    coarse, fine = (first_impacts(evidence, model, until=UNTIL) for model in (quick, evidence.model))
     found = fit_support(coarse, fine, evidence.latest_first_contact)
     longest = evidence.latest_first_contact + LONGEST_WINDOW
-    friction = found.values[fine.vector.paths[fine.vector.friction]]
+    friction = identified_values(fine, found.search.best.x, found.covariance)[fine.paths[fine.friction]]
     problem, x, covariance = refit_with_friction(fine, found.search.best, friction, longest=longest)
     return found, identified_values(problem, x, covariance), problem, x
 
@@ -73,7 +69,7 @@ def one(seed: int, hertz: float) -> dict[str, Any]:
     evidence = read_evidence(model, drop.record, drop.tail)
     found, values, problem, x = supports_of(evidence)
     best = found.search.best
-    rows = problem.replica.bearing_rows(problem.vector, x[: len(problem.vector)])
+    rows = problem.rows(problem.trial(x))
     settled = replace(evidence.model, parameters=evidence.model.parameters._replace(bearing=rows))
     gap = identify_air_gap(present(evidence.rest), settled, present(evidence.sensing))
     bearings = {}

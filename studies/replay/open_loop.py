@@ -28,12 +28,11 @@ from rotordrop.evidence.evidence import Evidence, read_evidence
 from rotordrop.evidence.evidence import known as present
 from rotordrop.evidence.initial_state import InitialState, fit_initial_state
 from rotordrop.evidence.sensing import build_sensing
-from rotordrop.identification.modal_expansion import ExpandedState, expand_initial_state
-from rotordrop.identification.replica import build_replica
-from rotordrop.identification.support import impact_problem
 from rotordrop.machine import Machine
 from rotordrop.record.record import Record
-from rotordrop.replay.uncertainty import best_candidate, seen_at_bearings, whole_drop
+from rotordrop.replay.draws import seen_at_bearings, whole_drop
+from rotordrop.replay.first_impacts import first_impacts
+from rotordrop.replay.modal_expansion import ExpandedState, expand_initial_state
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.simulate.case import DropCase, StateStart
 from rotordrop.simulate.drop import simulate_drop
@@ -62,8 +61,8 @@ def true_machine(known: Machine, hidden: HiddenMachine) -> Machine:
 def by_fit(evidence: Evidence) -> tuple[InitialState, DropResult, Array]:
     """Replay from the fit over the fall, and its orbit at the bearings as the sensors would show it."""
     initial = present(evidence.fall)
-    problem = impact_problem(build_replica(evidence, evidence.model, until=EARLY))
-    central = best_candidate(problem, problem.prior_mean)
+    problem = first_impacts(evidence, evidence.model, until=EARLY)
+    central = problem.trial(problem.table.mean)
     result = whole_drop(problem, central, duration=DURATION, tolerance=TOLERANCE)
     return initial, result, seen_at_bearings(problem, central, result)
 

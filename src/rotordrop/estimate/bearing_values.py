@@ -13,10 +13,19 @@ from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
 
 
-def published_values(name: str, found: Sequence[FittedParameter]) -> dict[str, Known]:
-    """Parameters of the bearing of a name by the field names of the published document, in its order."""
-    own = {one.row.field: one.estimate for one in found if one.row.owner == "bearing" and one.owner == name}
-    return {field: own[field] for field in published() if field in own}
+def bearing_values(
+    machine: Machine, b: int, load: float, found: Sequence[FittedParameter]
+) -> dict[str, Known]:
+    """Values of one bearing under its static load [N], by the field names of the published document."""
+    bearing = machine.touchdown_bearings[b]
+    mine = (one for one in found if one.row.owner == "bearing" and one.owner == bearing.name)
+    own = {one.row.field: one.estimate for one in mine}
+    values = {field: own[field] for field in published() if field in own}
+    if "friction.dynamic" in values:  # a bearing described without friction has none to find
+        values["friction.static"] = bearing.friction.static_of(values["friction.dynamic"])
+    support, preload = values["support.stiffness_N_per_m"], values.get("preload_N")
+    values["equivalent_stiffness_N_per_m"] = equivalent_stiffness(machine, b, load, support, preload)
+    return values
 
 
 def equivalent_stiffness(

@@ -30,7 +30,6 @@ from rotordrop.evidence.events import DropInstant, PowerOff
 from rotordrop.evidence.quality.finding import Finding
 from rotordrop.evidence.speed import SpeedFit
 from rotordrop.files import write_json
-from rotordrop.identification.friction import FrictionSweep as FrictionSweep
 from rotordrop.known import Correlation, Known
 from rotordrop.machine import Machine
 from rotordrop.record.record import Record
@@ -172,6 +171,23 @@ class Innovations:
     C)."""
     limits: tuple[float, float]
     """Mean normalised squares between which model and record count as consistent [1]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrictionSweep:
+    """Orbit agreement over friction coefficients; K coefficients, D draws."""
+
+    coefficients: Array
+    """Dynamic coefficients [1], shape (K,)."""
+    disagreement: Array
+    """Distance of simulated and measured orbit [m rms], each moment weighted by how well it can be known,
+    shape (K,)."""
+    best: Array
+    """Best coefficient with the best parameters, then with each draw of them [1], shape (D + 1,)."""
+    value: Known
+    """The dynamic coefficient."""
+    window: tuple[float, float]
+    """Compared part of the drop [s from power-off]."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,51 +6,67 @@ recorded one. What it can say is said with draws over everything uncertain; the 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.elements.parameter import Step
-from rotordrop.estimate.agreement import Agreement, compare_orbits, spread_horizon
+from rotordrop.elements.race_bearing import numbers_of
+from rotordrop.elements.table import parameter, rows
+from rotordrop.estimate.agreement import compare_orbits, spread_horizon
+from rotordrop.estimate.allowances import MODEL_FORCE_SIGMA, MODEL_MEAN_FORCE_SIGMA, MODEL_STRESS_SIGMA
 from rotordrop.estimate.assumptions import evidence_assumptions
-from rotordrop.estimate.estimate import Estimate, ReplaySteps, Verdict
+from rotordrop.estimate.bearing_drop import (
+    AirGap,
+    BearingDrop,
+    Motion,
+    Origin,
+    Role,
+    deepest,
+    finite,
+    simulated_bearings,
+)
+from rotordrop.estimate.bearing_values import bearing_values
+from rotordrop.estimate.estimate import Estimate, FittedParameter, FrictionSweep, ReplaySteps, Verdict
 from rotordrop.estimate.fixed_values import machine_with_fixed, read_fixed
 from rotordrop.estimate.later_motion import later_motion
 from rotordrop.estimate.methods import Replay
 from rotordrop.estimate.published import Drop
 from rotordrop.estimate.record_facts import RecordFacts
 from rotordrop.evidence.evidence import Evidence, known, read_evidence
-from rotordrop.evidence.initial_state import InitialState
-from rotordrop.evidence.rest import AirGap, identify_air_gap
-from rotordrop.identification.friction import FrictionSweep, sweep_friction
-from rotordrop.identification.replica import build_replica
-from rotordrop.identification.support import (
+from rotordrop.evidence.rest import AirGap as IdentifiedGap
+from rotordrop.evidence.rest import identify_air_gap
+from rotordrop.known import NINETY, Known
+from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.record.record import Record
+from rotordrop.replay.draws import (
+    FEWEST_DRAWS,
+    Draws,
+    draw_drops,
+    mean_with_draws,
+    seen_at_bearings,
+    whole_drop,
+    with_draws,
+)
+from rotordrop.replay.first_impacts import FirstImpacts, first_impacts
+from rotordrop.replay.least_squares import Progress
+from rotordrop.replay.modal_expansion import expand_initial_state
+from rotordrop.replay.support_and_friction import (
     LONGEST_WINDOW,
-    ImpactFit,
     SupportFit,
     fit_support,
     identified_values,
-    impact_problem,
     refit_with_friction,
-)
-from rotordrop.known import Known
-from rotordrop.machine import Machine
-from rotordrop.record.record import Record
-from rotordrop.replay.replay_estimate import Replayed, replay_bearings, replay_parameters, steps_document
-from rotordrop.replay.uncertainty import (
-    FEWEST_DRAWS,
-    Draws,
-    best_candidate,
-    draw_drops,
-    seen_at_bearings,
-    whole_drop,
+    sweep_friction,
 )
 from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.simulate.result import DropResult
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, float], None]
 
 DURATION = 0.2
 IDENTIFIED_UNTIL = 0.06
@@ -61,13 +77,14 @@ KEPT_UNTIL = 7.5e-3
 
 FRICTION_DRAWS = 6
 STAGES = {"supports": 0.06, "friction": 0.6, "replay": 0.68, "draws": 0.7}
+"""Share of the time at which each step begins [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Impacts:
+class Identified:
     """What the first impacts say: best unknowns with covariance, and the steps behind them."""
 
-    problem: ImpactFit
+    problem: FirstImpacts
     """The drop with its unknowns."""
     x: Array
     covariance: Array
@@ -78,6 +95,26 @@ class Impacts:
     """Sweep of the friction; None when it was taken over."""
     values: dict[str, Known]
     """Identified values by path."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Replayed:
+    """The whole drop replayed with the identified values, beside the record; N samples, B bearings."""
+
+    result: DropResult
+    """Simulation from power-off."""
+    middle: Array
+    lower: Array
+    upper: Array
+    """Rotor at the bearings as the sensors would show it [m], for the air gap and for its two limits, shape
+    (T, B, 2)."""
+    time: Array
+    """Samples of the record in the simulated window [s from power-off], shape (N,)."""
+    measured: Array
+    """Measured displacement at the bearings, along the straight rotor, from the rest position [m], shape (N,
+    B, 2)."""
+    draws: Draws | None
+    """Draws behind the intervals."""
 
 
 def replay_drop(
@@ -120,15 +157,28 @@ def replay_drop(
     start = machine if fixed is None else machine_with_fixed(machine, fixed, origin)
     say("air gap, speed, initial state, first contact", 0.0)
     evidence = read_evidence(build_drop_model(start), record, tail, name=name)
-    initial = known(evidence.fall)
-    impacts = _first_impacts(evidence, method, say) if fixed is None else _taken_over(evidence, fixed)
-    gap = _steady_gap(evidence, impacts)
+    impacts = _identified(evidence, method, say) if fixed is None else _taken_over(evidence, fixed)
+    # Within the fit the gap follows the sag of every trial, so that it has come to rest with the supports.
+    rows_found = impacts.problem.rows(impacts.problem.trial(impacts.x))
+    settled = replace(evidence.model, parameters=evidence.model.parameters._replace(bearing=rows_found))
+    gap = identify_air_gap(known(evidence.rest), settled, known(evidence.sensing))
     say("replay of the whole drop", STAGES["replay"])
-    replayed = _replay(impacts, evidence, gap, _draws(impacts, evidence, method, say))
-    found = replay_parameters(start, impacts.values, gap, impacts.friction)
-    later = later_motion(
-        replayed.result.bearing_names, *evidence.measured(np.inf), DURATION, float(np.mean(initial.noise))
-    )
+    draws = None
+    if method.draws >= 2:
+        draws = draw_drops(
+            impacts.problem,
+            impacts.x,
+            impacts.covariance,
+            window=0.0 if fixed is not None else evidence.latest_first_contact + KEPT_UNTIL,
+            duration=DURATION,
+            count=method.draws,
+            threads=method.threads,
+            progress=lambda text, share: say(text, STAGES["draws"] + (1.0 - STAGES["draws"]) * share),
+        )
+    replayed = _replay(impacts, evidence, gap, draws)
+    found = _parameters(start, impacts, gap)
+    noise = float(np.mean(known(evidence.fall).noise))
+    later = later_motion(replayed.result.bearing_names, *evidence.measured(np.inf), DURATION, noise)
     return Estimate(
         name=name,
         method=method,
@@ -138,14 +188,38 @@ def replay_drop(
         speed=evidence.speed.initial,
         until=DURATION,
         verdict=Verdict.OPEN_LOOP,
-        bearings=replay_bearings(start, evidence, gap, found, replayed),
+        bearings=tuple(
+            _bearing(start.touchdown_bearings[b], evidence, gap, found, replayed, simulated, b)
+            for b, simulated in enumerate(simulated_bearings(replayed.result))
+        ),
         parameters=found,
-        agreement=_agreement(replayed, gap),
-        replay=_steps(start, evidence, impacts, gap, replayed, origin),
+        agreement=compare_orbits(
+            replayed.time,
+            replayed.measured,
+            replayed.middle,
+            gap.value,
+            at=replayed.result.time,
+            expected_horizon=None
+            if draws is None
+            else spread_horizon(draws.spread_time, draws.spread, gap.value),
+        ),
+        replay=ReplaySteps(
+            speed=evidence.speed,
+            contacts=known(evidence.contacts),
+            friction=impacts.friction,
+            correlations=() if impacts.support is None else impacts.support.correlations,
+            speed_time=replayed.result.time,
+            speed_simulated=replayed.result.speed,
+            fixed=origin,
+            draws=None if draws is None else len(draws),
+            rejected=None if draws is None else draws.rejected,
+            identified=_identified_machine(start, impacts, gap),
+            document=_document(evidence, impacts, gap, replayed),
+        ),
         later=later,
         findings=facts.findings,
         warnings=facts.warnings_with(
-            *_warnings(evidence, initial, impacts, replayed.draws),
+            *_warnings(evidence, impacts, draws),
             *(one.sentence() for one in later if one.larger),
         ),
         notes=_notes(evidence, gap),
@@ -153,58 +227,24 @@ def replay_drop(
     )
 
 
-def _steps(
-    machine: Machine, evidence: Evidence, impacts: Impacts, gap: AirGap, replayed: Replayed, origin: str
-) -> ReplaySteps:
-    result, draws = replayed.result, replayed.draws
-    return ReplaySteps(
-        speed=evidence.speed,
-        contacts=known(evidence.contacts),
-        friction=impacts.friction,
-        correlations=() if impacts.support is None else impacts.support.correlations,
-        speed_time=result.time,
-        speed_simulated=result.speed,
-        fixed=origin,
-        draws=None if draws is None else len(draws),
-        rejected=None if draws is None else draws.rejected,
-        identified=_identified_machine(machine, impacts, gap),
-        document=steps_document(
-            evidence,
-            gap,
-            impacts.support,
-            impacts.friction,
-            draws,
-            result.bearing_names,
-            float(result.speed[-1]),
-        ),
-    )
-
-
-def _taken_over(evidence: Evidence, fixed: Drop) -> Impacts:
+def _taken_over(evidence: Evidence, fixed: Drop) -> Identified:
     """Supports and friction of an earlier estimate, with their own uncertainty."""
-    problem = impact_problem(build_replica(evidence, evidence.model, until=IDENTIFIED_UNTIL))
-    covariance = np.diag(problem.prior_sigma**2)
-    paths = problem.vector.paths
+    problem = first_impacts(evidence, evidence.model, until=IDENTIFIED_UNTIL)
+    x, sigma, paths = problem.table.mean, problem.table.sigma, problem.paths
+    covariance = np.diag(sigma**2)
     for pair in fixed.correlations:
         if pair.first in paths and pair.second in paths:
             i, k = paths.index(pair.first), paths.index(pair.second)
-            covariance[i, k] = covariance[k, i] = pair.value * problem.prior_sigma[i] * problem.prior_sigma[k]
-    return Impacts(
-        problem=problem,
-        x=problem.prior_mean,
-        covariance=covariance,
-        support=None,
-        friction=None,
-        values=identified_values(problem, problem.prior_mean, covariance, given=True),
-    )
+            covariance[i, k] = covariance[k, i] = pair.value * sigma[i] * sigma[k]
+    values = identified_values(problem, x, covariance, given=True)
+    return Identified(problem=problem, x=x, covariance=covariance, support=None, friction=None, values=values)
 
 
-def _first_impacts(evidence: Evidence, method: Replay, say: Progress) -> Impacts:
+def _identified(evidence: Evidence, method: Replay, say: Progress) -> Identified:
     """Supports by least squares on the first impacts, then the sweep of the friction."""
     quick = build_drop_model(evidence.model.machine, "quick")
     coarse, fine = (
-        impact_problem(build_replica(evidence, model, until=IDENTIFIED_UNTIL))
-        for model in (quick, evidence.model)
+        first_impacts(evidence, model, until=IDENTIFIED_UNTIL) for model in (quick, evidence.model)
     )
     begin, end = STAGES["supports"], STAGES["friction"]
     support = fit_support(
@@ -220,7 +260,7 @@ def _first_impacts(evidence: Evidence, method: Replay, say: Progress) -> Impacts
     root = np.linalg.cholesky(support.covariance)
     random = np.random.Generator(np.random.Philox(11))
     points = [
-        np.clip(best.x + root @ random.standard_normal(len(best.x)), *fine.bounds)
+        np.clip(best.x + root @ random.standard_normal(len(best.x)), fine.table.lower, fine.table.upper)
         for _ in range(FRICTION_DRAWS)
     ]
     friction = sweep_friction(fine, best.x, evidence.earliest_contact, draws=points, threads=method.threads)
@@ -228,7 +268,7 @@ def _first_impacts(evidence: Evidence, method: Replay, say: Progress) -> Impacts
     problem, x, covariance = refit_with_friction(
         fine, best, friction.value, longest=longest, threads=method.threads
     )
-    return Impacts(
+    return Identified(
         problem=problem,
         x=x,
         covariance=covariance,
@@ -238,75 +278,220 @@ def _first_impacts(evidence: Evidence, method: Replay, say: Progress) -> Impacts
     )
 
 
-def _steady_gap(evidence: Evidence, impacts: Impacts) -> AirGap:
-    """Air gap with the sag of the identified supports.
-
-    Within the fit the gap follows the sag of every trial, so that it has come to rest with the supports.
-    """
-    model, problem = evidence.model, impacts.problem
-    rows = problem.replica.bearing_rows(problem.vector, impacts.x[: len(problem.vector)])
-    settled = replace(model, parameters=model.parameters._replace(bearing=rows))
-    return identify_air_gap(known(evidence.rest), settled, known(evidence.sensing))
-
-
-def _replay(impacts: Impacts, evidence: Evidence, gap: AirGap, draws: Draws | None) -> Replayed:
+def _replay(impacts: Identified, evidence: Evidence, gap: IdentifiedGap, draws: Draws | None) -> Replayed:
     """The whole drop with the identified values, for the air gap and for its two limits."""
-    problem = impacts.problem
-    central = best_candidate(problem, impacts.x)
-    simulated = whole_drop(problem, central, duration=DURATION)
-    lower, upper = (
-        whole_drop(problem, central, duration=DURATION, gap_change=limit - gap.value)
+    problem, trial = impacts.problem, impacts.problem.trial(impacts.x)
+    result = whole_drop(problem, trial, duration=DURATION)
+    limits = [
+        whole_drop(problem, trial, duration=DURATION, gap_change=limit - gap.value)
         for limit in (gap.lower, gap.upper)
-    )
+    ]
     time, measured = evidence.measured(DURATION)
+    middle, lower, upper = (seen_at_bearings(problem, trial, one) for one in (result, *limits))
     return Replayed(
-        result=simulated,
-        middle=seen_at_bearings(problem, central, simulated),
-        lower=seen_at_bearings(problem, central, lower),
-        upper=seen_at_bearings(problem, central, upper),
+        result=result,
+        middle=middle,
+        lower=lower,
+        upper=upper,
         time=time,
         measured=measured,
         draws=draws,
     )
 
 
-def _draws(impacts: Impacts, evidence: Evidence, method: Replay, say: Progress) -> Draws | None:
-    if method.draws < 2:
-        return None
-    begin = STAGES["draws"]
-    return draw_drops(
-        impacts.problem,
-        impacts.x,
-        impacts.covariance,
-        window=evidence.latest_first_contact + KEPT_UNTIL if impacts.support is not None else 0.0,
-        duration=DURATION,
-        count=method.draws,
-        threads=method.threads,
-        progress=lambda text, share: say(text, begin + (1.0 - begin) * share),
+def _parameters(machine: Machine, impacts: Identified, gap: IdentifiedGap) -> tuple[FittedParameter, ...]:
+    """Every identified value of every bearing; gap and friction from steps of their own."""
+    found = []
+    for b, bearing in enumerate(machine.touchdown_bearings):
+        value, error, friction = float(gap.value[b]), float(gap.standard_error[b]), bearing.friction.dynamic
+        values = {
+            parameter("air_gap"): Known(
+                value=value,
+                status="determined",
+                standard_error=error,
+                interval_90=(value - NINETY * error, value + NINETY * error),
+                lower=float(gap.lower[b]),
+                upper=float(gap.upper[b]),
+                unit="m",
+            ),
+            **{
+                row: impacts.values[row.path_of(bearing.name)]
+                for row in rows("bearing")
+                if row.step is Step.IMPACTS
+            },
+            parameter("friction.dynamic"): impacts.friction.value
+            if impacts.friction is not None
+            else Known(
+                value=float(friction),
+                status="taken over",
+                standard_error=friction.standard_error,
+                interval_90=friction.interval_90,
+                unit="1",
+            ),
+        }
+        for row, estimate in values.items():
+            prior = None
+            if (start := estimate.start) is not None:
+                prior = Known(
+                    value=start, status="determined", unit=estimate.unit, interval_90=estimate.bounds
+                )
+            found.append(FittedParameter(row=row, owner=bearing.name, prior=prior, estimate=estimate))
+    return tuple(found)
+
+
+def _bearing(
+    bearing: TouchdownBearing,
+    evidence: Evidence,
+    gap: IdentifiedGap,
+    found: tuple[FittedParameter, ...],
+    replayed: Replayed,
+    simulated: BearingDrop,
+    b: int,
+) -> BearingDrop:
+    """One bearing: histories of the replay, loads with intervals of the draws, identified values."""
+    contact = known(evidence.contacts)[b]
+    measured = Motion(
+        label="measured", time=replayed.time, displacement=replayed.measured[:, b], role="measured"
+    )
+
+    def shown(label: str, displacement: Array, role: Role = "simulated") -> Motion:
+        return Motion(label=label, time=replayed.result.time, displacement=displacement[:, b], role=role)
+
+    values = bearing_values(evidence.model.machine, b, float(evidence.model.load_shares[b]), found)
+    count = 0 if replayed.draws is None else len(replayed.draws)
+    draws = replayed.draws if count >= FEWEST_DRAWS else None
+    stress_sigma = math.hypot(MODEL_STRESS_SIGMA, numbers_of(bearing).stress_sigma)
+
+    def drawn(sample: Callable[[Draws], Array]) -> Array | None:
+        return None if draws is None else sample(draws)[:, b]
+
+    means = {
+        name: mean_with_draws(simulated.values[name], sample, model)
+        for name, sample, model in (
+            ("mean_stress_Pa", drawn(lambda d: d.mean_stress), stress_sigma),
+            ("mean_force_0p15_0p2_N", drawn(lambda d: d.mean_force), MODEL_MEAN_FORCE_SIGMA),
+        )
+        if name in simulated.values
+    }
+    force, stress = (
+        replace(peak, known=with_draws(peak.known, sample, model), origin=Origin.REPLAY)
+        for peak, sample, model in (
+            (simulated.peak_force, drawn(lambda d: d.peak_force), MODEL_FORCE_SIGMA),
+            (simulated.peak_stress, drawn(lambda d: d.peak_stress), stress_sigma),
+        )
+    )
+    reason = f"no interval: {count} draws, at least {FEWEST_DRAWS} are needed"
+    return replace(
+        simulated,
+        motions=(measured, shown("simulated", replayed.middle)),
+        at_gap_limits=(
+            measured,
+            shown("simulated, lower gap", replayed.lower, "simulated, lower gap"),
+            shown("simulated, upper gap", replayed.upper),
+        ),
+        air_gap=AirGap(lower=float(gap.lower[b]), upper=float(gap.upper[b])),
+        peak_force=force,
+        peak_stress=stress,
+        values={**values, **means},
+        missing={}
+        if draws is not None
+        else dict.fromkeys(("peak_force_N", "peak_stress_Pa", *means), reason),
+        first_contact=replace(
+            deepest(measured, contact.start, contact.end, 0.0), indentation=contact.indentation
+        ),
     )
 
 
-def _agreement(replayed: Replayed, gap: AirGap) -> Agreement:
-    simulated = np.empty_like(replayed.measured)
-    for b in range(simulated.shape[1]):
-        for axis in range(2):
-            simulated[:, b, axis] = np.interp(
-                replayed.time, replayed.result.time, replayed.middle[:, b, axis]
-            )
-    draws = replayed.draws
-    expected = None if draws is None else spread_horizon(draws.spread_time, draws.spread, gap.value)
-    return compare_orbits(replayed.time, replayed.measured, simulated, gap.value, expected_horizon=expected)
+def _document(
+    evidence: Evidence, impacts: Identified, gap: IdentifiedGap, replayed: Replayed
+) -> dict[str, Any]:
+    """Initial state, speed law, settled rest and search of a replay, ready for the published document."""
+    names, fit, initial = replayed.result.bearing_names, evidence.speed, known(evidence.fall)
+    # The paper's start, beside ours: two rigid modes from the samples around power-off.
+    expanded = expand_initial_state(
+        evidence.record.time,
+        initial.deviation_of(evidence.record) + initial.settled,
+        initial.drop_instant,
+        evidence.model,
+        initial.sensing,
+    )
+
+    def by_bearing(values: Array) -> dict[str, list[float]]:
+        return {name: [float(v) for v in values[b]] for b, name in enumerate(names)}
+
+    return {
+        "speed": {
+            "aero_time_constant_s": fit.aero_time_constant.as_json()
+            if math.isfinite(fit.aero_time_constant.value)
+            else None,
+            "profile_time_constant_s": finite(fit.profile_time_constant),
+            "friction_loss_Hz": fit.friction_loss / (2.0 * np.pi),
+            "simulated_end_Hz": float(replayed.result.speed[-1]) / (2.0 * np.pi),
+        },
+        "initial_state": {
+            "displacement_m": by_bearing(initial.displacement),
+            "velocity_m_per_s": by_bearing(initial.velocity),
+            "remanent_force_N": initial.remanent_force.tolist(),
+            "remanence_time_constant_s": initial.decay,
+            "misfit": initial.misfit,
+            "modal_expansion": {
+                "displacement_m": by_bearing(expanded.at_bearings),
+                "velocity_m_per_s": by_bearing(expanded.velocity_at_bearings),
+            },
+        },
+        "identification": _searched(impacts.support, impacts.friction, replayed.draws),
+        "settled": {
+            name: {
+                "radius_m": float(gap.rest.radius[b]),
+                "sideways_m": float(gap.rest.sideways[b]),
+                "sway_m": float(gap.rest.sway[b]),
+                "indentation_m": float(gap.sag.indentation[b]),
+                "race_deflection_m": float(gap.sag.race[b]),
+                "support_deflection_m": float(gap.sag.support[b]),
+                "vertical_zero_sigma_m": float(gap.zero_sigma[b]),
+            }
+            for b, name in enumerate(names)
+        },
+    }
 
 
-def _identified_machine(machine: Machine, impacts: Impacts, gap: AirGap) -> Machine:
+def _searched(
+    support: SupportFit | None, friction: FrictionSweep | None, draws: Draws | None
+) -> dict[str, Any]:
+    """What was searched for; a step that was not made is left out."""
+    entry: dict[str, Any] = {}
+    if support is not None:
+        entry["support"] = {
+            "starts": support.coarse.starts,
+            "agreeing": support.coarse.agreeing,
+            "windows_s": [*support.coarse.windows, *support.search.windows],
+            "misfit": support.search.best.misfit,
+            "simulations": support.coarse.evaluations + support.search.evaluations,
+            "ended_early": support.search.ended_early or None,
+            "correlations": [asdict(pair) for pair in support.correlations],
+        }
+    if friction is not None:
+        entry["friction_sweep"] = {
+            "dynamic": friction.coefficients.tolist(),
+            "disagreement_m": friction.disagreement.tolist(),
+            "window_s": list(friction.window),
+        }
+    if draws is not None:
+        entry["draws"] = {"count": len(draws), "rejected": draws.rejected}
+    return entry
+
+
+def _identified_machine(machine: Machine, impacts: Identified, gap: IdentifiedGap) -> Machine:
     """The machine with air gaps, supports, friction and contact as identified."""
-    values: dict[str, Known] = {}
-    vector = impacts.problem.vector
-    for unknown in vector.unknowns:
-        if unknown.parameter.estimated_by is not None or unknown.parameter.step is Step.SWEEP:
-            continue
-        value = impacts.values[unknown.path]
-        values[unknown.path] = Known(value=value.value, status="estimated", interval_90=value.interval_90)
+    values: dict[str, Known] = {
+        one.path: Known(
+            value=impacts.values[one.path].value,
+            status="estimated",
+            interval_90=impacts.values[one.path].interval_90,
+        )
+        for one in impacts.problem.unknowns
+        if one.parameter.estimated_by is None and one.parameter.step is Step.IMPACTS
+    }
     for b, bearing in enumerate(machine.touchdown_bearings):
         values[f"{bearing.name}.air_gap"] = Known(
             value=float(gap.value[b]), status="estimated", standard_error=float(gap.standard_error[b])
@@ -320,22 +505,8 @@ def _identified_machine(machine: Machine, impacts: Impacts, gap: AirGap) -> Mach
     return machine.with_values(values)
 
 
-def _notes(evidence: Evidence, gap: AirGap) -> tuple[str, ...]:
-    zero = ", ".join(f"{1e6 * z:.3g}" for z in gap.zero_sigma)
-    return (
-        *evidence_assumptions(evidence),
-        "the settled tail cannot tell air gap from vertical sensor zero: a zero that is 1 µm off reads as 1 "
-        "µm of "
-        f"air gap (standard error {zero} µm); the fall height, and so the force, is hardly touched by it",
-        "an open-loop replay is one drop like the recorded one: after some contacts its force is statistics "
-        "only",
-    )
-
-
-def _warnings(
-    evidence: Evidence, initial: InitialState, impacts: Impacts, draws: Draws | None
-) -> tuple[str, ...]:
-    said = [*evidence.power_off.notes, *initial.notes]
+def _warnings(evidence: Evidence, impacts: Identified, draws: Draws | None) -> tuple[str, ...]:
+    said = [*evidence.power_off.notes, *known(evidence.fall).notes]
     if impacts.support is not None:
         search = impacts.support.search
         if search.ended_early:
@@ -345,11 +516,21 @@ def _warnings(
                 f"the first impacts are followed to {search.best.misfit**0.5:.2g} times the noise only; "
                 "expected about 1: the machine description misses something"
             )
-        said += [
-            f"{path}: {value.status}"
-            for path, value in impacts.values.items()
-            if ".support." in path and value.status != "determined"
-        ]
+        supports = [impacts.problem.paths[k] for k in impacts.problem.supports]
+        status = {path: impacts.values[path].status for path in supports}
+        said += [f"{path}: {found}" for path, found in status.items() if found != "determined"]
     if draws is not None and len(draws) < FEWEST_DRAWS:
         said.append(f"{len(draws)} draws keep to the record; {FEWEST_DRAWS} are needed for intervals")
     return tuple(said)
+
+
+def _notes(evidence: Evidence, gap: IdentifiedGap) -> tuple[str, ...]:
+    zero = ", ".join(f"{1e6 * z:.3g}" for z in gap.zero_sigma)
+    return (
+        *evidence_assumptions(evidence),
+        "the settled tail cannot tell air gap from vertical sensor zero: a zero that is 1 µm off reads as "
+        f"1 µm of air gap (standard error {zero} µm); the fall height, and so the force, is hardly touched "
+        "by it",
+        "an open-loop replay is one drop like the recorded one: after some contacts its force is statistics "
+        "only",
+    )

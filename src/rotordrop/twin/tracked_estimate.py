@@ -12,6 +12,7 @@ from rotordrop.errors import IdentificationError
 from rotordrop.estimate.advice import Advice
 from rotordrop.estimate.assumptions import twin_assumptions
 from rotordrop.estimate.bearing_drop import BearingDrop
+from rotordrop.estimate.bearing_values import bearing_values
 from rotordrop.estimate.estimate import (
     CrossCheck,
     Estimate,
@@ -44,7 +45,6 @@ from rotordrop.twin.tracked_loads import (
     twin_loads,
 )
 from rotordrop.twin.tracked_parameters import (
-    bearing_values,
     gap_of_record,
     is_lost,
     joint_estimate,
@@ -269,7 +269,9 @@ def _bearings(drop: TrackedDrop, judged: _Judgement) -> tuple[BearingDrop, ...]:
     measured = _measured(drop, judged, drop.problem.readings)
     found = []
     for b in range(len(drop.problem.model.bearing_names)):
-        values: dict[str, Known] = bearing_values(drop.problem, judged.parameters, b)
+        values: dict[str, Known] = bearing_values(
+            drop.problem.model.machine, b, float(drop.problem.model.load_shares[b]), judged.parameters
+        )
         held = None if judged.fits else judged.check
         found.append(
             bearing_drop(drop.problem, drop.forces, b, _loads(drop, judged, b), measured[:, b], values, held)

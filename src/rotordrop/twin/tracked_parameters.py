@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +11,6 @@ from numpy.typing import NDArray
 from rotordrop.elements.parameter import Parameter
 from rotordrop.elements.table import parameter
 from rotordrop.elements.touchdown_bearing import MODEL_GAP_ERROR
-from rotordrop.estimate.bearing_values import equivalent_stiffness, published_values
 from rotordrop.estimate.estimate import FittedParameter, JointEstimate, SensorErrors
 from rotordrop.known import NINETY, Known, Status
 from rotordrop.rotor.unknowns import Unknown, sensor_prior, smallest_gap
@@ -159,22 +157,6 @@ def is_lost(problem: DropProblem, gap: Known, b: int) -> bool:
     entry = problem.gap_entries[b]
     sigma = math.sqrt(problem.covariance[entry, entry])
     return gap.value <= 0.0 or abs(gap.value - float(problem.mean[entry])) > PARAMETER_LIMIT * sigma
-
-
-def bearing_values(problem: DropProblem, found: Sequence[FittedParameter], b: int) -> dict[str, Known]:
-    """Identified values of one bearing by the field names of the published document."""
-    bearing = problem.model.machine.touchdown_bearings[b]
-    values = published_values(bearing.name, found)
-    if "friction.dynamic" in values:  # a bearing described without friction has none to find
-        values["friction.static"] = bearing.friction.static_of(values["friction.dynamic"])
-    values["equivalent_stiffness_N_per_m"] = equivalent_stiffness(
-        problem.model.machine,
-        b,
-        float(problem.model.load_shares[b]),
-        values["support.stiffness_N_per_m"],
-        values.get("preload_N"),
-    )
-    return values
 
 
 def sensor_errors(

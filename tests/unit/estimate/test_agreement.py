@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from rotordrop.estimate.agreement import AFTER_CONTACT, compare_orbits
-from rotordrop.replay import replay
+from rotordrop.estimate.agreement import (
+    AFTER_CONTACT,
+    TENFOLD,
+    compare_orbits,
+    orbit_disagreement,
+    spread_horizon,
+)
 
 GAP = 300e-6
 times = np.arange(0.0, 0.2, 5e-5)
@@ -67,22 +71,42 @@ def test_contacts_bounces_and_horizon_belong_to_their_orbit() -> None:
     assert other.horizon == pytest.approx(times[-1])
 
 
-def test_the_replayed_drop_is_compared_at_the_times_of_the_record() -> None:
+def test_a_simulated_drop_is_compared_at_the_times_of_the_record() -> None:
     """The measured orbit touches once, the simulated one, on a grid of its own, twice."""
     fine = np.arange(0.0, 0.2, 1.25e-5)
     measured = np.stack([orbit(((0.010, 0.012),))] * 2, axis=1)
     simulated = np.stack([orbit(((0.010, 0.012), (0.050, 0.052)))] * 2, axis=1)
-    middle = np.stack(
-        [[np.interp(fine, times, simulated[:, b, axis]) for axis in range(2)] for b in range(2)]
-    ).transpose(2, 0, 1)
-    replayed: Any = SimpleNamespace(
-        time=times, measured=measured, middle=middle, result=SimpleNamespace(time=fine), draws=None
-    )
-    found = replay._agreement(replayed, SimpleNamespace(value=GAPS))  # type: ignore[arg-type]
+    columns = simulated.reshape(len(times), -1).T
+    finer = np.column_stack([np.interp(fine, times, column) for column in columns]).reshape(-1, 2, 2)
+    found = compare_orbits(times, measured, finer, GAPS, at=fine)
     for one in found.bearings:
         assert (len(one.measured_contacts), len(one.simulated_contacts)) == (1, 2)
     assert found.expected_horizon is None
-    spread = np.where(times[::5] < 0.07, 1e-6, 0.2 * GAP)[:, None] * np.ones(2)
-    replayed.draws = SimpleNamespace(spread_time=times[::5], spread=spread)
-    found = replay._agreement(replayed, SimpleNamespace(value=GAPS))  # type: ignore[arg-type]
-    assert found.expected_horizon == pytest.approx(0.07, abs=2.6e-4)
+
+
+def test_draws_say_up_to_when_two_drops_can_be_compared() -> None:
+    spread = np.where(times < 0.07, 1e-6, 0.2 * GAP)[:, None] * np.ones(2)
+    assert spread_horizon(times, spread, GAPS) == pytest.approx(0.07, abs=6e-5)
+
+
+def test_a_difference_counts_ten_times_less_33_ms_later() -> None:
+    """1 µm apart at the first contact is as much as 10 µm 33 ms later, and as 1 µm before it."""
+    contact, time = 0.01, np.linspace(0.0, 0.1, 1001)
+
+    def one_moment(at: float, size: float) -> float:
+        distance = np.zeros((len(time), 2))
+        distance[int(np.argmin(np.abs(time - at)))] = size
+        return orbit_disagreement(time, distance, contact)
+
+    first = one_moment(contact, 1e-6)
+    assert one_moment(contact + TENFOLD, 10e-6) == pytest.approx(first, rel=1e-2)
+    assert one_moment(0.002, 1e-6) == pytest.approx(first)
+    assert orbit_disagreement(time, np.full((1001, 2), 3e-6), contact) == pytest.approx(3e-6)
+
+
+def test_disagreement_forgets_what_chaos_does() -> None:
+    time = np.arange(0.0, 40e-3, 5e-5)
+    early = np.where(time[:, None] < 10e-3, 1e-6, 0.0)
+    late = np.where(time[:, None] > 30e-3, 1e-6, 0.0)
+    assert orbit_disagreement(time, np.full((len(time), 1), 2e-6), 5e-3) == pytest.approx(2e-6, rel=1e-12)
+    assert orbit_disagreement(time, late, 5e-3) < 0.3 * orbit_disagreement(time, early, 5e-3)

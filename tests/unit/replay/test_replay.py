@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -21,11 +19,10 @@ from rotordrop.estimate.estimate import Estimate, Verdict
 from rotordrop.estimate.fixed_values import read_fixed
 from rotordrop.estimate.published import estimate_schema
 from rotordrop.estimation import Replay, estimate_drop
-from rotordrop.evidence.speed import SpeedFit
 from rotordrop.known import Known
 from rotordrop.machine import Machine, example_path
-from rotordrop.replay import replay_estimate, uncertainty
-from rotordrop.replay.replay_estimate import _speed
+from rotordrop.replay import draws
+from rotordrop.replay.draws import mean_with_draws, whole_drop, with_draws
 from rotordrop_bench import SyntheticDrop
 from rotordrop_bench.files import write_synthetic
 from rotordrop_bench.score import score_estimate
@@ -46,7 +43,7 @@ def replayed(known: Machine, synthetic: SyntheticDrop, fitted: dict[str, Any]) -
 
     def drawing(problem: Any, x: Any, covariance: Any, **options: Any) -> Any:
         fitted.update(problem=problem, x=x)
-        return uncertainty.draw_drops(problem, x, covariance, **options)
+        return draws.draw_drops(problem, x, covariance, **options)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("rotordrop.replay.replay.FRICTION_DRAWS", 2)
@@ -105,15 +102,19 @@ def test_few_draws_give_no_interval_and_say_why(document: dict[str, Any], replay
 def test_draws_of_the_rest_position_fall_on_one_path(replayed: Estimate, fitted: dict[str, Any]) -> None:
     """A vertical zero that is off moves rest and fall alike: seen from rest, nothing moves before contact."""
     problem = fitted["problem"]
-    best = uncertainty.best_candidate(problem, fitted["x"])
-    initial = problem.replica.initial
-    _, orbit = uncertainty._numbers(problem, best, 6e-3)
+    best = problem.trial(fitted["x"])
+    initial = problem.initial
+
+    def orbit(fall: np.ndarray) -> np.ndarray:
+        trial = best._replace(fall=fall)
+        moved = whole_drop(problem, trial, duration=6e-3).displacement
+        return np.asarray(moved - problem.rest_error(trial))
+
     for height in range(initial.unknowns.rest.start + 1, initial.unknowns.rest.stop, 2):
         column = initial.covariance[:, height]
-        drawn = replace(best, fall=best.fall + column / math.sqrt(column[height]))
-        assert drawn.fall[height] - best.fall[height] > 5e-6
-        _, other = uncertainty._numbers(problem, drawn, 6e-3)
-        assert np.max(np.abs(other - orbit)) < 0.05e-6
+        drawn = best.fall + column / math.sqrt(column[height])
+        assert drawn[height] - best.fall[height] > 5e-6
+        assert np.max(np.abs(orbit(drawn) - orbit(best.fall))) < 0.05e-6
 
 
 def test_the_drop_is_simulated_at_both_limits_of_the_air_gap(replayed: Estimate) -> None:
@@ -136,6 +137,7 @@ def test_every_number_of_the_document_is_that_of_its_source(
     assert steps is not None and agreement is not None
     speed = document["speed"]
     assert speed["friction_loss_Hz"] == pytest.approx(steps.speed.friction_loss / (2.0 * math.pi))
+    assert speed["profile_time_constant_s"] == steps.speed.profile_time_constant
     assert speed["simulated_end_Hz"] == pytest.approx(steps.speed_simulated[-1] / (2.0 * math.pi))
     assert 0.0 <= speed["friction_loss_Hz"] < document["speed_Hz"] - speed["simulated_end_Hz"]
     assert document["speed_Hz"] == pytest.approx(replayed.speed / (2.0 * math.pi))
@@ -155,22 +157,6 @@ def test_every_number_of_the_document_is_that_of_its_source(
         assert bounce["measured_bounce_m"] == compared.measured_bounce
         assert bounce["measured_bounce_m"] == pytest.approx(bounce["simulated_bounce_m"], rel=0.3)
         assert 5e-6 < bounce["measured_bounce_m"] < 400e-6
-
-
-def test_the_speed_that_friction_took_is_shown_in_hertz() -> None:
-    air = Known(value=9.0, status="determined")
-    fit = SpeedFit(
-        initial=377.0,
-        initial_error=0.1,
-        profile_time_constant=6.0,
-        aero_time_constant=air,
-        friction_loss=math.pi,
-        residual=0.1,
-    )
-    fall: Any = SimpleNamespace(speed=fit)
-    shown = _speed(fall, 4.0 * math.pi)
-    assert (shown["friction_loss_Hz"], shown["simulated_end_Hz"]) == (0.5, 2.0)
-    assert shown["profile_time_constant_s"] == 6.0
 
 
 def test_the_equivalent_stiffness_is_support_and_bearing_in_series(
@@ -290,9 +276,9 @@ def test_fixed_belongs_to_the_replay(tmp_path: Path, capsys: pytest.CaptureFixtu
 def test_no_number_lies_outside_its_own_interval() -> None:
     """The replay is one of many possible drops: its late mean may lie beyond nine of ten draws."""
     sample = np.linspace(400.0, 430.0, 64)
-    mean = replay_estimate._mean(Known(value=415.0, status="determined", unit="N"), sample, 0.01)
+    mean = mean_with_draws(Known(value=415.0, status="determined", unit="N"), sample, 0.01)
     assert mean.value == np.median(sample)
-    peak = replay_estimate.with_draws(Known(value=470.0, status="determined", unit="N"), sample, 0.01)
+    peak = with_draws(Known(value=470.0, status="determined", unit="N"), sample, 0.01)
     for value in (mean, peak):
         low, high = value.interval_90 or (math.nan, math.nan)
         assert low < value.value < high
@@ -307,17 +293,10 @@ def test_a_fit_whose_draws_do_not_keep_to_the_record_is_no_basis() -> None:
             raise IdentificationError("beside the record")
         return np.zeros(3)
 
+    table = SimpleNamespace(lower=np.full(2, -9.0), upper=np.full(2, 9.0), sigma=np.ones(2))
     problem: Any = SimpleNamespace(
-        residual=residual,
-        bounds=(np.full(2, -9.0), np.full(2, 9.0)),
-        prior_sigma=np.ones(2),
-        remaining_directions=np.zeros((1, 1)),
-        split=lambda x: (x, np.zeros(1)),
+        residual=residual, table=table, directions=SimpleNamespace(remaining=np.zeros((1, 1)))
     )
-    with ThreadPoolExecutor(1) as pool:
-        message = r"of 64 draws of the uncertain values only 0 keep to the record up to 7.5 ms"
-        with pytest.raises(IdentificationError, match=message):
-            uncertainty._keeping(problem, best, np.eye(2), 7.5e-3, 16, pool)
-        problem.residual = lambda x, window: np.zeros(3)
-        kept, rejected = uncertainty._keeping(problem, best, np.eye(2), 7.5e-3, 16, pool)
-    assert (len(kept), rejected) == (16, 0)
+    message = r"of 64 draws of the uncertain values only 0 keep to the record up to 7.5 ms"
+    with pytest.raises(IdentificationError, match=message):
+        draws.draw_drops(problem, best, np.eye(2), window=7.5e-3, duration=0.2, count=16)

@@ -13,10 +13,9 @@ from numpy.testing import assert_allclose
 from rotordrop.elements.table import parameter
 from rotordrop.estimate.agreement import Agreement, compare_orbits
 from rotordrop.estimate.bearing_drop import BearingDrop, Motion, Origin, Peak, simulated_bearings
-from rotordrop.estimate.estimate import Estimate, FittedParameter, ReplaySteps, Verdict
+from rotordrop.estimate.estimate import Estimate, FittedParameter, FrictionSweep, ReplaySteps, Verdict
 from rotordrop.estimate.methods import Replay
 from rotordrop.evidence.contacts import TimedContact
-from rotordrop.identification.friction import FrictionSweep
 from rotordrop.known import Correlation, Known
 from rotordrop.machine import example_machine
 from rotordrop.report.content import Section

@@ -9,9 +9,9 @@ import pytest
 
 from rotordrop.errors import IdentificationError
 from rotordrop.evidence.sensing import Sensing, build_sensing
-from rotordrop.identification.modal_expansion import expansion_matrix
 from rotordrop.known import Known
 from rotordrop.machine import Machine, Sensor
+from rotordrop.replay.modal_expansion import expansion_matrix
 from rotordrop.rotor.parameters import DropModel
 
 

@@ -12,7 +12,7 @@ from rotordrop.evidence.evidence import Evidence, known
 from rotordrop.evidence.initial_state import InitialState, end_of_fall, fit_initial_state, settled_along
 from rotordrop.evidence.rest import SettledRest
 from rotordrop.evidence.sensing import Sensing
-from rotordrop.identification.modal_expansion import expand_initial_state
+from rotordrop.replay.modal_expansion import expand_initial_state
 from rotordrop.rotor.parameters import DropModel
 from rotordrop_bench import SyntheticDrop
 

@@ -9,11 +9,35 @@ import pytest
 from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError
-from rotordrop.identification.fit import completed, considered_covariance, fit_window
-from rotordrop.identification.search import Schedule, search, sobol_starts
+from rotordrop.replay.least_squares import (
+    Schedule,
+    Unknowns,
+    completed,
+    considered_covariance,
+    fit_window,
+    search,
+    sobol_starts,
+)
 
 Array = NDArray[np.float64]
 RNG = np.random.default_rng(4)
+
+
+def table(n: int, **other: object) -> Unknowns:
+    """Unknowns with the priors of the linear problem; all are fitted, the first half leads."""
+    values = {
+        "mean": np.array([0.5, -0.2, 0.1, 0.0])[:n],
+        "sigma": np.array([1.0, 0.3, 2.0, 0.5])[:n],
+        "begin": np.zeros(n),
+        "step": np.full(n, 1e-4),
+        "reach": np.full(n, 10.0),
+        "lower": np.full(n, -9.0),
+        "upper": np.full(n, 9.0),
+        "leading": np.arange(n) < 2,
+        "decisive": np.arange(n) < 2,
+        "considered": np.zeros(n, dtype=np.bool_),
+    }
+    return Unknowns(**{**values, **other})  # type: ignore[arg-type]
 
 
 @dataclass
@@ -22,37 +46,33 @@ class Linear:
 
     matrix: Array = field(default_factory=lambda: RNG.standard_normal((30, 4)))
     right: Array = field(default_factory=lambda: RNG.standard_normal(30))
-    prior_mean: Array = field(default_factory=lambda: np.array([0.5, -0.2, 0.1, 0.0]))
-    prior_sigma: Array = field(default_factory=lambda: np.array([1.0, 0.3, 2.0, 0.5]))
-    step: Array = field(default_factory=lambda: np.full(4, 1e-4))
-    reach: Array = field(default_factory=lambda: np.full(4, 10.0))
-    bounds: tuple[Array, Array] = field(default_factory=lambda: (np.full(4, -9.0), np.full(4, 9.0)))
-    leading: NDArray[np.bool_] = field(default_factory=lambda: np.array([True, True, False, False]))
-    considered: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(4, dtype=np.bool_))
-    decisive: NDArray[np.bool_] = field(default_factory=lambda: np.array([True, True, False, False]))
+    table: Unknowns = field(default_factory=lambda: table(4))
 
     def residual(self, x: Array, window: float) -> Array:
         return np.asarray((self.matrix @ x - self.right)[: int(window)])
 
     def posterior(self, rows: int = 30) -> tuple[Array, Array]:
-        a, weight = self.matrix[:rows], np.diag(1.0 / self.prior_sigma**2)
+        a, weight = self.matrix[:rows], np.diag(1.0 / self.table.sigma**2)
         normal = a.T @ a + weight
-        mean = np.linalg.solve(normal, a.T @ self.right[:rows] + weight @ self.prior_mean)
+        mean = np.linalg.solve(normal, a.T @ self.right[:rows] + weight @ self.table.mean)
         return mean, np.linalg.inv(normal)
 
 
 @dataclass
-class Wavy(Linear):
+class Wavy:
     """One unknown with many minima; only the growing window leads to the one at 1.7."""
 
-    prior_mean: Array = field(default_factory=lambda: np.zeros(1))
-    prior_sigma: Array = field(default_factory=lambda: np.full(1, 100.0))
-    step: Array = field(default_factory=lambda: np.full(1, 1e-6))
-    reach: Array = field(default_factory=lambda: np.full(1, 0.5))
-    bounds: tuple[Array, Array] = field(default_factory=lambda: (np.full(1, -6.0), np.full(1, 6.0)))
-    leading: NDArray[np.bool_] = field(default_factory=lambda: np.ones(1, dtype=np.bool_))
-    considered: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(1, dtype=np.bool_))
-    decisive: NDArray[np.bool_] = field(default_factory=lambda: np.ones(1, dtype=np.bool_))
+    table: Unknowns = field(
+        default_factory=lambda: table(
+            1,
+            mean=np.zeros(1),
+            sigma=np.full(1, 100.0),
+            step=np.full(1, 1e-6),
+            reach=np.full(1, 0.5),
+            lower=np.full(1, -6.0),
+            upper=np.full(1, 6.0),
+        )
+    )
 
     def residual(self, x: Array, window: float) -> Array:
         t = np.arange(0.0, window, 0.05)
@@ -76,29 +96,29 @@ def test_window_cuts_the_data() -> None:
 def test_unknown_at_its_bound_stays_there_and_is_named() -> None:
     problem = Linear()
     best = problem.posterior()[0]
-    problem.bounds = (np.full(4, -9.0), np.array([best[0] - 0.1, 9.0, 9.0, 9.0]))
+    problem.table = table(4, upper=np.array([best[0] - 0.1, 9.0, 9.0, 9.0]))
     fit = fit_window(problem, np.full(4, -1.0), 30.0)
-    assert fit.x[0] == problem.bounds[1][0]
-    assert fit.active == (True, False, False, False)
+    assert fit.x[0] == problem.table.upper[0]
+    assert list(fit.active) == [True, False, False, False]
 
 
 def test_fitted_unknowns_move_alone() -> None:
     problem = Linear()
     start = np.array([0.0, 0.0, 3.0, -3.0])
-    fit = fit_window(problem, start, 30.0, fitted=problem.leading)
+    fit = fit_window(problem, start, 30.0, fitted=problem.table.leading)
     assert list(fit.x[2:]) == [3.0, -3.0]
     assert np.abs(fit.x[:2]).min() > 1e-3
 
 
 def test_considered_unknowns_keep_their_prior_and_widen_the_others() -> None:
     problem = Linear()
-    problem.considered = np.array([False, False, False, True])
-    start = problem.prior_mean.copy()
+    problem.table = table(4, considered=np.array([False, False, False, True]))
+    start = problem.table.mean.copy()
     fit = completed(problem, fit_window(problem, start, 30.0))
-    assert fit.x[3] == problem.prior_mean[3]
+    assert fit.x[3] == problem.table.mean[3]
     assert fit.covariance[3, 3] == pytest.approx(0.25)
     a = problem.matrix
-    weight = np.diag(1.0 / problem.prior_sigma[:3] ** 2)
+    weight = np.diag(1.0 / problem.table.sigma[:3] ** 2)
     gain = np.linalg.solve(a[:, :3].T @ a[:, :3] + weight, a[:, :3].T)
     scale = max(fit.misfit, 1.0)
     narrow = np.linalg.inv(a[:, :3].T @ a[:, :3] / scale + weight)
@@ -111,8 +131,8 @@ def test_considered_unknowns_keep_their_prior_and_widen_the_others() -> None:
 def test_scale_divides_the_information() -> None:
     problem = Linear()
     information = problem.matrix.T @ problem.matrix
-    wide = considered_covariance(problem, information, 1e12)
-    assert np.diag(wide) == pytest.approx(problem.prior_sigma**2, rel=1e-6)
+    wide = considered_covariance(problem.table, information, 1e12)
+    assert np.diag(wide) == pytest.approx(problem.table.sigma**2, rel=1e-6)
 
 
 def test_growing_window_finds_what_one_start_on_the_long_window_misses() -> None:
@@ -122,9 +142,27 @@ def test_growing_window_finds_what_one_start_on_the_long_window_misses() -> None
     starts = sobol_starts(np.zeros(1), np.full(1, 4.0), 8)
     found = search(problem, starts, Schedule(windows=(1.0, 3.0, 8.0, 30.0)), threads=2)
     assert found.best.x[0] == pytest.approx(1.7, abs=1e-4)
-    assert len(found.by_window) == 4
+    assert found.windows == (1.0, 3.0, 8.0, 30.0)
     assert found.agreeing >= 1
     assert found.evaluations > 8
+
+
+def test_a_second_try_goes_on_from_two_minima() -> None:
+    """With one start kept, a window that is not followed is tried again from both minima before it."""
+
+    @dataclass
+    class Forked(Wavy):
+        """Minima at 4 and −4; the longer window moves the minimum of the worse one alone within reach."""
+
+        def residual(self, x: Array, window: float) -> Array:
+            height = abs(x[0]) - 4.0
+            if window > 1.0:
+                height = x[0] + 4.2
+            return np.full(20, height / 0.01 + (0.5 if x[0] < 0.0 else 0.0))
+
+    starts = [np.array([4.0]), np.array([-4.0])]
+    found = search(Forked(), starts, Schedule(windows=(1.0, 2.0), kept=(1,), draws=(6,), filled=False))
+    assert found.ended_early == "" and found.best.x[0] == pytest.approx(-4.2, abs=1e-2)
 
 
 def test_search_is_the_same_on_one_and_two_threads() -> None:
@@ -183,7 +221,7 @@ class Broken(Linear):
 def test_a_simulation_that_fails_on_one_side_leaves_the_slope_of_the_other() -> None:
     """A zero column said that the unknown has no effect: it stayed at its prior, with the prior's error."""
     problem = Broken()
-    fit = fit_window(problem, problem.prior_mean.copy(), 30.0, iterations=1)
+    fit = fit_window(problem, problem.table.mean.copy(), 30.0, iterations=1)
     assert fit.covariance[0, 0] == pytest.approx(
         problem.posterior()[1][0, 0] * max(fit.misfit, 1.0), rel=1e-4
     )

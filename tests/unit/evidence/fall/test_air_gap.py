@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import IdentificationError, RecordError
-from rotordrop.evidence.rest import SettledRest, find_rest, identify_air_gap, resting_record
+from rotordrop.evidence.rest import LARGEST_SWAY, SettledRest, find_rest, identify_air_gap, resting_record
 from rotordrop.evidence.sensing import Sensing
 from rotordrop.machine import Machine
 from rotordrop.record.axes import sensor_directions
@@ -107,3 +107,22 @@ def test_levitated_rotor_is_no_rest(drop: SyntheticDrop, sensing: Sensing) -> No
     floating = replace(drop.tail, signals=-drop.tail.signals)
     with pytest.raises(IdentificationError, match=r"not at rest on its bearings: mean height 2\d\d"):
         find_rest(floating, sensing)
+
+
+def test_a_rotor_that_swings_in_one_bearing_alone_is_not_at_rest(
+    drop: SyntheticDrop, sensing: Sensing, rest: SettledRest
+) -> None:
+    assert drop.tail is not None
+    time = np.arange(4000) * 1e-3
+    place = np.zeros((len(time), 2, 2))
+    place[..., 1] = -rest.radius
+
+    def tail() -> Record:
+        assert drop.tail is not None
+        along = np.einsum("sbc,tbc->ts", sensing.from_bearings, place) + sensing.settled_bend
+        return replace(drop.tail, time=time, signals=along)
+
+    assert find_rest(tail(), sensing).radius == pytest.approx(rest.radius)
+    place[:, 1, 0] = 1.5 * LARGEST_SWAY * rest.radius[1] * np.sin(2.0 * np.pi * 8.0 * time)
+    with pytest.raises(IdentificationError, match=r"the rotor is not at rest on its bearings"):
+        find_rest(tail(), sensing)

@@ -1,4 +1,4 @@
-"""One simulated drop with a known truth, recorded by good sensors, for the tests of the identification."""
+"""One simulated drop with a known truth, recorded by good sensors."""
 
 from __future__ import annotations
 
@@ -12,8 +12,6 @@ from rotordrop.evidence.evidence import Evidence, known, read_evidence
 from rotordrop.evidence.initial_state import InitialState
 from rotordrop.evidence.rest import SettledRest
 from rotordrop.evidence.sensing import Sensing, build_sensing
-from rotordrop.identification.replica import Replica, build_replica
-from rotordrop.identification.support import ImpactFit, impact_problem
 from rotordrop.known import Known
 from rotordrop.machine import Machine, example_machine
 from rotordrop.rotor.parameters import DropModel, build_drop_model
@@ -68,16 +66,6 @@ def rest(evidence: Evidence) -> SettledRest:
 @pytest.fixture(scope="session")
 def initial(evidence: Evidence) -> InitialState:
     return known(evidence.fall)
-
-
-@pytest.fixture(scope="session")
-def replica(evidence: Evidence, model: DropModel) -> Replica:
-    return build_replica(evidence, model, until=0.045)
-
-
-@pytest.fixture(scope="session")
-def problem(replica: Replica) -> ImpactFit:
-    return impact_problem(replica)
 
 
 @pytest.fixture(scope="session")
