@@ -224,7 +224,7 @@ def test_friction_sweep_finds_the_coefficient(problem: FirstImpacts, contacts: n
         problem.table.mean,
         float(contacts.min()),
         coefficients=np.array([0.06, 0.08, 0.1, 0.12, 0.14]),
-        draws=[problem.table.mean + 1e-3, problem.table.mean - 1e-3],
+        draws=[problem.table.mean + side * 1e-2 * problem.table.sigma for side in (1.0, -1.0)],
     )
     assert swept.value.value == pytest.approx(0.1, abs=0.004)
     assert swept.value.status == "determined"
