@@ -105,8 +105,8 @@ def machine_of(job: Job) -> Machine | None:
         table = rotor.get("shaft_table") if isinstance(rotor, dict) else None
         if isinstance(table, str) and (is_path(table) or not (file.parent / table).is_file()):
             raise MachineFileError(
-                f"the machine file names the shaft table {table!r}; drop that file on the page together with "
-                "it, under this plain name",
+                f"the machine file needs the shaft table {table!r}; drop that file alone on the page, under "
+                "this plain name",
                 file=file,
             )
     machine = load_machine(file)

@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from rotordrop.cli.app import run
-from rotordrop.errors import RecordError
+from rotordrop.errors import RecordError, UsageError
 from rotordrop.machine import example_machine, example_path
-from rotordrop.record import load_profile, read_record
+from rotordrop.machine.simple import EXAMPLES
+from rotordrop.record import example_record_path, load_profile, read_record
 from rotordrop.record.profile import profile_of
 
 LP400 = str(example_path("lp400"))
+RECORD = str(example_record_path("lp400_drop_060"))
 SENSORS = ("S_NDE_A", "S_NDE_B", "S_DE_A", "S_DE_B")
 
 
@@ -91,3 +93,42 @@ def test_the_examples_of_the_documentation_are_profiles():
     assert len(examples) == 6
     for example in examples:
         profile_of(tomllib.loads(example), "example")
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["look", RECORD, LP400],
+        ["estimate", LP400, RECORD],
+        ["calibrate", LP400, RECORD, "-o", "made.toml"],
+        ["waterfall", LP400, RECORD],
+        ["clearance", RECORD, "--machine", LP400],
+        ["look", RECORD, LP400, "--split", "parts"],
+        ["profile", RECORD, "--machine", LP400, "-o", "made.toml"],
+    ],
+    ids=lambda command: command[0],
+)
+def test_every_command_that_reads_a_record_takes_a_map(command, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert run([*command, "--map", "middle: S_NDE_A, S_NDE_B"]) == UsageError.exit_code
+    assert "'middle' names 2 channels; the machine has the planes NDE, DE" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_twelve_numbers_fit_the_recorder_and_the_next_command_is_printed(tmp_path, monkeypatch, capsys):
+    """The sensors of twelve numbers are called NDE_A, those of the recorder S_NDE_A."""
+    monkeypatch.chdir(tmp_path)
+    numbers = {name: value for name, value in EXAMPLES.items() if name != "preload"}
+    given = [f"--{name.replace('_', '-')}={joined(value)}" for name, value in numbers.items()]
+    assert run(["init", "--simple", *given, "twelve.toml"]) == 0
+    said = capsys.readouterr().err
+    (following,) = re.findall(r"next: rotordrop (.*)", said)
+    assert following == "look RECORD twelve.toml"
+    assert run(following.replace("RECORD", RECORD).split()) == 0
+    assert run(["profile", RECORD, "--machine", "twelve.toml", "-o", "recorder.toml"]) == 0
+    profile = load_profile("recorder.toml")
+    assert {label.split("/")[-1] for label in profile.channels.values()} == set(SENSORS)
+
+
+def joined(value):
+    return value if isinstance(value, str) else ", ".join(value)

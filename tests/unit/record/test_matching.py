@@ -1,5 +1,7 @@
 """Channels find their sensors, by name or map, and their units."""
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +16,9 @@ from rotordrop.record import (
     save_profile,
     save_record,
 )
-from rotordrop.record.profile import SpeedSource
+from rotordrop.record.arrangement import arrangement_of
+from rotordrop.record.columns import guess_profile
+from rotordrop.record.profile import SpeedSource, rules_of
 from rotordrop.record.record import record_of
 from rotordrop.record.recording import Channel, Recording
 
@@ -210,3 +214,106 @@ def test_a_record_cannot_be_written_to(drop):
 def test_an_unknown_example_is_refused():
     with pytest.raises(UsageError, match=r"no example recording 'paper_drop'; there are lp400_drop_060"):
         example_record_path("paper_drop")
+
+
+API = ("Ch1 VE-101X", "Ch2 VE-101Y", "Ch3 VE-102X", "Ch4 VE-102Y")
+
+
+@pytest.mark.parametrize(
+    "mapping",
+    [
+        ("NDE: Ch1 VE-101X, VE-101Y", "DE: VE-102X, VE-102Y"),
+        ("nde: VE-101X 135 deg, VE-101Y 45 deg", "DE: VE-102Y 45 deg, VE-102X 135 deg"),
+        ("S_NDE_A = VE-101X", "S_NDE_B=Ch2 VE-101Y", "DE: VE-102X, VE-102Y"),
+    ],
+)
+def test_a_map_names_planes_or_sensors(mapping, machine):
+    rules = rules_of(None, mapping)
+    readings = [np.full(10, float(k)) for k in range(4)]
+    channels = tuple(channel(name, values=values) for name, values in zip(API, readings, strict=True))
+    record = record_of(Recording(channels=channels), machine.sensors, profile=rules)
+    np.testing.assert_allclose(record.signals[0], [0.0, 1e-6, 2e-6, 3e-6])
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            "NDE: VE-101X 0 deg, VE-101Y 90 deg",
+            r"VE-101X at 0 deg is none of the sensors .*S_NDE_A at 135 deg",
+        ),
+        ("middle: VE-101X, VE-101Y", r"'middle' names 2 channels; the machine has the planes NDE, DE"),
+        ("NDE: VE-101X, VE-101Z", r"there is no channel 'VE-101Z'.*there are Ch1 VE-101X, Ch2 VE-101Y"),
+        ("NDE VE-101X", r"is neither \"SENSOR=CHANNEL\" nor \"PLANE: CHANNEL"),
+    ],
+)
+def test_a_map_that_does_not_fit_says_why(text, said, machine):
+    with pytest.raises(UsageError, match=said):
+        record_of(recording(*API), machine.sensors, profile=rules_of(None, [text]))
+
+
+def test_channels_without_the_names_of_sensors_are_asked_with_the_likeliest_answer(machine):
+    asked = r'likeliest --map "NDE: Ch1 VE-101X, Ch2 VE-101Y" --map "DE: Ch3 VE-102X, Ch4 VE-102Y"'
+    with pytest.raises(RecordError, match=asked):
+        record_of(recording(*API), machine.sensors)
+    given = re.findall(r'--map "([^"]+)"', asked)
+    assert record_of(recording(*API), machine.sensors, profile=rules_of(None, given)).signals.shape == (10, 4)
+
+
+def test_a_sensor_takes_the_channel_of_its_name_without_counter_and_prefix(machine):
+    plain = tuple(s.model_copy(update={"name": s.name.removeprefix("S_")}) for s in machine.sensors)
+    for names in (SENSORS, [f"Ch{k}: {name}" for k, name in enumerate(SENSORS, start=1)]):
+        assert record_of(recording(*names), plain).channel_names == ("NDE_A", "NDE_B", "DE_A", "DE_B")
+
+
+@pytest.mark.parametrize(
+    ("names", "planes"),
+    [
+        (("A_X", "B_X", "A_Y", "B_Y"), ("A", "B")),
+        (("V13", "W13", "V24", "W24"), ("13", "24")),
+        (("DE 45L", "DE 45R", "NDE 45L", "NDE 45R"), ("DE 45", "NDE 45")),
+        (("Brg 1 Left", "Brg 1 Right", "Status", "Brg 2 Left", "Brg 2 Right"), ("Brg 1", "Brg 2")),
+        (("Ch1 X", "Ch2 Y", "Ch3 X", "Ch4 Y"), ("plane 1", "plane 2")),
+        (("1MAD10CY011", "1MAD10CY012", "1MAD20CY011", "1MAD20CY012"), ("1MAD10CY01", "1MAD20CY01")),
+    ],
+)
+def test_pairs_by_tags(names, planes):
+    arranged = arrangement_of(recording(*names), Profile())
+    assert tuple(dict.fromkeys(sensor.bearing for sensor in arranged.sensors)) == planes
+    assert len(set(arranged.channels)) == len(arranged.sensors) == 4
+    record = record_of(recording(*names), arranged.sensors, profile=Profile(channels=dict(arranged.channels)))
+    assert record.signals.shape == (10, 4)
+
+
+def test_names_of_sensors_in_a_profile_pair_the_channels_without_a_machine():
+    rules = rules_of(None, ["DE_A=four", "NDE_A = one", "NDE_B = two", "DE_B = three"])
+    arranged = arrangement_of(recording("one", "two", "three", "four"), rules)
+    assert [sensor.bearing for sensor in arranged.sensors] == ["NDE", "NDE", "DE", "DE"]
+    assert list(arranged.channels.values()) == ["one", "two", "four", "three"]
+
+
+def test_a_tail_may_lack_the_speed_that_the_profile_names(tail, machine, tmp_path):
+    save_record(replace(tail, speed=None, speed_time=None, speed_readings=None), tmp_path / "tail.h5")
+    for speed in (SpeedSource(channel="Speed"), SpeedSource(pulses="KPH")):
+        rules = Profile(speed=speed)
+        with pytest.raises(RecordError, match=r"has no (speed channel 'Speed'|channel of pulses 'KPH')"):
+            read_record(tmp_path / "tail.h5", machine, profile=rules)
+        assert read_record(tmp_path / "tail.h5", machine, profile=rules, tail=True).speed is None
+
+
+def test_what_a_profile_writes_serves_look_with_and_without_the_machine(machine, tmp_path):
+    names = recording(*API, extra=(channel("n", "rpm", np.full(10, 3600.0)),))
+    alone = guess_profile(names, Profile())
+    assert alone.missing == ()
+    assert alone.profile.planes == {
+        "VE-101": "Ch1 VE-101X, Ch2 VE-101Y",
+        "VE-102": "Ch3 VE-102X, Ch4 VE-102Y",
+    }
+    given = rules_of(None, ["NDE: VE-101X, VE-101Y", "DE: VE-102X, VE-102Y"])
+    known = guess_profile(names, given, machine.sensors)
+    assert known.missing == ()
+    save_profile(known.profile, tmp_path / "p.toml")
+    rules = load_profile(tmp_path / "p.toml")
+    assert record_of(names, machine.sensors, profile=rules).signals.shape == (10, 4)
+    arranged = arrangement_of(names, rules)
+    assert [sensor.bearing for sensor in arranged.sensors] == ["NDE", "NDE", "DE", "DE"]

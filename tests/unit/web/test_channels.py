@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.unit.record.exports import EXPORTS
 
 from rotordrop import load_machine, look
 from rotordrop.machine.simple import EXAMPLES
@@ -14,6 +15,10 @@ from rotordrop.record.profile import Profile, load_profile
 from rotordrop.web.python_lines import estimate_lines, look_lines
 
 SENSORS = {"NDE_A": "S_NDE_A", "NDE_B": "S_NDE_B", "DE_A": "S_DE_A", "DE_B": "S_DE_B"}
+
+
+def export(form: str):
+    return next(one for one in EXPORTS if one.form == form)
 
 
 def profile_text(**speed: str) -> bytes:
@@ -52,6 +57,33 @@ def test_what_a_record_does_not_tell_is_asked(served, tmp_path):
     assert served.settled(number, "channels")["state"] == "done"
     told = served.ask("GET", f"/api/jobs/{number}/channels/page").told
     assert "channels of NDE_A, NDE_B, DE_A, DE_B" in told["missing"][0]
+
+
+def test_a_shaft_table_that_was_forgotten_is_asked_for_alone(served, files):
+    number = served.new_job({role: files[role] for role in ("record", "machine")})
+    served.order(f"/api/jobs/{number}/look")
+    told = served.settled(number, "look")["error"]
+    assert "needs the shaft table 'lp400_shaft.csv'; drop that file alone on the page" in told
+    path = files["beside"]
+    sent = served.ask("PUT", f"/api/jobs/{number}/files/beside?name={path.name}", path.read_bytes())
+    assert sent.status == 201, sent.text
+    served.order(f"/api/jobs/{number}/look")
+    assert served.settled(number, "look")["state"] == "done"
+
+
+def test_without_a_machine_the_planes_are_guessed_and_a_wav_asks_for_its_full_scale(served, tmp_path):
+    number = served.new_job({"record": export("WAV").written(tmp_path)})
+    served.order(f"/api/jobs/{number}/look")
+    assert "holds shares of a full scale" in served.settled(number, "look")["error"]
+    served.order(f"/api/jobs/{number}/channels")
+    assert served.settled(number, "channels")["state"] == "done"
+    told = served.ask("GET", f"/api/jobs/{number}/channels/page").told
+    assert told["profile"]["planes"] == {
+        "plane 1": "channel 1, channel 2",
+        "plane 2": "channel 3, channel 4",
+    }
+    assert {one["unit"] for one in told["channels"]} == {"of full scale"}
+    assert 'what full scale is: --full-scale "500 um"' in told["missing"]
 
 
 def test_the_answer_serves_look_and_lines_of_python(served, job, files, tmp_path, monkeypatch):

@@ -7,10 +7,10 @@ const NAMES = { machine: "machine file", profile: "profile of the recorder", rec
 
 async function rolesOf(found) {
   const texts = await Promise.all(found.map((file) => (/\.toml$/i.test(file.name) && file.size < 2e7 ? file.text() : "")));
-  const machine = found.find((file, i) => texts[i] && /^\s*\[+\s*(rotor|touchdown_bearings|sensors)/m.test(texts[i])) || found.find((file, i) => texts[i] && !/^\s*\[(channels|time|text|speed|units)\]/m.test(texts[i]));
+  const machine = found.find((file, i) => texts[i] && /^\s*\[+\s*(rotor|touchdown_bearings|sensors)/m.test(texts[i])) || found.find((file, i) => texts[i] && !/^\s*\[(channels|planes|time|text|speed|units)\]/m.test(texts[i]));
   const shaft = machine ? texts[found.indexOf(machine)].match(/shaft_table\s*=\s*["']([^"']+)["']/)?.[1] : null;
-  const config = found.some((file) => /\.cfg$/i.test(file.name));
-  return found.map((file, i) => (file === machine ? "machine" : texts[i] ? "profile" : file.name === shaft || (config && /\.dat$/i.test(file.name)) ? "beside"
+  const config = found.some((file) => /\.cfg$/i.test(file.name)), asked = state.job?.states?.look?.error || ""; // a shaft table that was forgotten
+  return found.map((file, i) => (file === machine ? "machine" : texts[i] ? "profile" : file.name === shaft || asked.includes(`'${file.name}'`) || (config && /\.dat$/i.test(file.name)) ? "beside"
     : /tail|settled|standstill/i.test(file.name) ? "tail" : "record"));
 }
 
@@ -81,7 +81,7 @@ export function tomlOf(table) {
   return [...plain.map(line), ...parts.flatMap(([name, part]) => ["", `[${name}]`, ...Object.entries(part).filter(([, value]) => value !== undefined).map(line)]), ""].join("\n");
 }
 
-const LENGTHS = ["m", "mm", "um", "nm", "mil", "in", "V", "mV", ""];
+const LENGTHS = ["m", "mm", "um", "nm", "mil", "in", "V", "mV", "of full scale", ""];
 const spoken = ({ label, unit, low, high }) => `${label} (${low === null ? "empty" : `${Number(low.toPrecision(3))} to ${Number(high.toPrecision(3))} ${unit || "without a unit"}`})`.replaceAll("-", "−");
 const choice = (name, options, chosen, label) => make("select", { name, "aria-label": label, of: options.map(([value, text]) => make("option", { value, text, selected: value === chosen ? "" : null })) });
 const entry = (name, value, placeholder, label) => make("input", { name, value: value || "", placeholder, "aria-label": label, maxlength: 120, autocomplete: "off", size: 12 });
@@ -101,9 +101,13 @@ function guessed(channels, profile) {
 export function askChannels({ channels, sensors, profile }, words, sent) {
   const guess = guessed(channels, profile), rows = [];
   const options = [["", "–"], ...channels.map((one) => [one.label, spoken(one)])];
-  const places = sensors.length ? sensors : ["NDE", "NDE", "DE", "DE"].map((plane, i) => ({ name: `sensor ${i + 1}`, plane, angle: (i % 2) * Math.PI / 2 }));
+  const pairs = Object.entries(profile.planes || {}).flatMap(([plane, text]) => text.split(", ").map((said, i) => {
+    const [, channel, degrees] = said.match(/^(.*?)(?: +([-+]?[0-9.]+) *(?:deg|°))?$/);
+    return { name: `sensor ${i + 1}`, plane, channel, angle: degrees ? (Number(degrees) * Math.PI) / 180 : (i % 2) * Math.PI / 2 };
+  }));
+  const places = sensors.length ? sensors : pairs.length ? pairs : ["NDE", "NDE", "DE", "DE"].map((plane, i) => ({ name: `sensor ${i + 1}`, plane, angle: (i % 2) * Math.PI / 2 }));
   for (const sensor of places) {
-    const chosen = profile.channels?.[sensor.name] || guess(sensor.plane), degrees = `${Number(((sensor.angle * 180) / Math.PI).toFixed(1))} deg`;
+    const chosen = profile.channels?.[sensor.name] || sensor.channel || guess(sensor.plane), degrees = `${Number(((sensor.angle * 180) / Math.PI).toFixed(1))} deg`;
     rows.push(make("tr", { of: [make("th", { scope: "row", text: sensor.name }),
       make("td", { of: [sensors.length ? make("span", { text: sensor.plane }) : entry("plane", sensor.plane, "NDE", `Plane of ${sensor.name}`)] }),
       make("td", { of: [sensors.length ? make("span", { text: degrees.replace("-", "−").replace(" deg", "°") }) : entry("angle", degrees, "0 deg", `Angle of ${sensor.name}, from +x`)] }),
@@ -116,6 +120,8 @@ export function askChannels({ channels, sensors, profile }, words, sent) {
   by("speedhand").value = speed.constant || "";
   by("unitgiven").value = profile.unit || "";
   by("sensitivity").value = profile.sensitivity || "";
+  by("fullscale").value = profile.full_scale || "";
+  by("fullscale").parentElement.hidden = !profile.full_scale && !channels.some(({ unit }) => unit === "of full scale");
   by("channelwords").textContent = words;
   by("mapping").showModal();
   by("mapping").querySelector(".main").focus();
@@ -130,7 +136,7 @@ async function sendChannels(places, known, profile) {
   const from = by("speedfrom").querySelector("select").value, [kind, ...label] = from.split(" "), hand = by("speedhand").value.trim();
   const speed = kind === "constant" || (!from && hand) ? { constant: hand || undefined } : from ? { ...profile.speed, constant: undefined, channel: undefined, pulses: undefined, [kind]: label.join(" ") } : undefined;
   const channels = known ? Object.fromEntries(places.map(({ name }, i) => [name, told[i].channel]).filter(([, channel]) => channel)) : {};
-  const made = { ...profile, unit: by("unitgiven").value.trim() || undefined, sensitivity: by("sensitivity").value.trim() || undefined, channels, speed };
+  const made = { ...profile, unit: by("unitgiven").value.trim() || undefined, sensitivity: by("sensitivity").value.trim() || undefined, full_scale: by("fullscale").value.trim() || undefined, channels, planes: undefined, speed };
   const { id } = state.job;
   if (!known) {
     const planes = new Map();
