@@ -39,13 +39,28 @@ class Race(Description):
 
 PARAMETERS: tuple[Parameter, ...] = (
     Parameter(
+        path="race.mass",
+        label="race mass",
+        kind="mass",
+        measured_by="the inner race of {owner} with all that spins with it, weighed",
+        guess_sigma=0.4,
+        given_sigma=0.05,
+        reach=4.0,
+        drift=0.02,
+        entries=bearing_entries(L.RACE_MASS),
+        field="race.mass_kg",
+        truth=("ring_m",),
+    ),
+    Parameter(
         path="race.inertia",
         label="race inertia",
         kind="inertia",
         measured_by="a speed sensor on the inner race of {owner}",
         role=Role.CONSIDERED,
         guess_sigma=0.12,
-        reach=2.0,
+        # Rings that carry a sleeve have 2.5 times the inertia inferred from the bearing alone: the end of the
+        # inferred range is no bound.
+        reach=4.0,
         drift=0.1,
         late_drift_factor=5.0,
         entries=bearing_entries(L.RACE_INERTIA),

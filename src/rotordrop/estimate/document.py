@@ -49,7 +49,13 @@ def published_drop(estimate: Estimate) -> published.Drop:
             nis=finite(estimate.nis),
             process_noise_factor=estimate.noise_factor,
             checks=[
-                published.Check(name=one.name, passed=one.passed, message=one.said(), note=one.noted())
+                published.Check(
+                    name=one.name,
+                    passed=one.passed,
+                    message=one.said(),
+                    note=one.noted(),
+                    **({} if one.widening == 1.0 else {"widening": one.widening}),
+                )
                 for one in estimate.checks
             ],
         ),

@@ -190,6 +190,8 @@ class Check(Document):
     passed: bool
     message: str
     note: str
+    widening: float = ABSENT
+    """Factor on all intervals that what is noted asks for [1]."""
 
 
 class Consistency(Document):

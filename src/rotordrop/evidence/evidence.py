@@ -11,6 +11,7 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotordrop.errors import IdentificationError, RecordError, RotordropError
 from rotordrop.evidence.events import (
@@ -312,6 +313,13 @@ class Evidence:
         return np.asarray(self.record.time - self.power_off.value)
 
     @property
+    def damaged(self) -> NDArray[np.bool_]:
+        """Samples that are no readings of the motion, shape (N, S)."""
+        from rotordrop.evidence.quality.channels import damaged_samples
+
+        return damaged_samples(self.record.signals)
+
+    @property
     def earliest_contact(self) -> float:
         """When the first bearing is touched [s from power-off]."""
         return min(contact.start for contact in known(self.contacts))
@@ -333,9 +341,12 @@ class Evidence:
         return np.asarray(np.sqrt(self.levitated.noise**2 + runout))
 
     def readings(self, until: float) -> Array:
-        """Readings in the positive directions [m] until a time [s], hum and 2X runout taken off."""
+        """Readings in the positive directions [m] until a time [s], hum and 2X runout taken off.
+
+        NaN where a channel held its reading or a single one stands out: the filter goes on without them.
+        """
         near = self.time <= until
-        signals = self.record.signals[near]
+        signals = np.where(self.damaged[near], np.nan, self.record.signals[near])
         if self.levitated is not None:
             signals = signals - self.levitated.disturbance(self.record.time[near], self.angle)
         return np.asarray(signals * sensor_polarity(self.record.sensors))

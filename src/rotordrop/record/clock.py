@@ -11,8 +11,12 @@ from rotordrop.errors import RecordError
 from rotordrop.record.recording import Array, Channel
 from rotordrop.units import format_quantity
 
-LEAST_REPEATED = 0.01
-"""Share of time stamps equal to their neighbour from which a clock may be a rounded one [1] (chosen)."""
+MOST_DECIMALS = 9
+"""Decimals of time stamps up to which a rounding is looked for [1]: of a nanosecond (chosen)."""
+
+LONG_PART = 20
+"""Part of a record over which its usual step is taken [1]: a gap spoils few of such spans, and what one stamp
+was rounded by is spread over many steps (chosen)."""
 
 ROUNDING_SLACK = 0.05
 """How far a stamp may be off beyond half its resolution, for the fit of the even clock [1] (chosen)."""
@@ -73,16 +77,23 @@ def shared_clock(channels: Sequence[Channel], place: str) -> tuple[Array, float,
             )
     if len(first.time) < 2:
         raise RecordError(f"{place}: {len(first.time)} samples are no recording")
-    time, rate = _even(first.time)
+    stands = np.flatnonzero(np.diff(first.time) == 0.0)
+    # rows that stand twice in a file have one stamp and the same readings; rounded stamps have others
+    copied = any(all(one.values[k] == one.values[k + 1] for one in channels) for k in stands)
+    time, rate = _even(first.time, copied=copied)
     rounded = np.any(np.diff(first.time) == 0.0) and np.all(np.diff(time) > 0.0)
     return time, rate, ["time stamps are rounded; an even clock was put behind them"] if rounded else []
 
 
 def _step(time: Array) -> float:
-    return float(np.median(np.diff(time))) if len(time) > 1 else 1.0
+    """Usual step [s]: the slope of the times, which single roundings and gaps do not move."""
+    if len(time) < 2:
+        return 1.0
+    span = max(1, len(time) // LONG_PART)
+    return float(np.median(time[span:] - time[:-span])) / span
 
 
-def _even(time: Array) -> tuple[Array, float]:
+def _even(time: Array, *, copied: bool) -> tuple[Array, float]:
     """Replace times that are even but for rounding in the file by exactly even ones; the rate [Hz]."""
     count = len(time) - 1
     step = (time[-1] - time[0]) / count
@@ -91,7 +102,7 @@ def _even(time: Array) -> tuple[Array, float]:
         # nine digits of a rate are what a file can mean; more would be the rounding of its stamps
         rate = float(f"{1.0 / step:.9g}")
         return time[0] + np.arange(count + 1) / rate, rate
-    rounded = _rounded_clock(time)
+    rounded = None if copied else _rounded_clock(time)
     if rounded is not None:
         return rounded
     usual = _step(time)
@@ -99,25 +110,34 @@ def _even(time: Array) -> tuple[Array, float]:
 
 
 def _rounded_clock(time: Array) -> tuple[Array, float] | None:
-    """The even clock behind stamps that were rounded to about their step; None where there is none.
+    """The even clock behind stamps that were rounded to decimals; None where there is none.
 
-    Such stamps are multiples of one resolution, many of them equal to their neighbour, and none is further
-    from the even clock than half the resolution. Rows that are there twice, or missing, drift away from it.
+    Such stamps are multiples of one resolution, and none is further from the even clock than half of it. Rows
+    that are there twice, or missing, drift away from it.
     """
     steps = np.diff(time)
-    if np.mean(steps == 0.0) < LEAST_REPEATED or np.any(steps < 0.0) or not np.any(steps > 0.0):
+    resolution = _resolution(time)
+    if resolution is None or np.any(steps < 0.0) or not np.any(steps > 0.0):
         return None
-    resolution = float(np.min(steps[steps > 0.0]))
     count = np.rint((time - time[0]) / resolution)
-    if np.max(np.abs(time - time[0] - count * resolution)) > 1e-3 * resolution:
-        return None
     index = np.arange(len(time), dtype=np.float64)
     slope, start = np.polyfit(index, count, 1)
     if np.max(np.abs(count - start - slope * index)) > 0.5 + ROUNDING_SLACK:
         return None
+    if not np.any(steps == 0.0) and slope < 2.0:
+        return None  # one row that is missing looks like the rounding of a clock that is a trifle slow
     # within one step over the whole record: the step is the resolution
     if abs(slope - 1.0) * len(time) < 1.0:
         slope = 1.0
         start = float(np.mean(count - index))
     rate = float(f"{1.0 / (slope * resolution):.9g}")
     return time[0] + start * resolution + index / rate, rate
+
+
+def _resolution(time: Array) -> float | None:
+    """Largest step of which all distances of decimal stamps are multiples [s]; None where there is none."""
+    for decimals in range(MOST_DECIMALS + 1):
+        counts = np.rint((time - time[0]) * 10.0**decimals)
+        if np.max(np.abs(time - time[0] - counts * 10.0**-decimals)) < 1e-3 * 10.0**-decimals:
+            return float(np.gcd.reduce(counts.astype(np.int64))) * 10.0**-decimals or None
+    return None

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.elements.magnet import REMANENCE
+from rotordrop.elements.magnet import FORCES, REMANENCE
 from rotordrop.elements.table import STRUCTURE
 from rotordrop.track.calibration import FITTING_NIS
 from rotordrop.track.problem import DropProblem
@@ -20,14 +21,21 @@ NIS_RANGE = (0.6, FITTING_NIS)
 DIRECTIONS = "directions"
 """Name of the check without which nothing can cross-check an estimate."""
 CORRELATION_LIMIT = 0.25
-SENSOR_LIMIT = 3.5
-PARAMETER_LIMIT = 3.5
+DEPARTURE_LIMIT = 3.5
+"""Departure of a parameter or a sensor error from its prior in standard deviations, from which on it is told
+[1]: one of 40 goes so far in one of 50 drops of right models."""
+NOTED_DEPARTURE = 4.0
+"""Departure up to which one of them alone is a note where the innovations are white [1]. Of hidden records
+four with one at 3.6 to 3.9 had all peaks within 1.5 %, and one with 4.0 a peak 4.5 % off."""
 NOISE_FACTOR_LIMIT = 8.0
 BEAM_GAIN_SIGMA = 0.03
 """Relative standard deviation of what a beam in place of the rotor gets wrong between bearing and sensor [1]:
 gains take it up. Such a gain went 5 % off on a rotor whose forces came out within 4 %."""
 LONGEST_REMANENCE = 0.2
 """Time constant [s] from which on a remanent force is none: eddy currents fade within milliseconds."""
+LARGEST_LASTING_LIFT = 0.02
+"""Upward part of a force that stays, over the weight, up to which it is a note [1]: a gain error of all
+sensors looks like one, and forces have as much of it; the stated intervals allow for this much anyway."""
 LEAST_SECOND_DIRECTION = 0.05
 """Smallest singular value of the directions of a plane's sensors that still counts as two directions [1]."""
 
@@ -44,6 +52,8 @@ class Check:
     """What is worth knowing although it passed; empty where there is nothing."""
     path: str = ""
     """The unknown that message and note are about, where they are about one."""
+    widening: float = 1.0
+    """Factor on all intervals that what is noted asks for [1]."""
 
     def said(self, name_of: Callable[[str], str] = str) -> str:
         """What was compared, with the unknown by its path or by another name."""
@@ -67,13 +77,16 @@ def consistency_checks(problem: DropProblem, smoothed: Smoothed, noise_factor: f
     """Check innovations, sensor errors, parameters and process noise of a smoothed drop."""
     innovations = _innovation_checks(problem, smoothed)
     white = all(check.passed for check in innovations)
+    sensors, parameters = _sensor_departures(problem, smoothed), _departures(problem, smoothed, "machine")
+    beyond = [one for one in (*sensors, *parameters) if one[0] >= DEPARTURE_LIMIT]
+    tolerated = white and len(beyond) == 1
     return (
         *innovations,
-        _sensor_check(problem, smoothed),
+        _departure_check("sensor errors", sensors, tolerated=tolerated, by_path=False),
         direction_check(problem, smoothed),
-        _parameter_check(problem, smoothed),
+        _departure_check("parameters", parameters, tolerated=tolerated, by_path=True),
         _nuisance_check(problem, smoothed, white),
-        _remanence_check(problem, smoothed),
+        _remanence_check(problem, smoothed, white),
         Check(
             name="process noise",
             passed=noise_factor < NOISE_FACTOR_LIMIT,
@@ -142,23 +155,42 @@ def _lag_one(e: Array) -> float:
     return float(np.sum(e[1:][pairs] * e[:-1][pairs]) / np.sum(e[1:][pairs] ** 2))
 
 
-def _sensor_check(problem: DropProblem, smoothed: Smoothed) -> Check:
+Departure = tuple[float, str]
+"""How far something went from its prior, in standard deviations [1], and what."""
+
+
+def _sensor_departures(problem: DropProblem, smoothed: Smoothed) -> list[Departure]:
+    """Gains and offsets of all channels."""
     start, n_c = problem.n_dynamic + len(problem.unknowns), problem.n_channels
     chosen = slice(start, start + 2 * n_c)
     sigma = np.sqrt(np.diag(problem.covariance)[chosen])
     if problem.model.machine.rotor.is_beam:
         sigma[:n_c] = np.hypot(sigma[:n_c], BEAM_GAIN_SIGMA)
-    departure = (smoothed.means[-1][chosen] - problem.mean[chosen]) / sigma
-    worst = int(np.argmax(np.abs(departure)))
-    channel = problem.model.machine.sensors[worst % n_c].name
-    kind = "gain" if worst < n_c else "offset"
-    return Check(
-        name="sensor errors",
-        passed=bool(abs(departure[worst]) < SENSOR_LIMIT),
-        message=(
-            f"{kind} of channel {channel} departs by {abs(departure[worst]):.1f} prior standard deviations "
-            f"(limit {SENSOR_LIMIT:g})"
-        ),
+    departure = np.abs(smoothed.means[-1][chosen] - problem.mean[chosen]) / sigma
+    names = [
+        f"{kind} of channel {sensor.name}"
+        for kind in ("gain", "offset")
+        for sensor in problem.model.machine.sensors
+    ]
+    return list(zip(departure.tolist(), names, strict=True))
+
+
+def _departure_check(name: str, departures: list[Departure], *, tolerated: bool, by_path: bool) -> Check:
+    """What went farthest from its prior.
+
+    One alone that goes a little too far is news of the machine where the innovations are white; the intervals
+    widen with it, up to where it counts as a fault.
+    """
+    departure, what = max(departures, default=(0.0, "no unknown"))
+    said, path = (_departs(departure), what) if by_path else (f"{what} {_departs(departure)}", "")
+    check = Check(name=name, passed=departure < DEPARTURE_LIMIT, message=said, path=path)
+    if check.passed or not tolerated or departure >= NOTED_DEPARTURE:
+        return check
+    return replace(
+        check,
+        passed=True,
+        note=f"{check.message}; the readings are followed all the same, and all intervals are wider for it",
+        widening=1.0 + (departure - DEPARTURE_LIMIT) / (NOTED_DEPARTURE - DEPARTURE_LIMIT),
     )
 
 
@@ -177,60 +209,71 @@ def direction_check(problem: DropProblem, smoothed: Smoothed) -> Check:
     return Check(name=DIRECTIONS, passed=not blind, message=missing if blind else seen)
 
 
-def _parameter_check(problem: DropProblem, smoothed: Smoothed) -> Check:
-    """Parameters of the machine against what was known of them."""
-    path, departure = _farthest(problem, smoothed, "machine")
-    passed = departure < PARAMETER_LIMIT
-    return Check(name="parameters", passed=passed, message=_departs(departure), path=path)
-
-
 def _nuisance_check(problem: DropProblem, smoothed: Smoothed, white: bool) -> Check:
     """What belongs to this drop alone (unbalance, remanent lift, drag of the air) against what is usual.
 
     Forces do not depend on how large these are, only on whether the filter has found them: as long as the
     innovations are white it has, and an unusual value is news of the machine, not a fault of the estimate.
     """
-    path, departure = _farthest(problem, smoothed, "drop")
-    usual = departure < PARAMETER_LIMIT
+    departure, path = max(_departures(problem, smoothed, "drop"), default=(0.0, "no unknown"))
+    usual = departure < DEPARTURE_LIMIT
     message = _departs(departure)
     note = "" if usual or not white else f"{message}; the readings are followed all the same"
     return Check(name="unknowns of the drop", passed=usual or white, message=message, note=note, path=path)
 
 
-def _remanence_check(problem: DropProblem, smoothed: Smoothed) -> Check:
+def _remanence_check(problem: DropProblem, smoothed: Smoothed, white: bool) -> Check:
     """Whether the remanent force fades.
 
-    One that stays is how a gain error that all sensors share looks: the rotor falls and flies with another
-    gravity, every reading is followed, and every force and gap has the error.
+    One that stays and acts upwards is how a gain error that all sensors share looks: the rotor falls and
+    flies with another gravity, every reading is followed, and every force and gap has the error. One that
+    stays and acts sideways is none of that: the machine is not level, or something pulls at the rotor.
     """
-    theta = smoothed.means[parameter_sample(smoothed)][problem.parameter_slice]
-    lasting = [
-        unknown.value_of(float(t))
-        for t, unknown in zip(theta, problem.unknowns, strict=True)
-        if unknown.parameter is REMANENCE
-    ]
-    longest = max(lasting, default=0.0)
+    theta = smoothed.means[parameter_sample(smoothed)][problem.parameter_slice].tolist()
+    values = dict(zip((unknown.parameter for unknown in problem.unknowns), theta, strict=True))
+    longest = next(
+        (u.value_of(values[u.parameter]) for u in problem.unknowns if u.parameter is REMANENCE), 0.0
+    )
+    if longest < LONGEST_REMANENCE:
+        return Check(name="remanent force", passed=True, message=_fades(longest))
+    weight = problem.model.machine.rotor.mass * float(problem.model.machine.gravity)
+    across, up = (
+        math.fsum(t for t, u in zip(theta, problem.unknowns, strict=True) if u.parameter is row)
+        for row in FORCES
+    )
+    share = abs(up) / weight
+    noted = white and share < LARGEST_LASTING_LIFT
     return Check(
         name="remanent force",
-        passed=longest < LONGEST_REMANENCE,
+        passed=noted,
         message=(
-            f"the remanent force of the magnets fades in {longest:.3g} s (limit {LONGEST_REMANENCE:g} s); "
-            "one that stays looks like a gain error of all sensors, which forces and gaps would share"
+            f"{_fades(longest)}; one that stays looks like a gain error of all sensors, which forces and "
+            "gaps would share"
         ),
+        note=(
+            f"a force of {across:.0f} N across and {up:.0f} N upwards stays after power-off: the machine is "
+            "not level, or something pulls at the rotor; a gain error that all sensors share would be "
+            f"{share:.1%} at most, for which all intervals are wider"
+        )
+        if noted
+        else "",
+        widening=math.hypot(1.0, share / LARGEST_LASTING_LIFT) if noted else 1.0,
     )
 
 
-def _farthest(problem: DropProblem, smoothed: Smoothed, scope: str) -> tuple[str, float]:
-    """Unknown of a scope that went farthest from its prior, and how far in standard deviations [1]."""
+def _fades(longest: float) -> str:
+    return f"the remanent force of the magnets fades in {longest:.3g} s (limit {LONGEST_REMANENCE:g} s)"
+
+
+def _departures(problem: DropProblem, smoothed: Smoothed, scope: str) -> list[Departure]:
+    """Unknowns of a scope."""
     theta = smoothed.means[parameter_sample(smoothed)][problem.parameter_slice]
-    departures = [
-        (0.0 if u.parameter.spin_up_only or u.parameter in STRUCTURE else abs(t - u.mean) / u.sigma, u.path)
+    return [
+        (abs(float(t) - u.mean) / u.sigma, u.path)
         for t, u in zip(theta, problem.unknowns, strict=True)
-        if u.scope == scope
+        if u.scope == scope and not u.parameter.spin_up_only and u.parameter not in STRUCTURE
     ]
-    departure, path = max(departures, default=(0.0, "no unknown"))
-    return path, float(departure)
 
 
 def _departs(departure: float) -> str:
-    return f"departs by {departure:.1f} prior standard deviations (limit {PARAMETER_LIMIT:g})"
+    return f"departs by {departure:.1f} prior standard deviations (limit {DEPARTURE_LIMIT:g})"

@@ -27,8 +27,8 @@ from rotordrop.track.smoother import Smoothed, parameter_sample
 from rotordrop.track.unknown_impulses import likeliest_noise, with_noise
 from rotordrop.twin.joint_spread import joint_spread
 from rotordrop.twin.search import CALIBRATION_SCHEDULE, track_drops
-from rotordrop.twin.tracked_loads import INCONSISTENT_WIDENING
-from rotordrop.twin.tracked_parameters import NOT_DETERMINED, identified, model_error, parameter_widening
+from rotordrop.twin.tracked_loads import widening_of
+from rotordrop.twin.tracked_parameters import NOT_DETERMINED, fitted_values, identified
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -145,7 +145,7 @@ def calibrate_machine(
     at = parameter_sample(smoothed)
     covariance = smoothed.covariance(at)
     mean = smoothed.means[at]
-    widening = 1.0 if consistent else INCONSISTENT_WIDENING
+    widening = widening_of(check for one in checks.values() for check in one)
     values = _values(problem, mean, covariance, widening)
     bearings = [bearing.name for bearing in machine.touchdown_bearings]
     identifiability = _identifiability(problem, covariance, values)
@@ -240,15 +240,10 @@ def _possible(machine: Machine, fitted: dict[str, Known], drops: Sequence[str]) 
 
 
 def _values(problem: DropProblem, mean: Array, covariance: Array, widening: float) -> dict[str, Known]:
+    fitted = zip(problem.unknowns, fitted_values(problem, mean, covariance, widening), strict=True)
+    # a machine file states intervals, and not which part of them the model leaves out
+    values = {u.path: replace(value, allowance_90=None) for u, value in fitted if u.scope == "machine"}
     sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    values: dict[str, Known] = {}
-    for k, unknown in enumerate(problem.unknowns):
-        if unknown.scope != "machine":
-            continue
-        i = problem.n_dynamic + k
-        error = model_error(unknown, float(sigma[i]))
-        wide = parameter_widening(unknown, error, widening)
-        values[unknown.path] = identified(unknown, float(mean[i]), error, wide)
     first = problem.n_dynamic + len(problem.unknowns)
     for c, sensor in enumerate(problem.model.machine.sensors):
         gain, offset = first + c, first + problem.n_channels + c

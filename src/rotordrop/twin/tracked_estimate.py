@@ -32,7 +32,6 @@ from rotordrop.track.input_state import InputEstimate, at_bearings
 from rotordrop.twin.narrowing import DRAWING, narrowing
 from rotordrop.twin.tracked import TrackedDrop
 from rotordrop.twin.tracked_loads import (
-    INCONSISTENT_WIDENING,
     Loads,
     bearing_drop,
     check_of_the_rotor,
@@ -43,6 +42,7 @@ from rotordrop.twin.tracked_loads import (
     loads_of_cross_check,
     of_the_rotor,
     twin_loads,
+    widening_of,
 )
 from rotordrop.twin.tracked_parameters import (
     gap_of_record,
@@ -219,7 +219,7 @@ def _judge(drop: TrackedDrop, check: InputEstimate | None) -> _Judgement:
     if not drop.consistent and check is None:
         _refuse_unchecked(drop)
     fits = drop.consistent or check is None
-    widening = 1.0 if drop.consistent else INCONSISTENT_WIDENING
+    widening = widening_of(drop.checks)
     found = parameters(problem, smoothed, fits=fits, widening=widening)
     given_way = [False] * len(problem.model.bearing_names)
     if not fits and check is not None:
@@ -274,7 +274,16 @@ def _bearings(drop: TrackedDrop, judged: _Judgement) -> tuple[BearingDrop, ...]:
         )
         held = None if judged.fits else judged.check
         found.append(
-            bearing_drop(drop.problem, drop.forces, b, _loads(drop, judged, b), measured[:, b], values, held)
+            bearing_drop(
+                drop.problem,
+                drop.forces,
+                b,
+                _loads(drop, judged, b),
+                measured[:, b],
+                values,
+                judged.widening,
+                held,
+            )
         )
     return tuple(found)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field, replace
 
@@ -34,7 +34,7 @@ from rotordrop.estimate.estimate import CrossCheck
 from rotordrop.known import NINETY, Known, Status
 from rotordrop.simulate.certificate import refined_peak
 from rotordrop.track.calibration import TrackedDrops
-from rotordrop.track.consistency import direction_check
+from rotordrop.track.consistency import Check, direction_check
 from rotordrop.track.forces import ForceHistory
 from rotordrop.track.input_state import MEAN_ERROR, InputEstimate, input_state_estimate, lent_by_record
 from rotordrop.track.problem import DropProblem
@@ -70,6 +70,11 @@ class Loads:
     peak_stress: Peak
     means: Mapping[str, Known]
     missing: Mapping[str, str] = field(default_factory=dict)
+
+
+def widening_of(checks: Iterable[Check]) -> float:
+    """Factor on all intervals by the checks of a drop [1]: what is noted widens, what fails doubles them."""
+    return max(check.widening if check.passed else INCONSISTENT_WIDENING for check in checks)
 
 
 def of_a_beam(forces: ForceHistory) -> ForceHistory:
@@ -320,6 +325,7 @@ def bearing_drop(
     loads: Loads,
     measured: Array,
     values: Mapping[str, Known],
+    widening: float,
     cross_check: InputEstimate | None,
 ) -> BearingDrop:
     """Everything about one bearing; ``measured`` (N, 2) is the motion that its sensors show [m]."""
@@ -334,7 +340,6 @@ def bearing_drop(
     )
     impacts: tuple[Impact, ...] = ()
     if loads.peak_force.origin is Origin.TWIN:
-        widening = 1.0 if cross_check is None else INCONSISTENT_WIDENING
         impacts = twin_impacts(forces, b, widening, cross_check)
     first = impacts[0] if impacts else None
     ends = math.nan if first is None else float(np.nan_to_num(first.end, nan=forces.time[-1]))

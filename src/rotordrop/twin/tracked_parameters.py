@@ -14,7 +14,7 @@ from rotordrop.elements.touchdown_bearing import MODEL_GAP_ERROR
 from rotordrop.estimate.estimate import FittedParameter, JointEstimate, SensorErrors
 from rotordrop.known import NINETY, Known, Status
 from rotordrop.rotor.unknowns import Unknown, sensor_prior, smallest_gap
-from rotordrop.track.consistency import PARAMETER_LIMIT
+from rotordrop.track.consistency import DEPARTURE_LIMIT
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Smoothed, parameter_sample
 from rotordrop.twin.tracked_loads import INCONSISTENT, OF_CROSS_CHECK, with_interval
@@ -27,8 +27,10 @@ PARAMETER_WIDENING = 1.5
 """Factor on standard errors of parameters for what the linearised fit leaves out [1]."""
 UNDETERMINED: Status = "the record does not determine it"
 KNOWN: Status = "known from the calibration"
-NOT_DETERMINED: tuple[Status, ...] = (UNDETERMINED, KNOWN)
-"""Verdicts on a parameter that the record says little about; the second where it was calibrated before."""
+AT_BOUND: Status = "at its bound"
+NOT_DETERMINED: tuple[Status, ...] = (UNDETERMINED, KNOWN, AT_BOUND)
+"""Verdicts on a parameter that the record says little about; the second where it was calibrated before, the
+third where the fit went beyond what the model follows."""
 DETERMINED_SHARE, WEAKLY_DETERMINED_SHARE = 0.3, 0.7
 """Standard error over that of the prior up to which a parameter is determined, and weakly determined [1]."""
 
@@ -46,9 +48,16 @@ def identified(unknown: Unknown, theta: float, sigma: float, widening: float = 1
     """An estimated parameter as a value with interval, start and verdict."""
     half = NINETY * sigma * widening
     interval = (unknown.value_of(theta - half), unknown.value_of(theta + half))
+    status = determination(sigma / unknown.sigma, calibrated=unknown.calibrated)
+    if status not in NOT_DETERMINED and not unknown.bounds[0] < theta < unknown.bounds[1]:
+        # beyond its bound the model does not follow: what is known of it is what was known before
+        status = AT_BOUND
+        known = (unknown.value_of(unknown.mean + side * NINETY * unknown.sigma) for side in (-1, 1))
+        ends = (*interval, *known)
+        interval = (min(ends), max(ends))
     return Known(
         value=unknown.value_of(theta),
-        status=determination(sigma / unknown.sigma, calibrated=unknown.calibrated),
+        status=status,
         standard_error=unknown.standard_error(theta, sigma * widening),
         interval_90=within_bounds(unknown.parameter, interval),
         start=unknown.value_of(unknown.begin),
@@ -85,20 +94,42 @@ def parameters(
     Where model and record disagree, a parameter may be anything between its prior and the fit.
     """
     at = parameter_sample(smoothed)
-    theta = smoothed.means[at][problem.parameter_slice]
-    sigma = np.sqrt(np.maximum(np.diag(smoothed.covariance(at))[problem.parameter_slice], 0.0))
+    values = fitted_values(problem, smoothed.means[at], smoothed.covariance(at), widening)
     found = []
-    for unknown, t, s in zip(problem.unknowns, theta, sigma, strict=True):
-        error = model_error(unknown, float(s))
+    for unknown, value in zip(problem.unknowns, values, strict=True):
         prior = identified(unknown, unknown.mean, unknown.sigma)
-        wider = parameter_widening(unknown, error, widening)
-        value = identified(unknown, float(t), error, wider)
         if not fits:
-            value = replace(value, status=INCONSISTENT, interval_90=_hull(value, prior))
-        elif (allowed := left_out(unknown)) > 0.0:
-            value = replace(value, allowance_90=NINETY * wider * allowed)
+            value = replace(value, status=INCONSISTENT, interval_90=_hull(value, prior), allowance_90=None)
         found.append(FittedParameter(row=unknown.parameter, owner=unknown.owner, prior=prior, estimate=value))
     return tuple(found)
+
+
+def fitted_values(problem: DropProblem, mean: Array, covariance: Array, widening: float) -> list[Known]:
+    """Every unknown with its interval and verdict, from mean (n,) and covariance (n, n) of an estimate.
+
+    Inertia and drag of a race show together, when it catches up with the rotor. Where one of them ended at
+    its bound the other one stands in for it, and neither is a finding.
+    """
+    theta = mean[problem.parameter_slice]
+    sigma = np.sqrt(np.maximum(np.diag(covariance)[problem.parameter_slice], 0.0))
+    values = []
+    for unknown, t, s in zip(problem.unknowns, theta.tolist(), sigma.tolist(), strict=True):
+        error = model_error(unknown, s)
+        wider = parameter_widening(unknown, error, widening)
+        value, allowed = identified(unknown, t, error, wider), NINETY * wider * left_out(unknown)
+        values.append(replace(value, allowance_90=allowed) if allowed > 0.0 else value)
+    races = list(zip(problem.unknowns, values, strict=True))
+    astray = {u.owner for u, v in races if u.parameter.spin_up_only and v.status == AT_BOUND}
+    return [
+        replace(
+            value,
+            status=UNDETERMINED,
+            interval_90=_hull(value, identified(unknown, unknown.mean, unknown.sigma)),
+        )
+        if unknown.parameter.spin_up_only and unknown.owner in astray and value.status != AT_BOUND
+        else value
+        for unknown, value in races
+    ]
 
 
 def joint_estimate(problem: DropProblem, smoothed: Smoothed) -> JointEstimate:
@@ -156,7 +187,7 @@ def is_lost(problem: DropProblem, gap: Known, b: int) -> bool:
     """Whether an estimated air gap is none that the machine can have, by settled tail and machine file."""
     entry = problem.gap_entries[b]
     sigma = math.sqrt(problem.covariance[entry, entry])
-    return gap.value <= 0.0 or abs(gap.value - float(problem.mean[entry])) > PARAMETER_LIMIT * sigma
+    return gap.value <= 0.0 or abs(gap.value - float(problem.mean[entry])) > DEPARTURE_LIMIT * sigma
 
 
 def sensor_errors(

@@ -9,6 +9,7 @@ import pytest
 from rotordrop.errors import RecordError
 from rotordrop.evidence import check_record, refuse_unusable
 from rotordrop.evidence.events import Beginning, beginning_of, find_fall
+from rotordrop.evidence.evidence import Evidence
 from rotordrop.evidence.levitated import fit_levitated
 from rotordrop.evidence.quality import Finding, Kind, standing
 from rotordrop.evidence.quality import fall as quality_fall
@@ -106,13 +107,35 @@ class TestSingleChannels:
         assert found.time == pytest.approx(0.05)
         assert "(25 ms) read exactly" in found.message
 
-    def test_a_short_hold_is_stuck_too(self, drop, machine, edited):
+    def test_a_short_hold_is_stuck_too_and_gone_on_without(self, drop, tail, machine, edited):
         def change(signals):
             signals[6000:6012, 0] = signals[6000, 0]
 
-        found = only(edited(drop, change), machine)
+        found = only(edited(drop, change), machine, tail, severity="warning")
         assert (found.kind, found.channel) == ("stuck channel", "S_NDE_A")
         assert "12 samples (0.6 ms)" in found.message
+        assert "the tracked twin goes on without these samples" in found.remedy
+
+    def test_a_hold_of_all_channels_is_no_dropped_block(self, drop, tail, machine, edited):
+        """2 ms were refused as a record to be made again, which a drop that happened cannot be."""
+
+        def change(signals):
+            signals[6000:6040] = signals[6000]
+
+        found = check_record(edited(drop, change), machine, tail)
+        assert not [one for one in found if one.severity == "stop"]
+        held = [one for one in found if one.kind == "stuck channel"]
+        assert [one.channel for one in held] == list(drop.channel_names)
+
+    def test_what_is_damaged_is_marked_sample_by_sample(self, drop, machine, edited):
+        def change(signals):
+            signals[6000:6040] = signals[6000]
+            signals[9000, 2] += 60e-6
+
+        bad = Evidence(record=edited(drop, change), machine=machine).damaged
+        assert np.flatnonzero(bad.all(axis=1)).tolist() == list(range(6001, 6040))
+        assert np.argwhere(bad[6040:]).tolist() == [[9000 - 6040, 2]]
+        assert not Evidence(record=drop, machine=machine).damaged.any()
 
     def test_a_damaged_block(self, drop, tail, machine, edited):
         def change(signals):

@@ -11,8 +11,10 @@ import pytest
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.track.consistency import (
     CORRELATION_LIMIT,
+    DEPARTURE_LIMIT,
+    LARGEST_LASTING_LIFT,
     NOISE_FACTOR_LIMIT,
-    SENSOR_LIMIT,
+    NOTED_DEPARTURE,
     consistency_checks,
     judged_by,
     normalised_innovations,
@@ -94,7 +96,7 @@ def test_a_sensor_offset_beyond_its_prior_is_named(impacts):
     shifted[:, 3] += 120e-6
     check = checked(replace(impacts, readings=shifted))["sensor errors"]
     assert not check.passed
-    assert f"(limit {SENSOR_LIMIT:g})" in check.message and "channel S_DE_" in check.message
+    assert f"(limit {DEPARTURE_LIMIT:g})" in check.message and "channel S_DE_" in check.message
 
 
 def test_a_parameter_far_from_its_prior_is_named(impacts, impacts_smoothed):
@@ -105,6 +107,64 @@ def test_a_parameter_far_from_its_prior_is_named(impacts, impacts_smoothed):
     check = next(c for c in checks if c.name == "parameters")
     assert not check.passed
     assert check.said().startswith("NDE.support.mass departs by")
+
+
+def departed(problem, smoothed, paths, by):
+    """The smoothed drop with unknowns that stand so many standard deviations off their prior."""
+    means = smoothed.means.copy()
+    for path in paths:
+        place = [u.path for u in problem.unknowns].index(path)
+        means[:, problem.n_dynamic + place] = (
+            problem.unknowns[place].mean + by * problem.unknowns[place].sigma
+        )
+    return replace(smoothed, means=means)
+
+
+@pytest.mark.parametrize("by", [3.6, 3.9])
+def test_one_departure_beside_white_innovations_is_a_note_that_widens(impacts, impacts_smoothed, by):
+    """Contact stiffness at 3.6 and gains at 3.9 were no reason to drop an estimate whose peaks were right."""
+    one = departed(impacts, impacts_smoothed, ["NDE.contact.stiffness"], by)
+    checks = {c.name: c for c in consistency_checks(impacts, one, 1.0)}
+    check = checks["parameters"]
+    assert check.passed and f"departs by {by:.1f} prior standard deviations" in check.note
+    assert check.widening == pytest.approx(1.0 + (by - DEPARTURE_LIMIT) / 0.5)
+    assert all(other.widening == 1.0 for other in checks.values() if other is not check)
+
+
+def test_two_departures_or_a_far_one_or_coloured_innovations_are_none(impacts, impacts_smoothed):
+    for paths, by in (
+        (["NDE.contact.stiffness"], NOTED_DEPARTURE),
+        (["NDE.support.mass", "DE.support.mass"], 3.7),
+    ):
+        check = next(
+            c
+            for c in consistency_checks(impacts, departed(impacts, impacts_smoothed, paths, by), 1.0)
+            if c.name == "parameters"
+        )
+        assert not check.passed and check.note == "" and check.widening == 1.0
+    one = departed(impacts, impacts_smoothed, ["NDE.contact.stiffness"], 3.7)
+    loud = replace(one.filtered, innovations=2.0 * one.filtered.innovations)
+    checks = consistency_checks(impacts, replace(one, filtered=loud), 1.0)
+    assert not next(c for c in checks if c.name == "parameters").passed
+
+
+def test_a_side_force_that_stays_is_no_gain_error(impacts, impacts_smoothed):
+    """A machine 3 degrees off level, and a rotor pulled aside, were flagged as sensors at fault."""
+    weight = impacts.model.machine.rotor.mass * 9.81
+    lasting = {"remanence.time_constant": math.log(0.46)}
+    for up, passes in ((0.25 * LARGEST_LASTING_LIFT, True), (1.1 * LARGEST_LASTING_LIFT, False)):
+        means = impacts_smoothed.means.copy()
+        for place, unknown in enumerate(impacts.unknowns):
+            if unknown.path in lasting:
+                means[:, impacts.n_dynamic + place] = lasting[unknown.path]
+            elif unknown.parameter.owner == "magnet":
+                share = 0.05 if unknown.path.endswith(".x") else up
+                means[:, impacts.n_dynamic + place] = share * weight / len(impacts.model.machine.ambs)
+        smoothed = replace(impacts_smoothed, means=means)
+        check = next(c for c in consistency_checks(impacts, smoothed, 1.0) if c.name == "remanent force")
+        assert check.passed is passes
+        assert ("the machine is not level" in check.note) is passes
+        assert check.widening == pytest.approx(math.hypot(1.0, 0.25) if passes else 1.0)
 
 
 def test_a_remanent_force_that_stays_is_a_gain_error_of_all_sensors(impacts, impacts_smoothed):

@@ -238,6 +238,7 @@ COLUMNS = {
     "contact.damping": {L.CONTACT_DAMPING},
     "friction.dynamic": {L.FRICTION_DYNAMIC, L.FRICTION_STATIC},
     "friction.stribeck_speed": {L.STRIBECK_SPEED},
+    "race.mass": {L.RACE_MASS},
     "race.inertia": {L.RACE_INERTIA},
     "race.drag_coefficient": {L.DRAG_COEFFICIENT},
     "damping_time": {L.BEARING_DAMPING},

@@ -96,9 +96,9 @@ def test_a_ratio_is_stated_as_a_ratio(lp400):
 
 
 def test_a_number_beyond_its_bounds_is_stated_as_the_model_took_it(lp400):
-    """A race inertia is followed up to twice what was inferred; what lies beyond has no effect."""
+    """A race inertia is followed up to four times what was inferred; what lies beyond has no effect."""
     inertia = unknown_of(lp400, "DE.race.inertia")
-    assert inertia.value_of(inertia.mean + 3.0) == pytest.approx(2.0 * math.exp(inertia.mean))
+    assert inertia.value_of(inertia.mean + 3.0) == pytest.approx(4.0 * math.exp(inertia.mean))
 
 
 def test_what_a_drop_owns_is_not_shared(flight):

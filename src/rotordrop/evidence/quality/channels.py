@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotordrop.evidence.quality.finding import Finding, Kind
 from rotordrop.evidence.quality.motion import first_motion
@@ -30,6 +31,24 @@ _SPIKE = 12.0
 _SPIKE_LEAST = 5e-6
 _SPIKE_STEPS = 2.5
 """A spike is higher than this many steps of the converter [1]."""
+
+
+MOST_HELD = 5e-3
+"""Longest time for which a channel may hold one reading and the estimate still goes on without it [s]: less
+than a fall through a usual gap (chosen)."""
+
+
+def damaged_samples(signals: Array) -> NDArray[np.bool_]:
+    """Samples (N, C) that are no readings of the motion: copies of the one before, or single ones far off."""
+    bad = np.zeros(signals.shape, dtype=np.bool_)
+    for c in range(signals.shape[1]):
+        values = signals[:, c]
+        if not np.isfinite(values).all() or len(values) < 3:
+            continue  # such a channel is no candidate for single faults
+        for start, count in zip(*_held(values), strict=True):
+            bad[start + 1 : start + count, c] = True
+        bad[_standing_out(values)[0] + 1, c] = True
+    return bad
 
 
 def check_channels(record: Record) -> list[Finding]:
@@ -86,26 +105,37 @@ def _dead(channel: str, values: Array, moves: float, typical: float) -> Finding:
     )
 
 
-def _stuck(record: Record, channel: str, values: Array) -> Finding | None:
+def _held(values: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Starts and lengths [samples] of the runs in which a channel holds one reading, the longest first."""
     starts, lengths = runs_of(np.diff(values) == 0)
     if not len(lengths):
-        return None
+        return starts, lengths
     longest = int(np.argmax(lengths))
-    count = int(lengths[longest]) + 1
     others = np.append(np.delete(lengths, longest), 0)  # coarse steps make runs everywhere
     usual = int(np.percentile(others, 99.9, method="lower")) + 1
-    if count < max(_STUCK_SAMPLES, 4 * usual):
+    # flat at the extreme is clipping, which is looked for by itself
+    inside = (values[starts] != np.min(values)) & (values[starts] != np.max(values))
+    chosen = np.flatnonzero((lengths + 1 >= max(_STUCK_SAMPLES, 4 * usual)) & inside)
+    chosen = chosen[np.argsort(-lengths[chosen], kind="stable")]
+    return starts[chosen], lengths[chosen] + 1
+
+
+def _stuck(record: Record, channel: str, values: Array) -> Finding | None:
+    starts, lengths = _held(values)
+    if not len(lengths):
         return None
-    if values[starts[longest]] in (np.min(values), np.max(values)):
-        return None  # flat at the extreme is clipping, which is looked for by itself
-    at = float(record.time[starts[longest]])
-    held = format_quantity(float(values[starts[longest]]), "length")
+    count, first = int(lengths[0]), int(starts[0])
+    held, at = format_quantity(float(values[first]), "length"), float(record.time[first])
+    lasts = count / record.sampling_rate
+    short = float(np.sum(lengths)) / record.sampling_rate <= MOST_HELD
     return Finding(
         kind=Kind.STUCK_CHANNEL,
-        message=f"{count} samples ({count / record.sampling_rate * 1e3:.3g} ms) read exactly {held} from "
-        f"{at:.6g} s on",
-        remedy="check the recorder's input, then record again",
-        severity="stop",
+        message=f"{count} samples ({lasts * 1e3:.3g} ms) read exactly {held} from {at:.6g} s on",
+        remedy="check the recorder's input; the tracked twin goes on without these samples, for at most "
+        f"{MOST_HELD * 1e3:g} ms"
+        if short
+        else "check the recorder's input, then record again",
+        severity="warning" if short else "stop",
         channel=channel,
         time=at,
     )
@@ -134,25 +164,29 @@ def _clipped(record: Record, channel: str, values: Array) -> Finding | None:
 
 def _spikes(record: Record, channel: str, values: Array) -> Finding | None:
     """Single samples off the line through their neighbours, with the neighbours agreeing."""
-    middle = values[1:-1] - 0.5 * (values[:-2] + values[2:])
-    usual = 1.4826 * float(np.median(np.abs(middle)))
-    limit = max(_SPIKE * usual, _SPIKE_LEAST)
-    across = np.abs(values[2:] - values[:-2])
-    spikes = np.flatnonzero((np.abs(middle) > limit) & (across < 0.5 * np.abs(middle)))
-    if len(spikes):  # the steps of a coarse converter are none
-        spikes = spikes[np.abs(middle[spikes]) > _SPIKE_STEPS * _step_of(values)]
+    spikes, heights = _standing_out(values)
     if not len(spikes):
         return _steps(record, channel, values)
     at = float(record.time[spikes[0] + 1])
-    size = format_quantity(float(np.max(np.abs(middle[spikes]))), "length")
+    size = format_quantity(float(np.max(heights)), "length")
     return Finding(
         kind=Kind.SPIKES,
         message=f"{len(spikes)} single samples stand out by up to {size}, the first at {at:.6g} s",
-        remedy="look for loose contacts or switching noise; single spikes pull every fit",
+        remedy="look for loose contacts or switching noise; the tracked twin goes on without these samples",
         severity="warning",
         channel=channel,
         time=at,
     )
+
+
+def _standing_out(values: Array) -> tuple[NDArray[np.intp], Array]:
+    """Single samples off the line through their neighbours: their places less one, and by how much [m]."""
+    middle = np.abs(values[1:-1] - 0.5 * (values[:-2] + values[2:]))
+    limit = max(_SPIKE * 1.4826 * float(np.median(middle)), _SPIKE_LEAST)
+    spikes = np.flatnonzero((middle > limit) & (np.abs(values[2:] - values[:-2]) < 0.5 * middle))
+    if len(spikes):  # the steps of a coarse converter are none
+        spikes = spikes[middle[spikes] > _SPIKE_STEPS * _step_of(values)]
+    return spikes, middle[spikes]
 
 
 def _steps(record: Record, channel: str, values: Array) -> Finding | None:

@@ -196,12 +196,15 @@ def _jumps(record: Record) -> list[Finding]:
     finest = np.array([np.min(np.diff(np.unique(column)), initial=np.inf) for column in signals.T])
     limit = np.maximum(np.maximum(12.0 * usual, 2e-6), 4.0 * np.where(np.isfinite(finest), finest, 0.0))
     enough = max(2, signals.shape[1] // 2 + 1)
-    many = np.sum(kink > limit, axis=1) >= enough
+    # channels that stood still before catch up with the rotor: a hold has its own name
+    jumped = (kink > limit) & (step[1:-3] != 0.0)
+    many = np.sum(jumped, axis=1) >= enough
     # where the rotor moves along one sensor, one channel jumps far and the others less
     far = np.max(kink / np.maximum(8.0 * np.percentile(kink, 99.9, axis=0), limit), axis=1) > 1.0
     for jump in np.flatnonzero(far & ~many).tolist():
         nearby = np.median(kink[max(jump - _AROUND, 0) : jump + _AROUND], axis=0)
-        many[jump] = np.sum(kink[jump] > 6.0 * np.maximum(nearby, usual)) >= enough
+        jumped = (kink[jump] > 6.0 * np.maximum(nearby, usual)) & (step[jump + 1] != 0.0)
+        many[jump] = np.sum(jumped) >= enough
     beside = np.append(many[1:], False) | np.append(False, many[:-1])
     alone = np.flatnonzero(many & ~beside)  # a spike makes two such steps in a row
     if not len(alone):
