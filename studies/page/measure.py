@@ -26,7 +26,7 @@ sys.path[:0] = [str(ROOT / "src"), str(ROOT)]
 from tests.unit.web.browser import Browser
 from tests.unit.web.serving import Served
 
-from rotordrop.web.running import publish, state_file
+from rotordrop.web.running import publish, write_state
 from rotordrop.web.traces import write_traces
 from rotordrop.web.workspace import Workspace
 
@@ -101,7 +101,7 @@ def zoom() -> dict[str, object]:
             traces = {"name": "motion", "columns": list(names), "start": 0.0, "end": float(clock[-1])}
             (made / "page.json").write_text(json.dumps({"traces": traces}))
             publish(job, "look", "0" * 16, made)
-            state_file(job, "look").write_text(json.dumps({"state": "done", "run": "0" * 16}))
+            write_state(job, "look", {"state": "done", "run": "0" * 16})
             taken, most = [], 0
             asked = "&".join(f"column={name}" for name in names)
             for _ in range(200):

@@ -61,7 +61,7 @@ def serve(
         if open_page:
             typer.launch(address)
 
-    serve_page(place, port, announce, log)
+    serve_page(place, port, announce, lambda words: console(sys.stderr).print(words), log)
 
 
 def data_folder() -> Path:

@@ -17,13 +17,13 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
 from starlette.routing import Route
 
-from rotordrop.errors import RotordropError, UsageError
+from rotordrop.errors import DamagedFileError, OutputError, RotordropError, UsageError
 from rotordrop.web import histories
 from rotordrop.web.desk import Desk, NotThereError, Operation, options_of, order_of, verb_of
-from rotordrop.web.guard import App, Guard
+from rotordrop.web.guard import App, Guard, Receive, Scope, Send
 from rotordrop.web.numbers import machine_of_numbers, schema_of_numbers
-from rotordrop.web.running import VERBS, Runner, published_run, state_of
-from rotordrop.web.workspace import ROLES, Job, Role, TooLargeError, Workspace, labelled, receive
+from rotordrop.web.running import VERBS, Runner, published, state_of
+from rotordrop.web.workspace import LARGEST, ROLES, Job, Role, TooLargeError, Workspace, labelled, receive
 
 ASSETS = {".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 """What of the folder of the page is sent, by its ending."""
@@ -32,6 +32,8 @@ BETWEEN_LOOKS_S = 0.25
 """Pause between two looks at what waits and what ended [s]; chosen, not measured."""
 TICKET_S = 120.0
 """How long an address of a report waits to be opened [s]; chosen, not measured."""
+LINGER_S = 30.0
+"""How long an upload that was refused may go on [s]; chosen, not measured."""
 REPORT_HEADERS = {
     "content-security-policy": "sandbox allow-scripts allow-downloads allow-modals",
     "cross-origin-opener-policy": "unsafe-none",  # a sandboxed page must not claim an opener policy
@@ -54,7 +56,16 @@ async def static(desk: Desk, request: Request) -> Response:
 
 
 def _told(job: Job) -> dict[str, Any]:
-    told = job.read()
+    try:
+        told = job.read()
+    except DamagedFileError as error:
+        named = {
+            "name": f"damaged drop {job.number[:6]}",
+            "created": job.created(),
+            "options": {},
+            "files": {},
+        }
+        return {"id": job.number, **named, "states": {}, "damaged": without_folder(str(error), job.path)}
     states: dict[str, Any] = {}
     for verb in VERBS:
         state = state_of(job, verb)
@@ -63,7 +74,14 @@ def _told(job: Job) -> dict[str, Any]:
             states[verb] = {
                 key: state.get(key) for key in ("state", "stage", "fraction", "error", "options", "run")
             }
-            states[verb] |= {"spent": spent, "result": published_run(job, verb)}
+            states[verb] |= {"spent": max(spent, 0.0), "result": None}
+            try:
+                found = published(job, verb)
+                states[verb]["result"] = found and found["run"]
+            except DamagedFileError as error:
+                states[verb] |= {"state": "failed", "error": str(error)}
+            if states[verb]["error"]:
+                states[verb]["error"] = without_folder(states[verb]["error"], job.path)
     return {"id": job.number, **told, "states": states}
 
 
@@ -110,7 +128,7 @@ async def upload(desk: Desk, request: Request) -> Response:
 async def sent_file(desk: Desk, request: Request) -> Response:
     """A file of a job as it was sent or made, so that what the page computes can be computed elsewhere."""
     job, role = desk.job(request), request.path_params["role"]
-    place = job.file(role) if role in ROLES else None
+    place = await asyncio.to_thread(job.file, role) if role in ROLES else None
     if place is None:
         raise NotThereError("the job has no such file")
     return FileResponse(place, media_type="application/octet-stream")
@@ -129,7 +147,7 @@ async def ask(desk: Desk, request: Request) -> Response:
     """Ask for a computation."""
     job, verb = desk.job(request), verb_of(request)
     options = {**job.read()["options"], **options_of(await order_of(request))}
-    if job.file("record") is None:
+    if "record" not in job.read()["files"]:
         raise UsageError("no record was sent; drop one on the page")
     await asyncio.to_thread(desk.runner.ask, job, verb, options)
     return JSONResponse(_told(job), status_code=202)
@@ -144,17 +162,17 @@ async def cancel(desk: Desk, request: Request) -> Response:
 
 async def found_page(desk: Desk, request: Request) -> Response:
     """What the page draws of a result."""
-    return FileResponse(desk.found(request) / "page.json", media_type="application/json")
+    return FileResponse(await desk.found(request) / "page.json", media_type="application/json")
 
 
 async def found_document(desk: Desk, request: Request) -> Response:
     """The document of a result."""
-    return FileResponse(desk.found(request) / "document.json", media_type="application/json")
+    return FileResponse(await desk.found(request) / "document.json", media_type="application/json")
 
 
 async def ticket(desk: Desk, request: Request) -> Response:
     """An address for the report that works once and soon: a page that is opened carries no token."""
-    place = desk.found(request) / "report.html"
+    place = await desk.found(request) / "report.html"
     if not place.is_file():
         raise NotThereError("there is no report of this; make an estimate first")
     now = time.monotonic()
@@ -191,16 +209,16 @@ async def twelve_numbers(desk: Desk, request: Request) -> Response:
 
 
 async def formats(desk: Desk, request: Request) -> Response:
-    """Endings of the recordings that can be read."""
+    """Endings of the recordings that can be read, and how many bytes are taken of what."""
     readers = await asyncio.to_thread(import_module, "rotordrop.record.readers")
-    return JSONResponse({"formats": readers.known_formats()})
+    return JSONResponse({"formats": readers.known_formats(), "largest": LARGEST})
 
 
 async def drops(desk: Desk, request: Request) -> Response:
     """Drops to compare with: estimates that are here, and entries of the log."""
     compared = await asyncio.to_thread(import_module, "rotordrop.web.compared")
-    found = await asyncio.to_thread(compared.compared_drops, desk.space, desk.log)
-    return JSONResponse({"drops": found, "log": desk.log is not None})
+    found, problem = await asyncio.to_thread(compared.compared_drops, desk.space, desk.log)
+    return JSONResponse({"drops": found, "log": desk.log is not None, "problem": problem})
 
 
 _RESULT = "/api/jobs/{job}/{verb}"
@@ -241,7 +259,10 @@ def make_app(space: Workspace, *, port: int, log: str | None = None) -> App:
     async def tended(app: Starlette) -> AsyncIterator[None]:
         async def tend() -> None:
             while True:
-                await asyncio.to_thread(desk.runner.tend)
+                with contextlib.suppress(
+                    OSError, RotordropError
+                ):  # a folder that may only be read, or is full
+                    await asyncio.to_thread(desk.runner.tend)
                 await asyncio.sleep(BETWEEN_LOOKS_S)
 
         task = asyncio.create_task(tend())
@@ -251,7 +272,7 @@ def make_app(space: Workspace, *, port: int, log: str | None = None) -> App:
     return Guard(
         Starlette(
             routes=[Route(one.path, partial(one.handler, desk), methods=[one.method]) for one in OPERATIONS],
-            exception_handlers=dict.fromkeys(STATUS, refused),
+            exception_handlers=dict.fromkeys(STATUS, partial(refused, space)),
             lifespan=tended,
         ),
         port=port,
@@ -262,8 +283,10 @@ def make_app(space: Workspace, *, port: int, log: str | None = None) -> App:
 STATUS: dict[Any, int] = {
     NotThereError: 404,
     TooLargeError: 413,
+    DamagedFileError: 409,
     RotordropError: 400,
     FileNotFoundError: 404,
+    OSError: 400,
     ClientDisconnect: 400,
 }
 """Refusals that become sentences, with their status."""
@@ -273,8 +296,43 @@ _SENTENCES: dict[type, str] = {
 }
 
 
-async def refused(request: Request, error: Exception) -> Response:
+def without_folder(words: str, folder: Path) -> str:
+    """Words that do not say where the server keeps its files."""
+    return words.replace(f"{folder}/", "").replace(str(folder), "the folder of the page")
+
+
+async def refused(space: Workspace, request: Request, error: Exception) -> Response:
     """A refusal as a sentence with a status."""
     kind = next(kind for kind in type(error).__mro__ if kind in STATUS)
-    headers = {"connection": "close"} if kind is TooLargeError else None
-    return PlainTextResponse(_SENTENCES.get(kind, str(error)), status_code=STATUS[kind], headers=headers)
+    words = _SENTENCES.get(kind, str(error))
+    if kind is OSError or type(error) is OutputError:  # nothing but what is written by the server itself
+        cause = error if kind is OSError else error.__cause__
+        reason = getattr(cause, "strerror", None) or "it is read-only"
+        words = (
+            f"the folder of the page cannot be written: {reason}; make room in it, or let it be written, on "
+            "the computer that serves the page"
+        )
+    words = without_folder(words, space.jobs_folder / request.path_params.get("job", ""))
+    answer = PlainTextResponse(without_folder(words, space.path), status_code=STATUS[kind])
+    return Lingering(answer) if kind is TooLargeError else answer
+
+
+class Lingering(Response):
+    """An answer to an upload that is still sent: given at once, and what comes is thrown away for a while.
+
+    A connection that is closed with bytes unread is reset, and many a sender then never reads the answer.
+    """
+
+    def __init__(self, answer: Response) -> None:
+        super().__init__(answer.body, answer.status_code, {"connection": "close"}, "text/plain")
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Send the answer, then wait for the sender to end."""
+        start = {"type": "http.response.start", "status": self.status_code, "headers": self.raw_headers}
+        await send(start)
+        await send({"type": "http.response.body", "body": self.body, "more_body": True})
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(LINGER_S):
+                while (await receive()).get("more_body", False):
+                    pass
+        await send({"type": "http.response.body", "body": b"", "more_body": False})

@@ -16,10 +16,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotordrop.errors import MachineFileError, RotordropError, UsageError
+from rotordrop.errors import DamagedFileError, MachineFileError, RotordropError, UsageError
 from rotordrop.files import write_json
-from rotordrop.web.running import Verb, clear, publish, result_folder, state_file, state_of
-from rotordrop.web.workspace import Job, Workspace, is_path
+from rotordrop.web.running import Verb, clear, publish, result_folder, state_of, write_state
+from rotordrop.web.workspace import Job, Workspace, beside, is_path
 
 if TYPE_CHECKING:
     from rotordrop.estimate.published import Drop
@@ -45,9 +45,9 @@ def main(order: dict[str, Any]) -> None:
     job, verb = Job(Path(order["job"])), order["verb"]
     told = state_of(job, verb)
     assert told is not None
-    of = job.digests()
     try:
         _limit(job, verb)
+        of = job.digests()
         made = job.path / f"{verb}.part-{told['run']}"
         made.mkdir()
         _WORK[verb](job, made, told)
@@ -63,26 +63,31 @@ def main(order: dict[str, Any]) -> None:
     except Exception as error:  # noqa: BLE001 - whatever it is, the page must say that it happened
         ended = {"state": "failed", "error": f"this should not happen: {type(error).__name__}: {error}"}
     clear(job, verb)
-    write_json(state_file(job, verb), {**(state_of(job, verb) or told), **ended, "ended": time.time()})
+    write_state(job, verb, {**(state_of(job, verb) or told), **ended, "ended": time.time()})
 
 
 def _without_folder(message: str, job: Job) -> str:
     """A message that names files as the user does, not where the page keeps them."""
-    files = sorted(job.read()["files"].values(), key=lambda entry: -len(entry["stored"]))
-    for entry in files:  # the longest first: record.csv is part of record.csv.gz
-        message = message.replace(str(job.path / "files" / entry["stored"]), entry["name"])
-    return message.replace(str(job.path), "")
+    with suppress(RotordropError):  # one that is damaged itself has no names
+        files = sorted(job.read()["files"].values(), key=lambda entry: -len(entry["stored"]))
+        for entry in files:  # the longest first: record.csv is part of record.csv.gz
+            message = message.replace(str(job.path / "files" / entry["stored"]), entry["name"])
+    return message.replace(f"{job.path}/", "")
 
 
 def _limit(job: Job, verb: Verb) -> None:
+    size = sum(entry["bytes"] for entry in job.read()["files"].values())
+    limit(MEMORY[verb] + MEMORY_PER_BYTE * size, CPU_S[verb])
+
+
+def limit(memory: int, seconds: int) -> None:
+    """Limit memory [byte] and processor time [s] of this process, on POSIX systems."""
     if os.name != "posix":
         return
     import resource
 
-    size = sum(entry["bytes"] for entry in job.read()["files"].values())
-    memory = MEMORY[verb] + MEMORY_PER_BYTE * size
     with suppress(ValueError, OSError):
-        resource.setrlimit(resource.RLIMIT_CPU, (CPU_S[verb], CPU_S[verb] + 1))
+        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
     with suppress(ValueError, OSError):
         resource.setrlimit(
             resource.RLIMIT_DATA if sys.platform == "linux" else resource.RLIMIT_AS, (memory, memory)
@@ -98,6 +103,8 @@ def machine_of(job: Job) -> Machine | None:
     file = job.file("machine")
     if file is None:
         return None
+    for role in beside(job):
+        job.file(role)  # refuses what has changed on the disk
     with suppress(
         ValueError, RecursionError, OSError
     ):  # whoever reads it properly says what is wrong with it
@@ -208,7 +215,7 @@ def _told_progress(job: Job, verb: Verb, told: dict[str, Any]) -> Callable[[str,
         now = time.monotonic()
         if now - last[0] >= BETWEEN_WORDS_S:
             last[0] = now
-            write_json(state_file(job, verb), {**running, "stage": stage, "fraction": round(fraction, 4)})
+            write_state(job, verb, {**running, "stage": stage, "fraction": round(fraction, 4)})
 
     return progress
 
@@ -244,14 +251,16 @@ def _since(job: Job) -> Drop | None:
     from rotordrop.estimate.published import read_drop
 
     told = job.read()
-    machine, before = told["files"]["machine"]["sha256"], None
+    machine = told["files"]["machine"]["sha256"]
     for other in Workspace(job.path.parent.parent).jobs():  # the newest first
-        folder, known = result_folder(other, "estimate"), other.read()
-        same = known["files"].get("machine", {}).get("sha256") == machine
-        if before is None and folder is not None and same and known["created"] < told["created"]:
-            with suppress(UsageError):
-                before = read_drop(folder / "document.json")
-    return before
+        with suppress(UsageError, DamagedFileError, FileNotFoundError):  # whoever opens that drop is told
+            known = other.read()
+            same = known["files"].get("machine", {}).get("sha256") == machine
+            if same and known["created"] < told["created"]:
+                folder = result_folder(other, "estimate", "document.json")
+                if folder is not None:
+                    return read_drop(folder / "document.json")
+    return None
 
 
 def _waterfall(job: Job, made: Path, told: dict[str, Any]) -> None:

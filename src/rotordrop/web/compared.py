@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rotordrop.elements.table import LOADS
-from rotordrop.errors import UsageError
+from rotordrop.errors import DamagedFileError, RotordropError, UsageError
 from rotordrop.estimate.published import read_drop
 from rotordrop.ledger.book import LoggedDrop, drop_of_estimate, logged_drops
 from rotordrop.report.quantity import Quantity
@@ -21,25 +21,31 @@ _KINDS = {"N": "force", "Pa": "pressure"}
 _LABELS = {load.field: load.label for load in LOADS}
 
 
-def compared_drops(space: Workspace, log: str | None) -> list[dict[str, Any]]:
+def compared_drops(space: Workspace, log: str | None) -> tuple[list[dict[str, Any]], str]:
     """Every drop with an estimate, and every drop of the log whose recording is not among them.
 
-    Their numbers are those of the log: a number without an interval is no evidence.
+    Their numbers are those of the log: a number without an interval is no evidence. What is wrong with the
+    log comes beside.
     """
-    drops, seen = [], set()
+    drops, seen, problem = [], set(), ""
     for job in space.jobs():
         # one that is removed meanwhile, or of nothing that can be compared, hides no other
-        with suppress(FileNotFoundError, UsageError):
-            folder = result_folder(job, "estimate")
+        with suppress(FileNotFoundError, UsageError, DamagedFileError):
+            folder = result_folder(job, "estimate", "document.json")
             if folder is not None:
                 drop = _drop_of(folder)
                 seen.add(drop.sha256)
                 drops.append({**_told(drop), "job": job.number, "name": job.read()["name"]})
-    for number, drop in logged_drops(log).items() if log is not None else ():
+    logged: dict[int, LoggedDrop] = {}
+    try:
+        logged = {} if log is None else logged_drops(log)
+    except RotordropError as error:
+        problem = str(error)
+    for number, drop in logged.items():
         if drop.sha256 not in seen:
             lines = f"from rotordrop.ledger.book import logged_drops\n\ndrop = logged_drops(LOG)[{number}]\n"
             drops.append({**_told(drop), "log": number, "name": drop.record, "python": lines})
-    return drops
+    return drops, problem
 
 
 @lru_cache(maxsize=512)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import math
 from collections.abc import Awaitable, Callable
@@ -50,9 +51,9 @@ class Desk:
             raise NotThereError("there is no such job; it may have been removed")
         return job
 
-    def found(self, request: Request) -> Path:
-        """The folder of the result an address names."""
-        folder = result_folder(self.job(request), verb_of(request))
+    async def found(self, request: Request) -> Path:
+        """The folder of the result an address names, whose files are what was computed."""
+        folder = await asyncio.to_thread(result_folder, self.job(request), verb_of(request))
         if folder is None or not folder.is_dir():
             raise NotThereError("there is no result yet")
         return folder

@@ -6,7 +6,7 @@ Cards, sentences, tables and panels are those of the report; the page derives no
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from rotordrop.estimate.estimate import Estimate
     from rotordrop.estimate.published import Drop
     from rotordrop.evidence.look import Look
+    from rotordrop.evidence.quality.finding import Finding
     from rotordrop.machine import Machine
     from rotordrop.record.record import Record
     from rotordrop.report.time_panels import Panel
@@ -47,11 +48,14 @@ def write_look(
     from rotordrop.report.rotor_drawing import rotor_outline
 
     columns: dict[str, Array] = {}
+    labels: dict[str, str] = {}
     for number, path in enumerate(seen.motion.paths):
         columns |= {f"x{number}": path.position[:, 0], f"y{number}": path.position[:, 1]}
         columns[f"r{number}"] = path.radius
+        labels |= {f"{axis}{number}": f"{path.name} {axis} [m]" for axis in "xy"}
+        labels[f"r{number}"] = f"{path.name} radius [m]"
     if seen.record.speed is not None:
-        columns["speed"] = seen.record.speed
+        columns["speed"], labels["speed"] = seen.record.speed, "speed [rad/s]"
     write_traces(made, "motion", seen.motion.time, columns)
     content = look_page(seen, drawn=False)
     write_json(made / "document.json", seen.as_json())
@@ -61,6 +65,7 @@ def write_look(
             **content_json(content),
             **_common("motion", tuple(columns), seen.motion.time),
             "rotor": None if machine is None else rotor_outline(machine),
+            "labels": labels,
             "zero": seen.drops[0].release,
             "places": [
                 {
@@ -83,10 +88,7 @@ def write_look(
                 for impact in seen.impacts
             ],
             "impact_columns": ["beyond the air gap", "radial velocity before"],
-            "findings": [
-                {"severity": f.severity, "channel": f.channel, "message": f.message, "remedy": f.remedy}
-                for f in seen.findings
-            ],
+            "findings": _findings(seen.findings),
             "python": look_lines(job.read()["files"], options, len(seen.motion.paths)),
         },
     )
@@ -139,6 +141,9 @@ def write_estimate(
             **content_json(content),
             **_common("drop", tuple(columns), grid),
             "rotor": rotor_outline(estimate.machine),
+            "labels": {column: _label(estimate, column) for column in columns},
+            "timeline": _events(estimate),
+            "findings": _findings(estimate.findings),
             "zero": estimate.drop_instant.value,
             "speed": estimate.speed,
             "places": places,
@@ -151,6 +156,33 @@ def write_estimate(
             "python": estimate_lines(job.read()["files"], options, [b.name for b in estimate.bearings]),
         },
     )
+
+
+def _findings(found: Iterable[Finding]) -> list[dict[str, Any]]:
+    return [
+        {"severity": f.severity, "channel": f.channel, "message": f.message, "remedy": f.remedy}
+        for f in found
+    ]
+
+
+def _label(estimate: Estimate, column: str) -> str:
+    """A column as people name it, ``"force lower 0"`` by the bearing it is of and with its unit."""
+    words, _, number = column.rpartition(" ")
+    unit = {"force": "N", "stress": "Pa"}.get(words.partition(" ")[0], "m")
+    return f"{estimate.bearings[int(number)].name} {words} [{unit}]"
+
+
+def _events(estimate: Estimate) -> list[dict[str, Any]]:
+    """What happened when, times [s] from power-off: the estimate knows better than the first look."""
+    events = [(0.0, "power-off")]
+    for bearing in estimate.bearings:
+        for words, at in (("first", 0), ("last", -1)):
+            if bearing.impacts:
+                impact = sorted(bearing.impacts, key=lambda one: one.start)[at]
+                events.append((impact.start, f"{words} contact at {bearing.name} begins"))
+        peak = bearing.peak_force
+        events.append((peak.time, f"largest force at {bearing.name}"))
+    return [{"time": time, "words": words} for time, words in sorted(events) if math.isfinite(time)]
 
 
 def field_name(plane: int, part: str) -> str:

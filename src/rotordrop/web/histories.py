@@ -27,7 +27,8 @@ async def field(desk: Desk, request: Request) -> Response:
     """Amplitudes of one waterfall [m], frame after frame, in single precision."""
     from rotordrop.web.drawn import field_name
 
-    told = _page_of(desk.found(request))
+    folder = await desk.found(request)
+    told = _page_of(folder)
     if "parts" not in told:
         raise NotThereError("this result has no waterfall")
     plane, part = number(request, "plane", 0), request.query_params.get("part", told["parts"][0])
@@ -36,13 +37,13 @@ async def field(desk: Desk, request: Request) -> Response:
             f"there is no waterfall of plane {plane:g}, part {labelled(part)!r}; there are planes 0 to "
             f"{len(told['planes']) - 1} and parts {', '.join(told['parts'])}"
         )
-    place = desk.found(request) / field_name(int(plane), part)
+    place = folder / field_name(int(plane), part)
     return FileResponse(place, media_type="application/octet-stream")
 
 
 async def window(desk: Desk, request: Request) -> Response:
     """Few samples that show a window of histories, in single precision."""
-    folder = desk.found(request)
+    folder = await desk.found(request)
 
     def shown() -> bytes:
         from rotordrop.web.traces import FEWEST_POINTS, MOST_POINTS, sent
@@ -76,18 +77,23 @@ def _asked_window(folder: Path, request: Request) -> tuple[Traces, list[int], fl
 def _page_of(folder: Path) -> dict[str, Any]:
     """What the routes need of the content of a page."""
     found: dict[str, Any] = json.loads((folder / "page.json").read_text(encoding="utf-8"))
-    return {key: found[key] for key in ("traces", "planes", "parts") if key in found}
+    return {key: found[key] for key in ("traces", "planes", "parts", "labels") if key in found}
 
 
 async def csv(desk: Desk, request: Request) -> Response:
     """Every sample of a window as a table, in SI units."""
     import numpy as np
 
-    traces, rows, start, end = await asyncio.to_thread(_asked_window, desk.found(request), request)
+    folder = await desk.found(request)
+    traces, rows, start, end = await asyncio.to_thread(_asked_window, folder, request)
+    labels = _page_of(folder).get("labels", {})  # an earlier version wrote none
     first, last = np.searchsorted(traces.time, start), np.searchsorted(traces.time, end, side="right")
 
     async def table() -> AsyncIterator[str]:
-        yield ",".join(["time [s]", *(f"{traces.columns[row]} [SI]" for row in rows)]) + "\n"
+        yield (
+            ",".join(["time [s]", *(labels.get(traces.columns[row], traces.columns[row]) for row in rows)])
+            + "\n"
+        )
         for begin in range(int(first), int(last), CSV_ROWS):
             stop = min(begin + CSV_ROWS, int(last))
             columns = [[repr(float(time)) for time in traces.time[begin:stop]]]

@@ -20,8 +20,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
-from rotordrop.files import write_json
-from rotordrop.web.workspace import Job, Workspace
+from rotordrop.errors import DamagedFileError
+from rotordrop.files import read_sealed, write_json
+from rotordrop.web.workspace import Job, Workspace, digest_at, digests_in
 
 Verb: TypeAlias = Literal["channels", "look", "estimate", "waterfall"]
 Key: TypeAlias = tuple[str, Verb]
@@ -47,34 +48,69 @@ def state_file(job: Job, verb: Verb) -> Path:
     return job.path / f"{verb}.state.json"
 
 
+def write_state(job: Job, verb: Verb, told: dict[str, Any]) -> None:
+    """Keep what a computation is at."""
+    write_json(state_file(job, verb), told, sealed=True)
+
+
 def state_of(job: Job, verb: Verb) -> dict[str, Any] | None:
-    """What a computation is at; None where none was asked for."""
+    """What a computation is at; None where none was asked for, a failure where that is damaged."""
     try:
-        told: dict[str, Any] = json.loads(state_file(job, verb).read_text(encoding="utf-8"))
+        return read_sealed(state_file(job, verb), _AGAIN)
     except FileNotFoundError:
         return None
-    return told
+    except DamagedFileError as error:
+        return {"state": "failed", "error": str(error), "run": "", "options": {}}
 
 
-def result_folder(job: Job, verb: Verb) -> Path | None:
-    """What the last finished computation found; None where none has finished."""
-    run = published_run(job, verb)
-    return None if run is None else job.path / f"{verb}.{run}"
+_AGAIN = "ask for it again"
+
+
+def result_folder(job: Job, verb: Verb, *names: str) -> Path | None:
+    """What the last finished computation found; None where none has finished.
+
+    Of the files named, or of all, the digests are compared: one that has changed on the disk is refused.
+    """
+    told = published(job, verb)
+    if told is None:
+        return None
+    folder: Path = job.path / f"{verb}.{told['run']}"
+    for name in names or told["files"]:
+        if digest_at(folder / name) != told["files"].get(name, ""):
+            raise DamagedFileError(
+                f"{name} of {verb!r} is damaged: it has changed on the disk since it was computed; {_AGAIN}"
+            )
+    return folder
+
+
+def published(job: Job, verb: Verb) -> dict[str, Any] | None:
+    """The last result: its run and the digests of its files; none where the files it was of were replaced."""
+    with suppress(FileNotFoundError):
+        told = read_sealed(job.path / f"{verb}.result.json", _AGAIN)
+        if told["of"] in (None, job.digests()):
+            return told
+    return None
 
 
 def published_run(job: Job, verb: Verb) -> str | None:
-    """Which computation the result is of; none where the files it was of have been replaced since."""
-    with suppress(FileNotFoundError):
-        told = json.loads((job.path / f"{verb}.result.json").read_text(encoding="utf-8"))
-        if told.get("of") in (None, job.digests()):
-            return str(told["run"])
+    """Which computation the last result is of; none where that cannot be read either."""
+    with suppress(DamagedFileError):
+        told = published(job, verb)
+        return None if told is None else str(told["run"])
     return None
+
+
+def running(space: Workspace) -> list[Verb]:
+    """Computations that go on at this moment, whichever server began them."""
+    return [verb for job in space.jobs() for verb in VERBS if _locked(job, verb)]
 
 
 def publish(job: Job, verb: Verb, run: str, made: Path, of: dict[str, str] | None = None) -> None:
     """Make a finished folder the result of files by their content: its name first, then that it counts."""
+    digests = digests_in(made)
     made.rename(job.path / f"{verb}.{run}")
-    write_json(job.path / f"{verb}.result.json", {"run": run, "of": job.digests() if of is None else of})
+    told = {"run": run, "of": job.digests() if of is None else of, "files": digests}
+    write_json(job.path / f"{verb}.result.json", told, sealed=True)
 
 
 @dataclass
@@ -101,7 +137,7 @@ class Runner:
             if told is None or told["state"] not in ("waiting", "running"):
                 now = time.time()
                 told = {"state": "waiting", "run": secrets.token_hex(8), "asked": now, "options": options}
-                write_json(state_file(job, verb), told)
+                write_state(job, verb, told)
                 self._open[job.number, verb] = job
             self.tend()
             return state_of(job, verb) or told
@@ -136,9 +172,7 @@ class Runner:
         try:
             if not _lock(lock):
                 return
-            write_json(
-                state_file(job, verb), {**told, "state": "running", "started": time.time(), "fraction": 0.0}
-            )
+            write_state(job, verb, {**told, "state": "running", "started": time.time(), "fraction": 0.0})
             order = {"job": str(job.path), "verb": verb, "sys_path": [entry for entry in sys.path if entry]}
             child = subprocess.Popen(
                 [sys.executable, "-I", "-c", _PROGRAM, json.dumps(order)],
@@ -166,7 +200,7 @@ class Runner:
                 return
             latest = state_of(job, verb) or told
             if latest["state"] in ("waiting", "running"):
-                write_json(state_file(job, verb), {**latest, "state": "cancelled", "ended": time.time()})
+                write_state(job, verb, {**latest, "state": "cancelled", "ended": time.time()})
             clear(job, verb)
 
     def _stop(self, job: Job, verb: Verb) -> bool:
@@ -215,7 +249,7 @@ def _settle(job: Job, verb: Verb) -> None:
             "state": "failed",
             "error": "the computation was ended from outside before it was done; start it again",
         }
-    write_json(state_file(job, verb), {**told, **ended, "ended": time.time()})
+    write_state(job, verb, {**told, **ended, "ended": time.time()})
     clear(job, verb)
 
 

@@ -7,14 +7,21 @@ from collections.abc import Callable
 from pathlib import Path
 
 from rotordrop.errors import UsageError
+from rotordrop.web.running import running
 from rotordrop.web.workspace import Workspace
 
 
-def serve(folder: Path, port: int, announce: Callable[[str], None], log: str | None = None) -> None:
+def serve(
+    folder: Path,
+    port: int,
+    announce: Callable[[str], None],
+    tell: Callable[[str], None],
+    log: str | None = None,
+) -> None:
     """Serve the page until it is interrupted; computations that run go on without it.
 
     It listens on the loopback address only, port 0 takes a free one. ``announce`` hears the address with its
-    token once the server listens.
+    token once the server listens, ``tell`` what goes on when it ends.
     """
     try:
         import uvicorn
@@ -33,7 +40,14 @@ def serve(folder: Path, port: int, announce: Callable[[str], None], log: str | N
         app, log_level="warning", access_log=False, ws="none", server_header=False, date_header=False,
         timeout_graceful_shutdown=2, proxy_headers=False,
     )  # fmt: skip
-    uvicorn.Server(config).run(sockets=[listening])
+    try:
+        uvicorn.Server(config).run(sockets=[listening])
+    finally:
+        if left := running(space):
+            tell(
+                f"Still computing: {', '.join(left)}. That goes on without the server; start it again to see "
+                "or to cancel it."
+            )
 
 
 def listening_at(port: int) -> socket.socket:

@@ -6,6 +6,7 @@ shaft table), whose name must be a plain one.
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 import json
 import os
@@ -13,14 +14,23 @@ import re
 import secrets
 import shutil
 import time
-from collections.abc import AsyncIterable
+from collections.abc import AsyncIterable, AsyncIterator
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any, Literal, TypeAlias
 
-from rotordrop.errors import OutputError, UsageError
-from rotordrop.files import atomic_path, write_json, write_text
+from rotordrop.errors import DamagedFileError, OutputError, UsageError
+from rotordrop.files import (
+    atomic_folder,
+    atomic_path,
+    clear_after_killed_runs,
+    digest_of_file,
+    read_sealed,
+    write_json,
+    write_text,
+)
 
 Role: TypeAlias = Literal["machine", "profile", "record", "tail", "beside"]
 ROLES: tuple[Role, ...] = ("machine", "profile", "record", "tail", "beside")
@@ -31,11 +41,15 @@ QUOTA = 8 * 2**30
 LARGEST: dict[str, int] = {
     "machine": 16 * 2**20,
     "profile": 2**20,
-    "record": 2 * 2**30,
-    "tail": 2 * 2**30,
+    "record": 2**30,
+    "tail": 2**30,
     "beside": 2**30,
 }
-"""Bytes of one upload."""
+"""Bytes of one upload; of recordings what their readers take."""
+
+STALLED_S, SLOWEST = 30.0, 20_000.0
+"""How long an upload may pause [s], and how fast it must come after that on average [byte/s]; chosen, not
+measured."""
 
 MOST_JOBS, MOST_BESIDE = 500, 8
 """Jobs in the folder, and files of a job that another one names; chosen, not measured."""
@@ -84,11 +98,34 @@ class Workspace:
             ) from error
         for folder in (self.path, self.jobs_folder) if fresh else (self.jobs_folder,):
             with suppress(OSError):
-                folder.chmod(0o700)
-        for left in self.jobs_folder.glob("*/files/.*.part*"):
-            left.unlink(missing_ok=True)
-        for left in self.jobs_folder.glob("*.removed"):
-            shutil.rmtree(left, ignore_errors=True)
+                folder.chmod(folder.stat().st_mode & 0o700)
+        clear_after_killed_runs(self.jobs_folder)
+        for folder in list(self.jobs_folder.iterdir()):
+            if folder.suffix == ".removed":
+                shutil.rmtree(folder, ignore_errors=True)
+            for part in (folder, folder / "files"):
+                clear_after_killed_runs(part)
+            if not (folder / "job.json").exists():
+                with suppress(OSError):  # empty: an earlier version was killed while it made a job
+                    (folder / "files").rmdir()
+                    folder.rmdir()
+        with suppress(OSError, OutputError):  # a folder that may only be read
+            self._give_digests()
+
+    def _give_digests(self) -> None:
+        """Give the files of an earlier version of the page digests, once."""
+        mark = self.path / "jobs have digests"
+        if mark.exists():
+            return
+        for file in self.jobs_folder.glob("*/*.json"):
+            with suppress(ValueError):
+                told = json.loads(file.read_bytes())
+                if isinstance(told, dict) and "sha256" not in told:
+                    verb = file.name.removesuffix(".result.json")
+                    found = file.with_name(f"{verb}.{told.get('run')}")
+                    more = {"files": digests_in(found)} if verb != file.name and found.is_dir() else {}
+                    write_json(file, told | more, sealed=True)
+        mark.touch()
 
     @property
     def jobs_folder(self) -> Path:
@@ -112,8 +149,9 @@ class Workspace:
         if len(self.jobs()) >= MOST_JOBS:
             raise UsageError(f"there are {MOST_JOBS} jobs; remove some before adding another")
         job = Job(self.jobs_folder / secrets.token_hex(8))
-        (job.path / "files").mkdir(parents=True)
-        job.write({"name": name, "created": time.time(), "options": options, "files": {}})
+        with atomic_folder(job.path) as folder:
+            (folder / "files").mkdir()
+            Job(folder).write({"name": name, "created": time.time(), "options": options, "files": {}})
         return job
 
     def job(self, number: str) -> Job | None:
@@ -121,7 +159,7 @@ class Workspace:
         if not _JOB.fullmatch(number):
             return None
         job = Job(self.jobs_folder / number)
-        return job if (job.path / "job.json").is_file() else None
+        return job if job.path.is_dir() else None
 
     def jobs(self) -> list[Job]:
         """All jobs, the newest first."""
@@ -129,7 +167,7 @@ class Workspace:
         for name in os.listdir(self.jobs_folder):  # noqa: PTH208
             with suppress(FileNotFoundError):  # removed meanwhile
                 if (job := self.job(name)) is not None:
-                    found.append((-float(job.read()["created"]), job.number, job))
+                    found.append((-job.created(), job.number, job))
         return [job for _, _, job in sorted(found, key=lambda entry: entry[:2])]
 
     def used(self) -> int:
@@ -156,27 +194,87 @@ class Job:
 
     def read(self) -> dict[str, Any]:
         """Name, options and files of the job."""
-        found: dict[str, Any] = json.loads((self.path / "job.json").read_text(encoding="utf-8"))
-        return found
+        remedy = "remove the drop, and send its files again"
+        try:
+            return read_sealed(self.path / "job.json", remedy)
+        except FileNotFoundError:
+            if not self.path.is_dir():
+                raise
+            raise DamagedFileError(f"{self.path / 'job.json'} is damaged: it is gone; {remedy}") from None
+
+    def created(self) -> float:
+        """When the job was made [s of the clock of the system], as far as that is known."""
+        try:
+            return float(self.read()["created"])
+        except DamagedFileError:
+            return self.path.stat().st_mtime
 
     def write(self, told: dict[str, Any]) -> None:
         """Keep name, options and files."""
-        write_json(self.path / "job.json", told)
+        write_json(self.path / "job.json", told, sealed=True)
 
     def digests(self) -> dict[str, str]:
         """Which files the job has, by their content."""
         return {role: entry["sha256"] for role, entry in self.read()["files"].items()}
 
     def file(self, role: str) -> Path | None:
-        """Where the file of a role lies; None where none was sent."""
+        """Where the file of a role lies; None where none was sent.
+
+        One that leads out of the folder of the job, or that is not what was sent, is refused.
+        """
         told = self.read()["files"].get(role)
-        return None if told is None else self.path / "files" / told["stored"]
+        if told is None:
+            return None
+        place: Path = self.path / "files" / told["stored"]
+        if place.resolve() != self.path.parent.resolve() / self.number / "files" / told["stored"]:
+            raise DamagedFileError(f"{told['name']} lies outside the folder of this drop; send it again")
+        if digest_at(place) != told["sha256"]:
+            raise DamagedFileError(
+                f"{told['name']} is damaged: it has changed on the disk since it was sent; send it again"
+            )
+        return place
 
     def remove(self) -> None:
         """Remove the job with everything; it is gone at once, whatever happens to its files."""
         away = self.path.with_name(f"{self.number}.removed")
         self.path.rename(away)
         shutil.rmtree(away, ignore_errors=True)
+
+
+def digests_in(folder: Path) -> dict[str, str]:
+    """Digest of every file of a folder, by name."""
+    return {file.name: digest_of_file(file) for file in sorted(folder.iterdir())}
+
+
+def digest_at(file: Path) -> str:
+    """Digest of a file, computed again when the file has changed; empty where there is none."""
+    try:
+        now = file.stat()
+    except OSError:
+        return ""
+    return _digest(file, now.st_ino, now.st_size, now.st_mtime_ns, now.st_ctime_ns)
+
+
+@lru_cache(maxsize=4096)
+def _digest(file: Path, *state: int) -> str:
+    return digest_of_file(file)
+
+
+async def _in_time(body: AsyncIterable[bytes], label: str) -> AsyncIterator[bytes]:
+    """The pieces of an upload, as long as they come fast enough: what stalls keeps others from the room."""
+    begun, counted, parts = time.monotonic(), 0, aiter(body)
+    while True:
+        try:
+            async with asyncio.timeout(STALLED_S):
+                part = await anext(parts)
+        except StopAsyncIteration:
+            return
+        except TimeoutError:
+            raise UsageError(f"nothing of {label} came for {STALLED_S:g} s; send it again") from None
+        counted += len(part)
+        if counted < SLOWEST * (time.monotonic() - begun - STALLED_S):
+            raise UsageError(f"{label} comes too slowly, below {SLOWEST / 1e3:g} kB/s; send it again")
+        yield part
 
 
 async def receive(
@@ -208,7 +306,7 @@ async def receive(
     try:
         claim(declared or 0)
         with atomic_path(job.path / "files" / stored) as place, place.open("wb") as stream:
-            async for part in body:
+            async for part in _in_time(body, label):
                 counted += len(part)
                 claim(counted)
                 digest.update(part)
@@ -240,8 +338,8 @@ def _refuse_clash(job: Job, key: str, label: str, stored: str) -> None:
 
 
 def beside(job: Job) -> list[str]:
-    """Names of the files that others name."""
-    return [entry["stored"] for role, entry in job.read()["files"].items() if role.startswith("beside ")]
+    """Roles of the files that others name."""
+    return [role for role in job.read()["files"] if role.startswith("beside ")]
 
 
 def labelled(name: str) -> str:

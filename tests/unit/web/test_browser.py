@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import quote
@@ -13,7 +14,7 @@ from tests.unit.web.browser import CHROMIUM, Browser
 from tests.unit.web.serving import Served
 from tests.unit.web.steps import LOOKED, look_at, press, quiet, send, serving, words
 
-from rotordrop.web.running import publish, result_folder, state_file
+from rotordrop.web.running import publish, result_folder, write_state
 from rotordrop.web.traces import write_traces
 from rotordrop.web.workspace import Job, Workspace
 
@@ -202,10 +203,11 @@ def test_more_sensor_planes_than_bearings_are_drawn(browser, tmp_path, files):
 
 def _with_a_third_plane_and_an_estimate(job: Job) -> None:
     """Add a plane between the bearings to what was seen, and an estimate of the two bearings."""
-    seen = result_folder(job, "look") / "page.json"
-    page = json.loads(seen.read_text())
+    seen = shutil.copytree(result_folder(job, "look"), job.path / "look.part")
+    page = json.loads((seen / "page.json").read_text())
     page["places"].append({**page["places"][0], "name": "MID"})
-    seen.write_text(json.dumps(page))
+    (seen / "page.json").write_text(json.dumps(page))
+    publish(job, "look", "1" * 16, seen)
     made, time = job.path / "estimate.part", np.linspace(0.0, 0.2, 4001)
     made.mkdir()
     names = [f"{what} {b}" for what in ("x", "y", "force", "stress") for b in range(2)]
@@ -233,7 +235,7 @@ def _with_a_third_plane_and_an_estimate(job: Job) -> None:
     (made / "page.json").write_text(json.dumps({**page, **told}))
     publish(job, "estimate", "0" * 16, made)
     state = {"state": "done", "run": "0" * 16, "fraction": 1.0, "options": {}}
-    state_file(job, "estimate").write_text(json.dumps(state))
+    write_state(job, "estimate", state)
 
 
 MARK = "window.stolen=1"

@@ -17,6 +17,7 @@ from tests.unit.web.serving import Served
 
 from rotordrop import load_machine, look
 from rotordrop.cli.app import run
+from rotordrop.files import digest_of_file
 from rotordrop.web import running
 from rotordrop.web.running import Runner, published_run, result_folder, state_of
 from rotordrop.web.workspace import Job, Workspace
@@ -51,7 +52,7 @@ def test_a_table_holds_every_sample_of_a_window(served, looked, files):
     seen = look(files["record"], machine=load_machine(files["machine"]))
     text = served.ask("GET", f"/api/jobs/{looked}/look/csv?column=x0&column=y0&start=0&end=1").text
     head, *rows = text.strip().split("\n")
-    assert head == "time [s],x0 [SI],y0 [SI]"
+    assert head == "time [s],NDE x [m],NDE y [m]"
     inside = (seen.motion.time >= 0) & (seen.motion.time <= 1)
     table = np.array([[float(cell) for cell in row.split(",")] for row in rows])
     np.testing.assert_array_equal(table[:, 0], seen.motion.time[inside])
@@ -227,7 +228,8 @@ def test_no_finished_job_is_lost_whenever_server_or_child_is_killed(tmp_path, fi
     space.prepare()
     job = space.new_job("drop", {})
     (job.path / "files" / "record.h5").write_bytes(files["record"].read_bytes())
-    entry = {"name": "a.h5", "stored": "record.h5", "bytes": 1, "sha256": ""}
+    digest = digest_of_file(files["record"])
+    entry = {"name": "a.h5", "stored": "record.h5", "bytes": 1, "sha256": digest}
     job.write({**job.read(), "files": {"record": entry}})
     runner, begun = Runner(space), time.monotonic()
     runner.ask(job, "look", {})

@@ -6,6 +6,8 @@ import asyncio
 import gzip
 import pickle
 import socket
+import subprocess
+import sys
 import time
 import zipfile
 from io import BytesIO
@@ -15,6 +17,8 @@ import pytest
 from tests.unit.web.serving import Served
 
 from rotordrop.errors import UsageError
+from rotordrop.files import atomic_folder, atomic_path
+from rotordrop.record import readers
 from rotordrop.web import workspace
 from rotordrop.web.workspace import Workspace, labelled, receive, stored_as
 
@@ -79,10 +83,27 @@ def test_what_a_killed_server_left_is_removed_by_the_next(tmp_path):
     space = Workspace(tmp_path)
     space.prepare()
     job = space.new_job("drop", {})
-    left = job.path / "files" / ".record.0123abcd-1-0123abcd.part.csv"
-    left.write_bytes(b"half")
+    command = (
+        "import os, sys; from pathlib import Path; from rotordrop.files import atomic_path\n"
+        "with atomic_path(Path(sys.argv[1])) as place: place.write_bytes(b'half'); os.kill(os.getpid(), 9)"
+    )
+    subprocess.run([sys.executable, "-c", command, str(job.path / "files" / "record.csv")], check=False)
+    assert len(list((job.path / "files").iterdir())) == 1
+    with atomic_path(job.path / "files" / "tail.csv") as place:
+        place.write_bytes(b"of a server that lives")
+        Workspace(tmp_path).prepare()
+    assert [file.name for file in (job.path / "files").iterdir()] == ["tail.csv"]
+
+
+def test_what_was_never_a_job_goes_with_the_next_start(tmp_path):
+    space = Workspace(tmp_path)
     space.prepare()
-    assert not left.exists()
+    (space.jobs_folder / ("0" * 16) / "files").mkdir(parents=True)
+    space.prepare()
+    assert list(space.jobs_folder.iterdir()) == []
+    with pytest.raises(ZeroDivisionError), atomic_folder(space.jobs_folder / ("2" * 16)):
+        raise ZeroDivisionError
+    assert list(space.jobs_folder.iterdir()) == []
 
 
 @pytest.mark.parametrize(
@@ -175,7 +196,44 @@ def test_a_machine_file_may_name_no_file_elsewhere(served, files):
     served.order(f"/api/jobs/{job}/look")
     state = served.settled(job, "look")
     assert state["state"] == "failed"
-    assert "names the shaft table '/etc/hostname'" in state["error"]
+    assert "needs the shaft table '/etc/hostname'" in state["error"]
+
+
+def test_the_page_takes_what_its_readers_take():
+    assert workspace.LARGEST["record"] == workspace.LARGEST["tail"] == readers.LARGEST
+
+
+def test_whoever_sends_too_much_reads_why(served, monkeypatch):
+    """The answer used to be lost: the connection was reset while the sender still sent."""
+    monkeypatch.setitem(workspace.LARGEST, "record", 1000)
+    job = served.new_job({})
+    answer = served.ask("PUT", f"/api/jobs/{job}/files/record?name=a.csv", b"x" * 50_000_000)
+    assert answer.status == 413
+    assert "a.csv is larger than the 0 MB that may still be sent" in answer.text
+    assert served.ask("GET", "/api/formats").told["largest"]["record"] == 1000
+
+
+@pytest.mark.parametrize(
+    ("limits", "words"),
+    [({"STALLED_S": 0.2}, r"nothing of a\.csv came for 0\.2 s"), ({"SLOWEST": 1e9}, "comes too slowly")],
+)
+def test_an_upload_that_stalls_ends_and_gives_its_room_back(tmp_path, monkeypatch, limits, words):
+    monkeypatch.setattr(workspace, "STALLED_S", 0.0 if "SLOWEST" in limits else 0.2)
+    for name, value in limits.items():
+        monkeypatch.setattr(workspace, name, value)
+    space = Workspace(tmp_path)
+    space.prepare()
+    job = space.new_job("drop", {})
+
+    async def stalled():
+        yield b"x"
+        await asyncio.sleep(0 if "SLOWEST" in limits else 30)
+        yield b"x"
+
+    with pytest.raises(UsageError, match=words):
+        asyncio.run(receive(space, job, "record", "a.csv", 2**30, stalled()))
+    assert space.room.coming == {}
+    assert list((job.path / "files").iterdir()) == []
 
 
 def test_uploads_side_by_side_do_not_outgrow_the_folder(tmp_path):

@@ -37,13 +37,13 @@ async function opened(drop) {
 }
 
 export async function chooseOthers() {
-  const [{ drops }, { jobs }] = await Promise.all([server.drops(), server.jobs()]);
+  const [{ drops, problem }, { jobs }] = await Promise.all([server.drops(), server.jobs()]);
   const looked = jobs.filter((one) => one.states.look?.result && !drops.some((drop) => drop.job === one.id))
     .map((one) => ({ job: one.id, name: one.name, machine: "", numbers: [] }));
   const found = [...drops, ...looked].filter((drop) => drop.job !== state.job.id), now = state.others.map(keyOf);
   const told = (drop) => [drop.machine, drop.speed && drop.speed[units.chosen()][0], drop.recorded, drop.log ? `log ${drop.log}, numbers only` : drop.numbers.length ? "estimate" : "looked at only"].filter(Boolean).join(" · ");
   state.drops = drops;
-  by("dropsfound").replaceChildren(...(found.length ? found.map((drop, i) => make("label", { class: "choice", of: [
+  by("dropsfound").replaceChildren(...(problem ? [make("p", { class: "small", text: problem })] : []), ...(found.length ? found.map((drop, i) => make("label", { class: "choice", of: [
     make("input", { type: "checkbox", value: i, ...(now.includes(keyOf(drop)) ? { checked: "" } : {}) }), make("span", { text: drop.name }), make("span", { class: "small", text: told(drop) })] }))
     : [make("p", { text: "There is no other drop yet. Drops of this page are found by themselves, those of a log by: rotordrop serve --log LOG." })]));
   const boxes = [...by("dropsfound").querySelectorAll("input")];

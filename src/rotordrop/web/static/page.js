@@ -6,7 +6,7 @@ import { keep } from "./figures.js";
 import { drawAll, lines, loadView } from "./panels.js";
 import { rotorTab } from "./rotor.js";
 import * as server from "./server.js";
-import { by, files, homeView, impacts, samples, say, showLines, span, state, zero } from "./state.js";
+import { by, events, files, homeView, impacts, samples, say, showLines, simulated, span, state, zero } from "./state.js";
 import { cards, facts, findings, impactTable, make, sentence, table, timeline } from "./tables.js";
 import { cutFiles, drawFall, fallFiles, openFall } from "./waterfall.js";
 import * as units from "./units.js";
@@ -32,12 +32,12 @@ const TABS = {
     return [...(list.length ? [impactTable(list.slice(0, 400), source.impact_columns, state.impact, timeOf("estimate"), goImpact)] : [make("p", { text: "No impacts." })]),
       make("span", { class: "files", of: [make("button", { text: "as Python", on: { click: () => showLines(lines(source === state.look ? "look" : "estimate", "impacts")) } })] })];
   },
-  Events: () => [timeline(state.look.timeline, timeOf("look"), (time) => { const t = time - zero(); state.cursor = t; setView({ from: t - 0.05, to: t + 0.1 }); })],
+  Events: () => [timeline(events(), units.eventText, (time) => { state.cursor = time; setView({ from: time - 0.05, to: time + 0.1 }); })],
   Numbers: () => {
     const page = state.estimate || state.look;
     return [cards(page.cards), make("ul", { class: "statements", of: page.verdict.map(sentence) }), ...(state.estimate ? page.summary : []).map(table)];
   },
-  Quality: () => [findings(state.look.findings), ...(state.look.sections.at(-1)?.statements || []).map((one) => make("p", { class: "small", text: one.text }))],
+  Quality: () => [findings(state.estimate?.findings || state.look.findings), ...(!state.estimate && state.look.sections.at(-1)?.statements || []).map((one) => make("p", { class: "small", text: one.text }))],
   All: () => (state.estimate || state.look).sections.flatMap((part) => [make("h3", { class: "part", text: part.heading }),
     ...part.text.map((text) => make("p", { text })), make("ul", { class: "statements", of: part.statements.map(sentence) }), ...part.tables.map(table)]),
   Compare: compareTab,
@@ -58,12 +58,16 @@ function showTab(name, focus = false) {
 
 function showStatus() {
   const { states } = state.job, { look, estimate, waterfall, channels } = states;
+  for (const id of ["estimate", "report", "document", "waterfall", "channels", "tomachine"]) { by(id).disabled = Boolean(state.job.damaged); }
+  if (state.job.damaged) { say(state.job.damaged, "bad", make("button", { text: "Remove", on: { click: () => by("sure").showModal() } })); return false; }
   const running = [estimate, waterfall, look, channels].find((one) => one && ["waiting", "running"].includes(one.state));
   by("estimate").disabled = Boolean(running) || !state.job.files.machine || !state.look;
-  by("estimate").title = state.job.files.machine ? "Estimate force and stress" : "An estimate needs the machine file";
+  by("estimate").title = !state.job.files.machine ? "An estimate needs the machine file" : state.look ? "Estimate force and stress" : "An estimate needs a record that could be looked at";
   by("report").disabled = by("document").disabled = !(estimate && estimate.result);
   by("waterfall").disabled = !(waterfall && waterfall.result) && by("estimate").disabled;
   by("tomachine").hidden = Boolean(state.job.files.machine);
+  by("simulated").hidden = !simulated();
+  by("simulated").title = simulated();
   by("waterfall").title = "Frequencies of the coast-down, found and named; needs a record to standstill, or nearly";
   if (running) {
     const verb = Object.keys(states).find((one) => states[one] === running), share = running.fraction || 0;
@@ -75,7 +79,7 @@ function showStatus() {
     return true;
   }
   const failed = [waterfall, estimate, look].find((one) => one && one.state === "failed");
-  if (failed) { say(failed.error, "bad"); }
+  if (failed) { say(failed.error, "bad", ...(failed === estimate || failed === waterfall ? [] : waysOut(failed.error))); }
   else if (state.estimate) {
     say(state.estimate.verdict[0].text, state.estimate.verdict[0].level, ...state.estimate.cards.map(({ title, figures: [first] }) => {
       const [text, interval] = first.value[units.chosen()];
@@ -87,6 +91,14 @@ function showStatus() {
     say(words + (stop ? `${stop.message}; ${stop.remedy}` : told.text), stop ? "bad" : told.level);
   } else { say("Nothing was found yet.", "notice"); }
   return false;
+}
+
+// What helps after a record could not be looked at: the missing file, the channels, or to look once more.
+function waysOut(error) {
+  const missing = error.match(/shaft table '([^']+)'/);
+  const again = async () => { state.job = await server.begin(state.job.id, "look", {}); await refresh(); };
+  const way = (text, click) => make("button", { text, on: { click: () => Promise.resolve(click()).catch(lost) } });
+  return [...(missing ? [way(`Choose ${missing[1]} …`, openFiles)] : [way("Channels …", () => channels(error))]), way("Look again", again), way("Remove", () => by("sure").showModal())];
 }
 
 // ---- jobs
@@ -124,13 +136,14 @@ async function refresh() {
 }
 
 function lost(error) {
+  if (error.status === 409) { say(error.message, "bad", ...waysOut(error.message)); return; } // damaged on the disk
   say(error instanceof server.Refusal ? error.message : "The server does not answer; is 'rotordrop serve' running? The page tries again.", "bad");
   if (!(error instanceof server.Refusal)) { setTimeout(() => state.job && refresh().catch(lost), 1500); }
 }
 
 async function listJobs(choose) {
   const { jobs } = await server.jobs();
-  by("jobs").replaceChildren(...jobs.map((one) => make("option", { value: one.id, text: one.name })));
+  by("jobs").replaceChildren(...jobs.map((one) => make("option", { value: one.id, text: `${one.name} · ${units.dateText(one.created)}${one.damaged || one.states.look?.state === "failed" ? " · not readable" : one.states.estimate?.result ? " · estimated" : ""}` })));
   by("empty").hidden = jobs.length > 0;
   by("actions").hidden = !jobs.length;
   const wantedJob = choose || localStorage.getItem("rotordrop job");

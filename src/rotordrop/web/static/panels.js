@@ -4,7 +4,7 @@ import { makeOrbits, setCursor, setView, setWindow, zoom } from "./cursor.js";
 import { colours, faint, keep, keepPng, keepSvg, placeColour, svgPen, tracePicture } from "./figures.js";
 import { clearPlots, drawOverview, drawPanel, follow, stripOn } from "./plots.js";
 import * as server from "./server.js";
-import { by, fileName, files, homeView, impacts, samples, say, shift, showLines, span, state, usesEstimate, zero } from "./state.js";
+import { by, events, fileName, files, homeView, impacts, samples, say, shift, showLines, span, state, usesEstimate, zero } from "./state.js";
 import { make } from "./tables.js";
 import * as units from "./units.js";
 
@@ -136,7 +136,7 @@ export function drawAll() {
 }
 
 const strip = () => ({ ...state.overview, view: state.view, span: span(), impacts: impacts().map((one) => one.time),
-  events: state.look.timeline.map(({ time, words }) => ({ time: time - zero(), words })) });
+  events: events() });
 export function drawStrip() { if (state.overview) { drawOverview(by("overview"), strip()); } }
 const stripPicture = () => {
   const pen = svgPen(1200, 180, colours().back, `${state.job.name}: whole record`);

@@ -150,6 +150,5 @@ async function sendChannels(places, known, profile) {
 }
 
 export async function tellFormats() {
-  const { formats } = await server.formats();
-  by("formats").textContent = `Recordings: ${formats.map((name) => `.${name}`).join(", ")}.`;
+  by("formats").textContent = `Recordings: ${(await server.formats()).map((name) => `.${name}`).join(", ")}.`;
 }

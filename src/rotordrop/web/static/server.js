@@ -25,11 +25,18 @@ export const jobs = async () => (await ask("GET", "/api/jobs")).json();
 export const job = async (id) => (await ask("GET", `/api/jobs/${id}`)).json();
 export const newJob = async (name, options) => (await ask("POST", "/api/jobs", order({ name, options }))).json();
 export const remove = (id) => ask("DELETE", `/api/jobs/${id}`);
-export const send = (id, role, file) =>
-  ask("PUT", `/api/jobs/${id}/files/${role}?name=${encodeURIComponent(file.name)}`, file);
+let largest = {}; // bytes by role, as the server said
+export const send = (id, role, file) => {
+  if (file.size > largest[role]) { throw new Refusal(413, `${file.name} has ${(file.size / 1e6).toFixed(0)} MB, and at most ${(largest[role] / 1e6).toFixed(0)} MB are taken; cut the record to the drop`); }
+  return ask("PUT", `/api/jobs/${id}/files/${role}?name=${encodeURIComponent(file.name)}`, file);
+};
 export const setOptions = async (id, options) => (await ask("POST", `/api/jobs/${id}/options`, order(options))).json();
 export const sentFile = async (id, role) => (await ask("GET", `/api/jobs/${id}/files/${role}`)).blob();
-export const formats = async () => (await ask("GET", "/api/formats")).json();
+export async function formats() {
+  const told = await (await ask("GET", "/api/formats")).json();
+  ({ largest } = told);
+  return told.formats;
+}
 export const drops = async () => (await ask("GET", "/api/drops")).json();
 export const begin = async (id, verb, options) => (await ask("POST", `/api/jobs/${id}/${verb}`, order(options))).json();
 export const numbers = async () => (await ask("GET", "/api/numbers")).json();
