@@ -21,6 +21,7 @@ from rotordrop.known import Known
 from rotordrop.machine import example_machine
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns
+from rotordrop.track.consistency import Check
 from rotordrop.twin import tracked_estimate
 from rotordrop.twin.calibrated import CONFOUNDED, _confounded, _values
 from rotordrop.twin.tracked_loads import twin_impacts
@@ -123,7 +124,11 @@ def test_a_calibrated_gain_undoes_the_error_of_the_sensor() -> None:
     names = ("A", "B")
     machine = SimpleNamespace(sensors=tuple(SimpleNamespace(name=name) for name in names))
     only: Any = SimpleNamespace(
-        unknowns=(), n_dynamic=3, n_channels=2, model=SimpleNamespace(machine=machine)
+        unknowns=(),
+        n_dynamic=3,
+        n_channels=2,
+        model=SimpleNamespace(machine=machine),
+        parameter_slice=slice(3, 3),
     )
     errors, offsets = np.array([0.1, -0.2]), np.array([3e-6, -4e-6])
     sigma = np.array([1.0, 1.0, 1.0, 0.02, 0.01, 1e-6, 2e-6])
@@ -229,6 +234,7 @@ def test_an_impact_lasts_from_its_first_to_its_last_indented_sample() -> None:
     [
         (True, True, Verdict.CONSISTENT, 1.0),
         (True, False, Verdict.CONSISTENT, 1.0),
+        (True, False, Verdict.CONSISTENT, 1.4),
         (False, True, Verdict.HELD, 2.0),
     ],
 )
@@ -249,7 +255,10 @@ def test_a_twin_that_fits_stands_whether_it_was_cross_checked_or_not(
     monkeypatch.setattr(tracked_estimate, "parameters", parameters)
     monkeypatch.setattr(tracked_estimate, "sensor_errors", lambda *_, **__: ())
     monkeypatch.setattr(tracked_estimate, "_gives_way", lambda *_: False)
-    drop: Any = SimpleNamespace(problem=problem, smoothed=None, consistent=consistent, drops=1, accepted=())
+    noted = Check(name="parameters", passed=consistent, message="", widening=widening if consistent else 1.0)
+    drop: Any = SimpleNamespace(
+        problem=problem, smoothed=None, consistent=consistent, checks=(noted,), drops=1, accepted=()
+    )
     check: Any = object() if checked else None
     judged = tracked_estimate._judge(drop, check)
     assert judged.verdict is verdict and judged.widening == widening
