@@ -621,7 +621,7 @@ def internals(states: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
             drop_derivative(0.003, state, parameters, rate, work)
             drop_jacobian(0.003, state, parameters, jacobian)
             rates[i], jacobians[i] = rate[at], jacobian[np.ix_(at, at)]
-            energy[i] = stored_energy(state, parameters, True)
+            energy[i] = stored_energy(0.003, state, parameters, True)
             power[i] = rate[layout.dissipated], rate[layout.work_in]
         yield (
             name,

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from rotordrop.simulate.case import DropCase as DropCase
     from rotordrop.simulate.case import LevitatedStart as LevitatedStart
     from rotordrop.simulate.case import PlacedStart as PlacedStart
+    from rotordrop.simulate.case import UnbalanceJump as UnbalanceJump
     from rotordrop.simulate.drop import simulate_drop as simulate_drop
     from rotordrop.simulate.result import DropResult as DropResult
     from rotordrop.simulate.result import load_result as load_result
@@ -55,6 +56,7 @@ _PUBLIC = {
     "RotordropError": "rotordrop.errors",
     "Replay": "rotordrop.estimation",
     "Tracked": "rotordrop.estimation",
+    "UnbalanceJump": "rotordrop.simulate.case",
     "build_drop_model": "rotordrop.rotor.parameters",
     "calibrate_machine": "rotordrop.twin.calibrated",
     "check_record": "rotordrop.evidence",

@@ -7,7 +7,6 @@ import zlib
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.table import structure_rows as structure_rows_of
@@ -17,10 +16,8 @@ from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.rotor.reduction import Reduction
 from rotordrop.simulate.case import LevitatedStart
-from rotordrop_bench.structure import structure_rows, violated, without_structure
+from rotordrop_bench.structure import departures_of, violated
 from rotordrop_bench.violations import Violations, named_violations
-
-Array = NDArray[np.float64]
 
 FINER = Reduction(modes=14, attachment=True)
 """Basis of the true rotor: finer than that of any estimator."""
@@ -45,9 +42,7 @@ class HiddenMachine:
     violations: Violations
     """What breaks the estimator's assumptions."""
     model: DropModel = field(repr=False)
-    """The true machine, ready to be simulated."""
-    structure: Array | None = field(default=None, repr=False)
-    """Structures of its bearings that no model of a drop has; None without any, shape (B, C)."""
+    """The true machine with all that departs from any estimator's model, ready to be simulated."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,10 +89,9 @@ def hidden_machine(
     true = machine.with_values(_drawn_values(machine, stream(seed, "machine"))) if drawn else machine
     true = violated(true, broken)
     model = build_drop_model(true, reduction)
-    rows = structure_rows(true, broken)
-    acts = broken.unbalance_jump is not None or not without_structure(rows)
-    if acts:
-        # the kernels of violations do not have the structures that a machine file may state
+    rows = departures_of(true, broken)
+    if len(rows):
+        # a departing support does not have the structures that a machine file may state
         for bearing in true.touchdown_bearings:
             for row in structure_rows_of("bearing"):
                 own = row.stated(bearing)
@@ -112,8 +106,7 @@ def hidden_machine(
         known=machine,
         seed=seed,
         violations=broken,
-        model=model,
-        structure=rows if acts else None,
+        model=model.departing(rows),
     )
 
 

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop._version import __version__
+from rotordrop.errors import SimulationError
 from rotordrop.record.record import Record
-from rotordrop.simulate.case import DropCase
+from rotordrop.simulate.case import DropCase, UnbalanceJump
+from rotordrop.simulate.drop import simulate_drop
 from rotordrop.simulate.result import DropResult
 from rotordrop_bench.event import LARGEST_JITTER, DropConditions, HiddenMachine, drop_conditions, stream
-from rotordrop_bench.hidden_drop import true_drop
-from rotordrop_bench.hidden_rest import hidden_rest
 from rotordrop_bench.motion import housing_motion, true_motion
 from rotordrop_bench.sensor_chain import (
     SensorChain,
@@ -27,7 +27,7 @@ from rotordrop_bench.sensor_chain import (
     speed_readings,
     true_rows,
 )
-from rotordrop_bench.settled import Swing, swinging_amplitudes
+from rotordrop_bench.settled import Swing, settled_coordinates, swinging_amplitudes
 from rotordrop_bench.true_values import true_histories, true_values
 
 Array = NDArray[np.float64]
@@ -105,10 +105,10 @@ def synthesize_drop(
         start=conditions.start,
         tolerance=tolerance,
     )
-    result = true_drop(hidden.model, hidden.structure, case, hidden.violations.unbalance_jump)
+    result = true_drop(hidden, case)
     errors = _true_errors(hidden, chain)
     record = _record(hidden, result, conditions, chain, errors, seed, before, duration, name)
-    rest = hidden_rest(hidden.model, hidden.structure)
+    rest = settled_coordinates(hidden.model)
     random, count = stream(seed, "swing"), len(hidden.machine.touchdown_bearings)
     swing = Swing(
         amplitude=np.exp(random.uniform(np.log(0.003), np.log(0.1), count)),
@@ -123,6 +123,27 @@ def synthesize_drop(
         histories=true_histories(hidden, result, conditions, chain.sampling_rate),
         result=result,
     )
+
+
+def true_drop(hidden: HiddenMachine, case: DropCase) -> DropResult:
+    """The drop of a hidden machine, with an unbalance that comes at its time or at the first contact."""
+    jump = hidden.violations.unbalance_jump
+    if jump is not None:
+        if jump.time is None:
+            plain = simulate_drop(hidden.model, case)
+            touching = plain.time[np.any(plain.indentation > 0.0, axis=1)]
+            time = float(touching[0]) if len(touching) else np.inf
+        else:
+            time = float(jump.time)
+        comes = UnbalanceJump(node=jump.node, amount=float(jump.amount), phase=float(jump.phase), time=time)
+        case = replace(case, jump=comes)
+    result = simulate_drop(hidden.model, case)
+    if not result.finished:
+        raise SimulationError(
+            f"the drop of the hidden machine {hidden.machine.name!r} stopped at {result.time[-1]:.6g} s of "
+            f"{case.duration:g} s; a violation is too extreme for it: give a milder one"
+        )
+    return result
 
 
 def _true_errors(hidden: HiddenMachine, chain: SensorChain) -> SensorErrors:

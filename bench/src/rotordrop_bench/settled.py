@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.errors import SimulationError
 from rotordrop.physics import columns as L
+from rotordrop.physics import departure as D
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.pendulum import small_frequency
 from rotordrop.rotor.parameters import DropModel, sag_of_model
@@ -23,6 +24,10 @@ Array = NDArray[np.float64]
 
 MOST_ITERATIONS = 100
 SMALLEST_CHANGE = 1e-15
+LONG_AFTER = 1e9
+"""Time [s] at which all that drifts has come to its end."""
+DIFFERENCE = 1e-9
+"""Step of the difference quotients of a departing machine [√kg m, m]; small against every indentation."""
 LEAST_DAMPING = 1e-6
 """Damping of the steps that is always there [weight over gap], for a direction in which nothing holds."""
 
@@ -41,8 +46,12 @@ class Swing:
 def settled_coordinates(model: DropModel) -> Array:
     """Coordinates (modal amplitudes, races, supports), shape (n_q,), of the rotor at rest in its bearings.
 
-    The lowest energy near the rotor lying straight down, by Newton steps damped until the energy falls.
+    The lowest energy near the rotor lying straight down, by Newton steps damped until the energy falls. Of a
+    machine that departs from its model the one nearest to that: slip in a support has crept to nothing, the
+    cage stands where it stood.
     """
+    if model.layout.departing:
+        return _departing_rest(model)
     parameters = without_magnets(model)
     mass = coordinate_masses(model)
     state = model.at_rest()
@@ -126,7 +135,47 @@ def coordinate_masses(model: DropModel) -> Array:
 
 
 def _energy(state: Array, parameters: KernelParameters) -> float:
-    return float(stored_energy(state, parameters, False))
+    return float(stored_energy(LONG_AFTER, state, parameters, False))
+
+
+def _departing_rest(model: DropModel) -> Array:
+    plain = model.departing(model.parameters.departure[:0])
+    parameters, n_q = without_magnets(model), model.layout.n_coordinates
+    found = settled_coordinates(plain)
+    places, mass = list(range(n_q)), list(coordinate_masses(model))
+    for row, at in zip(parameters.departure, parameters.bearing_at[:, L.DEPARTURE], strict=True):
+        for mode, place in ((D.FOUNDATION_MODE, D.FOUNDATION), (D.TILT_MODE, D.TILT)):
+            if row[mode + D.COMPLIANCE] > 0.0:
+                places += [at + place, at + place + 1]
+                mass += [1.0 / row[mode + D.COMPLIANCE]] * 2
+    at, masses = np.array(places), np.array(mass)
+    velocities = np.where(at < n_q, at + n_q, at + 2)
+    work = scratch_of(parameters)
+
+    def completed(coordinates: Array) -> Array:
+        state = model.layout.zeros()
+        state[at] = coordinates
+        return state
+
+    def force(coordinates: Array) -> Array:
+        rates = model.layout.zeros()
+        drop_derivative(LONG_AFTER, completed(coordinates), parameters, rates, work)
+        return np.asarray(masses * rates[velocities])
+
+    def force_and_stiffness(coordinates: Array) -> tuple[Array, Array]:
+        steps = DIFFERENCE * np.eye(len(coordinates))
+        columns = [(force(coordinates - s) - force(coordinates + s)) / (2.0 * DIFFERENCE) for s in steps]
+        stiffness = np.column_stack(columns)
+        return force(coordinates), 0.5 * (stiffness + stiffness.T)
+
+    return lowest_energy(
+        np.concatenate([found, np.zeros(len(at) - n_q)]),
+        masses,
+        float(np.max(np.abs(parameters.gravity))),
+        lambda q: _energy(completed(q), parameters),
+        force_and_stiffness,
+        model.machine.name,
+    )[:n_q]
 
 
 def _force_and_stiffness(

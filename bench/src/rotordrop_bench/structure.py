@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.known import Known
 from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.physics import departure as D
 from rotordrop.physics.contact import contact_law, stiffness_of_exponent
-from rotordrop_bench import _hidden_rhs as H
 from rotordrop_bench.violations import BearingViolations, ContactViolation, Violations
 
 Array = NDArray[np.float64]
@@ -86,62 +87,52 @@ def _of_bearing(bearing: TouchdownBearing, v: BearingViolations, typical: float)
     return values
 
 
-def no_structure() -> Array:
-    """Row of a bearing without any structure, shape (C,)."""
-    row = np.zeros(H.N_COLUMNS)
-    row[[H.AXIS_COSINE, H.SLIP_TRAVEL, H.GAP_DRIFT_TIME, H.GAP_HEAT]] = 1.0
-    return row
+def departures_of(machine: Machine, violations: Violations) -> Array:
+    """Departures of all bearings of a true machine, shape (B, C) [SI]; (0, C) where nothing departs."""
+    rows = np.array([_departure(b, violations.of_bearing(b.name)) for b in machine.touchdown_bearings])
+    if violations.unbalance_jump is None and np.all(rows == D.no_departure()):
+        return rows[:0]
+    return rows
 
 
-def without_structure(rows: Array) -> bool:
-    """Whether rows of structures (B, C) hold none."""
-    return bool(np.array_equal(rows, np.tile(no_structure(), (len(rows), 1))))
-
-
-def structure_rows(machine: Machine, violations: Violations) -> Array:
-    """Structures of all bearings, shape (B, C), for the kernels of the hidden machine."""
-    return np.array(
-        [
-            structure_row(bearing, violations.of_bearing(bearing.name))
-            for bearing in machine.touchdown_bearings
-        ]
-    )
-
-
-def structure_row(bearing: TouchdownBearing, v: BearingViolations) -> Array:
-    """Structures of one bearing, shape (C,) [SI]; the bearing is the true one."""
-    row = no_structure()
+def _departure(bearing: TouchdownBearing, v: BearingViolations) -> Array:
+    row = D.no_departure()
     support, gap, foundation = v.support, v.gap, v.foundation
     angle = float(support.axes_angle)
     if angle != 0.0:
-        row[[H.AXIS_COSINE, H.AXIS_SINE]] = math.cos(angle), math.sin(angle)
+        row[[D.AXIS_COSINE, D.AXIS_SINE]] = math.cos(angle), math.sin(angle)
     deflection = float(support.hardening_force) / float(bearing.support.stiffness)
-    row[H.HARDENING] = float(support.hardening) / deflection**2
-    row[H.RADIAL] = float(support.hardening_radial and row[H.HARDENING] > 0.0)
+    row[D.HARDENING] = float(support.hardening) / deflection**2
+    row[D.RADIAL] = float(support.hardening_radial and row[D.HARDENING] > 0.0)
     if float(support.slip_force) > 0.0:
-        row[[H.SLIP_FORCE, H.SLIP_TRAVEL]] = float(support.slip_force), float(support.slip_travel)
+        row[[D.SLIP_FORCE, D.SLIP_TRAVEL]] = float(support.slip_force), float(support.slip_travel)
     if foundation.mass is not None and foundation.frequency is not None:
-        row[H.FOUNDATION_COMPLIANCE] = 1.0 / float(foundation.mass)
         across = foundation.frequency_horizontal or foundation.frequency
-        for frequency, square, decay in (
-            (across, H.FOUNDATION_SQUARE_X, H.FOUNDATION_DECAY_X),
-            (foundation.frequency, H.FOUNDATION_SQUARE_Y, H.FOUNDATION_DECAY_Y),
-        ):
-            w = 2.0 * math.pi * float(frequency)
-            row[square], row[decay] = w * w, 2.0 * float(foundation.damping_ratio) * w
+        row[D.FOUNDATION_MODE : D.FOUNDATION_MODE + D.MODE_WIDTH] = _mode(
+            1.0 / float(foundation.mass), float(across), float(foundation.frequency), foundation.damping_ratio
+        )
     if v.race.tilt_stiffness is not None and v.race.tilt_frequency is not None:
-        w = 2.0 * math.pi * float(v.race.tilt_frequency)
-        row[H.TILT_COMPLIANCE] = w * w / float(v.race.tilt_stiffness)
-        row[H.TILT_SQUARE], row[H.TILT_DECAY] = w * w, 2.0 * float(v.race.tilt_damping_ratio) * w
-    row[[H.CENTRE_X, H.CENTRE_Y]] = float(v.centre.x), float(v.centre.y)
+        frequency = float(v.race.tilt_frequency)
+        w = 2.0 * math.pi * frequency
+        row[D.TILT_MODE : D.TILT_MODE + D.MODE_WIDTH] = _mode(
+            w * w / float(v.race.tilt_stiffness), frequency, frequency, v.race.tilt_damping_ratio
+        )
+    row[[D.CENTRE_X, D.CENTRE_Y]] = float(v.centre.x), float(v.centre.y)
     if float(gap.drift) != 0.0:
-        row[[H.GAP_DRIFT, H.GAP_DRIFT_TIME]] = float(gap.drift), float(gap.drift_time)
+        row[[D.GAP_DRIFT, D.GAP_DRIFT_TIME]] = float(gap.drift), float(gap.drift_time)
     if float(gap.closing) != 0.0:
-        row[[H.GAP_CLOSING, H.GAP_HEAT]] = float(gap.closing), float(gap.heat)
+        row[[D.GAP_CLOSING, D.GAP_HEAT]] = float(gap.closing), float(gap.heat)
     if v.balls.turn:
-        row[H.CAGE_RATIO] = _cage_ratio(bearing)
+        row[D.CAGE_RATIO] = _cage_ratio(bearing)
     _put_law(row, v.contact, float(bearing.contact.damping))
     return row
+
+
+def _mode(compliance: float, across: float, upright: float, damping_ratio: Known) -> list[float]:
+    """Entries of a mode from 1/M [1/kg], its frequencies along x and y [Hz] and its damping ratio [1]."""
+    wx, wy = 2.0 * math.pi * across, 2.0 * math.pi * upright
+    twice = 2.0 * float(damping_ratio)
+    return [compliance, wx * wx, wy * wy, twice * wx, twice * wy]
 
 
 def _cage_ratio(bearing: TouchdownBearing) -> float:
@@ -154,11 +145,11 @@ def _cage_ratio(bearing: TouchdownBearing) -> float:
 def _put_law(row: Array, contact: ContactViolation, damping: float) -> None:
     """Write the pieces of a law, a power of the depth each, into the row of a bearing."""
     points = [(float(p.depth), float(p.force)) for p in contact.law]
-    row[H.LAW_PIECES] = max(len(points) - 1, 0)
+    row[D.LAW_PIECES] = max(len(points) - 1, 0)
     for i, ((d1, f1), (d2, f2)) in enumerate(pairwise(points)):
         exponent = math.log(f2 / f1) / math.log(d2 / d1)
-        at = H.LAW + i * H.LAW_WIDTH
-        row[at : at + H.LAW_WIDTH] = f1 / d1**exponent, exponent, damping, d2
+        at = D.LAW + i * D.LAW_WIDTH
+        row[at : at + D.LAW_WIDTH] = f1 / d1**exponent, exponent, damping, d2
 
 
 def support_matrices(bearing: TouchdownBearing, v: BearingViolations) -> dict[str, Any]:

@@ -1,8 +1,8 @@
-"""All balls between race and support: force, stiffness, energy, load and stress of one touchdown bearing.
+"""All balls between race and support: force, torque, stiffness, energy, load and stress of one bearing.
 
-Whoever needs one of these hands over the bearing's numbers and its balls and does not know what stands behind
-the race. The numbers are a short array that only this module reads: `ball_set_entries` makes it and the
-columns of `rotordrop.physics.columns` hold it.
+Whoever needs one of these hands over the bearing's numbers and its balls, the motion of the race and its
+spin, and does not know what rolls behind the race. The numbers are a short array that only this module reads:
+`ball_set_entries` makes what it says of the balls, the columns of `rotordrop.physics.columns` hold it.
 """
 
 from __future__ import annotations
@@ -32,8 +32,21 @@ from rotordrop.physics.blocks import (
 from rotordrop.physics.blocks import (
     BALLS_STRESS_COEFFICIENT as STRESS_COEFFICIENT,
 )
+from rotordrop.physics.blocks import (
+    ROLLING_DAMPING as DAMPING,
+)
+from rotordrop.physics.blocks import (
+    ROLLING_DRAG_COEFFICIENT as DRAG_COEFFICIENT,
+)
+from rotordrop.physics.blocks import (
+    ROLLING_DRAG_SPEED as DRAG_SPEED,
+)
+from rotordrop.physics.blocks import (
+    ROLLING_PITCH_DIAMETER as PITCH_DIAMETER,
+)
 from rotordrop.physics.elementary import cos_each, cube_root, magnitude, sin_each
 from rotordrop.physics.linear_algebra import solve
+from rotordrop.physics.spin import race_drag_torque
 
 Array = NDArray[np.float64]
 LANES = 8
@@ -127,6 +140,45 @@ def ball_set_force(entries: Array, balls: Array, dx: float, dy: float, work: Arr
         work[0, j] = q * cosines[j]
         work[1, j] = q * sines[j]
     return lane_sum(work[0]), lane_sum(work[1])
+
+
+@inner_kernel
+def bearing_reaction(
+    numbers: Array, F_x: float, F_y: float, vx: float, vy: float, spin: float
+) -> tuple[float, float, float, float, float]:
+    """Force on the support, torque on the race and power lost of a bearing whose balls push back.
+
+    Parameters
+    ----------
+    numbers : ndarray, shape (9,)
+        Ball set, drag, pitch diameter [m] and damping [N s/m].
+    F_x, F_y : float
+        Force of the balls [N], from `ball_set_force`.
+    vx, vy : float
+        Velocity of the race against the support [m/s].
+    spin : float
+        Spin of the race [rad/s].
+
+    Returns
+    -------
+    tuple of float
+        Force on the support along x and y [N], torque that brakes the race [N m], power that the damping of
+        the balls and the drag take [W].
+
+    Notes
+    -----
+    Source: Neisi 2020, eq. (12) with `rotordrop.physics.spin.race_drag_torque`; damping in proportion to the
+    velocity.
+    """
+    drag = race_drag_torque(
+        math.sqrt(F_x * F_x + F_y * F_y),
+        spin,
+        numbers[DRAG_COEFFICIENT],
+        numbers[PITCH_DIAMETER],
+        numbers[DRAG_SPEED],
+    )
+    C_b = numbers[DAMPING]
+    return F_x + C_b * vx, F_y + C_b * vy, drag, C_b * (vx * vx + vy * vy), drag * spin
 
 
 @lean_kernel

@@ -30,25 +30,27 @@ CONTACT_EXPONENT = CONTACT + blocks.CONTACT_EXPONENT
 CONTACT_DAMPING = CONTACT + blocks.CONTACT_DAMPING
 RACE_MASS = TOUCH_END
 RACE_INERTIA = TOUCH_END + 1
-DRAG_COEFFICIENT = TOUCH_END + 2
-DRAG_SPEED = TOUCH_END + 3
-PITCH_DIAMETER = TOUCH_END + 4
-BEARING_DAMPING = TOUCH_END + 5
-SUPPORT_MASS_X = TOUCH_END + 6
-SUPPORT_MASS_Y = TOUCH_END + 7
-SUPPORT_STIFFNESS_X = TOUCH_END + 8
-SUPPORT_STIFFNESS_Y = TOUCH_END + 9
-SUPPORT_DAMPING_X = TOUCH_END + 10
-SUPPORT_DAMPING_Y = TOUCH_END + 11
-RACE_WEIGHT = TOUCH_END + 12
-BALL_SET = TOUCH_END + 13
+RACE_WEIGHT = TOUCH_END + 2
+ROLLING = TOUCH_END + 3
+ROLLING_END = ROLLING + blocks.ROLLING_N_ENTRIES
+BALL_SET = ROLLING
 BALL_SET_END = BALL_SET + blocks.BALLS_N_ENTRIES
 BALL_STIFFNESS = BALL_SET + blocks.BALLS_BALL_STIFFNESS
 GROOVE_DISTANCE = BALL_SET + blocks.BALLS_GROOVE_DISTANCE
 RADIAL_OFFSET = BALL_SET + blocks.BALLS_RADIAL_OFFSET
 AXIAL_OFFSET = BALL_SET + blocks.BALLS_AXIAL_OFFSET
 STRESS_COEFFICIENT = BALL_SET + blocks.BALLS_STRESS_COEFFICIENT
-SUPPORT_FORM = BALL_SET_END
+DRAG_COEFFICIENT = ROLLING + blocks.ROLLING_DRAG_COEFFICIENT
+DRAG_SPEED = ROLLING + blocks.ROLLING_DRAG_SPEED
+PITCH_DIAMETER = ROLLING + blocks.ROLLING_PITCH_DIAMETER
+BEARING_DAMPING = ROLLING + blocks.ROLLING_DAMPING
+SUPPORT_MASS_X = ROLLING_END
+SUPPORT_MASS_Y = ROLLING_END + 1
+SUPPORT_STIFFNESS_X = ROLLING_END + 2
+SUPPORT_STIFFNESS_Y = ROLLING_END + 3
+SUPPORT_DAMPING_X = ROLLING_END + 4
+SUPPORT_DAMPING_Y = ROLLING_END + 5
+SUPPORT_FORM = ROLLING_END + 6
 SUPPORT_FORM_END = SUPPORT_FORM + blocks.SUPPORT_N_ENTRIES
 N_BEARING_COLUMNS = SUPPORT_FORM_END
 FOUNDATION_STATES = 4
@@ -97,14 +99,15 @@ N_ROTOR_PLACES = 10
 
 # Columns of `KernelParameters.bearing_at`, one row per touchdown bearing: place of its race and of its
 # support (x, then y), of the spin of its race and of the first of its further states; -1 where it has none.
-# Then its first contact and the one behind its last.
+# Then its first contact and the one behind its last, and the first state of its departure; -1 without one.
 RACE = 0
 SUPPORT = 1
 RACE_SPIN = 2
 BEARING_OWN = 3
 CONTACTS = 4
 CONTACTS_END = 5
-N_BEARING_PLACES = 6
+DEPARTURE = 6
+N_BEARING_PLACES = 7
 
 # Columns of `KernelParameters.contact_at`, one row per contact, those of a bearing side by side: the bearing
 # whose row holds its numbers, place of the body that the rotor touches (x, then y), place of the spin of that
@@ -119,7 +122,8 @@ MAGNET_OWN = 0
 N_MAGNET_PLACES = 1
 
 # Kinds of states: they set error scale, process noise and prior.
-POSITION, VELOCITY, SPIN, INTERNAL, ANGLE, AUDIT = range(6)
+POSITION, VELOCITY, SPIN, INTERNAL, ANGLE, HEAT, AUDIT = range(7)
+N_KINDS = 7
 
 
 class KernelParameters(NamedTuple):
@@ -128,7 +132,8 @@ class KernelParameters(NamedTuple):
 
     Columns and entries are named in this module. ``balls`` (B, 3, Z8) are the balls of `physics.ball_set`;
     ``rotor_at``, ``bearing_at`` (B, ·), ``contact_at`` (C, ·) and ``magnet_at`` (A, ·) say where the states
-    of each owner stand, so that no kernel computes a place from numbers of modes and bearings. ``memory`` is
+    of each owner stand, so that no kernel computes a place from numbers of modes and bearings. ``departure``
+    (B, ·) or (0, ·) holds what `physics.departure` reads. ``memory`` is
     what is remembered beside the state: a right-hand side reads it, an accepted step alone writes it
     (`simulate._loop.remember`). No element of today has any; its length is zero.
     """
@@ -150,4 +155,5 @@ class KernelParameters(NamedTuple):
     bearing_at: Integers
     contact_at: Integers
     magnet_at: Integers
+    departure: Array
     memory: Array

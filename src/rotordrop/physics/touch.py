@@ -48,7 +48,15 @@ Array = NDArray[np.float64]
 
 @inner_kernel
 def touch(
-    numbers: Array, ux: float, uy: float, vx: float, vy: float, omega: float, omega_i: float
+    numbers: Array,
+    gap: float,
+    law: Array,
+    ux: float,
+    uy: float,
+    vx: float,
+    vy: float,
+    omega: float,
+    omega_i: float,
 ) -> tuple[float, float, float, float, float, float, float]:
     """Contact of a rotor with the bore around it.
 
@@ -56,6 +64,10 @@ def touch(
     ----------
     numbers : ndarray, shape (N_ENTRIES,)
         Gap and radii [m], friction, law.
+    gap : float
+        The air gap now [m], which is that of the numbers where nothing departs; so is the law.
+    law : ndarray, shape (3,)
+        Law of the contact, K [N/m^n], n [1] and λ [s/m].
     ux, uy, vx, vy : float
         Displacement [m] and velocity [m/s] of the rotor against the bore.
     omega, omega_i : float
@@ -73,14 +85,14 @@ def touch(
     Source: Neisi 2020, eqs. (8)–(12).
     """
     e_r = math.sqrt(ux * ux + uy * uy)
-    delta = e_r - numbers[AIR_GAP]
+    delta = e_r - gap
     if delta <= 0.0:
         return delta, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     # Unit vectors instead of angles: no branch at an azimuth, no sign to set by hand.
     nx = ux / e_r
     ny = uy / e_r
     delta_dot = vx * nx + vy * ny
-    F_r, elastic = contact.contact_force(numbers[LAW:N_ENTRIES], delta, delta_dot)
+    F_r, elastic = contact.contact_force(law, delta, delta_dot)
     v_t = surface_speed(vy * nx - vx * ny, omega, numbers[ROTOR_RADIUS], omega_i, numbers[BORE_RADIUS])
     F_mu = F_r * stribeck_coefficient(
         v_t,

@@ -29,6 +29,8 @@ class StateLayout:
     sensor_own: int = 0
     """Number of sensors that lag behind, each with the reading that it has got to [m]; only the filter moves
     these."""
+    departing: tuple[int, ...] = ()
+    """Kinds of the states of what departs at each bearing, behind the books; empty where nothing does."""
     modal_x: slice = field(init=False)
     modal_y: slice = field(init=False)
     """Modal amplitudes [sqrt(kg) m]."""
@@ -72,6 +74,7 @@ class StateLayout:
         for (name, (size, _)), stop in zip(blocks.items(), accumulate(sizes), strict=True):
             object.__setattr__(self, name, stop - 1 if size is None else slice(stop - size, stop))
         kinds = np.repeat([kind for _, kind in blocks.values()], sizes).astype(np.int64)
+        kinds = np.concatenate([kinds, np.tile(np.array(self.departing, dtype=np.int64), b)])
         object.__setattr__(self, "kinds", kinds)
 
     @classmethod
@@ -121,7 +124,7 @@ class StateLayout:
         return places
 
     def bearing_at(self) -> Integers:
-        """Places of the states of each bearing, shape (B, 6), see ``RACE`` and the names beside it."""
+        """Places of the states of each bearing, shape (B, 7), see ``RACE`` and the names beside it."""
         places = np.empty((self.n_bearings, L.N_BEARING_PLACES), dtype=np.int64)
         count = np.arange(self.n_bearings)
         places[:, L.RACE] = self.race.start + 2 * count
@@ -129,6 +132,8 @@ class StateLayout:
         places[:, L.RACE_SPIN] = self.race_spin.start + count
         places[:, L.BEARING_OWN] = _first_of(self.bearing_own, self.own.start, self.n_bearings)
         places[:, L.CONTACTS], places[:, L.CONTACTS_END] = count, count + 1
+        of_one = len(self.departing)
+        places[:, L.DEPARTURE] = self.work_in + 1 + of_one * count if of_one else -1
         return places
 
     def contact_at(self) -> Integers:
@@ -154,6 +159,7 @@ class StateLayout:
             *(f"race {name} spin" for name in bearing_names),
             *(f"further state {k + 1}" for k in range(self.sensors.stop - self.own.start)),
             *("rotor speed", "rotor angle", "dissipated energy", "work put in"),
+            *(f"departure {name} {k + 1}" for name in bearing_names for k in range(len(self.departing))),
         )
 
     def zeros(self) -> Array:

@@ -14,7 +14,7 @@ from rotordrop.elements.description import Placed
 from rotordrop.elements.race_bearing import numbers_of, places_of
 from rotordrop.elements.support import support_sag
 from rotordrop.machine import Machine, TouchdownBearing
-from rotordrop.physics import aerodynamics
+from rotordrop.physics import aerodynamics, departure
 from rotordrop.physics import columns as L
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.contact import depth_at
@@ -50,6 +50,14 @@ class DropModel:
         """The same model of a machine with the same rotor and other bearings or values."""
         values = _of_values(machine, self.fe, self.basis, self.load_shares)
         return replace(self, machine=machine, parameters=self.parameters._replace(**values))
+
+    def departing(self, rows: Array) -> DropModel:
+        """The same model whose bearings depart from it by rows (B, C) of `physics.departure`, if any."""
+        layout = replace(self.layout, departing=departure.KINDS if len(rows) else ())
+        p = self.parameters._replace(
+            departure=rows, rotor_at=layout.rotor_at(), bearing_at=layout.bearing_at()
+        )
+        return replace(self, layout=layout, parameters=p)
 
     def at_rest(self) -> Array:
         """State, shape (n,), of a centred rotor with all at rest; loose races lie where they fall."""
@@ -121,6 +129,7 @@ def _kernel_parameters(
         bearing_at=layout.bearing_at(),
         contact_at=layout.contact_at(),
         magnet_at=layout.magnet_at(len(machine.ambs)),
+        departure=np.zeros((0, departure.N_COLUMNS)),
         memory=np.zeros(0),
         **_of_values(machine, fe, basis, shares),
     )

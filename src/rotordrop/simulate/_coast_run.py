@@ -143,7 +143,7 @@ def begin(setup: Setup) -> Run:
     status = np.zeros(8)
     status[STOPPED_AT] = np.nan
     status[LAST_SAMPLE] = math.ceil(setup.case.last_time / setup.case.output_step - 1e-9)
-    status[ENERGY_AT_START] = stored_energy_of(setup, start) - start[setup.model.layout.work_in]
+    status[ENERGY_AT_START] = stored_energy_of(setup, 0.0, start) - start[setup.model.layout.work_in]
     return Run(
         state=start,
         progress=progress,
@@ -158,8 +158,8 @@ def begin(setup: Setup) -> Run:
     )
 
 
-def stored_energy_of(setup: Setup, state: Array) -> float:
-    return float(H.stored_energy(state, setup.parameters, True))
+def stored_energy_of(setup: Setup, time: float, state: Array) -> float:
+    return float(H.stored_energy(time, state, setup.parameters, True))
 
 
 def relative_displacement(setup: Setup, states: Array) -> Array:
@@ -181,7 +181,9 @@ def advance(setup: Setup, run: Run) -> tuple[dict[str, Single], Array]:
     states = np.empty((rows, len(run.state)))
     histories = np.empty((rows, len(run.running), H.N_HISTORIES))
     states[0] = run.state
-    H.bearing_histories(states[:1], setup.parameters, histories[:1])
+    H.bearing_histories(
+        _grid(first, first + 1, case.output_step), states[:1], setup.parameters, histories[:1]
+    )
     before = (float(run.progress[_loop.TIME]), float(run.state[setup.model.layout.dissipated]))
     log, already_open = _log_of_window(run, rows * case.output_step), int(run.progress[_loop.LOGGED])
     method, filled, try_settled = np.zeros(3), 1, case.settled_scheme and may_be_settled(run)
@@ -198,7 +200,7 @@ def advance(setup: Setup, run: Run) -> tuple[dict[str, Single], Array]:
             outcome = integrate(setup, run, times, states[wanted], log)
             got = int(run.progress[_loop.SAMPLES])
             fresh = slice(filled, filled + got)
-            H.bearing_histories(states[fresh], setup.parameters, histories[fresh])
+            H.bearing_histories(times[:got], states[fresh], setup.parameters, histories[fresh])
         filled += got
         _after(setup, run, outcome, first + filled - 1)
     ended, began = _ended_contacts(run, log, already_open)
@@ -318,7 +320,8 @@ def keep_statistics(
     force = magnitude(histories[..., H.H_BEARING_FORCE_X], histories[..., H.H_BEARING_FORCE_Y])
     depth = histories[..., H.H_DELTA]
     values = np.stack([depth, force, histories[..., H.H_STRESS]], axis=-1)
-    balance = stored_energy_of(setup, run.state) + run.state[layout.dissipated] - run.state[layout.work_in]
+    stored = stored_energy_of(setup, float(run.progress[_loop.TIME]), run.state)
+    balance = stored + run.state[layout.dissipated] - run.state[layout.work_in]
     residual = balance - run.status[ENERGY_AT_START]
     run.status[WORST_BALANCE] = max(run.status[WORST_BALANCE], abs(residual))
     speed = float(run.state[layout.rotor_speed])
@@ -373,14 +376,16 @@ def settled_piece(setup: Setup, run: Run, states: Array, histories: Array, log: 
         case.stop_speed if spinning else -1.0,
         states,
     )
-    H.bearing_histories(states[:got], setup.parameters, histories[:got])
+    sample = round(begun / case.output_step) + 1
+    times = _grid(sample, sample + len(states), case.output_step)
+    H.bearing_histories(times[:got], states[:got], setup.parameters, histories[:got])
     done = histories[:got]
-    error = _difference(setup, states[:got], done, reference)
+    error = _difference(setup, times, states[:got], done, reference)
     lost = not np.all(np.isfinite(states[:got])) or bool(np.any(done[..., H.H_DELTA] <= 0.0))
     if got == 0 or lost or not error[0] <= case.settled_error:
         run.state[:] = start
         return 0, np.zeros(3)
-    run.progress[_loop.TIME] = (round(begun / case.output_step) + got) * case.output_step
+    run.progress[_loop.TIME] = (sample - 1 + got) * case.output_step
     _carry_contacts(run, done, begun, case.output_step, log)
     return got, np.array([got / len(states), *error])
 
@@ -397,7 +402,9 @@ def _reference(setup: Setup, run: Run, begun: float, available: int) -> Array:
     return states
 
 
-def _difference(setup: Setup, states: Array, histories: Array, reference: Array) -> tuple[float, float]:
+def _difference(
+    setup: Setup, times: Array, states: Array, histories: Array, reference: Array
+) -> tuple[float, float]:
     """Largest difference of displacement at the bearings [m] and of ball force [N] over the checked time."""
     count = min(len(reference), len(states))
     if count == 0:
@@ -405,7 +412,7 @@ def _difference(setup: Setup, states: Array, histories: Array, reference: Array)
     rows = setup.parameters.bearing_shape
     moved = displacement_at(setup, states[:count], rows) - displacement_at(setup, reference[:count], rows)
     exact = np.empty((count, *histories.shape[1:]))
-    H.bearing_histories(np.ascontiguousarray(reference[:count]), setup.parameters, exact)
+    H.bearing_histories(times[:count], np.ascontiguousarray(reference[:count]), setup.parameters, exact)
     force = slice(H.H_BEARING_FORCE_X, H.H_BEARING_FORCE_Y + 1)
     return float(np.max(np.abs(moved))), float(
         np.max(np.abs(histories[:count, :, force] - exact[..., force]))

@@ -7,14 +7,17 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.physics import blocks, support
+from rotordrop.physics import blocks, departure, support
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
-from rotordrop.physics.ball_set import ball_set_energy, ball_set_force, ball_set_load
+from rotordrop.physics.ball_set import ball_set_energy, ball_set_load
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.contact import contact_energy
 from rotordrop.simulate._loop import contact_at
 from rotordrop.simulate._rhs import (
+    ball_force,
+    departing,
+    gap_at,
     modal_parts,
     project,
     race_deflection,
@@ -39,26 +42,27 @@ N_HISTORIES = 10
 
 
 @inner_kernel
-def fill_history(b: int, y: Array, p: KernelParameters, work: Array, out: Array) -> None:
+def fill_history(t: float, b: int, y: Array, p: KernelParameters, work: Array, out: Array) -> None:
     """Fill ``out`` (10,) with what one bearing does in a state."""
-    contact_at(p.bearing_at[b, L.CONTACTS], y, p, out)
-    entries, balls = p.bearing[b, L.BALL_SET : L.BALL_SET_END], p.balls[b]
-    dx, dy = race_deflection(b, y, p)
-    F_x, F_y = ball_set_force(entries, balls, dx, dy, work)
+    contact_at(t, p.bearing_at[b, L.CONTACTS], y, p, out)
+    F_x, F_y = ball_force(b, y, p, work)
     out[H_BEARING_FORCE_X] = -F_x
     out[H_BEARING_FORCE_Y] = -F_y
-    out[H_BALL_LOAD], out[H_STRESS] = ball_set_load(entries, balls, dx, dy)
+    dx, dy = race_deflection(b, y, p)
+    numbers = p.bearing[b][L.ROLLING : L.ROLLING_END]
+    out[H_BALL_LOAD], out[H_STRESS] = ball_set_load(numbers, p.balls[b], dx, dy)
 
 
 @kernel
-def bearing_histories(states: Array, p: KernelParameters, out: Array) -> None:
-    """Fill ``out`` (T, B, 10) from ``states`` (T, n); SI units, columns ``H_*``; the ball force is that on
-    the race.
+def bearing_histories(times: Array, states: Array, p: KernelParameters, out: Array) -> None:
+    """Fill ``out`` (T, B, 10) from ``times`` (T,) [s] and ``states`` (T, n); SI units, columns ``H_*``.
+
+    The ball force is that on the race.
     """
     work = np.empty((2, p.balls.shape[2]))
     for i in range(states.shape[0]):
         for b in range(p.bearing.shape[0]):
-            fill_history(b, states[i], p, work, out[i, b])
+            fill_history(times[i], b, states[i], p, work, out[i, b])
 
 
 @kernel
@@ -92,7 +96,7 @@ def support_form_energy(b: int, y: Array, p: KernelParameters) -> float:
 
 
 @lean_kernel
-def stored_energy(y: Array, p: KernelParameters, with_rotor_spin: bool) -> float:
+def stored_energy(t: float, y: Array, p: KernelParameters, with_rotor_spin: bool) -> float:
     """Energy [J] of a state: motion, bending, contacts, balls, supports, gravity and spin."""
     n_q = p.rotor_at[L.N_COORDINATES]
     qx, qy, sx, sy = modal_parts(y, p)
@@ -104,10 +108,13 @@ def stored_energy(y: Array, p: KernelParameters, with_rotor_spin: bool) -> float
         row = p.bearing[b]
         r, h = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT]
         for c in range(p.bearing_at[b, L.CONTACTS], p.bearing_at[b, L.CONTACTS_END]):
-            ux, uy, _vx, _vy = relative_motion(c, y, p)
-            delta = math.sqrt(ux * ux + uy * uy) - row[L.AIR_GAP]
-            if delta > 0.0:
-                energy += contact_energy(row[L.CONTACT : L.CONTACT_END], delta)
+            ux, uy, _vx, _vy = relative_motion(c, b, y, p)
+            delta = math.sqrt(ux * ux + uy * uy) - gap_at(t, b, y, p)
+            law = row[L.CONTACT : L.CONTACT_END]
+            if delta > 0.0 and p.bearing_at[b, L.DEPARTURE] >= 0:
+                energy += departure.energy_in_contact(p.departure[b], law, delta)
+            elif delta > 0.0:
+                energy += contact_energy(law, delta)
         dx, dy = race_deflection(b, y, p)
         energy += ball_set_energy(row[L.BALL_SET : L.BALL_SET_END], p.balls[b], dx, dy)
         energy += row[L.RACE_WEIGHT] * y[r + 1]
@@ -115,9 +122,15 @@ def stored_energy(y: Array, p: KernelParameters, with_rotor_spin: bool) -> float
         energy += (
             0.5 * row[L.SUPPORT_MASS_X] * y[n_q + h] ** 2 + 0.5 * row[L.SUPPORT_MASS_Y] * y[n_q + h + 1] ** 2
         )
-        energy += (
-            0.5 * row[L.SUPPORT_STIFFNESS_X] * y[h] ** 2 + 0.5 * row[L.SUPPORT_STIFFNESS_Y] * y[h + 1] ** 2
-        )
+        if p.bearing_at[b, L.DEPARTURE] >= 0:
+            s, own = departing(b, y, p)
+            springs = row[L.SUPPORT_STIFFNESS_X : L.SUPPORT_STIFFNESS_Y + 1]
+            energy += departure.stored_energy(s, own, springs, y[h], y[h + 1])
+        else:
+            energy += (
+                0.5 * row[L.SUPPORT_STIFFNESS_X] * y[h] ** 2
+                + 0.5 * row[L.SUPPORT_STIFFNESS_Y] * y[h + 1] ** 2
+            )
         if row[L.SUPPORT_FORM + blocks.SUPPORT_PRESENT] != 0.0:
             energy += support_form_energy(b, y, p)
         energy += 0.5 * row[L.RACE_INERTIA] * y[p.bearing_at[b, L.RACE_SPIN]] ** 2
@@ -127,7 +140,9 @@ def stored_energy(y: Array, p: KernelParameters, with_rotor_spin: bool) -> float
 
 
 @kernel
-def stored_energies(states: Array, p: KernelParameters, with_rotor_spin: bool, out: Array) -> None:
-    """Fill ``out`` (T,) with the energy [J] of each of the ``states`` (T, n)."""
+def stored_energies(
+    times: Array, states: Array, p: KernelParameters, with_rotor_spin: bool, out: Array
+) -> None:
+    """Fill ``out`` (T,) with the energy [J] of each of the ``states`` (T, n) at ``times`` (T,) [s]."""
     for i in range(states.shape[0]):
-        out[i] = stored_energy(states[i], p, with_rotor_spin)
+        out[i] = stored_energy(times[i], states[i], p, with_rotor_spin)

@@ -15,14 +15,16 @@ from numpy.typing import NDArray
 
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
-from rotordrop.physics.ball_set import ball_set_force, ball_set_load
+from rotordrop.physics.ball_set import ball_set_load
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import atan2, exp, ln, power
 from rotordrop.simulate._rhs import (
     N_PLACES,
     Scratch,
+    ball_force,
     contact_values,
     drop_derivative,
+    gap_at,
     race_deflection,
     relative_motion,
     scratch_of,
@@ -194,14 +196,17 @@ def dense_output(theta: float, h: float, y: Array, k: Array, tab: Tableau, out: 
 
 
 @inner_kernel
-def contact_at(c: int, y: Array, p: KernelParameters, out: Array) -> None:
+def contact_at(t: float, c: int, y: Array, p: KernelParameters, out: Array) -> None:
     """Fill ``out`` (6,) with one contact in a state: as `contact_values`, the powers as one."""
-    out[0], out[1], out[2], out[3], out[4], sliding, lost = contact_values(c, y, p)
+    out[0], out[1], out[2], out[3], out[4], sliding, lost = contact_values(
+        t, c, p.contact_at[c, L.CONTACT_BEARING], y, p
+    )
     out[5] = sliding + lost
 
 
 @lean_kernel
 def crossing_fraction(
+    t: float,
     c: int,
     h: float,
     y: Array,
@@ -214,13 +219,14 @@ def crossing_fraction(
     """Fraction of a step at which the indentation changes sign, by bisection on the dense output."""
     # Bisection, not Newton: the normal speed may pass zero within the step, and thirty halvings are few
     # against the right-hand sides of a step.
-    gap = p.bearing[p.contact_at[c, L.CONTACT_BEARING], L.AIR_GAP]
+    b = p.contact_at[c, L.CONTACT_BEARING]
     low = 0.0
     high = 1.0
     for _ in range(30):
         middle = 0.5 * (low + high)
         dense_output(middle, h, y, k, tab, scratch)
-        ux, uy, _vx, _vy = relative_motion(c, scratch, p)
+        ux, uy, _vx, _vy = relative_motion(c, b, scratch, p)
+        gap = gap_at(t + middle * h, b, scratch, p)
         if (math.sqrt(ux * ux + uy * uy) > gap) == (delta_0 > 0.0):
             low = middle
         else:
@@ -254,14 +260,15 @@ def log_contacts(
     """Update the contact log with an accepted step; returns the number of entries opened so far."""
     scratch_time = -math.inf
     for c in range(p.contact_at.shape[0]):
-        delta, force, _friction, nx, ny, sliding, lost = contact_values(c, y_new, p)
+        b = p.contact_at[c, L.CONTACT_BEARING]
+        delta, force, _friction, nx, ny, sliding, lost = contact_values(t + h, c, b, y_new, p)
         power = sliding + lost
         was = running[c, RUN_IN_CONTACT] > 0.0
         touches = delta > 0.0
         begin = t
         end = t + h
         if was != touches:
-            moment = t + h * crossing_fraction(c, h, y, k, tab, p, running[c, RUN_DELTA], scratch)
+            moment = t + h * crossing_fraction(t, c, h, y, k, tab, p, running[c, RUN_DELTA], scratch)
             scratch_time = -math.inf
             if touches:
                 begin = moment
@@ -281,7 +288,9 @@ def log_contacts(
             if middle != scratch_time:
                 dense_output((middle - t) / h, h, y, k, tab, scratch)
                 scratch_time = middle
-            _delta, between, _friction, mid_x, mid_y, mid_sliding, mid_lost = contact_values(c, scratch, p)
+            _delta, between, _friction, mid_x, mid_y, mid_sliding, mid_lost = contact_values(
+                middle, c, b, scratch, p
+            )
             mid_power = mid_sliding + mid_lost
             sixth = (end - begin) / 6.0
             log[row, LOG_IMPULSE] += sixth * (running[c, RUN_FORCE] + 4.0 * between + force)
@@ -305,7 +314,8 @@ def start_running(y: Array, t: float, p: KernelParameters, running: Array, log: 
     """Fill the running contacts from a state that may already touch; returns the number of entries opened."""
     n_log = 0
     for c in range(p.contact_at.shape[0]):
-        delta, force, _friction, nx, ny, sliding, lost = contact_values(c, y, p)
+        b = p.contact_at[c, L.CONTACT_BEARING]
+        delta, force, _friction, nx, ny, sliding, lost = contact_values(t, c, b, y, p)
         power = sliding + lost
         running[c, RUN_IN_CONTACT] = 0.0
         running[c, RUN_FORCE] = force
@@ -326,11 +336,11 @@ def start_running(y: Array, t: float, p: KernelParameters, running: Array, log: 
 
 
 @lean_kernel
-def force_and_stress(b: int, dx: float, dy: float, p: KernelParameters, work: Array) -> tuple[float, float]:
-    """Magnitude of the ball force [N] and largest Hertz stress [Pa] for a race moved by (dx, dy) [m]."""
-    entries, balls = p.bearing[b, L.BALL_SET : L.BALL_SET_END], p.balls[b]
-    F_x, F_y = ball_set_force(entries, balls, dx, dy, work)
-    _load, stress = ball_set_load(entries, balls, dx, dy)
+def force_and_stress(b: int, y: Array, p: KernelParameters, work: Array) -> tuple[float, float]:
+    """Magnitude of the ball force [N] and largest Hertz stress [Pa] of one bearing in a state."""
+    F_x, F_y = ball_force(b, y, p, work)
+    dx, dy = race_deflection(b, y, p)
+    _load, stress = ball_set_load(p.bearing[b][L.ROLLING : L.ROLLING_END], p.balls[b], dx, dy)
     return math.sqrt(F_x * F_x + F_y * F_y), stress
 
 
@@ -354,7 +364,7 @@ def update_peaks(t: float, y: Array, p: KernelParameters, running: Array, peaks:
         if travel < 0.9 * peaks[b, PEAK_TRAVEL]:
             continue
         peaks[b, PEAK_TRAVEL] = max(travel, peaks[b, PEAK_TRAVEL])
-        force, stress = force_and_stress(b, dx, dy, p, work)
+        force, stress = force_and_stress(b, y, p, work)
         if force > peaks[b, PEAK_FORCE]:
             peaks[b, PEAK_FORCE] = force
             peaks[b, PEAK_FORCE + 1] = t
@@ -405,6 +415,8 @@ def integrate(  # noqa: C901, PLR0915  one compiled loop
     """
     n = y.shape[0]
     i_w = p.rotor_at[L.ROTOR_SPEED]
+    # What departs stands behind the books and has a norm of its own: at rest it must not loosen the control.
+    apart, watched = p.rotor_at[L.WORK_IN] + 1, control.scale[: p.rotor_at[L.N_CONTROLLED]]
     y_new = np.empty(n)
     k = np.empty((7, n))
     work = scratch_of(p)
@@ -428,7 +440,13 @@ def integrate(  # noqa: C901, PLR0915  one compiled loop
         tried += 1
         step = min(h, t_end - t, landing)
         runge_kutta_stages(t, step, y, p, tab, k, y_new, work, powers)
-        error = scaled_error(step, y, y_new, k, tab.e, control.scale, control.tolerance, scratch)
+        error = scaled_error(step, y, y_new, k, tab.e, watched, control.tolerance, scratch)
+        if n > apart:
+            scale = control.scale[apart:]
+            by_others = scaled_error(
+                step, y[apart:], y_new[apart:], k[:, apart:], tab.e, scale, control.tolerance, scratch
+            )
+            error = max(error, by_others)
         if not error <= 1.0:
             progress[REJECTED] += 1.0
             h = 0.1 * step if not math.isfinite(error) else step * max(SHRINK, SAFETY * power(error, -0.2))
@@ -498,8 +516,11 @@ def integrate_drop(
     log: Array,
     counters: Array,
     books: Array | None = None,
+    change: tuple[float, KernelParameters] | None = None,
 ) -> int:
-    """Integrate a drop as one window; returns ``FINISHED`` or why it ended early.
+    """Integrate a drop; returns ``FINISHED`` or why it ended early.
+
+    A drop is one window, or two where a ``change`` says when [s] its parameters become others.
 
     ``states`` (T, n) are filled on the grid ``times`` (T,) from the start state ``y0`` (n,), NaN behind an
     early end; ``log`` (R, 9) with the contacts, ``counters`` (5,) with accepted steps, rejected steps, last
@@ -513,12 +534,24 @@ def integrate_drop(
     progress[[TIME, STEP]] = times[0], min(first_step, largest_step)
     progress[LOGGED] = start_running(y, times[0], p, running, log)
     states[0] = y
-    control = Control(
-        scale, float(tolerance), float(largest_step), most_steps, -1.0, float(times[-1]), 0.0, True
-    )
     books = np.zeros((p.bearing.shape[0] + 1, N_PLACES)) if books is None else books
     peaks = np.zeros((0, N_PEAKS))
-    outcome = integrate(y, times[1:], p, tab, control, states[1:], log, running, books, peaks, progress)
-    states[1 + int(progress[SAMPLES]) :] = np.nan
+    windows = [(float(times[-1]), p)]
+    if change is not None and change[0] < times[-1]:
+        before = [(change[0], p)] if change[0] > times[0] else []
+        windows = [*before, (float(times[-1]), change[1]._replace(memory=p.memory))]
+    done, outcome = 1, FINISHED
+    for end, parameters in windows:
+        control = Control(
+            scale, float(tolerance), float(largest_step), most_steps, -1.0, float(end), 0.0, True
+        )
+        grid = times[done : int(np.searchsorted(times, end, side="right"))]
+        outcome = integrate(
+            y, grid, parameters, tab, control, states[done:], log, running, books, peaks, progress
+        )
+        done += int(progress[SAMPLES])
+        if outcome != FINISHED:
+            break
+    states[done:] = np.nan
     counters[:] = progress[[ACCEPTED, REJECTED, STEP, LOGGED, TIME]]
     return outcome

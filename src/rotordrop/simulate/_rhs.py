@@ -12,15 +12,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.physics import aerodynamics, blocks, support
+from rotordrop.physics import aerodynamics, blocks, departure, support
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
 from rotordrop.physics.aerodynamics import exponential_deceleration, speed_dependent_deceleration
-from rotordrop.physics.ball_set import ball_set_force
+from rotordrop.physics.ball_set import ball_set_force, bearing_reaction
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import sine_cosine
 from rotordrop.physics.remanence import remanent_fraction
-from rotordrop.physics.spin import race_drag_torque
 from rotordrop.physics.touch import touch
 
 Array = NDArray[np.float64]
@@ -67,10 +66,20 @@ def modal_parts(y: Array, p: KernelParameters) -> tuple[Array, Array, Array, Arr
 
 
 @inner_kernel
-def relative_motion(c: int, y: Array, p: KernelParameters) -> tuple[float, float, float, float]:
-    """Displacement [m] and velocity [m/s] of the rotor relative to the body of one contact, x and y."""
+def departing(b: int, y: Array, p: KernelParameters) -> tuple[Array, Array]:
+    """Numbers and states of what departs at one bearing that has a departure."""
+    first = p.bearing_at[b, L.DEPARTURE]
+    return p.departure[b], y[first : first + departure.N_STATES]
+
+
+@inner_kernel
+def relative_motion(c: int, b: int, y: Array, p: KernelParameters) -> tuple[float, float, float, float]:
+    """Displacement [m] and velocity [m/s] of the rotor against the bore of contact ``c`` of bearing ``b``.
+
+    The bearing is handed in: looked up in the table of contacts it costs 3 % of a right-hand side.
+    """
     n_q, r = p.rotor_at[L.N_COORDINATES], p.contact_at[c, L.CONTACT_BODY]
-    shape = p.bearing_shape[p.contact_at[c, L.CONTACT_BEARING]]
+    shape = p.bearing_shape[b]
     qx, qy, sx, sy = modal_parts(y, p)
     ux = uy = vx = vy = 0.0
     for k in range(shape.shape[0]):
@@ -78,26 +87,60 @@ def relative_motion(c: int, y: Array, p: KernelParameters) -> tuple[float, float
         uy += shape[k] * qy[k]
         vx += shape[k] * sx[k]
         vy += shape[k] * sy[k]
-    return ux - y[r], uy - y[r + 1], vx - y[n_q + r], vy - y[n_q + r + 1]
+    ux, uy, vx, vy = ux - y[r], uy - y[r + 1], vx - y[n_q + r], vy - y[n_q + r + 1]
+    if p.bearing_at[b, L.DEPARTURE] >= 0:
+        s, own = departing(b, y, p)
+        return departure.against_bore(s, own, ux, uy, vx, vy)
+    return ux, uy, vx, vy
+
+
+@inner_kernel
+def gap_at(t: float, b: int, y: Array, p: KernelParameters) -> float:
+    """Air gap [m] of one bearing now."""
+    gap: float = p.bearing[b, L.AIR_GAP]
+    if p.bearing_at[b, L.DEPARTURE] >= 0:
+        s, own = departing(b, y, p)
+        gap = departure.gap_now(s, own, t, gap)
+    return gap
 
 
 @inner_kernel
 def contact_values(
-    c: int, y: Array, p: KernelParameters
+    t: float, c: int, b: int, y: Array, p: KernelParameters
 ) -> tuple[float, float, float, float, float, float, float]:
-    """One contact in a state, in the order of `rotordrop.physics.touch.touch`."""
-    ux, uy, vx, vy = relative_motion(c, y, p)
+    """One contact of a bearing in a state, in the order of `rotordrop.physics.touch.touch`."""
+    ux, uy, vx, vy = relative_motion(c, b, y, p)
     spin = p.contact_at[c, L.CONTACT_SPIN]
     omega_i = y[spin] if spin >= 0 else 0.0
-    numbers = p.bearing[p.contact_at[c, L.CONTACT_BEARING], L.TOUCH : L.TOUCH_END]
-    return touch(numbers, ux, uy, vx, vy, y[p.rotor_at[L.ROTOR_SPEED]], omega_i)
+    row, gap = p.bearing[b], gap_at(t, b, y, p)
+    numbers, law = row[L.TOUCH : L.TOUCH_END], row[L.CONTACT : L.CONTACT_END]
+    if p.bearing_at[b, L.DEPARTURE] >= 0:
+        s = p.departure[b]
+        at = departure.law_at(s, math.sqrt(ux * ux + uy * uy) - gap)
+        law = s[at : at + departure.LAW_UNTIL] if at >= 0 else law
+    return touch(numbers, gap, law, ux, uy, vx, vy, y[p.rotor_at[L.ROTOR_SPEED]], omega_i)
 
 
 @inner_kernel
 def race_deflection(b: int, y: Array, p: KernelParameters) -> tuple[float, float]:
-    """Displacement [m] of the race of one bearing relative to its support, x and y."""
+    """Displacement [m] of the race of one bearing relative to its support, in the axes of its balls."""
     r, h = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT]
-    return y[r] - y[h], y[r + 1] - y[h + 1]
+    x, z = y[r] - y[h], y[r + 1] - y[h + 1]
+    if p.bearing_at[b, L.DEPARTURE] >= 0:
+        _, own = departing(b, y, p)
+        return departure.turned(own[departure.CAGE_ANGLE], x, z)
+    return x, z
+
+
+@inner_kernel
+def ball_force(b: int, y: Array, p: KernelParameters, balls: Array) -> tuple[float, float]:
+    """Force of the balls of one bearing [N] against the deflection of its race, x and y."""
+    x, z = race_deflection(b, y, p)
+    F_x, F_y = ball_set_force(p.bearing[b][L.ROLLING : L.ROLLING_END], p.balls[b], x, z, balls)
+    if p.bearing_at[b, L.DEPARTURE] >= 0:
+        _, own = departing(b, y, p)
+        return departure.turned(-own[departure.CAGE_ANGLE], F_x, F_y)
+    return F_x, F_y
 
 
 @inner_kernel
@@ -225,17 +268,19 @@ def add_support_form(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
 
 
 @inner_kernel
-def add_contact(c: int, y: Array, p: KernelParameters, dy: Array) -> tuple[float, float, float]:
+def add_contact(
+    t: float, c: int, b: int, y: Array, p: KernelParameters, dy: Array
+) -> tuple[float, float, float]:
     """Add the force of one contact to the rotor and the body it touches.
 
     Returns the friction force [N] and the power that sliding and law take [W].
     """
-    delta, F_r, F_mu, nx, ny, sliding, lost = contact_values(c, y, p)
+    delta, F_r, F_mu, nx, ny, sliding, lost = contact_values(t, c, b, y, p)
     if delta <= 0.0:
         return 0.0, 0.0, 0.0
     x = F_r * nx - F_mu * ny
     z = F_r * ny + F_mu * nx
-    shape = p.bearing_shape[p.contact_at[c, L.CONTACT_BEARING]]
+    shape = p.bearing_shape[b]
     body = p.rotor_at[L.N_COORDINATES] + p.contact_at[c, L.CONTACT_BODY]
     _, _, ax, ay = modal_parts(dy, p)
     for k in range(shape.shape[0]):
@@ -258,31 +303,72 @@ def add_race(
     n_q = p.rotor_at[L.N_COORDINATES]
     r, h, spin = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.RACE_SPIN]
     row = p.bearing[b]
-    race_x, race_y = race_deflection(b, y, p)
-    F_x, F_y = ball_set_force(row[L.BALL_SET : L.BALL_SET_END], p.balls[b], race_x, race_y, balls)
-    drag = race_drag_torque(
-        math.sqrt(F_x * F_x + F_y * F_y),
-        y[spin],
-        row[L.DRAG_COEFFICIENT],
-        row[L.PITCH_DIAMETER],
-        row[L.DRAG_SPEED],
-    )
+    F_x, F_y = ball_force(b, y, p, balls)
     wx = y[n_q + r] - y[n_q + h]
     wy = y[n_q + r + 1] - y[n_q + h + 1]
-    C_b = row[L.BEARING_DAMPING]
-    F_x += C_b * wx
-    F_y += C_b * wy
-    by_balls: float = C_b * (wx * wx + wy * wy)
-    by_drag: float = drag * y[spin]
+    numbers = row[L.ROLLING : L.ROLLING_END]
+    F_x, F_y, drag, by_balls, by_drag = bearing_reaction(numbers, F_x, F_y, wx, wy, y[spin])
     dy[n_q + r] = (dy[n_q + r] - F_x) / row[L.RACE_MASS]
     dy[n_q + r + 1] = (dy[n_q + r + 1] - F_y - row[L.RACE_WEIGHT]) / row[L.RACE_MASS]
     dy[spin] = (friction * row[L.BORE_RADIUS] - drag) / row[L.RACE_INERTIA]
     return F_x, F_y, by_balls, by_drag
 
 
+@lean_kernel
+def add_tilt(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
+    """Rates of the tilt of a race under the contact force that ``dy`` holds so far; power it takes [W]."""
+    race = p.rotor_at[L.N_COORDINATES] + p.bearing_at[b, L.RACE]
+    s, own = departing(b, y, p)
+    _, rates = departing(b, dy, p)
+    lost: float = departure.mode_rates(
+        s[departure.TILT_MODE : departure.TILT_MODE + departure.MODE_WIDTH],
+        dy[race],
+        dy[race + 1],
+        own[departure.TILT : departure.TILT + 4],
+        rates[departure.TILT : departure.TILT + 4],
+    )
+    return lost
+
+
+@lean_kernel
+def add_departing_support(
+    b: int, F_x: float, F_y: float, sliding: float, y: Array, p: KernelParameters, dy: Array
+) -> float:
+    """Rates of a support that departs, its foundation, the heat of sliding and the cage; power lost [W].
+
+    ``F_x, F_y`` is the force on the support [N], ``sliding`` the heat of friction [W].
+    """
+    n_q, h = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.SUPPORT]
+    row = p.bearing[b]
+    s, own = departing(b, y, p)
+    _, rates = departing(b, dy, p)
+    k_x, k_y, c_x, c_y, lost = departure.support_force(
+        s,
+        own,
+        rates,
+        row[L.SUPPORT_STIFFNESS_X : L.SUPPORT_STIFFNESS_Y + 1],
+        row[L.SUPPORT_DAMPING_X : L.SUPPORT_DAMPING_Y + 1],
+        y[h],
+        y[h + 1],
+        y[n_q + h],
+        y[n_q + h + 1],
+    )
+    dy[n_q + h] = (F_x - c_x - k_x) / row[L.SUPPORT_MASS_X]
+    dy[n_q + h + 1] = (F_y - c_y - k_y) / row[L.SUPPORT_MASS_Y]
+    rates[departure.HEAT] = sliding
+    rates[departure.CAGE_ANGLE] = s[departure.CAGE_RATIO] * y[p.bearing_at[b, L.RACE_SPIN]]
+    return lost + departure.mode_rates(
+        s[departure.FOUNDATION_MODE : departure.FOUNDATION_MODE + departure.MODE_WIDTH],
+        k_x + c_x,
+        k_y + c_y,
+        own[departure.FOUNDATION : departure.FOUNDATION + 4],
+        rates[departure.FOUNDATION : departure.FOUNDATION + 4],
+    )
+
+
 @inner_kernel
 def bearing_accelerations(
-    b: int, y: Array, p: KernelParameters, dy: Array, work: Scratch
+    t: float, b: int, y: Array, p: KernelParameters, dy: Array, work: Scratch
 ) -> tuple[float, float]:
     """Forces at one touchdown bearing, added to rotor, race, support and spin; power lost, in its row.
 
@@ -295,11 +381,13 @@ def bearing_accelerations(
     sliding = 0.0
     lost = 0.0
     for c in range(p.bearing_at[b, L.CONTACTS], p.bearing_at[b, L.CONTACTS_END]):
-        force, by_sliding, by_law = add_contact(c, y, p, dy)
+        force, by_sliding, by_law = add_contact(t, c, b, y, p, dy)
         friction += force
         sliding += by_sliding
         lost += by_law
     F_x, F_y, by_balls, by_drag = 0.0, 0.0, 0.0, 0.0
+    departs = p.bearing_at[b, L.DEPARTURE] >= 0
+    by_tilt = add_tilt(b, y, p, dy) if departs else 0.0
     if p.bearing_at[b, L.RACE] >= 0:
         F_x, F_y, by_balls, by_drag = add_race(b, friction, y, p, dy, work.balls)
     sx = y[n_q + h]
@@ -315,6 +403,8 @@ def bearing_accelerations(
     ]
     if row[L.SUPPORT_FORM + blocks.SUPPORT_PRESENT] != 0.0:
         by_support = add_support_form(b, y, p, dy)
+    if departs:
+        by_support = by_tilt + add_departing_support(b, F_x, F_y, sliding, y, p, dy)
     # Written together and last: each write makes the compiler read the arrays of the bearing again.
     power = work.power[b]
     power[SLIDING], power[IN_CONTACT] = sliding, lost
@@ -347,7 +437,7 @@ def drop_derivative(t: float, y: Array, p: KernelParameters, dy: Array, work: Sc
     contact_torque = 0.0
     dissipated = 0.0
     for b in range(p.bearing.shape[0]):
-        torque, lost = bearing_accelerations(b, y, p, dy, work)
+        torque, lost = bearing_accelerations(t, b, y, p, dy, work)
         contact_torque += torque
         dissipated += lost
     work.power[p.bearing.shape[0], BENDING] = add_rotor_rates(t, y, contact_torque, dissipated, p, dy)

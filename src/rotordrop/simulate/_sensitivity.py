@@ -214,10 +214,11 @@ def drop_jacobian_parts(
             _race_jacobian(b, y, p, J)
         _support_jacobian(b, y, p, J)
     for c in range(p.contact_at.shape[0]):
-        ux, uy, vx, vy = relative_motion(c, y, p)
+        b = p.contact_at[c, L.CONTACT_BEARING]
+        ux, uy, vx, vy = relative_motion(c, b, y, p)
         spin = p.contact_at[c, L.CONTACT_SPIN]
         omega_i = y[spin] if spin >= 0 else 0.0
-        numbers = p.bearing[p.contact_at[c, L.CONTACT_BEARING], L.TOUCH : L.TOUCH_END]
+        numbers = p.bearing[b, L.TOUCH : L.TOUCH_END]
         touching[c] = 1 if touch_gradient(numbers, ux, uy, vx, vy, y[i_w], omega_i, g[c]) else 0
     _rotor_jacobian(y, p, J)
     J[p.rotor_at[L.ROTOR_ANGLE], i_w] = 1.0

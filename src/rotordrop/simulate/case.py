@@ -62,6 +62,20 @@ class LevitatedStart:
     follows the runout of its sensors makes it; by default the response to the unbalance alone, shape (A,)."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class UnbalanceJump:
+    """An unbalance that comes during the drop, as when a blade is lost."""
+
+    node: int
+    """Node, counted from 1."""
+    amount: float
+    """Amount [kg m]."""
+    phase: float = 0.0
+    """Phase, counted from +y at rotor angle zero [rad]."""
+    time: float
+    """When it comes [s], from power-off."""
+
+
 Start: TypeAlias = CentredStart | PlacedStart | StateStart | LevitatedStart
 
 
@@ -90,6 +104,8 @@ class DropCase:
     """Bound of the step [s]."""
     most_steps: int = 50_000_000
     """Bound of the number of steps [1]."""
+    jump: UnbalanceJump | None = None
+    """An unbalance that comes during the drop."""
 
     def __post_init__(self) -> None:
         for name in ("duration", "output_step", "tolerance", "largest_step"):

@@ -154,7 +154,7 @@ def _result(setup: Setup, run: Run, output: Path | None) -> CoastDownResult:
     for row in whirl:
         C.close_sweep(row)
     rows = np.array(run.windows["window_rows"])
-    stopped = float(run.status[STOPPED_AT])
+    stopped, end = float(run.status[STOPPED_AT]), float(run.progress[_loop.TIME])
     peaks = run.peaks[:, : 2 * len(QUANTITIES)].reshape(-1, len(QUANTITIES), 2)
     result = CoastDownResult(
         machine_name=model.machine.name,
@@ -163,7 +163,7 @@ def _result(setup: Setup, run: Run, output: Path | None) -> CoastDownResult:
         tolerance=case.tolerance,
         reduction=model.basis.description,
         output_step=case.output_step,
-        end_time=float(run.progress[_loop.TIME]),
+        end_time=end,
         standstill_time=None if math.isnan(stopped) else stopped,
         finished=run.status[PHASE] == ENDED and (case.duration is not None or not math.isnan(stopped)),
         outcome="",
@@ -188,7 +188,7 @@ def _result(setup: Setup, run: Run, output: Path | None) -> CoastDownResult:
         dissipated=float(run.state[layout.dissipated]),
         air_work=float(run.state[layout.work_in]),
         energy_residual=float(run.status[WORST_BALANCE]),
-        energy_scale=float(run.status[ENERGY_AT_START] - stored_energy_of(setup, run.state)),
+        energy_scale=float(run.status[ENERGY_AT_START] - stored_energy_of(setup, end, run.state)),
         steps=int(run.progress[_loop.ACCEPTED]),
         rejected_steps=int(run.progress[_loop.REJECTED]),
         path=output,

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.errors import SimulationError
 from rotordrop.machine import Machine
 from rotordrop.physics import columns as L
 from rotordrop.physics.columns import KernelParameters
-from rotordrop.physics.elementary import magnitude
+from rotordrop.physics.elementary import magnitude, sine_cosine
 from rotordrop.rotor.machine_summary import rotor_on_race
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.rotor.reduction import Reduction
@@ -18,16 +20,16 @@ from rotordrop.simulate import _histories as H
 from rotordrop.simulate import _loop
 from rotordrop.simulate._rhs import N_PLACES
 from rotordrop.simulate._tableau import Tableau, dp5, tsit5
-from rotordrop.simulate.case import DropCase
+from rotordrop.simulate.case import DropCase, UnbalanceJump
 from rotordrop.simulate.certificate import COMPARABLE_WINDOW, Certificate, peaks_of
 from rotordrop.simulate.levitation import start_of_drop
 from rotordrop.simulate.result import ContactLog, DropResult
 
 Array = NDArray[np.float64]
 
-TYPICAL = np.empty(L.AUDIT)
+TYPICAL = np.full(L.N_KINDS, np.inf)
 """Typical size of a state by its kind, in its unit; angle and audit follow without control."""
-TYPICAL[[L.POSITION, L.VELOCITY, L.SPIN, L.INTERNAL, L.ANGLE]] = 1e-4, 0.1, 10.0, 1.0, np.inf
+TYPICAL[[L.POSITION, L.VELOCITY, L.SPIN, L.INTERNAL, L.HEAT]] = 1e-4, 0.1, 10.0, 1.0, 10.0
 FIRST_STEP = 1e-6
 LOG_ROWS_PER_SECOND = 20_000
 
@@ -68,7 +70,7 @@ def tableau_of(case: DropCase) -> Tableau:
 
 
 def error_scale(model: DropModel) -> Array:
-    """Typical size of every state that the step control looks at, shape (s,), in the units of the states.
+    """Typical size of every state, shape (n,), in its unit; infinite where the step control does not look.
 
     Modal amplitudes are scaled so that a mode counts by what it moves at the bearings.
     """
@@ -76,7 +78,7 @@ def error_scale(model: DropModel) -> Array:
     reach = np.max(np.abs(model.parameters.bearing_shape), axis=0)
     floor = 0.05 * np.max(reach)
     modal = 1.0 / np.maximum(reach, floor)
-    scale = TYPICAL[layout.kinds[: layout.n_controlled]]
+    scale = TYPICAL[layout.kinds]
     for part in (layout.modal_x, layout.modal_y):
         scale[part] *= modal
         scale[layout.velocity_of(part)] *= modal
@@ -103,9 +105,22 @@ def _simulate(model: DropModel, case: DropCase) -> DropResult:
         log,
         counters,
         books,
+        None if case.jump is None else (case.jump.time, _with_jump(model, parameters, case.jump)),
     )
     result = _result(model, case, parameters, times, states, log[: int(counters[3])], counters, outcome)
     return replace(result, lost=books)
+
+
+def _with_jump(model: DropModel, parameters: KernelParameters, jump: UnbalanceJump) -> KernelParameters:
+    nodes = len(model.fe.node_positions)
+    if not 1 <= jump.node <= nodes:
+        raise SimulationError(f"the unbalance comes at node {jump.node}; give one of the nodes 1 to {nodes}")
+    sine, cosine = sine_cosine(jump.phase + 0.5 * math.pi)  # the phase counts from +y
+    row = jump.amount * model.basis.node_row(jump.node)
+    return parameters._replace(
+        unbalance_cos=parameters.unbalance_cos + cosine * row,
+        unbalance_sin=parameters.unbalance_sin + sine * row,
+    )
 
 
 def _result(
@@ -122,7 +137,7 @@ def _result(
     reached = int(np.sum(times <= counters[4]))
     times, states = times[:reached], states[:reached]
     histories = np.empty((reached, n_b, H.N_HISTORIES))
-    H.bearing_histories(states, parameters, histories)
+    H.bearing_histories(times, states, parameters, histories)
     displacement = H.node_displacements(states, parameters.bearing_shape)
     force = histories[..., H.H_BEARING_FORCE_X : H.H_BEARING_FORCE_Y + 1]
     return DropResult(
@@ -196,7 +211,7 @@ def _energy_certificate(
     layout = model.layout
     chosen = np.unique(np.linspace(0, len(states) - 1, 200).astype(int))
     stored = np.empty(len(chosen))
-    H.stored_energies(states[chosen], parameters, True, stored)
+    H.stored_energies(times[chosen], states[chosen], parameters, True, stored)
     balance = stored + states[chosen, layout.dissipated] - states[chosen, layout.work_in]
     return Certificate(
         energy_residual=float(np.max(np.abs(balance - balance[0]))),

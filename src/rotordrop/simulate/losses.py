@@ -51,12 +51,12 @@ def losses(model: DropModel, result: DropResult) -> Losses:
     Raises
     ------
     UsageError
-        For a drop whose energies were not booked by place: one of a hidden machine, or an older file.
+        For a drop whose energies were not booked by place: one of an older file.
     """
     if result.lost is None:
         raise UsageError(
-            f"the drop of {result.machine_name!r} holds no energies by place: its file is older, "
-            "or it is that of a hidden machine; simulate it to get them"
+            f"the drop of {result.machine_name!r} holds no energies by place: its file is older; "
+            "simulate it to get them"
         )
     lost, spin = result.lost[:-1], result.race_speed
     gained = 0.5 * model.parameters.bearing[:, L.RACE_INERTIA] * (spin[-1] ** 2 - spin[0] ** 2)

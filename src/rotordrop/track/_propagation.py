@@ -166,7 +166,7 @@ def rates_by_owner(
     if owner == p.bearing.shape[0]:
         add_rotor_rates(t, y, torque, 0.0, p, out)
         return 0.0
-    driven, _lost = bearing_accelerations(owner, y, p, out, work)
+    driven, _lost = bearing_accelerations(t, owner, y, p, out, work)
     return driven
 
 
@@ -390,7 +390,7 @@ def propagate(
             parameter_jacobian(now + 0.5 * h, middle, theta, targets, p, base, other, work, B)
         # What the contact law gets wrong is a share of what it gives; process noise is scaled by the impulse.
         for c in range(p.contact_at.shape[0]):
-            contact_at(c, middle, p, contact)
+            contact_at(now + 0.5 * h, c, middle, p, contact)
             impulses[p.contact_at[c, L.CONTACT_BEARING]] += h * contact[1]
         # F <- exp(hJ) F + what the parameters add, to third order: at second order light modes would grow
         jacobian_product(entries, places, starts, touching, g, p, F, moved, first)

@@ -45,6 +45,7 @@ def bearing_values(
 
 @kernel
 def force_values(
+    times: Array,
     means: Array,
     s: int,
     targets: P.ParameterTargets,
@@ -54,7 +55,7 @@ def force_values(
     gradients: Array,
     contacts: Array,
 ) -> None:
-    """Fill values (N, B, 4), their gradients (N, B, 4, 3) and contacts (N, B, 6).
+    """Fill values (N, B, 4), their gradients (N, B, 4, 3) and contacts (N, B, 6) at ``times`` (N,) [s].
 
     Gradients are by race deflection x, y and axial offset. Values are ball force on the race x, y, its
     magnitude [N] and inner-race stress [Pa]; contacts as in `contact_at`.
@@ -70,7 +71,7 @@ def force_values(
         for b in range(p.bearing.shape[0]):
             dx, dy = race_deflection(b, y, p)
             axial = p.bearing[b, L.AXIAL_OFFSET]
-            contact_at(p.bearing_at[b, L.CONTACTS], y, p, contacts[i, b])
+            contact_at(times[i], p.bearing_at[b, L.CONTACTS], y, p, contacts[i, b])
             bearing_values(dx, dy, axial, b, p, work, values[i, b])
             for c in range(3):
                 ex = step_d if c == 0 else 0.0
@@ -118,6 +119,7 @@ def force_history(problem: DropProblem, smoothed: Smoothed) -> ForceHistory:
     gradients = np.empty((count, n_b, N_VALUES, 3))
     contacts = np.empty((count, n_b, 6))
     force_values(
+        problem.time[:count],
         means,
         s,
         problem.targets,
@@ -153,7 +155,8 @@ def force_gradient(problem: DropProblem, mean: Array, b: int) -> Array:
     gradients = np.empty((1, n_b, N_VALUES, 3))
     values, contacts = np.empty((1, n_b, N_VALUES)), np.empty((1, n_b, 6))
     p = private_copy(problem.model.parameters)
-    force_values(mean[None].copy(), problem.n_dynamic, problem.targets, p, count, values, gradients, contacts)
+    one, s = mean[None].copy(), problem.n_dynamic
+    force_values(np.zeros(1), one, s, problem.targets, p, count, values, gradients, contacts)
     rows = problem.watched_rows(problem.model.bearing_names[b])[:3]
     return np.asarray(gradients[0, b, FORCE] @ rows)
 

@@ -37,7 +37,7 @@ def slope_of_energy(state, rate, parameters, layout):
         upper, lower = state.copy(), state.copy()
         upper[i] += step
         lower[i] -= step
-        change = stored_energy(upper, parameters, False) - stored_energy(lower, parameters, False)
+        change = stored_energy(0.0, upper, parameters, False) - stored_energy(0.0, lower, parameters, False)
         slope += rate[i] * change / (2.0 * step)
     return slope
 
@@ -131,7 +131,7 @@ def test_a_moving_support_loses_to_its_own_dampers(quick):
     race = layout.velocity_of(layout.race)
     state[race] = state[support]
     rate = np.zeros(layout.size)
-    bearing_accelerations(0, state, parameters, rate, work)
+    bearing_accelerations(0.0, 0, state, parameters, rate, work)
     damping = quick.machine.touchdown_bearings[0].support
     expected = float(damping.damping_horizontal) * 0.3**2 + float(damping.damping) * 0.2**2
     assert work.power[0, SUPPORT] == pytest.approx(expected, rel=1e-12)

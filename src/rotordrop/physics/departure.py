@@ -1,0 +1,241 @@
+"""What a touchdown bearing may have and no estimator models: departing support, gap, contact law and race.
+
+A departure is a row of numbers and twelve states that stand behind the books of the state. What an extension
+of the estimator models too (turned axes, a hardening support, a foundation) has other equations here: a
+recording that is estimated must not share the equation it was made with.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.physics import columns as L
+from rotordrop.physics._compile import inner_kernel, lean_kernel
+from rotordrop.physics.contact import contact_energy
+from rotordrop.physics.elementary import exp, sine_cosine
+
+Array = NDArray[np.float64]
+
+# Columns of a departure, one row per bearing; SI units.
+AXIS_COSINE, AXIS_SINE = 0, 1  # of the angle from horizontal to the first principal axis of the support
+HARDENING, RADIAL = 2, 3  # k in F = K h (1 + k h²) [1/m²]; h along the axis, or the whole where RADIAL is 1
+SLIP_FORCE, SLIP_TRAVEL = 4, 5  # [N], [m]
+FOUNDATION_MODE, TILT_MODE = 6, 11  # of each: 1/M [1/kg], ω² along x and y [1/s²], 2ζω along x and y [1/s]
+COMPLIANCE, SQUARE_X, SQUARE_Y, DECAY_X, DECAY_Y, MODE_WIDTH = 0, 1, 2, 3, 4, 5
+CENTRE_X, CENTRE_Y = 16, 17  # centre of the bearing in the axes of the magnets [m]
+GAP_DRIFT, GAP_DRIFT_TIME = 18, 19  # [m] within [s]
+GAP_CLOSING, GAP_HEAT = 20, 21  # [m] when much more than [J] were rubbed
+CAGE_RATIO = 22  # turn of the cage per turn of the race
+LAW_PIECES, LAW = 23, 24
+LAW_STIFFNESS, LAW_EXPONENT, LAW_DAMPING, LAW_UNTIL, LAW_WIDTH = 0, 1, 2, 3, 4
+MOST_PIECES = 8
+N_COLUMNS = LAW + MOST_PIECES * LAW_WIDTH
+
+# States of a departure: displacement, then velocity of foundation and of tilt (x, y), slip over its travel
+# [1], heat rubbed into the contact [J], angle of the cage [rad].
+FOUNDATION, TILT, SLIP_X, SLIP_Y, HEAT, CAGE_ANGLE, N_STATES = 0, 4, 8, 9, 10, 11, 12
+KINDS = (
+    *(L.POSITION, L.POSITION, L.VELOCITY, L.VELOCITY) * 2,
+    *(L.INTERNAL, L.INTERNAL, L.HEAT, L.ANGLE),
+)
+"""Kind of each of these states."""
+
+
+def no_departure() -> Array:
+    """Row of a bearing that departs in nothing [its columns in SI], shape (C,).
+
+    Source: by definition; it gives the bits of a bearing without a row.
+    """
+    row = np.zeros(N_COLUMNS)
+    row[[AXIS_COSINE, SLIP_TRAVEL, GAP_DRIFT_TIME, GAP_HEAT]] = 1.0
+    return row
+
+
+@inner_kernel
+def against_bore(
+    s: Array, own: Array, x: float, y: float, vx: float, vy: float
+) -> tuple[float, float, float, float]:
+    """Motion of the rotor against the tilted bore [m], [m/s] from that against the race.
+
+    Source: kinematics of a bore that stands off the axis of the magnets and tilts where the rotor touches.
+    """
+    return (
+        x - own[TILT] - s[CENTRE_X],
+        y - own[TILT + 1] - s[CENTRE_Y],
+        vx - own[TILT + 2],
+        vy - own[TILT + 3],
+    )
+
+
+@lean_kernel
+def gap_now(s: Array, own: Array, t: float, nominal: float) -> float:
+    """Air gap [m] at a time [s], from the nominal one: it drifts, and closes with the heat of friction.
+
+    Source: chosen, not measured: even drift, and growth that saturates with the heat.
+    """
+    drift = s[GAP_DRIFT] * min(max(t, 0.0) / s[GAP_DRIFT_TIME], 1.0)
+    gap: float = nominal + drift - s[GAP_CLOSING] * (1.0 - exp(-own[HEAT] / s[GAP_HEAT]))
+    return gap
+
+
+@lean_kernel
+def law_at(s: Array, delta: float) -> int:
+    """Column of the piece of a departing contact law at an indentation [m]; -1 where the law stays.
+
+    Source: a law through given points, a power of the depth between two of them.
+    """
+    pieces = int(s[LAW_PIECES])
+    at = LAW if pieces > 0 else -1
+    for _ in range(pieces - 1):
+        if delta > s[at + LAW_UNTIL]:
+            at += LAW_WIDTH
+    return at
+
+
+@lean_kernel
+def energy_in_contact(s: Array, law: Array, delta: float) -> float:
+    """Energy [J] of the contact at a positive indentation [m], piece by piece where its law has pieces.
+
+    Source: integral of `law_at`.
+    """
+    pieces = int(s[LAW_PIECES])
+    if pieces == 0:
+        return contact_energy(law, delta)
+    energy, low = 0.0, 0.0
+    for i in range(pieces):
+        at = LAW + i * LAW_WIDTH
+        piece = s[at : at + LAW_UNTIL]
+        high = delta if i == pieces - 1 else min(delta, s[at + LAW_UNTIL])
+        energy += contact_energy(piece, high) - (contact_energy(piece, low) if low > 0.0 else 0.0)
+        if high == delta:
+            break
+        low = high
+    return energy
+
+
+@lean_kernel
+def turned(angle: float, x: float, y: float) -> tuple[float, float]:
+    """A vector in axes turned by an angle [rad]; in its own unit.
+
+    Source: rotation of axes; the balls stand where the cage has taken them.
+    """
+    sine, cosine = sine_cosine(angle)
+    return cosine * x + sine * y, cosine * y - sine * x
+
+
+@lean_kernel
+def support_force(
+    s: Array,
+    own: Array,
+    rates: Array,
+    springs: Array,
+    dampers: Array,
+    x: float,
+    y: float,
+    vx: float,
+    vy: float,
+) -> tuple[float, float, float, float, float]:
+    """Forces of a departing support [N] at a deflection [m] and its rate [m/s], and the power it takes [W].
+
+    Parameters
+    ----------
+    s, own, rates : ndarray
+        Departure [SI], its states and their rates, of which those of the slip are filled [1/s].
+    springs, dampers : ndarray, shape (2,)
+        Stiffness [N/m] and damping [N s/m] along the first axis and across.
+    x, y, vx, vy : float
+        Displacement [m] and velocity [m/s] of the support.
+
+    Returns
+    -------
+    tuple of float
+        Force of the springs, slip included, and of the dampers along x and y [N]; power lost [W].
+
+    Notes
+    -----
+    Source: principal axes turned by an angle; ``K h (1 + k h²)`` along each, or the gradient of
+    ``(1 + k h²/2)`` times the energy of the linear springs, with h the whole deflection; slip of a bristle of
+    Dahl 1968, ``z' = (v - |v| z) / travel``. Not validated.
+    """
+    x, y, vx, vy = x - own[0], y - own[1], vx - own[2], vy - own[3]
+    c, z = s[AXIS_COSINE], s[AXIS_SINE]
+    along = c * x + z * y
+    across = c * y - z * x
+    first, second = springs[0] * along, springs[1] * across
+    k = s[HARDENING]
+    if s[RADIAL] == 0.0:
+        first *= 1.0 + k * along * along
+        second *= 1.0 + k * across * across
+    else:  # no force without a potential
+        share = 1.0 + 0.5 * k * (along * along + across * across)
+        pull = 0.5 * k * (first * along + second * across)
+        first = first * share + pull * along
+        second = second * share + pull * across
+    damp_first = dampers[0] * (c * vx + z * vy)
+    damp_second = dampers[1] * (c * vy - z * vx)
+    damp_x = c * damp_first - z * damp_second
+    damp_y = c * damp_second + z * damp_first
+    speed = math.sqrt(vx * vx + vy * vy)
+    zx, zy = own[SLIP_X], own[SLIP_Y]
+    rates[SLIP_X] = (vx - speed * zx) / s[SLIP_TRAVEL]
+    rates[SLIP_Y] = (vy - speed * zy) / s[SLIP_TRAVEL]
+    slip = s[SLIP_FORCE]
+    lost = damp_x * vx + damp_y * vy + slip * speed * (zx * zx + zy * zy)
+    return c * first - z * second + slip * zx, c * second + z * first + slip * zy, damp_x, damp_y, lost
+
+
+@lean_kernel
+def mode_rates(mode: Array, force_x: float, force_y: float, own: Array, rates: Array) -> float:
+    """Fill the rates of foundation or tilt, (4,), under a force [N]; returns the power that it takes [W].
+
+    ``mode`` (5,) as in the columns. Source: a mode that the force drives, ``u'' = F/M - ω² u - 2ζω u'``.
+    """
+    lost = 0.0
+    for axis in range(2):
+        force = force_x if axis == 0 else force_y
+        u, v = own[axis], own[2 + axis]
+        brake = mode[DECAY_X + axis] * v
+        rates[axis] = v
+        rates[2 + axis] = mode[COMPLIANCE] * force - mode[SQUARE_X + axis] * u - brake
+        lost += brake * v
+    power: float = lost / mode[COMPLIANCE] if mode[COMPLIANCE] > 0.0 else 0.0
+    return power
+
+
+@lean_kernel
+def mode_energy(mode: Array, own: Array) -> float:
+    """Energy [J] of foundation or tilt in its displacement and velocity (4,).
+
+    Source: integral of `mode_rates`.
+    """
+    if mode[COMPLIANCE] == 0.0:
+        return 0.0
+    energy = 0.0
+    for axis in range(2):
+        energy += mode[SQUARE_X + axis] * own[axis] ** 2 + own[2 + axis] ** 2
+    stored: float = 0.5 * energy / mode[COMPLIANCE]
+    return stored
+
+
+@lean_kernel
+def stored_energy(s: Array, own: Array, springs: Array, x: float, y: float) -> float:
+    """Energy [J] of a departing support at a displacement [m], of its slip, of foundation and tilt.
+
+    ``springs`` (2,) as in `support_force`. Source: integral of `support_force` and `mode_rates`.
+    """
+    x, y = x - own[0], y - own[1]
+    c, z, k = s[AXIS_COSINE], s[AXIS_SINE], s[HARDENING]
+    along, across = c * x + z * y, c * y - z * x
+    first, second = 0.5 * springs[0] * along * along, 0.5 * springs[1] * across * across
+    if s[RADIAL] > 0.0:
+        energy = (first + second) * (1.0 + 0.5 * k * (x * x + y * y))
+    else:
+        energy = first * (1.0 + 0.5 * k * along * along) + second * (1.0 + 0.5 * k * across * across)
+    energy += 0.5 * s[SLIP_FORCE] * s[SLIP_TRAVEL] * (own[SLIP_X] ** 2 + own[SLIP_Y] ** 2)
+    energy += mode_energy(s[FOUNDATION_MODE : FOUNDATION_MODE + MODE_WIDTH], own[FOUNDATION : FOUNDATION + 4])
+    energy += mode_energy(s[TILT_MODE : TILT_MODE + MODE_WIDTH], own[TILT : TILT + 4])
+    stored: float = energy
+    return stored
