@@ -68,23 +68,7 @@ class Arrangement:
 
 
 def arrangement_of(recording: Recording, profile: Profile) -> Arrangement:
-    """Pair the displacement channels of a recording into planes.
-
-    Parameters
-    ----------
-    recording : Recording
-        The channels.
-    profile : Profile
-        Its planes, else its names for the channels; where it has neither, names that differ in one letter or
-        word only (X and Y, A and B, H and V, left and right) are a pair.
-
-    Raises
-    ------
-    RecordError
-        When no pair is found.
-    UsageError
-        When a plane of the profile cannot be read.
-    """
+    """Planes of a recording: those of the profile, else pairs by its names for channels or the file's."""
     known = False
     notes: tuple[str, ...] = ()
     if profile.planes:
@@ -166,13 +150,7 @@ def given_planes(
 
 
 def sensors_of_planes(recording: Recording, sensors: Sequence[Sensor], profile: Profile) -> dict[str, str]:
-    """Channel of each sensor of the machine by the planes of a profile: by angle, or in their order.
-
-    Raises
-    ------
-    UsageError
-        When the machine has no such plane or its sensors stand at other angles.
-    """
+    """Channel of each sensor of the machine by the planes of a profile: by angle, or in their order."""
     mapped: dict[str, str] = {}
     for name, entries in given_planes(recording, profile):
         members = [sensor for sensor in sensors if (sensor.bearing or "").lower() == name.lower()]

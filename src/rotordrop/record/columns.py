@@ -41,13 +41,7 @@ class Guess:
 def match_sensors(
     recording: Recording, sensors: tuple[Sensor, ...], profile: Profile, place: str
 ) -> tuple[Channel, ...]:
-    """Find the channel of every sensor of the machine, in their order, by the map of the profile or by name.
-
-    Raises
-    ------
-    RecordError
-        When a sensor has no channel, or more than one, or two sensors share one; `place` names the file.
-    """
+    """The channel of every sensor of the machine, in their order, by the map of the profile or by name."""
     unknown = sorted(set(profile.channels) - {sensor.name for sensor in sensors})
     if unknown:
         names = ", ".join(sensor.name for sensor in sensors)
@@ -101,13 +95,7 @@ def _likeliest(recording: Recording, sensors: Sequence[Sensor], missing: Sequenc
 def find_speed(
     recording: Recording, taken: Sequence[Channel], profile: Profile, place: str
 ) -> Channel | None:
-    """Find the channel of the shaft speed, or None when the file has none.
-
-    Raises
-    ------
-    RecordError
-        When several channels could be the speed.
-    """
+    """Find the channel of the shaft speed, or None when the file has none."""
     free = [channel for channel in recording.channels if all(channel is not other for other in taken)]
     if profile.speed.channel is not None:
         return _named(free, profile.speed.channel, "speed channel", recording, place)
@@ -127,13 +115,7 @@ def find_speed(
 def find_pulses(
     recording: Recording, taken: Sequence[Channel], profile: Profile, place: str
 ) -> Channel | None:
-    """Find the channel of tacho pulses that the profile names, or None when it names none.
-
-    Raises
-    ------
-    RecordError
-        When there is no such channel.
-    """
+    """Find the channel of tacho pulses that the profile names, or None when it names none."""
     if profile.speed.pulses is None:
         return None
     free = [channel for channel in recording.channels if all(channel is not other for other in taken)]
@@ -150,13 +132,12 @@ def _named(free: list[Channel], name: str, what: str, recording: Recording, plac
 def displacement(
     channel: Channel, sensor: Sensor, recording: Recording, profile: Profile, place: str
 ) -> tuple[Array, list[str]]:
-    """Give the reading of a sensor [m], shape (N,), with a word where two sensitivities disagree.
-
-    Raises
-    ------
-    RecordError
-        When the unit is missing, is no length, or is volts without a sensitivity.
-    """
+    """Give the reading of a sensor [m], shape (N,), with a word where two sensitivities disagree."""
+    if channel.unit == FULL_SCALE:
+        raise RecordError(
+            f"{place} holds shares of a full scale, from -1 to 1, and does not tell it: say what it is with "
+            f"'rotordrop profile {Path(place).name} --full-scale \"500 um\" -o recorder.toml'"
+        )
     # a sensor may be called "S_V": the ending of its channel's name is then no unit
     suffixed = channel.label == sensor.name and channel.name != channel.label
     unit = profile.units.get(channel.label, "" if suffixed else channel.unit) or profile.unit or ""
@@ -164,11 +145,6 @@ def displacement(
         volts = channel.values * parse_quantity(f"1 {unit}", "voltage") - recording.voltage_offset
         sensitivity, words = _sensitivity(channel, sensor, recording, profile, place)
         return volts / sensitivity, words
-    if channel.unit == FULL_SCALE:
-        raise RecordError(
-            f"{place} holds shares of a full scale, from -1 to 1, and does not tell it: say what it is with "
-            f"'rotordrop profile {Path(place).name} --full-scale \"500 um\" -o recorder.toml'"
-        )
     if not unit:
         raise RecordError(
             f'{place}: channel {channel.label!r} has no unit; name it in the profile: unit = "um"'
@@ -208,13 +184,7 @@ def _sensitivity(
 
 
 def speed_factor(channel: Channel, profile: Profile, place: str) -> float:
-    """Speed in rad/s of one unit of the speed channel.
-
-    Raises
-    ------
-    RecordError
-        When the unit is missing or is no unit of speed.
-    """
+    """Speed in rad/s of one unit of the speed channel."""
     unit = profile.speed.unit or profile.units.get(channel.label, channel.unit)
     if not unit:
         raise RecordError(

@@ -9,10 +9,13 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from rotordrop.errors import RecordError, UsageError
 from rotordrop.files import write_text
+from rotordrop.record.recording import Array, Channel, spelled
 from rotordrop.record.tacho import Edge
 from rotordrop.units import parse_quantity
 
@@ -86,6 +89,19 @@ class Profile(_Section):
     time: Clock = Clock()
     speed: SpeedSource = SpeedSource()
 
+    def channel(
+        self, name: str, unit: str, values: ArrayLike, time: Array, *, label: str | None = None
+    ) -> Channel:
+        """A channel as a file names it, in the unit that the profile says or else the file."""
+        label = name if label is None else label
+        return Channel(
+            name=name,
+            label=label,
+            unit=spelled(self.units.get(label, unit)),
+            values=np.asarray(values, dtype=np.float64),
+            time=time,
+        )
+
     @field_validator("sensitivity")
     @classmethod
     def _is_sensitivity(cls, text: str | None) -> str | None:
@@ -111,13 +127,7 @@ def load_profile(path: str | Path) -> Profile:
 
 
 def profile_of(content: dict[str, Any], place: str) -> Profile:
-    """Make a profile of the entries of a TOML file, or say which entry is wrong and what belongs there.
-
-    Raises
-    ------
-    RecordError
-        Names every entry that does not fit, with the entries its section knows.
-    """
+    """Make a profile of the entries of a TOML file, or say which entry is wrong and what belongs there."""
     try:
         return Profile.model_validate(content)
     except ValidationError as error:
@@ -155,20 +165,7 @@ _EXPECTED = {
 
 
 def rules_of(profile: Profile | str | Path | None, mapping: Sequence[str] = ()) -> Profile:
-    """The reading rules of a profile or its file, with what texts such as those of ``--map`` add.
-
-    Parameters
-    ----------
-    profile : Profile or path-like, optional
-        The rules of the recorder.
-    mapping : sequence of str
-        ``"SENSOR = CHANNEL"`` or ``"PLANE: CHANNEL angle, CHANNEL angle"``.
-
-    Raises
-    ------
-    UsageError
-        When a text is neither.
-    """
+    """A profile or its file, with "SENSOR=CHANNEL" and "PLANE: CHANNEL angle, CHANNEL angle" added."""
     rules = profile if isinstance(profile, Profile) else load_profile(profile) if profile else Profile()
     channels, planes = dict(rules.channels), {} if mapping else dict(rules.planes)
     for text in mapping:

@@ -71,13 +71,7 @@ class Content:
 
 
 def unpack(path: Path, kind: str) -> Content:
-    """Read a file in a child process by `unpacked` of the module `kind` of `rotordrop.record.readers`.
-
-    Raises
-    ------
-    RecordError
-        When the child refuses the file, needs too much time or memory, or is ended by the file.
-    """
+    """Read a file in a child process by `unpacked` of the module `kind` of `rotordrop.record.readers`."""
     import subprocess
 
     size = path.stat().st_size

@@ -76,19 +76,9 @@ class RotorAngle:
 def rotor_angle(
     record: Record, power_off: float, turning: float, *, strongest_slowing: float = 0.0
 ) -> RotorAngle:
-    """Angle of the rotor over a record.
+    """Angle of the rotor over a record, from power-off [s] and its speed before, without sign [rad/s].
 
-    Parameters
-    ----------
-    record : Record
-        The record.
-    power_off : float
-        Power-off in record time [s].
-    turning : float
-        Speed before it, without sign [rad/s].
-    strongest_slowing : float
-        Deceleration that the friction of the touchdown bearings reaches at most [rad/s²]; used where no speed
-        was read after power-off: anything from none to that is taken as equally likely.
+    Where no speed was read after it, any slowing up to `strongest_slowing` [rad/s²] is equally likely.
     """
     measured = record.measured_speed
     later = measured is not None and np.flatnonzero((measured[0] > power_off) & np.isfinite(measured[1]))
@@ -114,20 +104,7 @@ def rotor_angle(
 
 
 def readings_of_held_signal(time: Array, values: Array) -> tuple[Array, Array]:
-    """Find the readings in a signal that holds each until the next; other signals come back as they are.
-
-    Parameters
-    ----------
-    time : array, shape (N,)
-        Time of the samples [s].
-    values : array, shape (N,)
-        Samples, in any unit.
-
-    Returns
-    -------
-    time, values : array, shape (K,)
-        When a new value appeared and which.
-    """
+    """When a signal that holds each reading took a new one [s] and which, (K,); others as they are."""
     changes = np.flatnonzero(np.diff(values)) + 1
     if len(changes) < 3 or len(changes) > 0.5 * len(values):
         return time, values
@@ -219,13 +196,7 @@ def smooth_speed(record: Record, *, span: float = 0.1) -> Array:
 
 
 def require_speed(record: Record) -> tuple[Array, Array]:
-    """Give the speed readings, time [s] and value [rad/s], or say that they are missing and what to do.
-
-    Raises
-    ------
-    RecordError
-        When the record has no speed.
-    """
+    """Give the speed readings, time [s] and value [rad/s], or say that they are missing and what to do."""
     if record.speed_time is None or record.speed_readings is None:
         raise RecordError(
             f"{record.name} has no shaft speed beside {', '.join(record.channel_names)}; name its channel in "

@@ -49,26 +49,10 @@ class Passages:
 def passages(
     time: Array, values: Array, *, per_turn: int = 1, edge: Edge = "rising", place: str = "the tacho channel"
 ) -> Passages:
-    """Read the passages of a mark and the speed from a channel of pulses.
+    """Read the passages of a mark and the speed from samples (N,) of a channel of pulses, called `place`.
 
     Speed is taken over whole turns, so that marks at uneven distances do not show, and over several where one
     is sampled too coarsely.
-
-    Parameters
-    ----------
-    time, values : array, shape (N,)
-        Samples of the channel [s], in any unit.
-    per_turn : int
-        Pulses per turn.
-    edge : {"rising", "falling"}
-        Which edge of a pulse is the passage.
-    place : str
-        What to call the channel in messages.
-
-    Raises
-    ------
-    RecordError
-        When the channel has no pulses, fewer than three turns, or too many that do not fit the others.
     """
     crossings = _crossings(time, values if edge == "rising" else -values)
     if len(crossings) < 2 * per_turn + 1:

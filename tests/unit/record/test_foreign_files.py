@@ -119,7 +119,9 @@ def test_uneven_times_and_spectra_of_universal_files(tmp_path):
     np.testing.assert_allclose(channel.time, TIME, atol=1e-8)
     np.testing.assert_allclose(channel.values, MICRONS[:, 0], rtol=1e-5)
     path.write_text(text.replace(f"{17:10d}{0:5d}", f"{18:10d}{0:5d}", 1))
-    with pytest.raises(RecordError, match=r"holds only spectra: 'NDE X'; a real time history is expected"):
+    with pytest.raises(
+        RecordError, match=r"holds no time history of dataset 58 \(it has spectrum 'NDE X'\); export"
+    ):
         read(path)
 
 
@@ -142,7 +144,7 @@ def test_testlab_structures_must_be_whole_and_in_time(tmp_path):
 def test_a_wav_file_asks_for_its_full_scale_whatever_unit_is_given(tmp_path):
     path = export("WAV").written(tmp_path)
     asked = r"holds shares of a full scale, from -1 to 1, .*--full-scale \"500 um\""
-    for rules in (Profile(), Profile(unit="um"), Profile(units={"channel 1": "um"})):
+    for rules in (Profile(), Profile(unit="um"), Profile(units={"channel 1": "V"})):
         with pytest.raises(RecordError, match=asked):
             open_record(path, None, profile=rules)
     record, _ = open_record(path, None, profile=Profile(full_scale="500 um"))
@@ -195,3 +197,49 @@ def test_messages_name_eight_channels_at_most(machine, tmp_path):
     )
     with pytest.raises(RecordError, match=r"it has T0, T1, T2, T3, T4, T5, T6, T7 and 22 more"):
         read_record(path, machine)
+
+
+def test_one_damaged_field_does_not_turn_the_table_into_words(tmp_path):
+    """Beside a status column of whole numbers all others passed as words, and only the status was read."""
+    content = export("KKS tags").content
+    row = next(line for line in content.split(b"\r\n")[30:])
+    (tmp_path / "drop.csv").write_bytes(content.replace(row, row.replace(b";", b";%A", 2), 1))
+    with pytest.raises(RecordError, match=r"line \d+, column '10MKA11CY01. \[mil\]': '%A.* is not a number"):
+        read(tmp_path / "drop.csv")
+
+
+def test_damage_to_a_universal_file_does_not_take_a_channel_away(tmp_path):
+    """A dataset whose type or whose line -1 was damaged was passed over without a word."""
+    path = tmp_path / "drop.uff"
+    whole = universal(binary="<", padded=False)
+    second = whole.index(b"    58b", whole.index(b"    58b") + 1)
+    for damaged, said in (
+        (
+            whole[:second] + whole[second:].replace(b"58b", b"50b", 1),
+            r"where a line -1 and the type of a dat",
+        ),
+        (whole[: second - 7] + whole[second - 7 :].replace(b"-1", b"-9", 1), r"stands b'-9.*where a line -1"),
+    ):
+        path.write_bytes(damaged)
+        with pytest.raises(RecordError, match=said):
+            read(path)
+
+
+def test_damage_to_a_head_beside_the_readings_does_not_take_a_channel_away(tmp_path):
+    path = tmp_path / "drop.csv"
+    content = export("head beside the readings").content
+    path.write_bytes(content.replace(b",Record Length", b",Rocord Length", 1))
+    with pytest.raises(
+        RecordError, match=r"line 1: 2\d fields with 3 times 'Record Length' are no heads of five"
+    ):
+        read(path)
+    path.write_bytes(b"\r\n".join(content.split(b"\r\n")[:40]) + b"\r\n")
+    (told,) = read(path).warnings
+    assert "declares 60 samples and 40 are present" in told
+
+
+def test_damage_to_the_head_of_a_labview_file_does_not_take_a_segment_away(tmp_path):
+    path = tmp_path / "drop.lvm"
+    text = labview("No", segments=(range(25), range(25, COUNT))).decode()
+    path.write_text(text.replace("***End_of_Header***", "**+End_of_Header***", 1), newline="")
+    assert len(read(path).channels[0].values) == COUNT

@@ -57,13 +57,7 @@ its bytes to be read."""
 
 
 def read_recording(path: Path, profile: Profile) -> Recording:
-    """Read a file with the reader its suffix or the profile names.
-
-    Raises
-    ------
-    RecordError
-        When there is no such file or no reader for it.
-    """
+    """Read a file with the reader its suffix or the profile names."""
     try:
         there = path.is_file()
     except OSError as error:

@@ -12,7 +12,7 @@ import numpy as np
 from rotordrop.errors import RecordError
 from rotordrop.record.profile import Profile
 from rotordrop.record.readers import refuse_large
-from rotordrop.record.recording import Array, Channel, Recording, spelled, split_unit
+from rotordrop.record.recording import Array, Recording, spelled, split_unit
 
 _FORMATS = {"BINARY": ("<i2", -(2**15)), "BINARY32": ("<i4", -(2**31)), "FLOAT32": ("<f4", None)}
 """How an analogue sample is stored and what stands for a missing one (IEEE C37.111)."""
@@ -70,12 +70,12 @@ def read_comtrade(path: Path, profile: Profile) -> Recording:
         )
     time = rules.start + _seconds(numbers, stamps, rules, samples)
     channels = [
-        Channel(
-            name=split_unit(entry.name)[0],
+        profile.channel(
+            split_unit(entry.name)[0],
+            entry.unit,
+            table[:, i] * entry.factor + entry.offset,
+            time + entry.skew if entry.skew else time,
             label=entry.name,
-            unit=spelled(profile.units.get(entry.name, entry.unit)),
-            values=table[:, i] * entry.factor + entry.offset,
-            time=time + entry.skew if entry.skew else time,
         )
         for i, entry in enumerate(rules.analogue)
     ]

@@ -20,7 +20,7 @@ from rotordrop.record.readers.text import (
     read_lines,
     stamp_parts,
 )
-from rotordrop.record.recording import Array, Channel, Recording, listed, spelled, split_unit
+from rotordrop.record.recording import Array, Recording, listed, split_unit
 from rotordrop.units import parse_quantity
 
 _UNEVEN = 0.1
@@ -39,11 +39,11 @@ _DAY = 86_400
 def read_delimited(path: Path, profile: Profile) -> Recording:
     """Read a text file of columns, whatever its separator, decimal sign, header and time column."""
     lines, complete, encoding = read_lines(path, profile.text)
-    lines = _without_head_beside(lines)
+    lines = _without_head_beside(lines, path)
     return recording_of_lines(lines, complete, f"text in {encoding}", path, profile)
 
 
-def _without_head_beside(lines: list[str]) -> list[str]:
+def _without_head_beside(lines: list[str], path: Path) -> list[str]:
     """Put a head that stands beside the readings above them, as oscilloscopes of Tektronix write it.
 
     Each channel has five columns: key, value, a third for a unit, time, reading.
@@ -53,13 +53,22 @@ def _without_head_beside(lines: list[str]) -> list[str]:
     if not beside or not is_number(first[beside[0] + 3], ".") or not is_number(first[beside[0] + 4], "."):
         return lines
     rows = [fields_of(line, ",") for line in lines]
+    if beside != list(range(0, 5 * (len(first) // 5), 5)):
+        raise RecordError(
+            f"{path}, line 1: {len(first)} fields with {len(beside)} times 'Record Length' are no heads of "
+            "five columns each; export it again"
+        )
     labels = []
     for i in beside:
         head = {row[i]: row[i + 1] for row in rows if len(row) > i + 1 and row[i]}
         labels.append(f"Time [{head.get('Horizontal Units', 's')}]")
         labels.append(f"{head.get('Source', f'CH{i // 5 + 1}')} [{head.get('Vertical Units', '')}]")
     kept = [i + offset for i in beside for offset in (3, 4)]
-    return [",".join(labels), *(",".join(row[i] for i in kept if i < len(row)) for row in rows)]
+    return [
+        f"Record Length,{rows[0][1]}",
+        ",".join(labels),
+        *(",".join(row[i] for i in kept if i < len(row)) for row in rows),
+    ]
 
 
 def recording_of_lines(
@@ -80,17 +89,14 @@ def recording_of_lines(
     channels = []
     for i in sorted(set(table) - set(used)):
         name, label, unit = columns[i]
-        unit, time = spelled(profile.units.get(label, unit)), times[max(k for k in times if k <= i)]
+        time = times[max(k for k in times if k <= i)]
         # side by side, captures may differ in length: the shorter ends in blanks
-        there = np.isfinite(time) if len(used) > 1 else np.ones(len(time), dtype=bool)
+        there = slice(
+            int(np.max(np.flatnonzero(np.isfinite(time)), initial=-1)) + 1 if len(used) > 1 else None
+        )
+        unnamed = f"column {i + 1}"
         channels.append(
-            Channel(
-                name=name or f"column {i + 1}",
-                label=label or f"column {i + 1}",
-                unit=unit,
-                values=table[i][there],
-                time=time if there.all() else time[there],
-            )
+            profile.channel(name or unnamed, unit, table[i][there], time[there], label=label or unnamed)
         )
     texts = [label for label, kind in zip(head.labels, layout.kinds, strict=True) if kind == "text"]
     notes += [f"left out, no numbers: {', '.join(texts)}"] if texts else []

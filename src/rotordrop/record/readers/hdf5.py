@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from rotordrop.errors import RecordError
-from rotordrop.record.recording import Array, Channel, Recording, spelled
+from rotordrop.record.recording import Array, Recording
 from rotordrop.record.sandbox import MOST_SERIES, Content, Item, plain, refuse_bomb, unpack
 
 if TYPE_CHECKING:
@@ -46,11 +46,9 @@ def read_hdf5(path: Path, profile: Profile) -> Recording:
         values = item.values.astype(np.float64)
         values *= 1.0 if scale is None else scale
         values += 0.0 if offset is None else offset
-        unit = profile.units.get(item.name, str(attributes.get("unit", attributes.get("units", ""))))
+        unit = str(attributes.get("unit", attributes.get("units", "")))
         time = _time(item, attributes, times, path, clocks)
-        channels.append(
-            Channel(name=last[item.name], label=item.name, unit=spelled(unit), values=values, time=time)
-        )
+        channels.append(profile.channel(last[item.name], unit, values, time, label=item.name))
     if not channels:
         raise RecordError(f"{path} holds no one-dimensional numeric dataset; export the channels one by one")
     entries = {key: str(value) for key, value in content.attributes.items()}

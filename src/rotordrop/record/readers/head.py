@@ -37,6 +37,9 @@ _KEYS = {
 }
 """Keys of lines in letters and digits only, as recorders write them in English and German."""
 
+_OF_CLOCK = 2
+"""Fields of a clock that may stand beyond the columns: its start and its step."""
+
 _KIND = {key: kind for kind, keys in _KEYS.items() for key in keys.split()}
 
 _SENSITIVITY = re.compile(r"(\d+(?:[.,]\d+)?)\s*(m?V)\s*/\s*([uµμm]?m|mil)\b")
@@ -68,17 +71,11 @@ class Head:
 
 
 def read_head(lines: list[str], layout: Layout, profile: Profile, path: Path) -> Head:
-    """Read the comment and header lines above the columns.
-
-    Raises
-    ------
-    RecordError
-        When nothing names the columns, or a line there is a damaged row of readings.
-    """
+    """Read the comment and header lines above the columns."""
     given = profile.text.names
     if given is not None and len(given) != layout.columns:
         raise RecordError(f"{path} has {layout.columns} columns and the profile names {len(given)}")
-    rows = [fields_of(line if given else line.lstrip("# "), layout.separator) for line in lines]
+    rows = [fields_of(line if given else line.lstrip("# "), layout.separator) or [""] for line in lines]
     names, units, used = ([], [], set()) if given else _names_and_units(rows, layout)
     # rows that stand where the samples begin and are none: left out, the record would start later
     last = max(used, default=-1)
@@ -162,7 +159,7 @@ def _names_and_units(rows: list[list[str]], layout: Layout) -> tuple[list[str], 
     full = [
         i
         for i, row in enumerate(rows)
-        if i not in used and not _kind(row[0]) and (wide := _cut(row, columns)) and _may_name(wide)
+        if i not in used and not _kind(row[0]) and (wide := _cut(row, columns)) and _may_name(wide, layout)
     ]
     if full:
         names = _cut(rows[full[-1]], columns) or names
@@ -173,6 +170,12 @@ def _names_and_units(rows: list[list[str]], layout: Layout) -> tuple[list[str], 
             names = [new or old for new, old in zip(said, names, strict=True)]
     names = [f"CH{name}" if name.isdigit() else name for name in names]
     return names, [unit.strip("[]()") for unit in units], used
+
+
+def _trimmed(row: list[str]) -> list[str]:
+    """A row without the blank fields at its end."""
+    filled = [i for i, field in enumerate(row) if field]
+    return row[: filled[-1] + 1] if filled else []
 
 
 def _filled(fields: list[str]) -> list[str]:
@@ -186,21 +189,21 @@ def _cut(row: list[str], columns: int) -> list[str] | None:
         return None
     beyond = [field for field in row[columns:] if field and field.lower() != "comment"]
     clock = all(_kind(field) in ("step", "start") or is_number(field, ".") for field in beyond)
-    return row[:columns] if clock and len(beyond) < columns else None
+    return row[:columns] if clock and len(beyond) <= _OF_CLOCK else None
 
 
-def _may_name(row: list[str]) -> bool:
+def _may_name(row: list[str], layout: Layout) -> bool:
     """Whether a row can name columns: most fields filled, no numbers, not one word for all."""
     if sum(map(bool, row)) <= len(row) // 2 or (len(row) > 2 and len(set(row[1:])) == 1):
         return False
-    return bool(TIME_NAMES.match(row[0])) or not any(is_number(field, ".") for field in row)
+    if TIME_NAMES.match(row[0]) and all(field.isdigit() for field in row[1:]):
+        return True  # channels that have numbers for names
+    return not any(is_number(field, sign) for field in row for sign in {".", layout.decimal})
 
 
 def _by_column(row: list[str], columns: int, *, alone: bool) -> list[str] | None:
     """Values behind a key, one for every column or for all but the first; None where they are others."""
-    values = row[1:]
-    while values and not values[-1] and len(values) > columns:
-        values = values[:-1]
+    values = row[1:] if len(row) <= columns + 1 else _trimmed(row[1:])
     if len(values) == columns:
         return values if values[-1] or columns == 1 else ["", *values[:-1]]
     if len(values) == columns - 1:
@@ -222,8 +225,9 @@ def _entries(lines: list[str], rows: list[list[str]], used: set[int], layout: La
     entries: dict[str, str] = {}
     for line in lines:
         _collect(line, layout.separator, entries)
-    for above, below in pairwise(rows):
-        for key, value in zip(above[1:], below[1:], strict=False):
+    for above, below in pairwise([_trimmed(row) for row in rows]):
+        same = len(above) == len(below)
+        for key, value in zip(above[1:], below[1:], strict=True) if same else ():
             if _kind(key) in ("step", "start") and is_number(value, layout.decimal):
                 entries.setdefault(key, value)
     return entries

@@ -55,6 +55,9 @@ def _segments(lines: Sequence[str], separator: str) -> tuple[list[int], list[int
     if len(marks) < 2:  # no heads of segments
         first = marks[0] + 1 if marks else 0
         return [first], [len(lines)]
+    below = next((line for line in lines[marks[0] + 1 :] if line.strip()), "")
+    if below.startswith("X_Value"):  # the head of the file and that of the first segment are one
+        marks = [-1, *marks]
     starts = []
     for before, mark in pairwise(marks):
         heads = (i for i in range(mark, before, -1) if lines[i].startswith(f"Channels{separator}"))

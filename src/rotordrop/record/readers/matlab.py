@@ -97,13 +97,7 @@ def _testlab_channels(
         names = [f"{names[0] if len(names) == 1 else signal} ({k + 1})" for k in range(table.shape[1])]
     time = start + step * np.arange(len(table), dtype=np.float64)
     return [
-        Channel(
-            name=name,
-            label=name,
-            unit=spelled(profile.units.get(name, unit)),
-            values=table[:, i] * float(factor) + float(offset),
-            time=time,
-        )
+        profile.channel(name, unit, table[:, i] * float(factor) + float(offset), time)
         for i, name in enumerate(names)
     ]
 
@@ -141,9 +135,7 @@ def _channels_of(
     if time is None:
         return []
     return [
-        Channel(
-            name=n, label=t, unit=spelled(profile.units.get(t, unit)), values=matrix[:, i].copy(), time=time
-        )
+        profile.channel(n, unit, matrix[:, i].copy(), time, label=t)
         for i, (n, t) in enumerate(zip(shown, labels, strict=True))
     ]
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotordrop.errors import RecordError
-from rotordrop.record.recording import Channel, Recording, spelled, split_unit
+from rotordrop.record.recording import Recording, split_unit
 from rotordrop.record.sandbox import Content, Item, plain, refuse_bomb, unpack
 
 if TYPE_CHECKING:
@@ -40,15 +40,9 @@ def read_tdms(path: Path, profile: Profile) -> Recording:
             raise RecordError(
                 f"{path}: channel {item.name!r} has no waveform property 'wf_increment' and so no clock"
             )
-        channels.append(
-            Channel(
-                name=name,
-                label=own,
-                unit=spelled(profile.units.get(item.name, profile.units.get(own, unit))),
-                values=item.values.astype(np.float64),
-                time=start + step * np.arange(len(item.values), dtype=np.float64),
-            )
-        )
+        time = start + step * np.arange(len(item.values), dtype=np.float64)
+        unit = profile.units.get(item.name, unit)
+        channels.append(profile.channel(name, unit, item.values, time, label=own))
     entries = {key: str(value) for key, value in content.attributes.items()}
     return Recording(channels=tuple(channels), metadata=entries)
 

@@ -140,13 +140,7 @@ def fields_of(line: str, separator: str) -> list[str]:
 
 
 def find_layout(lines: list[str], path: Path, rules: TextLayout) -> Layout:
-    """Find separator, decimal sign, what each column holds and the first data line from the lines themselves.
-
-    Raises
-    ------
-    RecordError
-        When no separator turns the lines into rows that hold numbers.
-    """
+    """Separator, decimal sign, what each column holds and the first data line, from the lines themselves."""
     # spread over the file, without the header and a last line that may be cut
     begin = len(lines) // 4 if rules.first_data_line is None else rules.first_data_line - 1
     body = [line for line in lines[begin:-1] if line.strip()] or lines
@@ -158,7 +152,7 @@ def find_layout(lines: list[str], path: Path, rules: TextLayout) -> Layout:
         if separator != decimal and (fit := _fit(sample, separator, decimal)) is not None
     ]
     best = max(fits, key=lambda fit: fit[0], default=None)
-    if best is None or best[0][0] < _LEAST_FITTING * len(sample):
+    if best is None or best[0][2] < _LEAST_FITTING * len(sample):
         last = f"{lines[-1][:60]!r}"
         if re.search(r"[;,\t]", lines[-1]) and not any(_A_NUMBER.search(line) for line in lines):
             raise RecordError(
@@ -178,7 +172,10 @@ def find_layout(lines: list[str], path: Path, rules: TextLayout) -> Layout:
 
 
 def _fit(sample: list[str], separator: str, decimal: str) -> tuple[tuple[int, int, int], Layout] | None:
-    """How well a pair of signs fits: rows of one length, columns of numbers less those of words, columns."""
+    """How well a pair of signs fits: rows times columns of numbers less those of words, columns, rows.
+
+    A row that is damaged counts less than a column: one that holds words would take every row.
+    """
     rows = [fields_of(line, separator) for line in sample]
     lengths = Counter(len(row) for row in rows if len(row) > 1)
     if not lengths:
@@ -191,7 +188,7 @@ def _fit(sample: list[str], separator: str, decimal: str) -> tuple[tuple[int, in
         return None
     layout = Layout(separator=separator, decimal=decimal, first=0, columns=columns, kinds=kinds)
     intact = sum(is_row(row, layout) for row in fitting)
-    return (intact, numbers - kinds.count("text"), columns), layout
+    return (intact * max(numbers - kinds.count("text"), 0), columns, intact), layout
 
 
 def _kind(fields: list[str], decimal: str) -> ColumnKind:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotordrop.errors import RecordError
-from rotordrop.record.recording import Array, Channel, Recording, spelled, split_unit
+from rotordrop.record.recording import Array, Channel, Recording, listed, split_unit
 from rotordrop.record.sandbox import refuse_bomb
 
 if TYPE_CHECKING:
@@ -20,6 +20,10 @@ if TYPE_CHECKING:
 _ONLY = rb"[ \t]*-1[ \t]*\r?(?:\n|\Z)"
 _DELIMITER, _NEXT_DELIMITER = re.compile(_ONLY), re.compile(rb"(?<=\n)" + _ONLY)
 """A line that holds only -1; some pad it with blanks, and the last one may have no line end."""
+
+_SIGN = re.compile(rb"[^ \t\r\n]")
+_KIND = re.compile(rb"58b?(?!\S)|(?:1[58]|55|56|82|\d{3,4})(?!\S)")
+"""Types of datasets: the one that is read, and others that stand in universal files."""
 
 _HEAD_LINES = 11
 """Lines of a dataset 58 before its samples: five of text, the degrees of freedom, the form, four axes."""
@@ -37,39 +41,49 @@ def read_uff(path: Path, profile: Profile) -> Recording:
     channels: list[Channel] = []
     others: list[str] = []
     entries: dict[str, str] = {}
-    at = 0
-    while (opening := _delimiter(content, at)) is not None:
-        line_end = content.find(b"\n", opening.end())
-        kind = content[opening.end() : line_end if line_end >= 0 else len(content)].split()
-        at = line_end + 1 if line_end >= 0 else len(content)
-        if kind and kind[0] in (b"58", b"58b"):
+    at = _behind_blanks(content, 0)
+    while at < len(content):
+        opening = _DELIMITER.match(content, at)
+        line_end = len(content) if opening is None else content.find(b"\n", opening.end())
+        kind = b"" if opening is None else content[opening.end() : line_end].strip()
+        if not _KIND.match(kind):
+            raise RecordError(
+                f"{path}: at byte {at} stands {content[at : at + 30]!r} where a line -1 and the type of a "
+                "dataset are expected; it is no universal file, cut off or damaged: export it again"
+            )
+        at = line_end + 1
+        if kind.startswith(b"58"):
             head, at = _head(content, at, path)
-            time, values, at = _samples(content, at, kind, head, path)
+            time, values, at = _samples(content, at, kind.split(), head, path)
             name, label, unit = split_unit(head[0].strip())
             unit = unit if head[8][47:69].strip() in ("", "NONE") else head[8][47:69].strip()
             if values is None:
-                others.append(label)
+                others.append(f"spectrum {label!r}")
             else:
-                unit = spelled(profile.units.get(label, unit))
-                channels.append(Channel(name=name, label=label, unit=unit, values=values, time=time))
+                channels.append(profile.channel(name, unit, values, time, label=label))
                 entries.setdefault("id2", head[1].strip())
-        closing = _delimiter(content, at)
+            closing = _DELIMITER.match(content, _behind_blanks(content, at))
+        else:
+            others.append(f"dataset {kind.decode()[:6]}")
+            closing = _NEXT_DELIMITER.search(content, at - 1)
         if closing is None:
             raise RecordError(
-                f"{path} is truncated: dataset {len(channels) + len(others)} has no closing -1 (the file has "
-                f"{len(content)} bytes); export it again"
+                f"{path} is truncated or damaged: dataset {len(channels) + len(others)} has no closing -1 "
+                f"(the file has {len(content)} bytes); export it again"
             )
-        at = closing.end()
+        at = _behind_blanks(content, closing.end())
     if not channels:
-        what = f"only spectra: {', '.join(map(repr, others[:8]))}" if others else "no dataset of type 58"
-        raise RecordError(f"{path} holds {what}; a real time history is expected, export the time signals")
-    notes = (f"left out, no time histories: {', '.join(others)}",) if others else ()
+        raise RecordError(
+            f"{path} holds no time history of dataset 58 (it has {listed(others) or 'no dataset'}); export "
+            "the time signals"
+        )
+    notes = (f"left out, no time histories: {listed(others)}",) if others else ()
     return Recording(channels=tuple(channels), metadata=entries, notes=notes)
 
 
-def _delimiter(content: bytes, at: int) -> re.Match[bytes] | None:
-    """The delimiter that begins there, as behind binary samples, or the next that is a line of its own."""
-    return _DELIMITER.match(content, at) or _NEXT_DELIMITER.search(content, at)
+def _behind_blanks(content: bytes, at: int) -> int:
+    """Where the next sign stands that is no blank."""
+    return len(content) if (found := _SIGN.search(content, at)) is None else found.start()
 
 
 def _head(content: bytes, at: int, path: Path) -> tuple[list[str], int]:
@@ -128,7 +142,7 @@ def _samples(
         values = table["y"][:, 0].astype(np.float64)
         time = time if even else table["time"][:, 0].astype(np.float64)
         return time, None if spectrum else values, at + declared
-    closing = _delimiter(content, at)
+    closing = _NEXT_DELIMITER.search(content, at - 1)
     end = len(content) if closing is None else closing.start()
     if spectrum:
         return time, None, end

@@ -9,7 +9,7 @@ import numpy as np
 
 from rotordrop.errors import RecordError
 from rotordrop.record.profile import Profile
-from rotordrop.record.recording import FULL_SCALE, Array, Channel, Recording, spelled
+from rotordrop.record.recording import FULL_SCALE, Array, Recording
 from rotordrop.units import split_quantity
 
 _PCM, _FLOAT, _EXTENSIBLE = 1, 3, 0xFFFE
@@ -40,18 +40,13 @@ def read_wav(path: Path, profile: Profile) -> Recording:
     if len(names) != count:
         raise RecordError(f"{path} has {count} channels and the profile names {len(names)}")
     time = np.arange(len(samples), dtype=np.float64) / rate
-    channels = [
-        Channel(
-            name=n,
-            label=n,
-            unit=spelled(unit if unit == FULL_SCALE else profile.units.get(n, unit)),
-            values=samples[:, i] * factor,
-            time=time,
-        )
-        for i, n in enumerate(names)
-    ]
+    if unit == FULL_SCALE:  # shares have no unit, whatever the profile calls them
+        profile = profile.model_copy(update={"units": {}})
+    channels = tuple(
+        profile.channel(name, unit, samples[:, i] * factor, time) for i, name in enumerate(names)
+    )
     notes = ("no trigger in the file: record time counts from the start",)
-    return Recording(channels=tuple(channels), notes=notes)
+    return Recording(channels=channels, notes=notes)
 
 
 def _blocks(content: bytes, path: Path) -> dict[bytes, bytes]:
