@@ -67,21 +67,7 @@ def whole_drop(
     tolerance: float = 1e-6,
     output_step: float = 1e-5,
 ) -> DropResult:
-    """Simulate the whole drop from power-off with given unknowns.
-
-    Parameters
-    ----------
-    problem : FirstImpacts
-        The drop with its parameters.
-    trial : Trial
-        The unknowns.
-    duration : float
-        Length [s].
-    gap_change : ndarray, shape (B,), optional
-        Added to the air gaps [m], for the limits of the tail.
-    tolerance, output_step : float
-        Of the simulation.
-    """
+    """Simulate the whole drop from power-off [s], its air gaps (B,) changed by so much [m]."""
     initial = replace(problem.initial, mean=trial.fall)
     rows = problem.rows(trial)
     if gap_change is not None:
@@ -120,24 +106,9 @@ def draw_drops(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Draws:
-    """Simulate the drop for draws of everything uncertain.
+    """Simulate the drop for draws from the covariance (n, n) of the unknowns around the best of them (n,).
 
-    Parameters
-    ----------
-    problem : FirstImpacts
-        The drop with its parameters.
-    x, covariance : ndarray, shapes (n,), (n, n)
-        Best unknowns and their covariance.
-    window : float
-        Draws must keep to the record up to here [s from power-off].
-    duration : float
-        Length of the drop [s].
-    count : int
-        Number of draws.
-    threads : int, optional
-        Threads; all cores by default.
-    progress : callable, optional
-        Called with a text and the share done.
+    Draws must keep to the record up to the end of the window [s from power-off].
     """
     report = progress or (lambda text, share: None)
     report("draws that keep to the record", 0.0)

@@ -195,18 +195,9 @@ class FirstImpacts:
         return start_state(self.initial, self.start, self.initial.mean)[0]
 
     def run(self, rows: Array, time: Array, state: Array, unbalance: Array) -> Array:
-        """States at times after the start, shape (T, n).
+        """States (T, n) at times [s from power-off] after the start, from a state (n,) on.
 
-        Parameters
-        ----------
-        rows : ndarray, shape (B, columns)
-            Bearing parameters.
-        time : ndarray, shape (T,)
-            Times [s from power-off].
-        state : ndarray, shape (n,)
-            State at the start.
-        unbalance : ndarray, shape (2, m)
-            Modal unbalance, cosine and sine [kg m].
+        ``rows`` are the parameters of the bearings, ``unbalance`` (2, m) is that of the modes.
 
         Raises
         ------
@@ -265,16 +256,9 @@ class FirstImpacts:
 
 
 def first_impacts(evidence: Evidence, model: DropModel, *, until: float) -> FirstImpacts:
-    """Make the first impacts of a recorded drop ready to be run again and again.
+    """Make the first impacts of a recorded drop, up to a time from power-off [s], ready to be run again.
 
-    Parameters
-    ----------
-    evidence : Evidence
-        The record, its initial state and its rest.
-    model : DropModel
-        The model to run; may be of a coarser reduction than that of the initial state.
-    until : float
-        Last time that will be compared [s from power-off].
+    The model may be of a coarser reduction than that of the initial state.
     """
     initial = known(evidence.fall)
     if model.basis is not initial.fall.model.basis:

@@ -133,24 +133,10 @@ def fit_window(
     fitted: Mask | None = None,
     pool: Executor | None = None,
 ) -> Fit:
-    """Levenberg–Marquardt over one window.
+    """Levenberg–Marquardt over one window [s], with so many Jacobians at most.
 
-    Parameters
-    ----------
-    problem : Problem
-        What is fitted.
-    start : ndarray, shape (n,)
-        Start of the unknowns.
-    window : float
-        End of the window [s].
-    iterations : int
-        Bound of the number of Jacobians.
-    tolerance : float
-        Ends when the cost falls by less than this share.
-    fitted : ndarray of bool, shape (n,), optional
-        Unknowns that are fitted; all by default.
-    pool : Executor, optional
-        Threads for the columns of the Jacobian.
+    It ends when the cost falls by less than the tolerance [1]. Only the unknowns ``fitted`` move; all by
+    default. The threads of a pool share the columns of the Jacobian.
     """
     table = problem.table
     free = ~table.considered if fitted is None else fitted & ~table.considered
@@ -197,14 +183,8 @@ def completed(problem: Problem, fit: Fit, *, pool: Executor | None = None) -> Fi
 def considered_covariance(table: Unknowns, information: Array, scale: float) -> Array:
     """Covariance of the unknowns, with those that are only considered at their prior.
 
-    Parameters
-    ----------
-    table : Unknowns
-        Gives priors, and which unknowns are considered.
-    information : ndarray, shape (n, n)
-        Normal matrix of the record without the priors.
-    scale : float
-        What the information is divided by [1]: misfit over noise, and widening.
+    ``information`` is the normal matrix of the record without the priors, ``scale`` [1] what it is divided
+    by: misfit over noise, and widening.
 
     Notes
     -----
@@ -338,18 +318,7 @@ def search(
     the longer window start there: what the short window leaves open is searched before the next impact
     decides it.
 
-    Parameters
-    ----------
-    problem : Problem
-        What is fitted.
-    starts : sequence of ndarray
-        Starts of the unknowns.
-    schedule : Schedule
-        Windows, and how many starts go on.
-    threads : int, optional
-        Threads; all cores by default.
-    progress : callable, optional
-        Called with a text and the share done.
+    With many starts every thread fits one; a single one shares its Jacobian among all threads.
     """
     report = progress or (lambda text, share: None)
     points, finalists, windows, agreeing, ended = list(starts), list[Fit](), list[float](), 0, ""

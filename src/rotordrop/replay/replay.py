@@ -129,22 +129,8 @@ def replay_drop(
 ) -> Estimate:
     """Estimate force and stress of a recorded drop by the paper's flowchart.
 
-    Parameters
-    ----------
-    machine : Machine
-        The machine, with guesses where nothing better is known.
-    record : Record
-        The recorded drop.
-    tail : Record or None
-        The settled tail; needed when the record does not reach standstill.
-    method : Replay
-        Options of the route.
-    facts : RecordFacts
-        What the record itself gives.
-    name : str
-        Name of the drop.
-    progress : callable, optional
-        Called with a text and the share done.
+    The machine has guesses where nothing better is known; the settled tail is needed when the record does not
+    reach standstill.
 
     Notes
     -----

@@ -87,18 +87,8 @@ def fit_support(
 ) -> SupportFit:
     """Find the supports by least squares on the first impacts.
 
-    Parameters
-    ----------
-    coarse, fine : FirstImpacts
-        The problem with a basis for the search from many starts, and with one for the result.
-    later_contact : float
-        Time of the later of the first contacts, from power-off [s]; the windows count from it.
-    starts : int
-        Quasi-random starts.
-    threads : int, optional
-        Threads; all cores by default.
-    progress : callable, optional
-        Called with a text and the share done.
+    The coarse basis serves the search from many starts, the fine one the result. The windows count from the
+    later of the first contacts [s from power-off].
 
     Notes
     -----
@@ -173,23 +163,8 @@ def refit_with_friction(
 ) -> tuple[FirstImpacts, Array, Array]:
     """Fit once more with the friction that the sweep found, more of the fall, and over a longer window.
 
-    Parameters
-    ----------
-    problem, fit
-        The problem and its best fit.
-    friction : Known
-        Friction coefficient of the sweep.
-    longest : float, optional
-        End of a longer window [s from power-off]; left out where the model does not follow the record so far.
-    threads : int, optional
-        Threads; all cores by default.
-
-    Returns
-    -------
-    problem : FirstImpacts
-        The problem with that friction as its prior.
-    x, covariance : ndarray, shapes (n,), (n, n)
-        Best unknowns and their widened covariance.
+    The longer window [s from power-off] is left out where the model does not follow the record so far. Gives
+    the problem with that friction as its prior, best unknowns (n,) and their widened covariance (n, n).
     """
     place, unknowns = problem.friction, list(problem.unknowns)
     error = (friction.standard_error or 0.0) / friction.value
@@ -227,16 +202,7 @@ def identified_values(
 ) -> dict[str, Known]:
     """Values of the parameters by path, each with error, interval, start, bounds and verdict.
 
-    Parameters
-    ----------
-    problem : FirstImpacts
-        The problem they belong to.
-    x, covariance : ndarray, shapes (n,), (n, n)
-        The unknowns and their covariance.
-    active : sequence of bool
-        Which unknowns lie at a bound.
-    given : bool
-        Whether the values were taken over and not found from this record.
+    ``active`` says which unknowns lie at a bound, ``given`` that they were taken over, not found.
     """
     values = {}
     for k, unknown in enumerate(problem.unknowns):
@@ -272,20 +238,8 @@ def sweep_friction(
 ) -> FrictionSweep:
     """Simulate the drop for a range of friction coefficients and compare the orbits.
 
-    Parameters
-    ----------
-    problem : FirstImpacts
-        The drop; its record must reach beyond the window.
-    x : ndarray
-        Best unknowns of the problem.
-    contact : float
-        Earlier first contact [s from power-off].
-    draws : sequence of ndarray
-        Other values of the unknowns, from their covariance: their best coefficients give the interval.
-    coefficients : ndarray
-        Dynamic coefficients of the sweep [1]; the static one follows at the ratio of the machine file.
-    threads : int, optional
-        Threads; all cores by default.
+    The comparison begins with the earlier first contact [s from power-off]; the static coefficient follows at
+    the ratio of the machine file. The best coefficients of draws of the other unknowns give the interval.
 
     Notes
     -----
