@@ -101,6 +101,7 @@ class LineSearch:
         self._views: dict[tuple[bool, float], View] = {}
         self._after: tuple[Array, View] | None = None
         self._phases: list[tuple[FoundLine, Array]] = []
+        self._reach: dict[tuple[int, bool, float], tuple[Array, Array]] = {}
         self.found: list[FoundLine] = []
 
     def run(self) -> list[FoundLine]:
@@ -179,7 +180,7 @@ class LineSearch:
 
     def _free(self, view: View) -> Mask:
         """Where a new line may be: not at low frequency, not on the path of a line already taken out."""
-        time, place = view.frames.time, view.frames.coordinate
+        time, place, reach = view.frames.time, view.frames.coordinate, self._reach
         unit = np.ones((len(time), len(FIVE_MOMENTS)))
         if view.of_orders:
             moments = [
@@ -189,13 +190,16 @@ class LineSearch:
         middle = unit[:, 2]
         free = place * middle[:, None] >= self.settings.lowest_frequency
         width = np.maximum(self.settings.bandwidth, 1.0 / view.length) / middle
-        for line in self.found:
+        for k, line in enumerate(self.found):
             of_orders = line.kind == "order" or (line.kind == "undecided" and line.order is not None)
             if of_orders != view.of_orders and line.ratio < HARMLESS:
                 continue
             apart = width * (2.0 if of_orders == view.of_orders else line.skirt)
             # Within a frame the speed changes, and with it the path moves across the view.
-            low, high = path_range(line, time, view.length, unit)
+            key = (k, view.of_orders, view.share)  # such frames lie at the same times in every view
+            if key not in reach:
+                reach[key] = path_range(line, time, view.length, unit)
+            low, high = reach[key]
             free &= (
                 (place < (low - apart)[:, None]) | (place > (high + apart)[:, None]) | np.isinf(low)[:, None]
             )
@@ -414,18 +418,19 @@ class LineSearch:
             return
         steady = sorted(self._phases, key=lambda entry: -entry[0].strength)
         pairs = [(line, phase, k) for line, phase in steady[:STEADY_PARTNERS] for k in COMBINED_ORDERS]
+        seen: list[list[Peak | None]] = []
         while pairs and len(self.found) < self.settings.most_lines:
-            scored = [
-                (peak, index)
-                for index, (_, phase, k) in enumerate(pairs)
-                for peak in self._along(phase + k * self._clock.angle)
-            ]
+            # what is seen along the paths stays as it is until a line is taken out
+            seen = seen or [self._along(phase + k * self._clock.angle) for _, phase, k in pairs]
+            scored = [(peak, index) for index, peaks in enumerate(seen) for peak in peaks]
             peak, index = max(scored, key=lambda entry: entry[0].score if entry[0] else 0.0)
             if peak is None:
                 return
             line, phase, k = pairs.pop(index)
+            del seen[index]
             if peak.amplitude < float(line.amplitude.max()):
                 self._take_combination(peak, line, phase, k)
+                seen = []
 
     def _along(self, phase: Array) -> list[Peak | None]:
         """The peak on a moving path against what lies beside it, in long frames and in short ones."""

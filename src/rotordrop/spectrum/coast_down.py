@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -202,7 +203,11 @@ def analyse_coast_down(
         settings=STANDARD_SETTINGS if signal.recorded else LineSettings(most_lines=LINES_OF_A_SIMULATION),
     )
     tell("orders and waterfalls", 0.5)
-    planes = {name: _plane(signal, name, read[name], lines, candidates, choice) for name in signal.planes}
+    with ThreadPoolExecutor() as pool:
+        seen = pool.map(
+            lambda name: _plane(signal, name, read[name], lines, candidates, choice), signal.planes
+        )
+        planes = dict(zip(signal.planes, seen, strict=True))
     tell("speed", 0.95)
     return CoastDownAnalysis(signal=signal, planes=planes, lines=lines, speed_law=_speed_law(signal))
 

@@ -92,9 +92,23 @@ def clearest_peak(
         floor = np.maximum(floor, usual)
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = np.where(allowed[:, :, None] & (floor > 0.0), frames.power / floor, np.nan)
+    # Counts over the frames say at once which lines a stretch can hold: sorting all of them takes long.
+    nearly = (1.0 - 1e-9) * settings.least_ratio**2 / MEDIAN_OF_NOISE
+    seen, above = (
+        np.concatenate([np.zeros((1, *part.shape[1:]), dtype=np.intp), np.cumsum(part, axis=0)])
+        for part in (np.isfinite(ratio), ratio >= nearly)
+    )
     best: tuple[float, int, int, int, int] = (threshold, -1, -1, -1, -1)
     for first, last in stretches:
-        best = max(best, _best_in(ratio[first:last], settings, first, last))
+        known = seen[last] - seen[first]
+        enough = known >= max(1, (last - first + 1) // 2)
+        possible = enough & (2 * (above[last] - above[first]) >= known)
+        if possible.any():
+            around = possible.copy()
+            around[1:] |= possible[:-1]
+            around[:-1] |= possible[1:]
+            looked = around & enough
+            best = max(best, _best_in(ratio[first:last], looked, known, settings.least_ratio, first, last))
     if best[1] < 0:
         return None
     return _peak(frames, floor, ratio, *best)
@@ -110,13 +124,16 @@ def stretches_of(count: int, shortest: int) -> Iterator[tuple[int, int]]:
 
 
 def _best_in(
-    ratio: Array, settings: DetectionSettings, first: int, last: int
+    ratio: Array, looked: Mask, known: NDArray[np.intp], least: float, first: int, last: int
 ) -> tuple[float, int, int, int, int]:
-    """Score, line, channel and stretch of the clearest peak in one stretch."""
-    seen = np.isfinite(ratio).sum(axis=0)
-    typical = _median_of_frames(ratio, seen >= max(1, (last - first + 1) // 2))
-    independent = np.maximum(seen / (1.0 + HANN_OVERLAP_SHARE), 1.0)
-    clear = (typical * MEDIAN_OF_NOISE >= settings.least_ratio**2) & _local_maximum(typical)
+    """Score, line, channel and stretch of the clearest peak in one stretch, of the lines looked at.
+
+    A line is as clear as half of its frames show it: what only passes through, or a bang, leaves that alone.
+    """
+    typical = np.full(ratio.shape[1:], np.nan)
+    typical[looked] = median_of_known(ratio[:, looked])
+    independent = np.maximum(known / (1.0 + HANN_OVERLAP_SHARE), 1.0)
+    clear = (typical * MEDIAN_OF_NOISE >= least**2) & _local_maximum(typical)
     score = np.where(clear, _improbability(np.nan_to_num(typical), independent), 0.0)
     line, channel = np.unravel_index(int(np.argmax(score)), score.shape)
     return float(score[line, channel]), int(line), int(channel), first, last
@@ -167,15 +184,6 @@ def _floor(power: Array, lines: int) -> Array:
     left, right = blocks[:, low], blocks[:, high]
     joined = np.where(np.isnan(right), left, np.where(np.isnan(left), right, left + share * (right - left)))
     return cast(Array, np.where(np.isfinite(power), joined, np.nan))
-
-
-def _median_of_frames(ratio: Array, enough: Mask) -> Array:
-    """Ratio exceeded in half of the frames: a line that only passes through, or a bang, leaves it alone."""
-    median = np.full(ratio.shape[1:], np.nan)
-    columns = ratio[:, enough]
-    if columns.size:
-        median[enough] = median_of_known(columns)
-    return median
 
 
 def median_of_known(values: Array) -> Array:

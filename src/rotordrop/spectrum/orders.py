@@ -219,9 +219,10 @@ def _window_fit(
     beside = _distinct(steady, orders, signal.profile, centre, window)
     u = 2.0 * (time - centre) / window
     weight = np.cos(0.5 * np.pi * u)[:, None]
-    following = _basis([k * angle for k in orders], u, degree)
-    standing = _basis([line.phase_over(time) for line in beside], u, degree + STEADY_EXTRA)
-    basis = np.hstack([following, standing, u[:, None] ** np.arange(degree + 1)]) * weight
+    phases = [(k * angle, degree) for k in orders]
+    phases += [(line.phase_over(time), degree + STEADY_EXTRA) for line in beside]
+    basis = _basis(phases, u, degree)
+    basis *= weight
     measured = (cut - cut.mean(axis=0)) * weight
     inverse = np.linalg.pinv(basis.T @ basis, rcond=1e-13, hermitian=True)
     coefficients = inverse @ (basis.T @ measured)
@@ -231,7 +232,8 @@ def _window_fit(
     freedom = max(float(np.sum(weight**2)) * (1.0 - basis.shape[1] / len(basis)), 1.0)
     spread = np.sqrt(np.sum(residual**2, axis=0) / freedom)
     # Equal noise in all samples, unequal weights: the weights enter the variance once more.
-    variance = np.sum(((basis * weight) @ inverse[first].T) ** 2, axis=0)
+    basis *= weight
+    variance = np.sum((basis @ inverse[first].T) ** 2, axis=0)
     return amplitude, np.sqrt(variance)[:, None] * spread
 
 
@@ -250,11 +252,18 @@ def _distinct(
     return chosen
 
 
-def _basis(phases: list[Array], u: Array, degree: int) -> Array:
-    """Cosine and sine of every phase, times powers of the place in the window."""
-    powers = u[:, None] ** np.arange(degree + 1)
-    columns = [part[:, None] * powers for phase in phases for part in (np.cos(phase), np.sin(phase))]
-    return np.hstack(columns) if columns else np.empty((u.size, 0))
+def _basis(phases: list[tuple[Array, int]], u: Array, degree: int) -> Array:
+    """Cosine and sine of every phase times powers of the place in the window up to its degree; the powers."""
+    powers = u[:, None] ** np.arange(max(degree, *(highest for _, highest in phases)) + 1)
+    # filled in place: a window has thousands of samples and up to a hundred columns
+    basis = np.empty((u.size, sum(2 * (highest + 1) for _, highest in phases) + degree + 1))
+    column = 0
+    for phase, highest in phases:
+        for part in (np.cos(phase), np.sin(phase)):
+            np.multiply(part[:, None], powers[:, : highest + 1], out=basis[:, column : column + highest + 1])
+            column += highest + 1
+    basis[:, column:] = powers[:, : degree + 1]
+    return basis
 
 
 def _separable(

@@ -171,7 +171,9 @@ def _smooth_without_outliers(log_time: Array, speed: Array, limit: float) -> tup
         smooth = make_smoothing_spline(log_time[keep], speed[keep])
         residual = speed - smooth(log_time)
         spread = _spread(residual[keep & turning])
-        keep = np.abs(residual) <= limit * max(spread, least)
+        before, keep = keep, np.abs(residual) <= limit * max(spread, least)
+        if np.array_equal(before, keep):  # the same curve would be drawn again
+            break
     return smooth, spread, int((~keep).sum())
 
 
