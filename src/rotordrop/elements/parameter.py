@@ -223,7 +223,7 @@ class Parameter:
 
 def _at(part: Any, path: str) -> Any:
     for name in path.split("."):
-        part = getattr(part, name)
+        part = None if part is None else getattr(part, name)
     return part
 
 

@@ -42,6 +42,7 @@ _CUBIC = L.SUPPORT_FORM + blocks.SUPPORT_CUBIC
 _SHARE = L.SUPPORT_FORM + blocks.SUPPORT_FOUNDATION_SHARE
 _SPEED = L.SUPPORT_FORM + blocks.SUPPORT_FOUNDATION_SPEED
 _DAMPING = L.SUPPORT_FORM + blocks.SUPPORT_FOUNDATION_DAMPING
+_STOP_GAP, _STOP = L.MOUNT + blocks.MOUNT_STOP_GAP, L.MOUNT + blocks.MOUNT_STOP
 
 _FORM = ("coupling", "cubic", "foundation_share", "foundation_frequency", "foundation_damping_ratio")
 """What a support may have beyond a spring and a damper on two axes."""
@@ -148,9 +149,10 @@ class Support(Description):
         return L.FOUNDATION_STATES if self.foundation_share is not None else 0
 
     def fill(self, row: Array) -> None:
-        """Write the columns of the support."""
+        """Write the columns of the support, after those of its mount."""
         super().fill(row)
-        row[_PRESENT] = float(any(getattr(self, name) is not None for name in _FORM))
+        form = any(getattr(self, name) is not None for name in _FORM)
+        row[_PRESENT] = float(form or row[L.MOUNT] != 0.0)
 
 
 def _from_ratio(ratio: Known | None, mass: Known, stiffness: Known) -> Known:
@@ -166,9 +168,14 @@ def _from_ratio(ratio: Known | None, mass: Known, stiffness: Known) -> Known:
 
 def support_sag(row: Array, load: float) -> float:
     """Deflection [m] of a support under a static load [N], its foundation included."""
-    sag = load / float(row[L.SUPPORT_STIFFNESS_Y])
+    stiffness = float(row[L.SUPPORT_STIFFNESS_Y])
+    sag = load / stiffness
     if row[_PRESENT] == 0.0:
         return sag
+    gap = float(row[_STOP_GAP])
+    if 0.0 < gap < sag:  # relaxed branches and a slipped ribbon carry nothing; a stop shares the rest
+        stop = float(row[_STOP])
+        sag = (load + stop * gap) / (stiffness + stop)
     cubic = float(row[_CUBIC])
     coupled = sag / (1.0 - float(row[_COUPLING]) ** 2)
     deflection = coupled / (1.0 + cubic * sag**2)  # next order: a few parts in ten thousand of 3 µm

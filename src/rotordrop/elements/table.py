@@ -15,6 +15,7 @@ from rotordrop.elements import (
     contact,
     friction,
     magnet,
+    mount,
     race,
     rotor,
     sensor,
@@ -50,8 +51,11 @@ EXTENSIONS: tuple[Extension, ...] = (
 )
 """What a machine may have beyond the base model, in the order in which a search tries it."""
 
-STRUCTURE: tuple[Parameter, ...] = tuple(row for extension in EXTENSIONS for row in extension.rows)
-"""Unknowns of extensions: of a machine only where its description names them."""
+STRUCTURE: tuple[Parameter, ...] = (
+    *(row for extension in EXTENSIONS for row in extension.rows),
+    *mount.PARAMETERS,
+)
+"""Unknowns of a machine only where its description names them: those of extensions, and of a mount."""
 
 _BY_PATH = {(row.owner, row.path): row for row in (*TABLE, *STRUCTURE, *FORM)}
 

@@ -13,6 +13,7 @@ from rotordrop.elements.ball_bearing import BallBearing
 from rotordrop.elements.contact import Contact
 from rotordrop.elements.description import Misfit, Name, Placed
 from rotordrop.elements.friction import Friction
+from rotordrop.elements.mount import Mount, mounted
 from rotordrop.elements.parameter import Entry, Parameter, Role, Rule, Step, bearing_entries
 from rotordrop.elements.race import Race
 from rotordrop.elements.support import Support
@@ -47,12 +48,18 @@ class TouchdownBearing(Placed):
     """The inner race."""
     support: Support = Field(default_factory=Support)
     """What carries the outer ring."""
+    mount: Mount = Field(default_factory=Mount)
+    """What lies in parallel to spring and damper of the support: ribbon, branches that relax, stop."""
 
     reserved: ClassVar[Mapping[str, str]] = {
         "kind": "another kind of touchdown bearing than a ball bearing (sleeve, planetary)",
-        "mount": "a soft mount with a stop",
         "thermal": "the heat of the bearing",
     }
+
+    @classmethod
+    def rewritten(cls, raw: dict[str, Any]) -> dict[str, Any]:
+        """Read a mount as a list of elements in parallel."""
+        return mounted(raw)
 
     def check(self) -> None:
         """Refuse a clearance that leaves no rotor and a bore outside the balls."""
@@ -101,7 +108,10 @@ class TouchdownBearing(Placed):
             values["inertia"] = Known(
                 value=inertia, status="inferred", range=bounds, source=why, unit="kg m^2"
             )
-        return {"race": self.race.completed_with(values)}
+        return {
+            "race": self.race.completed_with(values),
+            "mount": self.mount.beside(self.support.stiffness),
+        }
 
     def _race_width(self) -> Known:
         if self.contact.length is not None:

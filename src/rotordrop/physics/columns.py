@@ -52,7 +52,9 @@ SUPPORT_DAMPING_X = ROLLING_END + 4
 SUPPORT_DAMPING_Y = ROLLING_END + 5
 SUPPORT_FORM = ROLLING_END + 6
 SUPPORT_FORM_END = SUPPORT_FORM + blocks.SUPPORT_N_ENTRIES
-N_BEARING_COLUMNS = SUPPORT_FORM_END
+MOUNT = SUPPORT_FORM_END
+MOUNT_END = MOUNT + blocks.MOUNT_N_ENTRIES
+N_BEARING_COLUMNS = MOUNT_END
 FOUNDATION_STATES = 4
 
 # Entries of `KernelParameters.spin`.
@@ -99,7 +101,8 @@ N_ROTOR_PLACES = 10
 
 # Columns of `KernelParameters.bearing_at`, one row per touchdown bearing: place of its race and of its
 # support (x, then y), of the spin of its race and of the first of its further states; -1 where it has none.
-# Then its first contact and the one behind its last, and the first state of its departure; -1 without one.
+# Then its first contact and the one behind its last, and the first state of its departure and of its mount;
+# -1 without one.
 RACE = 0
 SUPPORT = 1
 RACE_SPIN = 2
@@ -107,7 +110,8 @@ BEARING_OWN = 3
 CONTACTS = 4
 CONTACTS_END = 5
 DEPARTURE = 6
-N_BEARING_PLACES = 7
+MOUNT_STATES = 7
+N_BEARING_PLACES = 8
 
 # Columns of `KernelParameters.contact_at`, one row per contact, those of a bearing side by side: the bearing
 # whose row holds its numbers, place of the body that the rotor touches (x, then y), place of the spin of that

@@ -89,6 +89,7 @@ def _verdict(
     if machine is not None:
         doubts = doubts_of_speed(machine, result.initial_speed)
         said += [Statement(f"{doubt.message}.", "warning") for doubt in doubts]
+        said += _stops(result, machine)
     said += [_certificate(result), Statement(NO_INTERVAL)]
     said += [static_limit_statement(bearing) for bearing in bearings]
     if machine is not None and machine.defaults_in_use:
@@ -98,6 +99,26 @@ def _verdict(
         )
         said.append(Statement(text))
     return tuple(said)
+
+
+def _stops(result: DropResult, machine: Machine) -> list[Statement]:
+    """Whether a mount reached its stop."""
+    said = []
+    for b, bearing in enumerate(machine.touchdown_bearings):
+        if bearing.mount.stop is None:
+            continue
+        travel = np.hypot(*result.support_displacement[:, b].T)
+        gap, largest = float(bearing.mount.stop.gap), float(travel.max())
+        moved, free = shown(largest, "length"), shown(gap, "length")
+        if largest > gap:
+            first = shown(result.time[np.argmax(travel > gap)], "time")
+            text = f"{bearing.name}: the mount reached its stop at {first}; it moved {moved} of {free}."
+            said.append(Statement(text, "warning"))
+        else:
+            said.append(
+                Statement(f"{bearing.name}: the mount did not reach its stop; it moved {moved} of {free}.")
+            )
+    return said
 
 
 def _certificate(result: DropResult) -> Statement:

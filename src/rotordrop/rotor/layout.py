@@ -26,6 +26,9 @@ class StateLayout:
     magnet_own: tuple[int, ...] = ()
     """Number of further states of each touchdown bearing and of each AMB; empty where none has any. Those of
     a bearing are displacement (x, y) and velocity (x, y) of its foundation."""
+    mount_own: tuple[int, ...] = ()
+    """Number of states of the mount of each touchdown bearing: stretch (x, y) of each spring that slips or
+    relaxes; empty where none has any."""
     sensor_own: int = 0
     """Number of sensors that lag behind, each with the reading that it has got to [m]; only the filter moves
     these."""
@@ -43,6 +46,8 @@ class StateLayout:
     """Race spins [rad/s]."""
     own: slice = field(init=False)
     """Further states of bearings, then of AMBs."""
+    mount: slice = field(init=False)
+    """Stretch of the springs of mounts that slip or relax [m]."""
     sensors: slice = field(init=False)
     """What sensors that lag behind have got to [m]."""
     rotor_speed: int = field(init=False)
@@ -64,6 +69,7 @@ class StateLayout:
             "velocities": (2 * m + 4 * b, L.VELOCITY),
             "race_spin": (b, L.SPIN),
             "own": (sum(self.bearing_own) + sum(self.magnet_own), L.INTERNAL),
+            "mount": (sum(self.mount_own), L.POSITION),
             "sensors": (self.sensor_own, L.INTERNAL),
             "rotor_speed": (None, L.SPIN),
             "rotor_angle": (None, L.ANGLE),
@@ -82,10 +88,12 @@ class StateLayout:
         """Give the layout that the elements of a machine ask for."""
         bearings = machine.touchdown_bearings
         further = tuple(bearing.support.further_states for bearing in bearings)
+        mounts = tuple(bearing.mount.states for bearing in bearings)
         return cls(
             n_modes=n_modes,
             n_bearings=len(bearings),
             bearing_own=further if any(further) else (),
+            mount_own=mounts if any(mounts) else (),
             sensor_own=sum(sensor.further_states for sensor in machine.sensors),
         )
 
@@ -124,7 +132,7 @@ class StateLayout:
         return places
 
     def bearing_at(self) -> Integers:
-        """Places of the states of each bearing, shape (B, 7), see ``RACE`` and the names beside it."""
+        """Places of the states of each bearing, shape (B, 8), see ``RACE`` and the names beside it."""
         places = np.empty((self.n_bearings, L.N_BEARING_PLACES), dtype=np.int64)
         count = np.arange(self.n_bearings)
         places[:, L.RACE] = self.race.start + 2 * count
@@ -134,6 +142,7 @@ class StateLayout:
         places[:, L.CONTACTS], places[:, L.CONTACTS_END] = count, count + 1
         of_one = len(self.departing)
         places[:, L.DEPARTURE] = self.work_in + 1 + of_one * count if of_one else -1
+        places[:, L.MOUNT_STATES] = _first_of(self.mount_own, self.mount.start, self.n_bearings)
         return places
 
     def contact_at(self) -> Integers:

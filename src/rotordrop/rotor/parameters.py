@@ -179,7 +179,7 @@ def bearing_row(bearing: TouchdownBearing, static_load: float) -> Array:
     row[L.BALL_SET : L.BALL_SET_END] = numbers.entries()
     row[L.PITCH_DIAMETER] = numbers.drag_diameter
     row[L.BEARING_DAMPING] = float(bearing.damping_time) * numbers.tangent_stiffness(static_load)
-    for part in (bearing.contact, bearing.friction, bearing.race, bearing.support):
+    for part in (bearing.contact, bearing.friction, bearing.race, bearing.mount, bearing.support):
         part.fill(row)
     return row
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.physics import blocks, departure, support
+from rotordrop.physics import blocks, departure, mount, support
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
 from rotordrop.physics.ball_set import ball_set_energy, ball_set_load
@@ -19,6 +19,7 @@ from rotordrop.simulate._rhs import (
     departing,
     gap_at,
     modal_parts,
+    mount_states,
     project,
     race_deflection,
     relative_motion,
@@ -87,6 +88,9 @@ def support_form_energy(b: int, y: Array, p: KernelParameters) -> float:
     x, z, _vx, _vz = support_deflection(b, y, p)
     energy: float = support.support_energy(form, k_x, k_y, x, z)
     energy -= 0.5 * (k_x * y[h] ** 2 + k_y * y[h + 1] ** 2)
+    if row[L.MOUNT] != 0.0:
+        first, last = mount_states(b, p)
+        energy += mount.mount_energy(row[L.MOUNT : L.MOUNT_END], x, z, y[first:last])
     if own >= 0 and form[blocks.SUPPORT_FOUNDATION_SHARE] > 0.0:
         mass = row[L.SUPPORT_MASS_Y] / form[blocks.SUPPORT_FOUNDATION_SHARE]
         for axis in range(2):

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.physics import aerodynamics, blocks, departure, support
+from rotordrop.physics import aerodynamics, blocks, departure, mount, support
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
 from rotordrop.physics.aerodynamics import exponential_deceleration, speed_dependent_deceleration
@@ -154,6 +154,13 @@ def support_deflection(b: int, y: Array, p: KernelParameters) -> tuple[float, fl
 
 
 @inner_kernel
+def mount_states(b: int, p: KernelParameters) -> tuple[int, int]:
+    """Place of the first state of a mount and the one behind its last; equal where it has none."""
+    first = max(p.bearing_at[b, L.MOUNT_STATES], 0)
+    return first, first + int(p.bearing[b, L.MOUNT + blocks.MOUNT_STATES])
+
+
+@inner_kernel
 def gyroscopic_forces(
     polar: Array,
     ux: Array,
@@ -239,7 +246,7 @@ def add_magnet_forces(t: float, y: Array, p: KernelParameters, dy: Array) -> flo
 
 @lean_kernel
 def add_support_form(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
-    """Add what the form of a support changes: its force, and the motion of its foundation.
+    """Add what form and mount of a support change: its force, and the motion of its foundation.
 
     Returns what support and foundation dissipate [W].
     """
@@ -250,6 +257,13 @@ def add_support_form(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
     c_x, c_y = row[L.SUPPORT_DAMPING_X], row[L.SUPPORT_DAMPING_Y]
     form = row[L.SUPPORT_FORM : L.SUPPORT_FORM_END]
     F_x, F_y, dissipated = support.support_force(form, k_x, k_y, c_x, c_y, x, z, vx, vz)
+    if row[L.MOUNT] != 0.0:
+        first, last = mount_states(b, p)
+        numbers = row[L.MOUNT : L.MOUNT_END]
+        beside_x, beside_y, lost = mount.mount_force(numbers, x, z, vx, vz, y[first:last], dy[first:last])
+        F_x += beside_x
+        F_y += beside_y
+        dissipated += lost
     sx, sy = y[n_q + h], y[n_q + h + 1]
     dy[n_q + h] += (c_x * sx + k_x * y[h] - F_x) / row[L.SUPPORT_MASS_X]
     dy[n_q + h + 1] += (c_y * sy + k_y * y[h + 1] - F_y) / row[L.SUPPORT_MASS_Y]

@@ -11,9 +11,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.physics import aerodynamics, blocks, support
+from rotordrop.physics import aerodynamics, blocks, mount, support
 from rotordrop.physics import columns as L
-from rotordrop.physics._compile import kernel, lean_kernel
+from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
 from rotordrop.physics.ball_set import ball_set_gradient
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import sine_cosine
@@ -21,6 +21,7 @@ from rotordrop.physics.spin import race_drag_gradient
 from rotordrop.physics.touch import touch_gradient
 from rotordrop.simulate._rhs import (
     aerodynamic_deceleration,
+    mount_states,
     race_deflection,
     relative_motion,
     support_deflection,
@@ -141,6 +142,46 @@ def _race_jacobian(b: int, y: Array, p: KernelParameters, J: Array) -> None:
             J[spin, h + j] += by_force / row[L.RACE_INERTIA] * along / F
 
 
+@inner_kernel
+def _entry(matrix: mount.Matrix, i: int, j: int) -> float:
+    """Entry of a matrix of x and y."""
+    if i == 0:
+        return matrix[0] if j == 0 else matrix[1]
+    return matrix[2] if j == 0 else matrix[3]
+
+
+@lean_kernel
+def _mount_jacobian(b: int, y: Array, p: KernelParameters, J: Array) -> None:
+    """Add stop, ribbon and branches of a mount: their forces on support and foundation, and their states."""
+    n_q, h, own = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.BEARING_OWN]
+    row = p.bearing[b]
+    numbers = row[L.MOUNT : L.MOUNT_END]
+    x, z, vx, vz = support_deflection(b, y, p)
+    first, last = mount_states(b, p)
+    mobility = max(row[L.SUPPORT_FORM + blocks.SUPPORT_FOUNDATION_SHARE], 0.0) / row[L.SUPPORT_MASS_Y]
+    k, c = mount.stop_tangent(numbers, x, z, vx, vz)
+    for i in range(2):
+        for body in range(1 if own < 0 else 2):  # the force acts on the support and back on its foundation
+            place = n_q + h + i if body == 0 else own + 2 + i
+            weight = -1.0 / row[L.SUPPORT_MASS_X + i] if body == 0 else mobility
+            for j in range(2):
+                J[place, h + j] += weight * _entry(k, i, j)
+                J[place, n_q + h + j] += weight * _entry(c, i, j)
+                if own >= 0:
+                    J[place, own + j] -= weight * _entry(k, i, j)
+                    J[place, own + 2 + j] -= weight * _entry(c, i, j)
+            for state in range(first + i, last, 2):
+                J[place, state] += weight * mount.stiffness_of_state(numbers, state - first)
+    for state in range(first, last, 2):
+        by_stretch, by_rate = mount.stretch_gradient(numbers, state - first, y[state], y[state + 1], vx, vz)
+        for i in range(2):
+            for j in range(2):
+                J[state + i, state + j] += _entry(by_stretch, i, j)
+                J[state + i, n_q + h + j] += _entry(by_rate, i, j)
+                if own >= 0:
+                    J[state + i, own + 2 + j] -= _entry(by_rate, i, j)
+
+
 @lean_kernel
 def _support_jacobian(b: int, y: Array, p: KernelParameters, J: Array) -> None:
     """Add a support with what its form changes, and its foundation."""
@@ -166,6 +207,8 @@ def _support_jacobian(b: int, y: Array, p: KernelParameters, J: Array) -> None:
         J[own + i, own + 2 + i] = 1.0
         J[own + 2 + i, own + i] -= speed * speed
         J[own + 2 + i, own + 2 + i] -= 2.0 * form[blocks.SUPPORT_FOUNDATION_DAMPING] * speed
+    if row[L.MOUNT] != 0.0:
+        _mount_jacobian(b, y, p, J)
 
 
 @kernel

@@ -76,6 +76,7 @@ def prior_at_power_off(
         known = sensor_prior(parameter("offset", "sensor"), sensor.offset, gap)
         mean[offset], sigma[offset] = known.mean, known.sigma
     sigma[s + n_p + 2 * n_c :] = RUNOUT_SIGMA
+    sigma[layout.mount] = RACE_POSITION_SIGMA * gap
     sigma[layout.own] = np.resize(OWN_SIGMA, layout.own.stop - layout.own.start)
     covariance = np.diag(sigma**2)
     share_in_groups(model, unknowns, covariance[s : s + n_p, s : s + n_p])

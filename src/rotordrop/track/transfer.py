@@ -31,6 +31,8 @@ def transferred(coarse: DropProblem, fine: DropProblem, means: Array) -> Array:
     result[:, two.race_spin] = means[:, one.race_spin]
     if one.bearing_own == two.bearing_own:
         result[:, two.own] = means[:, one.own]
+    if one.mount_own == two.mount_own:
+        result[:, two.mount] = means[:, one.mount]
     result[:, two.rotor_speed : two.n_dynamic] = means[:, one.rotor_speed : one.n_dynamic]
     _carry_unknowns(coarse, fine, means, result)
     if two.sensor_own:

@@ -34,7 +34,7 @@ BAD = [
     (
         GAP,
         GAP + '\nmount = "soft"',
-        "'mount' is reserved for a soft mount with a stop, which is not yet",
+        "'soft' is no mount; write a list of its elements, mount = .*kind = .stop",
         "mount",
     ),
     ("[[rotor.discs]]", "[[rotor.disks]]", "unknown key 'disks'; did you mean 'discs'", "rotor.disks"),

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from tests.unit.simulate import plain_equations
 
+from rotordrop.physics import columns as L
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.simulate._rhs import drop_derivative, scratch_of
 from rotordrop.simulate._sensitivity import drop_jacobian
@@ -120,7 +121,4 @@ def both_jacobians(model, state, case):
 
 
 def _step(model, column):
-    layout = model.layout
-    if column < layout.n_coordinates:
-        return 1e-9
-    return 1e-6 if column < 2 * layout.n_coordinates else 1e-4
+    return {L.POSITION: 1e-9, L.INTERNAL: 1e-9, L.VELOCITY: 1e-6}.get(model.layout.kinds[column], 1e-4)

@@ -1,0 +1,236 @@
+"""A soft mount: what lies beside the spring and damper of a support. Ribbon, branches that relax, stop.
+
+Spring and damper themselves are those of the support, `rotordrop.elements.support`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.elements import values as V
+from rotordrop.elements.description import Description, Misfit
+from rotordrop.elements.parameter import Parameter, bearing_entries
+from rotordrop.elements.values import default, follows, scaled
+from rotordrop.known import Known
+from rotordrop.physics import blocks
+from rotordrop.physics import columns as L
+from rotordrop.units import format_quantity
+
+Array = NDArray[np.float64]
+
+FRICTION_SHARE = 1.573
+"""Stiffness of a ribbon's friction over that of its spring [1] for a loss factor of 0.3 at 3.4 times the
+travel of slip: by harmonic balance 0.2643 r / (1 + 0.2455 r)."""
+
+SLIP_TRAVEL = (25e-6, 5e-6, 100e-6)
+"""Travel at which a ribbon slips [m] and its range, where no slip force is given: chosen, not measured."""
+
+_OF_SUPPORT: Mapping[str, tuple[str, ...]] = {
+    "spring": ("stiffness", "damping", "damping_ratio", "cubic"),
+    "ribbon": ("stiffness",),
+    "maxwell": ("stiffness",),
+    "stop": (),
+}
+"""Kinds of elements, and what each says of the spring and damper of the support."""
+
+
+class Stop(Description):
+    """A stop around the support: a second contact, circle in circle, without friction."""
+
+    gap: V.PositiveLength
+    """Travel of the support up to the stop [m]."""
+    stiffness: V.Stiffness = default(5e8, "a steel ring in its housing", (1e8, 5e9))
+    """Stiffness of the stop [N/m]."""
+    damping: V.ContactDamping = default(0.1, "contact damping of steel at low speed", (0.0, 0.5))
+    """Contact damping λ [s/m]."""
+
+
+class Ribbon(Description):
+    """A corrugated ribbon: it holds by a spring up to its slip force, and slips beyond."""
+
+    friction_stiffness: V.Stiffness = follows(
+        "a loss factor of 0.3 at 3.4 times the travel at which it slips"
+    )
+    """Stiffness of the spring that slips [N/m]."""
+    slip_force: V.PositiveForce = follows("a travel of 25 µm")
+    """Force at which it slips [N]."""
+    sharpness: V.Positive = default(10.0, "close to Coulomb's friction, and smooth")
+    """Exponent n of the transition to slip [1]."""
+
+
+class Branch(Description):
+    """A spring in series with a damper (Maxwell): stiff when fast, gone when slow."""
+
+    stiffness: V.Stiffness
+    """Stiffness of its spring [N/m]."""
+    time: V.PositiveTime
+    """Time in which its force relaxes [s]."""
+
+
+class Mount(Description):
+    """What lies in parallel to spring and damper of a support; nothing by default."""
+
+    stop: Stop | None = None
+    """A stop."""
+    ribbon: Ribbon | None = None
+    """A corrugated ribbon (tolerance ring)."""
+    maxwell: tuple[Branch, ...] = ()
+    """Branches that relax, such as of an O-ring, slowest first; three at most."""
+
+    @property
+    def present(self) -> bool:
+        """Whether there is any element."""
+        return self.stop is not None or self.states > 0
+
+    @property
+    def states(self) -> int:
+        """Number of its states: the stretch, x and y, of each spring that slips or relaxes."""
+        return 2 * (len(self.maxwell) + (self.ribbon is not None))
+
+    def check(self) -> None:
+        """Refuse branches that do not descend, or too many."""
+        times = [branch.time.value for branch in self.maxwell]
+        if len(times) > blocks.MOUNT_MOST_BRANCHES:
+            raise Misfit(
+                f"the mount has {len(times)} branches; {blocks.MOUNT_MOST_BRANCHES} cover two decades of "
+                "frequency and are the most",
+                ("maxwell",),
+            )
+        for k, (one, other) in enumerate(pairwise(times)):
+            if other >= one:
+                shown = " and ".join(format_quantity(time, "time") for time in (one, other))
+                raise Misfit(
+                    f"the relaxation times do not descend: {shown}; write the slowest branch first",
+                    ("maxwell", k + 1, "time"),
+                )
+
+    def beside(self, stiffness: Known) -> Mount:
+        """The mount with what its ribbon leaves out, beside a spring of a stiffness [N/m]."""
+        if self.ribbon is None:
+            return self
+        given, values = self.ribbon.model_fields_set, dict[str, Any]()
+        friction = self.ribbon.friction_stiffness
+        if "friction_stiffness" not in given:
+            if "slip_force" in given and stiffness.status == "default":
+                raise Misfit(
+                    "the ribbon has a 'slip_force' but no stiffness; give its 'friction_stiffness', or the "
+                    "'stiffness' of the spring beside it",
+                    ("ribbon", "slip_force"),
+                )
+            why = "a loss factor of 0.3 at 3.4 × the travel of slip"
+            friction = scaled(stiffness, FRICTION_SHARE, why, "N/m")
+            values["friction_stiffness"] = friction
+        if "slip_force" not in given:
+            force, low, high = (travel * friction.value for travel in SLIP_TRAVEL)
+            why = f"{format_quantity(SLIP_TRAVEL[0], 'length')} of travel, chosen and not measured"
+            values["slip_force"] = Known(
+                value=force, status="default", range=(low, high), source=why, unit="N"
+            )
+        return self.completed_with({"ribbon": self.ribbon.completed_with(values)})
+
+    def fill(self, row: Array) -> None:
+        """Write the columns of the mount."""
+        numbers = row[L.MOUNT : L.MOUNT_END]
+        numbers[blocks.MOUNT_PRESENT], numbers[blocks.MOUNT_STATES] = self.present, self.states
+        if self.stop is not None:
+            numbers[blocks.MOUNT_STOP_GAP] = float(self.stop.gap)
+            numbers[blocks.MOUNT_STOP : blocks.MOUNT_STOP_END] = (
+                float(self.stop.stiffness),
+                1.0,
+                float(self.stop.damping),
+            )
+        if self.ribbon is not None:
+            numbers[blocks.MOUNT_RIBBON_STIFFNESS] = float(self.ribbon.friction_stiffness)
+            numbers[blocks.MOUNT_RIBBON_SLIP] = float(self.ribbon.slip_force)
+            numbers[blocks.MOUNT_RIBBON_SHARPNESS] = float(self.ribbon.sharpness)
+        for k, branch in enumerate(self.maxwell):
+            at = blocks.MOUNT_BRANCHES + k * blocks.MOUNT_BRANCH_ENTRIES
+            numbers[at], numbers[at + 1] = float(branch.stiffness), float(branch.time)
+
+
+def mounted(raw: dict[str, Any]) -> dict[str, Any]:
+    """Sort a mount that is a list of elements in parallel: spring and damper are those of the support.
+
+    Spring, ribbon and maxwell may state the ``stiffness`` of the plain spring beside them; one of them does.
+    """
+    elements = raw.get("mount")
+    if elements is None or isinstance(elements, Mapping | Mount):
+        return raw
+    if not isinstance(elements, list | tuple):
+        example = 'mount = [{ kind = "stop", gap = "0.25 mm" }]'
+        raise Misfit(f"{elements!r} is no mount; write a list of its elements, {example}", ("mount",))
+    mount: dict[str, Any] = {}
+    given = raw.get("support", {})
+    support = dict(given) if isinstance(given, Mapping) else {}
+    for k, element in enumerate(elements):
+        kind, rest = _element(element, ("mount", k))
+        for key in [key for key in _OF_SUPPORT[kind] if key in rest]:
+            if key in support or not isinstance(given, Mapping):
+                raise Misfit(
+                    f"the support has a {key!r} already, and so does this {kind}; state their sum once",
+                    ("mount", k, key),
+                )
+            support[key] = rest.pop(key)
+        if kind in mount:
+            raise Misfit(f"the mount has two elements {kind!r}; keep one", ("mount", k))
+        mount[kind] = rest
+    if unknown := mount.pop("spring", {}):
+        raise Misfit(f"a spring has no {next(iter(unknown))!r}", ("mount",))
+    if "maxwell" in mount:
+        mount["maxwell"] = mount["maxwell"]["branches"]
+    return raw | {"mount": mount} | ({"support": support} if support else {})
+
+
+def _element(element: Any, place: tuple[str | int, ...]) -> tuple[str, dict[str, Any]]:
+    """Kind of an element, and the rest of it."""
+    kind = element.get("kind") if isinstance(element, Mapping) else None
+    if not isinstance(kind, str) or kind not in _OF_SUPPORT:
+        shown = repr(element if kind is None else kind)
+        raise Misfit(f"{shown} is no element of a mount; its kind is one of {', '.join(_OF_SUPPORT)}", place)
+    rest = {key: value for key, value in element.items() if key != "kind"}
+    if kind == "maxwell" and not (set(rest) <= {"stiffness", "branches"} and rest.get("branches")):
+        raise Misfit('write branches = [{ stiffness = "4e6 N/m", time = "30 ms" }, ...]', place)
+    return kind, rest
+
+
+PARAMETERS: tuple[Parameter, ...] = (
+    Parameter(
+        path="mount.stop.gap",
+        label="travel up to the stop of the mount",
+        kind="length",
+        measured_by="a push of the bearing in its housing at {owner} until it stops",
+        guess_sigma=0.2,
+        given_sigma=1e-4,
+        entries=bearing_entries(L.MOUNT + blocks.MOUNT_STOP_GAP),
+    ),
+    Parameter(
+        path="mount.stop.stiffness",
+        label="stiffness of the stop of the mount",
+        kind="stiffness",
+        guess_sigma=0.7,
+        given_sigma=1e-4,
+        entries=bearing_entries(L.MOUNT + blocks.MOUNT_STOP),
+    ),
+    Parameter(
+        path="mount.ribbon.friction_stiffness",
+        label="stiffness of the ribbon's friction",
+        kind="stiffness",
+        guess_sigma=0.5,
+        given_sigma=1e-4,
+        entries=bearing_entries(L.MOUNT + blocks.MOUNT_RIBBON_STIFFNESS),
+    ),
+    Parameter(
+        path="mount.ribbon.slip_force",
+        label="force at which the ribbon slips",
+        kind="force",
+        guess_sigma=0.7,
+        given_sigma=1e-4,
+        entries=bearing_entries(L.MOUNT + blocks.MOUNT_RIBBON_SLIP),
+    ),
+)
+"""Unknowns of a mount, of a bearing that has it; branches that relax are taken as they are given."""

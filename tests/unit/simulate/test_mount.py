@@ -1,0 +1,120 @@
+"""Drops on soft mounts: the description reaches the kernel, the derivative is right, energy closes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tests.unit.simulate.test_right_hand_side import SPEED, a_state, both_jacobians
+
+from rotordrop.errors import MachineFileError
+from rotordrop.machine import example_path, load_machine, loads_machine, machine_text
+from rotordrop.rotor.parameters import build_drop_model, sag_of_model
+from rotordrop.rotor.unknowns import structure_unknowns
+from rotordrop.simulate.case import DropCase
+from rotordrop.simulate.drop import simulate_drop
+
+STOP = '{ kind = "stop", gap = "8 um", stiffness = "5e8 N/m" }'
+RIBBON = '{ kind = "ribbon", friction_stiffness = "6e7 N/m", slip_force = "1.5 kN" }'
+O_RING = (
+    '{ kind = "maxwell", branches = [{ stiffness = "4e7 N/m", time = "3 ms" }, '
+    '{ stiffness = "6e7 N/m", time = "0.3 ms" }] }'
+)
+
+
+TEXT = example_path("small").read_text(encoding="utf-8")
+HEAD = '[[touchdown_bearings]]\nname = "DE"'
+
+
+def mounted(*elements, text=TEXT):
+    """The small machine with a mount under its DE bearing."""
+    assert HEAD in text
+    return loads_machine(text.replace(HEAD, f"{HEAD}\nmount = [{', '.join(elements)}]"))
+
+
+@pytest.fixture(scope="module")
+def small():
+    return load_machine(example_path("small"))
+
+
+@pytest.mark.parametrize("elements", [(STOP,), (RIBBON,), (O_RING,), (STOP, RIBBON, O_RING)])
+@pytest.mark.parametrize("foundation", [False, True])
+def test_jacobian_agrees_with_finite_differences(elements, foundation):
+    machine = mounted(*elements)
+    if foundation:
+        values = {"foundation_share": 0.1, "foundation_frequency": 600.0, "foundation_damping_ratio": 0.03}
+        machine = machine.with_values({f"DE.support.{name}": value for name, value in values.items()})
+    model = build_drop_model(machine, "quick")
+    state = a_state(model, np.array([-40e-6, 15e-6]), 0.98)
+    state[model.layout.support][-2:] = 9e-6, -4e-6  # beyond the stop
+    states = model.layout.mount
+    state[states] = np.resize([4e-6, -3e-6, 2e-6, 1e-6], states.stop - states.start)
+    jacobian, numeric = both_jacobians(model, state, DropCase(speed=SPEED, spin="prescribed"))
+    size = np.maximum(np.max(np.abs(numeric), axis=0), 1e-9)
+    error = np.delete(np.max(np.abs(jacobian - numeric), axis=0) / size, model.layout.rotor_angle)
+    assert np.max(error) < 5e-5, int(np.argmax(error))
+
+
+def test_energy_closes_and_a_stop_out_of_reach_changes_nothing(small):
+    case = DropCase(speed=SPEED, duration=0.03)
+    plain = simulate_drop(small, case)
+    far = simulate_drop(mounted('{ kind = "stop", gap = "5 mm" }'), case)
+    near = simulate_drop(mounted(STOP, RIBBON, O_RING), case)
+    assert np.array_equal(plain.displacement, far.displacement)
+    assert not np.array_equal(plain.displacement, near.displacement)
+    assert near.certificate.energy_residual < 1e-6 * near.certificate.energy_scale
+
+
+def test_a_stop_takes_the_load_that_the_spring_leaves(small):
+    load = float(build_drop_model(small, "quick").load_shares[1])
+    spring = float(small.touchdown_bearings[1].support.stiffness)
+    gap = 0.5 * load / spring
+    held = sag_of_model(build_drop_model(mounted(f'{{ kind = "stop", gap = "{gap!r} m" }}'), "quick"))
+    assert spring * held.support[1] + 5e8 * (held.support[1] - gap) == pytest.approx(load, rel=1e-12)
+
+
+def test_a_mount_is_written_and_read_again():
+    machine = mounted(STOP, RIBBON, O_RING)
+    assert loads_machine(machine_text(machine)).touchdown_bearings == machine.touchdown_bearings
+
+
+def test_a_guess_makes_an_unknown_and_a_given_value_none():
+    machine = mounted('{ kind = "stop", gap = { guess = "20 um", range = ["10 um", "40 um"] } }')
+    (gap,) = [one for one in structure_unknowns(build_drop_model(machine, "quick")) if "gap" in one.path]
+    assert gap.path == "DE.mount.stop.gap"
+    assert np.exp(gap.mean + 1.645 * gap.sigma) == pytest.approx(40e-6, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("element", "message"),
+    [
+        ('{ kind = "stop" }', r"gap"),
+        ('{ kind = "stop", gap = "0 um" }', r"must be positive"),
+        (
+            '{ kind = "stop", gap = "20 um" }, { kind = "stop", gap = "30 um" }',
+            r"two elements 'stop'; keep one",
+        ),
+        (
+            '{ kind = "rubber" }',
+            r"'rubber' is no element of a mount; its kind is one of spring, ribbon, maxwell",
+        ),
+        ('{ kind = "spring", gap = "20 um" }', r"a spring has no 'gap'"),
+        ('{ kind = "ribbon", stiffness = "2e7 N/m" }', r"has a 'stiffness' already, and so does this ribbon"),
+        (
+            '{ kind = "maxwell", branches = [{ stiffness = "4e6 N/m", time = "3 ms" }, '
+            '{ stiffness = "4e6 N/m", time = "30 ms" }] }',
+            r"the relaxation times do not descend: .*3.00 ms and 30.0 ms",
+        ),
+    ],
+)
+def test_mounts_that_cannot_be_are_refused(element, message):
+    with pytest.raises(MachineFileError, match=message):
+        mounted(element)
+
+
+def test_a_slip_force_needs_a_stiffness():
+    start = TEXT.index(HEAD)
+    lines = [line for line in TEXT[start:].splitlines() if not line.startswith('stiffness = { guess = "8e7')]
+    with pytest.raises(
+        MachineFileError, match=r"'slip_force' but no stiffness; give its 'friction_stiffness'"
+    ):
+        mounted('{ kind = "ribbon", slip_force = "1.5 kN" }', text=TEXT[:start] + "\n".join(lines))
