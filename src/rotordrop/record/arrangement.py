@@ -216,7 +216,12 @@ def pairs_of(
         return [(f"plane {k}", pair) for k, pair in enumerate(pairs, start=1)], "order"
     found: list[tuple[str, tuple[Channel, Channel]]] = []
     for strip in (False, True):
-        names = {id(channel): _spoken(called(channel), strip) for channel in left}
+        names = {}
+        for channel in left:
+            spoken = _COUNTER.sub("", called(channel)) if strip else called(channel)
+            for letter, words in _SPOKEN.items():
+                spoken = words.sub(letter, spoken)
+            names[id(channel)] = spoken
         for axes in _AXES:
             for first in list(left):
                 for second in list(left):
@@ -228,14 +233,6 @@ def pairs_of(
     order = {id(channel): place for place, channel in enumerate(channels)}
     found.sort(key=lambda entry: min(order[id(channel)] for channel in entry[1]))
     return [(name or f"plane {number}", pair) for number, (name, pair) in enumerate(found, start=1)], "names"
-
-
-def _spoken(name: str, strip: bool) -> str:
-    """A name whose words for an axis are letters, on request without the counter of the channel."""
-    name = _COUNTER.sub("", name) if strip else name
-    for letter, words in _SPOKEN.items():
-        name = words.sub(letter, name)
-    return name
 
 
 def _common(first: str, second: str, axes: str) -> str | None:

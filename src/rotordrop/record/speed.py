@@ -161,7 +161,7 @@ def speed_at_drop(record: Record, drop: float, *, span: float = 0.5) -> SpeedAtD
     return SpeedAtDrop(
         value=value,
         standard_error=float(scatter * np.sqrt(covariance[0, 0])),
-        slope=_slope_after(time[after] - drop, readings[after] - value),
+        slope=float(np.median((readings[after] - value) / (time[after] - drop))) if after.any() else 0.0,
         scatter=scatter,
         readings=int(used.sum()),
     )
@@ -175,11 +175,6 @@ def _level_or_line(when: Array, values: Array) -> tuple[Array, float, Array]:
     line = _robust(np.column_stack([np.ones_like(when), when]), values)
     doubt = 4.0 * line[1] * float(np.sqrt(line[2][1, 1]))
     return line if abs(line[0][1]) > doubt else level
-
-
-def _slope_after(when: Array, change: Array) -> float:
-    """Robust slope [rad/s²] of the readings after the drop through the speed at it; 0 without any."""
-    return float(np.median(change / when)) if len(when) else 0.0
 
 
 def smooth_speed(record: Record, *, span: float = 0.1) -> Array:

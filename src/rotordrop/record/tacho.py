@@ -97,10 +97,15 @@ def _crossings(time: Array, values: Array) -> Array:
 
 def _sorted_out(crossings: Array, per_turn: int, place: str) -> tuple[Array, tuple[str, ...]]:
     """Passages with a NaN for each missing pulse and none too many, and words on both."""
+    from scipy.ndimage import median_filter
+
     intervals = np.diff(crossings)
-    usual = _usual(intervals, NEIGHBOURS * per_turn)
+    # median of the intervals around each; beyond the ends the first and the last count on
+    usual = np.asarray(median_filter(intervals, size=2 * NEIGHBOURS * per_turn + 1, mode="nearest"))
     missing = np.flatnonzero(intervals > MISSED * usual)
-    spare = _too_many(intervals, usual)
+    # one pulse too many splits an interval in two
+    short = intervals < usual / MISSED
+    spare = {k + 1 for k in range(len(intervals) - 1) if short[k] and short[k + 1]}
     faulty = len(missing) + len(spare)
     if faulty > MOST_FAULTY * len(intervals):
         raise RecordError(
@@ -121,16 +126,3 @@ def _sorted_out(crossings: Array, per_turn: int, place: str) -> tuple[Array, tup
             told = ", ".join(f"{crossings[k]:.4g} s" for k in places[:5])
             warnings.append(f"{place}: {len(places)} pulses {what} {told}; their turns give no speed")
     return np.array(rows), tuple(warnings)
-
-
-def _usual(intervals: Array, reach: int) -> Array:
-    """Median of the intervals around each; beyond the ends the first and the last count on."""
-    from scipy.ndimage import median_filter
-
-    return np.asarray(median_filter(intervals, size=2 * reach + 1, mode="nearest"))
-
-
-def _too_many(intervals: Array, usual: Array) -> set[int]:
-    """Pulses between two that are a usual interval apart: those that split an interval in two."""
-    short = intervals < usual / MISSED
-    return {k + 1 for k in range(len(intervals) - 1) if short[k] and short[k + 1]}

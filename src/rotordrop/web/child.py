@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from rotordrop.machine import Machine
     from rotordrop.record.profile import Profile
     from rotordrop.record.record import Record
+    from rotordrop.record.recording import Array
 
 MEMORY: dict[str, int] = {
     "channels": 2 * 2**30,
@@ -36,6 +37,8 @@ MEMORY: dict[str, int] = {
 MEMORY_PER_BYTE = 40
 """Memory a computation may take beside that, for each byte of its files [1]; chosen, not measured."""
 CPU_S: dict[str, int] = {"channels": 300, "look": 300, "estimate": 4 * 3600, "waterfall": 4 * 3600}
+TRACE_POINTS = 80
+"""Points of the small trace of a channel; chosen, not measured."""
 BETWEEN_WORDS_S = 0.3
 """Pause between two words on the progress [s]; chosen, not measured."""
 
@@ -157,6 +160,17 @@ def _record_file(job: Job) -> Path:
     return file
 
 
+def _trace(values: Array) -> list[float | None]:
+    """A channel in few points as shares of its range; None where a sample is missing."""
+    import numpy as np
+
+    if not np.isfinite(values).any():
+        return []
+    few = values[np.linspace(0, len(values) - 1, min(len(values), TRACE_POINTS)).astype(int)]
+    low, span = float(np.nanmin(values)), float(np.nanmax(values) - np.nanmin(values)) or 1.0
+    return [None if np.isnan(value) else round((value - low) / span, 3) for value in few.tolist()]
+
+
 def _channels(job: Job, made: Path, told: dict[str, Any]) -> None:
     """What a recording holds, which sensors look for a channel, and what could be guessed."""
     from rotordrop.record.columns import guess_profile
@@ -171,6 +185,7 @@ def _channels(job: Job, made: Path, told: dict[str, Any]) -> None:
             "unit": given.units.get(channel.label) or channel.unit or given.unit or "",
             "low": float(channel.values.min()) if len(channel.values) else None,
             "high": float(channel.values.max()) if len(channel.values) else None,
+            "trace": _trace(channel.values),
         }
         for channel in recording.channels
     ]

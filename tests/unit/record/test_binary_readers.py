@@ -390,7 +390,7 @@ class TestFilesThatEndTheLibrary:
         try:
             read_recording(path, Profile())
         except RecordError as error:
-            assert re.search(r"cannot be read within 4 s|no intact HDF5 file|clock", str(error))
+            assert re.search(r"cannot be read within (4|20) s|no intact HDF5 file|clock", str(error))
         assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - started < 5.5
 
     def test_a_file_that_unpacks_to_far_more(self, tmp_path):

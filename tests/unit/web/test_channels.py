@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.unit.record.exports import EXPORTS
+from tests.unit.record.exports import EXPORTS, MICRONS
 
 from rotordrop import load_machine, look
 from rotordrop.machine.simple import EXAMPLES
@@ -83,6 +83,9 @@ def test_without_a_machine_the_planes_are_guessed_and_a_wav_asks_for_its_full_sc
         "plane 2": "channel 3, channel 4",
     }
     assert {one["unit"] for one in told["channels"]} == {"of full scale"}
+    for column, one in enumerate(told["channels"]):
+        shares = (MICRONS[:, column] - MICRONS[:, column].min()) / np.ptp(MICRONS[:, column])
+        np.testing.assert_allclose(one["trace"], shares, atol=2e-3)
     assert 'what full scale is: --full-scale "500 um"' in told["missing"]
 
 

@@ -82,7 +82,16 @@ export function tomlOf(table) {
 }
 
 const LENGTHS = ["m", "mm", "um", "nm", "mil", "in", "V", "mV", "of full scale", ""];
-const spoken = ({ label, unit, low, high }) => `${label} (${low === null ? "empty" : `${Number(low.toPrecision(3))} to ${Number(high.toPrecision(3))} ${unit || "without a unit"}`})`.replaceAll("-", "−");
+const spoken = ({ label, unit, low, high }) => `${label} (${low === null ? "empty" : `${`${Number(low.toPrecision(3))} to ${Number(high.toPrecision(3))}`.replaceAll("-", "−")} ${unit || "without a unit"}`})`;
+function drawn(values) {
+  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg"), line = document.createElementNS(svg.namespaceURI, "polyline");
+  svg.setAttribute("class", "trace");
+  svg.setAttribute("viewBox", "-1 -1 82 22");
+  svg.setAttribute("aria-hidden", "true");
+  line.setAttribute("points", (values || []).map((y, i) => (y === null ? "" : `${((80 * i) / Math.max(values.length - 1, 1)).toFixed(1)},${(20 - 20 * y).toFixed(1)}`)).join(" "));
+  svg.append(line);
+  return svg;
+}
 const choice = (name, options, chosen, label) => make("select", { name, "aria-label": label, of: options.map(([value, text]) => make("option", { value, text, selected: value === chosen ? "" : null })) });
 const entry = (name, value, placeholder, label) => make("input", { name, value: value || "", placeholder, "aria-label": label, maxlength: 120, autocomplete: "off", size: 12 });
 
@@ -111,7 +120,9 @@ export function askChannels({ channels, sensors, profile }, words, sent) {
     rows.push(make("tr", { of: [make("th", { scope: "row", text: sensor.name }),
       make("td", { of: [sensors.length ? make("span", { text: sensor.plane }) : entry("plane", sensor.plane, "NDE", `Plane of ${sensor.name}`)] }),
       make("td", { of: [sensors.length ? make("span", { text: degrees.replace("-", "−").replace(" deg", "°") }) : entry("angle", degrees, "0 deg", `Angle of ${sensor.name}, from +x`)] }),
-      make("td", { of: [choice("channel", options, chosen, `Channel of ${sensor.name}`)] })] }));
+      make("td", { of: [choice("channel", options, chosen, `Channel of ${sensor.name}`)] }), make("td", { of: [drawn(channels.find(({ label }) => label === chosen)?.trace)] })] }));
+    const row = rows.at(-1), select = row.querySelector("select");
+    select.addEventListener("change", () => row.lastElementChild.replaceChildren(drawn(channels.find(({ label }) => label === select.value)?.trace)));
   }
   by("channelrows").replaceChildren(...rows);
   const speed = profile.speed || {}, source = speed.channel ? `channel ${speed.channel}` : speed.pulses ? `pulses ${speed.pulses}` : speed.constant ? "constant" : "";
