@@ -285,6 +285,15 @@ def format_minute(moment: str) -> str:
     return re.sub(r"^(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d).*$", r"\1 \2", moment)
 
 
+def format_second(moment: str) -> str:
+    """Write a moment of ISO 8601 to the second, ``"2026-03-01 12:30:05 UTC"``; anything else as it is."""
+    return re.sub(
+        r"^(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d:\d\d)(?:[.,]\d+)?(.*)$",
+        lambda found: f"{found[1]} {found[2]}{' UTC' if found[3] == 'Z' else found[3]}",
+        moment,
+    )
+
+
 def format_chance(probability: float) -> str:
     """Write a probability [1] in per cent, ``"93%"``; nothing is certain: the ends are "> 99%" and "< 1%"."""
     if probability >= 0.995:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 Level: TypeAlias = Literal["good", "notice", "warning", "bad"]
 Cell: TypeAlias = str | Quantity
 
+OPEN_NOTES = 6
+"""Notes that stand open on a page; chosen, not measured."""
 SIMULATED_RECORD = (
     "This record is simulated: it comes from a program with a model of the measuring chain, "
     "not from a machine."
@@ -32,6 +34,13 @@ class Statement:
 
     text: str
     level: Level = "notice"
+
+    @property
+    def sentence(self) -> str:
+        """The text with a capital at its beginning and a full stop at its end; names keep their letters."""
+        first = self.text.partition(" ")[0]
+        begun = f"{self.text[:1].upper()}{self.text[1:]}" if first.isalpha() else self.text
+        return begun if begun.endswith((".", "!", "?", ":")) or not begun else f"{begun}."
 
 
 @dataclass(frozen=True)
@@ -97,6 +106,21 @@ class Table:
                     f"{row!r}; give as many cells as columns"
                 )
 
+    def with_units_above(self) -> Table:
+        """The same table as it is shown: a unit that all numbers of a column share stands in its heading."""
+        heads, columns = [], []
+        for k, head in enumerate(self.columns):
+            cells = [row[k] for row in self.rows]
+            numbers = [cell for cell in cells if isinstance(cell, Quantity)]
+            one_kind = len(numbers) > 1 and len({cell.kind for cell in numbers}) == 1
+            above = one_kind and numbers[0].kind != "speed" and numbers[0].unit not in ("", "°")
+            heads.append(f"{head} [{numbers[0].unit}]" if above else head)
+            columns.append(
+                [replace(cell, bare=above) if isinstance(cell, Quantity) else cell for cell in cells]
+            )
+        rows = tuple(zip(*columns, strict=True)) if self.rows else ()
+        return Table(tuple(heads), rows, self.caption, self.note)
+
 
 def table(rows: Iterable[Any], columns: Sequence[Column], caption: str = "", note: str = "") -> Table:
     """Make a table of typed rows by its declared columns."""
@@ -143,6 +167,24 @@ class ReportContent:
     """Tables that belong beside the verdict and into the terminal."""
     sections: tuple[Section, ...] = ()
     """Figures and tables."""
+    lead: int = 0
+    """How many of the sections stand directly under the headline numbers, before the notes."""
+    ends: tuple[str, str] | None = None
+    """Names of the first and the last bearing, between which one looks."""
+
+    @property
+    def notes(self) -> tuple[Statement, ...]:
+        """Statements that stand open below the headline numbers: every warning, and a few notes."""
+        folded = set(map(id, self.assumptions))
+        return tuple(one for one in self.verdict[1:] if id(one) not in folded)
+
+    @property
+    def assumptions(self) -> tuple[Statement, ...]:
+        """Notes that are folded away, so that no more than a few lines stand open."""
+        rest = self.verdict[1:]
+        grave = sum(one.level in ("bad", "warning") for one in rest)
+        calm = [one for one in rest if one.level not in ("bad", "warning")]
+        return tuple(calm[max(0, OPEN_NOTES - grave) :])
 
     @property
     def figures(self) -> dict[str, go.Figure]:

@@ -27,6 +27,7 @@ from rotordrop.report.critical_speeds_figure import (
     stability_figure,
 )
 from rotordrop.report.machine_sections import defaults_section
+from rotordrop.report.quantity import written
 from rotordrop.report.style import TURN
 from rotordrop.rotor.campbell import (
     CampbellDiagram,
@@ -44,6 +45,8 @@ if TYPE_CHECKING:
 HIGHEST = 1000.0
 """Highest frequency of a Campbell diagram [Hz]; chosen, not measured."""
 SHAPES = 6
+ON_CARD = 6
+"""Critical speeds on a card; all stand in the table."""
 AT_LINES = {
     "tangent": "bearings' tangent stiffness, supports without mass",
     "simple": "simple formula, supports without mass",
@@ -78,18 +81,23 @@ def critical_speeds_page(
     Maps by whirl ("standstill" as in the paper, "forward", "backward"), Campbell diagrams by what holds the
     rotor, and a stability map for each suspension that has one.
     """
+    nominal = float(machine.speed.nominal)
+    first, *others = sorted(maps.values(), key=lambda found: found.whirl != "forward")
     return ReportContent(
         title=f"Critical speeds of {machine.name}",
         verdict=_verdict(machine, maps["standstill"], diagrams),
-        cards=_cards(maps["standstill"]),
+        cards=critical_speeds_cards(diagrams, nominal),
         facts=(("machine", machine.name), ("rotordrop", __version__)),
-        summary=(line_table(maps["standstill"]), crossing_table(diagrams, float(machine.speed.nominal))),
+        summary=(crossing_table(diagrams, nominal),),
         sections=(
-            *(_map_section(found) for found in maps.values()),
+            _map_section(first),
             *(_campbell_section(machine, diagram) for diagram in diagrams.values()),
             *(_stability_section(machine, stability) if stability else ()),
+            Section("Stiffness of the bearings", tables=(stiffness_table(first),)),
+            *map(_map_section, others),
             *defaults_section(machine),
         ),
+        lead=1,
     )
 
 
@@ -139,21 +147,35 @@ def _held(name: str) -> str:
     return "Free-free" if name == "free-free" else f"In its {name}"
 
 
-def _cards(found: CriticalSpeedMap) -> tuple[Card, ...]:
-    return tuple(
-        Card(
-            f"{part.bearing} touchdown bearing",
-            (
-                fact("Static load", part.load, "force"),
-                fact("Ball bearing, tangent", part.tangent, "stiffness"),
-                fact("Ball bearing, simple formula", part.simple, "stiffness"),
-                fact("Support", part.support, "stiffness"),
-                fact("Equivalent, tangent", part.equivalent("tangent"), "stiffness"),
-                fact("Equivalent, simple formula", part.equivalent("simple"), "stiffness"),
-            ),
-        )
-        for part in found.lines
+def critical_speeds_cards(diagrams: Mapping[str, CampbellDiagram], nominal: float) -> tuple[Card, ...]:
+    """The lowest critical speeds of the rotor, a card for what holds it, forward and mixed ones first."""
+    cards = []
+    for name, diagram in diagrams.items():
+        judged = {id(one.crossing): one for one in separations(diagram, nominal, nominal)}
+        ordered = sorted(diagram.crossings, key=lambda one: (one.direction == "backward", one.speed))
+        figures = []
+        for number, crossing in enumerate(ordered[:ON_CARD], start=1):
+            one, hertz = judged.get(id(crossing)), crossing.speed / TURN
+            margin = "" if one is None else f"; margin {one.margin:.1%}, API 617 {one.verdict}"
+            note = f"{written(60.0 * hertz, 0)} rpm; damping ratio {crossing.damping_ratio:.2%}{margin}"
+            label = f"Critical speed {number}, {crossing.direction}"
+            figures.append(fact(label, hertz, "frequency", note=note))
+        cards.append(Card(_held(name), tuple(figures)))
+    return tuple(cards)
+
+
+def stiffness_table(found: CriticalSpeedMap) -> Table:
+    """Static load, stiffness and its parts at every bearing."""
+    columns = (
+        Column("touchdown bearing", "bearing"),
+        Column("static load", "load", "force"),
+        Column("ball bearing, tangent", "tangent", "stiffness"),
+        Column("ball bearing, simple formula", "simple", "stiffness"),
+        Column("support", "support", "stiffness"),
+        Column("equivalent, tangent", lambda part: part.equivalent("tangent"), "stiffness"),
+        Column("equivalent, simple formula", lambda part: part.equivalent("simple"), "stiffness"),
     )
+    return table(found.lines, columns, "Stiffness that holds the rotor where it rests in its bearings")
 
 
 def line_table(found: CriticalSpeedMap) -> Table:

@@ -6,6 +6,7 @@ A further figure of a drop is one function here, or one file and a line here.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from rotordrop.elements.ball_bearing import STATIC_STRESS
 from rotordrop.estimate.bearing_drop import BearingDrop, BearingMotions, History
@@ -18,8 +19,6 @@ from rotordrop.report.stress_box import StressBox, stress_box, stress_box_figure
 from rotordrop.report.style import MICRO, TURN
 from rotordrop.report.time_panels import Panel, time_panels
 
-EARLY = 0.04
-"""Window [s] around the first contacts that gets figures of its own; that of the paper."""
 AROUND_PEAK = (2e-3, 4e-3)
 """Stretch before and after a peak [s] that gets a figure of its own; chosen, not measured."""
 MEGA = 1e-6
@@ -84,22 +83,13 @@ def stress_panel(bearing: BearingDrop) -> Panel:
 
 
 def _force(bearings: Sequence[BearingDrop], loads: Mapping[str, float]) -> Section:
+    """The whole force beside its stretch around the peak, where the 90 % interval can be seen."""
     panels = [force_panel(bearing, loads) for bearing in bearings]
-
-    def figure(caption: str, name: str, drawn: Sequence[Panel], *, from_power_off: bool = True) -> Figure:
-        rows = [[panel] for panel in drawn]
-        chart = time_panels(rows, 1.0, "N", from_zero=True, from_power_off=from_power_off)
-        return Figure(chart, caption, name)
-
-    whole = "Magnitude of the ball force on the race, instantaneous (Neisi 2020, Fig. 15)."
-    figures = [figure(whole, "force", panels)]
-    if max(bearing.force.time[-1] for bearing in bearings) > EARLY:
-        first = f"The same force in the first {1e3 * EARLY:.0f} ms."
-        figures.append(figure(first, "force, first contacts", [panel.until(EARLY) for panel in panels]))
-        near = [panel.around(*AROUND_PEAK) for panel in panels]
-        caption = "The same force around its peak, where the 90 % interval can be seen."
-        figures.append(figure(caption, "force, around its peak", near, from_power_off=False))
-    return Section("Bearing force", figures=tuple(figures))
+    near = [replace(panel.around(*AROUND_PEAK), title=f"{panel.title}, around its peak") for panel in panels]
+    rows = [[replace(whole, peak=None), close] for whole, close in zip(panels, near, strict=True)]
+    chart = time_panels(rows, 1.0, "N", from_zero=True, from_power_off=False)
+    caption = "Magnitude of the ball force on the race, instantaneous (Neisi 2020, Fig. 15), and its peak."
+    return Section("Bearing force", figures=(Figure(chart, caption, "force"),))
 
 
 def _stress(bearings: Sequence[BearingDrop], speed: float) -> Section:
@@ -137,7 +127,7 @@ def _impacts(bearings: Sequence[BearingDrop]) -> Section:
     force = hit[0].impact_force
     figure = Figure(
         impact_figure(hit, force=force),
-        f"Peak {force} of every impact where it hit the race, seen from the last bearing; −90° is "
+        f"Peak {force} of every impact where it hit the race, seen from {bearings[-1].name}; −90° is "
         "the bottom, the distance from the centre is the force, the bar its 90 % interval.",
         "impacts",
     )
@@ -145,54 +135,39 @@ def _impacts(bearings: Sequence[BearingDrop]) -> Section:
 
 
 def motion_section(bearings: Sequence[BearingMotions | BearingDrop], origin: str, *text: str) -> Section:
-    """Displacement against time: every bearing for itself, and all side by side."""
-    figures = [
-        Figure(
-            displacement_figure(bearing),
-            f"Displacement of the rotor in the {bearing.name} touchdown bearing, {origin}; "
-            "vertical above, horizontal below (Neisi 2020, Figs 7 and 8).",
-            f"displacement {bearing.name}",
-        )
-        for bearing in bearings
-    ]
-    rows = [
-        [_sideways(bearing, "displacement", ()), _upwards(bearing, "displacement")] for bearing in bearings
-    ]
-    pair = Figure(
-        time_panels(rows, MICRO, "µm", height=250, together=True),
-        "All bearings side by side; the panels zoom together (Neisi 2020, Fig. 13).",
-        "displacement",
-    )
+    """Displacement against time, horizontal beside vertical, all bearings zooming together."""
+    caption = f"Displacement of the rotor, {origin}; the panels zoom together (Neisi 2020, Figs 7, 8 and 13)."
     carried = any(isinstance(b, BearingDrop) and b.motions[0].role == "measured" for b in bearings)
-    return Section("Displacement", (*text, *((CARRIED,) if carried else ())), figures=(*figures, pair))
+    figure = Figure(displacement_figure(bearings), caption, "displacement")
+    return Section("Displacement", (*text, *((CARRIED,) if carried else ())), figures=(figure,))
 
 
-def displacement_figure(bearing: BearingMotions | BearingDrop) -> object:
-    """Draw vertical (y, up) and horizontal (x) displacement at one bearing (Neisi 2020, Figs 7 and 8).
+def displacement_figure(bearings: Sequence[BearingMotions | BearingDrop]) -> object:
+    """Draw horizontal (x) and vertical (y, up) displacement at every bearing (Neisi 2020, Figs 7, 8, 13).
 
     Differs from the paper: vertical is y and horizontal is x here, z runs along the rotor.
     """
-    rows = [[_upwards(bearing, "displacement y")], [_sideways(bearing, "displacement x", (-1.0, 1.0))]]
-    return time_panels(rows, MICRO, "µm", height=235)
+    rows = [[_sideways(bearing), _upwards(bearing)] for bearing in bearings]
+    return time_panels(rows, MICRO, "µm", height=250, together=True)
 
 
-def _upwards(bearing: BearingMotions | BearingDrop, axis: str) -> Panel:
+def _upwards(bearing: BearingMotions | BearingDrop) -> Panel:
     return Panel(
         title=f"{bearing.name}: vertical, y",
-        axis=axis,
+        axis="displacement y",
         histories=tuple(motion.vertical for motion in bearing.motions),
         air_gap=bearing.air_gap,
         gap_signs=(-1.0,),
     )
 
 
-def _sideways(bearing: BearingMotions | BearingDrop, axis: str, signs: tuple[float, ...]) -> Panel:
+def _sideways(bearing: BearingMotions | BearingDrop) -> Panel:
     return Panel(
         title=f"{bearing.name}: horizontal, x",
-        axis=axis,
+        axis="displacement x",
         histories=tuple(motion.horizontal for motion in bearing.motions),
         air_gap=bearing.air_gap,
-        gap_signs=signs,
+        gap_signs=(-1.0, 1.0),
     )
 
 
@@ -203,7 +178,7 @@ def orbit_section(
     orbit = Figure(
         orbit_figure(early or bearings),
         f"Path of the rotor centre against the clearance circle{until}; x to the right, y up, seen "
-        "from the last bearing (Neisi 2020, Fig. 12).",
+        f"from {bearings[-1].name} (Neisi 2020, Fig. 12).",
         "orbit",
     )
     rows = [

@@ -45,7 +45,7 @@ def headline_card(bearing: BearingDrop, *, certain: bool = True) -> Card:
 
 
 def identified_table(bearings: Sequence[BearingDrop], *, taken_over: str = "", certain: bool = True) -> Table:
-    """Identified values of every bearing side by side, each with its interval and verdict.
+    """Identified values of every bearing side by side, with interval, and verdict unless determined.
 
     Supports and friction may be taken over from a file; single numbers are shown where they are certain.
     """
@@ -61,7 +61,7 @@ def identified_table(bearings: Sequence[BearingDrop], *, taken_over: str = "", c
                 return "not estimated"
             if taken_over and known.status == "taken over":
                 return f"taken over from {Path(taken_over).name}"
-            return known.status
+            return "" if known.status == "determined" else known.status
 
         return Column(bearing.name, value), Column(f"{bearing.name}: verdict", verdict)
 

@@ -40,6 +40,7 @@ from rotordrop.report.replay_sections import (
     speed_section,
 )
 from rotordrop.severity.numbers import NOTE, SEVERITY
+from rotordrop.units import format_second
 
 KINDS = {"N": "force", "Pa": "pressure"}
 PRIOR_NOTE = (
@@ -72,7 +73,7 @@ def estimate_page(
     Everything it says of the drop comes from the estimate; the origin says how it was made, and an earlier
     estimate of the machine, as published, is compared with this one.
     """
-    return replace(estimate_summary(estimate, origin), sections=_sections(estimate, since))
+    return replace(estimate_summary(estimate, origin), sections=_sections(estimate, since), lead=1)
 
 
 def estimate_summary(estimate: Estimate, origin: Origin | None = None) -> ReportContent:
@@ -88,6 +89,7 @@ def estimate_summary(estimate: Estimate, origin: Origin | None = None) -> Report
         cards=tuple(headline_card(b, certain=certain) for b in estimate.bearings),
         summary=(identified_table(estimate.bearings, taken_over=fixed, certain=certain),),
         facts=(*_facts(estimate), *(origin or Origin()).facts(estimate.record.sha256)),
+        ends=(estimate.bearings[0].name, estimate.bearings[-1].name),
     )
 
 
@@ -159,7 +161,7 @@ def _facts(estimate: Estimate) -> tuple[tuple[str, str], ...]:
         "machine": machine.name if path is None else f"{machine.name} ({path.name})",
         "record": estimate.name if record.path is None else record.path.name,
         "SHA-256": record.sha256 or "not from a file",
-        "event": record.event_date,
+        "event": format_second(record.event_date),
         "power-off": f"{power_off.text} in record time (90 %: {power_off.interval_text})",
         "method": method,
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import plotly.graph_objects as go
 
 from rotordrop.estimate.bearing_drop import BearingDrop, Impact
 from rotordrop.report.content import Column, Table, table
+from rotordrop.report.quantity import Quantity, places_of
 from rotordrop.report.style import MUTED, axis_title, curve, panels, square
 
 LISTED = 24
@@ -23,13 +25,19 @@ def impact_table(bearings: Sequence[BearingDrop], *, force: str, listed: int = L
     strongest = sorted(impacts, key=lambda item: -item[1].peak_force.value)[:listed]
     left_out = len(impacts) - len(strongest)
     rest = f" {left_out} weaker ones are left out." if left_out else ""
+
+    def number(label: str, field: str, kind: str) -> Column:
+        """A number of the impacts, with as many places in every line as the largest needs."""
+        places = places_of((getattr(impact, field).value for _, impact in strongest), kind)
+        return Column(label, lambda row: replace(Quantity.of(getattr(row[1], field), kind), places=places))
+
     columns = (
         Column("bearing", lambda row: row[0]),
         Column("time of peak", lambda row: row[1].peak_time, "time"),
         Column("azimuth", lambda row: row[1].azimuth, "angle", 3),
-        Column(f"peak {force}", lambda row: row[1].peak_force, "force"),
-        Column("impulse", lambda row: row[1].impulse, "impulse", 3),
-        Column("dissipated energy", lambda row: row[1].dissipated_energy, "energy", 3),
+        number(f"peak {force}", "peak_force", "force"),
+        number("impulse", "impulse", "impulse"),
+        number("dissipated energy", "dissipated_energy", "energy"),
         Column("duration", lambda row: row[1].end - row[1].start, "time", 3),
     )
     return table(

@@ -44,7 +44,7 @@ def machine_content(
         facts=(("machine file", str(machine.source_path or "-")), ("rotordrop", __version__)),
         verdict=(_verdict(warnings), *_remarks(machine, warnings, brief)),
         cards=tuple(_card(machine, rest) for rest in summary.bearings),
-        summary=(_rotor_table(summary), mode_table(modes, "bending or support mode"), *tables),
+        summary=(_rotor_table(summary), mode_table(modes, "bending or support"), *tables),
         sections=(drawing_section(machine), *open_values) if drawn else (),
     )
 
@@ -132,7 +132,7 @@ def mode_table(modes: Iterable[tuple[str, Iterable[float]]], head: str, count: i
 
     def frequency(number: int) -> Column:
         return Column(
-            str(number + 1),
+            f"mode {number + 1}",
             lambda row: row[1][number] if number < len(row[1]) else None,
             "frequency",
         )

@@ -25,12 +25,12 @@ class ParameterRow(NamedTuple):
 
 
 def parameter_table(rows: Sequence[ParameterRow], *, caption: str = "Parameters", note: str = "") -> Table:
-    """Set prior, estimate, 90 % interval and verdict side by side."""
+    """Set prior, estimate, 90 % interval and a verdict where it is not determined side by side."""
     columns = (
         Column("parameter", "name"),
         Column("prior or start", "prior"),
         Column("estimate (90 % interval)", "estimate"),
-        Column("verdict", "verdict"),
+        Column("verdict", lambda row: "" if row.verdict == "determined" else row.verdict),
     )
     return table(rows, columns, caption, note)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
@@ -79,6 +80,10 @@ class Quantity:
     """Significant digits when no interval says how many are meant."""
     range_only: bool = False
     """Show the interval in place of the value, where a single number would say too much."""
+    places: int | None = None
+    """Decimal places of the shown unit, where a column has the same; a smaller number is "< 0.01"."""
+    bare: bool = False
+    """Without its unit, which stands above the column."""
     system: System = "SI"
     """``"SI"``, or ``"US"`` for mil, rpm and lbf."""
 
@@ -123,6 +128,8 @@ class Quantity:
         """Number and unit; a speed in Hz and rpm; the range where only that is to be shown."""
         if self.range_only:
             return self._range() if self.interval_90 is not None else "–"
+        if self.places is not None and 0.0 < abs(self._in_unit(self.value)) < 0.5 * 10.0**-self.places:
+            return self._with_unit(f"< {written(10.0**-self.places, self.places)}")
         if self.kind == "speed" and self.system == "SI" and math.isfinite(self.value):
             turns = self.value / (2 * math.pi)
             rpm = written(60 * turns, max(0, 3 - _magnitude(60 * turns)))
@@ -132,7 +139,7 @@ class Quantity:
     @property
     def interval_text(self) -> str:
         """The 90 % interval or else the limits in words; empty when neither is known."""
-        if self.range_only:
+        if self.range_only or self.text.startswith("<"):
             return ""
         if self.interval_90 is not None:
             return self._range()
@@ -159,13 +166,15 @@ class Quantity:
         return self._with_unit(parts)
 
     def _range(self) -> str:
-        return self._with_unit(" to ".join(self._at(limit) for limit in self.interval_90 or ()))
+        """The interval; an end that is not known is open."""
+        ends = (self._at(end) if math.isfinite(end) else "open" for end in self.interval_90 or ())
+        return self._with_unit(" to ".join(ends))
 
     def _at(self, value: float) -> str:
         return written(self._in_unit(value), self._places())
 
     def _with_unit(self, number: str) -> str:
-        if number == "–" or not self.unit:
+        if number == "–" or not self.unit or self.bare:
             return number
         return f"{number}{self.unit}" if self.unit == "°" else f"{number} {self.unit}"
 
@@ -177,6 +186,8 @@ class Quantity:
         value = self._in_unit(self.value)
         if not math.isfinite(value):
             return 0
+        if self.places is not None:
+            return self.places
         if self.kind in FIXED_PLACES:
             return FIXED_PLACES[self.kind]
         if not PLACES_OF_SCIENCE[0] < _magnitude(value) < PLACES_OF_SCIENCE[1]:
@@ -192,6 +203,12 @@ class Quantity:
         if self.standard_error is not None:
             return abs(self._in_unit(self.standard_error))
         return 0.0
+
+
+def places_of(values: Iterable[float], kind: str, digits: int = 3) -> int:
+    """Decimal places with which the largest of some values [SI] has so many digits in its unit."""
+    largest = max((abs(value) for value in values if math.isfinite(value)), default=0.0)
+    return max(0, digits - 1 - _magnitude(largest / display_unit(kind)[0]))
 
 
 def shown(value: object, kind: str, digits: int = 4) -> str:
@@ -214,7 +231,9 @@ def written(value: float, places: int | None) -> str:
     if not math.isfinite(value):
         return "–"
     if places is None:
-        mantissa, exponent = f"{value:.3e}".split("e")
+        if value == 0.0:
+            return "0"
+        mantissa, exponent = f"{value:.2e}".split("e")
         return f"{mantissa} × 10{_superscript(int(exponent))}"
     text = f"{value:,.{places}f}".replace(",", THIN_SPACE)
     return (

@@ -39,7 +39,7 @@ def imported_content(imported: ImportedRotor, name: str) -> ReportContent:
         subtitle=imported.source,
         verdict=tuple(Statement(note) for note in imported.notes)
         or (Statement("Everything in the file was taken over.", "good"),),
-        summary=(named_values("rotor", rows), mode_table(modes, "mode", SHOWN)),
+        summary=(named_values("rotor", rows), mode_table(modes, "rotor held", SHOWN)),
     )
 
 

@@ -62,6 +62,8 @@ def simulate_page(result: DropResult, machine: Machine | None = None) -> ReportC
             Section("Speed", figures=(turning,)),
             *(() if machine is None else machine_sections(machine)),
         ),
+        lead=1,
+        ends=(bearings[0].name, bearings[-1].name),
     )
 
 

@@ -10,13 +10,16 @@ import plotly.graph_objects as go
 
 from rotordrop._version import __version__
 from rotordrop.elements.description import unknown_key
+from rotordrop.elements.table import fitted_row
 from rotordrop.errors import UsageError
 from rotordrop.known import Known
+from rotordrop.machine import Machine
 from rotordrop.machine.machine import kind_of_path
 from rotordrop.report.content import Column, Figure, ReportContent, Section, Statement, Table, table
+from rotordrop.report.quantity import Quantity as Shown
 from rotordrop.report.quantity import display_unit
-from rotordrop.report.spread import ends, percent, spread, study_numbers_of
-from rotordrop.report.style import SERIES, axis_title, bars, curve, fit_legend, panels, plain
+from rotordrop.report.spread import ends, percent, study_numbers_of
+from rotordrop.report.style import SERIES, axis_title, bars, curve, fit_legend, panels, plain, upright
 from rotordrop.study.plan import case_kind
 from rotordrop.study.quantities import Quantity
 from rotordrop.study.sensitivity import influences
@@ -29,7 +32,7 @@ MAPPED = ("peak_force", "peak_stress", "settling_time")
 MATTERS = ("peak_force", "peak_stress")
 """Quantities of a bearing for which it is said which varied values matter."""
 WHIRL = {"backward_whirl": 0.0}
-HEADLINES = ("peak_force", "peak_stress", "largest_radius")
+HEADLINES = ("peak_force", "peak_stress")
 """Quantities of a bearing that stand beside the verdict."""
 SCOPE = (
     "The drops are simulated; the spread is that of the values that vary here, not of all that is unknown "
@@ -71,9 +74,10 @@ def study_page(
             ("rotordrop", __version__),
         ),
         sections=(
-            Section("Spread over all drops", (QUANTILES,), tables=(_table(results, (0.05, *SHARES)),)),
             *_influence_section(results),
+            _distribution_section(results),
             *(_map_section(results, name, limits or {}) for name in by),
+            Section("All quantiles", (QUANTILES,), tables=(_table(results, (0.05, *SHARES)),)),
         ),
     )
 
@@ -115,10 +119,58 @@ def _verdict(results: StudyResults, limits: Mapping[str, float]) -> list[Stateme
     return [*said, Statement(SCOPE)]
 
 
+def _distribution_section(results: StudyResults) -> Section:
+    """How the numbers that matter are spread: counts of drops, and the share below a value."""
+    caption = (
+        "Above: share of the drops by {words}. Below: share of the drops below a value; dotted: "
+        f"{', '.join(f'{100 * share:g}' for share in SHARES)} % of the drops lie below."
+    )
+    figures = tuple(
+        Figure(_distribution_figure(results, quantity), caption.format(words=words), f"spread of {words}")
+        for quantity in MATTERS
+        if (words := quantity.replace("_", " "))
+    )
+    return Section("Distribution", figures=figures)
+
+
+def _distribution_figure(results: StudyResults, quantity: str) -> go.Figure:
+    """Draw a histogram and the cumulative distribution of a quantity, a column for each bearing."""
+    bearings = [bearing.name for bearing in results.study.machine.touchdown_bearings]
+    count = len(bearings)
+    figure = panels([*bearings, *[""] * count], rows=2, columns=count, height=220)
+    for column, bearing in enumerate(bearings, start=1):
+        shown = _quantity(results, bearing, quantity)
+        size, unit = display_unit(shown.kind)
+        values = np.sort(results.numbers[shown.name])
+        values = values[np.isfinite(values)] / size
+        if not len(values):
+            continue
+        counted, edges = np.histogram(values, bins="auto" if len(values) > 1 else 1)
+        shares = 100.0 * counted / len(values)
+        steps: dict[str, Any] = {"line": {"color": SERIES[0], "width": 1.2, "shape": "hv"}, "fill": "tozeroy"}
+        drawn: dict[str, Any] = {"column": column, "legend": False}
+        bounds = np.append(shares, shares[-1])
+        curve(figure, edges, bounds, "drops", **drawn, **steps, hover="from %{x:.4~g}: %{y:.3~g} %")
+        below = 100.0 * (np.arange(len(values)) + 0.5) / len(values)
+        step = {"color": SERIES[0], "width": 1.6, "shape": "hv"}
+        curve(figure, values, below, "drops below", row=2, **drawn, line=step, hover="%{x:.4~g}: %{y:.3~g} %")
+        for share in SHARES:
+            at = results.quantile(shown.name, share).value / size
+            upright(figure, at, SERIES[1], "dot", row=2, col=column, annotation_text=f"{100 * share:g} %")
+        words = quantity.replace("_", " ")
+        figure.update_xaxes(title_text=axis_title(words, unit), row=2, col=column)
+        figure.update_xaxes(matches="x" if column == 1 else f"x{column}", row=2, col=column)
+    figure.update_yaxes(title_text=axis_title("drops", "%"), rangemode="tozero", row=1, col=1)
+    figure.update_yaxes(title_text=axis_title("drops below", "%"), rangemode="tozero", row=2, col=1)
+    return fit_legend(figure)
+
+
 def _table(results: StudyResults, shares: Sequence[float], only: Sequence[str] = ()) -> Table:
+    """Quantiles over the drops; each in the unit of its line, its interval below it."""
+
     def quantile(share: float) -> Column:
-        head = f"{100 * share:g} % quantile (90 %)"
-        return Column(head, lambda q: spread(results.quantile(q.name, share), q.kind))
+        head = f"{100 * share:g} % of drops below"
+        return Column(head, lambda q: Shown.of(results.quantile(q.name, share), q.kind, 3))
 
     def counted(q: Quantity) -> int:
         return int(np.count_nonzero(np.isfinite(results.numbers[q.name])))
@@ -142,25 +194,44 @@ def _quantity(results: StudyResults, bearing: str, quantity: str) -> Quantity:
 
 def _influence_section(results: StudyResults) -> tuple[Section, ...]:
     """Which varied values matter, or nothing where there are too few drops to say it."""
+    names = [bearing.name for bearing in results.study.machine.touchdown_bearings]
+    try:
+        found = {
+            f"{name} {quantity.replace('_', ' ')}": {
+                one.name: one for one in influences(results, f"{name}.{quantity}")
+            }
+            for name in names
+            for quantity in MATTERS
+        }
+    except UsageError:
+        return ()
 
-    def part(share: Known | None) -> str:
-        return "–" if share is None else percent(share, "{:.0f} % ({:.0f} to {:.0f} %)")
+    def part(what: str, field: str) -> Column:
+        def text(name: str) -> str:
+            share: Known | None = getattr(found[what][name], field)
+            return "–" if share is None else percent(share, "{:.0f} % ({:.0f} to {:.0f} %)")
 
+        return Column(what if field == "alone" else f"{what}, with all others", text)
+
+    values = list(next(iter(found.values())))
+    with_others = any(one.total is not None for parts in found.values() for one in parts.values())
+    fields = ("alone", "total") if with_others else ("alone",)
     columns = (
-        Column("varied value", "name"),
-        Column("alone (90 %)", lambda one: part(one.alone)),
-        Column("with all others (90 %)", lambda one: part(one.total)),
+        Column("varied value", lambda name: spoken_value(results.study.machine, name)),
+        *(part(what, field) for what in found for field in fields),
     )
-    tables = []
-    for bearing in results.study.machine.touchdown_bearings:
-        for quantity in MATTERS:
-            try:
-                found = influences(results, f"{bearing.name}.{quantity}")
-            except UsageError:
-                return ()
-            caption = f"{bearing.name} {quantity.replace('_', ' ')}: shares of the variance"
-            tables.append(table(found, columns, caption))
-    return (Section("What matters", (SHARES_OF_VARIANCE,), tables=tuple(tables)),)
+    shares = table(values, columns, "Shares of the variance (90 %)")
+    return (Section("What matters", (SHARES_OF_VARIANCE,), tables=(shares,)),)
+
+
+def spoken_value(machine: Machine, name: str) -> str:
+    """A varied value in words: ``*.friction.dynamic`` is the dynamic friction of every bearing."""
+    owner, _, rest = name.partition(".")
+    if case_kind(machine, name) is not None or not rest:
+        return name.replace("_", " ")
+    row = fitted_row(name)
+    label = rest.replace(".", " ").replace("_", " ") if row is None else row.label
+    return f"{label}, {'every bearing' if owner == '*' else owner}"
 
 
 def _map_section(results: StudyResults, name: str, limits: Mapping[str, float]) -> Section:
@@ -175,7 +246,7 @@ def _map_section(results: StudyResults, name: str, limits: Mapping[str, float]) 
         what = "Quantiles of" if limit is None else "Probability among"
         caption = f"{what} drops with neighbouring values; bars: 90 % intervals."
         figures.append(Figure(_map_figure(results, name, kind, quantity, limit), caption))
-    return Section(f"Against {plain(name)}", figures=tuple(figures))
+    return Section(f"Against {spoken_value(machine, name)}", figures=tuple(figures))
 
 
 def _map_figure(
@@ -202,7 +273,8 @@ def _map_figure(
                 legend=column == 1,
                 error_y=bars([(one.value, one.low, one.high) for one in known], size),
             )
-        figure.update_xaxes(title_text=axis_title(plain(name), unit), col=column)
+        title = plain(spoken_value(results.study.machine, name))
+        figure.update_xaxes(title_text=axis_title(title, unit), col=column)
     words = quantity.replace("_", " ")
     if limit is not None:
         words = f"P({words} > {format_quantity(limit, shown.kind)})" if limit else f"P({words})"

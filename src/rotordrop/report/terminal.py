@@ -70,7 +70,7 @@ def _statement(statement: Statement) -> RenderableType:
     from rich.text import Text
 
     word, style = MARKS[statement.level]
-    return Text.assemble((f"{word}: ", style), _safe(statement.text))
+    return Text.assemble((f"{word}: ", style), _safe(statement.sentence))
 
 
 def _table(table: Table) -> RenderableType:
@@ -84,6 +84,7 @@ def _table(table: Table) -> RenderableType:
         box=box.SIMPLE_HEAD,
         pad_edge=False,
     )
+    table = table.with_units_above()
     for index, column in enumerate(table.columns):
         numeric = bool(table.rows) and isinstance(table.rows[0][index], Quantity)
         drawn.add_column(Text(_safe(column)), justify="right" if numeric else "left")

@@ -66,15 +66,6 @@ class Panel:
             levels=(),
         )
 
-    def until(self, end: float) -> Panel:
-        """The panel up to a time [s]; a later peak is not marked."""
-        return replace(
-            self,
-            histories=tuple(history.between(-np.inf, end) for history in self.histories),
-            band=None if self.band is None else self.band.between(-np.inf, end),
-            peak=self.peak if self.peak is not None and self.peak.time <= end else None,
-        )
-
 
 def time_panels(
     rows: Sequence[Sequence[Panel]],

@@ -53,7 +53,8 @@ BEYOND = 1.2
 """How far a waterfall is drawn beyond the last thing in it [1]."""
 NEAR = 0.97
 """Share of the air gap at which the enlarged panel begins [1]."""
-WHITE = "#ffffff"
+WHITE = "#fff"
+"""On a map, whose colours are the same on dark paper."""
 
 
 def highest_shown(analysis: CoastDownAnalysis) -> float:

@@ -8,8 +8,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rotordrop.report.critical_speeds_page import _stability_section, _verdict, critical_speeds_json
-from rotordrop.rotor.campbell import StabilityMap
+from rotordrop.machine import example_machine
+from rotordrop.report.critical_speeds_page import (
+    _stability_section,
+    _verdict,
+    critical_speeds_cards,
+    critical_speeds_json,
+)
+from rotordrop.rotor.campbell import Crossing, StabilityMap
 
 AT_LINES = {"tangent": np.array([100.0]), "with support mass": np.array([90.0])}
 
@@ -64,3 +70,19 @@ def test_the_stability_map_is_drawn_told_and_in_the_json():
     told = critical_speeds_json({}, {}, [found])["stability"]["AMBs"]
     assert told["limit_N_m"] == 3e6
     assert told["logarithmic_decrement"] == [0.3, 0.1, -0.1]
+
+
+def test_the_cards_hold_the_critical_speeds_forward_ones_first():
+    crossings = tuple(
+        Crossing(speed=2.0 * math.pi * hertz, line=k, direction=direction, damping_ratio=0.025)
+        for k, (hertz, direction) in enumerate(((90.0, "backward"), (548.4, "forward"), (120.0, "forward")))
+    )
+    machine = example_machine("lp400")
+    nominal = float(machine.speed.nominal) / (2.0 * math.pi)
+    diagram = SimpleNamespace(crossings=crossings, suspension="AMBs")
+    (card,) = critical_speeds_cards({"AMBs": diagram}, 2.0 * math.pi * nominal)
+    assert card.title == "In its AMBs"
+    assert [one.value.text for one in card.figures] == ["120.0 Hz", "548.4 Hz", "90.00 Hz"]
+    assert card.figures[0].label == "Critical speed 1, forward"
+    assert "7\u202f200 rpm; damping ratio 2.50%; margin" in card.figures[0].note
+    assert "margin" not in card.figures[2].note

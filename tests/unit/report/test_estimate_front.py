@@ -79,7 +79,7 @@ def test_parquet_without_its_package_says_what_it_needs(estimate, tmp_path, monk
 
 def test_figures_are_asked_for_by_name_and_are_those_of_the_page(estimate):
     figures = estimate.figures
-    assert {"force", "stress", "impacts", "displacement NDE", "orbit", "parameters"} <= set(figures)
+    assert {"force", "stress", "impacts", "displacement", "orbit", "parameters"} <= set(figures)
     drawn = np.asarray(figures["force"].data[0].y, dtype=float)
     assert drawn.max() > 0.0
     named = [figure.name for section in estimate_page(estimate).sections for figure in section.figures]

@@ -93,7 +93,7 @@ def charts(*drops: BearingDrop, loads: dict[str, float] | None = None) -> dict[s
     found = {}
     for section in drop_sections(drops or bearings(), "simulated", 377.0, loads):
         for figure in section.figures:
-            for word in ("ball force", "same force", "Hertz stress of all", "side by side", "Distance of"):
+            for word in ("ball force", "Hertz stress of all", "zoom together", "Distance of"):
                 if word in figure.caption:
                     found[word] = figure.chart
     return found
@@ -114,8 +114,7 @@ def shapes(figure: Any, panel: int = 1) -> list[Any]:
 
 ALL_FIGURES = {
     "friction curve": lambda: friction_curve_figure(LAW),
-    "displacement": lambda: displacement_figure(bearings()[0]),
-    "displacement pair": lambda: charts()["side by side"],
+    "displacement": lambda: displacement_figure(bearings()),
     "first contact": lambda: first_contact_figure(bearings()),
     "orbit": lambda: orbit_figure(bearings()),
     "radial": lambda: charts()["Distance of"],
@@ -140,20 +139,20 @@ def test_every_axis_title_has_its_unit(name: str) -> None:
 
 
 def test_displacement_comes_back_in_micrometres_and_milliseconds() -> None:
-    drawn = displacement_figure(bearings()[0])
+    drawn = displacement_figure(bearings())
     given = motion("simulated")
-    for panel, axis in ((1, 1), (2, 0)):
+    for panel, axis in ((1, 0), (2, 1)):
         item = trace(drawn, "simulated", panel)
         assert_allclose(item.x, 1e3 * TIME, rtol=SINGLE)
         assert_allclose(item.y, 1e6 * given.displacement[:, axis], rtol=SINGLE, atol=1e-4)
-    assert "y [µm]" in drawn.layout.yaxis.title.text
-    assert "x [µm]" in drawn.layout.yaxis2.title.text
+    assert "x [µm]" in drawn.layout.yaxis.title.text
+    assert "y [µm]" in drawn.layout.yaxis2.title.text
 
 
 def test_the_air_gap_is_below_in_the_vertical_and_on_both_sides_in_the_horizontal() -> None:
-    drawn = displacement_figure(bearings()[0])
-    vertical = {(round(shape.y0, 6), round(shape.y1, 6)) for shape in shapes(drawn, 1)}
-    horizontal = {(round(shape.y0, 6), round(shape.y1, 6)) for shape in shapes(drawn, 2)}
+    drawn = displacement_figure(bearings())
+    vertical = {(round(shape.y0, 6), round(shape.y1, 6)) for shape in shapes(drawn, 2)}
+    horizontal = {(round(shape.y0, 6), round(shape.y1, 6)) for shape in shapes(drawn, 1)}
     assert vertical == {(-275.0, -270.0)}
     assert horizontal == {(-275.0, -270.0), (270.0, 275.0)}
 
@@ -163,8 +162,8 @@ def test_a_gap_known_as_one_value_is_one_line() -> None:
     assert [(round(shape.y0, 6), round(shape.y1, 6)) for shape in shapes(drawn, 1)] == [(280.0, 280.0)]
 
 
-def test_the_pair_has_horizontal_left_and_vertical_right_of_every_bearing() -> None:
-    drawn = charts()["side by side"]
+def test_the_displacement_has_horizontal_left_and_vertical_right_of_every_bearing() -> None:
+    drawn = charts()["zoom together"]
     given = motion("measured", "measured", 0.1)
     for panel, axis in ((1, 0), (2, 1), (3, 0), (4, 1)):
         assert_allclose(
@@ -234,16 +233,18 @@ def test_the_force_has_its_band_its_peak_and_the_weight() -> None:
     assert found[1].fill == "tonexty"
     texts = [note.text.replace("\u202f", "") for note in drawn.layout.annotations]
     assert "peak 3333 N at 8.18 ms (90 %: 3180 to 3490 N)" in texts
-    assert [shape.y0 for shape in shapes(drawn, 2)] == [409.1]
+    assert [shape.y0 for shape in shapes(drawn, 3)] == [409.1]
+    near = trace(drawn, "estimated", 2)
+    assert (near.x[0], near.x[-1]) == pytest.approx((6.2, 12.1), abs=0.1)
+    assert sum("peak 3333 N" in text for text in texts) == 1
 
 
-def test_a_window_cuts_history_and_band_and_hides_a_later_peak() -> None:
-    late = Peak(known=Known(value=2000.0, status="determined"), time=0.05, origin=Origin.TWIN)
-    panel = Panel(title="NDE", axis="force", histories=(history(),), band=band(history()), peak=late)
-    drawn = time_panels([[panel.until(0.02)]], 1.0, "N")
-    assert all(max(item.x) <= 20.0 for item in drawn.data)
-    assert not any("peak" in note.text for note in drawn.layout.annotations)
-    assert any("peak" in note.text for note in time_panels([[panel]], 1.0, "N").layout.annotations)
+def test_a_window_around_a_peak_cuts_history_and_band() -> None:
+    peak = Peak(known=Known(value=2000.0, status="determined"), time=0.05, origin=Origin.TWIN)
+    panel = Panel(title="NDE", axis="force", histories=(history(),), band=band(history()), peak=peak)
+    drawn = time_panels([[panel.around(2e-3, 4e-3)]], 1.0, "N")
+    assert all(min(item.x) >= 48.0 and max(item.x) <= 54.0 for item in drawn.data)
+    assert any("peak" in note.text for note in drawn.layout.annotations)
 
 
 def test_stress_is_in_megapascal_above_the_preload() -> None:
@@ -317,8 +318,7 @@ EVIL_LAW = rubbing(EVIL, 0.2, 0.1, 1.0, 0.1)
 EVIL_FIGURES = {
     "orbit": lambda: orbit_figure([EVIL_DROP]),
     "radial": lambda: charts(EVIL_DROP)["Distance of"],
-    "displacement": lambda: displacement_figure(EVIL_DROP),
-    "displacement pair": lambda: charts(EVIL_DROP)["side by side"],
+    "displacement": lambda: displacement_figure([EVIL_DROP]),
     "first contact": lambda: first_contact_figure([EVIL_DROP]),
     "force": lambda: charts(EVIL_DROP)["ball force"],
     "friction curve": lambda: friction_curve_figure(EVIL_LAW),

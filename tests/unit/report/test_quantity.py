@@ -89,3 +89,11 @@ def test_what_the_record_leaves_open_stands_apart_from_the_allowance():
     assert Quantity.of(known, "force", range_only=True).parts_text == ""
     assert Quantity.of(replace(known, allowance_90=None), "force").parts_text == ""
     assert Quantity.of(replace(known, allowance_90=50.0), "force").parts_text == "all of it allowance"
+
+
+def test_nothing_is_zero_and_an_open_end_is_called_so() -> None:
+    tiny = Quantity(value=4.2e-11, kind="dimensionless", interval_90=(0.0, 8.572e-11))
+    assert tiny.interval_text == "0 to 8.57 × 10⁻¹¹"
+    assert Quantity(
+        value=2400.0, kind="force", interval_90=(2300.0, math.inf)
+    ).interval_text == "2 300 to open N".replace(" 300", "\u202f300")

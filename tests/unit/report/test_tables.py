@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 from rotordrop.estimate.bearing_drop import simulated_bearings
 from rotordrop.estimate.estimate import CrossCheck
 from rotordrop.known import Known
-from rotordrop.report.content import Table
+from rotordrop.report.content import Column, Table, table
 from rotordrop.report.estimate_page import cross_check_statements, cross_check_table
 from rotordrop.report.impacts import impact_figure, impact_table, ring_forces
 from rotordrop.report.parameters import ParameterRow, parameter_figure, parameter_table
@@ -45,6 +45,27 @@ def test_impacts_are_listed_in_the_order_of_time(drop_result: DropResult) -> Non
     ]
     assert texts(table.rows[1])[3:] == ["4\u202f660 N", "6.40 N s", "7.60 J", "2.40 ms"]
     assert texts(table.rows[2])[6] == "–"
+
+
+def test_a_tiny_number_of_an_impact_is_read_beside_the_large_ones(drop_result: DropResult) -> None:
+    nde, de = simulated_bearings(drop_result)
+    tiny = Known(value=8.854e-5, interval_90=(8.211e-5, 9.496e-5), unit="J")
+    soft = replace(nde, impacts=(replace(nde.impacts[0], dissipated_energy=tiny),))
+    rows = impact_table([soft, de], force="contact force").rows
+    energies = [row[5] for row in rows if isinstance(row[5], Quantity)]
+    assert [one.text for one in energies] == ["< 0.01 J", "7.60 J", "0.20 J"]
+    assert energies[0].interval_text == ""
+
+
+def test_a_unit_that_all_numbers_of_a_column_share_stands_above_it() -> None:
+    columns = (Column("bearing", lambda row: row[0]), Column("force", lambda row: row[1], "force"))
+    made = table((("NDE", 3333.0), ("DE", None)), columns)
+    shown = made.with_units_above()
+    assert shown.columns == ("bearing", "force [N]")
+    assert [texts(row) for row in shown.rows] == [["NDE", "3\u202f333"], ["DE", "–"]]
+    assert texts(made.rows[0]) == ["NDE", "3\u202f333 N"]
+    mixed = Table(("a", "b"), (("x", Quantity.of(1.0, "force")), ("y", Quantity.of(1.0, "length"))))
+    assert mixed.with_units_above().columns == ("a", "b")
 
 
 def test_the_weakest_impacts_are_left_out_and_counted(drop_result: DropResult) -> None:
@@ -115,7 +136,7 @@ def row(name: str, prior: float, estimate: float, interval: tuple[float, float] 
 
 def test_parameters_show_prior_estimate_interval_and_verdict() -> None:
     table = parameter_table([row("NDE.support.stiffness", 1e8, 1.4e8, (1.38e8, 1.42e8))])
-    assert texts(table.rows[0]) == ["NDE.support.stiffness", "100.0 N/µm", "140.0 N/µm", "determined"]
+    assert texts(table.rows[0]) == ["NDE.support.stiffness", "100.0 N/µm", "140.0 N/µm", ""]
     cell = table.rows[0][2]
     assert isinstance(cell, Quantity)
     assert cell.interval_text == "138.0 to 142.0 N/µm"

@@ -1,0 +1,92 @@
+"""How a page looks in a browser: nothing overflows, it is dark where that is asked for, two columns fit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.unit.web.browser import CHROMIUM, Browser
+
+from rotordrop.estimate.bearing_drop import History
+from rotordrop.report.content import Card, Figure, KeyFigure, ReportContent, Section, Statement
+from rotordrop.report.page import write_page
+from rotordrop.report.quantity import Quantity
+from rotordrop.report.time_panels import Panel, time_panels
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here")
+
+LABELS = (("Peak bearing force, range", "force"), ("Peak Hertz stress, range", "pressure"))
+
+
+def ranged(kind: str) -> Quantity:
+    low, high = (2049.0, 14709.0) if kind == "force" else (1552e6, 12017e6)
+    return Quantity(value=high, kind=kind, interval_90=(low, high), range_only=True)
+
+
+def content() -> ReportContent:
+    """A failed estimate: ranges in place of numbers."""
+    time = np.linspace(0.0, 0.2, 500)
+    history = History(label="estimated", time=time, values=1000.0 * np.sin(90.0 * time) ** 2)
+    panel = Panel(title="NDE", axis="bearing force", histories=(history,))
+    figures = tuple(KeyFigure(label, ranged(kind), "by the cross-check") for label, kind in 2 * LABELS)
+    return ReportContent(
+        title="Drop",
+        verdict=(Statement("The model is not consistent with the record.", "bad"), Statement("a note")),
+        cards=tuple(Card(f"{name} touchdown bearing", figures) for name in ("NDE", "DE")),
+        sections=(Section("Bearing force", figures=(Figure(time_panels([[panel]], 1.0, "N"), "force"),)),),
+        lead=1,
+    )
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    folder: Path = tmp_path_factory.mktemp("page")
+    write_page(content(), folder / "page.html")
+    driven = Browser(folder / "profile")
+    driven.open(f"file://{folder / 'page.html'}")
+    driven.until("document.documentElement.getAttribute('data-drawn') === '1'")
+    yield driven
+    driven.close()
+
+
+def edges(browser: Browser, selector: str) -> tuple[float, float, float, float]:
+    """Left, top, right and bottom edge of the first element."""
+    box = f"document.querySelector('{selector}').getBoundingClientRect()"
+    left, top, right, bottom = browser.evaluate(f"[{box}.left, {box}.top, {box}.right, {box}.bottom]")
+    return left, top, right, bottom
+
+
+@pytest.mark.parametrize("width", [360, 800, 1280, 1920])
+def test_no_number_leaves_its_card(browser: Browser, width: int) -> None:
+    browser.size(width, 900)
+    beyond = browser.evaluate(
+        "Array.from(document.querySelectorAll('.card dl > div')).filter(one => "
+        "Array.from(one.querySelectorAll('.value')).some(value => "
+        "value.getBoundingClientRect().right > one.getBoundingClientRect().right + 0.5)).length"
+    )
+    assert beyond == 0
+    browser.until("document.documentElement.scrollWidth <= window.innerWidth", 20.0)
+
+
+def test_the_curve_stands_under_the_cards_and_beside_them_where_there_is_room(browser: Browser) -> None:
+    browser.size(1280, 900)
+    assert edges(browser, ".cards")[3] < edges(browser, ".chart")[1]
+    assert edges(browser, ".chart")[3] < edges(browser, "#notes")[1]
+    browser.size(1920, 900)
+    assert edges(browser, ".cards")[2] < edges(browser, ".chart")[0]
+    assert abs(edges(browser, "#verdict")[1] - edges(browser, "#section-1")[1]) < 40
+
+
+def test_a_page_is_dark_where_that_is_asked_for_its_figures_too(browser: Browser) -> None:
+    browser.size(1280, 900)
+    paper = "getComputedStyle(document.body).backgroundColor"
+    drawn = "document.querySelector('.chart')._fullLayout.paper_bgcolor"
+    for scheme, page, figure in (
+        ("dark", "rgb(22, 28, 34)", "#161c22"),
+        ("light", "rgb(255, 255, 255)", "#ffffff"),
+    ):
+        browser.colours(scheme)
+        browser.until(f"{drawn} === '{figure}'")
+        assert browser.evaluate(paper) == page

@@ -1,0 +1,94 @@
+"""The report on a study: verdict first, what matters, how it is spread, few numbers beside the verdict."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from rotordrop.machine import example_machine
+from rotordrop.report.content import ReportContent
+from rotordrop.report.quantity import Quantity
+from rotordrop.report.study_page import SHARES, spoken_value, study_page
+from rotordrop.study.plan import read_study
+from rotordrop.study.quantities import columns_of
+from rotordrop.study.summary import StudyResults, quantile
+
+DROPS = 200
+FRICTION = "*.friction.dynamic"
+
+
+@pytest.fixture(scope="module")
+def results() -> StudyResults:
+    """Drops whose peak force follows the friction alone."""
+    machine = example_machine("lp400")
+    plan = {
+        "name": "friction",
+        "speed": "60 Hz",
+        "drops": DROPS,
+        "duration": "10 ms",
+        "vary": {FRICTION: {"uniform": [0.05, 0.2]}, "speed": {"uniform": ["60 Hz", "200 Hz"]}},
+    }
+    random = np.random.default_rng(3)
+    varied = {FRICTION: random.uniform(0.05, 0.2, DROPS), "speed": random.uniform(377.0, 1257.0, DROPS)}
+    numbers = {q.name: np.full(DROPS, np.nan) for q in columns_of(machine)}
+    for bearing in machine.touchdown_bearings:
+        numbers[f"{bearing.name}.backward_whirl"] = np.zeros(DROPS)
+        for quantity, size in (("peak_force", 1e4), ("peak_stress", 1e10)):
+            noise = 0.001 * random.standard_normal(DROPS)
+            numbers[f"{bearing.name}.{quantity}"] = size * (varied[FRICTION] + noise)
+    study = read_study(plan, machine)
+    return StudyResults(
+        study=study, drop=np.arange(DROPS), varied=varied, numbers=numbers, reasons=("",) * DROPS
+    )
+
+
+@pytest.fixture(scope="module")
+def page(results: StudyResults) -> ReportContent:
+    return study_page(results)
+
+
+def test_what_matters_stands_first_in_words_and_in_one_table(page: ReportContent) -> None:
+    assert [section.heading for section in page.sections] == ["What matters", "Distribution", "All quantiles"]
+    (found,) = page.sections[0].tables
+    assert found.rows[0][0] == "dynamic friction coefficient, every bearing"
+    assert found.columns[1:3] == ("NDE peak force", "NDE peak stress")
+    share = str(found.rows[0][1])
+    assert int(share.partition(" ")[0]) > 80 > int(str(found.rows[1][1]).partition(" ")[0].replace("−", "-"))
+
+
+def test_the_histogram_counts_every_drop_and_the_curve_passes_the_quantiles(
+    page: ReportContent, results: StudyResults
+) -> None:
+    chart = page.sections[1].figures[0].chart
+    counted, below = (next(one for one in chart.data if one.yaxis == axis) for axis in ("y", "y3"))
+    assert_allclose(np.sum(counted.y[:-1]), 100.0, rtol=1e-6)
+    values = results.numbers["NDE.peak_force"]
+    for share in SHARES[:2]:
+        at = np.interp(quantile(values, share).value, below.x, below.y)
+        assert at == pytest.approx(100.0 * share, abs=1.0)
+    lines = [shape.x0 for shape in chart.layout.shapes if shape.xref == "x3"]
+    assert_allclose(lines, [quantile(values, share).value for share in SHARES])
+
+
+def test_at_most_five_lines_stand_beside_the_verdict_each_with_its_interval(page: ReportContent) -> None:
+    (summary,) = page.summary
+    assert len(summary.rows) <= 5
+    cells = [cell for row in summary.rows for cell in row if isinstance(cell, Quantity)]
+    assert len(cells) == len(summary.rows) * len(SHARES)
+    assert all(cell.interval_90 is not None for cell in cells)
+    assert not any(math.isnan(cell.value) for cell in cells)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("rotor_angle", "rotor angle"),
+        ("NDE.support.stiffness", "support stiffness, NDE"),
+        (FRICTION, "dynamic friction coefficient, every bearing"),
+    ],
+)
+def test_a_varied_value_is_named_in_words(name: str, words: str) -> None:
+    assert spoken_value(example_machine("lp400"), name) == words
