@@ -89,6 +89,7 @@ def coast_down_page(
             *(() if analysis is None else frequency_sections(analysis)),
             *(() if machine is None else machine_sections(machine)),
         ),
+        ends=(result.bearing_names[0], result.bearing_names[-1]),
     )
 
 

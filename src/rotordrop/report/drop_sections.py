@@ -175,10 +175,12 @@ def orbit_section(
     bearings: Sequence[BearingMotions | BearingDrop], early: Sequence[BearingMotions] = (), until: str = ""
 ) -> Section:
     """Orbits in the clearance circle, of an early part alone where one is given, and radial displacement."""
+    # planes of sensors alone stand in the order of the record, not in that of the rotor
+    seen = f", seen from {bearings[-1].name}" if isinstance(bearings[-1], BearingDrop) else ""
     orbit = Figure(
         orbit_figure(early or bearings),
-        f"Path of the rotor centre against the clearance circle{until}; x to the right, y up, seen "
-        f"from {bearings[-1].name} (Neisi 2020, Fig. 12).",
+        f"Path of the rotor centre against the clearance circle{until}; x to the right, y up{seen} "
+        "(Neisi 2020, Fig. 12).",
         "orbit",
     )
     rows = [

@@ -54,7 +54,6 @@ def look_page(seen: Look, *, drawn: bool = True) -> ReportContent:
             record_quality_section(seen.findings),
             Section("What was read and guessed", statements=notes),
         ),
-        ends=(seen.motion.paths[0].name, seen.motion.paths[-1].name),
     )
 
 

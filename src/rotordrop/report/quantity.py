@@ -166,9 +166,13 @@ class Quantity:
         return self._with_unit(parts)
 
     def _range(self) -> str:
-        """The interval; an end that is not known is open."""
-        ends = (self._at(end) if math.isfinite(end) else "open" for end in self.interval_90 or ())
-        return self._with_unit(" to ".join(ends))
+        """The interval; one without an end goes on."""
+        low, high = self.interval_90 or (math.nan, math.nan)
+        if math.isfinite(low) and not math.isfinite(high):
+            return f"{self._with_unit(self._at(low))} or more"
+        if math.isfinite(high) and not math.isfinite(low):
+            return f"{self._with_unit(self._at(high))} or less"
+        return self._with_unit(f"{self._at(low)} to {self._at(high)}")
 
     def _at(self, value: float) -> str:
         return written(self._in_unit(value), self._places())

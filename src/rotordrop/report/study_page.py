@@ -44,7 +44,7 @@ SENSITIVITY = (
 )
 QUANTILES = (
     "Quantiles over the drops with 90 % intervals from order statistics: how well the number of drops "
-    "determines them. An open end means that more drops are needed."
+    'determines them. "Or more" and "or less" mean that more drops are needed.'
 )
 SHARES_OF_VARIANCE = (
     "Alone: the part of the variance over the drops that would go if this value were known. With all others: "

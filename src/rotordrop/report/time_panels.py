@@ -137,7 +137,7 @@ def _mark(figure: go.Figure, peak: Peak, scale: float, unit: str, row: int, colu
     text = f"peak {written(scale * peak.value, 0)} {unit} at {MILLI * peak.time:.2f} ms"
     if peak.interval_90 is not None:
         low, high = (written(scale * limit, 0) for limit in peak.interval_90)
-        text += f" (90 %: {low} to {high} {unit})"
+        text += f"<br>90 %: {low} to {high} {unit}"
     figure.add_annotation(
         x=MILLI * peak.time,
         y=scale * peak.value,
@@ -148,6 +148,7 @@ def _mark(figure: go.Figure, peak: Peak, scale: float, unit: str, row: int, colu
         ax=34,
         ay=4,
         xanchor="left",
+        align="left",
         bgcolor="rgba(255,255,255,0.85)",
         font={"size": 11.5, "color": INK},
         row=row,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rotordrop._version import __version__
 from rotordrop.files import write_json
-from rotordrop.report.content import Figure
+from rotordrop.report.content import Figure, Statement
 from rotordrop.report.origin import Origin, UsedFile, command_line, now
 from rotordrop.report.quantity import Quantity, System, display_unit
 from rotordrop.web.python_lines import course_lines, estimate_lines, look_lines, waterfall_lines
@@ -368,6 +368,8 @@ def content_json(part: Any) -> Any:
     """A report or a part of it without its pictures, its numbers written in both systems of units."""
     if isinstance(part, Quantity):
         return quantity_json(part)
+    if isinstance(part, Statement):
+        return {"text": part.sentence, "level": part.level}
     if isinstance(part, tuple):
         return [content_json(one) for one in part if not isinstance(one, Figure)]
     if not is_dataclass(part):

@@ -232,7 +232,7 @@ def test_the_force_has_its_band_its_peak_and_the_weight() -> None:
     assert_allclose(found[1].y, 1.2 * values, rtol=SINGLE)
     assert found[1].fill == "tonexty"
     texts = [note.text.replace("\u202f", "") for note in drawn.layout.annotations]
-    assert "peak 3333 N at 8.18 ms (90 %: 3180 to 3490 N)" in texts
+    assert "peak 3333 N at 8.18 ms<br>90 %: 3180 to 3490 N" in texts
     assert [shape.y0 for shape in shapes(drawn, 3)] == [409.1]
     near = trace(drawn, "estimated", 2)
     assert (near.x[0], near.x[-1]) == pytest.approx((6.2, 12.1), abs=0.1)
