@@ -66,6 +66,9 @@ def coast_down_page(
     of the samples, the certificate how the statistics moved at a tighter tolerance.
     """
     speed, end = shown(result.initial_speed, "speed"), shown(result.end_time, "duration")
+    steps = f"{written(result.steps, 0)} taken, {written(result.rejected_steps, 0)} rejected"
+    step = f"every {1e6 * result.output_step:g} µs"
+    samples = () if result.path is None else (("samples", f"{result.path.name}, {step}"),)
     seconds = Figure(
         statistics_figure(result),
         "Indentation, force and stress second by second; the first point stands for the first 0.2 s. "
@@ -81,7 +84,14 @@ def coast_down_page(
         simulated=SIMULATED_MACHINE,
         verdict=_verdict(result, analysis, certificate),
         cards=tuple(_card(result, index) for index in range(len(result.bearing_names))),
-        facts=_facts(result),
+        facts=(
+            ("machine", result.machine_name),
+            ("rotor basis", result.reduction),
+            ("tolerance", f"{result.tolerance:g}"),
+            ("Runge–Kutta steps", steps),
+            ("rotordrop", __version__),
+            *samples,
+        ),
         summary=(maxima_table(result),),
         sections=(
             Section("Second by second", figures=(seconds,)),
@@ -156,20 +166,6 @@ def maxima_table(result: CoastDownResult) -> Table:
     )
     rows = [(QUANTITIES[maximum.quantity][0], maximum) for maximum in result.maxima()]
     return table(rows, columns, "Does 0.2 s hold the maximum? (Neisi 2020, section 5.4)", LARGEST_NOTE)
-
-
-def _facts(result: CoastDownResult) -> tuple[tuple[str, str], ...]:
-    steps = f"{written(result.steps, 0)} taken, {written(result.rejected_steps, 0)} rejected"
-    facts = [
-        ("machine", result.machine_name),
-        ("rotor basis", result.reduction),
-        ("tolerance", f"{result.tolerance:g}"),
-        ("Runge–Kutta steps", steps),
-        ("rotordrop", __version__),
-    ]
-    if result.path is not None:
-        facts.append(("samples", f"{result.path.name}, every {1e6 * result.output_step:g} µs"))
-    return tuple(facts)
 
 
 def statistics_figure(result: CoastDownResult) -> go.Figure:

@@ -143,19 +143,18 @@ def _reach(one: ComparedDrop) -> str:
     return f"; its peak force may be {', '.join(parts)}" if parts else ""
 
 
-def _at(bearing: str, number: Number) -> Column:
-    return Column(number.label, lambda one: one.number(bearing, number))
-
-
 def _number_table(drops: Sequence[ComparedDrop], bearing: str) -> Table:
     def name(one: ComparedDrop) -> str:
         return one.name if one.drop.consistent else f"{one.name} (not consistent with its record)"
+
+    def stated(number: Number) -> Column:
+        return Column(number.label, lambda one: one.number(bearing, number))
 
     columns = (
         Column("drop", name),
         Column("recorded", lambda one: one.minute or "–"),
         Column("speed", lambda one: 2 * math.pi * one.drop.speed_Hz, "speed", 3),
-        *(_at(bearing, number) for number in LOADS),
+        *map(stated, LOADS),
     )
     note = "Below a number: its 90 % interval. Peaks are the largest value within the drop."
     return table(drops, columns, f"{bearing} touchdown bearing", note)

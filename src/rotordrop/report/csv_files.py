@@ -63,25 +63,23 @@ def _column(head: str, cells: list[Cell]) -> list[list[str]]:
     kinds = {cell.kind for cell in quantities}
     unit = f" [{quantities[0].si_unit}]" if len(kinds) == 1 and quantities[0].si_unit else ""
     mixed = len(kinds) > 1
-    values = [head + unit, *(_text(cell, mixed) for cell in cells)]
+
+    def text(cell: Cell) -> str:
+        if isinstance(cell, str) or cell.value != cell.value:
+            return cell if isinstance(cell, str) else ""
+        return f"{cell.value:.9g} {cell.si_unit if mixed else ''}".rstrip()
+
+    def end(cell: Cell, k: int) -> str:
+        known = cell.interval_90 if isinstance(cell, Quantity) else None
+        return "" if known is None else f"{known[k]:.9g}"
+
+    values = [head + unit, *map(text, cells)]
     if not any(cell.interval_90 for cell in quantities):
         return [values]
     ends = []
     for k, name in ((0, "5 %"), (1, "95 %")):
-        ends.append([f"{head} {name}{unit}", *(_end(cell, k) for cell in cells)])
+        ends.append([f"{head} {name}{unit}", *(end(cell, k) for cell in cells)])
     return [values, *ends]
-
-
-def _text(cell: Cell, with_unit: bool) -> str:
-    if isinstance(cell, str):
-        return cell
-    unit = f" {cell.si_unit}" if with_unit and cell.si_unit else ""
-    return "" if cell.value != cell.value else f"{cell.value:.9g}{unit}"
-
-
-def _end(cell: Cell, k: int) -> str:
-    known = cell.interval_90 if isinstance(cell, Quantity) else None
-    return "" if known is None else f"{known[k]:.9g}"
 
 
 def _figure(chart: Any) -> list[list[str]]:
@@ -95,16 +93,10 @@ def _figure(chart: Any) -> list[list[str]]:
             values["x"], values["y"] = (grid.ravel() for grid in np.meshgrid(values["x"], values["y"]))
             values["z"] = height.ravel()
         for axis, along in values.items():
-            title = "value" if axis == "z" else _axis_title(chart, trace, axis)
-            columns.append([f"{trace.name or 'line'}: {title}", *(_plain(value) for value in along)])
+            title = "value"
+            if axis != "z":
+                reference = getattr(trace, f"{axis}axis", None) or axis
+                title = str(chart.layout[f"{axis}axis{reference[1:]}"].title.text or axis)
+            texts = (f"{v:.9g}" if isinstance(v, int | float | np.number) else str(v) for v in along)
+            columns.append([f"{trace.name or 'line'}: {title}", *texts])
     return [list(row) for row in zip_longest(*columns, fillvalue="")]
-
-
-def _axis_title(chart: Any, trace: Any, axis: str) -> str:
-    reference = getattr(trace, f"{axis}axis", None) or axis
-    layout = chart.layout[f"{axis}axis{reference[1:]}"]
-    return str(layout.title.text or axis)
-
-
-def _plain(value: Any) -> str:
-    return f"{value:.9g}" if isinstance(value, int | float | np.number) else str(value)

@@ -182,6 +182,11 @@ def _sections(estimate: Estimate, since: Drop | None) -> tuple[Section, ...]:
     tables = () if steps is None else (first_contact_table(names, steps.contacts),)
     origin = "measured and estimated" if steps is None else "measured and simulated"
     shares = weight_shares(estimate.machine)
+    cross_check = Section(
+        "Independent cross-check",
+        statements=cross_check_statements(estimate.cross_check),
+        tables=(cross_check_table(estimate.cross_check),),
+    )
     return (
         *drop_sections(estimate.bearings, origin, estimate.speed, shares, contact_tables=tables),
         _severity(estimate),
@@ -191,7 +196,7 @@ def _sections(estimate: Estimate, since: Drop | None) -> tuple[Section, ...]:
         *(() if steps is None or steps.friction is None else (friction_section(steps.friction),)),
         *(() if steps is None else (speed_section(estimate, steps),)),
         *((_consistency(estimate),) if estimate.checks else ()),
-        *((_cross_check(estimate.cross_check),) if estimate.cross_check else ()),
+        *((cross_check,) if estimate.cross_check else ()),
         inspection_section(estimate),
         limits_section(estimate),
         record_quality_section(estimate.findings),
@@ -317,8 +322,3 @@ def _own(check: CrossCheck) -> Quantity:
 
 def _other(check: CrossCheck) -> Quantity:
     return Quantity.of(check.check, KINDS[check.estimate.unit], 3)
-
-
-def _cross_check(checks: Sequence[CrossCheck]) -> Section:
-    statements, tables = cross_check_statements(checks), (cross_check_table(checks),)
-    return Section("Independent cross-check", statements=statements, tables=tables)

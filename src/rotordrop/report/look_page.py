@@ -40,6 +40,10 @@ def look_page(seen: Look, *, drawn: bool = True) -> ReportContent:
     record = seen.record
     speed = "" if seen.speed is None else f" at {shown(seen.speed, 'speed')}"
     notes = tuple(Statement(note) for note in seen.notes)
+    timeline = (
+        Column("record time", lambda row: format_moment(row[0], 4)),
+        Column("event", lambda row: row[1]),
+    )
     return ReportContent(
         title=f"A look at {record.name}",
         subtitle=f"{len(seen.drops)} drop{'s' if len(seen.drops) > 1 else ''}{speed}",
@@ -47,7 +51,7 @@ def look_page(seen: Look, *, drawn: bool = True) -> ReportContent:
         simulated=SIMULATED_RECORD if record.is_simulated else "",
         verdict=(*_verdict(seen), *quality_statements(seen.findings)),
         cards=tuple(_card(seen, number) for number in range(len(seen.planes))),
-        summary=(_timeline(seen),),
+        summary=(table(seen.timeline(), timeline, "What happened when"),),
         sections=(
             *(_figures(seen) if drawn else ()),
             Section("Impacts", tables=(_impacts(seen),)),
@@ -121,14 +125,6 @@ def _synchronous(found: Synchronous) -> list[KeyFigure]:
         KeyFigure("1X amplitude", amplitude, note),
         KeyFigure("1X high spot at the mark, from +y with the spin", phase, note),
     ]
-
-
-def _timeline(seen: Look) -> Table:
-    columns = (
-        Column("record time", lambda row: format_moment(row[0], 4)),
-        Column("event", lambda row: row[1]),
-    )
-    return table(seen.timeline(), columns, "What happened when")
 
 
 def _figures(seen: Look) -> tuple[Section, ...]:

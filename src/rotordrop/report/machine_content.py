@@ -34,6 +34,10 @@ def machine_content(
     """
     open_values = defaults_section(machine)
     tables = () if brief or drawn else tuple(found for section in open_values for found in section.tables)
+    rotor, sag = rotor_values(summary.fe, 4), summary.levitated_sag
+    if sag is not None:
+        span = float(max(sag) - min(sag))
+        rotor.append(("levitated sag, lowest to highest node", Quantity.of(span, "length")))
     modes = (
         ("free-free", summary.free_free),
         ("resting in its bearings, supports without mass", summary.settled),
@@ -44,7 +48,7 @@ def machine_content(
         facts=(("machine file", str(machine.source_path or "-")), ("rotordrop", __version__)),
         verdict=(_verdict(warnings), *_remarks(machine, warnings, brief)),
         cards=tuple(_card(machine, rest) for rest in summary.bearings),
-        summary=(_rotor_table(summary), mode_table(modes, "bending or support"), *tables),
+        summary=(named_values("rotor", rotor), mode_table(modes, "bending or support"), *tables),
         sections=(drawing_section(machine), *open_values) if drawn else (),
     )
 
@@ -117,14 +121,6 @@ def rotor_values(fe: RotorFE, digits: int) -> list[tuple[str, object]]:
         ("polar inertia", f"{fe.polar_inertia:.{digits}g} kg m²"),
         ("diametral inertia about the centre of gravity", f"{fe.diametral_inertia:.{digits}g} kg m²"),
     ]
-
-
-def _rotor_table(summary: MachineSummary) -> Table:
-    rows = rotor_values(summary.fe, 4)
-    if summary.levitated_sag is not None:
-        span = float(max(summary.levitated_sag) - min(summary.levitated_sag))
-        rows.append(("levitated sag, lowest to highest node", Quantity.of(span, "length")))
-    return named_values("rotor", rows)
 
 
 def mode_table(modes: Iterable[tuple[str, Iterable[float]]], head: str, count: int = 0) -> Table:

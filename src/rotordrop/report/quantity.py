@@ -238,7 +238,8 @@ def written(value: float, places: int | None) -> str:
         if value == 0.0:
             return "0"
         mantissa, exponent = f"{value:.2e}".split("e")
-        return f"{mantissa} × 10{_superscript(int(exponent))}"
+        power = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+        return f"{mantissa} × 10{power}"
     text = f"{value:,.{places}f}".replace(",", THIN_SPACE)
     return (
         "0" + text[2:]
@@ -260,10 +261,6 @@ def with_error(value: float, error: float | None, unit: str) -> str:
         return f"{written(value, 3)} {unit}"
     places = min(12, max(0, 1 - _magnitude(error)))
     return f"{written(value, places)} ± {written(error, places)} {unit}"
-
-
-def _superscript(number: int) -> str:
-    return str(number).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
 def _magnitude(value: float) -> int:

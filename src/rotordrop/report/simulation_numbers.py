@@ -10,41 +10,8 @@ from rotordrop.simulate.result import DropResult
 
 
 def simulation_numbers(result: DropResult) -> dict[str, Any]:
-    """Give the numbers of a simulated drop: SI values under the names of the estimate's schema.
-
-    Parameters
-    ----------
-    result : DropResult
-        The simulated drop.
-    """
-    return {
-        "machine": result.machine_name,
-        "method": "simulation",
-        "speed_Hz": result.initial_speed / (2 * math.pi),
-        "final_speed_Hz": float(result.speed[-1]) / (2 * math.pi),
-        "duration_s": float(result.time[-1]),
-        "outcome": result.outcome,
-        "finished": result.finished,
-        "certificate": _certificate(result),
-        "bearings": {
-            one.name: {**published_bearing(one).as_json(), **_contact(result, index)}
-            for index, one in enumerate(simulated_bearings(result))
-        },
-    }
-
-
-def _contact(result: DropResult, index: int) -> dict[str, Any]:
-    """Pressure of rotor on race as a line contact."""
-    pressure, half_width, moment = result.peak_contact_pressure(index)
-    return {
-        "peak_contact_pressure_Pa": {"value": pressure, "time_s": moment},
-        "contact_half_width_m": {"value": half_width},
-    }
-
-
-def _certificate(result: DropResult) -> dict[str, Any]:
-    """Give the parts of the certificate that were computed."""
-    certificate = result.certificate
+    """Give the numbers of a simulated drop: SI values under the names of the estimate's schema."""
+    certificate, bearings = result.certificate, {}
     parts: dict[str, Any] = {
         "tolerance": result.tolerance,
         "reduction": result.reduction,
@@ -55,4 +22,21 @@ def _certificate(result: DropResult) -> dict[str, Any]:
         change = getattr(certificate, name)
         if change is not None:
             parts[name] = [float(value) for value in change]
-    return parts
+    for index, one in enumerate(simulated_bearings(result)):
+        pressure, half_width, moment = result.peak_contact_pressure(index)
+        bearings[one.name] = {
+            **published_bearing(one).as_json(),
+            "peak_contact_pressure_Pa": {"value": pressure, "time_s": moment},
+            "contact_half_width_m": {"value": half_width},
+        }
+    return {
+        "machine": result.machine_name,
+        "method": "simulation",
+        "speed_Hz": result.initial_speed / (2 * math.pi),
+        "final_speed_Hz": float(result.speed[-1]) / (2 * math.pi),
+        "duration_s": float(result.time[-1]),
+        "outcome": result.outcome,
+        "finished": result.finished,
+        "certificate": parts,
+        "bearings": bearings,
+    }

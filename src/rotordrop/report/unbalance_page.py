@@ -95,6 +95,11 @@ def unbalance_page(machine: Machine, response: MachineResponse) -> ReportContent
     """Build the report on the response of a machine to its unbalance."""
     nominal = float(machine.speed.nominal)
     peaks = plane_peaks(response, nominal)
+    unbalance = (
+        Column("node", lambda row: row[0]),
+        Column("unbalance", lambda row: row[1], "unbalance"),
+        Column("phase from +y", lambda row: row[2], "angle"),
+    )
     bode = Figure(
         bode_figure(response, nominal),
         "Half the major axis of the orbit (0 to peak) and phase lag of its forward part behind the rotor "
@@ -117,7 +122,7 @@ def unbalance_page(machine: Machine, response: MachineResponse) -> ReportContent
         subtitle=f"in its {response.suspension}, nominal speed {shown(nominal, 'speed')}",
         verdict=_verdict(machine, response, peaks),
         facts=(("machine", machine.name), ("rotordrop", __version__)),
-        summary=(peak_table(peaks), _unbalance_table(response)),
+        summary=(peak_table(peaks), table(response.unbalance, unbalance, "Unbalance")),
         sections=(
             Section("Bode and polar plots", figures=(bode, polar)),
             Section("Deflected shapes", figures=(shapes,)),
@@ -159,15 +164,6 @@ def peak_table(peaks: Sequence[PlanePeak]) -> Table:
     )
     note = "Amplification by the half-power width of the peak; margin from the nominal speed."
     return table(peaks, columns, "Peaks of the response", note)
-
-
-def _unbalance_table(response: MachineResponse) -> Table:
-    columns = (
-        Column("node", lambda row: row[0]),
-        Column("unbalance", lambda row: row[1], "unbalance"),
-        Column("phase from +y", lambda row: row[2], "angle"),
-    )
-    return table(response.unbalance, columns, "Unbalance")
 
 
 def _forward(response: MachineResponse, node: int) -> Any:

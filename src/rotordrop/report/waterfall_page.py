@@ -75,11 +75,22 @@ def waterfall_page(
     Waterfalls go upwards with the time or the speed (``against``), as far as anything happens, or up to a
     ``highest`` frequency [Hz].
     """
+    cards = []
+    for name, plane in analysis.planes.items():
+        history, last = plane.history, plane.settling.last_lift_off
+        at = f"at {shown(history.largest_time, 'duration', 3)}"
+        figures = (
+            fact("Largest displacement", history.largest, "length", note=at),
+            fact("Beyond the air gap", history.largest_indentation, "length", 3),
+            fact("Largest after 0.2 s", history.largest_later, "length"),
+            fact("Last lift-off", last, "duration", 3),
+        )
+        cards.append(Card(f"{name} plane", figures))
     return ReportContent(
         title=title,
         simulated=simulated,
         verdict=_verdict(analysis),
-        cards=tuple(_card(name, plane) for name, plane in analysis.planes.items()),
+        cards=tuple(cards),
         facts=(*facts, ("rotordrop", __version__)),
         summary=(line_table(analysis),),
         sections=tuple(
@@ -145,18 +156,6 @@ def _standstill(stop: Known) -> str:
     return (
         f"The rotor stopped {stop.value:.1f} s after power-off (90 %: {stop.low:.1f} to {stop.high:.1f} s)."
     )
-
-
-def _card(name: str, plane: PlaneAnalysis) -> Card:
-    history = plane.history
-    at = f"at {shown(history.largest_time, 'duration', 3)}"
-    figures = (
-        fact("Largest displacement", history.largest, "length", note=at),
-        fact("Beyond the air gap", history.largest_indentation, "length", 3),
-        fact("Largest after 0.2 s", history.largest_later, "length"),
-        fact("Last lift-off", plane.settling.last_lift_off, "duration", 3),
-    )
-    return Card(f"{name} plane", figures)
 
 
 def line_table(analysis: CoastDownAnalysis) -> Table:

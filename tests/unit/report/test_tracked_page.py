@@ -268,7 +268,7 @@ def test_captions_and_foot_say_which_bearing_one_looks_from(estimate: Estimate) 
 
 
 def test_the_event_is_written_as_a_person_would(estimate: Estimate) -> None:
-    record = replace(estimate.record, event_date="2019-10-16T13:42:07.250000Z")
+    record = replace(estimate.record, metadata={"event_time": "2019-10-16T13:42:07.250000Z"})
     facts = dict(estimate_page(replace(estimate, record=record)).facts)
     assert facts["event"] == "2019-10-16 13:42:07 UTC"
 
