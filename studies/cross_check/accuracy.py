@@ -25,7 +25,7 @@ from tests.scaled_machines import scaled_machine
 from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine import Machine, example_machine, load_machine
 from rotordrop.rotor.parameters import build_drop_model
-from rotordrop.track.input_state import input_state_estimate, lent_by_record
+from rotordrop.track.input_state import corrections_by_record, input_state_estimate
 from rotordrop.twin.problems import twin_problem
 from rotordrop_bench import SensorChain, hidden_machine, synthesize_drop
 
@@ -87,7 +87,7 @@ def study(case: Case, seed: int) -> Iterator[dict[str, Any]]:
         started = time.perf_counter()
         evidence = read_evidence(build_drop_model(hidden.known, "quick"), drop.record, drop.tail)
         problem = twin_problem(hidden.known, evidence)
-        found = input_state_estimate(problem, lent_by_record(problem))
+        found = input_state_estimate(problem, corrections_by_record(problem))
         vectors = np.hypot(*_late_mean(drop).T)
         for b, name in enumerate(problem.model.bearing_names):
             at = int(np.argmax(found.magnitude[:, b]))

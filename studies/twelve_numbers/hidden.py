@@ -37,7 +37,7 @@ from rotordrop.record.record import read_record
 from rotordrop.rotor.assembly import free_free_modes, rotor_fe
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import Unknown, all_unknowns
-from rotordrop.track.input_state import input_state_estimate, lent_by_record
+from rotordrop.track.input_state import corrections_by_record, input_state_estimate
 from rotordrop.track.prior import fall_time
 from rotordrop.twin.narrowing import DRAWING
 from rotordrop.twin.problems import COARSE_BASIS, drop_problem, recorded_drop
@@ -173,7 +173,7 @@ def checked(machine: Machine, folder: Path, truth: Mapping[str, Any], described:
     until = ROTOR_SEEN * fall_time(machine)
     found = with_found_rotor(machine, [(evidence, recorded_drop(evidence, until))])
     problem = drop_problem(build_drop_model(found, COARSE_BASIS), evidence, 0.1)
-    check = input_state_estimate(problem, lent_by_record(problem))
+    check = input_state_estimate(problem, corrections_by_record(problem))
     row: dict[str, Any] = {"cpu_s": round(time.process_time() - began, 1)}
     if found.rotor.is_beam:
         row["rotor"] = found_rotor(found.rotor, described)

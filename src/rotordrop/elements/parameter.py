@@ -290,7 +290,7 @@ class Extension:
     base: Callable[[Any], dict[str, Known]] = lambda _: {}
     """Values with which a machine says what the base model says and is followed as with this extension:
     smaller process noise in the fall is no evidence of a long remanence."""
-    shows_beside: bool = True
+    shows_when_consistent: bool = True
     """Whether it can show beside a base model that is consistent with the record."""
 
     def values(self, machine: Any) -> dict[str, Known]:
@@ -300,7 +300,7 @@ class Extension:
             return {}
         return self._of_parts(machine, self.neutral)
 
-    def usual(self, machine: Any) -> dict[str, Known]:
+    def base_values(self, machine: Any) -> dict[str, Known]:
         """Values with which the base model is followed as with this extension."""
         return self._of_parts(machine, self.base)
 
@@ -315,9 +315,9 @@ class Extension:
         changed: M = cast(Any, machine).with_values(self.values(machine))
         return changed
 
-    def saying_the_usual(self, machine: M) -> M:
+    def as_base_model(self, machine: M) -> M:
         """The machine followed as with this extension, which says nothing."""
-        changed: M = cast(Any, machine).with_values(self.usual(machine))
+        changed: M = cast(Any, machine).with_values(self.base_values(machine))
         return changed
 
     def says_nothing(self, machine: Any, values: Values) -> bool:

@@ -149,7 +149,12 @@ def _along_rotor(sensor: Sensor) -> Seen:
 
 
 def _extension(
-    row: Parameter, name: str, neutral: float, words: tuple[str, float, str], *, shows_beside: bool = True
+    row: Parameter,
+    name: str,
+    neutral: float,
+    words: tuple[str, float, str],
+    *,
+    shows_when_consistent: bool = True,
 ) -> Extension:
     """An extension with one unknown of each sensor; words are unit, its size [SI] and text."""
     unit, size, text = words
@@ -168,7 +173,7 @@ def _extension(
         joined=", ",
         frame=text,
         rows=(row,),
-        shows_beside=shows_beside,
+        shows_when_consistent=shows_when_consistent,
     )
 
 
@@ -214,7 +219,7 @@ EXTENSIONS: tuple[Extension, ...] = (
         "sensor lag",
         1e-5,
         ("µs", 1e-6, "sensors that lag behind by {}"),
-        shows_beside=False,
+        shows_when_consistent=False,
     ),
     _extension(
         Parameter(

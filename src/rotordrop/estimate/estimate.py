@@ -47,16 +47,16 @@ class Verdict(Enum):
     """What model and record say of each other; the values are the sentences a reader sees first."""
 
     CONSISTENT = "The model is consistent with the record."
-    EXTENDED = "With an extension of the usual model, the model is consistent with the record."
+    EXTENDED = "With an extension of the base model, the model is consistent with the record."
     ONE_DIRECTION = (
         "Not every plane shows both directions: forces across the missing one rest on the model alone. "
         "Intervals are 2 × as wide, and no independent cross-check is possible."
     )
-    HELD = (
+    WIDENED = (
         "The model is not consistent with the record. Only ranges are stated: they hold the independent "
         "cross-check too."
     )
-    GIVEN_WAY = (
+    REPLACED = (
         "The model is not consistent with the record and lost it at a bearing. Loads there are those of the "
         "independent cross-check, as ranges."
     )
@@ -68,7 +68,7 @@ class Verdict(Enum):
     @property
     def holds(self) -> bool:
         """Whether single numbers may be relied on within their intervals."""
-        return self not in (Verdict.HELD, Verdict.GIVEN_WAY)
+        return self not in (Verdict.WIDENED, Verdict.REPLACED)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,7 +136,7 @@ class JointEstimate:
 
 @dataclass(frozen=True, kw_only=True)
 class Structure:
-    """Something the machine has beyond the usual model, as far as the record says."""
+    """Something the machine has beyond the base model, as far as the record says."""
 
     name: str
     """What it is called."""
@@ -249,14 +249,14 @@ class Estimate:
     unbalance: tuple[PlaneUnbalance, ...] = ()
     """Amount and phase of the unbalance of every plane; empty for a replay."""
     structure: tuple[Structure, ...] = ()
-    """What the machine has beyond the usual model; empty where that does."""
+    """What the machine has beyond the base model; empty where that does."""
     cross_check: tuple[CrossCheck, ...] = ()
     """Comparisons with the estimate without contact law; empty where none was made."""
     innovations: Innovations | None = None
     """What the filter did not foresee; None for a replay."""
     nis: float | None = None
     noise_factor: float | None = None
-    """Mean normalised innovation squared [1], and size of the unknown impulses over the usual one [1]."""
+    """Mean normalised innovation squared [1], and size of the process noise over the usual one [1]."""
     agreement: Agreement | None = None
     """How far the replayed drop follows the record."""
     replay: ReplaySteps | None = None

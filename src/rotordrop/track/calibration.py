@@ -105,7 +105,7 @@ class TrackedDrops:
     diverged: tuple[bool, ...] = field(default=())
     """Drops in which the filter had to give up."""
     noise_factors: tuple[float, ...] = field(default=())
-    """Factor on the usual unknown impulses that the last pass needed to follow each drop [1]."""
+    """Factor on the usual process noise that the last pass needed to follow each drop [1]."""
 
     @property
     def negative_log_likelihood(self) -> float:

@@ -90,8 +90,7 @@ def consistency_checks(problem: DropProblem, smoothed: Smoothed, noise_factor: f
         Check(
             name="process noise",
             passed=noise_factor < NOISE_FACTOR_LIMIT,
-            message=f"unknown impulses {noise_factor:.3g} × their usual size "
-            f"(limit {NOISE_FACTOR_LIMIT:g} ×)",
+            message=f"process noise {noise_factor:.3g} × its usual size (limit {NOISE_FACTOR_LIMIT:g} ×)",
             note=_of_a_beam(noise_factor) if problem.model.machine.rotor.is_beam else "",
         ),
         Check(
@@ -104,8 +103,8 @@ def consistency_checks(problem: DropProblem, smoothed: Smoothed, noise_factor: f
 
 def _of_a_beam(noise_factor: float) -> str:
     return (
-        "a beam stands for the rotor: whether it follows the record is judged with unknown impulses "
-        f"{noise_factor:.3g} × their usual size, and the error of a beam stands in every interval"
+        "a beam stands for the rotor: whether it follows the record is judged with process noise "
+        f"{noise_factor:.3g} × its usual size, and the error of a beam stands in every interval"
     )
 
 
@@ -120,9 +119,9 @@ def normalised_innovations(smoothed: Smoothed) -> Array:
 
 def _innovation_checks(problem: DropProblem, smoothed: Smoothed) -> tuple[Check, ...]:
     e = normalised_innovations(smoothed)
-    heard = np.flatnonzero(np.isfinite(e).any(axis=0))
-    e = e[:, heard]
-    names = [problem.model.machine.sensors[c].name for c in heard]
+    live = np.flatnonzero(np.isfinite(e).any(axis=0))
+    e = e[:, live]
+    names = [problem.model.machine.sensors[c].name for c in live]
     nis = np.nanmean(e**2, axis=0)
     worst = int(np.argmax(np.abs(np.log(nis))))
     lag = np.array([_lag_one(e[:, c]) for c in range(e.shape[1])])
@@ -196,8 +195,8 @@ def _departure_check(name: str, departures: list[Departure], *, tolerated: bool,
 
 def direction_check(problem: DropProblem, smoothed: Smoothed) -> Check:
     """Whether both directions are seen at every node with sensors; the rest follows from the model alone."""
-    heard = np.flatnonzero(np.isfinite(normalised_innovations(smoothed)).any(axis=0))
-    sensors = [problem.model.machine.sensors[c] for c in heard]
+    live = np.flatnonzero(np.isfinite(normalised_innovations(smoothed)).any(axis=0))
+    sensors = [problem.model.machine.sensors[c] for c in live]
     blind = []
     for node in sorted({sensor.node for sensor in problem.model.machine.sensors}):
         angles = np.array([float(sensor.angle) for sensor in sensors if sensor.node == node])

@@ -91,7 +91,7 @@ class InputEstimate:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Lent:
+class SensorCorrections:
     """What the cross-check has to be told; N samples, B bearings, C channels."""
 
     gain_errors: Array
@@ -105,7 +105,7 @@ class Lent:
     """Parameters of the drop model, of which the stress takes the preload, shape (P,)."""
 
 
-def lent_by_record(problem: DropProblem) -> Lent:
+def corrections_by_record(problem: DropProblem) -> SensorCorrections:
     """What settled tail and machine file say alone: the cross-check takes nothing from the twin.
 
     The rotor counts as clear of a race only where it is so by twice the error of gap and sensors and by
@@ -119,7 +119,7 @@ def lent_by_record(problem: DropProblem) -> Lent:
     zero = float(np.max(variance[first : first + problem.n_channels]))
     margin = GATE_MARGIN * problem.mean[entries] + 2.0 * np.sqrt(variance[entries] + zero)
     motion = at_bearings(problem, (problem.readings - offsets) / (1.0 + gain_errors))
-    return Lent(
+    return SensorCorrections(
         gain_errors=gain_errors,
         offsets=offsets,
         radius=np.hypot(motion[..., 0], motion[..., 1]),
@@ -148,14 +148,14 @@ def at_bearings(problem: DropProblem, along: Array) -> Array:
     layout, rigid = problem.model.layout, slice(0, problem.model.basis.n_rigid)
     rows = problem.sensor_rows
     design = np.hstack([rows[:, layout.modal_x][:, rigid], rows[:, layout.modal_y][:, rigid]])
-    heard = np.isfinite(along).any(axis=0)
-    amplitudes = along[:, heard] @ np.linalg.pinv(design[heard]).T
+    live = np.isfinite(along).any(axis=0)
+    amplitudes = along[:, live] @ np.linalg.pinv(design[live]).T
     shapes = problem.model.parameters.bearing_shape[:, rigid]
     half = shapes.shape[1]
     return np.stack([amplitudes[:, :half] @ shapes.T, amplitudes[:, half:] @ shapes.T], axis=-1)
 
 
-def input_state_estimate(problem: DropProblem, lent: Lent) -> InputEstimate:
+def input_state_estimate(problem: DropProblem, corrections: SensorCorrections) -> InputEstimate:
     """Joint estimate of motion and bearing forces from the readings, by a linear filter and smoother.
 
     No contact, friction or support enters. Both directions must be seen in two planes: with less, the rotor
@@ -165,12 +165,12 @@ def input_state_estimate(problem: DropProblem, lent: Lent) -> InputEstimate:
     ----------
     problem : DropProblem
         Readings and rotor.
-    lent : Lent
+    corrections : SensorCorrections
         Sensor errors, air gaps and preload, from the twin or from the record alone.
     """
-    count = len(lent.radius)
-    closed = np.repeat(lent.radius < lent.reach, 2, axis=1)
-    readings = ((problem.readings - lent.offsets) / (1.0 + lent.gain_errors))[:count]
+    count = len(corrections.radius)
+    closed = np.repeat(corrections.radius < corrections.reach, 2, axis=1)
+    readings = ((problem.readings - corrections.offsets) / (1.0 + corrections.gain_errors))[:count]
     rotor = rotor_of(problem)
     early = slice(0, int(np.searchsorted(problem.time[:count], SEARCHED * problem.fall_time)))
     turn = (
@@ -198,7 +198,9 @@ def input_state_estimate(problem: DropProblem, lent: Lent) -> InputEstimate:
     late = time >= 0.15
     unknown = np.full(force.shape[1], np.nan)
     whole = time[-1] > 0.199
-    stress = np.column_stack([_stress(problem, lent.theta, b, force[:, b]) for b in range(force.shape[1])])
+    stress = np.column_stack(
+        [_stress(problem, corrections.theta, b, force[:, b]) for b in range(force.shape[1])]
+    )
     return InputEstimate(
         time=time,
         turn=turn,
@@ -386,11 +388,11 @@ def forward_pass(
             P[at, rate] += of_both[i]
             P[rate, at] += of_both[i]
             P[rate, rate] += of_rate[i]
-        heard, shut = np.flatnonzero(np.isfinite(readings[i])), np.flatnonzero(closed[i])
+        live, shut = np.flatnonzero(np.isfinite(readings[i])), np.flatnonzero(closed[i])
         done = []
         for H, z, R, channels in (
             (identity[at[shut]], np.zeros(len(shut)), held[shut], None),
-            (rotor.C[heard], readings[i, heard], rotor.variances[heard], heard),
+            (rotor.C[live], readings[i, live], rotor.variances[live], live),
         ):
             if len(z) == 0:
                 continue
@@ -403,7 +405,7 @@ def forward_pass(
             left = identity - K @ H
             P = left @ P @ left.T + (K * R) @ K.T  # Joseph form: stays positive with a channel missing
             done.append(_Update(K=K, H=H, whitened=inverse @ e, inverse=inverse, channels=channels))
-        if len(heard):
+        if len(live):
             negative_log_likelihood += 0.5 * float(e @ done[-1].whitened - np.linalg.slogdet(inverse)[1])
         updates.append(done)
         shown[i], rows[i] = watched @ x, watched @ P

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.rotor.parameters import DropModel
-from rotordrop.track.input_state import USUAL_PEAK, forward_pass, lent_by_record, rotor_of
+from rotordrop.track.input_state import USUAL_PEAK, corrections_by_record, forward_pass, rotor_of
 from rotordrop.track.problem import DropProblem, RecordedDrop, build_problem
 
 Array = NDArray[np.float64]
@@ -26,10 +26,12 @@ class Readings:
 
 def readings_of(problem: DropProblem) -> Readings:
     """The readings of a problem by what settled tail and machine file say of its sensors."""
-    lent = lent_by_record(problem)
+    corrections = corrections_by_record(problem)
     return Readings(
-        along=((problem.readings - lent.offsets) / (1.0 + lent.gain_errors))[: len(lent.radius)],
-        closed=np.repeat(lent.radius < lent.reach, 2, axis=1),
+        along=((problem.readings - corrections.offsets) / (1.0 + corrections.gain_errors))[
+            : len(corrections.radius)
+        ],
+        closed=np.repeat(corrections.radius < corrections.reach, 2, axis=1),
     )
 
 

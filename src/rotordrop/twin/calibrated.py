@@ -22,9 +22,9 @@ from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.statics import bearing_load_shares
 from rotordrop.rotor.unknowns import weight_per_magnet
 from rotordrop.track.consistency import Check, consistency_checks, judged_by
+from rotordrop.track.noise_size import likeliest_noise, with_noise
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Smoothed, parameter_sample
-from rotordrop.track.unknown_impulses import likeliest_noise, with_noise
 from rotordrop.twin.joint_spread import joint_spread
 from rotordrop.twin.search import CALIBRATION_SCHEDULE, track_drops
 from rotordrop.twin.tracked_loads import widening_of
@@ -78,7 +78,7 @@ class Calibration:
     """Whether all checks of all drops passed."""
     nis: dict[str, float]
     structure: tuple[Structure, ...] = ()
-    """What the machine has beyond the usual model; empty where that does."""
+    """What the machine has beyond the base model; empty where that does."""
 
     def sentence(self) -> str:
         """The outcome in words."""

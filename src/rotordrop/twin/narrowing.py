@@ -18,7 +18,7 @@ from rotordrop.track.smoother import Smoothed, smooth
 Array = NDArray[np.float64]
 
 DRAWING = "the rotor by its sections, from a drawing,"
-TOLD = 3
+MOST_NAMED = 3
 """Measurements that are told."""
 
 
@@ -71,7 +71,7 @@ def narrowing(
     if beam:
         listed.append(Advice(measurement=DRAWING, paths=("rotor",), half_widths=before, narrowed=drawing))
     listed.sort(key=lambda one: one.left)
-    return tuple(one for one in listed[:TOLD] if one.left < WORTH_SAYING)
+    return tuple(one for one in listed[:MOST_NAMED] if one.left < WORTH_SAYING)
 
 
 def explained(covariance: Array, shared: Array) -> float:

@@ -208,7 +208,7 @@ def track_drops(
         found = search.refine_if_followed(base)
     if found is None or not _fits(found):
         if progress is not None:
-            progress("trying extensions of the usual model, and other starts", 0.0)
+            progress("trying extensions of the base model, and other starts", 0.0)
         # Where a beam stands for a rotor, its form is what does not fit: no extension stands for that.
         other = best_start(base, search) if machine.rotor.is_beam else best_structure(base, search)
         again = None if other.fit is base.fit else search.refine_if_followed(other)
@@ -232,7 +232,7 @@ def gain_of(candidate: Candidate, before: Candidate) -> float:
 
 
 def best_structure(base: Candidate, search: Fits) -> Candidate:
-    """The best of the usual model and its extensions, one on top of the other while that pays.
+    """The best of the base model and its extensions, one on top of the other while that pays.
 
     The windows of a search leave it a few passes short, and an extension may have only led to a better start.
     So the model without it is given what both have found, and the rise of the likelihood counts from there.
@@ -240,7 +240,7 @@ def best_structure(base: Candidate, search: Fits) -> Candidate:
     Parameters
     ----------
     base : Candidate
-        The usual model, which does not fit the record.
+        The base model, which does not fit the record.
     search : Fits
         Fits machines to the record.
     """
@@ -340,7 +340,7 @@ def _halve(attempts: Sequence[_Attempt], search: Fits) -> Candidate | None:
 
 
 def extension_when_consistent(base: Candidate, search: Fits) -> Candidate:
-    """The usual model that fits, with the extension that pays all the same, if one does.
+    """The base model that fits, with the extension that pays all the same, if one does.
 
     A mild departure may not show in the size of the innovations, which nobody knows to a tenth, and yet move
     peaks and gaps: a rotor 3 % softer moved a peak by 4.6 %, cross-axis sensitivity a gap by 30 µm.
@@ -348,26 +348,26 @@ def extension_when_consistent(base: Candidate, search: Fits) -> Candidate:
     Parameters
     ----------
     base : Candidate
-        The usual model, which follows the record.
+        The base model, which follows the record.
     search : Fits
         Fits machines to the record.
     """
-    able = [one for one in EXTENSIONS if one.shows_beside and one.values(base.machine)]
+    able = [one for one in EXTENSIONS if one.shows_when_consistent and one.values(base.machine)]
     with ThreadPoolExecutor(max_workers=THREADS) as pool:
         described = pool.submit(search.likelihood, base.fit, base.machine)
 
         def rise(one: Extension) -> float:
             with_it = search.likelihood(base.fit, one.added_to(base.machine))
-            if not one.usual(base.machine):
+            if not one.base_values(base.machine):
                 return described.result() - with_it
-            return search.likelihood(base.fit, one.saying_the_usual(base.machine)) - with_it
+            return search.likelihood(base.fit, one.as_base_model(base.machine)) - with_it
 
         rises = list(pool.map(rise, able))
     if not math.isfinite(described.result()):
         return base
     promising = [pair for pair in zip(rises, able, strict=True) if pair[0] >= CONSISTENT_RISE]
     for _, extension in sorted(promising, key=lambda pair: -pair[0]):
-        machine, plain = extension.added_to(base.machine), extension.saying_the_usual(base.machine)
+        machine, plain = extension.added_to(base.machine), extension.as_base_model(base.machine)
         found = Candidate(machine=machine, fit=search.relinearise(base.fit, machine, RELINEARISED_PASSES))
         again = replace(base, fit=search.relinearise(base.fit, plain, RELINEARISED_PASSES))
         if (gain := gain_of(found, again)) >= CONSISTENT_RISE:

@@ -11,9 +11,9 @@ from rotordrop.machine import Machine
 from rotordrop.track.consistency import DIRECTIONS, Check, consistency_checks, judged_by
 from rotordrop.track.forces import ForceHistory, force_history
 from rotordrop.track.input_state import InputEstimate
+from rotordrop.track.noise_size import likeliest_noise, with_noise
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Forward, Smoothed
-from rotordrop.track.unknown_impulses import likeliest_noise, with_noise
 from rotordrop.twin.search import FINE_SCHEDULE, Accepted, Progress, track_drops
 from rotordrop.twin.tracked_loads import check_without_contact_law, checks_begun, of_a_beam
 
@@ -26,7 +26,7 @@ class TrackedDrop:
     """What the record says beside the contacts."""
     problem: DropProblem
     smoothed: Smoothed
-    """The estimation problem and its smoothed estimate with the likeliest unknown impulses."""
+    """The estimation problem and its smoothed estimate with the likeliest process noise."""
     judged: Forward
     """The pass by whose innovations the model is judged."""
     forces: ForceHistory
@@ -34,11 +34,11 @@ class TrackedDrop:
     checks: tuple[Check, ...]
     """Consistency of model and record."""
     noise_factor: float
-    """Size of the unknown impulses over the usual one [1]."""
+    """Size of the process noise over the usual one [1]."""
     drops: int = 1
     """Number of drops that were fitted together."""
     accepted: tuple[Accepted, ...] = ()
-    """Extensions of the usual model that the readings paid for."""
+    """Extensions of the base model that the readings paid for."""
     unaided: Future[InputEstimate] | None = None
     """The estimate without contact law, where it was begun beside the passes."""
 

@@ -19,13 +19,12 @@ from rotordrop.estimate.estimate import (
     FittedParameter,
     Innovations,
     SensorErrors,
-    Structure,
     Verdict,
 )
 from rotordrop.estimate.later_motion import LaterMotion, later_motion
 from rotordrop.estimate.methods import Tracked
 from rotordrop.estimate.record_facts import RecordFacts
-from rotordrop.estimate.unbalance import PlaneUnbalance, unbalance_notes
+from rotordrop.estimate.unbalance import unbalance_notes
 from rotordrop.known import Known
 from rotordrop.track.consistency import NIS_RANGE, Check
 from rotordrop.track.input_state import InputEstimate, at_bearings
@@ -36,12 +35,12 @@ from rotordrop.twin.tracked_loads import (
     bearing_drop,
     check_of_the_rotor,
     cross_checks,
-    holding_cross_check,
-    is_apart,
-    is_beside,
+    is_beyond_accuracy,
+    is_beyond_factor,
     loads_of_cross_check,
     of_the_rotor,
     twin_loads,
+    widened_to_cross_check,
     widening_of,
 )
 from rotordrop.twin.tracked_parameters import (
@@ -56,7 +55,7 @@ from rotordrop.twin.tracked_unbalance import plane_unbalances
 Array = NDArray[np.float64]
 
 QUICK = (
-    "Quick estimate: one pass over the record, {}without the search for the size of the unknown impulses. "
+    "Quick estimate: one pass over the record, {}without the search for the size of the process noise. "
     "For a number that decides, leave --quick out."
 )
 
@@ -66,8 +65,8 @@ class _Judgement:
     """How far the twin is believed.
 
     ``check`` is the estimate without contact law, if one was made; ``widening`` the factor on the twin's
-    intervals [1]; ``parameters`` and ``sensors`` what it identified; ``given_way`` the bearings whose numbers
-    are not the twin's.
+    intervals [1]; ``parameters`` and ``sensors`` what it identified; ``replaced_at`` the bearings whose
+    numbers are not the twin's.
     """
 
     verdict: Verdict
@@ -75,7 +74,7 @@ class _Judgement:
     widening: float
     parameters: tuple[FittedParameter, ...]
     sensors: tuple[SensorErrors, ...]
-    given_way: tuple[bool, ...]
+    replaced_at: tuple[bool, ...]
 
     @property
     def fits(self) -> bool:
@@ -97,7 +96,15 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
     judged = _judge(drop, check)
     later = _later(drop, judged)
     advice = _advice(drop, judged)
-    unbalance = _unbalance(drop, judged)
+    unbalance = plane_unbalances(
+        problem,
+        drop.smoothed,
+        evidence.record.marks,
+        evidence.power_off.value,
+        fits=judged.fits,
+        widening=judged.widening,
+    )
+    values = {parameter.path: parameter.estimate for parameter in judged.parameters}
     quick = (QUICK.format("" if judged.check else "without the independent cross-check and "),)
     return Estimate(
         name=evidence.name,
@@ -114,7 +121,9 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
         sensors=judged.sensors,
         joint=joint_estimate(problem, drop.smoothed) if judged.fits else None,
         unbalance=unbalance,
-        structure=_structure(drop, judged),
+        structure=tuple(
+            one.structure(problem.model.machine, values, believed=judged.fits) for one in drop.accepted
+        ),
         cross_check=_comparisons(drop, judged),
         innovations=_innovations(drop),
         nis=drop.judged.nis,
@@ -167,24 +176,6 @@ def _by_a_drawing(drop: TrackedDrop, judged: _Judgement) -> tuple[Advice, ...]:
     return (Advice(measurement=DRAWING, paths=("rotor",), half_widths=before, narrowed=after, at_most=True),)
 
 
-def _unbalance(drop: TrackedDrop, judged: _Judgement) -> tuple[PlaneUnbalance, ...]:
-    evidence = drop.evidence
-    return plane_unbalances(
-        drop.problem,
-        drop.smoothed,
-        evidence.record.marks,
-        evidence.power_off.value,
-        fits=judged.fits,
-        widening=judged.widening,
-    )
-
-
-def _structure(drop: TrackedDrop, judged: _Judgement) -> tuple[Structure, ...]:
-    values = {parameter.path: parameter.estimate for parameter in judged.parameters}
-    machine = drop.problem.model.machine
-    return tuple(one.structure(machine, values, believed=judged.fits) for one in drop.accepted)
-
-
 def _cross_checked(drop: TrackedDrop, method: Tracked) -> tuple[TrackedDrop, InputEstimate | None]:
     """The drop with one check more, and the estimate without contact law, if one is made.
 
@@ -195,7 +186,7 @@ def _cross_checked(drop: TrackedDrop, method: Tracked) -> tuple[TrackedDrop, Inp
     quick estimate does without it, but not for a bearing with play, whose force no study has validated.
     """
     problem = drop.problem
-    departs = is_apart if problem.model.machine.rotor.is_beam else is_beside
+    departs = is_beyond_accuracy if problem.model.machine.rotor.is_beam else is_beyond_factor
     with_play = any(not numbers_of(b).held for b in problem.model.machine.touchdown_bearings)
     if not drop.sees_all_directions or (drop.consistent and method.quick and not with_play):
         return drop, None
@@ -220,22 +211,27 @@ def _judge(drop: TrackedDrop, check: InputEstimate | None) -> _Judgement:
         _refuse_unchecked(drop)
     fits = drop.consistent or check is None
     widening = widening_of(drop.checks)
-    found = parameters(problem, smoothed, fits=fits, widening=widening)
-    given_way = [False] * len(problem.model.bearing_names)
+    found = {one.path: one for one in parameters(problem, smoothed, fits=fits, widening=widening)}
+    replaced_at = [False] * len(problem.model.bearing_names)
     if not fits and check is not None:
-        given_way = [_gives_way(drop, found, check, b) for b in range(len(given_way))]
+        for b, name in enumerate(problem.model.bearing_names):
+            # the twin has lost the drop there: by its peak force, or by an air gap that cannot be
+            gap, peak = found[f"{name}.air_gap"], float(drop.forces.magnitude[:, b].max())
+            replaced_at[b] = is_beyond_factor(peak, check, b) or is_lost(problem, gap.estimate, b)
+            if replaced_at[b]:
+                found[gap.path] = replace(gap, estimate=gap_of_record(problem, b))
     verdict = Verdict.CONSISTENT if drop.consistent else Verdict.ONE_DIRECTION
     if drop.consistent and drop.accepted:
         verdict = Verdict.EXTENDED
     if not fits:
-        verdict = Verdict.GIVEN_WAY if any(given_way) else Verdict.HELD
+        verdict = Verdict.REPLACED if any(replaced_at) else Verdict.WIDENED
     return _Judgement(
         verdict=verdict,
         check=check,
         widening=widening,
-        parameters=tuple(_with_own_gap(drop, parameter, given_way) for parameter in found),
+        parameters=tuple(found.values()),
         sensors=sensor_errors(problem, smoothed, fits=fits, widening=widening),
-        given_way=tuple(given_way),
+        replaced_at=tuple(replaced_at),
     )
 
 
@@ -249,20 +245,6 @@ def _refuse_unchecked(drop: TrackedDrop) -> None:
         "nothing can check its force; expected a model that fits, or both directions in two planes. "
         "Calibrate on drops with all sensors, estimate without --quick, or leave this drop out."
     )
-
-
-def _gives_way(drop: TrackedDrop, found: tuple[FittedParameter, ...], check: InputEstimate, b: int) -> bool:
-    """Whether the twin has lost the drop at a bearing: by its peak force, or by an air gap that cannot be."""
-    name = drop.problem.model.bearing_names[b]
-    gap = next(parameter.estimate for parameter in found if parameter.path == f"{name}.air_gap")
-    return is_beside(float(drop.forces.magnitude[:, b].max()), check, b) or is_lost(drop.problem, gap, b)
-
-
-def _with_own_gap(drop: TrackedDrop, parameter: FittedParameter, given_way: list[bool]) -> FittedParameter:
-    for b, name in enumerate(drop.problem.model.bearing_names):
-        if given_way[b] and parameter.path == f"{name}.air_gap":
-            return replace(parameter, estimate=gap_of_record(drop.problem, b))
-    return parameter
 
 
 def _bearings(drop: TrackedDrop, judged: _Judgement) -> tuple[BearingDrop, ...]:
@@ -292,9 +274,9 @@ def _loads(drop: TrackedDrop, judged: _Judgement, b: int) -> Loads:
     twin = _twin(drop, judged, b)
     if judged.fits or judged.check is None:
         return twin
-    if judged.given_way[b]:
+    if judged.replaced_at[b]:
         return loads_of_cross_check(judged.check, b)
-    return holding_cross_check(twin, judged.check, b)
+    return widened_to_cross_check(twin, judged.check, b)
 
 
 def _twin(drop: TrackedDrop, judged: _Judgement, b: int) -> Loads:
@@ -308,7 +290,7 @@ def _comparisons(drop: TrackedDrop, judged: _Judgement) -> tuple[CrossCheck, ...
     found: list[CrossCheck] = []
     for b, name in enumerate(drop.problem.model.bearing_names):
         twin = _twin(drop, judged, b)
-        found += cross_checks(name, twin, drop.forces, judged.check, b, replaced=judged.given_way[b])
+        found += cross_checks(name, twin, drop.forces, judged.check, b, replaced=judged.replaced_at[b])
     return tuple(found)
 
 

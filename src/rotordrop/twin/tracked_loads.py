@@ -36,7 +36,7 @@ from rotordrop.simulate.certificate import refined_peak
 from rotordrop.track.calibration import TrackedDrops
 from rotordrop.track.consistency import Check, direction_check
 from rotordrop.track.forces import ForceHistory
-from rotordrop.track.input_state import MEAN_ERROR, InputEstimate, input_state_estimate, lent_by_record
+from rotordrop.track.input_state import MEAN_ERROR, InputEstimate, corrections_by_record, input_state_estimate
 from rotordrop.track.problem import DropProblem
 
 Array = NDArray[np.float64]
@@ -97,7 +97,7 @@ def of_the_rotor(forces: ForceHistory) -> ForceHistory:
 
 def check_without_contact_law(problem: DropProblem) -> InputEstimate:
     """The cross-check, with the error of a beam where one stands for the rotor; the twin lends nothing."""
-    check = input_state_estimate(problem, lent_by_record(problem))
+    check = input_state_estimate(problem, corrections_by_record(problem))
     return check_of_a_beam(check) if problem.model.machine.rotor.is_beam else check
 
 
@@ -201,7 +201,7 @@ def _peak(history: History, sigma: Array, widening: float, unit: str, model_shar
     return Peak(known=known, time=moment, origin=Origin.TWIN)
 
 
-def holding(value: Known, ratio: float, accuracy: float) -> Known:
+def widened_to(value: Known, ratio: float, accuracy: float) -> Known:
     """The value with an interval that also holds ``ratio`` times it, within a relative accuracy [1]."""
     low, high = value.interval_90 or (value.value, value.value)
     other = value.value * ratio if math.isfinite(ratio) else value.value
@@ -217,12 +217,12 @@ def holding(value: Known, ratio: float, accuracy: float) -> Known:
     )
 
 
-def is_beside(peak: float, check: InputEstimate, b: int) -> bool:
+def is_beyond_factor(peak: float, check: InputEstimate, b: int) -> bool:
     """Whether a peak [N] is so far from the cross-check that the twin cannot have followed the drop."""
     return not 1.0 / FACTOR_APART <= _over_check(peak, check, b) <= FACTOR_APART
 
 
-def is_apart(peak: float, check: InputEstimate, b: int) -> bool:
+def is_beyond_accuracy(peak: float, check: InputEstimate, b: int) -> bool:
     """Whether a peak [N] lies outside the known accuracy of the cross-check."""
     return abs(_over_check(peak, check, b) - 1.0) > float(check.peak_error[b])
 
@@ -233,7 +233,7 @@ def _over_check(peak: float, check: InputEstimate, b: int) -> float:
     return peak / found if math.isfinite(found) and found > 0.0 and peak > 0.0 else 1.0
 
 
-def holding_cross_check(loads: Loads, check: InputEstimate, b: int) -> Loads:
+def widened_to_cross_check(loads: Loads, check: InputEstimate, b: int) -> Loads:
     """Force and stress where model and record disagree, with intervals that hold the cross-check.
 
     The error of the twin's own numbers is not known then: up to 340 % where a support is stiffer in one
@@ -249,9 +249,9 @@ def holding_cross_check(loads: Loads, check: InputEstimate, b: int) -> Loads:
         # the ratio of two mean vectors says nothing of the stated number.
         ratio = float(check.mean_magnitude_late[b]) / max(late.value, 1e-9)
         ratios["mean_force_0p15_0p2_N"] = (ratio, MEAN_ERROR)
-    peak_force = replace(loads.peak_force, known=holding(loads.peak_force.known, force_ratio, peak_error))
+    peak_force = replace(loads.peak_force, known=widened_to(loads.peak_force.known, force_ratio, peak_error))
     peak_stress = replace(
-        loads.peak_stress, known=holding(loads.peak_stress.known, stress_ratio, stress_error)
+        loads.peak_stress, known=widened_to(loads.peak_stress.known, stress_ratio, stress_error)
     )
     return replace(
         loads,
@@ -260,7 +260,7 @@ def holding_cross_check(loads: Loads, check: InputEstimate, b: int) -> Loads:
         peak_force=peak_force,
         peak_stress=peak_stress,
         means={
-            name: holding(value, *ratios[name]) if name in ratios else value
+            name: widened_to(value, *ratios[name]) if name in ratios else value
             for name, value in loads.means.items()
         },
     )
@@ -387,19 +387,22 @@ def _impact(forces: ForceHistory, b: int, first: int, last: int, widening: float
     lost = dt * float(np.sum(forces.contact_power[first:last, b]))
     middle = first + int(np.argmax(forces.contact_force[first:last, b]))
 
-    def known(value: float, error: float, unit: str) -> Known:
-        whole = with_interval(value, error, widening, unit)
-        # What is still to come of a contact that goes on is not known: the whole impact has at least this.
-        return Known(value=value, status=CUT, lower=whole.low, unit=unit) if cut else whole
-
+    force = with_interval(peak, relative * peak, widening, "N")
+    passed = with_interval(impulse, relative * impulse, widening, "N s")
+    energy = with_interval(lost, 2.0 * relative * abs(lost), widening, "J")
+    if cut:
+        # Impulse and energy are of the part that was estimated, and add up to that of the window. The peak of
+        # a contact that goes on may be still to come: the whole impact has at least this.
+        force = Known(value=peak, status=CUT, lower=force.low, unit="N")
+        passed, energy = replace(passed, status=CUT), replace(energy, status=CUT)
     return Impact(
         start=float(forces.time[first]),
         end=math.nan if cut else float(forces.time[last - 1]),
         azimuth=float(forces.azimuth[middle, b]),
         peak_time=moment,
-        peak_force=known(peak, relative * peak, "N"),
-        impulse=known(impulse, relative * impulse, "N s"),
-        dissipated_energy=known(lost, 2.0 * relative * abs(lost), "J"),
+        peak_force=force,
+        impulse=passed,
+        dissipated_energy=energy,
     )
 
 
@@ -412,9 +415,9 @@ def _impact_holding(impact: Impact, cross_check: InputEstimate, b: int) -> Impac
     error = float(cross_check.peak_error[b])
     return replace(
         impact,
-        peak_force=holding(impact.peak_force, ratio, error),
-        impulse=holding(impact.impulse, ratio, error),
-        dissipated_energy=holding(impact.dissipated_energy, ratio, 2.0 * error),
+        peak_force=widened_to(impact.peak_force, ratio, error),
+        impulse=widened_to(impact.impulse, ratio, error),
+        dissipated_energy=widened_to(impact.dissipated_energy, ratio, 2.0 * error),
     )
 
 

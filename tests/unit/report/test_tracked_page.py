@@ -156,7 +156,7 @@ def beside(estimate: Estimate, verdict: Verdict, origin: Origin) -> Estimate:
 
 
 def test_an_estimate_beside_its_record_shows_ranges_and_no_single_number(estimate: Estimate) -> None:
-    shown = estimate_page(beside(estimate, Verdict.HELD, Origin.TWIN))
+    shown = estimate_page(beside(estimate, Verdict.WIDENED, Origin.TWIN))
     assert shown.verdict[0].level == "bad"
     assert shown.verdict[0].text.startswith("The model is not consistent with the record.")
     assert "9.00 × expected" in shown.verdict[0].text
@@ -173,12 +173,12 @@ def test_an_estimate_beside_its_record_shows_ranges_and_no_single_number(estimat
 
 
 def test_loads_of_the_cross_check_are_called_so(estimate: Estimate) -> None:
-    shown = estimate_page(beside(estimate, Verdict.GIVEN_WAY, Origin.CROSS_CHECK))
+    shown = estimate_page(beside(estimate, Verdict.REPLACED, Origin.CROSS_CHECK))
     assert all(
         card.title.endswith("touchdown bearing, by the independent cross-check") for card in shown.cards
     )
-    document = estimate_document(beside(estimate, Verdict.GIVEN_WAY, Origin.CROSS_CHECK))
-    assert document["consistent"] is False and document["verdict"] == Verdict.GIVEN_WAY.value
+    document = estimate_document(beside(estimate, Verdict.REPLACED, Origin.CROSS_CHECK))
+    assert document["consistent"] is False and document["verdict"] == Verdict.REPLACED.value
     assert document["bearings"]["DE"]["origin"] == "independent cross-check"
     assert list(document)[:3] == ["format", "verdict", "consistent"]
 

@@ -214,5 +214,5 @@ def test_a_beam_is_judged_with_its_own_error(impacts, impacts_smoothed):
     for problem in (impacts, of_beam):
         checks = {c.name: c for c in consistency_checks(problem, replace(impacts_smoothed, means=means), 4.1)}
         passed[problem is of_beam] = checks["sensor errors"].passed
-        assert ("4.1 × their usual size" in checks["process noise"].note) is (problem is of_beam)
+        assert ("4.1 × its usual size" in checks["process noise"].note) is (problem is of_beam)
     assert passed == {False: False, True: True}

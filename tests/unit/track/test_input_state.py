@@ -13,7 +13,12 @@ from rotordrop.physics import columns as L
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.track import _propagation as P
 from rotordrop.track.forces import bearing_values, stress_at_force
-from rotordrop.track.input_state import Lent, at_bearings, input_state_estimate, lent_by_record
+from rotordrop.track.input_state import (
+    SensorCorrections,
+    at_bearings,
+    corrections_by_record,
+    input_state_estimate,
+)
 from rotordrop.track.problem import DropProblem, private_copy
 
 DT = 5e-5
@@ -61,12 +66,12 @@ def pushed_rotor(model: DropModel, speed: float, start: np.ndarray) -> np.ndarra
 
 
 @pytest.fixture(scope="module")
-def pushed(flight: DropProblem) -> tuple[DropProblem, Lent, np.ndarray]:
+def pushed(flight: DropProblem) -> tuple[DropProblem, SensorCorrections, np.ndarray]:
     """Readings of the pushed rotor with noise, a gate that opens at the pulses, true force."""
     return recorded_pushes(flight, every=1)
 
 
-def recorded_pushes(flight: DropProblem, every: int) -> tuple[DropProblem, Lent, np.ndarray]:
+def recorded_pushes(flight: DropProblem, every: int) -> tuple[DropProblem, SensorCorrections, np.ndarray]:
     """The pushed rotor with every so manieth reading, the noise density of the readings the same."""
     model, layout = flight.model, flight.model.layout
     m, n_b = layout.n_modes, layout.n_bearings
@@ -86,14 +91,14 @@ def recorded_pushes(flight: DropProblem, every: int) -> tuple[DropProblem, Lent,
         variances=variances,
         speed=np.full(len(time), np.nan),
     )
-    lent = Lent(
+    corrections = SensorCorrections(
         gain_errors=gain - 1.0,
         offsets=offset,
         radius=np.where(np.abs(force).max(axis=2) > 0.0, 1.0, 0.0),
         reach=np.full(n_b, 0.5),
         theta=flight.mean[flight.parameter_slice],
     )
-    return problem, lent, force
+    return problem, corrections, force
 
 
 def peaks_of(force: np.ndarray, dt: float = DT) -> list[np.ndarray]:
@@ -107,8 +112,8 @@ def peaks_of(force: np.ndarray, dt: float = DT) -> list[np.ndarray]:
 
 
 def test_the_peaks_of_known_pulses_are_found_back(pushed):
-    problem, lent, force = pushed
-    found = input_state_estimate(problem, lent)
+    problem, corrections, force = pushed
+    found = input_state_estimate(problem, corrections)
     for estimate, pulse in zip(peaks_of(found.force), PULSES, strict=True):
         true = pulse[4] * np.array(pulse[1])
         assert np.hypot(*(estimate - true)) < 0.2 * pulse[4]
@@ -119,8 +124,8 @@ def test_the_peaks_of_known_pulses_are_found_back(pushed):
 
 def test_the_peak_stress_is_that_of_the_bearing_under_the_peak_force(pushed):
     """The twin's own force at a deflection leads back to the twin's own stress there."""
-    problem, lent, _ = pushed
-    theta = lent.theta
+    problem, corrections, _ = pushed
+    theta = corrections.theta
     p = private_copy(problem.model.parameters)
     P.apply_parameters(theta.copy(), problem.targets, p)
     out = np.empty(4)
@@ -129,7 +134,7 @@ def test_the_peak_stress_is_that_of_the_bearing_under_the_peak_force(pushed):
         bearing_values(0.0, -deflection, p.bearing[b, L.AXIAL_OFFSET], b, p, work, out)
         found = stress_at_force(problem, theta, b, np.array([0.0, -out[2]]))
         assert found == pytest.approx(out[3], rel=1e-6)
-    estimate = input_state_estimate(problem, lent)
+    estimate = input_state_estimate(problem, corrections)
     for b in range(2):
         worst = estimate.force[estimate.magnitude[:, b].argmax(), b]
         assert estimate.peak_stress[b] == pytest.approx(stress_at_force(problem, theta, b, worst), rel=1e-9)
@@ -141,7 +146,7 @@ def test_the_peak_stress_is_that_of_the_bearing_under_the_peak_force(pushed):
 def test_without_the_twin_the_record_itself_opens_the_gate(pushed):
     """Nothing of the twin enters: gains within 1 per cent, gaps within their prior, and the same peaks."""
     problem, _, force = pushed
-    own = lent_by_record(problem)
+    own = corrections_by_record(problem)
     motion = at_bearings(problem, (problem.readings - own.offsets) / (1.0 + own.gain_errors))
     np.testing.assert_array_equal(own.radius, np.hypot(motion[..., 0], motion[..., 1]))
     assert np.all((own.reach > 100e-6) & (own.reach < 0.96 * problem.mean[problem.gap_entries]))
@@ -162,7 +167,7 @@ def test_the_gate_leaves_room_for_a_rotor_that_bends_beside_the_line_through_its
     path = np.stack([states[:, :m] @ shapes, states[:, m : 2 * m] @ shapes], axis=-1)
     bent = np.quantile(np.linalg.norm(line - path, axis=2), 0.9, axis=0)
     known = replace(flight, covariance=np.zeros_like(flight.covariance))
-    room = flight.mean[flight.gap_entries] - lent_by_record(known).reach
+    room = flight.mean[flight.gap_entries] - corrections_by_record(known).reach
     assert np.all(bent > 5e-6), bent
     assert np.all(room > bent), (room, bent)
 
@@ -170,8 +175,8 @@ def test_the_gate_leaves_room_for_a_rotor_that_bends_beside_the_line_through_its
 @pytest.mark.parametrize("every", [2, 4])
 def test_fewer_readings_of_the_same_information_give_the_same_forces(flight, pushed, every):
     """Process noise grows with time, not with samples: 5 and 10 kHz find what 20 kHz finds."""
-    problem, lent, force = pushed
-    whole = input_state_estimate(problem, lent)
+    problem, corrections, force = pushed
+    whole = input_state_estimate(problem, corrections)
     thin, thin_lent, thin_force = recorded_pushes(flight, every)
     found = input_state_estimate(thin, thin_lent)
     assert found.turn == pytest.approx(whole.turn, rel=0.35)
@@ -185,15 +190,15 @@ def test_fewer_readings_of_the_same_information_give_the_same_forces(flight, pus
 
 
 def test_the_stated_error_holds_the_peak_and_grows_with_noise(flight):
-    problem, lent, force = recorded_pushes(flight, 1)
+    problem, corrections, force = recorded_pushes(flight, 1)
     true = np.hypot(*force.transpose(2, 0, 1)).max(axis=0)
-    found = input_state_estimate(problem, lent)
+    found = input_state_estimate(problem, corrections)
     assert np.all(np.abs(found.peak - true) < found.peak_error * true)
     noise = np.random.default_rng(4).standard_normal(problem.readings.shape)
     worse = replace(
         problem, readings=problem.readings + 4e-6 * noise, variances=problem.variances + (4e-6) ** 2
     )
-    poor = input_state_estimate(worse, lent)
+    poor = input_state_estimate(worse, corrections)
     assert np.all(np.abs(poor.peak - true) < poor.peak_error * true)
     assert np.all(poor.put_back > 1.5 * found.put_back)
     assert np.all(poor.peak_error > found.peak_error)
@@ -202,47 +207,47 @@ def test_the_stated_error_holds_the_peak_and_grows_with_noise(flight):
 
 def test_a_loose_race_opens_the_gate_by_its_play(flight):
     """The race lies on its balls: above it, rotor and race touch nearer to the centre."""
-    tight = lent_by_record(flight)
+    tight = corrections_by_record(flight)
     machine = flight.model.machine
     bearing = machine.touchdown_bearings[0]
     ball = bearing.bearing.model_copy(update={"clearance": Known(value=40e-6), "preload": Known(value=0.0)})
     loose = bearing.model_copy(update={"bearing": ball})
     changed = machine.model_copy(update={"touchdown_bearings": (loose, *machine.touchdown_bearings[1:])})
-    reach = lent_by_record(replace(flight, model=replace(flight.model, machine=changed))).reach
+    reach = corrections_by_record(replace(flight, model=replace(flight.model, machine=changed))).reach
     assert tight.reach[0] - reach[0] == pytest.approx(20e-6, rel=0.05)
     assert reach[1] == tight.reach[1]
 
 
 def test_a_force_that_no_bearing_carries_is_refused(pushed):
-    problem, lent, _ = pushed
-    theta = lent.theta
+    problem, corrections, _ = pushed
+    theta = corrections.theta
     with pytest.raises(IdentificationError, match=r"NDE: a bearing force of 1000000000000 N was found"):
         stress_at_force(problem, theta, 0, np.array([0.0, -1e12]))
 
 
 def test_impulses_are_those_of_the_pulses(pushed):
-    problem, lent, force = pushed
-    found = input_state_estimate(problem, lent)
+    problem, corrections, force = pushed
+    found = input_state_estimate(problem, corrections)
     np.testing.assert_allclose(
         DT * found.force.sum(axis=0), DT * force.sum(axis=0), atol=0.05 * DT * np.abs(force).sum(axis=0).max()
     )
 
 
 def test_in_flight_the_force_is_held_at_zero(pushed):
-    problem, lent, force = pushed
-    found = input_state_estimate(problem, lent)
+    problem, corrections, force = pushed
+    found = input_state_estimate(problem, corrections)
     flying = np.abs(force).max(axis=2) == 0.0
     assert np.count_nonzero(flying) > 1000
     assert found.magnitude[flying].max() < 0.05 * found.peak.max()
 
 
 def test_missing_readings_are_bridged(pushed):
-    problem, lent, _ = pushed
+    problem, corrections, _ = pushed
     readings = problem.readings.copy()
     readings[400:405] = np.nan
     readings[100:130, 2] = np.nan
     worse = replace(problem, readings=readings)
-    found = input_state_estimate(worse, lent)
+    found = input_state_estimate(worse, corrections)
     assert np.all(np.isfinite(found.force))
-    whole = input_state_estimate(problem, lent)
+    whole = input_state_estimate(problem, corrections)
     np.testing.assert_allclose(found.peak, whole.peak, rtol=0.05)

@@ -235,7 +235,7 @@ def test_an_impact_lasts_from_its_first_to_its_last_indented_sample() -> None:
         (True, True, Verdict.CONSISTENT, 1.0),
         (True, False, Verdict.CONSISTENT, 1.0),
         (True, False, Verdict.CONSISTENT, 1.4),
-        (False, True, Verdict.HELD, 2.0),
+        (False, True, Verdict.WIDENED, 2.0),
     ],
 )
 def test_a_twin_that_fits_stands_whether_it_was_cross_checked_or_not(
@@ -250,19 +250,21 @@ def test_a_twin_that_fits_stands_whether_it_was_cross_checked_or_not(
 
     def parameters(*_: Any, fits: bool, widening: float) -> tuple[Any, ...]:
         seen.append((fits, widening))
-        return ()
+        return tuple(SimpleNamespace(path=f"{name}.air_gap", estimate=None) for name in ("NDE", "DE"))
 
     monkeypatch.setattr(tracked_estimate, "parameters", parameters)
     monkeypatch.setattr(tracked_estimate, "sensor_errors", lambda *_, **__: ())
-    monkeypatch.setattr(tracked_estimate, "_gives_way", lambda *_: False)
+    for name in ("is_beyond_factor", "is_lost"):
+        monkeypatch.setattr(tracked_estimate, name, lambda *_: False)
     noted = Check(name="parameters", passed=consistent, message="", widening=widening if consistent else 1.0)
     drop: Any = SimpleNamespace(
         problem=problem, smoothed=None, consistent=consistent, checks=(noted,), drops=1, accepted=()
     )
+    drop.forces = SimpleNamespace(magnitude=np.ones((3, 2)))
     check: Any = object() if checked else None
     judged = tracked_estimate._judge(drop, check)
     assert judged.verdict is verdict and judged.widening == widening
-    assert seen == [(consistent, widening)] and judged.given_way == (False, False)
+    assert seen == [(consistent, widening)] and judged.replaced_at == (False, False)
 
 
 def test_a_simulated_coast_down_is_seen_where_the_sensors_are(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -27,7 +27,7 @@ from rotordrop.twin.rotor_search import with_found_rotor
 from rotordrop.twin.tracked_loads import (
     check_of_a_beam,
     check_of_the_rotor,
-    is_apart,
+    is_beyond_accuracy,
     of_a_beam,
     of_the_rotor,
 )
@@ -146,5 +146,10 @@ def test_a_peak_beyond_the_accuracy_of_the_cross_check_is_apart():
     """Where a beam stands for the rotor, the cross-check decides within its accuracy, not by a factor."""
     check = InputEstimate(**{f.name: np.array([0.2]) for f in fields(InputEstimate)})
     check = replace(check, peak=np.array([1000.0, 0.0]), peak_error=np.array([0.2, 0.2]))
-    assert [is_apart(peak, check, 0) for peak in (790.0, 810.0, 1190.0, 1210.0)] == [True, False, False, True]
-    assert not is_apart(1e6, check, 1)  # no impact there to be compared with
+    assert [is_beyond_accuracy(peak, check, 0) for peak in (790.0, 810.0, 1190.0, 1210.0)] == [
+        True,
+        False,
+        False,
+        True,
+    ]
+    assert not is_beyond_accuracy(1e6, check, 1)  # no impact there to be compared with

@@ -247,7 +247,7 @@ def test_every_extension_says_what_was_found_with_its_interval(lp400, extension)
 
 
 def test_consistent_with_an_extension_holds():
-    assert Verdict.EXTENDED.holds and not Verdict.HELD.holds and not Verdict.GIVEN_WAY.holds
+    assert Verdict.EXTENDED.holds and not Verdict.WIDENED.holds and not Verdict.REPLACED.holds
 
 
 def test_an_unbalance_beyond_its_grade_is_known_by_its_field_and_outlives_the_file(lp400, tmp_path):

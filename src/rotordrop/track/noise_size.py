@@ -1,4 +1,4 @@
-"""The size of the unknown impulses by the likelihood of the readings, and the estimate that it gives.
+"""The size of the process noise by the likelihood of the readings, and the estimate that it gives.
 
 What the model leaves out differs from machine to machine. Impulses of a size set beforehand make the
 intervals of a machine that the model fits too wide, and those of another too narrow; their likeliest size
@@ -31,7 +31,7 @@ STEP = 4.0
 
 
 def likeliest_noise(fit: TrackedDrops, stage: Stage) -> float:
-    """Size of the unknown impulses, over the usual one, that makes the readings of all drops likeliest [1].
+    """Size of the process noise, over the usual one, that makes the readings of all drops likeliest [1].
 
     It is no smaller than a size without which the filter had lost a drop.
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rotordrop.track import unknown_impulses
+from rotordrop.track import noise_size
 from rotordrop.track.calibration import Stage, TrackedDrops, track
-from rotordrop.track.unknown_impulses import LARGEST, SMALLEST, likeliest_noise, with_noise
+from rotordrop.track.noise_size import LARGEST, SMALLEST, likeliest_noise, with_noise
 
 STAGE = Stage(until=0.012, force=0.07, share=0.01, passes=1)
 
@@ -35,7 +35,7 @@ def test_the_size_is_that_of_the_least_improbability(
         value = 30.0 * math.log(factor / likeliest) ** 2
         return [SimpleNamespace(done=10, negative_log_likelihood=share * value) for share in (0.3, 0.7)]
 
-    monkeypatch.setattr(unknown_impulses, "forward_passes", passes)
+    monkeypatch.setattr(noise_size, "forward_passes", passes)
     assert likeliest_noise(fit_that_needs(1.0, needed), STAGE) == pytest.approx(likeliest)
 
 
@@ -46,7 +46,7 @@ def test_the_size_stays_within_its_limits(
     def passes(_fit: Any, _stage: Stage, factor: float) -> list[Any]:
         return [SimpleNamespace(done=10, negative_log_likelihood=math.log(factor / likeliest) ** 2)]
 
-    monkeypatch.setattr(unknown_impulses, "forward_passes", passes)
+    monkeypatch.setattr(noise_size, "forward_passes", passes)
     assert likeliest_noise(fit_that_needs(1.0), STAGE) == limit
 
 
@@ -56,7 +56,7 @@ def test_no_size_is_smaller_than_the_one_that_followed_the_drop(monkeypatch: pyt
     def passes(_fit: Any, _stage: Stage, factor: float) -> list[Any]:
         return [SimpleNamespace(done=10, negative_log_likelihood=math.log(factor / 2.0) ** 2)]
 
-    monkeypatch.setattr(unknown_impulses, "forward_passes", passes)
+    monkeypatch.setattr(noise_size, "forward_passes", passes)
     assert likeliest_noise(fit_that_needs(8.0), STAGE) == 8.0
 
 
@@ -68,8 +68,8 @@ def test_the_last_pass_goes_to_the_end_of_the_longest_drop(monkeypatch: pytest.M
         ends.append(until)
         return []
 
-    monkeypatch.setattr(unknown_impulses, "one_pass", one_pass)
-    monkeypatch.setattr(unknown_impulses, "stage_settings", lambda *_: None)
+    monkeypatch.setattr(noise_size, "one_pass", one_pass)
+    monkeypatch.setattr(noise_size, "stage_settings", lambda *_: None)
     drops = [SimpleNamespace(means=np.zeros((count, 1)), filtered=None) for count in (50, 200)]
     problems = [SimpleNamespace(time=1e-3 * np.arange(count)) for count in (50, 400)]
     fit: Any = TrackedDrops(problems=tuple(problems), smoothed=tuple(drops), nis=())  # type: ignore[arg-type]
@@ -81,7 +81,7 @@ def test_a_size_that_loses_a_drop_is_not_the_likeliest(monkeypatch: pytest.Monke
     def passes(_fit: Any, _stage: Stage, factor: float) -> list[Any]:
         return [SimpleNamespace(done=10 if factor >= 1.0 else 9, negative_log_likelihood=factor)]
 
-    monkeypatch.setattr(unknown_impulses, "forward_passes", passes)
+    monkeypatch.setattr(noise_size, "forward_passes", passes)
     assert likeliest_noise(fit_that_needs(1.0), STAGE) == 1.0
 
 
@@ -89,7 +89,7 @@ def test_larger_impulses_make_the_readings_say_less(impacts: Any) -> None:
     fit = track([impacts], (STAGE,))
     found = likeliest_noise(fit, STAGE)
     best, other = (
-        sum(one.negative_log_likelihood for one in unknown_impulses.forward_passes(fit, STAGE, factor))
+        sum(one.negative_log_likelihood for one in noise_size.forward_passes(fit, STAGE, factor))
         for factor in (found, 4.0 * found)
     )
     assert best < other + 1.0, "the parabola is no exact one"
