@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from rotordrop.evidence.evidence import Evidence, read_evidence
 from rotordrop.evidence.evidence import known as present
-from rotordrop.evidence.initial_state import InitialState, fit_initial_state
+from rotordrop.evidence.initial_state import InitialState, initial_state_of
 from rotordrop.evidence.sensing import build_sensing
 from rotordrop.machine import Machine
 from rotordrop.record.record import Record
@@ -72,7 +72,8 @@ def with_gap(evidence: Evidence, gaps: Array) -> Evidence:
     gap = present(evidence.gap)
     rest = replace(gap.rest, radius=gaps + gap.sag.total)
     other = replace(gap, value=gaps, rest=rest)
-    fall = fit_initial_state(evidence, other, present(evidence.sensing))
+    sensing, speed, off = present(evidence.sensing), evidence.speed.initial, evidence.power_off
+    fall = initial_state_of(evidence.record, evidence.model, off, speed, evidence.angle, other, sensing)
     return evidence.with_facts(rest=rest, gap=other, fall=fall)
 
 

@@ -95,7 +95,7 @@ def early_forces(record: Record, machine: Machine, drop: DropInstant, *, span: f
             "has "
             f"{len(machine.ambs)} AMB planes; give the AMB nodes in the machine file"
         )
-    from rotordrop.evidence.fall import GRID, rotor_pushed_at_bearings, tabulate_response
+    from rotordrop.evidence.free_rotor import GRID, rotor_pushed_at_bearings
 
     rotor = rotor_pushed_at_bearings(machine, record.planes)
     if len(record.planes) < len(rotor.force_rows):
@@ -108,7 +108,7 @@ def early_forces(record: Record, machine: Machine, drop: DropInstant, *, span: f
     time = record.time[keep]
     knots = np.arange(begin, min(begin + span, float(time[-1])), _KNOTS)
     deviation = (record.signals[keep] - drop.fall.predicted(time)) * record.gains
-    table = tabulate_response(rotor, 2 * np.pi * drop.levitated.frequency, 0.0, span + 2 * _KNOTS)
+    table = rotor.table(2 * np.pi * drop.levitated.frequency, 0.0, span + 2 * _KNOTS)
     ramp = np.concatenate(
         [np.zeros_like(table[:1]), np.cumsum(0.5 * GRID * (table[1:] + table[:-1]), axis=0)]
     )
@@ -123,7 +123,7 @@ def early_forces(record: Record, machine: Machine, drop: DropInstant, *, span: f
 
 def _columns(ramp: np.ndarray, time: Array, knots: Array, record: Record) -> Array:
     """Displacement along the sensors per force at bearing and knot, x then y: shape (T · S, 2 · B · K)."""
-    from rotordrop.evidence.fall import response_at
+    from rotordrop.evidence.free_rotor import response_at
 
     seen = record.directions[:, 0] - 1j * record.directions[:, 1]
     parts = []

@@ -18,6 +18,7 @@ from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
     from rotordrop.evidence.fall import Fall
+    from rotordrop.evidence.free_rotor import FreeRotor
     from rotordrop.machine import Machine
     from rotordrop.record.record import Record
 
@@ -110,23 +111,25 @@ def find_drop_instant(record: Record, machine: Machine) -> DropInstant:
     RecordError
         When the rotor does not fall in the record, or the record does not begin before the fall.
     """
-    begun = beginning_of(record, machine)
-    return instant_of(find_fall(record, machine, begun), begun.levitated, record)
+    # The rotor model brings the compiler with it, and a first look at a record needs neither.
+    from rotordrop.evidence.free_rotor import free_rotor
+
+    begun, rotor = beginning_of(record, machine), free_rotor(machine, record.whole.planes)
+    return instant_of(find_fall(record, rotor, begun), begun.levitated, record)
 
 
-def find_fall(record: Record, machine: Machine, begun: Beginning, *, until: float | None = None) -> Fall:
-    """Fit the fall by the released rotor of the machine, in the planes whose sensors give x and y.
+def find_fall(record: Record, rotor: FreeRotor, begun: Beginning, *, until: float | None = None) -> Fall:
+    """Fit the fall by a released rotor, in the planes whose sensors give x and y.
 
     The window ends where the readings leave the free fall, or at `until` [s] whether they fit or not.
     """
-    # The rotor model brings the compiler with it, and a first look at a record needs neither.
-    from rotordrop.evidence.fall import fit_fall, free_rotor
+    from rotordrop.evidence.fall import fit_fall
 
-    coarse, whole = begun.coarse, record.whole
+    coarse = begun.coarse
     window = (coarse.instant, coarse.sunk, coarse.contact)
     if until is not None:
         window = (coarse.instant, until, until)
-    return fit_fall(whole, free_rotor(machine, whole.planes), of_whole(begun.levitated, record), window)
+    return fit_fall(record.whole, rotor, of_whole(begun.levitated, record), window)
 
 
 def of_whole(levitated: LevitatedModel, record: Record) -> LevitatedModel:
@@ -150,7 +153,7 @@ def instant_of(fall: Fall, levitated: LevitatedModel, record: Record) -> DropIns
         value=fall.instant,
         standard_error=error,
         interval_90=(fall.instant - NINETY * error, fall.instant + NINETY * error),
-        method=f"{fall.method}; {error * record.sampling_rate:.2g} of a sample",
+        method=f"{fall.rotor.description}; {error * record.sampling_rate:.2g} of a sample",
         fall=fall,
         levitated=levitated,
         notes=tuple(notes),

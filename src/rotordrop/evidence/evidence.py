@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from rotordrop.evidence.contacts import TimedContact
     from rotordrop.evidence.events import PowerOff
     from rotordrop.evidence.fall import Fall
+    from rotordrop.evidence.free_rotor import FreeRotor
     from rotordrop.evidence.initial_state import InitialState
     from rotordrop.evidence.quality.flight import Weighed
     from rotordrop.evidence.rest import AirGap, SettledRest
@@ -112,7 +113,15 @@ class Evidence:
     @cached_property
     def free_fall(self) -> Fall | Missing:
         """The fall after the levitated motion, fitted by the released rotor without tail or air gap."""
-        return sought(lambda: find_fall(self.record, self.machine, known(self.beginning)))
+        return sought(lambda: find_fall(self.record, self.rotor, known(self.beginning)))
+
+    @cached_property
+    def rotor(self) -> FreeRotor:
+        """The released rotor, seen in the planes whose sensors give x and y."""
+        # The rotor model brings the compiler with it, and a first look at a record needs neither.
+        from rotordrop.evidence.free_rotor import free_rotor
+
+        return free_rotor(self.machine, self.record.whole.planes)
 
     @cached_property
     def floating(self) -> LevitatedModel:
@@ -125,7 +134,7 @@ class Evidence:
         from rotordrop.evidence.quality.flight import weighed
 
         drop = known(self.beginning).coarse.instant
-        return weighed(self.record.whole, self.machine, self.floating, drop)
+        return weighed(self.record.whole, self.machine, self.rotor, self.floating, drop)
 
     @cached_property
     def still(self) -> Record | Missing:
@@ -133,8 +142,8 @@ class Evidence:
         return sought(lambda: resting_record(self.record, self.tail, self.machine))
 
     @cached_property
-    def release(self) -> DropInstant | PowerOff:
-        """Power-off by the fall alone.
+    def power_off(self) -> DropInstant | PowerOff:
+        """Power-off in record time, by the levitated motion and the fall, or by the fall alone.
 
         Raises
         ------
@@ -153,7 +162,7 @@ class Evidence:
     @cached_property
     def levitated(self) -> LevitatedModel | None:
         """Readings before power-off; None when the record begins with the fall."""
-        return self.release.levitated if isinstance(self.release, DropInstant) else None
+        return self.power_off.levitated if isinstance(self.power_off, DropInstant) else None
 
     @cached_property
     def base(self) -> DropModel:
@@ -173,7 +182,7 @@ class Evidence:
         """Speed at power-off and how it falls."""
         from rotordrop.evidence.speed import identify_speed
 
-        return identify_speed(self.record, self.release.value, turning=self._turning)
+        return identify_speed(self.record, self.power_off.value, turning=self._turning)
 
     @property
     def _turning(self) -> float | None:
@@ -184,7 +193,7 @@ class Evidence:
         """Rotor angle over the whole record."""
         turning = self.speed.initial if self._turning is None else self._turning
         slowing = strongest_slowing(self.base)
-        return rotor_angle(self.record, self.release.value, turning, strongest_slowing=slowing)
+        return rotor_angle(self.record, self.power_off.value, turning, strongest_slowing=slowing)
 
     @cached_property
     def sensing(self) -> Sensing | Missing:
@@ -236,11 +245,12 @@ class Evidence:
     def _landing(self) -> tuple[InitialState | Missing, tuple[TimedContact, ...] | Missing]:
         """Fall and first contacts: from the first seconds after the fall, or from all of a record."""
         from rotordrop.evidence.contacts import identify_first_contacts
-        from rotordrop.evidence.initial_state import fit_initial_state
+        from rotordrop.evidence.initial_state import initial_state_of
 
         def fall_in(part: Record) -> InitialState:
             gap, sensing = known(self.gap), known(self.sensing)
-            return fit_initial_state(part, self.model, self.release, self.speed, self.angle, gap, sensing)
+            off, turning = self.power_off, self.speed.initial
+            return initial_state_of(part, self.model, off, turning, self.angle, gap, sensing)
 
         def contacts_in(part: Record, fall: InitialState) -> tuple[TimedContact, ...]:
             return identify_first_contacts(
@@ -252,7 +262,7 @@ class Evidence:
                 float(np.mean(fall.noise)),
             )
 
-        until = max(self.release.value, float(self.record.time[0])) + AFTER_FALL
+        until = max(self.power_off.value, float(self.record.time[0])) + AFTER_FALL
         first = [self.record.window(-np.inf, until)] if self.record.time[-1] > until else []
         for part in (*first, self.record):
             fall = sought(partial(fall_in, part))
@@ -275,13 +285,6 @@ class Evidence:
         return self._landing[1]
 
     @cached_property
-    def power_off(self) -> DropInstant | PowerOff:
-        """Power-off in record time, refined by the fit of the initial state where there is one."""
-        if isinstance(self.fall, Missing) or not isinstance(self.release, DropInstant):
-            return self.release
-        return self.fall.refined(self.release)
-
-    @cached_property
     def reach(self) -> Array | Missing:
         """Distance from the bearing centre at which the first force acts [m], shape (B,); NaN without one.
 
@@ -292,7 +295,7 @@ class Evidence:
         from rotordrop.evidence.contacts import first_forces
 
         def found() -> Array:
-            instant, sensing, names = self.release, known(self.sensing), self.base.bearing_names
+            instant, sensing, names = self.power_off, known(self.sensing), self.base.bearing_names
             if not isinstance(instant, DropInstant):
                 raise IdentificationError(
                     f"{self.record.name} begins with the fall: where the first forces act shows only with "
@@ -383,7 +386,6 @@ class Evidence:
 _OF_ALL = (
     "base",
     "model",
-    "release",
     "power_off",
     "speed",
     "angle",
@@ -427,7 +429,7 @@ def read_evidence(
         When the rotor does not fall in the record, or it has no speed.
     """
     found = Evidence(record=record, machine=model.machine, tail=tail, name=name or record.name)
-    given: dict[str, Any] = {"base": model} if power_off is None else {"base": model, "release": power_off}
+    given: dict[str, Any] = {"base": model} if power_off is None else {"base": model, "power_off": power_off}
     return insisted(found.with_facts(**given))
 
 
@@ -444,7 +446,7 @@ def insisted(evidence: Evidence) -> Evidence:
             f"the record {evidence.name} has no rotor speed; expected one. Name its channel in a profile "
             '([speed] channel = "..."), or give it by hand ([speed] constant = "60 Hz").'
         )
-    for fact in (evidence.release, evidence.speed):
+    for fact in (evidence.power_off, evidence.speed):
         assert fact is not None
     return evidence
 

@@ -1,30 +1,29 @@
-"""Initial state of the drop from a fit over the whole fall: the better of the two starts.
+"""State of the rotor at power-off: that of the levitated rotor, with the forces that the fall says it had.
 
-From power-off to the first contact the rotor is a linear system: modes with gyroscopic coupling and damping,
-gravity, remanent forces that decay, unbalance that turns. Its motion is a matrix exponential. Its rigid and
-bending modes, the remanent lift of the magnets and the unbalance are found together, by maximum posterior
-probability, from the samples of the fall and from the orbit before it. The computed gravity sag of the
-levitated rotor, whose release rings at the first bending mode, comes in as prior; the bending part of the
-orbit follows from the forces that hold it.
+Until power-off the rotor keeps its levitated motion, and the fit of the fall (`rotordrop.evidence.fall`) says
+which forces held it there. Level and orbit before the drop give where it was and how fast; the unbalance
+follows from what the magnets do not hold of the orbit; the sag is that under the static lift. What the modes
+do beside that, little, comes from the samples of the fall.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import IdentificationError
-from rotordrop.evidence.events import DropInstant, PowerOff
-from rotordrop.evidence.fall import REMANENT_SHARE, REMANENT_TIME
+from rotordrop.evidence.contacts import local_polynomial
+from rotordrop.evidence.events import RINGING, RINGING_ERROR, DropInstant, PowerOff
+from rotordrop.evidence.fall import REMANENT_TIME
+from rotordrop.evidence.free_rotor import ComplexArray, Held, held_by, motion_of, response_at
 from rotordrop.evidence.levitated import LevitatedModel
 from rotordrop.evidence.rest import AirGap, SettledRest
 from rotordrop.evidence.sensing import Sensing
-from rotordrop.evidence.speed import SpeedFit
-from rotordrop.known import NINETY
 from rotordrop.machine import Machine
 from rotordrop.physics import columns as L
 from rotordrop.record.axes import along_sensors
@@ -32,13 +31,34 @@ from rotordrop.record.record import Record
 from rotordrop.record.recording import Array
 from rotordrop.record.speed import RotorAngle
 from rotordrop.rotor.parameters import DropModel
-from rotordrop.rotor.statics import levitated_sag
 from rotordrop.rotor.unknowns import smallest_gap
+
+MAGNET_FORCES = slice(L.REMANENT_X, L.REMANENT_Y + 1)
+
+BENDING_SIGMA = 1.1e-3
+"""Free bending of the rotor at power-off beside sag and orbit, over the air gap [1]; chosen, not measured."""
+
+END_WINDOW = 1e-3
+"""Time before the end of the fall at which place and velocity are read where nothing says what held the rotor
+[s]."""
+
+RUNOUT_SIGMA = 0.3e-6
+"""Runout of a sensor track at 1X [m], a quality of its surface whatever the size of the machine."""
+
+SIDEWAYS_REST_SIGMA = 5e-3
+"""How far beside the lowest point the resting rotor may lie, over the air gap [1]: a race turns on its balls
+before the shaft slides in it, and the starting friction of a ball bearing holds up this slope."""
+
+CLEARANCE_KEPT = 0.03
+"""The fall ends when the rotor has come this close to the air gap, over the gap [1]: a zero of the sensors
+that is off looks like another gap."""
+
+FEWEST_SAMPLES = 12
 
 
 @dataclass(frozen=True, kw_only=True)
 class FreeFall:
-    """Linear model of the falling rotor; m modes per plane, A magnets, U unbalance planes, n states.
+    """The free rotor of a drop with its forces; m modes per plane, A magnets, U unbalance planes, n states.
 
     The states are amplitudes in x, in y, their velocities in x, in y, the constant one (gravity), remanent
     forces (x, y) per magnetic bearing [N], and the turning unbalance (x, y) per plane [kg m].
@@ -52,18 +72,15 @@ class FreeFall:
     """Nodes of the unbalance planes, counted from 1."""
     planes: Array
     """Mode shapes at the unbalance planes, shape (U, m)."""
+    magnets: Array
+    """Mode shapes where the remanent forces act, shape (A, m)."""
     system: Array
     """System matrix without the decay of the remanent forces [1/s], shape (n, n)."""
 
     @property
     def n_modes(self) -> int:
         """Modes per plane."""
-        return len(self.model.parameters.eigenvalue)
-
-    @property
-    def n_magnets(self) -> int:
-        """Number of magnetic bearings."""
-        return len(self.model.parameters.magnet_shape)
+        return self.model.basis.size
 
     @property
     def size(self) -> int:
@@ -88,7 +105,7 @@ class FreeFall:
     @property
     def remanent(self) -> slice:
         """Remanent forces."""
-        return slice(self.one + 1, self.one + 1 + 2 * self.n_magnets)
+        return slice(self.one + 1, self.one + 1 + 2 * len(self.magnets))
 
     @property
     def unbalance(self) -> slice:
@@ -108,51 +125,30 @@ class FreeFall:
 
         return np.asarray(expm(self.matrix(decay) * span))
 
-    def observed(self, rows: Array, decay: float, first: float, step: float, count: int) -> Array:
-        """What sensors show of the initial state at evenly spaced times, shape (count, S, n).
+    def orbit(self) -> tuple[ComplexArray, ComplexArray]:
+        """Amplitudes of the modes on the orbits that turning forces hold.
 
-        Parameters
-        ----------
-        rows : ndarray, shape (S, 2m)
-            Displacement along each sensor per amplitude.
-        decay : float
-            Time constant of the remanent forces [s].
-        first, step : float
-            First time and distance of the times [s].
-        count : int
-            Number of times.
+        Returns
+        -------
+        forward : array, shape (m, U + A), complex
+            Those that turn with the spin, per unbalance [1/kg m] and per force at a magnet [1/N].
+        backward : array, shape (m, A), complex
+            Those that turn against it, per force at a magnet [1/N].
         """
-        one = self.transition(decay, step)
-        seen = np.zeros((rows.shape[0], self.size))
-        seen[:, self.displacement] = rows
-        seen = seen @ self.transition(decay, first)
-        out = np.empty((count, *seen.shape))
-        for k in range(count):
-            out[k] = seen
-            seen = seen @ one
-        return out
-
-    def synchronous(self) -> Array:
-        """Displacement and velocity amplitudes of the orbit that turning forces hold, shape (4m, 2U + 2A).
-
-        Columns come in pairs, a force along x and one along y at the instant looked at: first per unbalance
-        plane [per kg m], then per magnetic bearing [per N].
-        """
-        p, m, w = self.model.parameters, self.n_modes, self.speed
-        dynamic = np.diag(p.eigenvalue) - w * w * np.eye(m) + 1j * w * np.diag(p.damping) + w * w * p.polar
-        forces = np.column_stack([w * w * self.planes.T, p.magnet_shape.T])
-        if forces.shape[1] == 0 or w == 0.0:
-            return np.zeros((4 * m, 2 * forces.shape[1]))
-        response = np.linalg.solve(dynamic, forces.astype(np.complex128))
-        columns = []
-        for q in response.T:
-            for turn in (1.0, 1j):
-                c = q * turn
-                columns.append(np.concatenate([c.real, c.imag, (1j * w * c).real, (1j * w * c).imag]))
-        return np.column_stack(columns)
+        w, basis = self.speed, self.model.basis
+        free = motion_of(basis, w)
+        stiff, loss = -free[basis.size :, : basis.size], -free[basis.size :, basis.size :]
+        still = -w * w * np.eye(basis.size) + stiff
+        forward = np.column_stack([w * w * self.planes.T, self.magnets.T])
+        return (
+            np.linalg.solve(still + 1j * w * loss, forward),
+            np.linalg.solve(still - 1j * w * loss, self.magnets.T.astype(np.complex128)),
+        )
 
 
-def build_free_fall(model: DropModel, speed: float, unbalance_nodes: tuple[int, ...]) -> FreeFall:
+def build_free_fall(
+    model: DropModel, speed: float, unbalance_nodes: tuple[int, ...], magnets: Array | None = None
+) -> FreeFall:
     """Linear model of a falling rotor from the model of the drop.
 
     Parameters
@@ -163,35 +159,27 @@ def build_free_fall(model: DropModel, speed: float, unbalance_nodes: tuple[int, 
         Rotor speed [rad/s].
     unbalance_nodes : tuple of int
         Nodes at which unbalance may sit, counted from 1.
+    magnets : ndarray, shape (A, m), optional
+        Mode shapes where remanent forces act; those of the magnetic bearings by default.
     """
-    p = model.parameters
-    m, n_a, n_u = len(p.eigenvalue), len(p.magnet_shape), len(unbalance_nodes)
+    magnets = model.parameters.magnet_shape if magnets is None else magnets
+    m, n_a, n_u = model.basis.size, len(magnets), len(unbalance_nodes)
     planes = np.array([model.basis.node_row(node) for node in unbalance_nodes]).reshape(n_u, m)
-    system = np.zeros((4 * m + 1 + 2 * n_a + 2 * n_u,) * 2)
-    x, y, vx, vy = (slice(k * m, (k + 1) * m) for k in range(4))
-    system[x, vx] = system[y, vy] = np.eye(m)
-    for place, rate in ((x, vx), (y, vy)):
-        system[rate, place] = -np.diag(p.eigenvalue)
-        system[rate, rate] = -np.diag(p.damping)
-    system[vx, vy] = -speed * p.polar
-    system[vy, vx] = speed * p.polar
-    system[vy, 4 * m] = p.gravity
-    for a in range(n_a):
-        system[vx, 4 * m + 1 + 2 * a] = p.magnet_shape[a]
-        system[vy, 4 * m + 2 + 2 * a] = p.magnet_shape[a]
-    for u in range(n_u):
-        i = 4 * m + 1 + 2 * n_a + 2 * u
-        system[vx, i] = system[vy, i + 1] = speed**2 * planes[u]
-        system[i, i + 1], system[i + 1, i] = -speed, speed
-    return FreeFall(model=model, speed=speed, nodes=unbalance_nodes, planes=planes, system=system)
-
-
-def sagging_amplitudes(model: DropModel) -> Array:
-    """Amplitudes in y, shape (m,), of the levitated rotor's gravity sag; zero without known AMB planes."""
-    if len({amb.node for amb in model.machine.ambs}) < 2:
-        return np.zeros(len(model.parameters.eigenvalue))
-    shape = levitated_sag(model.fe, model.machine)
-    return np.asarray(model.basis.shapes.T @ (model.fe.mass @ shape))
+    inside = np.zeros((2 * m + n_a + n_u,) * 2, dtype=np.complex128)
+    inside[: 2 * m, : 2 * m] = motion_of(model.basis, speed)
+    inside[m : 2 * m, 2 * m :] = np.column_stack([magnets.T, speed**2 * planes.T])
+    turning = np.arange(2 * m + n_a, len(inside))
+    inside[turning, turning] = 1j * speed
+    # real and imaginary parts by themselves, in the order of the states
+    whole = np.block([[inside.real, -inside.imag], [inside.imag, inside.real]])
+    x, y = np.arange(len(inside)), len(inside) + np.arange(len(inside))
+    forces = np.column_stack([x, y])[2 * m :].ravel()
+    order = np.concatenate([x[:m], y[:m], x[m : 2 * m], y[m : 2 * m], forces])
+    system = np.insert(np.insert(whole[np.ix_(order, order)], 4 * m, 0.0, axis=0), 4 * m, 0.0, axis=1)
+    system[3 * m : 4 * m, 4 * m] = model.parameters.gravity
+    return FreeFall(
+        model=model, speed=speed, nodes=unbalance_nodes, planes=planes, magnets=magnets, system=system
+    )
 
 
 def kernel_state(fall: FreeFall, state: Array, angle: float) -> tuple[Array, Array, Array]:
@@ -228,53 +216,16 @@ def kernel_state(fall: FreeFall, state: Array, angle: float) -> tuple[Array, Arr
     return whole, state[fall.remanent].reshape(-1, 2).copy(), back.T @ fall.planes
 
 
-MAGNET_FORCES = slice(L.REMANENT_X, L.REMANENT_Y + 1)
-
-
-BENDING_MODES = 3
-BENDING_SIGMA = 1.1e-3
-"""Free bending of the rotor at power-off beside sag and orbit, at the sensors, over the air gap [1]."""
-
-HIGHER_SIGMA = 7e-5
-"""The same for modes beyond the third bending mode [1]."""
-
-POSITION_SIGMA = 0.36
-"""How far off the centre a rotor levitates, over the air gap [1]: a magnet need not hold it in the middle."""
-
-VELOCITY_SIGMA = 0.7
-"""Velocity at power-off over that of a free fall through the air gap [1]."""
-
-RUNOUT_SIGMA = 0.3e-6
-"""Runout of a sensor track at 1X [m], a quality of its surface whatever the size of the machine."""
-
-SIDEWAYS_SHARE = 0.05
-"""Sideways remanent force over static lift, standard deviation [1]."""
-
-TURNING_FORCE_SIGMA = 0.5
-"""Synchronous force of a magnetic bearing over the weight of the rotor [1]."""
-
-ORBIT_SIGMA = 0.15e-6
-"""Error of the orbit before the drop, carried on to power-off [m]."""
-
-SIDEWAYS_REST_SIGMA = 5e-3
-"""How far beside the lowest point the resting rotor may lie, over the air gap [1]: a race turns on its balls
-before the shaft slides in it, and the starting friction of a ball bearing holds up this slope."""
-
-ITERATIONS = 8
-
-
 @dataclass(frozen=True, kw_only=True)
 class Unknowns:
     """Where the unknowns of the fall are in one vector; S sensors, B bearings.
 
-    Order: states of the fall at power-off, gain errors, runout (cosine, sine) per sensor, logarithm of the
-    remanent time constant, power-off relative to the first guess [ms], synchronous forces of the magnetic
-    bearings, error of the rest position (x, y) per bearing.
+    Order: states of the fall at power-off, gain errors, logarithm of the remanent time constant, error of the
+    rest position (x, y) per bearing.
     """
 
     n_states: int
     n_sensors: int
-    n_magnets: int
     n_bearings: int
 
     @property
@@ -285,255 +236,22 @@ class Unknowns:
     @property
     def gain(self) -> slice:
         """Relative gain errors of the sensors."""
-        return slice(self.n_states, self.n_states + self.n_sensors)
-
-    @property
-    def runout(self) -> slice:
-        """Runout at 1X: cosine of every sensor, then sine [m]."""
-        return slice(self.n_states + self.n_sensors, self.decay)
+        return slice(self.n_states, self.decay)
 
     @property
     def decay(self) -> int:
         """Logarithm of the remanent time constant."""
-        return self.n_states + 3 * self.n_sensors
-
-    @property
-    def shift(self) -> int:
-        """Power-off relative to the first guess [ms]."""
-        return self.decay + 1
-
-    @property
-    def turning(self) -> slice:
-        """Synchronous forces of the magnetic bearings (x, y) at power-off [N]."""
-        return slice(self.shift + 1, self.shift + 1 + 2 * self.n_magnets)
+        return self.n_states + self.n_sensors
 
     @property
     def rest(self) -> slice:
         """Error of the rest position (x, y) per bearing [m]."""
-        return slice(self.size - 2 * self.n_bearings, self.size)
+        return slice(self.decay + 1, self.size)
 
     @property
     def size(self) -> int:
         """Number of unknowns."""
-        return self.shift + 1 + 2 * self.n_magnets + 2 * self.n_bearings
-
-
-def unbalance_nodes(machine: Machine) -> tuple[int, ...]:
-    """Nodes at which unbalance is looked for: those of the machine file, else the touchdown bearings."""
-    named = tuple(dict.fromkeys(unbalance.node for unbalance in machine.unbalances))
-    return named or tuple(bearing.node for bearing in machine.touchdown_bearings)
-
-
-def _unbalance_sigma(machine: Machine, nodes: tuple[int, ...], mass: float) -> Array:
-    if machine.unbalances:
-        sums = [sum(float(u.amount) for u in machine.unbalances if u.node == node) for node in nodes]
-        return np.asarray(np.maximum(np.array(sums), 1e-7))
-    usual = 2.5e-3 * mass / float(machine.speed.nominal)
-    return np.full(len(nodes), usual / np.sqrt(len(nodes)))
-
-
-@dataclass(frozen=True, kw_only=True)
-class FallReadings:
-    """What is compared: deviations from rest, and the orbit before the drop, along the sensors."""
-
-    time: Array
-    deviation: Array
-    noise: Array
-    orbit: Array
-    orbit_velocity: Array
-    orbit_acceleration: Array
-
-
-class FallFit:
-    """Gauss–Newton with priors over the unknowns of the fall."""
-
-    def __init__(
-        self,
-        fall: FreeFall,
-        sensing: Sensing,
-        readings: FallReadings,
-        settled: Array,
-        model: DropModel,
-        instant_error: float,
-    ) -> None:
-        self.fall, self.sensing, self.readings, self.settled = fall, sensing, readings, settled
-        self.unknowns = Unknowns(
-            n_states=fall.size,
-            n_sensors=len(sensing.names),
-            n_magnets=fall.n_magnets,
-            n_bearings=sensing.to_bearings.shape[0],
-        )
-        self.prior_mean, sigma = self._prior(model, instant_error)
-        self.prior_root = self._prior_root(sigma)
-        m = fall.n_modes
-        self.velocity_rows = np.zeros((len(sensing.names), fall.size))
-        self.velocity_rows[:, fall.velocity] = sensing.rows
-        self.place_rows = np.zeros_like(self.velocity_rows)
-        self.place_rows[:, : 2 * m] = sensing.rows
-
-    def _prior(self, model: DropModel, instant_error: float) -> tuple[Array, Array]:
-        u, fall, m = self.unknowns, self.fall, self.fall.n_modes
-        mean, sigma = np.zeros(u.size), np.ones(u.size)
-        sag = sagging_amplitudes(model)
-        mean[m + 2 : 2 * m] = sag[2:]
-        mean[fall.one], sigma[fall.one] = 1.0, 1e-9
-        gap = smallest_gap(model.machine)
-        position, velocity = _modal_sigmas(model, self.sensing.rows, fall.speed, gap)
-        sigma[fall.displacement] = np.tile(position, 2)
-        sigma[fall.velocity] = np.tile(velocity, 2)
-        weight = float(np.sum(model.load_shares))
-        lift = weight / max(fall.n_magnets, 1)
-        mean[fall.remanent] = np.tile([0.0, REMANENT_SHARE[0] * lift], fall.n_magnets)
-        sigma[fall.remanent] = np.tile([SIDEWAYS_SHARE * lift, REMANENT_SHARE[1] * lift], fall.n_magnets)
-        nodes = unbalance_nodes(model.machine)
-        sigma[fall.unbalance] = np.repeat(_unbalance_sigma(model.machine, nodes, model.fe.total_mass), 2)
-        sigma[u.gain] = self.sensing.gain_sigma
-        sigma[u.runout] = RUNOUT_SIGMA
-        mean[u.decay], sigma[u.decay] = np.log(REMANENT_TIME[0]), REMANENT_TIME[1]
-        sigma[u.shift] = 1e3 * max(instant_error, 1e-6)
-        sigma[u.turning] = TURNING_FORCE_SIGMA * weight
-        zero = np.sqrt(np.sum((self.sensing.to_bearings[:, 1, :] * self.sensing.offset_sigma) ** 2, axis=1))
-        sigma[u.rest] = np.column_stack([np.full(len(zero), SIDEWAYS_REST_SIGMA * gap), zero]).ravel()
-        return mean, sigma
-
-    def _prior_root(self, sigma: Array) -> Array:
-        """Rows of the prior: states beside what unbalance and magnets hold on the orbit."""
-        u, fall = self.unknowns, self.fall
-        # What unbalance and turning magnet forces hold on the orbit is no free bending: the prior is on the
-        # difference, so a flexible rotor that circles far out at power-off pays nothing for it.
-        root = np.diag(1.0 / sigma)
-        states = slice(0, 4 * fall.n_modes)
-        orbit = fall.synchronous() / sigma[states, None]
-        split = fall.unbalance.stop - fall.unbalance.start
-        root[states, fall.unbalance] -= orbit[:, :split]
-        root[states, u.turning] -= orbit[:, split:]
-        return root
-
-    def solve(self) -> tuple[Array, Array, float]:
-        """Estimate, covariance and mean square of the weighted residual of the samples."""
-        current = self.prior_mean.copy()
-        count = self.readings.deviation.size
-        for _ in range(ITERATIONS):
-            residual, jacobian = self.linearised(current)
-            scale = 1.0 / np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
-            step = np.linalg.lstsq(jacobian * scale, residual, rcond=None)[0] * scale
-            step[self.unknowns.decay] = np.clip(step[self.unknowns.decay], -0.3, 0.3)
-            step[self.unknowns.shift] = np.clip(step[self.unknowns.shift], -0.05, 0.05)
-            current = current + step
-            sigma = 1.0 / np.maximum(np.diag(self.prior_root), 1e-300)
-            if float(np.max(np.abs(step) / sigma)) < 1e-6:
-                break
-        residual, jacobian = self.linearised(current)
-        scale = 1.0 / np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
-        scaled = jacobian * scale
-        covariance = np.linalg.inv(scaled.T @ scaled) * np.outer(scale, scale)
-        misfit = float(np.mean(residual[:count] ** 2))
-        return current, covariance, misfit
-
-    def linearised(self, current: Array) -> tuple[Array, Array]:
-        """Weighted residual (samples, orbit, prior) and the Jacobian of the prediction."""
-        samples = self._samples(current)
-        orbit = self._orbit(current)
-        prior = self.prior_root @ (self.prior_mean - current)
-        return (
-            np.concatenate([samples[0], orbit[0], prior]),
-            np.vstack([samples[1], orbit[1], self.prior_root]),
-        )
-
-    def _samples(self, current: Array) -> tuple[Array, Array]:
-        u, e, fall = self.unknowns, self.readings, self.fall
-        states, decay = current[u.states], float(np.exp(current[u.decay]))
-        since = e.time - 1e-3 * current[u.shift]
-        step, count = float(e.time[1] - e.time[0]), len(e.time)
-        seen = fall.observed(self.sensing.rows, decay, float(since[0]), step, count)
-        place = seen @ states
-        later = fall.observed(self.sensing.rows, 1.01 * decay, float(since[0]), step, count) @ states
-        moved = np.gradient(place, step, axis=0)
-        wave = np.exp(1j * fall.speed * since)
-        gain, runout = current[u.gain], current[u.runout].reshape(2, -1)
-        predicted = (1.0 + gain) * (place - self._settled(current))
-        predicted += wave.real[:, None] * runout[0] + wave.imag[:, None] * runout[1]
-        jacobian = np.zeros((count, u.n_sensors, u.size))
-        jacobian[..., u.states] = (1.0 + gain)[None, :, None] * seen
-        self._sensor_columns(jacobian, current, place, wave)
-        jacobian[..., u.decay] = (1.0 + gain) * (later - place) / np.log(1.01)
-        jacobian[..., u.shift] = -1e-3 * (1.0 + gain) * moved
-        weight = 1.0 / e.noise
-        residual = (e.deviation - predicted) * weight
-        jacobian *= weight[None, :, None]
-        return residual.ravel(), jacobian.reshape(-1, u.size)
-
-    def _orbit(self, current: Array) -> tuple[Array, Array]:
-        u, e = self.unknowns, self.readings
-        states, gain, speed = current[u.states], current[u.gain], self.fall.speed
-        runout = current[u.runout].reshape(2, -1)
-        place, rate = self.place_rows @ states, self.velocity_rows @ states
-        delay = 1e-3 * current[u.shift]
-        jacobian = np.zeros((2, u.n_sensors, u.size))
-        jacobian[0, :, u.states] = (1.0 + gain)[:, None] * self.place_rows
-        jacobian[1, :, u.states] = (1.0 + gain)[:, None] * self.velocity_rows
-        self._sensor_columns(jacobian[:1], current, place[None], np.ones(1, dtype=np.complex128))
-        sensors = np.arange(u.n_sensors)
-        jacobian[1, sensors, u.gain.start + sensors] = rate
-        jacobian[1, sensors, u.runout.start + u.n_sensors + sensors] = speed
-        # A later power-off carries the measured orbit on; the unknown state is the one at power-off.
-        jacobian[0, :, u.shift] = -1e-3 * e.orbit_velocity
-        jacobian[1, :, u.shift] = -1e-3 * e.orbit_acceleration
-        first = (
-            e.orbit + delay * e.orbit_velocity - (1.0 + gain) * (place - self._settled(current)) - runout[0]
-        )
-        second = e.orbit_velocity + delay * e.orbit_acceleration - (1.0 + gain) * rate - speed * runout[1]
-        sigma = np.array([ORBIT_SIGMA, max(ORBIT_SIGMA * speed, 1e-4)])
-        residual = np.stack([first, second]) / sigma[:, None]
-        return residual.ravel(), (jacobian / sigma[:, None, None]).reshape(-1, u.size)
-
-    def _sensor_columns(
-        self, jacobian: Array, current: Array, place: Array, wave: NDArray[np.complex128]
-    ) -> None:
-        """Fill the columns of gain, runout and rest position of a Jacobian (T, S, n)."""
-        u, sensors = self.unknowns, np.arange(self.unknowns.n_sensors)
-        gain, settled = current[u.gain], self._settled(current)
-        for k in sensors:
-            jacobian[:, k, u.gain.start + k] = place[:, k] - settled[k]
-            jacobian[:, k, u.runout.start + k] = wave.real
-            jacobian[:, k, u.runout.start + u.n_sensors + k] = wave.imag
-        at_rest = self.sensing.from_bearings.reshape(u.n_sensors, -1)
-        jacobian[..., u.rest] = -(1.0 + gain)[:, None] * at_rest
-
-    def _settled(self, current: Array) -> Array:
-        """Displacement along the sensors at rest [m], with the error of the rest position."""
-        at_rest = self.sensing.from_bearings.reshape(self.unknowns.n_sensors, -1)
-        return np.asarray(self.settled + at_rest @ current[self.unknowns.rest])
-
-
-def _modal_sigmas(model: DropModel, rows: Array, speed: float, gap: float) -> tuple[Array, Array]:
-    """Prior standard deviations of amplitudes and their velocities, shape (m,), beside sag and orbit.
-
-    A mode is bounded by what it may move at the sensors and the bearings, wherever it moves most: a mode that
-    hardly shows there could otherwise take up anything. Without the AMB planes the sag is not known, and the
-    bending has room for it.
-    """
-    eigenvalues = model.parameters.eigenvalue
-    m = len(eigenvalues)
-    seen = np.vstack([np.hypot(rows[:, :m], rows[:, m:]), np.abs(model.parameters.bearing_shape)])
-    reach = np.max(seen, axis=0)
-    reach = np.maximum(reach, 0.05 * reach.max())
-    natural = np.sqrt(np.maximum(eigenvalues, 0.0))
-    free = 1.0 if len({amb.node for amb in model.machine.ambs}) >= 2 else 30.0
-    low = np.arange(m) < 2 + BENDING_MODES
-    position = np.where(low, free * BENDING_SIGMA, HIGHER_SIGMA) * gap / reach
-    velocity = position * np.maximum(abs(speed), np.where(low, 0.3, 0.05) * natural)
-    weight = np.sqrt(model.fe.total_mass)
-    falling = math.sqrt(2.0 * gap * float(model.machine.gravity))
-    position[:2], velocity[:2] = POSITION_SIGMA * gap * weight, VELOCITY_SIGMA * falling * weight
-    return position, velocity
-
-
-CLEARANCE_KEPT = 0.03
-"""The fall ends when the rotor has come this close to the air gap, over the gap [1]: a zero of the sensors
-that is off looks like another gap."""
-
-FEWEST_SAMPLES = 12
+        return self.decay + 1 + 2 * self.n_bearings
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -560,16 +278,13 @@ class InitialState:
     settled: Array
     """Displacement along the sensors at rest, from the settled radius [m], shape (S,)."""
     drop_instant: float
-    drop_instant_error: float
-    """Power-off in record time [s] and its standard error."""
+    """Power-off in record time [s]."""
     end: float
     """End of the free fall, from power-off [s]."""
     noise: Array
     """Noise of the displacements along the sensors [m], shape (S,)."""
     misfit: float
-    """Mean square of the residual over the noise [1]; 1 is a perfect model."""
-    samples: int
-    """Samples of the fall that were used."""
+    """Mean square of the residual of the fall over the noise [1]; 1 is a perfect model."""
     notes: tuple[str, ...] = ()
     """What to know about this state."""
 
@@ -604,19 +319,13 @@ class InitialState:
         return self.fall.transition(decay, time) @ values[self.unknowns.states]
 
     def deviation_of(self, record: Record) -> Array:
-        """Displacements along the sensors from rest, hum and 2X runout taken off [m], shape (N, S)."""
-        return deviations(record, self.rest_along, self.levitated, self.angle)
+        """Displacements along the sensors from rest, hum and 2X runout taken off [m], shape (N, S).
 
-    def refined(self, instant: DropInstant) -> DropInstant:
-        """Power-off as this fit leaves it."""
-        error = self.drop_instant_error
-        return replace(
-            instant,
-            value=self.drop_instant,
-            standard_error=error,
-            interval_90=(self.drop_instant - NINETY * error, self.drop_instant + NINETY * error),
-            method=f"{instant.method}; refined by the fit of the initial state",
-        )
+        A levitated rotor on its orbit shows no 2X of its own: what is there is runout and turns on with the
+        shaft.
+        """
+        disturbance = self.levitated.disturbance(record.time, self.angle) * record.gains
+        return record.along - disturbance - self.rest_along
 
     def square_root(self) -> Array:
         """Matrix L with L Lᵀ the covariance, shape (n, n); a draw is ``mean + L @ standard_normal``."""
@@ -663,16 +372,16 @@ def end_of_fall(time: Array, place: Array, gaps: Array) -> float:
     return float(time[int(np.argmax(near)) - 1])
 
 
-def fit_initial_state(
+def initial_state_of(
     record: Record,
     model: DropModel,
     release: DropInstant | PowerOff,
-    speed: SpeedFit,
+    speed: float,
     angle: RotorAngle,
     gap: AirGap,
     sensing: Sensing,
 ) -> InitialState:
-    """Initial state by a fit over the fall, with covariance.
+    """State at power-off with its covariance, by the levitated motion and the fit of the fall.
 
     Parameters
     ----------
@@ -681,9 +390,11 @@ def fit_initial_state(
     model : DropModel
         The rotor.
     release : DropInstant or PowerOff
-        Power-off with the levitated motion before it.
-    speed, angle : SpeedFit, RotorAngle
-        Speed at power-off, and the angle over the record.
+        Power-off with the levitated motion before it and the fall after it.
+    speed : float
+        Speed at power-off [rad/s].
+    angle : RotorAngle
+        Angle over the record.
     gap : AirGap
         Air gaps, to see where the fall ends, and the rest position, from which displacements count, so that
         zero errors of the sensors drop out.
@@ -706,40 +417,10 @@ def fit_initial_state(
             f"{record.name} begins with the fall; expected the levitated rotor before it. Record with "
             "pre-trigger."
         )
-    levitated, rest, time = release.levitated, gap.rest, record.time - release.value
+    rest, time = gap.rest, record.time - release.value
     settled = settled_along(rest, sensing)
     end = end_of_fall(time, sensing.at_bearings(record.along - rest.along + settled), gap.value)
     inside = (time > 0.0) & (time <= end)
-    _check_samples(record, inside, end)
-    # Deviations from rest, not readings, are compared: zeros of the sensors are in both and drop out, and
-    # what is left of them is an error of the rest position, which is one of the unknowns.
-    fall = build_free_fall(model, speed.initial, unbalance_nodes(model.machine))
-    readings = _fall_readings(record, release, angle, rest, inside)
-    problem = FallFit(fall, sensing, readings, settled, model, release.standard_error)
-    mean, covariance, misfit = problem.solve()
-    shift = problem.unknowns.shift
-    return InitialState(
-        fall=fall,
-        sensing=sensing,
-        sensors=record.sensors,
-        rest_along=rest.along,
-        levitated=levitated,
-        angle=angle,
-        unknowns=problem.unknowns,
-        mean=mean,
-        covariance=covariance * max(misfit, 1.0),
-        settled=settled,
-        drop_instant=release.value + 1e-3 * float(mean[shift]),
-        drop_instant_error=float(1e-3 * np.sqrt(covariance[shift, shift])),
-        end=end - 1e-3 * float(mean[shift]),
-        noise=readings.noise,
-        misfit=misfit,
-        samples=int(inside.sum()),
-        notes=_notes(misfit),
-    )
-
-
-def _check_samples(record: Record, inside: NDArray[np.bool_], end: float) -> None:
     if int(inside.sum()) < FEWEST_SAMPLES:
         raise IdentificationError(
             f"{record.name}: {int(inside.sum())} samples between power-off and the first contact at "
@@ -748,6 +429,32 @@ def _check_samples(record: Record, inside: NDArray[np.bool_], end: float) -> Non
         )
     if not np.isfinite(record.signals[inside]).all():
         raise IdentificationError(f"{record.name}: readings are missing between power-off and first contact")
+    held = held_by(model.machine, record.whole.planes, model.fe)
+    if held.by_magnets:
+        levitated = _Levitated(record, release, model, speed, held, rest, sensing)
+        found, mean, covariance = levitated.state()
+    else:
+        found, mean, covariance = _by_end_of_fall(record, time, end, model, speed, rest, sensing)
+    covariance[found.one, found.one] = 1e-18  # what has no error at all has no direction to be drawn in
+    return InitialState(
+        fall=found,
+        sensing=sensing,
+        sensors=record.sensors,
+        rest_along=rest.along,
+        levitated=release.levitated,
+        angle=angle,
+        unknowns=Unknowns(
+            n_states=found.size, n_sensors=len(record.sensors), n_bearings=len(sensing.to_bearings)
+        ),
+        mean=mean,
+        covariance=covariance,
+        settled=settled,
+        drop_instant=release.value,
+        end=end,
+        noise=np.maximum(release.levitated.noise * record.gains, 1e-9),
+        misfit=release.fall.misfit,
+        notes=_notes(release.fall.misfit),
+    )
 
 
 def _notes(misfit: float) -> tuple[str, ...]:
@@ -759,27 +466,228 @@ def _notes(misfit: float) -> tuple[str, ...]:
     )
 
 
-def deviations(record: Record, rest: Array, levitated: LevitatedModel, angle: RotorAngle) -> Array:
-    """Displacements along the sensors from rest (S,), hum and 2X runout taken off [m], shape (N, S).
+def unbalance_nodes(machine: Machine) -> tuple[int, ...]:
+    """Nodes at which unbalance is looked for: those of the machine file, else the touchdown bearings."""
+    named = tuple(dict.fromkeys(unbalance.node for unbalance in machine.unbalances))
+    return named or tuple(bearing.node for bearing in machine.touchdown_bearings)
 
-    A levitated rotor on its orbit shows no 2X of its own: what is there is runout and turns on with the
-    shaft.
+
+def _unbalance_sigma(machine: Machine, nodes: tuple[int, ...], mass: float) -> Array:
+    if machine.unbalances:
+        sums = [sum(float(u.amount) for u in machine.unbalances if u.node == node) for node in nodes]
+        return np.asarray(np.maximum(np.array(sums), 1e-7))
+    usual = 2.5e-3 * mass / float(machine.speed.nominal)
+    return np.full(len(nodes), usual / np.sqrt(len(nodes)))
+
+
+class _Levitated:
+    """The levitated rotor at power-off as a function of what is not known of it.
+
+    Unknown are, in this order: what the fit of the fall sought, except gains; the gain of every sensor; free
+    bending (displacement and velocity, each real then imaginary); unbalances (x, y); rest position (x, y).
     """
-    return record.along - levitated.disturbance(record.time, angle) * record.gains - rest
+
+    def __init__(
+        self,
+        record: Record,
+        release: DropInstant,
+        model: DropModel,
+        speed: float,
+        held: Held,
+        rest: SettledRest,
+        sensing: Sensing,
+    ) -> None:
+        self.release, self.sensing, self.model = release, sensing, model
+        nodes = unbalance_nodes(model.machine)
+        magnets = np.array([model.basis.node_row(node) for node in held.nodes])
+        self.found = build_free_fall(model, speed, nodes, magnets)
+        self.sag = model.basis.shapes.T @ (model.fe.mass @ held.sag)
+        self.settled = settled_along(rest, sensing)
+        self.level = along_sensors(release.levitated.mean, record.sensors) - rest.along
+        turned = np.exp(2j * np.pi * release.levitated.tones[0] * release.value)
+        self.tone = release.levitated.amplitudes[0] * turned * record.gains
+        columns = [record.sensors.index(sensor) for sensor in record.whole.sensors]
+        self.forward, self.backward = self.found.orbit()
+        m, rows = model.basis.size, sensing.rows
+        self.seen = rows[:, :m] - 1j * rows[:, m:]
+        self.rigid = np.linalg.pinv(np.column_stack([self.seen[:, :2].real, -self.seen[:, :2].imag]))
+        self._count(len(magnets), len(sensing.names), len(nodes), release.fall.rotor.basis.size - 2)
+        shapes = release.fall.rotor.basis.shapes[:, 2:]
+        self.bending = model.basis.shapes.T @ (model.fe.mass @ shapes)
+        self.prior = self._fitted(columns, held)
+
+    def _count(self, magnets: int, sensors: int, unbalances: int, bending: int) -> None:
+        """Places of the unknowns."""
+        bearings = self.sensing.to_bearings.shape[0]
+        sizes = (2 * magnets, 2 * magnets, 2 * magnets, 1, 1, sensors, 4 * bending, 2 * unbalances)
+        edges = np.cumsum((0, *sizes, 2 * bearings)).tolist()
+        (
+            self.remanent,
+            self.with_spin,
+            self.against,
+            self.instant,
+            self.decay,
+            self.gain,
+            self.bend,
+            self.unbalance,
+            self.rest,
+        ) = (slice(a, b) for a, b in pairwise(edges))
+        self.size = edges[-1]
+
+    def _fitted(self, columns: list[int], held: Held) -> tuple[Array, Array]:
+        """Mean and covariance by the fit of the fall, with bending that its samples show, and by priors."""
+        fall, machine, sensing = self.release.fall, self.model.machine, self.sensing
+        gap, problem = smallest_gap(machine), self.release.fall.problem
+        residual, jacobian = fall.linearised
+        forces, count = 6 * len(fall.rotor.lift), len(columns)
+        gains = [self.gain.start + column for column in columns]
+        places = [*range(forces), *gains, self.instant.start, self.decay.start]
+        mean, sigma = np.zeros(self.size), np.zeros(self.size)
+        mean[places] = [*fall.unknown, 0.0, math.log(fall.remanent_time)]
+        sigma[self.gain] = sensing.gain_sigma
+        sigma[self.bend] = self._bending_sigma(gap)
+        amounts = _unbalance_sigma(machine, self.found.nodes, self.model.fe.total_mass)
+        sigma[self.unbalance] = np.repeat(amounts, 2)
+        sigma[self.rest] = _rest_sigma(self.model, sensing)
+        bend = range(self.bend.start, self.bend.stop)
+        # the samples of the fall once more, to first order, with the bending beside what was sought
+        free = problem.seen(response_at(problem.responses.free, problem.time - fall.instant))
+        parts = np.split(free, [2, free.shape[-1] // 2, free.shape[-1] // 2 + 2], axis=-1)
+        added = np.concatenate([c for part in parts[1::2] for c in (part.real, -part.imag)], axis=-1)
+        added = (added / problem.noise[None, :, None]).reshape(-1, added.shape[-1])
+        whole = np.zeros((len(jacobian), len(places) + len(bend)))
+        whole[:, : len(places)], whole[: len(added), len(places) :] = jacobian, -added
+        rows = np.vstack([whole, np.eye(whole.shape[1])[len(places) :] / sigma[bend][:, None]])
+        scale = 1.0 / np.linalg.norm(rows, axis=0)
+        rows = rows * scale
+        spread = np.linalg.inv(rows.T @ rows) * np.outer(scale, scale)
+        sought = [*places, *bend]
+        covariance = np.diag(sigma**2)
+        covariance[np.ix_(sought, sought)] = spread * max(fall.misfit, 1.0)
+        mean[sought] -= spread @ (whole.T @ residual)
+        assert len(fall.unknown) == forces + count
+        # a remanent force is sought as a share of the lift, x before y, and wanted in newtons, (x, y) each
+        lift = fall.rotor.lift
+        turn = np.eye(self.size)
+        share, newtons = np.arange(2 * len(lift)), np.arange(2 * len(lift)).reshape(-1, 2)
+        turn[self.remanent, self.remanent] = 0.0
+        for axis in range(2):
+            turn[newtons[:, axis], share[axis * len(lift) :][: len(lift)]] = lift
+        return turn @ mean, turn @ covariance @ turn.T
+
+    def _bending_sigma(self, gap: float) -> Array:
+        """Prior deviations of the free bending, in the order of the unknowns: bounded by what it moves."""
+        basis = self.release.fall.rotor.basis
+        nodes = [b.node for b in self.model.machine.touchdown_bearings]
+        rows = [basis.node_row(node) for node in nodes] + list(self.release.fall.rotor.plane_rows)
+        reach = np.max(np.abs(np.array(rows)), axis=0)
+        reach = np.maximum(reach, 0.05 * reach.max())[2:]
+        place = BENDING_SIGMA * gap / reach
+        rate = place * np.maximum(abs(self.found.speed), 0.3 * np.sqrt(basis.eigenvalues[2:]))
+        return np.concatenate([place, place, rate, rate])
+
+    def _complex(self, values: Array) -> ComplexArray:
+        """Complex numbers of real parts followed by imaginary ones."""
+        return np.asarray(values[: len(values) // 2] + 1j * values[len(values) // 2 :])
+
+    def _orbits(self, x: Array) -> tuple[ComplexArray, ComplexArray]:
+        """Modal amplitudes that turn with the spin and against it; a force that went held them before."""
+        pairs = x[self.unbalance].reshape(-1, 2)
+        turning = np.concatenate([pairs[:, 0] + 1j * pairs[:, 1], -self._complex(x[self.with_spin])])
+        return self.forward @ turning, -self.backward @ self._complex(x[self.against])
+
+    def _tone_left(self, x: Array) -> Array:
+        """1X before the drop less that of the orbits, along the sensors, (real, imaginary) [m], (2 S,)."""
+        forward, backward = self._orbits(x)
+        later = np.exp(1j * self.found.speed * 1e-3 * x[self.instant])
+        left = self.tone * later - (self.seen @ forward + np.conj(self.seen @ backward))
+        return np.concatenate([left.real, left.imag])
+
+    def _outcome(self, x: Array) -> Array:
+        """State at the first guess of power-off, and gains, decay and rest: what replays the drop."""
+        forward, backward = self._orbits(x)
+        bend = x[self.bend].reshape(2, -1)
+        shape = 1j * self.sag + self.bending @ self._complex(bend[0])
+        at_rest = self.sensing.from_bearings.reshape(len(self.level), -1) @ x[self.rest]
+        place = self.settled + at_rest + self.level / (1.0 + x[self.gain])
+        shape[:2] += self._complex(self.rigid @ (place - (self.seen @ shape).real))
+        shape = shape + forward + backward
+        rate = 1j * self.found.speed * (forward - backward) + self.bending @ self._complex(bend[1])
+        moved = [shape.real, shape.imag, rate.real, rate.imag, [1.0]]
+        state = np.concatenate([*moved, x[self.remanent], x[self.unbalance]])
+        decay = float(np.exp(x[self.decay][0]))
+        state = state - 1e-3 * float(x[self.instant][0]) * (self.found.matrix(decay) @ state)
+        return np.concatenate([state, x[self.gain], x[self.decay], x[self.rest]])
+
+    def state(self) -> tuple[FreeFall, Array, Array]:
+        """Rotor, unknowns of the fall and their covariance.
+
+        The orbit before the drop, less what magnets held of it, is that of the unbalance: one update by the
+        1X of the sensors, whose runout counts as noise.
+        """
+        mean, covariance = self.prior
+        sigma = np.sqrt(np.diag(covariance))
+        seen = -_slopes(self._tone_left, mean, sigma)
+        spread = seen @ covariance @ seen.T + RUNOUT_SIGMA**2 * np.eye(len(seen))
+        gain = np.linalg.solve(spread, seen @ covariance).T
+        mean = mean + gain @ self._tone_left(mean)
+        covariance = covariance - gain @ seen @ covariance
+        slopes = _slopes(self._outcome, mean, sigma)
+        return self.found, self._outcome(mean), slopes @ covariance @ slopes.T
 
 
-def _fall_readings(
-    record: Record, release: DropInstant, angle: RotorAngle, rest: SettledRest, inside: NDArray[np.bool_]
-) -> FallReadings:
-    levitated = release.levitated
-    turning = 2.0 * np.pi * levitated.tones[0]
-    turned = np.exp(1j * turning * release.value) * levitated.amplitudes[0]
-    orbit = along_sensors((levitated.mean + turned.real)[None, :], record.sensors)[0]
-    return FallReadings(
-        time=(record.time - release.value)[inside],
-        deviation=deviations(record, rest.along, levitated, angle)[inside],
-        noise=np.maximum(levitated.noise * record.gains, 1e-9),
-        orbit=orbit - rest.along,
-        orbit_velocity=(1j * turning * turned).real * record.gains,
-        orbit_acceleration=(-(turning**2) * turned).real * record.gains,
+def _slopes(function: Callable[[Array], Array], at: Array, sigma: Array) -> Array:
+    """Derivatives of a nearly linear function by central differences, shape (F, X)."""
+    steps = np.maximum(1e-2 * sigma, 1e-12)
+    unit = np.eye(len(at))
+    return np.column_stack(
+        [(function(at + h * e) - function(at - h * e)) / (2.0 * h) for h, e in zip(steps, unit, strict=True)]
     )
+
+
+def _by_end_of_fall(
+    record: Record,
+    time: Array,
+    end: float,
+    model: DropModel,
+    speed: float,
+    rest: SettledRest,
+    sensing: Sensing,
+) -> tuple[FreeFall, Array, Array]:
+    """The state from which a straight rotor without remanent forces comes to the end of the fall.
+
+    Without AMB planes nothing says what held the orbit, and no magnet carries a remanent force.
+    """
+    found = build_free_fall(model, speed, unbalance_nodes(model.machine))
+    count, m, near = len(sensing.names), found.n_modes, max(end - END_WINDOW, 0.5 * end)
+    level, rate, error = local_polynomial(time, record.along - rest.along, near, width=2.0 * (end - near))
+    at_rest = sensing.from_bearings.reshape(count, -1)
+    settled, rigid = settled_along(rest, sensing), [0, 1, m, m + 1]
+    straight = np.linalg.pinv(sensing.rows[:, rigid])
+    back = found.transition(REMANENT_TIME[0], -near)
+    gain, rests = slice(2 * count, 3 * count), slice(3 * count + 1, 3 * count + 1 + at_rest.shape[1])
+
+    def outcome(x: Array) -> Array:
+        state = np.zeros(found.size)
+        place = settled + at_rest @ x[rests] + (level + x[:count]) / (1.0 + x[gain])
+        state[rigid] = straight @ place
+        state[[2 * m + k for k in rigid]] = straight @ ((rate + x[count : 2 * count]) / (1.0 + x[gain]))
+        state[found.one] = 1.0
+        state[found.unbalance] = x[rests.stop :]
+        return np.concatenate([back @ state, x[gain], x[3 * count : rests.stop]])
+
+    rates = np.hypot(error, float(model.machine.gravity) * RINGING_ERROR)
+    unbalance = np.repeat(_unbalance_sigma(model.machine, found.nodes, model.fe.total_mass), 2)
+    known = [sensing.gain_sigma, [REMANENT_TIME[1]], _rest_sigma(model, sensing), unbalance]
+    sigma = np.concatenate([np.full(count, RINGING), rates, *known])
+    mean = np.zeros(len(sigma))
+    mean[3 * count] = math.log(REMANENT_TIME[0])
+    slopes = _slopes(outcome, mean, sigma) * sigma
+    return found, outcome(mean), slopes @ slopes.T
+
+
+def _rest_sigma(model: DropModel, sensing: Sensing) -> Array:
+    """Prior deviation of the error of the rest position (x, y) per bearing [m], shape (2 B,)."""
+    zero = np.sqrt(np.sum((sensing.to_bearings[:, 1, :] * sensing.offset_sigma) ** 2, axis=1))
+    sideways = np.full(len(zero), SIDEWAYS_REST_SIGMA * smallest_gap(model.machine))
+    return np.column_stack([sideways, zero]).ravel()

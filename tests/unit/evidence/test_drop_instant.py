@@ -8,7 +8,7 @@ import pytest
 from rotordrop.errors import RecordError
 from rotordrop.evidence import EarlyForces, find_drop_instant, first_forces
 from rotordrop.evidence.events import coarse_drop
-from rotordrop.evidence.fall import GRID, free_rotor, response_at, tabulate_response
+from rotordrop.evidence.free_rotor import GRID, free_rotor, response_at
 from rotordrop.known import Known
 from rotordrop.machine import example_machine
 from rotordrop.record.axes import sensor_planes
@@ -147,10 +147,11 @@ def test_first_contacts_need_the_amb_planes(drop, machine, found):
 
 
 def test_without_amb_planes_the_instant_is_still_near(drop, machine):
-    """Each plane then falls by itself: the sag that the release sets free is not in this model."""
+    """The rotor then counts as held at its sensor planes, beside which its magnets are."""
     plain = find_drop_instant(drop, machine.changed(ambs=()))
-    assert plain.value == pytest.approx(-0.25e-3, abs=5e-4)
-    assert "AMB planes are not known" in plain.method
+    assert plain.value == pytest.approx(-0.25e-3, abs=5e-5)
+    assert plain.interval_90[0] < -0.25e-3 < plain.interval_90[1]
+    assert "forces at nodes 5, 25 (the AMB planes are not known)" in plain.method
 
 
 def test_the_free_rotor_falls_with_gravity_and_answers_a_step(machine, drop):
@@ -158,7 +159,7 @@ def test_the_free_rotor_falls_with_gravity_and_answers_a_step(machine, drop):
     planes = sensor_planes(drop.sensors)
     rotor = free_rotor(machine, planes)
     assert np.sum(rotor.lift) == pytest.approx(rotor.mass * 9.81, rel=1e-6)
-    table = tabulate_response(rotor, 0.0, 0.0, 0.05)
+    table = rotor.table(0.0, 0.0, 0.05)
     fall = np.real(-1j * table @ rotor.lift)
     assert np.max(np.abs(fall)) < 1e-9
     drop_of = np.imag(-1j * table @ rotor.lift)
@@ -173,7 +174,7 @@ def test_the_free_rotor_falls_with_gravity_and_answers_a_step(machine, drop):
 
 def test_gyroscopic_coupling_turns_the_answer(machine, drop):
     rotor = free_rotor(machine, sensor_planes(drop.sensors))
-    still, turning, back = (tabulate_response(rotor, speed, 0.0, 0.01)[-1] for speed in (0.0, 943.0, -943.0))
+    still, turning, back = (rotor.table(speed, 0.0, 0.01)[-1] for speed in (0.0, 943.0, -943.0))
     assert np.max(np.abs(still.imag)) < 1e-20
     assert np.max(np.abs(turning.imag)) > 1e-3 * np.max(np.abs(still))
     np.testing.assert_allclose(turning, back.conj(), atol=1e-18)

@@ -10,6 +10,7 @@ from rotordrop.errors import RecordError
 from rotordrop.evidence import check_record, refuse_unusable
 from rotordrop.evidence.events import Beginning, beginning_of, find_fall
 from rotordrop.evidence.evidence import Evidence
+from rotordrop.evidence.free_rotor import free_rotor
 from rotordrop.evidence.levitated import fit_levitated
 from rotordrop.evidence.quality import Finding, Kind, standing
 from rotordrop.evidence.quality import fall as quality_fall
@@ -460,8 +461,9 @@ class TestArrangement:
         coarse = beginning_of(drop, machine).coarse
         record = replace(drop, signals=drop.signals[:, list(order)] * np.array(signs))
         levitated = fit_levitated(record, coarse.instant - 3e-3, speed=coarse.speed)
-        fall = find_fall(record, machine, Beginning(coarse=coarse, levitated=levitated))
-        assert fell_as_described(record, machine, levitated, fall) is told
+        rotor = free_rotor(machine, record.planes)
+        fall = find_fall(record, rotor, Beginning(coarse=coarse, levitated=levitated))
+        assert fell_as_described(record, machine, fall) is told
 
     def test_ends_swapped(self, drop, fast_drop, machine, edited):
         for record in (drop, fast_drop):

@@ -7,7 +7,7 @@ import pytest
 
 from rotordrop.evidence import check_record
 from rotordrop.evidence.events import coarse_drop
-from rotordrop.evidence.fall import GRID, FallResponses, free_rotor, tabulate_response
+from rotordrop.evidence.free_rotor import GRID, Responses, free_rotor
 from rotordrop.evidence.levitated import fit_levitated
 from rotordrop.evidence.quality.flight import check_flights, weighed
 from rotordrop.record.axes import sensor_planes
@@ -26,7 +26,8 @@ def hopping(machine):
 def in_flight(record, machine):
     coarse = coarse_drop(record, machine)
     levitated = fit_levitated(record, coarse.instant - 3e-3, speed=coarse.speed)
-    seen = weighed(record, machine, levitated, coarse.instant)
+    rotor = free_rotor(machine, record.planes)
+    seen = weighed(record, machine, rotor, levitated, coarse.instant)
     return seen, [] if seen is None else check_flights(seen, record)
 
 
@@ -74,8 +75,8 @@ def test_a_fading_force_is_answered_as_by_stepping(hopping, machine):
     """The closed form of a force that fades is the response stepped through time."""
     rotor = free_rotor(machine, sensor_planes(hopping[0].sensors))
     for decay in (1e-4, 5e-3, 3e-2):
-        stepped = tabulate_response(rotor, 600.0, 1.0 / decay, 0.02)
+        stepped = rotor.table(600.0, 1.0 / decay, 0.02)
         stepped = stepped[:-1]  # what lies beyond the table is held at its end
         since = np.arange(len(stepped)) * GRID
-        closed = FallResponses.of(rotor, 600.0, 0.02).fading(decay, since)
+        closed = Responses.of(rotor, 600.0, 0.02).fading(decay, since)
         np.testing.assert_allclose(closed, stepped, rtol=0.0, atol=1e-9 * np.max(np.abs(stepped)))

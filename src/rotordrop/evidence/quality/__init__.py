@@ -126,7 +126,7 @@ def _wiring(evidence: Evidence) -> list[Finding]:
     fall = evidence.free_fall if stops(found) else Missing(reason="not asked")
     if isinstance(fall, Missing):
         return found
-    straight = fell_as_described(whole, evidence.machine, evidence.floating, fall)
+    straight = fell_as_described(whole, evidence.machine, fall)
     return check_planes(whole.planes, sunk, evidence.floating.amplitudes[0], fell_straight=straight)
 
 
@@ -165,7 +165,7 @@ def _fall(evidence: Evidence) -> list[Finding]:
     near = evidence.record.whole.window(-np.inf, coarse.instant + _NEAR)
     fall = evidence.free_fall
     own = None if isinstance(fall, Missing) else fall
-    return check_ends(near, evidence.machine, evidence.floating, coarse, own)
+    return check_ends(near, evidence.machine, evidence.rotor, evidence.floating, coarse, own)
 
 
 def _flights(evidence: Evidence) -> list[Finding]:

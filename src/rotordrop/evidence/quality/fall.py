@@ -31,6 +31,7 @@ from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
     from rotordrop.evidence.fall import Fall
+    from rotordrop.evidence.free_rotor import FreeRotor
     from rotordrop.machine import Machine
     from rotordrop.record.record import Record
 
@@ -66,7 +67,12 @@ class _Case:
 
 
 def check_ends(
-    record: Record, machine: Machine, levitated: LevitatedModel, coarse: CoarseDrop, own: Fall | None = None
+    record: Record,
+    machine: Machine,
+    rotor: FreeRotor,
+    levitated: LevitatedModel,
+    coarse: CoarseDrop,
+    own: Fall | None = None,
 ) -> list[Finding]:
     """Compare the fall with the rotor model: as described, ends exchanged, channels crossed, gain wrong.
 
@@ -76,11 +82,11 @@ def check_ends(
         return [_undecided("it takes two AMB planes in the machine file and two sensor planes")]
 
     def fitted(read: Record, floats: LevitatedModel, until: float | None = None) -> Fall:
-        return find_fall(read, machine, Beginning(coarse=coarse, levitated=floats), until=until)
+        return find_fall(read, rotor, Beginning(coarse=coarse, levitated=floats), until=until)
 
     own = own or fitted(record, levitated)
     if own.misfit <= GOOD_FIT and own.end >= coarse.contact - _NEAR_CONTACT:
-        return _as_described(record, levitated, own, machine)
+        return _as_described(own, machine)
     cases = _other_cases(record, levitated)
     if not machine.rotor.is_beam:
         cases.append(_any_gain(record, levitated))
@@ -88,7 +94,7 @@ def check_ends(
     until = max([own.end, *(fall.end for fall in grown if fall.misfit <= GOOD_FIT)])
     mine = fitted(record, levitated, until).misfit
     if mine <= GOOD_FIT:
-        return _as_described(record, levitated, own, machine)
+        return _as_described(own, machine)
     finals = [
         fitted(case.record, case.levitated, until)
         if case.kind == Kind.WRONG_GAIN or fall.end >= until - _NEAR_CONTACT
@@ -100,24 +106,22 @@ def check_ends(
         return [_doubted(decided)]
     if decided.kind not in (Kind.UNDECIDED_ENDS, Kind.WRONG_GAIN):
         return [decided]
-    named = read_otherwise(record, levitated, own)
+    named = read_otherwise(own)
     stop = decided.severity == "stop"
     return [replace(found, severity="stop") if stop else found for found in named] or [decided]
 
 
-def _as_described(record: Record, levitated: LevitatedModel, fall: Fall, machine: Machine) -> list[Finding]:
+def _as_described(fall: Fall, machine: Machine) -> list[Finding]:
     """What a fall that fits as described still says of gains, delays and angles."""
-    return read_otherwise(record, levitated, fall) or _implausible_lift(record, levitated, fall, machine)
+    return read_otherwise(fall) or _implausible_lift(fall, machine)
 
 
-def _implausible_lift(
-    record: Record, levitated: LevitatedModel, fall: Fall, machine: Machine
-) -> list[Finding]:
+def _implausible_lift(fall: Fall, machine: Machine) -> list[Finding]:
     """A fall that fits only with an impossible remanent lift is too fast or too slow: a gain is wrong."""
     share = fall.remanent_force[:, 1] / fall.rotor.lift
     worst = int(np.argmax(np.abs(share - np.mean(_POSSIBLE_LIFT))))
     if _POSSIBLE_LIFT[0] <= share[worst] <= _POSSIBLE_LIFT[1]:
-        return _implausible_sideways(record, levitated, fall, machine)
+        return _implausible_sideways(fall, machine)
     return [
         Finding(
             kind=Kind.WRONG_GAIN,
@@ -130,7 +134,7 @@ def _implausible_lift(
     ]
 
 
-def fell_as_described(record: Record, machine: Machine, levitated: LevitatedModel, fall: Fall) -> bool:
+def fell_as_described(record: Record, machine: Machine, fall: Fall) -> bool:
     """Whether gravity has shown, before the first contact, that the sensors look where they are said to.
 
     Sensors that are exchanged or inverted see gravity pull aside or upwards: the free rotor then explains the
@@ -144,29 +148,23 @@ def fell_as_described(record: Record, machine: Machine, levitated: LevitatedMode
     upwards = fall.remanent_force[:, 1] / fall.rotor.lift
     if np.any(upwards < _POSSIBLE_LIFT[0]) or np.any(upwards > _POSSIBLE_LIFT[1]):
         return False
-    aside, error = _sideways(record, levitated, fall)
+    aside, error = _sideways(fall)
     return bool(np.all(np.abs(aside) + NINETY * error < 0.5 * _AS_FALLING))
 
 
-def _sideways(record: Record, levitated: LevitatedModel, fall: Fall) -> tuple[Array, Array]:
+def _sideways(fall: Fall) -> tuple[Array, Array]:
     """Horizontal force at the release over static lift, per magnetic bearing, and its standard error [1]."""
-    from rotordrop.evidence.fall import linearised
-
     share = fall.remanent_force[:, 0] / fall.rotor.lift
-    jacobian = linearised(record, levitated, fall)[1]
-    variance = np.diag(np.linalg.inv(jacobian.T @ jacobian))[: len(share)] * max(fall.misfit, 1.0)
-    return share, np.sqrt(variance)
+    return share, np.sqrt(np.diag(fall.covariance)[: len(share)])
 
 
-def _implausible_sideways(
-    record: Record, levitated: LevitatedModel, fall: Fall, machine: Machine
-) -> list[Finding]:
+def _implausible_sideways(fall: Fall, machine: Machine) -> list[Finding]:
     """A fall that leads aside before anything is touched: the sensors look in other directions.
 
     In a short fall a force aside and the turning force of the unbalance look alike: what counts is by how
     much the force is larger than a magnet's at least.
     """
-    share, error = _sideways(record, levitated, fall)
+    share, error = _sideways(fall)
     worst = int(np.argmax(np.abs(share)))
     if not _POSSIBLE_SIDEWAYS < abs(share[worst]) < _AS_FALLING:
         return []
@@ -310,14 +308,13 @@ class _Fault:
     """What it adds to the readings per size, shape (T, S)."""
 
 
-def read_otherwise(record: Record, levitated: LevitatedModel, fall: Fall) -> list[Finding]:
+def read_otherwise(fall: Fall) -> list[Finding]:
     """Name what sensors or recorder did to a fall, if that takes away more chi square than chance would."""
-    from rotordrop.evidence.fall import linearised
-
-    residual, jacobian = linearised(record, levitated, fall)
+    levitated = fall.problem.levitated
+    residual, jacobian = fall.linearised
     basis = np.linalg.qr(jacobian)[0]
     found = sorted(
-        ((*_gain(fault, residual, basis, levitated), fault) for fault in _faults(record, levitated, fall)),
+        ((*_gain(fault, residual, basis, levitated), fault) for fault in _faults(fall)),
         key=lambda one: -one[0],
     )
     gained, size, best = found[0]
@@ -363,8 +360,8 @@ def _gain(fault: _Fault, residual: Array, basis: Array, levitated: LevitatedMode
     return size * float(added @ residual), size
 
 
-def _faults(record: Record, levitated: LevitatedModel, fall: Fall) -> Iterator[_Fault]:
-    time = record.time[(record.time >= fall.start) & (record.time <= fall.end)]
+def _faults(fall: Fall) -> Iterator[_Fault]:
+    record, levitated, time = fall.problem.record, fall.problem.levitated, fall.problem.time
     path = fall.predicted(time) - levitated.readings(time)
     lags = [-np.gradient(path, time, axis=0)]
     lags += [(_shifted(path, time, late) - path) / late for late in _LONG]

@@ -25,7 +25,7 @@ from rotordrop.record.recording import Array
 from rotordrop.series import runs_of
 
 if TYPE_CHECKING:
-    from rotordrop.evidence.fall import FreeRotor
+    from rotordrop.evidence.free_rotor import FreeRotor
     from rotordrop.machine import Machine
     from rotordrop.record.record import Record
 
@@ -97,13 +97,12 @@ class _Fall:
     time: float
 
 
-def weighed(record: Record, machine: Machine, levitated: LevitatedModel, drop: float) -> Weighed | None:
+def weighed(
+    record: Record, machine: Machine, rotor: FreeRotor, levitated: LevitatedModel, drop: float
+) -> Weighed | None:
     """Weigh the rotor in its flights; None where it never flew."""
-    from rotordrop.evidence.fall import free_rotor
-
     if len({amb.node for amb in machine.ambs}) < 2 or record.speed is None or float(machine.gravity) <= 0.0:
         return None
-    rotor = free_rotor(machine, record.planes)
     count = len(record.sensors)
     weight: Array = np.zeros((count, count))
     total: Array = np.zeros(count)
@@ -241,7 +240,7 @@ def _fitted(
     residual : array, shape (T, S)
         Residual over the noise, scaled by the degrees of freedom [1].
     """
-    from rotordrop.evidence.fall import response_at, response_to_start
+    from rotordrop.evidence.free_rotor import response_at
 
     assert record.speed is not None
     since = record.time[inside] - record.time[inside.start]
@@ -249,7 +248,7 @@ def _fitted(
     unit, gains, of_plane = record.directions, record.gains, record.plane_of
     noise = np.maximum(levitated.noise * gains, 1e-12)
     toward = (unit[:, 0] - 1j * unit[:, 1])[None, :, None]
-    left = response_at(response_to_start(rotor, speed, float(since[-1])), since)[:, of_plane] * toward
+    left = response_at(rotor.table_of_start(speed, float(since[-1])), since)[:, of_plane] * toward
     turning = np.exp(1j * speed * since)[:, None, None] * np.eye(len(record.planes))[of_plane] * toward
     parts = [column for seen in (left, turning) for column in (seen.real, -seen.imag)]
     falls = -0.5 * gravity * since[:, None, None] ** 2 * np.diag(unit[:, 1])

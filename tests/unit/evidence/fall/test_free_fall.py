@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from tests.reference.rotor_shapes import bending_part
 
-from rotordrop.evidence.initial_state import build_free_fall, kernel_state, sagging_amplitudes
+from rotordrop.evidence.free_rotor import held_by, motion_of
+from rotordrop.evidence.initial_state import build_free_fall, kernel_state
 from rotordrop.rotor.parameters import DropModel
-from rotordrop.rotor.statics import levitated_sag
+from rotordrop.rotor.statics import levitated_sag, rest_on
 from rotordrop.simulate.case import DropCase, LevitatedStart, StateStart
 from rotordrop.simulate.drop import simulate_drop
 from rotordrop.simulate.levitation import levitated_orbit, start_of_drop
+from rotordrop_bench import SyntheticDrop
 
 SPEED = 2.0 * np.pi * 150.0
 
@@ -61,16 +60,18 @@ def test_orbit_columns_solve_the_levitated_rotor(model: DropModel) -> None:
     p = model.parameters
     nodes = tuple(unbalance.node for unbalance in model.machine.unbalances)
     fall = build_free_fall(model, SPEED, nodes)
-    columns = fall.synchronous()
+    forward, backward = fall.orbit()
     turned = [float(u.amount) * np.exp(1j * (float(u.phase) + 0.5 * np.pi)) for u in model.machine.unbalances]
     at_magnets = p.magnet_shape @ orbit[:, 0]
     held = -(p.magnet[:, 4] + 1j * SPEED * p.magnet[:, 5]) * at_magnets
-    forces = np.array([*turned, *held])
-    found = columns @ np.column_stack([forces.real, forces.imag]).ravel()
-    m = fall.n_modes
-    assert found[:m] == pytest.approx(orbit[:, 0].real, abs=1e-14)
-    assert found[m : 2 * m] == pytest.approx(orbit[:, 1].real, abs=1e-14)
-    assert found[2 * m : 3 * m] == pytest.approx((1j * SPEED * orbit[:, 0]).real, abs=1e-11)
+    found = forward @ np.array([*turned, *held])
+    assert found.real == pytest.approx(orbit[:, 0].real, abs=1e-14)
+    assert found.imag == pytest.approx(orbit[:, 1].real, abs=1e-14)
+    # an orbit against the spin: what the motion by itself leaves of its rates is the force that holds it
+    turning = np.vstack([backward, -1j * SPEED * backward])
+    left = -1j * SPEED * turning - motion_of(model.basis, SPEED) @ turning
+    assert left[: model.basis.size] == pytest.approx(0.0, abs=1e-15)
+    assert left[model.basis.size :] == pytest.approx(p.magnet_shape.T, abs=1e-9)
 
 
 def test_remanent_force_decays_with_its_time_constant(model: DropModel) -> None:
@@ -80,27 +81,19 @@ def test_remanent_force_decays_with_its_time_constant(model: DropModel) -> None:
     assert (fall.transition(2e-3, 2e-3) @ state)[fall.remanent] == pytest.approx(np.exp(-1.0), rel=1e-9)
 
 
-def test_sag_in_modes_is_the_sag_of_the_finite_elements(model: DropModel) -> None:
-    shape = model.basis.shapes @ sagging_amplitudes(model)
-    expected = levitated_sag(model.fe, model.machine)
-    assert shape[0::2] == pytest.approx(expected[0::2], abs=1e-7)
-    assert np.max(np.abs(bending_part(model.fe, expected)[0::2])) > 3e-6
-
-
-def test_sag_without_magnet_planes_is_zero(model: DropModel) -> None:
-    bare = replace(model, machine=model.machine.changed(ambs=()))
-    assert not np.any(sagging_amplitudes(bare))
-
-
-def test_observed_rows_are_transitions_seen_by_the_sensors(model: DropModel) -> None:
-    fall = build_free_fall(model, SPEED, (8, 22))
-    random = np.random.default_rng(1)
-    rows = random.standard_normal((3, 2 * fall.n_modes))
-    state = random.standard_normal(fall.size)
-    seen = fall.observed(rows, 2e-3, 1e-4, 5e-5, 4)
-    for k in range(4):
-        later = fall.transition(2e-3, 1e-4 + 5e-5 * k) @ state
-        assert seen[k] @ state == pytest.approx(rows @ later[fall.displacement], rel=1e-8)
+def test_the_rotor_is_held_by_its_magnets_or_else_at_its_sensor_planes(
+    model: DropModel, drop: SyntheticDrop
+) -> None:
+    machine, planes = model.machine, drop.record.planes
+    held = held_by(machine, planes, model.fe)
+    assert held.sag == pytest.approx(levitated_sag(model.fe, machine), abs=1e-15)
+    assert held.nodes == tuple(amb.node for amb in machine.ambs)
+    beside = held_by(machine.changed(ambs=()), planes, model.fe)
+    assert not beside.by_magnets
+    assert beside.nodes == tuple(plane.node for plane in planes)
+    assert beside.lift == pytest.approx(rest_on(model.fe, beside.nodes, 9.81)[1])
+    one = held_by(machine.changed(ambs=()), planes[:1], model.fe)
+    assert one.nodes == tuple(bearing.node for bearing in machine.touchdown_bearings)
 
 
 def test_unbalance_keeps_its_place_on_the_rotor(model: DropModel) -> None:

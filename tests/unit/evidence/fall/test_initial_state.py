@@ -9,7 +9,7 @@ import pytest
 
 from rotordrop.errors import IdentificationError
 from rotordrop.evidence.evidence import Evidence, known
-from rotordrop.evidence.initial_state import InitialState, end_of_fall, fit_initial_state, settled_along
+from rotordrop.evidence.initial_state import InitialState, end_of_fall, initial_state_of, settled_along
 from rotordrop.evidence.rest import SettledRest
 from rotordrop.evidence.sensing import Sensing
 from rotordrop.replay.modal_expansion import expand_initial_state
@@ -109,11 +109,11 @@ def test_fall_with_too_few_samples_is_refused(evidence: Evidence, sensing: Sensi
     record = evidence.record
     coarse = replace(record, time=record.time[::16], signals=record.signals[::16], sampling_rate=1250.0)
     with pytest.raises(IdentificationError, match=r"\d samples between power-off and the first contact"):
-        fit_initial_state(
+        initial_state_of(
             coarse,
             evidence.model,
-            evidence.release,
-            evidence.speed,
+            evidence.power_off,
+            evidence.speed.initial,
             evidence.angle,
             known(evidence.gap),
             sensing,

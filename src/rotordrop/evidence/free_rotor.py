@@ -1,0 +1,227 @@
+"""The rotor that nothing holds, under forces at nodes: the one model of fall, flight and first contacts.
+
+Without bearings the rotor is linear: modes with gyroscopic coupling and damping. With displacements and
+forces as complex numbers x + j y, ``q̈ + (D − jωG) q̇ + Λ q = shapesᵀ f``; its motion is a matrix exponential.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rotordrop.elements.magnet import ActiveMagneticBearing
+from rotordrop.machine import Machine
+from rotordrop.record.axes import Plane
+from rotordrop.record.recording import Array
+from rotordrop.rotor.assembly import RotorFE, build_rotor_fe
+from rotordrop.rotor.reduction import Reduction, RotorBasis, reduce_rotor
+from rotordrop.rotor.statics import rest_on
+
+ComplexArray = np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
+
+GRID = 1e-5
+"""Step of the tabulated responses [s]."""
+
+_MODES = 6
+"""Free-free modes, the two rigid ones included: with four bending modes the falls of all rotors of the gate's
+study are explained at noise level."""
+
+
+def motion_of(basis: RotorBasis, speed: float) -> ComplexArray:
+    """Rates of displacements and velocities of the modes by themselves [1/s], shape (2m, 2m).
+
+    The modes are damped each by itself, as the time loop of a drop takes them.
+    """
+    m = basis.size
+    system = np.zeros((2 * m, 2 * m), dtype=np.complex128)
+    system[:m, m:] = np.eye(m)
+    system[m:, :m] = -np.diag(basis.eigenvalues)
+    system[m:, m:] = -np.diag(np.diag(basis.damping)) + 1j * speed * basis.polar
+    return system
+
+
+@dataclass(frozen=True, kw_only=True)
+class Held:
+    """What holds the levitated rotor; A magnetic bearings or places that stand for them."""
+
+    nodes: tuple[int, ...]
+    """Where, counted from 1."""
+    lift: Array
+    """Static lift [N], shape (A,)."""
+    sag: Array
+    """Static shape of the rotor in y [m, rad], shape (2N,)."""
+    words: str
+    """By what, in words."""
+    by_magnets: bool
+    """Whether the machine file says where its magnetic bearings are."""
+
+
+def held_by(machine: Machine, planes: tuple[Plane, ...], fe: RotorFE) -> Held:
+    """Say what holds the levitated rotor: its AMBs, or where they are not known its sensor planes.
+
+    Sensors stand beside the magnets that they control. Holding lp400 at its sensor planes dates a fall to
+    0.03 ms, each plane falling by itself to 0.1 ms.
+    """
+    gravity, ambs = float(machine.gravity), machine.ambs
+    if len({amb.node for amb in ambs}) >= 2:
+        compliance = [_compliance(amb) for amb in ambs]
+        nodes = tuple(amb.node for amb in ambs)
+        sag, lift = rest_on(fe, nodes, gravity, compliance)
+        words = f"{len(nodes)} magnetic bearings"
+        return Held(nodes=nodes, lift=lift, sag=sag, words=words, by_magnets=True)
+    bearings = tuple(bearing.node for bearing in machine.touchdown_bearings)
+    guesses = (tuple(plane.node for plane in planes), bearings, (1, len(machine.rotor.node_positions)))
+    nodes = next(guess for guess in guesses if len(set(guess)) >= 2)
+    sag, lift = rest_on(fe, nodes, gravity)
+    words = f"forces at nodes {', '.join(map(str, nodes))} (the AMB planes are not known)"
+    return Held(nodes=nodes, lift=lift, sag=sag, words=words, by_magnets=False)
+
+
+def _compliance(amb: ActiveMagneticBearing) -> float:
+    return 0.0 if amb.integral_action else 1.0 / float(amb.stiffness)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FreeRotor:
+    """A rotor without bearings, seen at the sensor planes and pushed at some nodes."""
+
+    basis: RotorBasis
+    """Its modes."""
+    plane_rows: Array
+    """Displacement at the sensor planes per modal amplitude [1/sqrt(kg)], shape (P, m)."""
+    force_rows: Array
+    """The same where forces act, shape (A, m)."""
+    lift: Array
+    """Static lift that acted there before the release [N], shape (A,)."""
+    mass: float
+    """Mass [kg]."""
+    description: str
+    """The model in words."""
+
+    def table(self, speed: float, exponent: complex, span: float) -> ComplexArray:
+        """Displacement of the planes after a unit force ``exp(−exponent · t)`` at each of its places.
+
+        Parameters
+        ----------
+        speed : float
+            Shaft speed [rad/s].
+        exponent : complex
+            0 for a step, 1/τ for a fading force, −jω for a turning one [1/s].
+        span : float
+            Time covered from the release [s].
+
+        Returns
+        -------
+        array, shape (K, P, A), complex
+            Displacement [m/N] at 0, `GRID`, 2 `GRID`, …
+        """
+        m, inputs = self.basis.size, len(self.force_rows)
+        system = np.zeros((2 * m + inputs, 2 * m + inputs), dtype=np.complex128)
+        system[: 2 * m, : 2 * m] = motion_of(self.basis, speed)
+        system[m : 2 * m, 2 * m :] = self.force_rows.T
+        system[2 * m :, 2 * m :] = -exponent * np.eye(inputs)
+        states = _stepped(system, np.eye(2 * m + inputs)[:, 2 * m :], span)
+        return np.asarray(self.plane_rows @ states[:, :m])
+
+    def table_of_start(self, speed: float, span: float) -> ComplexArray:
+        """Displacement of the planes (K, P, 2m) by unit displacements and velocities of the modes."""
+        m = self.basis.size
+        states = _stepped(motion_of(self.basis, speed), np.eye(2 * m), span)
+        return np.asarray(self.plane_rows @ states[:, :m])
+
+
+def free_rotor(machine: Machine, planes: tuple[Plane, ...]) -> FreeRotor:
+    """Model the rotor that is released by what held it."""
+    fe = build_rotor_fe(machine)
+    held = held_by(machine, planes, fe)
+    basis = reduce_rotor(fe, Reduction(modes=_MODES, attachment=False))
+    words = f"free rotor with {_MODES - 2} bending modes, released by {held.words}"
+    return _pushed(fe, basis, planes, held.nodes, held.lift, words)
+
+
+def rotor_pushed_at_bearings(machine: Machine, planes: tuple[Plane, ...]) -> FreeRotor:
+    """Model the free rotor with forces at the touchdown bearings, local flexibility there included."""
+    fe = build_rotor_fe(machine)
+    nodes = [bearing.node for bearing in machine.touchdown_bearings]
+    basis = reduce_rotor(fe, Reduction(modes=_MODES + 2, attachment=True), nodes)
+    words = f"free rotor, {basis.description}, pushed at {len(nodes)} touchdown bearings"
+    return _pushed(fe, basis, planes, nodes, np.zeros(len(nodes)), words)
+
+
+def _pushed(
+    fe: RotorFE,
+    basis: RotorBasis,
+    planes: tuple[Plane, ...],
+    nodes: Sequence[int],
+    lift: Array,
+    description: str,
+) -> FreeRotor:
+    return FreeRotor(
+        basis=basis,
+        plane_rows=np.array([basis.node_row(plane.node) for plane in planes]),
+        force_rows=np.array([basis.node_row(node) for node in nodes]),
+        lift=lift,
+        mass=float(fe.total_mass),
+        description=description,
+    )
+
+
+def _stepped(system: ComplexArray, start: Array, span: float) -> ComplexArray:
+    """States (K, N, C) at 0, `GRID`, 2 `GRID`, … from the columns of a start, by doubling."""
+    from scipy.linalg import expm
+
+    step = expm(GRID * system)
+    states = start[None].astype(np.complex128)
+    count = int(span / GRID) + 2
+    while len(states) < count:
+        states = np.concatenate([states, step @ states])
+        step = step @ step
+    return states[:count]
+
+
+def response_at(table: ComplexArray | Array, since: Array) -> ComplexArray:
+    """Look up a tabulated response at times since the release [s], shape (T,): zero before it."""
+    place = np.clip(since / GRID, 0.0, len(table) - 1.001)
+    low = place.astype(np.int64)
+    share = (place - low)[:, None, None]
+    return np.asarray(table[low] * (1.0 - share) + table[low + 1] * share)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Responses:
+    """What a released rotor answers to forces that stay, turn with it or fade, tabulated once for a span."""
+
+    fixed: tuple[ComplexArray, ...]
+    """Responses to a force that stays, turns with the shaft and against it [m/N], shape (K, P, A)."""
+    free: ComplexArray
+    """Displacement of the planes left to themselves, by displacements and velocities of the modes, shape (K,
+    P, 2m)."""
+    system: ComplexArray
+    inputs: Array
+    """Derivative of those by themselves and by unit forces at the places of the rotor."""
+
+    @classmethod
+    def of(cls, rotor: FreeRotor, speed: float, span: float) -> Responses:
+        """Tabulate a rotor at a speed [rad/s] over a time from the release on [s]."""
+        return cls(
+            fixed=tuple(rotor.table(speed, s, span) for s in (0.0, -1j * speed, 1j * speed)),
+            free=rotor.table_of_start(speed, span),
+            system=motion_of(rotor.basis, speed),
+            inputs=np.vstack([np.zeros_like(rotor.force_rows.T), rotor.force_rows.T]),
+        )
+
+    def fading(self, decay: float, since: Array) -> ComplexArray:
+        """Response (T, P, A) to forces that fade with a time constant [s], at times from the release [s].
+
+        With x' = A x + B exp(−t/τ) and x(0) = 0, x = (exp(A t) − exp(−t/τ)) (A + 1/τ)⁻¹ B. Only the rows that
+        are asked for are multiplied: the whole table is ten times as long, and a product of that size is
+        handed to several threads, which on a busy computer cost ten times the work.
+        """
+        rate = 1.0 / decay
+        share = np.linalg.solve(self.system + rate * np.eye(len(self.system)), self.inputs)
+        fades = np.exp(-rate * GRID * np.arange(len(self.free)))[:, None, None]
+        free = response_at(self.free, since)
+        released = (free.reshape(-1, free.shape[-1]) @ share).reshape(*free.shape[:2], -1)
+        return np.asarray(released - response_at(fades, since) * (self.free[0] @ share))
