@@ -141,8 +141,8 @@ class FreeFall:
         still = -w * w * np.eye(basis.size) + stiff
         forward = np.column_stack([w * w * self.planes.T, self.magnets.T])
         return (
-            np.linalg.solve(still + 1j * w * loss, forward),
-            np.linalg.solve(still - 1j * w * loss, self.magnets.T.astype(np.complex128)),
+            np.asarray(np.linalg.solve(still + 1j * w * loss, forward)),
+            np.asarray(np.linalg.solve(still - 1j * w * loss, self.magnets.T)),
         )
 
 

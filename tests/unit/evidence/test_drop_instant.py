@@ -63,6 +63,9 @@ def test_the_standard_error_of_the_power_off_is_its_scatter(drop, machine):
     scatter = np.std([one.value for one in found], ddof=1)
     stated = np.sqrt(np.mean([one.fall.standard_error**2 for one in found]))
     assert 0.53 < scatter / stated < 1.50  # √χ²₁₁/11 at 1 and 99 per cent
+    # searched with the forces eliminated or sought with them, the release is known equally well
+    jointly = [1e-3 * np.sqrt(one.fall.covariance[-2, -2]) for one in found]
+    assert jointly == pytest.approx([one.fall.standard_error for one in found], rel=0.05)
 
 
 def test_a_sensor_that_reads_more_is_told_by_the_fall(drop, machine):

@@ -8,13 +8,18 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import IdentificationError
-from rotordrop.evidence.evidence import Evidence, known
+from rotordrop.evidence.evidence import Evidence, known, read_evidence
 from rotordrop.evidence.initial_state import InitialState, end_of_fall, initial_state_of, settled_along
 from rotordrop.evidence.rest import SettledRest
 from rotordrop.evidence.sensing import Sensing
+from rotordrop.machine import Machine
 from rotordrop.replay.modal_expansion import expand_initial_state
-from rotordrop.rotor.parameters import DropModel
+from rotordrop.rotor.parameters import DropModel, build_drop_model
+from rotordrop.rotor.reduction import Reduction
 from rotordrop_bench import SyntheticDrop
+
+BASIS = Reduction(modes=6, attachment=True)
+OFFSET = 8e-6
 
 
 def bearing_state(initial: InitialState, time: float) -> np.ndarray:
@@ -63,6 +68,39 @@ def test_error_is_as_large_as_stated(
         part = slice(axis * m, (axis + 1) * m)
         sigma = np.sqrt(np.diag(shape @ covariance[part, part] @ shape.T))
         assert np.all(np.abs(error[:, axis]) < 4.0 * sigma + 0.05e-6)
+
+
+def test_zeros_of_the_sensors_make_the_rest_as_unsure_as_they_are(
+    evidence: Evidence, sensing: Sensing
+) -> None:
+    """What no reading tells stays as the machine file says it."""
+    unsure = replace(sensing, offset_sigma=np.full(4, OFFSET))
+    gap, speed, off = known(evidence.gap), evidence.speed.initial, evidence.power_off
+    found = initial_state_of(evidence.record, evidence.model, off, speed, evidence.angle, gap, unsure)
+    sigma = np.sqrt(np.diag(found.covariance))
+    zeros = OFFSET * np.random.default_rng(4).standard_normal((20000, 4))
+    vertical = np.std(sensing.at_bearings(zeros)[..., 1], axis=0)
+    assert sigma[found.unknowns.rest][1::2] == pytest.approx(vertical, rel=0.03)
+
+
+def test_without_amb_planes_the_fall_ends_where_it_did(
+    drop: SyntheticDrop, truth: Machine, contacts: np.ndarray
+) -> None:
+    """No magnet carries a remanent force then: the state is the one that leads to the end of the fall."""
+    bare = build_drop_model(truth.changed(ambs=()), BASIS)
+    initial = known(read_evidence(bare, drop.record, drop.tail).fall)
+    assert not len(initial.remanent_force)
+    late = float(round((contacts.min() - 3e-4) / 1e-5) * 1e-5)
+    place, velocity = bearing_state(initial, late) - true_state(drop, late)
+    assert np.abs(place).max() < 8e-6
+    assert np.abs(velocity).max() < 8e-3
+    turn, m = initial.fall.transition(initial.decay, late), initial.fall.n_modes
+    covariance = turn @ initial.covariance[initial.unknowns.states, initial.unknowns.states] @ turn.T
+    shape = initial.fall.model.parameters.bearing_shape
+    for axis in range(2):
+        part = slice(axis * m, (axis + 1) * m)
+        sigma = np.sqrt(np.diag(shape @ covariance[part, part] @ shape.T))
+        assert np.all(np.abs(place[:, axis]) < 3.0 * sigma)
 
 
 def test_remanent_lift_is_found(initial: InitialState, drop: SyntheticDrop) -> None:
