@@ -43,8 +43,8 @@ END_WINDOW = 1e-3
 [s]."""
 
 ROUGH_RATE = 0.1
-"""Standard deviation of that velocity, over that of a fall through the gap [1]: three hidden drops of lp400 at
-60, 100 and 250 Hz were off by up to 0.14 of it, the ringing of the released sag being in it."""
+"""Standard deviation of that velocity over that of a fall through the gap [1]: in three hidden drops of lp400
+at 60, 100 and 250 Hz it was off by up to 0.14, the ringing of the released sag being in it."""
 
 RUNOUT_SIGMA = 0.3e-6
 """Runout of a sensor track at 1X [m], a quality of its surface whatever the size of the machine."""
