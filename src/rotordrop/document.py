@@ -82,7 +82,7 @@ def read_json(path: Path, made_by: str) -> dict[str, Any]:
         content = json.loads(path.read_text(encoding="utf-8"))
     except OSError as fault:
         raise UsageError(f"{path} cannot be read ({fault.strerror}). {way_out}") from fault
-    except ValueError as fault:
+    except (ValueError, RecursionError) as fault:
         raise UsageError(f"{path} is not JSON ({fault}). {way_out}") from fault
     if not isinstance(content, dict):
         raise UsageError(f"{path} holds a {type(content).__name__}; expected an object. {way_out}")

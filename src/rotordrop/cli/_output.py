@@ -6,7 +6,7 @@ import json
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
@@ -160,9 +160,11 @@ def _identity(file: Path) -> object:
     """What two names of one file have in common, also where it does not exist yet."""
     try:
         found = file.stat()
+        return found.st_dev, found.st_ino
     except (OSError, ValueError):
-        return os.path.normcase(os.path.realpath(file))
-    return found.st_dev, found.st_ino
+        with suppress(FileNotFoundError):  # the folder one is in has been deleted
+            return os.path.normcase(os.path.realpath(file))
+        return str(file)
 
 
 def places_beside(named: Path | None, records: Iterable[Path]) -> list[Path]:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import hashlib
 import shutil
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -25,7 +24,7 @@ from rotordrop.rotor.parameters import DropModel
 Arrays = dict[str, NDArray[np.float64]]
 
 _CHECKPOINT = "checkpoint.npz"
-_DIGEST = "digest"
+_DIGEST, _SEAL = "digest", "digest of what follows"
 
 
 def work_folder(output: Path) -> Path:
@@ -73,7 +72,16 @@ def open_work_folder(output: Path, *, resume: bool) -> Path:
 def save_checkpoint(folder: Path, digest: str, arrays: Mapping[str, NDArray[np.float64]]) -> None:
     """Write where the run stands; the checkpoint before it stays until the new one is complete."""
     with atomic_path(folder / _CHECKPOINT) as temporary, temporary.open("wb") as file:
-        np.savez(file, **{_DIGEST: np.array(digest)}, **arrays)  # type: ignore[arg-type]
+        marks = {_DIGEST: np.array(digest), _SEAL: np.array(_digest_of(arrays))}
+        np.savez(file, **marks, **arrays)  # type: ignore[arg-type]
+
+
+def _digest_of(arrays: Mapping[str, NDArray[np.float64]]) -> str:
+    digest = hashlib.sha256()
+    for name, array in sorted(arrays.items()):
+        digest.update(f"{name} {array.dtype} {array.shape}\n".encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
 
 
 def load_checkpoint(folder: Path, digest: str) -> Arrays | None:
@@ -87,11 +95,14 @@ def load_checkpoint(folder: Path, digest: str) -> Arrays | None:
     try:
         with np.load(path, allow_pickle=False) as stored:
             arrays = {name: stored[name] for name in stored.files}
-    except (OSError, ValueError, zipfile.BadZipFile) as error:
+        found, seal = str(arrays.pop(_DIGEST)), str(arrays.pop(_SEAL))
+        if seal != _digest_of(arrays):
+            raise ValueError("it is not what was written")
+    except Exception as error:
+        # zipfile and numpy raise a dozen kinds of errors for a damaged file
         raise SimulationError(
             f"{path} cannot be read ({error}); remove {folder} and start the run again"
         ) from error
-    found = str(arrays.pop(_DIGEST, ""))
     if found != digest:
         raise SimulationError(
             f"{folder} belongs to another run (fingerprint {found[:8]}, this one has {digest[:8]}): machine, "

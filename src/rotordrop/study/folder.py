@@ -155,7 +155,7 @@ def read_plan(path: str | Path) -> dict[str, Any]:
         ) from error
     except DamagedFileError:
         plan = None
-        with suppress(ValueError):
+        with suppress(ValueError, RecursionError):
             plan = json.loads(file.read_bytes())
         # what has a digest was not written without one
         if not isinstance(plan, dict) or plan.get("format") != WITHOUT_DIGESTS or "sha256" in plan:

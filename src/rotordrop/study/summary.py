@@ -234,16 +234,14 @@ class EarlyEnd:
 
 def save_results(results: StudyResults, path: str | Path) -> None:
     """Write all drops as one columnar file, complete or not at all: ``.parquet``, else HDF5 (NetCDF4)."""
-    import h5py
-
-    from rotordrop.files import atomic_path
+    from rotordrop.files import new_hdf5
 
     if not len(results):
         raise OutputError(f"{path}: the study has no finished drops yet; run it first")
     if Path(path).suffix.lower() == ".parquet":
         _save_parquet(results, Path(path))
         return
-    with atomic_path(Path(path)) as temporary, h5py.File(temporary, "w", track_order=True) as file:
+    with new_hdf5(path, track_order=True) as file:
         file.attrs["format"] = "rotordrop study results 1"
         file.attrs["study"] = results.study.name
         file.attrs["digest"] = results.study.digest

@@ -75,6 +75,76 @@ def test_every_path_of_every_command_is_known_as_read_or_written(verb):
             assert name in (*OUTPUTS, *FILLED), f"{verb.name} writes {name}: is it kept apart?"
 
 
+def _call(verb, option: str, place: str) -> list[str]:
+    """A call of a verb with one output; what else it asks for is no file that is there."""
+    words = []
+    for parameter in verb.load().params:
+        if parameter.required and parameter.name != option:
+            named = [parameter.opts[0]] if parameter.param_type_name == "option" else []
+            words += [*named, SAMPLES.get(parameter.metavar, "nothing.toml")]
+        if parameter.name == option:
+            words += [parameter.opts[0], place] if parameter.param_type_name == "option" else [place]
+    return [*verb.name.split(), *words]
+
+
+SAMPLES = {"ACTION": "show", "SPEED": "60 Hz", "COLUMN": "NDE.peak_force", "LIMIT": "12 kN"}
+WRITTEN = [
+    pytest.param(verb, name, id=f"{verb.name} {name}")
+    for verb in app.VerbTable.verbs().values()
+    for name in (parameter.name for parameter in verb.load().params)
+    if name in OUTPUTS
+]
+
+
+@pytest.mark.parametrize(("verb", "option"), WRITTEN)
+@pytest.mark.parametrize(
+    "place", ["missing", "deleted", "deleted, by its name", "read-only", "a folder", "a long name"]
+)
+def test_a_place_that_takes_no_file_is_said_before_anything_is_read(
+    verb, option, place, tmp_path, monkeypatch, capsys
+):
+    folder = tmp_path / "place"
+    folder.mkdir()
+    file, words = str(folder / "o.json"), "does not exist; create it first"
+    if place == "missing":
+        file = str(folder / "none" / "o.json")
+    if place.startswith("deleted"):
+        monkeypatch.chdir(folder)
+        folder.rmdir()
+        if place == "deleted":
+            file, words = "o.json", "the folder you are in has been deleted"
+    if place == "read-only":
+        monkeypatch.setattr(os, "access", lambda path, mode: False)
+        words = "is read-only; choose another"
+    if place == "a folder":
+        file, words = str(folder), "it is a folder; name a file in it"
+    if place == "a long name":
+        file, words = str(folder / ("x" * 300)), "File name too long; choose another place"
+    try:
+        assert run(_call(verb, option, file)) == 6
+    finally:
+        monkeypatch.undo()
+    assert words in _told(capsys)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("check", "{machine}", "--json"),
+        ("check", "{machine}", "--report"),
+        ("critical-speeds", "{machine}", "--json"),
+        ("schema", "machine", "--force", "--output"),
+        ("bearings", "7014", "--json"),
+        ("doctor", "--json"),
+    ],
+    ids=" ".join,
+)
+def test_a_full_disk_is_a_sentence(machine, words, capsys):
+    assert run([*(word.format(machine=machine) for word in words), "/dev/full"]) == 6
+    assert "cannot write /dev/full: No space left on device" in _told(capsys)
+
+
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252", "utf-8"])
 @pytest.mark.parametrize("arguments", [[], ["--json", "-"]])
 def test_any_encoding_of_the_terminal_will_do(machine, encoding, arguments):

@@ -1,0 +1,341 @@
+"""Every file that the program writes and reads again: damaged, it ends in a sentence and never silently.
+
+Whoever makes the program write another file is asked for a row here by the last test.
+"""
+
+from __future__ import annotations
+
+import ast
+import json
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from tests.published import bearing, published, value
+from tests.unit.ledger.test_ledger import DROP
+from tests.unit.study.test_study import study_with
+
+import rotordrop
+from rotordrop import DropCase, example_machine, load_machine, save_machine, simulate_drop
+from rotordrop.errors import RotordropError
+from rotordrop.estimate.published import read_drop
+from rotordrop.files import write_json
+from rotordrop.ledger import add_drop
+from rotordrop.ledger.book import allow, read_log
+from rotordrop.machine.ross_files import read_ross, write_ross
+from rotordrop.record.profile import Profile, load_profile, save_profile
+from rotordrop.record.readers import read_recording
+from rotordrop.record.recording import Channel, Recording
+from rotordrop.record.writers import write_delimited, write_hdf5
+from rotordrop.simulate.checkpoint import load_checkpoint, save_checkpoint
+from rotordrop.simulate.coast_down import CoastDownCase, simulate_coast_down
+from rotordrop.simulate.coast_down_file import load_coast_down
+from rotordrop.simulate.result import load_result
+from rotordrop.study.folder import Shard, open_folder, publish, study_of
+from rotordrop.study.quantities import columns_of
+from rotordrop.study.summary import load_results
+from rotordrop.web.running import publish as publish_result
+from rotordrop.web.running import result_folder, state_of, write_state
+from rotordrop.web.traces import open_traces, write_traces
+from rotordrop.web.workspace import Job, Workspace
+
+SOURCE = Path(rotordrop.__file__).parent
+
+
+@dataclass(frozen=True)
+class Written:
+    """A kind of file: who writes it, how one is made, and what reads it."""
+
+    by: tuple[str, ...]
+    make: Callable[[Path], Path]
+    read: Callable[[Path], Any]
+    sealed: bool = False
+    """Whether a digest lets nothing pass that was changed."""
+
+
+def _machine(folder: Path) -> Path:
+    save_machine(example_machine("small"), folder / "m.toml")
+    return folder / "m.toml"
+
+
+def _ross(folder: Path) -> Path:
+    write_ross(example_machine("small").rotor, folder / "rotor.toml")
+    return folder / "rotor.toml"
+
+
+def _profile(folder: Path) -> Path:
+    save_profile(Profile(channels={"NDE_A": "S1", "NDE_B": "S2"}, sensitivity="8 mV/um"), folder / "p.toml")
+    return folder / "p.toml"
+
+
+def _recording() -> Recording:
+    time = np.arange(400) / 5000.0
+    turning = 1e-5 * np.sin(2 * np.pi * 60 * time)
+    channels = [
+        Channel(name=name, label=name, unit="m", values=turning + shift, time=time)
+        for shift, name in zip((0.0, 1e-5), ("S1", "S2"), strict=True)
+    ]
+    return Recording(channels=tuple(channels), metadata={}, notes=(), warnings=())
+
+
+def _csv(folder: Path) -> Path:
+    write_delimited(_recording(), folder / "drop.csv")
+    return folder / "drop.csv"
+
+
+def _hdf5(folder: Path) -> Path:
+    write_hdf5(_recording(), folder / "drop.h5")
+    return folder / "drop.h5"
+
+
+def _recorded(path: Path) -> Recording:
+    return read_recording(path, Profile())
+
+
+@cache
+def _dropped() -> Any:
+    case = DropCase(speed=377.0, duration=2e-3, output_step=1e-4, reduction="quick")
+    return simulate_drop(example_machine("lp400"), case)
+
+
+def _drop(folder: Path) -> Path:
+    _dropped().save(folder / "drop.h5")
+    return folder / "drop.h5"
+
+
+def _coast_down(folder: Path) -> Path:
+    case = CoastDownCase(speed=1.0, duration=0.6, reduction="quick")
+    machine = example_machine("lp400").with_values({"speed.aero_linear": 0.1, "speed.aero_quadratic": 0.0})
+    simulate_coast_down(machine, case, output=folder / "c.h5")
+    return folder / "c.h5"
+
+
+def _checkpoint(folder: Path) -> Path:
+    save_checkpoint(folder, "d" * 64, {"state": np.arange(50.0), "time": np.array(0.5)})
+    return next(folder.iterdir())
+
+
+def _estimate(folder: Path) -> Path:
+    peaks = {"peak_force_N": value(3300.0, 3200.0, 3400.0), "peak_stress_Pa": value(1.5e9)}
+    write_json(folder / "e.json", published(machine="m", bearings={"NDE": bearing(peaks)}).as_json())
+    return folder / "e.json"
+
+
+def _log(folder: Path) -> Path:
+    for digest in "abc":
+        add_drop(folder / "drops.db", replace(DROP, sha256=digest * 64))
+    allow(folder / "drops.db", "LP-400", "2026", drops=12, source="contract")
+    return folder / "drops.db"
+
+
+def _study(part: str) -> Callable[[Path], Path]:
+    def make(folder: Path) -> Path:
+        study = study_with()
+        place = open_folder(study, folder / "study")
+        width = len(columns_of(study.machine))
+        for number in range(study.shards):
+            drops = study.drops_of(number)
+            values = np.arange(len(drops) * width, dtype=float).reshape(-1, width)
+            shard = Shard(
+                first=drops.start,
+                varied=study.values(drops.start, drops.stop),
+                numbers=values,
+                reasons=("",) * len(drops),
+            )
+            publish(place, study, number, shard)
+        return place.path / part
+
+    return make
+
+
+def _numbers(path: Path) -> Any:
+    folder = next(parent for parent in path.parents if parent.name == "study")
+    found = load_results(folder)
+    return study_of(folder).digest, [values.tolist() for values in found.numbers.values()]
+
+
+def _job(part: str) -> Callable[[Path], Path]:
+    def make(folder: Path) -> Path:
+        space = Workspace(folder)
+        space.prepare()
+        job = space.new_job("drop", {})
+        made = job.path / "look.made"
+        made.mkdir()
+        clock = np.arange(2000.0)
+        write_traces(made, "motion", clock, {"x0": np.sin(clock)})
+        write_json(made / "page.json", {"traces": {"name": "motion"}})
+        write_json(made / "document.json", {"sha256": "x"})
+        publish_result(job, "look", "0" * 16, made)
+        write_state(job, "look", {"state": "done", "run": "0" * 16})
+        return job.path / part
+
+    return make
+
+
+def _looked(path: Path) -> Any:
+    """What the page shows of a job: its file, its state, its result, its histories."""
+    job = Job(next(parent for parent in path.parents if parent.parent.name == "jobs"))
+    state = state_of(job, "look")
+    assert state is not None
+    if state["state"] == "failed":
+        raise RotordropError(state["error"])
+    folder = result_folder(job, "look")
+    assert folder is not None
+    traces = open_traces(folder, "motion", ("x0",))
+    return job.read()["name"], state, (folder / "page.json").read_text(), float(np.sum(traces.values))
+
+
+STUDY, WEB, RUN = "study.folder:", "web.", f"look.{'0' * 16}/"
+WRITTEN = {
+    "machine": Written(("machine.saving:save_machine", "cli._output:deliver_text"), _machine, load_machine),
+    "rotor of ROSS": Written(("machine.ross_files:write_ross",), _ross, read_ross),
+    "profile": Written(("record.profile:save_profile",), _profile, load_profile),
+    "record, text": Written(("record.writers:write_delimited",), _csv, _recorded),
+    "record, HDF5": Written(("record.writers:write_hdf5",), _hdf5, _recorded),
+    "drop": Written(("simulate.result:save",), _drop, load_result),
+    "coast-down": Written(
+        ("simulate.coast_down_file:write_coast_down", "simulate.coast_down_file:write_part"),
+        _coast_down,
+        load_coast_down,
+    ),
+    "checkpoint": Written(
+        ("simulate.checkpoint:save_checkpoint",),
+        _checkpoint,
+        lambda path: load_checkpoint(path.parent, "d" * 64),
+        sealed=True,
+    ),
+    "estimate": Written(("estimate.estimate:save", "cli._output:deliver"), _estimate, read_drop),
+    "log": Written((), _log, read_log, sealed=True),
+    "shard": Written((f"{STUDY}_write_sealed",), _study("shards/000001.npy"), _numbers, sealed=True),
+    "plan": Written((f"{STUDY}open_folder",), _study("plan.json"), _numbers, sealed=True),
+    "machine of a study": Written((f"{STUDY}open_folder",), _study("machine.toml"), _numbers, sealed=True),
+    "job": Written(
+        (f"{WEB}workspace:write", f"{WEB}workspace:new_job", f"{WEB}workspace:_give_digests"),
+        _job("job.json"),
+        _looked,
+        sealed=True,
+    ),
+    "state": Written((f"{WEB}running:write_state",), _job("look.state.json"), _looked, sealed=True),
+    "result": Written((f"{WEB}running:publish",), _job("look.result.json"), _looked, sealed=True),
+    "trace": Written((f"{WEB}traces:write_traces",), _job(f"{RUN}motion.values.npy"), _looked, sealed=True),
+    "page": Written(
+        (
+            *(f"{WEB}drawn:write_{what}" for what in ("look", "estimate", "waterfall")),
+            f"{WEB}drawn:_falls",
+            f"{WEB}child:_channels",
+        ),
+        _job(f"{RUN}page.json"),
+        _looked,
+        sealed=True,
+    ),
+}
+NEVER_READ = {
+    "report.page:write_page": "for people",
+    "report.csv_files:write_data": "for people and other programs",
+    "cli._terminal:open_streams": "the null device",
+    "cli.log:_export": "a table for other programs",
+    "cli.machine:_copy_example": "what the package brings, read as a machine and a record",
+    "estimate.histories:_csv": "a table for other programs",
+    "estimate.histories:_mat": "for MATLAB",
+    "estimate.histories:_parquet": "for other programs",
+    "estimate.histories:_hdf5": "for other programs",
+    "spectrum.findings_file:write_findings": "for other programs",
+    "study.summary:save_results": "for other programs",
+    "study.summary:_save_parquet": "for other programs",
+    "web.workspace:token": "whatever is no token is replaced by one",
+    "web.workspace:receive": "what was sent; its digest stands in the job",
+    "web.running:_begin": "the number of a process; whatever is none is passed over",
+    "record.readers.__init__:read_gzip": "a temporary copy",
+}
+
+
+@pytest.mark.parametrize("kind", WRITTEN)
+def test_a_damaged_file_ends_in_a_sentence_and_never_silently(kind, tmp_path):
+    entry = WRITTEN[kind]
+    file = entry.make(tmp_path)
+    whole, expected = file.read_bytes(), entry.read(file)
+    for what, damaged in _damaged(whole, kind):
+        file.write_bytes(damaged)
+        try:
+            found = entry.read(file)
+        except RotordropError as refusal:
+            assert len(str(refusal)) > 20, what
+        else:
+            assert not entry.sealed or repr(found) == repr(expected), f"{what} of {kind} was silent"
+    file.write_bytes(whole)
+    assert repr(entry.read(file)) == repr(expected)
+
+
+def _damaged(whole: bytes, kind: str) -> list[tuple[str, bytes]]:
+    random = np.random.default_rng(list(kind.encode()))
+    found = []
+    for bit in random.integers(0, 8 * len(whole), 20).tolist():
+        raw = bytearray(whole)
+        raw[bit // 8] ^= 1 << bit % 8
+        found.append((f"bit {bit}", bytes(raw)))
+    for at in random.integers(0, len(whole), 5).tolist():
+        found.append((f"zeros at {at}", whole[:at] + bytes(min(64, len(whole) - at)) + whole[at + 64 :]))
+        found.append((f"cut at {at}", whole[:at]))
+        found.append((f"lost at {at}", whole[:at] + whole[at + 16 :]))
+    found += [("empty", b""), ("a list", b"[]"), ("a table", b"{}"), ("noise", random.bytes(3000))]
+    found += [("other text", b"\xff\xfe" * 40), ("deep", b"[" * 100_000)]
+    return found
+
+
+@pytest.mark.parametrize("kind", ["drop", "coast-down", "estimate", "plan"])
+def test_a_file_of_another_version_is_refused_in_words(kind, tmp_path):
+    entry = WRITTEN[kind]
+    file = entry.make(tmp_path)
+    if file.suffix == ".h5":
+        with h5py.File(file, "a") as content:
+            content.attrs["format"] = re.sub(r"\d+$", "999", content.attrs["format"])
+    else:
+        told = json.loads(file.read_text())
+        told["format"] = told["format"] + 1 if isinstance(told["format"], int) else f"{told['format']}9"
+        write_json(file, told, sealed=kind == "plan")
+    with pytest.raises(RotordropError, match=r"999|format|version"):
+        entry.read(file)
+
+
+WRITERS = {
+    "write_json",
+    "write_text",
+    "atomic_path",
+    "atomic_folder",
+    "new_hdf5",
+    "write_bytes",
+    "File",
+    "savez",
+}
+
+
+def test_every_function_that_writes_a_file_is_told_here():
+    """Who writes a file that is read again has a row above, with its reader."""
+    writing = set()
+    for source in SOURCE.rglob("*.py"):
+        if source.name in ("files.py", "every_format.py"):
+            continue
+        module = ".".join(source.relative_to(SOURCE).with_suffix("").parts)
+        for function in ast.walk(ast.parse(source.read_text())):
+            if isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef):
+                calls = [node for node in ast.walk(function) if isinstance(node, ast.Call)]
+                if any(_writes(call) for call in calls):
+                    writing.add(f"{module}:{function.name}")
+    told = {name for entry in WRITTEN.values() for name in entry.by} | set(NEVER_READ)
+    assert writing - told == set(), "these write files that nobody damages"
+    assert told - writing == set(), "these write none any more"
+
+
+def _writes(call: ast.Call) -> bool:
+    name = getattr(call.func, "attr", getattr(call.func, "id", ""))
+    if name == "File":
+        return any(isinstance(one, ast.Constant) and one.value in ("w", "a") for one in call.args)
+    if name == "open":
+        return any(isinstance(one, ast.Constant) and str(one.value) in ("wb", "w") for one in call.args)
+    return name in WRITERS
