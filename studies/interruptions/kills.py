@@ -10,6 +10,7 @@ not its start. One line of ``results/kills.jsonl`` each; a run that was stopped 
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 import io
 import json
@@ -21,14 +22,22 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import AsyncIterator, Callable
 from contextlib import redirect_stderr, redirect_stdout
+from functools import partial
 from pathlib import Path
 
 import h5py
 
 from rotordrop.cli.app import run
-from rotordrop.machine import example_path
+from rotordrop.errors import RotordropError
+from rotordrop.ledger.book import read_log
+from rotordrop.machine import example_path, load_machine, save_machine
 from rotordrop.record import example_record_path
+from rotordrop.study.summary import load_results
+from rotordrop.web import child
+from rotordrop.web.running import result_folder, write_state
+from rotordrop.web.workspace import Workspace, receive
 
 RESULTS = Path(__file__).parent / "results" / "kills.jsonl"
 COMMANDS = {
@@ -37,12 +46,25 @@ COMMANDS = {
     "init": "init out.toml --force",
     "profile": "profile {record} -o out.toml",
     "simulate": "simulate machine.toml --speed 60Hz --duration 0.02s -o out.h5 --json out.json",
-    "synthesize": "synthesize machine.toml --speed 60Hz --duration 0.05s -o made --seed 3",
+    "log": "log allow out.db --machine LP-400 --drops {number} --source contract",
+    "study": "study run study.toml --folder study --threads 1",
+    "coast-down": "coast-down machine.toml --speed 0.3Hz --duration 2s --reduction quick -o coast.h5",
+    "page": "page",
 }
+"""What is killed; ``page`` is a job of the page, from the upload to the result of a look."""
+STUDY = """machine = "machine.toml"
+drops = 12
+shard = 2
+duration = "10 ms"
+reduction = "quick"
+vary.speed = {uniform = ["60 Hz", "200 Hz"]}
+"""
 
 
 def whole(path: Path) -> bool:
     """Whether a file is complete by its kind."""
+    if "page" in path.parts:
+        return True  # told as a whole by `lost`
     try:
         if path.suffix == ".json":
             json.loads(path.read_text())
@@ -57,7 +79,50 @@ def whole(path: Path) -> bool:
     return True
 
 
-def _start(words: list[str]) -> int:
+def lost(folder: Path) -> list[str]:
+    """What of a study, a log and the jobs of the page is not what was written."""
+    found = []
+    readers: list[tuple[Path, Callable[[], object]]] = [
+        (folder / "study" / "plan.json", lambda: load_results(folder / "study")),
+        (folder / "out.db", lambda: read_log(folder / "out.db")),
+    ]
+    if (folder / "page" / "jobs").is_dir():
+        for job in Workspace(folder / "page").jobs():
+            readers.append((job.path, job.read))
+            readers.append((job.path, partial(job.file, "record")))
+            readers.append((job.path, partial(result_folder, job, "look")))
+    for path, read in readers:
+        try:
+            if path.exists():
+                read()
+        except RotordropError as error:
+            found.append(str(error))
+    return found
+
+
+def _look_on_the_page(record: str) -> int:
+    """One job, in this process: made, sent, looked at; the oldest goes."""
+    space = Workspace(Path("page"))
+    space.prepare()
+    for old in space.jobs()[1:]:
+        old.remove()
+    job = space.new_job("drop", {})
+
+    async def body() -> AsyncIterator[bytes]:
+        yield Path(record).read_bytes()
+
+    asyncio.run(receive(space, job, "record", record, None, body()))
+    options = {"gap": "300 um", "speed": "60 Hz"}
+    write_state(job, "look", {"state": "running", "run": os.urandom(8).hex(), "options": options})
+    child.main({"job": str(job.path), "verb": "look"})
+    return 0
+
+
+def _called(words: list[str], record: str) -> int:
+    return _look_on_the_page(record) if words == ["page"] else run(words)
+
+
+def _start(words: list[str], record: str) -> int:
     """Run a command in a copy of this process with a group of its own; its number."""
     number = os.fork()
     if number:
@@ -66,7 +131,7 @@ def _start(words: list[str]) -> int:
     quiet = os.open(os.devnull, os.O_WRONLY)
     os.dup2(quiet, 1)
     os.dup2(quiet, 2)
-    os._exit(run(words))
+    os._exit(_called(words, record))
 
 
 def _ended(number: int) -> bool:
@@ -79,7 +144,13 @@ def _folder(path: Path) -> tuple[list[Path], str]:
         shutil.copy(extra, path / extra.name.replace(f"{source.stem}.toml", "machine.toml"))
     record = path / "record.h5"
     shutil.copy(example_record_path("lp400_drop_060"), record)
-    return [path / "machine.toml", record], record.name
+    machine = path / "machine.toml"
+    machine.write_text(machine.read_text() + "\n")
+    save_machine(
+        load_machine(machine).with_values({"speed.aero_linear": 0.1, "speed.aero_quadratic": 0.0}), machine
+    )
+    (path / "study.toml").write_text(STUDY)
+    return [machine, record, path / "study.toml"], record.name
 
 
 def _hashes(paths: list[Path]) -> list[str]:
@@ -91,16 +162,20 @@ def one(
 ) -> dict[str, object]:
     """Kill one command and look at what is there."""
     name = list(COMMANDS)[number % len(COMMANDS)]
-    words = COMMANDS[name].format(record=record).split()
+    words = COMMANDS[name].format(record=record, number=number + 1).split()
+    if number % 3 == 0:  # two of three find what the one before left, and go on with it
+        shutil.rmtree(folder / "study", ignore_errors=True)
+    shutil.rmtree(folder / "coast.h5.partial", ignore_errors=True)
     if name not in took:
         with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
-            run(words)
+            _called(words, record)
+            shutil.rmtree(folder / "study", ignore_errors=True)
             begun = time.perf_counter()
-            run(words)
+            _called(words, record)
         took[name] = time.perf_counter() - begun
     before = _hashes(inputs)
     dice = random.Random(number)
-    running = _start(words)
+    running = _start(words, record)
     time.sleep(dice.uniform(0.02, 1.05) * took[name])
     ended = _ended(running)
     if not ended:
@@ -112,7 +187,7 @@ def one(
         "number": number,
         "command": name,
         "killed": not ended,
-        "broken": [path.name for path in shown if not whole(path)],
+        "broken": [path.name for path in shown if not whole(path)] + lost(folder),
         "inputs kept": before == _hashes(inputs),
         "hidden": len(files) - len(shown),
     }
