@@ -89,6 +89,8 @@ def time_panels(
     for i, row in enumerate(rows, start=1):
         for j, panel in enumerate(row, start=1):
             _draw(figure, panel, scale, unit, i, j, legend)
+            if j == 1 or panel.axis != row[j - 2].axis:  # one title for neighbours that show the same
+                figure.update_yaxes(title_text=axis_title(panel.axis, unit), row=i, col=j)
     label_time(figure, row=len(rows))
     drawn = [history.time for row in rows for panel in row for history in panel.histories]
     if any(float(np.ptp(time)) > LONG for time in drawn if len(time)):
@@ -129,7 +131,6 @@ def _draw(
         add_level(figure, scale * level, name, **place, legend=first(name))
     if panel.peak is not None:
         _mark(figure, panel.peak, scale, unit, row, column)
-    figure.update_yaxes(title_text=axis_title(panel.axis, unit), row=row, col=column)
 
 
 def _mark(figure: go.Figure, peak: Peak, scale: float, unit: str, row: int, column: int) -> None:

@@ -47,7 +47,8 @@
 
   function resize(width, share) {
     drawn.forEach(function (element) {
-      var height = Math.round(share * Number(element.getAttribute("data-height")));
+      var first = element.closest(".front") ? 1.0 : share;
+      var height = Math.round(first * Number(element.getAttribute("data-height")));
       element.style.height = height + "px";
       Plotly.relayout(element, { width: width, height: height, autosize: width === null });
     });
