@@ -40,6 +40,8 @@ if TYPE_CHECKING:
     from rotordrop.study import load_study as load_study
     from rotordrop.study import run_study as run_study
     from rotordrop.study import sweep as sweep
+    from rotordrop.track.force_estimate import ForceEstimate as ForceEstimate
+    from rotordrop.track.force_estimate import estimate_force as estimate_force
     from rotordrop.twin.calibrated import calibrate_machine as calibrate_machine
     from rotordrop.units import format_quantity as format_quantity
     from rotordrop.units import parse_quantity as parse_quantity
@@ -48,6 +50,7 @@ _PUBLIC = {
     "DropCase": "rotordrop.simulate.case",
     "DropModel": "rotordrop.rotor.parameters",
     "DropResult": "rotordrop.simulate.result",
+    "ForceEstimate": "rotordrop.track.force_estimate",
     "Known": "rotordrop.known",
     "LevitatedStart": "rotordrop.simulate.case",
     "Machine": "rotordrop.machine",
@@ -62,6 +65,7 @@ _PUBLIC = {
     "check_record": "rotordrop.evidence",
     "estimate_drop": "rotordrop.estimation",
     "estimate_drops": "rotordrop.estimation",
+    "estimate_force": "rotordrop.track.force_estimate",
     "find_bearing": "rotordrop.elements.catalog.lookup",
     "example_machine": "rotordrop.machine",
     "example_record_path": "rotordrop.record",

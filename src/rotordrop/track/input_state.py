@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.elements.race_bearing import numbers_of
-from rotordrop.rotor.parameters import DropModel
 from rotordrop.track.forces import stress_at_force
 from rotordrop.track.problem import DropProblem
 
@@ -181,13 +180,13 @@ def input_state_estimate(problem: DropProblem, corrections: SensorCorrections) -
         if look == 1:
             turn = _likeliest_turn(rotor, readings[early], closed[early], local[early], turn)
         passed = forward_pass(rotor, readings, closed, local, turn)
-        shown, variance = _backward(rotor, passed, variances=look == LOOKS - 1)
+        shown, variance = backward_pass(rotor, passed, variances=look == LOOKS - 1)
         force, fitted = shown[:, : closed.shape[1]], shown[:, closed.shape[1] :]
         local = _local_force(force, max(1, round(LOCAL * math.pi / (turn * rotor.dt))))
     # What smoothing took from the peaks is in what is left of the readings: found there in the same way, it
     # is put back ("twicing").
     smoothed_peak = _size(force).max(axis=0)
-    force = force + _again(rotor, passed, readings - fitted)[:, : closed.shape[1]]
+    force = force + pass_again(rotor, passed, readings - fitted)[:, : closed.shape[1]]
     peak = _size(force).max(axis=0)
     put_back = np.minimum(np.abs(peak - smoothed_peak) / np.maximum(peak, 1e-300), 1.0)
     peak_error = np.hypot(LEAST_PEAK_ERROR, PUT_BACK_ERROR * put_back)
@@ -242,32 +241,31 @@ def _local_force(force: Array, half: int) -> Array:
     return np.repeat(largest, 2, axis=1)
 
 
-def _transition(model: DropModel, speed: float, dt: float) -> tuple[Array, Array, int]:
-    """Discrete transition of ``[motion, forces, rates]`` and the gravity step, by the matrix exponential."""
+def transition(
+    stiffness: Array, damping: Array, push: Array, weight: Array, dt: float
+) -> tuple[Array, Array, int]:
+    """Transition of ``[motion, forces, rates]`` over ``dt`` [s], the step by the weight, size of the motion.
+
+    The motion is that of ``q̈ + C q̇ + K q = push · forces + weight`` with unit masses; a force runs on along a
+    straight line.
+    """
     from scipy.linalg import expm
 
-    p = model.parameters
-    m, n_b = len(p.eigenvalue), len(p.bearing_shape)
-    n, k = 4 * m, 2 * n_b
-    size = n + 2 * k + 1
-    A = np.zeros((size, size))
-    A[: 2 * m, 2 * m : n] = np.eye(2 * m)
-    for axis, sign in ((0, -1.0), (1, 1.0)):
-        rows = slice(2 * m + axis * m, 2 * m + (axis + 1) * m)
-        A[rows, axis * m : (axis + 1) * m] = -np.diag(p.eigenvalue)
-        A[rows, rows] = -np.diag(p.damping)
-        other = slice(2 * m + (1 - axis) * m, 2 * m + (2 - axis) * m)
-        A[rows, other] = sign * speed * p.polar
-        for b in range(n_b):
-            A[rows, n + 2 * b + axis] = -p.bearing_shape[b]
-    A[3 * m : n, -1] = p.gravity
+    m, k = push.shape
+    n = 2 * m
+    A = np.zeros((n + 2 * k + 1, n + 2 * k + 1))
+    A[:m, m:n] = np.eye(m)
+    A[m:n, :m] = -stiffness
+    A[m:n, m:n] = -damping
+    A[m:n, n : n + k] = push
+    A[m:n, -1] = weight
     A[n : n + k, n + k : n + 2 * k] = np.eye(k)
     E = expm(A * dt)
     return E[:-1, :-1], E[:-1, -1], n
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Rotor:
+class ForcedRotor:
     """The rotor under unknown forces, in samples: N readings, C channels, K force components, n states.
 
     ``forces`` are the places of the force components among the states; their rates follow them.
@@ -282,19 +280,28 @@ class _Rotor:
     start_covariance: Array
     variances: Array
     weight: Array
+    places: Array | None = None
+    """Rows of displacements that are wanted beside the readings, shape (D, n)."""
 
     @property
     def watched(self) -> Array:
-        """Rows of forces and readings (K + C, n)."""
-        return np.concatenate([np.eye(len(self.A))[self.forces], self.C])
+        """Rows of forces, readings and wanted displacements (K + C + D, n)."""
+        wanted = [] if self.places is None else [self.places]
+        return np.concatenate([np.eye(len(self.A))[self.forces], self.C, *wanted])
 
 
-def rotor_of(problem: DropProblem) -> _Rotor:
+def rotor_of(problem: DropProblem) -> ForcedRotor:
     """The rotor of a problem under unknown forces at its bearings."""
     model = problem.model
+    p = model.parameters
     dt = float(problem.time[1] - problem.time[0])
-    A, gravity, n = _transition(model, float(problem.mean[model.layout.rotor_speed]), dt)
-    m, k = model.layout.n_modes, 2 * len(model.parameters.bearing_shape)
+    m, k = model.layout.n_modes, 2 * len(p.bearing_shape)
+    turned = float(problem.mean[model.layout.rotor_speed]) * p.polar
+    push, weight = np.zeros((2 * m, k)), np.zeros(2 * m)
+    push[:m, 0::2] = push[m:, 1::2] = -p.bearing_shape.T
+    weight[m:] = p.gravity
+    damping = np.block([[np.diag(p.damping), turned], [-turned, np.diag(p.damping)]])
+    A, gravity, n = transition(np.diag(np.tile(p.eigenvalue, 2)), damping, push, weight, dt)
     C = np.zeros((problem.n_channels, len(A)))
     C[:, : 2 * m] = problem.sensor_rows[:, : 2 * m]
     start, variance = np.zeros(len(A)), np.zeros(len(A))
@@ -302,7 +309,7 @@ def rotor_of(problem: DropProblem) -> _Rotor:
     start[: 2 * m] = problem.mean[: 2 * m]
     variance[: 2 * m] = known[: 2 * m]
     variance[2 * m : n] = known[model.layout.velocity_of(slice(0, 2 * m))]
-    return _Rotor(
+    return ForcedRotor(
         dt=dt,
         A=A,
         gravity=gravity,
@@ -316,7 +323,7 @@ def rotor_of(problem: DropProblem) -> _Rotor:
 
 
 def _likeliest_turn(
-    rotor: _Rotor, readings: Array, closed: NDArray[np.bool_], local: Array, turn: float
+    rotor: ForcedRotor, readings: Array, closed: NDArray[np.bool_], local: Array, turn: float
 ) -> float:
     """Angular frequency of the contacts [rad/s] that makes the readings likeliest, by a parabola."""
 
@@ -351,7 +358,7 @@ class _Update:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Passed:
+class Passed:
     """A forward pass: what the smoother needs, and how improbable the readings are.
 
     One entry per sample: updates by gate and readings, what is watched, and its rows of the covariance.
@@ -364,8 +371,8 @@ class _Passed:
 
 
 def forward_pass(
-    rotor: _Rotor, readings: Array, closed: NDArray[np.bool_], local: Array, turn: float
-) -> _Passed:
+    rotor: ForcedRotor, readings: Array, closed: NDArray[np.bool_], local: Array, turn: float
+) -> Passed:
     """Kalman filter over the readings (N, C) with unknown forces of local size (N, K) [N]."""
     dt, f = rotor.dt, rotor.forces
     k = f.stop - f.start
@@ -409,10 +416,10 @@ def forward_pass(
             negative_log_likelihood += 0.5 * float(e @ done[-1].whitened - np.linalg.slogdet(inverse)[1])
         updates.append(done)
         shown[i], rows[i] = watched @ x, watched @ P
-    return _Passed(updates=updates, shown=shown, rows=rows, negative_log_likelihood=negative_log_likelihood)
+    return Passed(updates=updates, shown=shown, rows=rows, negative_log_likelihood=negative_log_likelihood)
 
 
-def _backward(rotor: _Rotor, passed: _Passed, *, variances: bool = True) -> tuple[Array, Array]:
+def backward_pass(rotor: ForcedRotor, passed: Passed, *, variances: bool = True) -> tuple[Array, Array]:
     """Smoothed forces and readings (N, K + C), variances of the forces (N, K): modified Bryson–Frazier."""
     size, f = len(rotor.A), rotor.forces
     k = f.stop - f.start
@@ -435,7 +442,7 @@ def _backward(rotor: _Rotor, passed: _Passed, *, variances: bool = True) -> tupl
     return shown, variance
 
 
-def _again(rotor: _Rotor, passed: _Passed, left: Array) -> Array:
+def pass_again(rotor: ForcedRotor, passed: Passed, left: Array) -> Array:
     """Forces (N, K) that the same filter and smoother find in other readings (N, C), from rest.
 
     Gains do not depend on readings, so that this is a fraction of the work of a pass.
@@ -451,4 +458,4 @@ def _again(rotor: _Rotor, passed: _Passed, left: Array) -> Array:
             done.append(replace(update, whitened=update.inverse @ e))
         shown[i] = rotor.watched @ x
         updates.append(done)
-    return _backward(rotor, replace(passed, updates=updates, shown=shown), variances=False)[0]
+    return backward_pass(rotor, replace(passed, updates=updates, shown=shown), variances=False)[0]
