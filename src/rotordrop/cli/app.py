@@ -108,6 +108,7 @@ NOW = {
     "fingerprint": "rotordrop doctor --fingerprint",
     "changed": "rotordrop compare BEFORE AFTER --changes",
     "split": "rotordrop look RECORD MACHINE --split FOLDER",
+    "share": "rotordrop look RECORD --share FILE --licence CC-BY-4.0",
     "rare": "rotordrop study rare",
     "design": "rotordrop study design",
     "repeat": "rotordrop study repeat",
@@ -117,7 +118,7 @@ NOW = {
     "score": "rotordrop-bench score",
     "bench": "rotordrop-bench list, make or score-all",
 }
-"""What has another name now."""
+"""What has another name now, or is looked for under one."""
 
 # Typer carries its own copy of click in new versions and uses the installed one in old versions.
 _CallError: type[Exception] = next(c for c in typer.BadParameter.__mro__ if c.__name__ == "ClickException")

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from rotordrop.machine import Machine
     from rotordrop.spectrum.coast_down import CoastDownSignal
 
+Licence = StrEnum("Licence", {"zero": "CC0-1.0", "by": "CC-BY-4.0", "share_alike": "CC-BY-SA-4.0"})
+"""Licences under which a record may be shared."""
+
 
 def look(
     record: Annotated[Path, Argument(metavar="RECORD", help="Recorded drop.", show_default=False)],
@@ -39,6 +42,16 @@ def look(
             file_okay=False,
         ),
     ] = None,
+    share: Annotated[
+        Path | None,
+        file_option(
+            "--share", "Write the record without names, header and paths as HDF5, and look no further."
+        ),
+    ] = None,
+    licence: Annotated[Licence | None, Option(help="Under which it may be used; goes with --share.")] = None,
+    channel: Annotated[
+        list[str] | None, text_option("NAME", "Channel to share; repeatable, all when left out.")
+    ] = None,
     report: options.Report = None,
     json: options.Json = None,
 ) -> None:
@@ -50,10 +63,16 @@ def look(
         raise UsageError(
             "--split needs the machine file too: rotordrop look both.h5 machine.toml --split parts"
         )
-    if split is not None:
-        others = {"--gap": gap, "--speed": speed, "--report": report, "--json": json}
-        refuse_beside("--split", others)
+    others = {"--gap": gap, "--speed": speed, "--report": report, "--json": json}
+    for option, given in (("--split", split), ("--share", share)):
+        if given is not None:
+            refuse_beside(option, {**others, "--split": split if option == "--share" else None})
+    if share is None and (licence or channel):
+        raise UsageError("--licence and --channel say how a record is shared; give --share FILE.h5 too")
     described = _loaded(machine)
+    if share is not None:
+        _share(record, share, licence, described, channel or (), mapping or (), profile)
+        return
     if split is not None and described is not None:
         _split(record, described, split, mapping or (), profile)
         return
@@ -91,6 +110,31 @@ def _split(
     for part, place in zip(parts, places, strict=True):
         save_record(part, place)
         console().print(f"{place}: {part.time[0]:.6g} to {part.time[-1]:.6g} s, {len(part.time)} samples")
+
+
+def _share(
+    record: Path,
+    place: Path,
+    licence: Licence | None,
+    machine: Machine | None,
+    channels: Sequence[str],
+    mapping: Sequence[str],
+    profile: Path | None,
+) -> None:
+    """Write a record for others, and say what is in it and what is not."""
+    from rotordrop.record.profile import rules_of
+    from rotordrop.record.share import LICENCES, share_record, shared_files
+
+    if licence is None:
+        raise UsageError(f"--share needs a licence: --licence {LICENCES[1]}, one of {', '.join(LICENCES)}")
+    require_places(*shared_files(place, with_machine=machine is not None))
+    rules = rules_of(profile, mapping)
+    done = share_record(record, place, licence.value, machine=machine, channels=channels, profile=rules)
+    out = console()
+    for file, digest in done.files.items():
+        out.print(f"{file}: SHA-256 {digest}")
+    out.print(f"channels: {', '.join(f'{new} (here {old})' for new, old in done.channels.items())}")
+    out.print(f"left out: {', '.join(done.left_out)}")
 
 
 def profile(
