@@ -69,6 +69,10 @@ def unbalance_response(
         float | None, measured("speed", "Highest speed; 1.5 × nominal when left out.")
     ] = None,
     held: Annotated[Held | None, Option(help="What holds the rotor; its AMBs where it has some.")] = None,
+    run_up: Annotated[
+        float | None,
+        measured("time", 'Run up from standstill in this time, "20 s"; steady at each speed when left out.'),
+    ] = None,
     report: options.Report = None,
     data: options.Data = None,
     json: options.Json = None,
@@ -79,13 +83,14 @@ def unbalance_response(
     """
     from rotordrop.machine import load_machine
     from rotordrop.report.unbalance_page import unbalance_json, unbalance_page
-    from rotordrop.rotor.unbalanced import resolved_response
+    from rotordrop.rotor.unbalanced import resolved_response, run_up_response
 
     described = load_machine(machine)
     chosen = held or (Held.ambs if described.ambs else Held.touchdown_bearings)
     if chosen is Held.free_free:
         raise UsageError("nothing holds a free rotor: choose 'AMBs' or 'touchdown bearings'")
     top = top_speed or BEYOND * float(described.speed.nominal)
-    response = resolved_response(described, top, chosen.value)
-    page = unbalance_page(described, response)
-    deliver(unbalance_json(described, response), json, page, report=report, data=data)
+    steady = resolved_response(described, top, chosen.value)
+    rising = None if run_up is None else run_up_response(described, top, run_up, chosen.value)
+    page = unbalance_page(described, steady, rising)
+    deliver(unbalance_json(described, steady, rising), json, page, report=report, data=data)

@@ -91,8 +91,10 @@ def _peaks(response: MachineResponse, node: int) -> tuple[ResponsePeak, ...]:
     return tuple(peak for peak in response_peaks(response.speed, amplitude) if peak.amplitude >= least)
 
 
-def unbalance_page(machine: Machine, response: MachineResponse) -> ReportContent:
-    """Build the report on the response of a machine to its unbalance."""
+def unbalance_page(
+    machine: Machine, response: MachineResponse, rising: MachineResponse | None = None
+) -> ReportContent:
+    """Build the report on the steady response of a machine to its unbalance, and on a run-up if asked for."""
     nominal = float(machine.speed.nominal)
     peaks = plane_peaks(response, nominal)
     unbalance = (
@@ -120,12 +122,13 @@ def unbalance_page(machine: Machine, response: MachineResponse) -> ReportContent
     return ReportContent(
         title=f"Unbalance response of {machine.name}",
         subtitle=f"in its {response.suspension}, nominal speed {shown(nominal, 'speed')}",
-        verdict=_verdict(machine, response, peaks),
+        verdict=(*_verdict(machine, response, peaks), *_rise(response, rising)),
         facts=(("machine", machine.name), ("rotordrop", __version__)),
         summary=(peak_table(peaks), table(response.unbalance, unbalance, "Unbalance")),
         sections=(
             Section("Bode and polar plots", figures=(bode, polar)),
             Section("Deflected shapes", figures=(shapes,)),
+            *([] if rising is None else [Section("Run-up", figures=(_run_up_figure(rising, nominal),))]),
         ),
     )
 
@@ -149,6 +152,32 @@ def _verdict(
     if response.suspension == "AMBs":
         said.append(Statement(SPRINGS))
     return tuple(said)
+
+
+def _rise(steady: MachineResponse, rising: MachineResponse | None) -> tuple[Statement, ...]:
+    """What a run-up makes of the largest amplitude of every plane."""
+    if rising is None:
+        return ()
+    said = []
+    for name, node in rising.places:
+        risen, held = rising.major_axis(node), steady.major_axis(node)
+        said.append(
+            Statement(
+                f"{name}: in a run-up of {shown(rising.run_up, 'time')} at most "
+                f"{shown(risen.max(), 'length')} at {shown(rising.speed[risen.argmax()], 'speed')}; "
+                f"steady {shown(held.max(), 'length')} at "
+                f"{shown(steady.speed[held.argmax()], 'speed')}"
+            )
+        )
+    return tuple(said)
+
+
+def _run_up_figure(rising: MachineResponse, nominal: float) -> Figure:
+    caption = (
+        f"The same in a run-up of {shown(rising.run_up, 'time')}: the largest amplitude comes late, and "
+        "behind it the vibration that dies away beats with the unbalance."
+    )
+    return Figure(bode_figure(rising, nominal), caption, "run-up")
 
 
 def peak_table(peaks: Sequence[PlanePeak]) -> Table:
@@ -266,7 +295,9 @@ def _mark_places(figure: go.Figure, response: MachineResponse) -> None:
         )
 
 
-def unbalance_json(machine: Machine, response: MachineResponse) -> dict[str, Any]:
+def unbalance_json(
+    machine: Machine, response: MachineResponse, rising: MachineResponse | None = None
+) -> dict[str, Any]:
     """Everything the page shows, ready for JSON, SI units."""
 
     def complex_json(values: Any) -> dict[str, list[float]]:
@@ -280,7 +311,7 @@ def unbalance_json(machine: Machine, response: MachineResponse) -> dict[str, Any
             "amplification_factor": factor,
         }
 
-    return {
+    content: dict[str, Any] = {
         "machine": machine.name,
         "suspension": response.suspension,
         "nominal_Hz": float(machine.speed.nominal) / TURN,
@@ -301,3 +332,8 @@ def unbalance_json(machine: Machine, response: MachineResponse) -> dict[str, Any
             for name, node in response.places
         ],
     }
+    if rising is not None:
+        risen = unbalance_json(machine, rising)
+        planes = [{key: value for key, value in one.items() if key != "peaks"} for one in risen["planes"]]
+        content["run_up"] = {"duration_s": rising.run_up, "speed_Hz": risen["speed_Hz"], "planes": planes}
+    return content

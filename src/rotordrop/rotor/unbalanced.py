@@ -14,12 +14,19 @@ from rotordrop.rotor.assembly import build_rotor_fe
 from rotordrop.rotor.campbell import response_peaks
 from rotordrop.rotor.reduction import Reduction, reduce_rotor
 from rotordrop.rotor.suspension import suspension_of
-from rotordrop.rotor.whirl import unbalance_response
+from rotordrop.rotor.whirl import unbalance_response, unbalance_run_up
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 REDUCTION = Reduction(modes=16, attachment=True)
+
+RUN_UP_REDUCTION = Reduction(modes=8, attachment=True)
+"""Basis of a run-up: every step takes a matrix exponential."""
+TURN_PER_STEP = 0.5
+"""Turn of the rotor in a step of a run-up [rad]: no beat is faster than the rotor; chosen, not measured."""
+FEWEST_STEPS, MOST_STEPS = 400, 60_000
+"""Steps of a run-up; the most take half a minute."""
 
 SPEEDS, PEAK_SPEEDS, CLOSEST = 2001, 81, 200
 """Speeds of the even grid and across a sharp peak, and how many times closer two may lie than on the grid."""
@@ -44,6 +51,8 @@ class MachineResponse:
     """Planes of interest with their nodes, counted from 1."""
     unbalance: tuple[tuple[int, float, float], ...]
     """Node, amount [kg m] and phase from +y [rad] of every unbalance."""
+    run_up: float | None = None
+    """Time [s] in which the speed rose evenly over `speed`; None where it was steady at each."""
 
     def at(self, node: int) -> ComplexArray:
         """Displacement (x, y) at a node [m], shape (S, 2)."""
@@ -70,18 +79,10 @@ def machine_response(machine: Machine, speeds: ArrayLike, suspension: str) -> Ma
 
     The machine needs unbalances, or a balance grade, which says nothing of their phases.
     """
-    if not machine.unbalances:
-        raise UsageError(
-            f"machine {machine.name!r} has no unbalance; add [balance_grade] or [[unbalances]] to its file"
-        )
+    known, forces = _unbalances_of(machine)
     supports = suspension_of(machine, suspension)
     fe = build_rotor_fe(machine)
-    known = tuple((one.node, float(one.amount), float(one.phase)) for one in machine.unbalances)
-    forces: dict[int, complex] = {}
-    for node, amount, phase in known:
-        forces[node] = forces.get(node, 0.0) + amount * complex(np.exp(1j * (0.5 * math.pi + phase)))
-    nodes = [*(support.node for support in supports), *forces]
-    basis = reduce_rotor(fe, REDUCTION, list(dict.fromkeys(nodes)))
+    basis = reduce_rotor(fe, REDUCTION, [*(support.node for support in supports), *forces])
     grid = np.atleast_1d(np.asarray(speeds, dtype=np.float64))
     return MachineResponse(
         suspension=suspension,
@@ -91,6 +92,54 @@ def machine_response(machine: Machine, speeds: ArrayLike, suspension: str) -> Ma
         places=_places(machine),
         unbalance=known,
     )
+
+
+def run_up_response(
+    machine: Machine, top: float, duration: float, suspension: str, start: float = 0.0
+) -> MachineResponse:
+    """Synchronous response while the speed rises evenly from `start` to `top` [rad/s] in a time [s].
+
+    It begins as at the steady start speed. Behind a critical speed the free vibration that is left beats with
+    the unbalance: the value turns with the rotor, as a tracking filter of any width would show it.
+    """
+    if not (0.0 <= start < top and duration > 0.0):
+        raise UsageError(
+            f"a run-up from {start:g} to {top:g} rad/s in {duration:g} s is none; expected a rise of "
+            "the speed in a time above zero"
+        )
+    steps = max(FEWEST_STEPS, math.ceil(top * duration / TURN_PER_STEP))
+    if steps > MOST_STEPS:
+        raise UsageError(
+            f"a run-up of {duration:g} s to {top:g} rad/s takes {steps} steps, more than "
+            f"{MOST_STEPS}; the response to so slow a rise is the steady one"
+        )
+    known, forces = _unbalances_of(machine)
+    supports = suspension_of(machine, suspension)
+    fe = build_rotor_fe(machine)
+    basis = reduce_rotor(fe, RUN_UP_REDUCTION, [*(support.node for support in supports), *forces])
+    speed = np.linspace(start, top, steps + 1)
+    return MachineResponse(
+        suspension=suspension,
+        speed=speed,
+        displacement=unbalance_run_up(basis, speed, duration, forces, supports),
+        node_positions=fe.node_positions,
+        places=_places(machine),
+        unbalance=known,
+        run_up=duration,
+    )
+
+
+def _unbalances_of(machine: Machine) -> tuple[tuple[tuple[int, float, float], ...], dict[int, complex]]:
+    """Node, amount and phase of every unbalance, and their complex sums by node from +x [kg m]."""
+    if not machine.unbalances:
+        raise UsageError(
+            f"machine {machine.name!r} has no unbalance; add [balance_grade] or [[unbalances]] to its file"
+        )
+    known = tuple((one.node, float(one.amount), float(one.phase)) for one in machine.unbalances)
+    forces: dict[int, complex] = {}
+    for node, amount, phase in known:
+        forces[node] = forces.get(node, 0.0) + amount * complex(np.exp(1j * (0.5 * math.pi + phase)))
+    return known, forces
 
 
 def resolved_response(machine: Machine, top: float, suspension: str) -> MachineResponse:

@@ -1,5 +1,6 @@
 """Amplification factors and margins of API 617, and the response of machines to their unbalance."""
 
+import json
 import math
 from types import SimpleNamespace
 
@@ -18,7 +19,7 @@ from rotordrop.rotor.campbell import (
     response_peaks,
     separations,
 )
-from rotordrop.rotor.unbalanced import machine_response, orbit_axis, resolved_response
+from rotordrop.rotor.unbalanced import machine_response, orbit_axis, resolved_response, run_up_response
 
 
 @pytest.mark.parametrize(
@@ -115,6 +116,31 @@ def test_the_command_shows_peaks_margins_and_figures(tmp_path, capsys):
         f.name for f in data.iterdir()
     }
     assert "Bode and polar plots" in report.read_text(encoding="utf-8")
+
+
+def test_the_command_shows_a_run_up(tmp_path, capsys):
+    data, document = tmp_path / "data", tmp_path / "rise.json"
+    arguments = [
+        "unbalance-response",
+        str(example_path("small")),
+        "--top-speed",
+        "120 Hz",
+        "--run-up",
+        "0.5 s",
+    ]
+    assert run([*arguments, "--data", str(data), "--json", str(document)]) == 0
+    text = capsys.readouterr().out
+    assert "in a run-up of 500 ms at most" in text and "steady" in text
+    assert (data / "figure_run_up.csv").is_file()
+    rise = json.loads(document.read_text())["run_up"]
+    assert rise["duration_s"] == 0.5
+    assert rise["speed_Hz"][-1] == pytest.approx(120.0)
+    steady = json.loads(document.read_text())["planes"][0]["major_axis_m"]
+    assert 0.0 < max(rise["planes"][0]["major_axis_m"]) < max(steady)
+    assert run([*arguments[:-1], "2 h"]) == 64
+    assert "the response to so slow a rise is the steady one" in capsys.readouterr().err
+    with pytest.raises(UsageError, match=r"a run-up from 9 to 5 rad/s in 1 s is none; expected a rise"):
+        run_up_response(example_machine("small"), 5.0, 1.0, "AMBs", start=9.0)
 
 
 def test_a_free_rotor_has_no_response(capsys):

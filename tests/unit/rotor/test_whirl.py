@@ -10,7 +10,13 @@ from rotordrop.physics.timoshenko import round_section
 from rotordrop.rotor.assembly import PointMass, assemble, modes_on_springs
 from rotordrop.rotor.reduction import reduce_rotor
 from rotordrop.rotor.suspension import Support, in_series, link, spring
-from rotordrop.rotor.whirl import direction_name, matrices_of, unbalance_response, whirl_modes
+from rotordrop.rotor.whirl import (
+    direction_name,
+    matrices_of,
+    unbalance_response,
+    unbalance_run_up,
+    whirl_modes,
+)
 
 EVEN = [spring(2, 2e7), spring(8, 2e7)]
 UNEVEN = [spring(2, (2e7, 1.2e7), (300.0, 100.0)), spring(8, [[2e7, 3e6], [1e6, 1.5e7]], 200.0)]
@@ -140,6 +146,70 @@ def test_unbalance_response_peaks_at_the_forward_critical_speed(overhung):
     speeds = critical * np.linspace(0.99, 1.01, 201)
     response = np.abs(unbalance_response(overhung, speeds, {11: 1e-4}, held)[:, 10, 0])
     assert speeds[np.argmax(response)] == pytest.approx(critical, rel=2e-4)
+
+
+RISE = (600.0, 2200.0)
+"""Speeds of a run-up through the first critical speed [rad/s]."""
+AMOUNTS = {11: 1e-4j, 3: 5e-5}
+HELD, DAMPED = ([spring(2, 2e7, c), spring(8, [[2e7, 2e6], [2e6, 1.4e7]], c)] for c in (400.0, 4e3))
+
+
+def risen(rotor, duration: float, steps: int, held=HELD) -> tuple[np.ndarray, np.ndarray]:
+    """Speeds of a run-up, and the synchronous motion (x, y) at node 11."""
+    speeds = np.linspace(*RISE, steps + 1)
+    return speeds, unbalance_run_up(rotor, speeds, duration, AMOUNTS, held)[:, 10]
+
+
+def test_a_run_up_is_that_of_the_equations_of_motion_in_time(overhung):
+    """Against the real equations, with ω̇ in force and gyroscopic moment, by an integrator of others."""
+    from scipy.integrate import solve_ivp
+
+    from rotordrop.rotor.reduction import Reduction
+
+    basis = reduce_rotor(overhung, Reduction(modes=4, attachment=False))
+    duration = 0.2
+    alpha = (RISE[1] - RISE[0]) / duration
+    system = matrices_of(basis, HELD)
+    n = system.plane_size
+    spun = np.concatenate(
+        [sum(u * turn * basis.node_row(k) for k, u in AMOUNTS.items()) for turn in (1, -1j)]
+    )
+
+    def rate(t, y):
+        q, v = np.split(y, 2)
+        omega = RISE[0] + alpha * t
+        force = (spun * (omega**2 - 1j * alpha) * np.exp(1j * (RISE[0] * t + 0.5 * alpha * t**2))).real
+        back = (system.damping + omega * system.gyroscopic) @ v
+        return np.concatenate([v, force - back - (system.stiffness + alpha * system.gyroscopic) @ q])
+
+    coupling = system.damping + RISE[0] * system.gyroscopic
+    start = np.linalg.solve(
+        system.stiffness - RISE[0] ** 2 * np.eye(2 * n) + 1j * RISE[0] * coupling, RISE[0] ** 2 * spun
+    )
+    times = np.linspace(0.0, duration, 1001)
+    y0 = np.concatenate([start.real, (1j * RISE[0] * start).real])
+    found = solve_ivp(rate, (0.0, duration), y0, "DOP853", times, rtol=1e-8, atol=1e-12).y
+    path = np.stack([basis.node_row(11) @ found[:n], basis.node_row(11) @ found[n : 2 * n]], axis=1)
+    angle = RISE[0] * times + 0.5 * alpha * times**2
+    ours = (risen(basis, duration, 1000)[1] * np.exp(1j * angle)[:, None]).real
+    assert np.abs(ours - path).max() < 2e-3 * np.abs(path).max()
+
+
+def test_a_slow_run_up_is_the_steady_response(overhung):
+    basis = reduce_rotor(overhung, "quick", (2, 8))
+    speeds, slow = risen(basis, 10.0, 5000, DAMPED)
+    steady = unbalance_response(basis, speeds, AMOUNTS, DAMPED)[:, 10]
+    np.testing.assert_allclose(slow, steady, atol=0.02 * np.abs(steady).max())
+
+
+def test_a_fast_run_up_stays_below_the_steady_peak_and_comes_after_it(overhung):
+    basis = reduce_rotor(overhung, "quick", (2, 8))
+    speeds, fast = risen(basis, 0.3, 1000)
+    steady, fast = (
+        np.abs(one).max(axis=1) for one in (unbalance_response(basis, speeds, AMOUNTS, HELD)[:, 10], fast)
+    )
+    assert fast.max() < 0.8 * steady.max()
+    assert speeds[fast.argmax()] > speeds[steady.argmax()]
 
 
 def test_names_of_directions():
