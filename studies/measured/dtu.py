@@ -33,8 +33,6 @@ SPIN = 2.0 * math.pi * 17.0
 UNBALANCE = 1e-3 * math.hypot(0.027, 0.072)
 COUPLED = [spring(BEARING, [[0.0, 2456.0], [292.0, 0.0]])]
 """Published k_xy and k_yx; their sign turns with y."""
-CENTRE = 1e-4
-"""Scale of the centre in a fit [m]."""
 SLOW = 60.0
 """Bandwidth [Hz] of the magnet's force."""
 AROUND, CONTACT = (0.050, 0.095), (0.066, 0.0712)
@@ -117,35 +115,26 @@ def fitted(
     def changed(factors: Mapping[str, float]) -> tuple[Machine, Record]:
         values = {
             "ambs.bearing.stiffness": Known(value=3.09e4 * factors.get("stiffness", 1.0)),
-            "ambs.bearing.damping": Known(value=8.48 * max(factors.get("damping", 1.0), 0.0)),
+            "ambs.bearing.damping": Known(value=8.48 * factors.get("damping", 1.0)),
         }
-        gain = Known(value=factors.get("gain", 1.0))
-        sensors = tuple(
-            one.model_copy(
-                update={"gain": gain, "offset": Known(value=CENTRE * factors.get(f"centre {one.name}", 0.0))}
-            )
-            for one in record.sensors
-        )
+        exact = {"gain": Known(value=factors.get("gain", 1.0)), "offset": Known(value=0.0)}
+        sensors = tuple(one.model_copy(update=exact) for one in record.sensors)
         return machine.with_values(values), replace(record, sensors=sensors)
 
     def misfit(point: Array) -> Array:
         one = pulled(*changed(dict(zip(names, point, strict=True))), phase)
-        left = one.force[here, 0] - force[: len(record.time)][here]
-        return left.ravel() if "centre x" in names else left[:, 0]
+        return one.force[here, 0, 0] - force[: len(record.time)][here, 0]
 
-    begin = [0.1 if name.startswith("centre") else 1.0 for name in names]
-    least = [-5.0 if name.startswith("centre") else 0.0 for name in names]
-    found = least_squares(misfit, begin, bounds=(least, 5.0), diff_step=0.02, xtol=1e-3, max_nfev=12)
+    found = least_squares(
+        misfit, np.ones(len(names)), bounds=(0.0, 5.0), diff_step=0.02, xtol=1e-3, max_nfev=12
+    )
     factors = dict(zip(names, map(float, found.x), strict=True))
     return *changed(factors), factors
 
 
 def factors_of(fit: tuple[Machine, Record, dict[str, float]]) -> str:
-    """The factors of a fit in words; a centre in micrometres."""
-    return ", ".join(
-        f"{name} {1e6 * CENTRE * value:+.0f} µm" if name.startswith("centre") else f"{name} × {value:.2f}"
-        for name, value in fit[2].items()
-    )
+    """The factors of a fit in words."""
+    return ", ".join(f"{name} × {value:.2f}" for name, value in fit[2].items())
 
 
 def against(found: ForceEstimate, force: Array, start: float, end: float) -> str:
@@ -217,10 +206,6 @@ def main() -> None:
     one = fitted(machine, early, force, phase_then, ("stiffness",), 0.004, 0.040)
     foretold = pulled(one[0], replace(before, sensors=one[1].sensors), phase_then)
     row(f"fitted to 40 ms: {factors_of(one)}", foretold, 0.043, 0.064)
-    five = fitted(
-        machine, before, force, phase, ("gain", "stiffness", "damping", "centre x", "centre y"), 0.004, 0.064
-    )
-    row(f"fitted on this stretch, both directions: {factors_of(five)}", pulled(five[0], five[1], phase))
     lines += [
         "",
         "| machine | up to, Hz | impulse, N s | direction, ° | off the radius, ° | peak, N | farthest, mm |",
@@ -229,7 +214,6 @@ def main() -> None:
     for text, (described, seen) in {
         "published": (machine, record),
         "three fitted": three[:2],
-        "five fitted": five[:2],
     }.items():
         whole = replace(record, sensors=seen.sensors)
         for bandwidth in (150.0, 300.0, None):
