@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.elements.parameter import Step
+from rotordrop.elements.parameter import Role, Step
 from rotordrop.elements.race_bearing import numbers_of
-from rotordrop.elements.table import parameter, rows
+from rotordrop.elements.table import rows
 from rotordrop.estimate.agreement import compare_orbits, spread_horizon
 from rotordrop.estimate.allowances import MODEL_FORCE_SIGMA, MODEL_MEAN_FORCE_SIGMA, MODEL_STRESS_SIGMA
 from rotordrop.estimate.assumptions import evidence_assumptions
@@ -25,11 +25,11 @@ from rotordrop.estimate.bearing_drop import (
     BearingDrop,
     Motion,
     Origin,
-    Role,
     deepest,
     finite,
     simulated_bearings,
 )
+from rotordrop.estimate.bearing_drop import Role as MotionRole
 from rotordrop.estimate.bearing_values import bearing_values
 from rotordrop.estimate.estimate import Estimate, FittedParameter, FrictionSweep, ReplaySteps, Verdict
 from rotordrop.estimate.fixed_values import machine_with_fixed, read_fixed
@@ -286,36 +286,36 @@ def _replay(impacts: Identified, evidence: Evidence, gap: IdentifiedGap, draws: 
 
 
 def _parameters(machine: Machine, impacts: Identified, gap: IdentifiedGap) -> tuple[FittedParameter, ...]:
-    """Every identified value of every bearing; gap and friction from steps of their own."""
+    """Every identified value of every bearing, in the order of the steps that find them."""
     found = []
     for b, bearing in enumerate(machine.touchdown_bearings):
         value, error, friction = float(gap.value[b]), float(gap.standard_error[b]), bearing.friction.dynamic
-        values = {
-            parameter("air_gap"): Known(
-                value=value,
-                status="determined",
-                standard_error=error,
-                interval_90=(value - NINETY * error, value + NINETY * error),
-                lower=float(gap.lower[b]),
-                upper=float(gap.upper[b]),
-                unit="m",
-            ),
-            **{
-                row: impacts.values[row.path_of(bearing.name)]
-                for row in rows("bearing")
-                if row.step is Step.IMPACTS
-            },
-            parameter("friction.dynamic"): impacts.friction.value
-            if impacts.friction is not None
-            else Known(
-                value=float(friction),
-                status="taken over",
-                standard_error=friction.standard_error,
-                interval_90=friction.interval_90,
-                unit="1",
-            ),
-        }
-        for row, estimate in values.items():
+        at_rest = Known(
+            value=value,
+            status="determined",
+            standard_error=error,
+            interval_90=(value - NINETY * error, value + NINETY * error),
+            lower=float(gap.lower[b]),
+            upper=float(gap.upper[b]),
+            unit="m",
+        )
+        swept = Known(
+            value=float(friction),
+            status="taken over",
+            standard_error=friction.standard_error,
+            interval_90=friction.interval_90,
+            unit="1",
+        )
+        if impacts.friction is not None:
+            swept = impacts.friction.value
+        steps = ((Step.TAIL, at_rest), (Step.IMPACTS, None), (Step.SWEEP, swept))
+        for row, alone in (
+            (row, alone) for step, alone in steps for row in rows("bearing") if row.step is step
+        ):
+            # a bearing with clearance has no preload to find, and what is derived follows from the others
+            estimate = alone or impacts.values.get(row.path_of(bearing.name))
+            if estimate is None or row.role is Role.DERIVED:
+                continue
             prior = None
             if (start := estimate.start) is not None:
                 prior = Known(
@@ -340,7 +340,7 @@ def _bearing(
         label="measured", time=replayed.time, displacement=replayed.measured[:, b], role="measured"
     )
 
-    def shown(label: str, displacement: Array, role: Role = "simulated") -> Motion:
+    def shown(label: str, displacement: Array, role: MotionRole = "simulated") -> Motion:
         return Motion(label=label, time=replayed.result.time, displacement=displacement[:, b], role=role)
 
     values = bearing_values(evidence.model.machine, b, float(evidence.model.load_shares[b]), found)

@@ -215,6 +215,27 @@ def test_fixed_takes_supports_and_friction_with_their_errors(
     assert pairs["NDE.support.stiffness", "NDE.support.mass"] > 0.5
 
 
+def test_a_bearing_with_clearance_is_replayed_without_a_preload(
+    known: Machine, synthetic: SyntheticDrop, document: dict[str, Any]
+) -> None:
+    """It has no preload to find; the replay asked for one and ended with a KeyError."""
+    paired = known.touchdown_bearings[0].bearing
+    given = {name: getattr(paired, name) for name in paired.model_fields_set - {"preload"}}
+    row = type(paired).model_validate(given | {"clearance": "10 um", "contact_angle": "0 deg"})
+    loose = known.model_copy(
+        update={"touchdown_bearings": tuple(one.changed(bearing=row) for one in known.touchdown_bearings)}
+    )
+    earlier = json.loads(json.dumps(document))
+    for bearing in earlier["bearings"].values():
+        del bearing["preload_N"]
+    method = Replay(fixed=earlier, draws=0)
+    found = estimate_drop(loose, synthetic.record, synthetic.tail, method=method)
+    for name in BEARINGS:
+        values = found.bearing(name).values
+        assert "preload_N" not in values and values["equivalent_stiffness_N_per_m"].value > 0.0
+        assert values["support.stiffness_N_per_m"].status == "taken over"
+
+
 def test_correlations_of_another_form_are_refused(document: dict[str, Any]) -> None:
     """They were passed over, and intervals that rest on them came out others without a word."""
     changed = json.loads(json.dumps(document))
