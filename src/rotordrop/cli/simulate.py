@@ -119,7 +119,7 @@ def simulate(
     if output is not None:
         result.save(output)
     page = simulate_page(result, described)
-    deliver(simulation_numbers(result), json, page, report=report, data=data)
+    deliver(simulation_numbers(result, described), json, page, report=report, data=data)
 
 
 def named_pairs(texts: Sequence[str], kind: str, names: Sequence[str]) -> NDArray[np.float64]:

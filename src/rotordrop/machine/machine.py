@@ -13,6 +13,7 @@ from typing import Any
 from pydantic import Field, PrivateAttr, ValidationError
 
 from rotordrop.elements.air import SpeedDescription
+from rotordrop.elements.clearance import Clearance, check_clearances
 from rotordrop.elements.description import Description, Misfit, Text, place_on_nodes
 from rotordrop.elements.magnet import ActiveMagneticBearing
 from rotordrop.elements.rotor import Rotor
@@ -53,6 +54,8 @@ class Machine(Description):
     """Time in which the remanent force of the magnets decays [s]; 2 ms, to a factor of two, when left out."""
     sensors: tuple[Sensor, ...] = ()
     """Displacement sensors."""
+    clearances: tuple[Clearance, ...] = ()
+    """Narrow places beside the touchdown bearings, such as seals."""
     calibration: CalibrationOrigin | None = None
     """Recorded drops that its estimates come from."""
 
@@ -72,7 +75,7 @@ class Machine(Description):
     def check(self) -> None:
         """Refuse parts that do not fit together."""
         nodes = self.rotor.node_positions
-        for key in ("unbalances", "touchdown_bearings", "ambs", "sensors"):
+        for key in ("unbalances", "touchdown_bearings", "ambs", "sensors", "clearances"):
             place_on_nodes(getattr(self, key), nodes, key)
         self._check_names()
         first: dict[int, str] = {}
@@ -85,11 +88,12 @@ class Machine(Description):
                     ("touchdown_bearings", index, "node" if bearing.position is None else "position"),
                 )
             first[bearing.node] = bearing.name
+        check_clearances(self.clearances, self.touchdown_bearings, nodes)
         if self.sensors:
             check_sensors_resolve_motion(tuple(one for one in self.sensors if not one.lost), nodes)
 
     def _check_names(self) -> None:
-        for key in ("touchdown_bearings", "ambs", "sensors"):
+        for key in ("touchdown_bearings", "ambs", "sensors", "clearances"):
             seen: set[str] = set()
             for index, part in enumerate(getattr(self, key)):
                 place = (key, index, "name")
@@ -296,7 +300,7 @@ def _resolved(machine: Machine, path: str) -> tuple[Any, ...]:
         if rest and not rest[0].removeprefix("-").isdecimal():
             raise UsageError(f"{path!r}: unbalances are counted from 0, as in 'unbalance.0.amount'")
         keys = ("unbalances", *map(int, rest[:1]), *rest[1:])
-    elif head in ("sensors", "ambs") and rest:
+    elif head in ("sensors", "ambs", "clearances") and rest:
         names = [part.name for part in getattr(machine, head)]
         if rest[0] in names:
             keys = (head, names.index(rest[0]), *rest[1:])

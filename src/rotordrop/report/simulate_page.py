@@ -9,11 +9,22 @@ import numpy as np
 from rotordrop._version import __version__
 from rotordrop.estimate.bearing_drop import BearingDrop, History, simulated_bearings
 from rotordrop.machine.plausibility import doubts_of_speed
-from rotordrop.report.content import SIMULATED_MACHINE, Card, Figure, ReportContent, Section, Statement, fact
+from rotordrop.report.content import (
+    SIMULATED_MACHINE,
+    Card,
+    Column,
+    Figure,
+    ReportContent,
+    Section,
+    Statement,
+    fact,
+    table,
+)
 from rotordrop.report.drop_sections import drop_sections, speed_figure, static_limit_statement
 from rotordrop.report.estimate_numbers import headline_card
 from rotordrop.report.machine_sections import machine_sections, weight_shares
 from rotordrop.report.quantity import shown
+from rotordrop.simulate.clearances import ClearanceUse, clearance_uses
 from rotordrop.simulate.result import DropResult
 
 if TYPE_CHECKING:
@@ -24,6 +35,14 @@ TRUSTED_CHANGE = 5e-3
 NO_INTERVAL = (
     "The numbers have no interval: one simulation with given parameters cannot state one. After about 50 ms "
     "a drop is chaotic, and only its statistics can be compared with another one."
+)
+CLEARANCES = (
+    Column("clearance", "name"),
+    Column("node", lambda use: str(use.node)),
+    Column("gap", "gap", "length"),
+    Column("largest travel", "travel", "length"),
+    Column("travel over gap", "share", "dimensionless", 3),
+    Column("at", "time", "time", 3),
 )
 BACKWARDS = "The speed is negative: the shaft turns from y towards x, clockwise seen from the DE."
 
@@ -36,6 +55,7 @@ def simulate_page(result: DropResult, machine: Machine | None = None) -> ReportC
     bearings = simulated_bearings(result)
     speed, duration = shown(result.initial_speed, "speed"), shown(result.time[-1], "time")
     path = getattr(machine, "source_path", None)
+    uses = () if machine is None else clearance_uses(machine, result)
     rotor = (History(label="rotor", time=result.time, values=result.speed),)
     races = tuple(
         History(label=f"{name} race", time=result.time, values=result.race_speed[:, index])
@@ -48,7 +68,7 @@ def simulate_page(result: DropResult, machine: Machine | None = None) -> ReportC
         title=f"Simulated drop of {result.machine_name}",
         subtitle=f"from {speed}, {duration} after power-off",
         simulated=SIMULATED_MACHINE,
-        verdict=_verdict(result, bearings, machine),
+        verdict=_verdict(result, bearings, machine, uses),
         cards=tuple(_card(result, b, bearing) for b, bearing in enumerate(bearings)),
         facts=(
             ("machine", result.machine_name if path is None else f"{result.machine_name} ({path.name})"),
@@ -59,6 +79,7 @@ def simulate_page(result: DropResult, machine: Machine | None = None) -> ReportC
         ),
         sections=(
             *drop_sections(bearings, "simulated", result.initial_speed, weight_shares(machine)),
+            *((Section("Clearances", tables=(table(uses, CLEARANCES),)),) if uses else ()),
             Section("Speed", figures=(turning,)),
             *(() if machine is None else machine_sections(machine)),
         ),
@@ -83,7 +104,10 @@ def _card(result: DropResult, index: int, bearing: BearingDrop) -> Card:
 
 
 def _verdict(
-    result: DropResult, bearings: tuple[BearingDrop, ...], machine: Machine | None
+    result: DropResult,
+    bearings: tuple[BearingDrop, ...],
+    machine: Machine | None,
+    uses: tuple[ClearanceUse, ...],
 ) -> tuple[Statement, ...]:
     said = [Statement(result.outcome, "good" if result.finished else "bad")]
     if result.initial_speed < 0.0:
@@ -94,6 +118,13 @@ def _verdict(
         said += _stops(result, machine)
     said += [_certificate(result), Statement(NO_INTERVAL)]
     said += [static_limit_statement(bearing) for bearing in bearings]
+    for use in uses:
+        travel, gap = shown(use.travel, "length", 3), shown(use.gap, "length", 3)
+        touches = use.share >= 1.0
+        text = f"{use.name}: the rotor travels {travel} of a gap of {gap}" + (
+            ", so it touches there; no force acts in a clearance." if touches else "."
+        )
+        said.append(Statement(text, "bad" if touches else "good"))
     if machine is not None and machine.defaults_in_use:
         count = len(machine.defaults_in_use)
         text = (

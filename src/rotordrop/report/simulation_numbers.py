@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rotordrop.estimate.bearing_drop import published_bearing, simulated_bearings
+from rotordrop.simulate.clearances import clearance_uses
 from rotordrop.simulate.result import DropResult
 
+if TYPE_CHECKING:
+    from rotordrop.machine import Machine
 
-def simulation_numbers(result: DropResult) -> dict[str, Any]:
-    """Give the numbers of a simulated drop: SI values under the names of the estimate's schema."""
+
+def simulation_numbers(result: DropResult, machine: Machine | None = None) -> dict[str, Any]:
+    """Give the numbers of a simulated drop: SI values under the names of the estimate's schema.
+
+    The machine that was simulated gives the use of its clearances.
+    """
     certificate, bearings = result.certificate, {}
     parts: dict[str, Any] = {
         "tolerance": result.tolerance,
@@ -29,7 +36,7 @@ def simulation_numbers(result: DropResult) -> dict[str, Any]:
             "peak_contact_pressure_Pa": {"value": pressure, "time_s": moment},
             "contact_half_width_m": {"value": half_width},
         }
-    return {
+    numbers = {
         "machine": result.machine_name,
         "method": "simulation",
         "speed_Hz": result.initial_speed / (2 * math.pi),
@@ -40,3 +47,15 @@ def simulation_numbers(result: DropResult) -> dict[str, Any]:
         "certificate": parts,
         "bearings": bearings,
     }
+    if machine is not None and machine.clearances:
+        numbers["clearances"] = {
+            use.name: {
+                "node": use.node,
+                "gap_m": use.gap,
+                "largest_travel_m": use.travel,
+                "travel_over_gap": use.share,
+                "time_s": use.time,
+            }
+            for use in clearance_uses(machine, result)
+        }
+    return numbers

@@ -116,6 +116,10 @@ def _verdict(results: StudyResults, limits: Mapping[str, float]) -> list[Stateme
                 f"{bearing.name}: {percent(over)} of the drops exceed {quantity.replace('_', ' ')} {shown}."
             )
             said.append(Statement(text, "notice" if over.high < 0.5 else "warning"))
+    for clearance in results.study.machine.clearances:
+        touching = results.exceedance(f"{clearance.name}.travel_over_gap", 1.0)
+        text = f"{clearance.name}: the rotor touches in {percent(touching)} of the drops."
+        said.append(Statement(text, "notice" if touching.value == 0.0 else "warning"))
     return [*said, Statement(SCOPE)]
 
 

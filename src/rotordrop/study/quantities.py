@@ -13,6 +13,7 @@ from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
 from rotordrop.physics.whirl_spells import whirl_spells
 from rotordrop.rotor.parameters import DropModel
+from rotordrop.simulate.clearances import clearance_uses
 from rotordrop.simulate.losses import losses
 from rotordrop.simulate.result import DropResult
 from rotordrop.units import si_unit
@@ -83,11 +84,14 @@ DROP_QUANTITIES: tuple[Quantity, ...] = _quantities(
 
 
 def columns_of(machine: Machine) -> tuple[Quantity, ...]:
-    """All columns of a study of a machine, in order: per bearing, per magnet, per drop."""
+    """All columns of a study of a machine, in order: per bearing, per magnet, per clearance, per drop."""
     names = [bearing.name for bearing in machine.touchdown_bearings]
     rubs = "largest displacement of the rotor in the magnet {}: rubs there beyond its gap"
     of_parts = [(f"{b}.{q.name}", q.kind, f"{b}: {q.meaning}") for b in names for q in BEARING_QUANTITIES]
     of_parts += [(f"{a.name}.largest_displacement", "length", rubs.format(a.name)) for a in machine.ambs]
+    used = "largest displacement over the gap of the clearance {}: touches there from one on"
+    names = [clearance.name for clearance in machine.clearances]
+    of_parts += [(f"{name}.travel_over_gap", "dimensionless", used.format(name)) for name in names]
     return (*_quantities(*of_parts), *DROP_QUANTITIES)
 
 
@@ -116,6 +120,7 @@ def row_of(model: DropModel, result: DropResult) -> Array:
     if machine.ambs:
         moved = result.at_nodes([amb.node for amb in machine.ambs])
         values += np.max(np.hypot(moved[..., 0], moved[..., 1]), axis=0).tolist()
+    values += [use.share for use in clearance_uses(machine, result)]
     certificate = result.certificate
     values += [
         float(result.state[-1, list(result.state_names).index("dissipated energy")]),

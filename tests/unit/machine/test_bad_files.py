@@ -136,6 +136,25 @@ BAD = [
     ('name = "DE"', 'name = "D E"', "'D E' is not a name; write one word without dots", '"D E"'),
     ('name = "DE"', 'name = "speed"', "a touchdown bearing cannot be called 'speed'", '"speed"'),
     ('position = "0.7 m"', "node = 2", "DE sits at node 2, where NDE sits already; give it another", "2"),
+    # clearances beside the touchdown bearings
+    (
+        "[[sensors]]",
+        '[[clearances]]\nname = "seal"\nnode = 3\ngap = "0 mm"\n[[sensors]]',
+        r"0 m is not allowed here; a length must be positive",
+        '"0 mm"',
+    ),
+    (
+        "[[sensors]]",
+        '[[clearances]]\nname = "seal"\nnode = 3\ngap = "0.2 mm"\n[[sensors]]',
+        r"the clearance 'seal' of .* at node 3 is used up before .* whose air gap is .* there; widen it",
+        '"0.2 mm"',
+    ),
+    (
+        "[[sensors]]",
+        '[[clearances]]\nname = "seal"\nnode = 99\ngap = "2 mm"\n[[sensors]]',
+        "node 99 is outside the rotor",
+        "99",
+    ),
     # clearance
     ('preload = "heavy"', 'clearance = "C7"', "'C7' is neither a length nor a clearance class", '"C7"'),
     (
