@@ -86,6 +86,11 @@ def hidden_machine(
     """
     broken = named_violations(violations)
     broken.check_names(machine)
+    if machine.loads or machine.base is not None:
+        raise UsageError(
+            f"the machine {machine.name!r} has loads or a base that accelerates, with which no recording can "
+            "be made yet; leave them out"
+        )
     true = machine.with_values(_drawn_values(machine, stream(seed, "machine"))) if drawn else machine
     true = violated(true, broken)
     model = build_drop_model(true, reduction)

@@ -441,6 +441,14 @@ def insisted(evidence: Evidence) -> Evidence:
     RecordError
         When the rotor does not fall in the record, or it has no speed.
     """
+    machine = evidence.machine
+    if machine.loads or machine.base is not None:
+        key = "[[loads]]" if machine.loads else "[base]"
+        raise RecordError(
+            f"the machine {machine.name!r} has {key}, with which a record cannot be estimated yet: the fall "
+            "before the first contact is taken as one under gravity alone. Leave it out to estimate without "
+            "it; 'rotordrop simulate' and 'study' know it"
+        )
     if evidence.record.speed_readings is None:
         raise RecordError(
             f"the record {evidence.name} has no rotor speed; expected one. Name its channel in a profile "

@@ -15,6 +15,7 @@ from pydantic import Field, PrivateAttr, ValidationError
 from rotordrop.elements.air import SpeedDescription
 from rotordrop.elements.clearance import Clearance, check_clearances
 from rotordrop.elements.description import Description, Misfit, Text, place_on_nodes
+from rotordrop.elements.load import Base, Load
 from rotordrop.elements.magnet import ActiveMagneticBearing
 from rotordrop.elements.rotor import Rotor
 from rotordrop.elements.sensor import Sensor, check_sensors_resolve_motion
@@ -54,6 +55,10 @@ class Machine(Description):
     """Time in which the remanent force of the magnets decays [s]; 2 ms, to a factor of two, when left out."""
     sensors: tuple[Sensor, ...] = ()
     """Displacement sensors."""
+    loads: tuple[Load, ...] = ()
+    """Forces on the rotor beside gravity."""
+    base: Base | None = None
+    """Acceleration of the ground on which the machine stands."""
     clearances: tuple[Clearance, ...] = ()
     """Narrow places beside the touchdown bearings, such as seals."""
     calibration: CalibrationOrigin | None = None
@@ -75,7 +80,7 @@ class Machine(Description):
     def check(self) -> None:
         """Refuse parts that do not fit together."""
         nodes = self.rotor.node_positions
-        for key in ("unbalances", "touchdown_bearings", "ambs", "sensors", "clearances"):
+        for key in ("unbalances", "touchdown_bearings", "ambs", "sensors", "loads", "clearances"):
             place_on_nodes(getattr(self, key), nodes, key)
         self._check_names()
         first: dict[int, str] = {}
@@ -296,10 +301,11 @@ def _resolved(machine: Machine, path: str) -> tuple[Any, ...]:
     if head in bearings:
         inside = ["bearing", *rest] if rest == ["preload"] else rest
         keys = ("touchdown_bearings", bearings.index(head), *inside)
-    elif head == "unbalance":
+    elif head in ("unbalance", "loads"):
+        what, value = ("unbalances", "amount") if head == "unbalance" else ("loads", "force")
         if rest and not rest[0].removeprefix("-").isdecimal():
-            raise UsageError(f"{path!r}: unbalances are counted from 0, as in 'unbalance.0.amount'")
-        keys = ("unbalances", *map(int, rest[:1]), *rest[1:])
+            raise UsageError(f"{path!r}: {what} are counted from 0, as in '{head}.0.{value}'")
+        keys = (what, *map(int, rest[:1]), *rest[1:])
     elif head in ("sensors", "ambs", "clearances") and rest:
         names = [part.name for part in getattr(machine, head)]
         if rest[0] in names:

@@ -70,7 +70,8 @@ N_SPIN_ENTRIES = 7
 # Entries of `KernelParameters.flags`.
 SPIN_MODE = 0
 MAGNETS_ACT = 1
-N_FLAGS = 2
+LOADS_ACT = 2
+N_FLAGS = 3
 
 # Columns of `KernelParameters.magnet`, one row per AMB: remanent force, holding force [N], spring, damper,
 # reference.
@@ -83,6 +84,20 @@ AMB_DAMPING = 5
 AMB_REFERENCE_X = 6
 AMB_REFERENCE_Y = 7
 N_MAGNET_COLUMNS = 8
+
+# Columns of `KernelParameters.load`, one row per load, that of the ground last: value along x and y, power of
+# the speed and its nominal, speed and phase of a sine, first point of its course and the one behind its last,
+# whether it is the acceleration of the ground.
+LOAD_X = 0
+LOAD_Y = 1
+LOAD_EXPONENT = 2
+LOAD_NOMINAL = 3
+LOAD_TURN = 4
+LOAD_PHASE = 5
+LOAD_FIRST = 6
+LOAD_END = 7
+LOAD_OF_BASE = 8
+N_LOAD_COLUMNS = 9
 
 # Entries of `KernelParameters.rotor_at`: where the states of the rotor, its books and the whole vector stand.
 # The velocity of a coordinate stands N_COORDINATES behind it. The step control looks at the first
@@ -137,7 +152,8 @@ class KernelParameters(NamedTuple):
     Columns and entries are named in this module. ``balls`` (B, 3, Z8) are the balls of `physics.ball_set`;
     ``rotor_at``, ``bearing_at`` (B, ·), ``contact_at`` (C, ·) and ``magnet_at`` (A, ·) say where the states
     of each owner stand, so that no kernel computes a place from numbers of modes and bearings. ``departure``
-    (B, ·) or (0, ·) holds what `physics.departure` reads. ``memory`` is
+    (B, ·) or (0, ·) holds what `physics.departure` reads. ``load`` (K, ·), ``load_shape`` (K, m) and
+    ``load_points`` (R, 3) are what pushes the rotor (`physics.load`). ``memory`` is
     what is remembered beside the state: a right-hand side reads it, an accepted step alone writes it
     (`simulate._loop.remember`). No element of today has any; its length is zero.
     """
@@ -160,4 +176,7 @@ class KernelParameters(NamedTuple):
     contact_at: Integers
     magnet_at: Integers
     departure: Array
+    load: Array
+    load_shape: Array
+    load_points: Array
     memory: Array

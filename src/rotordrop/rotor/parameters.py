@@ -124,7 +124,7 @@ def _kernel_parameters(
         bearing_shape=shapes_at(machine.touchdown_bearings),
         magnet_shape=shapes_at(machine.ambs),
         magnet=magnet,
-        flags=np.array([aerodynamics.OFF, 0], dtype=np.int64),
+        flags=np.array([aerodynamics.OFF, 0, bool(machine.loads or machine.base)], dtype=np.int64),
         rotor_at=layout.rotor_at(),
         bearing_at=layout.bearing_at(),
         contact_at=layout.contact_at(),
@@ -157,12 +157,33 @@ def _of_values(machine: Machine, fe: RotorFE, basis: RotorBasis, shares: Array) 
     # The machine file gives torques, the kernel wants them per polar inertia.
     spin[L.AERO_LINEAR] = float(speed.aero_linear or 0.0) / fe.polar_inertia
     spin[L.AERO_QUADRATIC] = float(speed.aero_quadratic or 0.0) / fe.polar_inertia
+    uniform = product(basis.shapes.T, product(fe.mass, fe.rigid_shapes[:, 0]))
     return {
+        **_loads(machine, basis, uniform),
         "bearing": rows,
         "balls": places_of([numbers_of(bearing) for bearing in bearings]),
         "unbalance_cos": cosine,
         "unbalance_sin": sine,
         "spin": spin,
+    }
+
+
+def _loads(machine: Machine, basis: RotorBasis, uniform: Array) -> dict[str, Array]:
+    """Rows, shapes and points of what pushes the rotor; ``uniform`` (m,) is the inertia of its modes."""
+    courses = [load.course(float(machine.speed.nominal)) for load in machine.loads]
+    shapes = [basis.node_row(load.node) for load in machine.loads]
+    if machine.base is not None:
+        courses.append(machine.base.course())
+        shapes.append(-uniform)
+    rows, points = np.zeros((len(courses), L.N_LOAD_COLUMNS)), np.zeros((0, 3))
+    for row, (entries, course) in zip(rows, courses, strict=True):
+        row[:] = entries
+        row[[L.LOAD_FIRST, L.LOAD_END]] = len(points), len(points) + len(course)
+        points = np.vstack([points, course])
+    return {
+        "load": rows,
+        "load_shape": np.ascontiguousarray(np.array(shapes).reshape(len(shapes), basis.size)),
+        "load_points": points,
     }
 
 

@@ -19,6 +19,7 @@ from rotordrop.physics.aerodynamics import exponential_deceleration, speed_depen
 from rotordrop.physics.ball_set import ball_set_force, bearing_reaction
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import sine_cosine
+from rotordrop.physics.load import load_now
 from rotordrop.physics.remanence import remanent_fraction
 from rotordrop.physics.touch import touch
 
@@ -241,6 +242,43 @@ def add_magnet_forces(t: float, y: Array, p: KernelParameters, dy: Array) -> flo
             ax[k] += shape[k] * fx
             ay[k] += shape[k] * fy
         put_in += fx * vx + fy * vy
+    return put_in
+
+
+@lean_kernel
+def add_loads(t: float, y: Array, p: KernelParameters, dy: Array) -> float:
+    """Add the loads on the rotor, and on everything the inertia force of a ground that accelerates.
+
+    Returns the power they put in [W]. Motion is against the ground.
+    """
+    n_q = p.rotor_at[L.N_COORDINATES]
+    _, _, sx, sy = modal_parts(y, p)
+    _, _, ax, ay = modal_parts(dy, p)
+    put_in = 0.0
+    for j in range(p.load.shape[0]):
+        row, shape = p.load[j], p.load_shape[j]
+        x, z = load_now(row, p.load_points, t, y[p.rotor_at[L.ROTOR_SPEED]])
+        for k in range(shape.shape[0]):
+            ax[k] += shape[k] * x
+            ay[k] += shape[k] * z
+        put_in += x * project(shape, sx) + z * project(shape, sy)
+        if row[L.LOAD_OF_BASE] == 0.0:
+            continue
+        for b in range(p.bearing.shape[0]):
+            numbers = p.bearing[b]
+            r, h, own = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.BEARING_OWN]
+            for axis in range(2):
+                a = x if axis == 0 else z
+                if r >= 0:
+                    dy[n_q + r + axis] -= a
+                    put_in -= numbers[L.RACE_MASS] * a * y[n_q + r + axis]
+                dy[n_q + h + axis] -= a
+                put_in -= numbers[L.SUPPORT_MASS_X + axis] * a * y[n_q + h + axis]
+                if own >= 0:
+                    dy[own + 2 + axis] -= a
+                    share = numbers[L.SUPPORT_FORM + blocks.SUPPORT_FOUNDATION_SHARE]
+                    if share > 0.0:
+                        put_in -= numbers[L.SUPPORT_MASS_Y] / share * a * y[own + 2 + axis]
     return put_in
 
 
@@ -479,6 +517,8 @@ def add_rotor_rates(
     lost, gained = add_rotor_accelerations(y, omega, omega_dot, p, dy)
     if p.flags[L.MAGNETS_ACT] != 0:
         gained += add_magnet_forces(t, y, p, dy)
+    if p.flags[L.LOADS_ACT] != 0:
+        gained += add_loads(t, y, p, dy)
     for i in range(n_q):
         rates[i] = velocities[i]
     dy[i_w] = omega_dot

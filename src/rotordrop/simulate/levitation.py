@@ -11,6 +11,7 @@ from rotordrop.physics import columns as L
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import sine_cosine
 from rotordrop.physics.linear_algebra import least_squares, product, solve
+from rotordrop.physics.load import load_now
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.simulate.case import CentredStart, DropCase, LevitatedStart, PlacedStart, StateStart
 
@@ -144,15 +145,18 @@ def _complex_solution(real: Array, imaginary: Array, right: Array) -> Array:
     return solve(system, np.concatenate([right[:, 0], right[:, 1]])).reshape(2, -1).T
 
 
-def levitated_static(model: DropModel, offset: Array | None) -> tuple[Array, Array]:
+def levitated_static(model: DropModel, offset: Array | None, speed: float = 0.0) -> tuple[Array, Array]:
     """Static amplitudes (m, 2) of the levitated rotor and the holding force of each AMB (A, 2) [N].
 
-    With integral action the controller holds the rotor at its reference in each AMB plane.
+    Loads act as they do at power-off, at a speed [rad/s]. With integral action the controller holds the rotor
+    at its reference in each AMB plane.
     """
     p = model.parameters
     n_a, m = p.magnet_shape.shape
     target = np.zeros((n_a, 2)) if offset is None else np.asarray(offset, dtype=np.float64)
     load = np.column_stack([np.zeros(m), p.gravity])
+    for row, shape in zip(p.load, p.load_shape, strict=True):
+        load += np.outer(shape, load_now(row, p.load_points, 0.0, speed))
     border = p.magnet_shape.T
     matrix = np.block([[np.diag(p.eigenvalue), -border], [p.magnet_shape, np.zeros((n_a, n_a))]])
     # rows of stiff modes are divided by their stiffness: its range would pass for a loss of rank
@@ -171,7 +175,7 @@ def _levitated(
             f"the machine {model.machine.name!r} has {n_a}. "
             "Add [[amb]] entries with node, stiffness and damping, or use another start."
         )
-    static, holding = levitated_static(model, start.offset)
+    static, holding = levitated_static(model, start.offset, speed)
     orbit = np.zeros(static.shape, dtype=np.complex128)
     if speed != 0.0:
         orbit = levitated_orbit(model, speed, start.orbit)

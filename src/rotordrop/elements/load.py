@@ -1,0 +1,130 @@
+"""What pushes the rotor beside gravity: forces at a node, and the motion of the ground under the machine."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.elements.description import Description, Misfit, Placed
+from rotordrop.elements.values import Angle, Force, NonNegative, Physical, Time, default
+from rotordrop.known import Known
+from rotordrop.physics import columns as L
+
+Array = NDArray[np.float64]
+SignedAcceleration = Annotated[Known, Physical("acceleration")]
+Frequency = Annotated[Known, Physical("frequency", above=0.0)]
+
+AXIAL = "axial motion of the rotor"
+
+
+class LoadPoint(Description):
+    """A load at a time."""
+
+    time: Time
+    """Time from power-off [s]."""
+    force: Force
+    """Force then [N]."""
+
+
+class Load(Placed):
+    """A force on the rotor, from before the release on."""
+
+    direction: Angle
+    """Direction of the force, from +x towards y [rad]."""
+    force: Force | None = None
+    """Force [N]; with an exponent that at nominal speed."""
+    speed_exponent: NonNegative = default(0.0, "the same at every speed")
+    """Power of the speed with which the force goes [1]."""
+    over_time: tuple[LoadPoint, ...] = ()
+    """In place of the force: its course, straight between points, constant before and after them."""
+
+    @classmethod
+    def rewritten(cls, raw: dict[str, Any]) -> dict[str, Any]:
+        """Refuse a direction along the rotor, which a later version will know."""
+        if raw.get("direction") == "axial":
+            raise Misfit(
+                f'direction = "axial" is reserved for {AXIAL}, which is not yet supported; give the angle of '
+                'a radial load, such as "-90 deg", or leave the load out',
+                ("direction",),
+            )
+        return raw
+
+    def check(self) -> None:
+        """Refuse a load without a force or with two, and a course that does not go on."""
+        super().check()
+        if (self.force is None) == (not self.over_time):
+            raise Misfit("a load needs either 'force' or 'over_time', and only one of them")
+        if self.over_time and "speed_exponent" in self.model_fields_set:
+            raise Misfit("a course over time does not go with the speed; leave out one", ("speed_exponent",))
+        check_times(self.over_time)
+
+    def course(self, nominal: float) -> tuple[Array, Array]:
+        """Entries of the load and the points of its course, shape (R, 3): time [s], force in x and y [N]."""
+        c, s = math.cos(float(self.direction)), math.sin(float(self.direction))
+        row = np.zeros(L.N_LOAD_COLUMNS)
+        points = np.array([[float(p.time), c * float(p.force), s * float(p.force)] for p in self.over_time])
+        if self.force is not None:
+            row[[L.LOAD_X, L.LOAD_Y]] = c * float(self.force), s * float(self.force)
+            row[[L.LOAD_EXPONENT, L.LOAD_NOMINAL]] = float(self.speed_exponent), nominal
+        return row, points.reshape(-1, 3)
+
+
+class BasePoint(Description):
+    """Acceleration of the ground at a time."""
+
+    time: Time
+    """Time from power-off [s]."""
+    x: SignedAcceleration = default(0.0, "none")
+    y: SignedAcceleration = default(0.0, "none")
+    """Horizontal and vertical acceleration [m/s²]."""
+
+    reserved: ClassVar = {"z": AXIAL}
+
+
+class Base(Description):
+    """Acceleration of the ground on which the machine stands, from before the release on."""
+
+    x: SignedAcceleration = default(0.0, "none")
+    y: SignedAcceleration = default(0.0, "none")
+    """Amplitude of a sine [m/s²], horizontal and vertical."""
+    frequency: Frequency | None = None
+    """Its frequency [Hz]."""
+    phase: Angle = default(0.0, "zero at power-off, upwards after it")
+    """Its phase at power-off [rad]."""
+    over_time: tuple[BasePoint, ...] = ()
+    """In place of a sine: its course, straight between points, constant before and after them."""
+
+    reserved: ClassVar = {"z": AXIAL}
+
+    def check(self) -> None:
+        """Refuse neither or both of sine and course."""
+        sine = self.model_fields_set - {"over_time"}
+        if bool(sine) == bool(self.over_time):
+            raise Misfit("a base needs either a sine ('x' or 'y' with 'frequency') or 'over_time', not both")
+        if sine and (self.frequency is None or not sine & {"x", "y"}):
+            raise Misfit("the sine of a base needs 'frequency' and an amplitude, 'x' or 'y'")
+        check_times(self.over_time)
+
+    def course(self) -> tuple[Array, Array]:
+        """Entries of the base as a load, and the points of its course, shape (R, 3) [s], [m/s²]."""
+        row = np.zeros(L.N_LOAD_COLUMNS)
+        row[L.LOAD_OF_BASE] = 1.0
+        points = np.array([[float(p.time), float(p.x), float(p.y)] for p in self.over_time]).reshape(-1, 3)
+        if self.frequency is not None:
+            row[[L.LOAD_X, L.LOAD_Y]] = float(self.x), float(self.y)
+            row[[L.LOAD_TURN, L.LOAD_PHASE]] = 2.0 * math.pi * float(self.frequency), float(self.phase)
+        return row, points
+
+
+def check_times(points: tuple[LoadPoint, ...] | tuple[BasePoint, ...]) -> None:
+    """Refuse points whose times do not ascend."""
+    for index in range(1, len(points)):
+        before, time = float(points[index - 1].time), float(points[index].time)
+        if not time > before:
+            raise Misfit(
+                f"time {time:g} s of point {index + 1} does not exceed {before:g} s before it; order them",
+                ("over_time", index, "time"),
+            )
