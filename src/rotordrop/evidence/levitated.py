@@ -152,11 +152,12 @@ def fit_levitated(record: Record, end: float, *, speed: float, start: float | No
 
 def _stays_until(time: Array, signals: Array, model: LevitatedModel) -> float:
     """Until when the last readings belong to the levitated motion [s]."""
-    count = round(float(time[-1] - time[0]) / _STRETCH)
+    # a slow clock leaves no sample to some stretches
+    count = min(round(float(time[-1] - time[0]) / _STRETCH), len(time) // 2)
     rest = np.square((signals - model.readings(time)) / model.noise)
     edges = np.linspace(0, len(time), max(count, 1) + 1).astype(int)
     scatter = np.sqrt([np.nanmean(rest[a:b]) for a, b in itertools.pairwise(edges)])
-    stay = np.flatnonzero(scatter <= _LEFT * np.median(scatter))
+    stay = np.flatnonzero(scatter <= _LEFT * np.nanmedian(scatter))
     return float(time[edges[stay[-1] + 1] - 1])
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfilt
 
-from rotordrop.evidence import check_record
+from rotordrop.evidence import check_record, fit_levitated
 from rotordrop.evidence.quality.recorder import check_filters
 from rotordrop_bench import hidden_machine, synthesize_drop
 from rotordrop_bench.sensor_chain import PERFECT
@@ -175,3 +175,98 @@ def test_a_single_run_of_equal_readings_is_stuck(drop, machine):
     )
     assert found.channel == drop.channel_names[2]
     assert "14 samples (0.7 ms)" in found.message
+
+
+def worst(record, machine, tail=None):
+    return next(iter(check_record(record, machine, tail)), None)
+
+
+def with_signals(record, change):
+    signals = record.signals.copy()
+    change(signals)
+    return replace(record, signals=signals)
+
+
+def test_times_in_ms_taken_for_seconds_are_refused_by_name(drop, machine):
+    """It ended in an IndexError: the levitated part had more stretches of a millisecond than samples."""
+    slow = replace(
+        drop,
+        time=1e3 * drop.time,
+        speed_time=1e3 * drop.speed_time,
+        sampling_rate=1e-3 * drop.sampling_rate,
+        metadata={},
+    )
+    found = worst(slow, machine)
+    assert (found.kind, found.severity) == ("wrong sampling rate", "stop")
+    assert "the clock gives 20 Hz over" in found.message and "make it 20000 Hz over" in found.message
+    assert '[time] unit = "ms"' in found.remedy
+
+
+def test_the_levitated_part_of_a_slow_clock_is_fitted(drop):
+    slow = replace(drop, time=1e3 * drop.time, sampling_rate=20.0)
+    assert fit_levitated(slow, -10.0, speed=2.0 * np.pi * 0.06).end <= -10.0
+
+
+def test_a_clock_that_is_two_per_cent_off(drop, tail, machine):
+    fast = replace(
+        drop,
+        time=drop.time / 1.02,
+        speed_time=drop.speed_time / 1.02,
+        sampling_rate=1.02 * drop.sampling_rate,
+        metadata={},
+    )
+    found = worst(fast, machine, tail)
+    assert (found.kind, found.severity) == ("wrong sampling rate", "warning")
+    assert "of the speed channel, +2.0% or more" in found.message
+
+
+def test_six_samples_stuck(drop, machine):
+    def hold(signals):
+        signals[6000:6006, 1] = signals[6000, 1]
+
+    found = worst(with_signals(drop, hold), machine)
+    assert (found.kind, found.channel) == ("stuck channel", drop.channel_names[1])
+    assert found.message.startswith("6 samples (0.3 ms)")
+
+
+@pytest.mark.parametrize("count", [16, 32])
+def test_neighbouring_blocks_exchanged_in_one_channel(count, drop, machine):
+    """No step is larger than those of the motion: only its course shows it."""
+
+    def exchange(signals):
+        first = signals[6000 : 6000 + count, 1].copy()
+        signals[6000 : 6000 + count, 1] = signals[6000 + count : 6000 + 2 * count, 1]
+        signals[6000 + count : 6000 + 2 * count, 1] = first
+
+    found = worst(with_signals(drop, exchange), machine)
+    assert (found.kind, found.channel) == ("damaged block", drop.channel_names[1])
+    assert found.time == pytest.approx(drop.time[6000 + count], abs=1.01 * count * 5e-5)
+
+
+def test_twenty_lost_samples_under_a_running_clock(fast_drop, machine):
+    at = int(np.searchsorted(fast_drop.time, 0.05))
+    keep = np.delete(np.arange(len(fast_drop.time)), np.arange(at, at + 20))
+    count = len(keep)
+    cut = replace(
+        fast_drop,
+        time=fast_drop.time[:count],
+        signals=fast_drop.signals[keep],
+        speed=fast_drop.speed[:count],
+    )
+    found = worst(cut, machine)
+    assert (found.kind, found.time) == ("dropped block", pytest.approx(0.05, abs=2e-3))
+
+
+def test_drift_is_no_noise(drop, tail, machine):
+    def wander(signals):
+        signals[:, 0] += 300e-6 * np.linspace(0.0, 1.0, len(signals))
+
+    found = worst(with_signals(drop, wander), machine, tail)
+    assert (found.kind, found.channel) == ("drift", drop.channel_names[0])
+
+
+def test_hum_that_hides_the_drop_is_no_missing_pre_trigger(drop, machine):
+    wave = 100e-6 * np.sin(2.0 * np.pi * 60.0 * drop.time)[:, None]
+    found = worst(replace(drop, signals=drop.signals + wave), machine)
+    assert (found.kind, found.severity) == ("hum", "stop")
+    assert "mains hum of 60 Hz" in found.message

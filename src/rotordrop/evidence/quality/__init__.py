@@ -28,6 +28,7 @@ from rotordrop.evidence.quality.motion import (
     check_speed,
     check_units,
     first_motion,
+    hum_instead_of_a_drop,
     no_drop,
 )
 from rotordrop.evidence.quality.recorder import (
@@ -144,7 +145,8 @@ def _begins(evidence: Evidence) -> list[Finding]:
     if not isinstance(begun, Missing):
         return []
     if isinstance(begun.error, NoDropError):
-        return [no_drop(begun.error)]
+        whole = evidence.record.whole
+        return hum_instead_of_a_drop(whole, float(np.min(evidence.gaps))) or [no_drop(begun.error)]
     raise begun.error or RecordError(begun.reason)
 
 

@@ -26,7 +26,14 @@ CLIPPED_RUN = 5
 COARSE_STEP = 1e-6
 """Quantisation coarser than this is worth a warning [m]."""
 
-_STUCK_SAMPLES = 8
+_STUCK_SAMPLES = 5
+_BY_CHANCE = 1e-5
+"""Runs as long as a stuck one that noise and converter make in a record, at most [1]; with 1e-3 one of 520
+clean channels was named."""
+
+_NEARBY = 400
+"""Steps around a run that say how often neighbours read the same there."""
+
 _SPIKE = 12.0
 _SPIKE_LEAST = 5e-6
 _SPIKE_STEPS = 2.5
@@ -110,14 +117,23 @@ def _held(values: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     starts, lengths = runs_of(np.diff(values) == 0)
     if not len(lengths):
         return starts, lengths
-    longest = int(np.argmax(lengths))
-    others = np.append(np.delete(lengths, longest), 0)  # coarse steps make runs everywhere
-    usual = int(np.percentile(others, 99.9, method="lower")) + 1
     # flat at the extreme is clipping, which is looked for by itself
     inside = (values[starts] != np.min(values)) & (values[starts] != np.max(values))
-    chosen = np.flatnonzero((lengths + 1 >= max(_STUCK_SAMPLES, 4 * usual)) & inside)
+    # coarse steps make runs everywhere, and more of them where the rotor hardly moves
+    same = np.diff(values) == 0
+    share = max(float(np.mean(same)), 1.0 / len(same))
+    rare = len(same) * share**lengths < _BY_CHANCE
+    chosen = np.flatnonzero((lengths + 1 >= _STUCK_SAMPLES) & inside & rare)
+    chosen = np.array([k for k in chosen if _alone(same, int(starts[k]), int(lengths[k]))], dtype=np.intp)
     chosen = chosen[np.argsort(-lengths[chosen], kind="stable")]
     return starts[chosen], lengths[chosen] + 1
+
+
+def _alone(same: NDArray[np.bool_], start: int, length: int) -> bool:
+    """Whether noise and converter hardly make a run as long as this, by what they do on both sides of it."""
+    beside = np.append(same[max(start - _NEARBY, 0) : start], same[start + length :][:_NEARBY])
+    share = (float(np.sum(beside)) + 1.0) / (len(beside) + 1.0)
+    return len(same) * share**length < _BY_CHANCE
 
 
 def _stuck(record: Record, channel: str, values: Array) -> Finding | None:

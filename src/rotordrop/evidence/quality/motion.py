@@ -50,6 +50,17 @@ GRAVITY = 9.81
 _LONG_ENOUGH = 0.2
 _LOUD = 3e-6
 
+_SLOW = 0.75
+"""Share of what is left of levitated readings that a parabola in time explains, from which it drifts [1]."""
+
+_AT_BORDER = 0.95
+"""Share of the range searched for the orbit at whose end none was found near the speed [1]."""
+
+_HUMMED, _DROWNED, _TOGETHER = 0.1, 0.15, 0.9
+"""Time from the beginning that is looked at for hum [s]; its amplitude over the air gap, and the sum over the
+channels over the sum of their amplitudes, from which hum hides a drop [1]: an orbit has 0.7 at sensors
+that are 90° apart."""
+
 
 def check_units(record: Record, machine: Machine) -> list[Finding]:
     """Compare how far every channel moves with the air gap."""
@@ -247,8 +258,15 @@ def _strongest_line(
 
 
 def check_levitated(levitated: LevitatedModel, record: Record) -> list[Finding]:
-    """Look for loud hum and noise in the levitated readings."""
-    findings = []
+    """Look for another frequency than that of the speed, loud hum, drift and noise before the drop."""
+    findings = _other_clock(levitated, record)
+    if findings:
+        return findings  # what the wrong frequency leaves is no noise
+    inside = (record.time >= levitated.start) & (record.time <= levitated.end)
+    left = record.signals[inside] - levitated.readings(record.time[inside])
+    course = np.vander((record.time[inside] - levitated.start) / (levitated.end - levitated.start), 3)
+    slow = course @ np.linalg.lstsq(course, np.nan_to_num(left), rcond=None)[0]
+    drifts = np.var(slow, axis=0) > _SLOW * np.nanvar(left, axis=0)
     for index, name in enumerate(record.channel_names):
         if levitated.hum is not None:
             size = float(np.abs(levitated.amplitudes[levitated.tones.index(levitated.hum), index]))
@@ -264,7 +282,19 @@ def check_levitated(levitated: LevitatedModel, record: Record) -> list[Finding]:
                     )
                 )
         noise = float(levitated.noise[index])
-        if noise > _LOUD:
+        if noise > _LOUD and drifts[index]:
+            findings.append(
+                Finding(
+                    kind=Kind.DRIFT,
+                    message=f"it wanders by {format_quantity(float(np.ptp(slow[:, index])), 'length')} in "
+                    f"{levitated.end - levitated.start:.3g} s before the drop, beside orbit and hum",
+                    remedy="let driver and sensor warm up, or look for a loose mount; where the rotor lies "
+                    "is off by as much",
+                    severity="warning",
+                    channel=name,
+                )
+            )
+        elif noise > _LOUD:
             findings.append(
                 Finding(
                     kind=Kind.NOISE,
@@ -276,6 +306,57 @@ def check_levitated(levitated: LevitatedModel, record: Record) -> list[Finding]:
                 )
             )
     return findings
+
+
+def _other_clock(levitated: LevitatedModel, record: Record) -> list[Finding]:
+    """An orbit that does not turn with the measured speed: clock or tacho is off by a few per cent.
+
+    The fit of the levitated part looks for the orbit near the speed; it ends at the border where none is.
+    """
+    if record.measured_speed is None:
+        return []
+    when, readings = record.measured_speed
+    readings = readings[(when >= levitated.start) & (when <= levitated.end)]
+    span = levitated.end - levitated.start
+    if not len(readings) or span <= 0.0:
+        return []
+    speed = float(np.median(np.abs(readings))) / (2.0 * np.pi)
+    reach = min(0.5 / span, 0.02 * speed)
+    off = levitated.frequency - speed
+    if abs(off) < _AT_BORDER * reach:
+        return []
+    return [
+        Finding(
+            kind=Kind.WRONG_RATE,
+            message=f"before the drop the orbit turns at {levitated.frequency:.5g} Hz or farther from the "
+            f"{speed:.5g} Hz of the speed channel, {off / speed:+.1%} or more: the sampling interval is off, "
+            "or the speed is; the readings do not tell which",
+            remedy="correct the sampling interval (time.step) or the speed channel in the profile",
+            severity="warning",
+        )
+    ]
+
+
+def hum_instead_of_a_drop(record: Record, gap: float) -> list[Finding]:
+    """Mains hum so large that no drop is found in it: it moves all sensors alike, which no rotor does."""
+    first = record.time < record.time[0] + _HUMMED
+    time, part = record.time[first], record.signals[first]
+    for mains in MAINS:
+        waves = np.exp(2j * np.pi * mains * time)
+        found = 2.0 * np.mean((part - np.mean(part, axis=0)) * waves.conj()[:, None], axis=0)
+        size = float(np.mean(np.abs(found)))
+        if size > _DROWNED * gap and abs(np.sum(found)) > _TOGETHER * np.sum(np.abs(found)):
+            return [
+                Finding(
+                    kind=Kind.HUM,
+                    message=f"mains hum of {mains:g} Hz with {format_quantity(size, 'length')} zero to peak "
+                    "in all channels together hides the drop",
+                    remedy="ground the sensor driver, then record again",
+                    severity="stop",
+                    channel=", ".join(record.channel_names),
+                )
+            ]
+    return []
 
 
 def check_length(record: Record, drop: float, has_tail: bool) -> list[Finding]:
