@@ -203,7 +203,8 @@ def _torn(record: Record) -> list[Finding]:
             f"{worst:.0f} standard deviations off the parabolas before and after it: "
             + ("samples are missing or exchanged there" if alike else "a block was overwritten or exchanged"),
             remedy="copy or export the recording again; the times after lost samples are wrong",
-            severity="stop",
+            # a drop cannot be recorded again: one torn channel leaves the others to tell of it
+            severity="stop" if alike else "warning",
             channel=None if alike else ", ".join(record.channel_names[i] for i in torn),
             time=float(record.time[at]),
         )
