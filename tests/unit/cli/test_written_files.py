@@ -197,7 +197,7 @@ WRITTEN = {
     "rotor of ROSS": Written(("machine.ross_files:write_ross",), _ross, read_ross),
     "profile": Written(("record.profile:save_profile",), _profile, load_profile),
     "record, text": Written(("record.writers:write_delimited",), _csv, _recorded),
-    "record, HDF5": Written(("record.writers:write_hdf5",), _hdf5, _recorded),
+    "record, HDF5": Written(("record.writers:write_hdf5", "record.share:share_record"), _hdf5, _recorded),
     "drop": Written(("simulate.result:save",), _drop, load_result),
     "coast-down": Written(
         ("simulate.coast_down_file:write_coast_down", "simulate.coast_down_file:write_part"),

@@ -26,6 +26,7 @@ def test_exit_codes_are_those_documented_and_all_different():
         "IdentificationError": 4,
         "SimulationError": 5,
         "OutputError": 6,
+        "DamagedFileError": 6,
         "ConsistencyError": 7,
         "UsageError": 64,
     }
