@@ -267,6 +267,6 @@ def test_the_truth_holds_what_structures_are(known):
 def test_a_structure_of_the_machine_file_is_not_lost_beside_violations():
     """The kernels of violations do not have it: it used to be left out without a word."""
     coupled = example_machine("small").with_values({"NDE.support.coupling": 0.4})
-    assert hidden_machine(coupled, 1, "none").structure is None
+    assert not len(hidden_machine(coupled, 1, "none").model.parameters.departure)
     with pytest.raises(UsageError, match=r"states NDE\.support\.coupling = 0\.4 .*support\.axes_angle"):
         hidden_machine(coupled, 1, Violations.model_validate({"support": {"axes_angle": "20 deg"}}))
