@@ -38,7 +38,8 @@ def fall_and_bounce(restitution=0.5, until=1.0, rest_for=0.4):
         if speed**2 / (2 * G) < 1e-6 or start > until:
             break
     y[time >= start] = -GAP
-    orbit = 5e-6 * np.exp(2j * np.pi * 60.0 * time) * (time < RELEASE)
+    fading = np.exp(-np.maximum(time - RELEASE, 0.0) / 2e-3)  # a rotor does not jump out of its orbit
+    orbit = 5e-6 * np.exp(2j * np.pi * 60.0 * time) * fading
     return time, np.column_stack([orbit.real, y + orbit.imag]), hits
 
 
