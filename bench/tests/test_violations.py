@@ -264,6 +264,17 @@ def test_the_truth_holds_what_structures_are(known):
     assert scored["coverage"] == {"intervals": 1, "covered": 1, "fraction": 1.0}
 
 
+def test_a_mount_of_the_machine_file_is_not_lost_beside_violations():
+    """The support of violations does not have it, whatever its elements are."""
+    machine = example_machine("small")
+    branch = {"stiffness": "4e7 N/m", "time": "3 ms"}
+    bearings = tuple(one.changed(mount={"maxwell": [branch]}) for one in machine.touchdown_bearings)
+    mounted = machine.changed(touchdown_bearings=bearings)
+    assert hidden_machine(mounted, 1, "none").model.layout.mount_own == (2, 2)
+    with pytest.raises(UsageError, match=r"states NDE\.mount .* leave the mount or the violations out"):
+        hidden_machine(mounted, 1, Violations.model_validate({"support": {"axes_angle": "20 deg"}}))
+
+
 def test_a_structure_of_the_machine_file_is_not_lost_beside_violations():
     """The kernels of violations do not have it: it used to be left out without a word."""
     coupled = example_machine("small").with_values({"NDE.support.coupling": 0.4})

@@ -98,6 +98,11 @@ def hidden_machine(
     if len(rows):
         # a departing support does not have the structures that a machine file may state
         for bearing in true.touchdown_bearings:
+            if bearing.mount.present:
+                raise UsageError(
+                    f"the machine file states {bearing.name}.mount and the drop has violations too, which "
+                    "would take its place; leave the mount or the violations out"
+                )
             for row in structure_rows_of("bearing"):
                 own = row.stated(bearing)
                 if own is not None and float(own) != 0.0:
