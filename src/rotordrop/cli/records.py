@@ -257,8 +257,9 @@ def clearance(
             low, high = (1e6 * limit for limit in found.interval_90)
             x, y = 1e6 * found.centre
             out.print(
-                f"{found.bearing}: air gap {1e6 * found.gap:.1f} µm (90 %: {low:.1f} to {high:.1f} µm), "
-                f"centre at x = {x:+.1f} µm, y = {y:+.1f} µm, {len(found.polygon)} directions, "
+                f"{found.bearing}: air gap {1e6 * found.gap:.1f} µm (90 %: {low:.1f} to {high:.1f} µm)"
+                + (f", the shaft goes {1e6 * found.sag:.1f} µm beyond it" if found.sag else "")
+                + f", centre at x = {x:+.1f} µm, y = {y:+.1f} µm, {len(found.polygon)} directions, "
                 f"out of round by {1e6 * found.out_of_round:.1f} µm"
             )
         for change in wear:
@@ -266,7 +267,11 @@ def clearance(
             told = "" if low <= 0.0 <= high else "; it has worn" if change.growth > 0 else "; it has shrunk"
             span = f"{low:+.1f} to {high:+.1f} µm"
             out.print(f"{change.bearing}: grown by {1e6 * change.growth:+.1f} µm (90 %: {span}){told}")
-        out.print("The gain of the sensors comes on top: an error of 1 % is 1 % of the gap.")
+        if not any(found.sag for found in checks[-1]):
+            out.print(
+                "The gain of the sensors comes on top: an error of 1 % is 1 % of the gap. What the bearing "
+                "gives way to the push counts to the gap; --machine takes both into account."
+            )
         if output is not None:
             out.print(f"Machine file with the measured gaps: {output}")
 

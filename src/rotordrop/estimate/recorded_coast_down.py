@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import IdentificationError, RecordError
-from rotordrop.evidence.evidence import Evidence, Missing, known, read_evidence
-from rotordrop.evidence.rest import AirGap, identify_air_gap, rest_at_end
+from rotordrop.evidence.evidence import Missing, known, read_evidence
+from rotordrop.evidence.rest import identify_air_gap, rest_of
 from rotordrop.evidence.sensing import Sensing
 from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
@@ -77,7 +77,8 @@ def recorded_coast_down(machine: Machine, record: Record) -> CoastDownSignal:
     sensing = known(evidence.sensing)
     first = int(np.searchsorted(record.time, off))
     try:
-        gap = _air_gap(evidence, sensing)
+        if isinstance(gap := evidence.gap, Missing):
+            gap = identify_air_gap(rest_of(record, sensing, turning=True), evidence.model, sensing)
         sideways = gap.rest.sideways
         gaps, errors = gap.value, dict(zip(names, map(float, gap.standard_error), strict=True))
         centre = (
@@ -104,13 +105,6 @@ def recorded_coast_down(machine: Machine, record: Record) -> CoastDownSignal:
         speed=speed,
         recorded=True,
     )
-
-
-def _air_gap(evidence: Evidence, sensing: Sensing) -> AirGap:
-    """Air gaps by the rest at standstill, or by where the rotor lies at the end of a record."""
-    if not isinstance(evidence.gap, Missing):
-        return evidence.gap
-    return identify_air_gap(rest_at_end(evidence.record, sensing), evidence.model, sensing)
 
 
 def with_found_air_gaps(machine: Machine, signal: CoastDownSignal) -> Machine:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +15,7 @@ from rotordrop.errors import RecordError
 from rotordrop.evidence.quality.channels import check_channels
 from rotordrop.evidence.quality.finding import refuse_unusable
 from rotordrop.evidence.quality.recorder import check_clock
+from rotordrop.evidence.rest import PUSH, of_few, sag_under, stay
 from rotordrop.known import NINETY
 from rotordrop.record.profile import Profile, rules_of
 from rotordrop.record.record import Record, open_record
@@ -62,18 +63,37 @@ class Clearance:
 
     bearing: str
     """Touchdown bearing, or sensor plane where no machine is known."""
-    gap: float
+    radius: float
     """Radius of the circle through the places at the wall [m]."""
-    standard_error: float
-    """Its standard error from noise and roundness [m]; the gain of the sensors comes on top."""
-    interval_90: tuple[float, float]
-    """Interval that holds the radius with 90 % probability [m]."""
+    radius_error: float
+    """Its standard error by noise and roundness, widened as the places are few [m]."""
+    sag: float = 0.0
+    """What contact, race and support give way under the push [m]; zero where no machine is known."""
+    sag_sigma: float = 0.0
+    gain_sigma: float = 0.0
+    """Standard deviations of the gap by the push and by the gain of the sensors [m], of a known machine."""
     centre: Array
     """Centre of the circle from the origin of the readings [m], shape (2,)."""
     polygon: Array
     """Places at the wall, round the circle [m], shape (K, 2)."""
     out_of_round: float
     """Largest deviation of a place at the wall from the circle [m]."""
+
+    @property
+    def gap(self) -> float:
+        """Air gap [m]."""
+        return self.radius - self.sag
+
+    @property
+    def standard_error(self) -> float:
+        """Standard error of the air gap [m]; without a machine the gain of the sensors comes on top."""
+        return math.hypot(self.radius_error, self.sag_sigma, self.gain_sigma)
+
+    @property
+    def interval_90(self) -> tuple[float, float]:
+        """Interval that holds the air gap with 90 % probability [m]."""
+        reach = NINETY * self.standard_error
+        return self.gap - reach, self.gap + reach
 
     def as_json(self) -> dict[str, Any]:
         """Give everything in SI units, ready for JSON."""
@@ -82,6 +102,8 @@ class Clearance:
             "air_gap_m": self.gap,
             "standard_error_m": self.standard_error,
             "interval_90_m": list(self.interval_90),
+            "radius_m": self.radius,
+            "sag_m": self.sag,
             "centre_m": self.centre.tolist(),
             "polygon_m": self.polygon.tolist(),
             "out_of_round_m": self.out_of_round,
@@ -125,7 +147,8 @@ def measure_clearance(
     record : path-like or Record
         Readings at standstill. A few pushes in different directions do, a whole round is better.
     machine : Machine, optional
-        Carries the motion along the straight line through the sensor planes to the touchdown bearings.
+        Carries the motion along the straight line through the sensor planes to the touchdown bearings, and
+        says how far these give way to the push, and how well the sensors are known.
     mapping : sequence of str
         Planes with channels and angles, ``"NDE: X1 0 deg, Y1 90 deg"``, or sensors, ``"S_NDE_A = X1"``.
     profile : Profile or path-like, optional
@@ -138,64 +161,90 @@ def measure_clearance(
 
     Notes
     -----
-    Not validated: the weight bends and tilts the shaft between the pushes, which is left out.
+    The push is not measured: it is taken as the weight on the bearing, within the limits of
+    `rotordrop.evidence.rest.PUSH`. Not validated: the weight bends and tilts the shaft between the pushes,
+    which is left out.
     """
     rules = rules_of(profile, mapping)
     read = record if isinstance(record, Record) else open_record(record, machine, profile=rules)[0]
     refuse_unusable([*check_clock(read, drop=False), *check_channels(read)], read.name)
-    path = _averaged(read.motion, read.sampling_rate)
+    block = max(int(BLOCK * read.sampling_rate), 1)
+    count = len(read.motion) // block
+    if count < 2 * _LEAST_PLACES:
+        raise RecordError(
+            f"{len(read.motion) / read.sampling_rate:.3g} s are too short for a lift check; record while the "
+            "shaft is pushed round"
+        )
+    path = read.motion[: count * block].reshape(count, block, -1, 2).mean(axis=1)
     names = [plane.bearing for plane in read.planes]
-    if machine is not None and len(names) > 1:
-        path = np.einsum("bp,npc->nbc", _carried(machine, [plane.node for plane in read.planes]), path)
-        names = [bearing.name for bearing in machine.touchdown_bearings]
-    return tuple(_clearance(path[:, i], name, read.name) for i, name in enumerate(names))
+    if machine is None or len(names) < 2:
+        return tuple(_clearance(path[:, i], name, read.name) for i, name in enumerate(names))
+    # both bring the rotor model, which a lift check without a machine does not need
+    from rotordrop.evidence.sensing import sensor_sigmas
+    from rotordrop.rotor.unknowns import smallest_gap
+
+    # the straight line through the sensor planes, as weights (B, P) of every plane at every bearing
+    position, bearings = np.asarray(machine.rotor.node_positions), machine.touchdown_bearings
+    sensed, wanted = (
+        np.column_stack([np.ones(len(parts)), position[[part.node - 1 for part in parts]]])
+        for parts in (read.planes, bearings)
+    )
+    weights = wanted @ np.linalg.pinv(sensed)
+    path = np.einsum("bp,npc->nbc", weights, path)
+    found = [_clearance(path[:, b], bearing.name, read.name) for b, bearing in enumerate(bearings)]
+    sag, *limits = (sag_under(machine, share).total for share in (1.0, *PUSH))
+    # the radius follows the mean gain of the sensors of a plane
+    gains = np.square(sensor_sigmas("gain", read.sensors, smallest_gap(machine)))
+    of_plane = [
+        np.sqrt(np.sum(gains[read.plane_of == p])) / np.sum(read.plane_of == p) for p in range(len(names))
+    ]
+    gain = np.hypot.reduce(weights * of_plane, axis=1)
+    return tuple(
+        replace(
+            one,
+            sag=float(sag[b]),
+            sag_sigma=float(limits[1][b] - limits[0][b]) / (2.0 * NINETY),
+            gain_sigma=float(gain[b]) * one.radius,
+        )
+        for b, one in enumerate(found)
+    )
 
 
 def wear_between(before: Sequence[Clearance], after: Sequence[Clearance]) -> tuple[Wear, ...]:
-    """Compare two lift checks, bearing by bearing."""
+    """Compare two lift checks, bearing by bearing, the shaft pushed alike in both."""
     earlier = {clearance.bearing: clearance for clearance in before}
     missing = [clearance.bearing for clearance in after if clearance.bearing not in earlier]
     if missing:
         raise RecordError(
             f"{missing[0]!r} is in the later lift check only; the earlier one has {', '.join(earlier)}"
         )
-    return tuple(_wear(earlier[clearance.bearing], clearance) for clearance in after)
-
-
-def _wear(before: Clearance, after: Clearance) -> Wear:
-    growth = after.gap - before.gap
-    halves = [0.5 * (c.interval_90[1] - c.interval_90[0]) for c in (before, after)]
-    reach = math.hypot(*halves)
-    return Wear(
-        bearing=after.bearing,
-        growth=growth,
-        interval_90=(growth - reach, growth + reach),
-        moved=after.centre - before.centre,
-    )
-
-
-def _averaged(path: Array, rate: float) -> Array:
-    """Means of blocks of readings, shape (K, P, 2)."""
-    block = max(int(BLOCK * rate), 1)
-    count = len(path) // block
-    if count < 2 * _LEAST_PLACES:
-        raise RecordError(
-            f"{len(path) / rate:.3g} s are too short for a lift check; record while the shaft is pushed round"
+    found = []
+    for later in after:
+        first = earlier[later.bearing]
+        growth = later.radius - first.radius
+        reach = NINETY * math.hypot(first.radius_error, later.radius_error)
+        found.append(
+            Wear(
+                bearing=later.bearing,
+                growth=growth,
+                interval_90=(growth - reach, growth + reach),
+                moved=later.centre - first.centre,
+            )
         )
-    return np.asarray(path[: count * block].reshape(count, block, *path.shape[1:]).mean(axis=1))
-
-
-def _carried(machine: Machine, nodes: list[int]) -> Array:
-    """Weight (B, P) of every sensor plane in the straight line at every touchdown bearing."""
-    place = np.asarray(machine.rotor.node_positions)
-    sensed = np.column_stack([np.ones(len(nodes)), place[np.array(nodes) - 1]])
-    wanted = place[np.array([bearing.node for bearing in machine.touchdown_bearings]) - 1]
-    return np.asarray(np.column_stack([np.ones(len(wanted)), wanted]) @ np.linalg.pinv(sensed))
+    return tuple(found)
 
 
 def _clearance(path: Array, name: str, record: str) -> Clearance:
-    corners = _corners(path, name, record)
-    wall = _agreeing(_mean_places(corners, np.mean(corners, axis=0)))
+    from scipy.spatial import ConvexHull, QhullError
+
+    # corners of the convex hull: on its straight way from place to place a shaft is inside
+    try:
+        corners = np.asarray(path[ConvexHull(path).vertices])
+    except QhullError as error:
+        raise RecordError(
+            f"{record}, {name}: the shaft did not move, or along a line only; push it round the whole bearing"
+        ) from error
+    wall = _agreeing(_stays(corners, np.mean(corners, axis=0)))
     _refuse_open(wall, np.mean(corners, axis=0) if len(wall) < 3 else _circle(wall)[0], name, record)
     centre, radius, scatter = _circle(wall)
     # corners lie outside by the noise of the readings: the mean of those at the wall does not
@@ -203,9 +252,21 @@ def _clearance(path: Array, name: str, record: str) -> Clearance:
     near = path[np.abs(distance - radius) < max(_APART * scatter, _AT_WALL)]
     aside = np.angle(np.exp(1j * (_direction(near, centre)[:, None] - _direction(wall, centre))))
     at_wall = near[np.min(np.abs(aside), axis=1) < 0.5 * _PLACE]
-    places = _mean_places(at_wall, centre, _TOUCHING * noise_by_differences(path, 3))
+    places = _stays(at_wall, centre, _TOUCHING * noise_by_differences(path, 3))
     _refuse_open(places, centre, name, record)
-    return _found(places, *_circle(places), name)
+    centre, radius, scatter = _circle(places)
+    offset = places - centre
+    distance = np.hypot(*offset.T)
+    jacobian = np.column_stack([offset / distance[:, None], np.ones(len(places))])
+    of_radius = scatter * math.sqrt(float(np.linalg.inv(jacobian.T @ jacobian)[2, 2]))
+    return Clearance(
+        bearing=name,
+        radius=radius,
+        radius_error=math.hypot(of_few(of_radius, max(len(places) - 3, 1)), _SHARED),
+        centre=np.asarray(centre),
+        polygon=places[np.argsort(_direction(places, centre))],
+        out_of_round=float(np.max(np.abs(distance - radius))),
+    )
 
 
 def _agreeing(places: Array) -> Array:
@@ -232,27 +293,14 @@ def _agreeing(places: Array) -> Array:
     return places[shared] if 2 * np.count_nonzero(shared) > len(places) else places
 
 
-def _corners(path: Array, name: str, record: str) -> Array:
-    """Corners of the convex hull of the path: on its straight way from place to place a shaft is inside."""
-    from scipy.spatial import ConvexHull, QhullError
-
-    try:
-        return np.asarray(path[ConvexHull(path).vertices])
-    except QhullError as error:
-        raise RecordError(
-            f"{record}, {name}: the shaft did not move, or along a line only; push it round the whole bearing"
-        ) from error
-
-
 def _direction(places: Array, centre: Array) -> Array:
     return np.asarray(np.arctan2(*(places - centre).T[::-1]))
 
 
-def _mean_places(path: Array, centre: Array, depth: float = math.inf) -> Array:
-    """Mean place of every direction that was visited; one push is one place however it trembles.
+def _stays(path: Array, centre: Array, depth: float = math.inf) -> Array:
+    """Where the shaft stayed in every direction that was visited; one push is one place however it trembles.
 
-    What lies deeper [m] than the outermost of a place was on its way to the wall and does not count. Distance
-    and direction are averaged: the mean of points along an arc would lie inside it.
+    What lies deeper [m] than the outermost of a place was on its way to the wall and does not count.
     """
     order = np.argsort(_direction(path, centre))
     angle = _direction(path, centre)[order]
@@ -263,13 +311,12 @@ def _mean_places(path: Array, centre: Array, depth: float = math.inf) -> Array:
     for k in range(1, len(turned)):
         if turned[k] - turned[starts[-1]] > _PLACE:
             starts.append(k)
-    means = []
+    places = []
     for group in np.split(path[np.roll(order, -first)], starts[1:]):
-        distance = np.hypot(*(group - centre).T)
-        touching = distance > np.max(distance) - depth
-        along = group[touching].mean(axis=0) - centre
-        means.append(centre + along * float(np.mean(distance[touching])) / math.hypot(*along))
-    return np.array(means)
+        reach = np.hypot(*(group - centre).T)
+        distance, direction = stay(group[reach > np.max(reach) - depth], centre)
+        places.append(centre + distance * direction)
+    return np.array(places)
 
 
 def _refuse_open(wall: Array, centre: Array, name: str, record: str) -> None:
@@ -307,23 +354,3 @@ def _circle(wall: Array) -> tuple[Array, float, float]:
     free = max(len(wall) - 3, 1)
     scatter = math.sqrt(float(np.sum((weights * rest) ** 2)) / free)
     return centre, radius, max(scatter, _LEAST_SCATTER)
-
-
-def _found(wall: Array, centre: Array, radius: float, scatter: float, name: str) -> Clearance:
-    from scipy.special import stdtrit
-
-    offset = wall - centre
-    distance = np.hypot(*offset.T)
-    jacobian = np.column_stack([offset / distance[:, None], np.ones(len(wall))])
-    error = scatter * math.sqrt(float(np.linalg.inv(jacobian.T @ jacobian)[2, 2]))
-    reach = math.hypot(error * float(stdtrit(max(len(wall) - 3, 1), 0.95)), NINETY * _SHARED)
-    order = np.argsort(np.arctan2(offset[:, 1], offset[:, 0]))
-    return Clearance(
-        bearing=name,
-        gap=radius,
-        standard_error=math.hypot(error, _SHARED),
-        interval_90=(radius - reach, radius + reach),
-        centre=np.asarray(centre),
-        polygon=wall[order],
-        out_of_round=float(np.max(np.abs(distance - radius))),
-    )

@@ -25,7 +25,7 @@ from rotordrop.evidence.events import (
     of_whole,
 )
 from rotordrop.evidence.levitated import LevitatedModel
-from rotordrop.evidence.rest import resting_record
+from rotordrop.evidence.rest import identify_air_gap, rest_of, resting_record
 from rotordrop.record.axes import along_sensors, sensor_polarity
 from rotordrop.record.record import Record
 from rotordrop.record.recording import Array
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from rotordrop.evidence.free_rotor import FreeRotor
     from rotordrop.evidence.initial_state import InitialState
     from rotordrop.evidence.quality.flight import Weighed
-    from rotordrop.evidence.rest import AirGap, SettledRest
+    from rotordrop.evidence.rest import AirGap, Rest
     from rotordrop.evidence.sensing import Sensing
     from rotordrop.evidence.speed import SpeedFit
     from rotordrop.machine import Machine
@@ -213,11 +213,9 @@ class Evidence:
         return sought(found)
 
     @cached_property
-    def rest(self) -> SettledRest | Missing:
+    def rest(self) -> Rest | Missing:
         """Where the rotor rests in the tail."""
-        from rotordrop.evidence.rest import find_rest
-
-        return sought(lambda: find_rest(known(self.still), known(self.sensing)))
+        return sought(lambda: rest_of(known(self.still), known(self.sensing)))
 
     @cached_property
     def settled_level(self) -> Array | Missing:
@@ -237,8 +235,6 @@ class Evidence:
     @cached_property
     def gap(self) -> AirGap | Missing:
         """Air gaps with the sag of the machine's supports."""
-        from rotordrop.evidence.rest import identify_air_gap
-
         return sought(lambda: identify_air_gap(known(self.rest), self.base, known(self.sensing)))
 
     @cached_property

@@ -17,14 +17,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotordrop.elements.magnet import REMANENCE_TIME
-from rotordrop.elements.table import parameter
 from rotordrop.evidence.free_rotor import ComplexArray, FreeRotor, Responses, response_at
 from rotordrop.evidence.levitated import LevitatedModel
+from rotordrop.evidence.sensing import sensor_sigmas
 from rotordrop.record.recording import Array
-from rotordrop.rotor.unknowns import sensor_prior
 
 if TYPE_CHECKING:
-    from rotordrop.elements.sensor import Sensor
     from rotordrop.record.record import Record
 
 REMANENT_SHARE = (0.2, 0.2)
@@ -344,7 +342,7 @@ def _problem(
     turning = max(rotor.mass * amplitude * speed**2, 1e-3 * float(np.sum(np.abs(rotor.lift))))
     ambs, (share, spread) = len(rotor.lift), REMANENT_SHARE
     forces = [_SIDEWAYS_SHARE, spread, turning, turning, _BACKWARD_SHARE * turning, _BACKWARD_SHARE * turning]
-    gains = [_gain_error(sensor) for sensor in record.sensors]
+    gains = np.maximum(sensor_sigmas("gain", record.sensors, 1.0), 1e-4)
     expected = np.zeros(len(forces) * ambs + len(gains))
     expected[ambs : 2 * ambs] = share
     return FallProblem(
@@ -359,8 +357,3 @@ def _problem(
         prior_mean=expected,
         prior_error=np.concatenate([np.repeat(forces, ambs), gains]),
     )
-
-
-def _gain_error(sensor: Sensor) -> float:
-    """Standard deviation of the gain, as every estimate takes it."""
-    return max(sensor_prior(parameter("gain", "sensor"), sensor.gain, smallest_gap=1.0).sigma, 1e-4)

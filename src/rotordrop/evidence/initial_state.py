@@ -22,7 +22,7 @@ from rotordrop.evidence.events import RINGING, DropInstant, PowerOff
 from rotordrop.evidence.fall import REMANENT_TIME
 from rotordrop.evidence.free_rotor import ComplexArray, Held, held_by, motion_of, response_at
 from rotordrop.evidence.levitated import LevitatedModel
-from rotordrop.evidence.rest import AirGap, SettledRest
+from rotordrop.evidence.rest import AirGap, Rest
 from rotordrop.evidence.sensing import Sensing
 from rotordrop.machine import Machine
 from rotordrop.physics import columns as L
@@ -348,11 +348,6 @@ def covariance_root(covariance: Array) -> Array:
     return np.asarray(scale[:, None] * ((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T))
 
 
-def settled_along(rest: SettledRest, sensing: Sensing) -> Array:
-    """Displacement along the sensors [m], shape (S,), of the rotor at the lowest point of its bearings."""
-    return np.asarray(-sensing.from_bearings[..., 1] @ rest.radius + sensing.settled_bend)
-
-
 def end_of_fall(time: Array, place: Array, gaps: Array) -> float:
     """Last time of the free fall [s from the first sample's clock].
 
@@ -422,8 +417,7 @@ def initial_state_of(
             "pre-trigger."
         )
     rest, time = gap.rest, record.time - release.value
-    settled = settled_along(rest, sensing)
-    end = end_of_fall(time, sensing.at_bearings(record.along - rest.along + settled), gap.value)
+    end = end_of_fall(time, sensing.at_bearings(record.along - rest.along + rest.settled), gap.value)
     inside = (time > 0.0) & (time <= end)
     if int(inside.sum()) < FEWEST_SAMPLES:
         raise IdentificationError(
@@ -452,7 +446,7 @@ def initial_state_of(
         ),
         mean=mean,
         covariance=covariance,
-        settled=settled,
+        settled=rest.settled,
         drop_instant=release.value,
         end=end,
         noise=np.maximum(release.levitated.noise * record.gains, 1e-9),
@@ -498,7 +492,7 @@ class _Levitated:
         model: DropModel,
         speed: float,
         held: Held,
-        rest: SettledRest,
+        rest: Rest,
         sensing: Sensing,
     ) -> None:
         self.release, self.sensing, self.model = release, sensing, model
@@ -506,7 +500,7 @@ class _Levitated:
         magnets = np.array([model.basis.node_row(node) for node in held.nodes])
         self.found = build_free_fall(model, speed, nodes, magnets)
         self.sag = model.basis.shapes.T @ (model.fe.mass @ held.sag)
-        self.settled = settled_along(rest, sensing)
+        self.settled = rest.settled
         self.level = along_sensors(release.levitated.mean, record.sensors) - rest.along
         turned = np.exp(2j * np.pi * release.levitated.tones[0] * release.value)
         self.tone = release.levitated.amplitudes[0] * turned * record.gains
@@ -655,7 +649,7 @@ def _by_end_of_fall(
     end: float,
     model: DropModel,
     speed: float,
-    rest: SettledRest,
+    rest: Rest,
     sensing: Sensing,
 ) -> tuple[FreeFall, Array, Array]:
     """The state from which a straight rotor without remanent forces comes to the end of the fall.
@@ -666,14 +660,14 @@ def _by_end_of_fall(
     count, m, near = len(sensing.names), found.n_modes, max(end - END_WINDOW, 0.5 * end)
     level, rate, error = local_polynomial(time, record.along - rest.along, near, width=2.0 * (end - near))
     at_rest = sensing.from_bearings.reshape(count, -1)
-    settled, rigid = settled_along(rest, sensing), [0, 1, m, m + 1]
+    rigid = [0, 1, m, m + 1]
     straight = np.linalg.pinv(sensing.rows[:, rigid])
     back = found.transition(REMANENT_TIME[0], -near)
     gain, rests = slice(2 * count, 3 * count), slice(3 * count + 1, 3 * count + 1 + at_rest.shape[1])
 
     def outcome(x: Array) -> Array:
         state = np.zeros(found.size)
-        place = settled + at_rest @ x[rests] + (level + x[:count]) / (1.0 + x[gain])
+        place = rest.settled + at_rest @ x[rests] + (level + x[:count]) / (1.0 + x[gain])
         state[rigid] = straight @ place
         state[[2 * m + k for k in rigid]] = straight @ ((rate + x[count : 2 * count]) / (1.0 + x[gain]))
         state[found.one] = 1.0
@@ -693,6 +687,6 @@ def _by_end_of_fall(
 
 def _rest_sigma(model: DropModel, sensing: Sensing) -> Array:
     """Prior deviation of the error of the rest position (x, y) per bearing [m], shape (2 B,)."""
-    zero = np.sqrt(np.sum((sensing.to_bearings[:, 1, :] * sensing.offset_sigma) ** 2, axis=1))
-    sideways = np.full(len(zero), SIDEWAYS_REST_SIGMA * smallest_gap(model.machine))
-    return np.column_stack([sideways, zero]).ravel()
+    height = sensing.height_sigma
+    sideways = np.full(len(height), SIDEWAYS_REST_SIGMA * smallest_gap(model.machine))
+    return np.column_stack([sideways, height]).ravel()

@@ -20,13 +20,13 @@ from rotordrop.evidence.paths import (
     impacts_of,
     motion_of,
     slope,
-    standstill_of,
     whirls_of,
 )
 from rotordrop.evidence.quality import Finding, Kind, check_record, stops
 from rotordrop.evidence.quality.channels import check_channels
 from rotordrop.evidence.quality.finding import ranked
 from rotordrop.evidence.quality.recorder import check_blocks, check_clock
+from rotordrop.evidence.rest import standstill_of
 from rotordrop.evidence.synchronous import Synchronous, synchronous_motion
 from rotordrop.json_schema import DIALECT, FLAG, MAYBE, NUMBER, PAIR, TEXT, TEXTS, closed, listed
 from rotordrop.record.arrangement import Arrangement

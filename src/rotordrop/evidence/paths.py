@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import RecordError
 from rotordrop.evidence.events import FALLEN_SHARE, fall_accelerations
-from rotordrop.evidence.rest import STANDSTILL
 from rotordrop.physics.whirl_spells import whirl_spells
 from rotordrop.record.record import Record
 from rotordrop.record.recording import Array
@@ -358,16 +357,6 @@ def _whirls(motion: Motion, path: Path, drop: Drop) -> list[Whirl]:
         Whirl(plane=path.name, start=s.start, end=s.end, turns=s.turns, frequency=abs(s.frequency))
         for s in spells
     ]
-
-
-def standstill_of(record: Record) -> float | None:
-    """When the shaft came to rest by its speed readings [s]; None where it did not or nothing tells."""
-    if record.speed_time is None or record.speed_readings is None:
-        return None
-    slow = np.abs(record.speed_readings) <= STANDSTILL
-    if not slow[-1] or slow.all():
-        return None
-    return float(record.speed_time[int(np.flatnonzero(~slow)[-1]) + 1])
 
 
 LYING = 0.7

@@ -1,9 +1,9 @@
-"""The rest at the end: a rotor at standstill on its touchdown bearings, swinging out, and the air gap.
+"""Where the rotor rests in its touchdown bearings: in a tail, at the end of a record, in a lift check.
 
-At the end of a drop the rotor rests on its bearings, so the distance of its centre from the sensors' origin
-is the air gap plus what race, support and contact give way under the weight (Neisi 2020, section 5). A
-vertical zero error of the sensors reads exactly like a larger or smaller gap: the tail alone cannot separate
-them.
+A rotor at rest lies on a circle about the centre of its bearing. The radius of the circle is the air gap plus
+what contact, race and support give way under the load there (Neisi 2020, section 5). Along the circle the
+rotor swings, or is held aside. A vertical zero error of the sensors reads exactly like a larger or smaller
+gap: the rest at the bottom cannot separate them, stays all round the circle can.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotordrop.errors import IdentificationError, UnsettledError
+from rotordrop.known import NINETY
 from rotordrop.record.recording import Array
 from rotordrop.units import format_quantity
 
@@ -24,13 +25,79 @@ if TYPE_CHECKING:
     from rotordrop.rotor.parameters import DropModel, StaticSag
 
 STANDSTILL = 2 * np.pi * 0.5
-"""Slower than this counts as standstill [rad/s]."""
+"""Slower than this counts as standstill [rad/s] (chosen): speed channels read some 0.1 Hz at rest."""
 
 MOST_SWING = 0.5
-"""Peak-to-peak motion at rest, in nominal air gaps."""
+"""Peak-to-peak motion at rest, in nominal air gaps (chosen)."""
 
-_BLOCK = 0.1
-_SHORTEST = 0.2
+_QUIET = 0.1
+"""Length of the blocks by which the end of a record is looked at for its rest [s]: three swings."""
+
+SHORTEST_TAIL = 0.2
+"""Length of settled record needed at least [s]: some five swings."""
+
+BLOCK = 0.5
+"""Length of the blocks whose means give limits and standard error [s]: some fifteen swings."""
+
+LARGEST_SWAY = 0.25
+"""Largest swing of a rotor that counts as settled, as a share of its radius [1] (chosen)."""
+
+LARGEST_SWING = 0.7
+"""The same where only centre and radius are asked, which a swing along the race does not move."""
+
+MOST_SPREAD = 0.05
+"""Scatter of the radius of a rotor that lies in its bearings, as a share of it [1] (chosen)."""
+
+END = 1.0
+"""Length of the end of a record that shows where the rotor lies [s]: some thirty swings."""
+
+PUSH = (0.5, 2.0)
+"""Loads at the wall in a lift check over the weight there, between which nine of ten lie (chosen, not
+measured): half the weight lifts no shaft to the upper half, and nobody needs much more than all of it."""
+
+
+def stay(path: Array, centre: Array) -> tuple[Array, Array]:
+    """Mean distance (...) of places (N, ..., 2) from a centre [m], and their mean direction [1], (..., 2).
+
+    Each is averaged by itself: the mean of places along an arc lies inside it.
+    """
+    away = path - centre
+    mean = away.mean(axis=0)
+    direction = mean / np.hypot(mean[..., 0], mean[..., 1])[..., None]
+    return np.hypot(away[..., 0], away[..., 1]).mean(axis=0), direction
+
+
+def of_few(error: Array | float, free: int) -> Array:
+    """Standard error of a mean of few values, widened by Student's t so that `NINETY` of it hold 90 %."""
+    from scipy.special import stdtrit
+
+    return np.asarray(error * float(stdtrit(free, 0.95)) / NINETY)
+
+
+def sag_under(machine: Machine, share: float = 1.0) -> StaticSag:
+    """What gives way at every bearing under a share of the static load there."""
+    from rotordrop.rotor.parameters import bearing_row, race_sag, static_sag
+    from rotordrop.rotor.statics import bearing_load_shares
+
+    bearings, loads = machine.touchdown_bearings, share * np.asarray(bearing_load_shares(machine))
+    rows = np.array([bearing_row(bearing, load) for bearing, load in zip(bearings, loads, strict=True)])
+    return static_sag(rows, race_sag(bearings, loads), loads)
+
+
+def standstill_of(record: Record) -> float | None:
+    """When the shaft came to rest by its speed readings [s]; None where it did not or nothing tells."""
+    turning = _turning(record)
+    if turning is None or record.speed_time is None or turning + 1 == len(record.speed_time):
+        return None
+    return float(record.speed_time[turning + 1])
+
+
+def _turning(record: Record) -> int | None:
+    """Index of the last speed reading above standstill."""
+    if record.measured_speed is None:
+        return None
+    turning = np.flatnonzero(np.abs(record.measured_speed[1]) > STANDSTILL)
+    return int(turning[-1]) if len(turning) else None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,8 +108,7 @@ class SettledTail:
     end: float
     """Where it is, in record time [s]."""
     mean: Array
-    """Mean readings [m]; a mean over a swing lies above the lowest point, take the arc into account, shape
-    (S,)."""
+    """Mean readings [m]; a mean over a swing lies above the lowest point, shape (S,)."""
     swing: Array
     """Peak-to-peak motion in x and y per sensor plane [m], shape (P, 2)."""
 
@@ -62,21 +128,29 @@ def settled_tail(record: Record, machine: Machine) -> SettledTail:
     RecordError
         When the record does not reach standstill; says how fast or how far the shaft still moves.
     """
-    start = _standstill_begins(record)
+    start, turning = float(record.time[0]), _turning(record)
+    if turning is not None and record.speed_time is not None and record.speed_readings is not None:
+        start = float(record.speed_time[turning])
+        if record.time[-1] - start < SHORTEST_TAIL:
+            speed = format_quantity(float(abs(record.speed_readings[turning])), "speed")
+            raise UnsettledError(
+                record.name,
+                f"does not reach standstill: the shaft still turns at {speed} at {start:.6g} s and the "
+                f"record ends at {record.time[-1]:.6g} s",
+            )
     gap = min(float(bearing.air_gap) for bearing in machine.touchdown_bearings)
     still = record.window(start, np.inf)
     path, time = still.whole.motion, still.time
-    block = max(int(_BLOCK * record.sampling_rate), 4)
-    count = len(time) // block
-    quiet = 0
-    while quiet < count and _swing(path[len(path) - (quiet + 1) * block :]).max() < MOST_SWING * gap:
-        quiet += 1
-    if quiet * block < _SHORTEST * record.sampling_rate:
-        moves = format_quantity(float(_swing(path[-block:]).max()), "length")
+    block = max(int(_QUIET * record.sampling_rate), 4)
+    swings = [np.ptp(path[end - block : end], axis=0).max() for end in range(len(path), block - 1, -block)]
+    moving = np.flatnonzero(~(np.array(swings) < MOST_SWING * gap))
+    quiet = int(moving[0]) if len(moving) else len(swings)
+    if quiet * block < SHORTEST_TAIL * record.sampling_rate:
+        moves = format_quantity(float(np.ptp(path[-block:], axis=0).max()), "length")
         raise UnsettledError(
             record.name,
             f"does not reach standstill: the shaft still moves by {moves} peak to peak in the last "
-            f"{_BLOCK:g} s, more than {MOST_SWING:.0%} of the nominal air gap of "
+            f"{_QUIET:g} s, more than {MOST_SWING:.0%} of the nominal air gap of "
             f"{format_quantity(gap, 'length')}",
         )
     first = len(time) - quiet * block
@@ -84,7 +158,7 @@ def settled_tail(record: Record, machine: Machine) -> SettledTail:
         start=float(time[first]),
         end=float(time[-1]),
         mean=np.mean(still.signals[first:], axis=0),
-        swing=_swing(path[first:]),
+        swing=np.asarray(np.ptp(path[first:], axis=0)),
     )
 
 
@@ -106,62 +180,17 @@ def resting_record(record: Record, tail: Record | None, machine: Machine) -> Rec
     return source.window(found.start, found.end)
 
 
-def _standstill_begins(record: Record) -> float:
-    """Time of the last speed reading above standstill [s]; the begin of a record without speed."""
-    measured = record.measured_speed
-    if measured is None:
-        return float(record.time[0])
-    speed_time, readings = measured
-    turning = np.flatnonzero(np.abs(readings) > STANDSTILL)
-    if not len(turning):
-        return float(record.time[0])
-    last = int(turning[-1])
-    left = float(record.time[-1] - speed_time[last])
-    if left < _SHORTEST:
-        speed = format_quantity(float(abs(readings[last])), "speed")
-        raise UnsettledError(
-            record.name,
-            f"does not reach standstill: the shaft still turns at {speed} at {speed_time[last]:.6g} s and "
-            f"the record ends at {record.time[-1]:.6g} s",
-        )
-    return float(speed_time[last])
-
-
-def _swing(path: Array) -> Array:
-    return np.asarray(np.ptp(path, axis=0))
-
-
-SHORTEST_TAIL = 0.2
-"""Length of settled record needed at least [s]: some five swings."""
-
-BLOCK = 0.5
-"""Length of the blocks whose means give the lower and upper limit [s]: some fifteen swings."""
-
-LARGEST_SWAY = 0.25
-"""Largest swing of a rotor that counts as settled, as a share of its radius [1]."""
-
-LARGEST_SWING = 0.7
-"""The same where only centre and radius are asked, which a swing along the race does not move."""
-
-MOST_SPREAD = 0.05
-"""Scatter of the radius of a rotor that lies in its bearings, as a share of it [1]."""
-
-END = 1.0
-"""Length of the end of a record that shows where the rotor lies [s]: some thirty swings."""
-
-
 @dataclass(frozen=True, kw_only=True)
-class SettledRest:
+class Rest:
     """Where the rotor rests at the end of a drop; B bearings, S sensors."""
 
     radius: Array
-    """Mean distance of the rotor centre at the bearing nodes from the centre of the sway arc [m], shape (B,).
-    """
+    """Mean distance of the rotor centre from the centre of the arc of its sway, at the bearings [m], (B,)."""
     radius_lower: Array
     radius_upper: Array
-    """Smallest and largest mean over a block of the tail [m], shape (B,)."""
+    """Smallest and largest mean over a block (the paper's two windows) [m], shape (B,)."""
     standard_error: Array
-    """Standard error of the mean radius from the scatter of the blocks [m], shape (B,)."""
+    """Standard error of the mean radius by the scatter of the blocks, widened as they are few [m], (B,)."""
     sideways: Array
     """Mean horizontal reading at the bearings [m]; taken as horizontal sensor zero, shape (B,)."""
     sway: Array
@@ -169,116 +198,100 @@ class SettledRest:
     spread: Array
     """Standard deviation of the radius [m], shape (B,)."""
     along: Array
-    """Displacements along the sensors [m] with the rotor at the lowest point of its sway, shape (S,)."""
+    """Readings along the sensors [m] with the rotor at the lowest point of its sway, shape (S,)."""
+    settled: Array
+    """Displacement along the sensors at that point by radius and bend of the rotor [m], shape (S,)."""
     start: float
     end: float
     """Part of the record that was used [s]."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class AirGap:
-    """Air gaps from the settled tail, shape (B,) each [m]."""
-
-    value: Array
-    """Air gap [m], shape (B,)."""
-    lower: Array
-    upper: Array
-    """Limits from the smallest and largest block of the tail [m] (the paper's two windows), shape (B,)."""
-    sag: StaticSag
-    """What was taken off the settled radius."""
-    zero_sigma: Array
-    gain_sigma: Array
-    """Standard deviation of the gap [m] by the vertical zero and by the gain of the sensors, which the tail
-    cannot separate from the gap, shape (B,)."""
-    rest: SettledRest
-    """The rest position behind it."""
-
-    @property
-    def standard_error(self) -> Array:
-        """Standard error with everything the tail cannot separate [m], shape (B,)."""
-        return np.asarray(np.sqrt(self.zero_sigma**2 + self.gain_sigma**2 + self.rest.standard_error**2))
-
-
-def find_rest(still: Record, sensing: Sensing) -> SettledRest:
-    """Where the rotor rests in a record of standstill alone.
+def rest_of(record: Record, sensing: Sensing, *, turning: bool = False) -> Rest:
+    """Where the rotor rests in a record of standstill alone, or at the end of one whose shaft may turn.
 
     Raises
     ------
     IdentificationError
-        If the rotor is not at rest in it, or it is too short.
+        If the rotor does not lie in its bearings there, or the record is too short.
     """
-    if still.duration < 0.9 * SHORTEST_TAIL:
+    name, time, along, largest = record.name, record.time, record.along, LARGEST_SWAY
+    if turning:
+        late = time >= time[-1] - END
+        if record.duration < 2.0 * END:
+            raise IdentificationError(f"{name} is shorter than {2.0 * END:g} s")
+        time, along, largest = time[late], along[late], LARGEST_SWING
+    elif record.duration < 0.9 * SHORTEST_TAIL:
         raise IdentificationError(
-            f"{still.name}: {still.duration:.3g} s of settled rotor; at least {SHORTEST_TAIL:g} s are "
+            f"{name}: {record.duration:.3g} s of settled rotor; at least {SHORTEST_TAIL:g} s are "
             "needed for the air gap. Record longer after standstill."
         )
-    return _rest(still.name, still.time, still.along, sensing)
-
-
-def rest_at_end(record: Record, sensing: Sensing) -> SettledRest:
-    """Where the rotor lies at the end of a record, the shaft turning or not: in contact, swinging at most.
-
-    Raises
-    ------
-    IdentificationError
-        If the rotor does not lie in its bearings for the last second, or the record is shorter.
-    """
-    late = record.time >= record.time[-1] - END
-    if record.time[-1] - record.time[0] < 2.0 * END:
-        raise IdentificationError(f"{record.name} is shorter than {2.0 * END:g} s")
-    rest = _rest(record.name, record.time[late], record.along[late], sensing, LARGEST_SWING)
-    if np.any(rest.spread > MOST_SPREAD * rest.radius):
-        raise IdentificationError(
-            f"{record.name}: in its last {END:g} s the rotor still leaves its races: its distance from their "
-            f"centre scatters by {_microns(rest.spread)} µm; expected less than {MOST_SPREAD:.0%} of it"
-        )
-    return rest
-
-
-def _rest(
-    name: str, time: Array, along: Array, sensing: Sensing, largest_sway: float = LARGEST_SWAY
-) -> SettledRest:
     place = sensing.at_bearings(along - sensing.settled_bend)
-    sideways = place[..., 0].mean(axis=0)
-    swing = place[..., 0] - sideways
-    radius = np.hypot(swing, place[..., 1])
-    sway = 0.5 * np.ptp(swing, axis=0)
-    if np.any(place[..., 1].mean(axis=0) > 0.0) or np.any(sway > largest_sway * radius.mean(axis=0)):
+    sideways, height = place[..., 0].mean(axis=0), place[..., 1].mean(axis=0)
+    # the arc is taken to be level where the rotor lies on average, and centred at the zero of the sensors
+    place[..., 0] -= sideways
+    radius = np.hypot(place[..., 0], place[..., 1])
+    mean, sway, spread = radius.mean(axis=0), 0.5 * np.ptp(place[..., 0], axis=0), radius.std(axis=0)
+    if np.any(height > 0.0) or np.any(sway > largest * mean):
         raise IdentificationError(
-            f"{name}: the rotor is not at rest on its bearings: mean height "
-            f"{_microns(place[..., 1].mean(axis=0))} µm, swing {_microns(sway)} µm; expected a height near "
-            "minus the air "
-            f"gap and a swing below {largest_sway:.0%} of it. Check polarity and angles of the sensors, or "
-            "give a later tail (--tail)."
+            f"{name}: the rotor is not at rest on its bearings: mean height {_microns(height)} µm, swing "
+            f"{_microns(sway)} µm; expected a height near minus the air gap and a swing below {largest:.0%} "
+            "of it. Check polarity and angles of the sensors, or give a later tail (--tail)."
         )
-    # A rotor that sways along its race is lifted: its mean height is above the lowest point, its mean radius
-    # is not. Gap and rest follow from the radius, and the mean readings are let down by the difference.
-    blocks = max(1, int((time[-1] - time[0]) / BLOCK + 0.1))
+    if turning and np.any(spread > MOST_SPREAD * mean):
+        raise IdentificationError(
+            f"{name}: in its last {END:g} s the rotor still leaves its races: its distance from their "
+            f"centre scatters by {_microns(spread)} µm; expected less than {MOST_SPREAD:.0%} of it"
+        )
+    blocks = max(2, int((time[-1] - time[0]) / BLOCK + 0.1))
     means = np.array([part.mean(axis=0) for part in np.array_split(radius, blocks)])
-    mean = radius.mean(axis=0)
-    lift = mean + place[..., 1].mean(axis=0)
-    raised = np.einsum("sb,b->s", sensing.from_bearings[..., 1], lift)
-    return SettledRest(
+    # a rotor that sways is lifted: its mean readings are let down to the lowest point of the arc
+    raised = np.einsum("sb,b->s", sensing.from_bearings[..., 1], mean + height)
+    return Rest(
         radius=mean,
         radius_lower=means.min(axis=0),
         radius_upper=means.max(axis=0),
-        standard_error=means.std(axis=0, ddof=1) / np.sqrt(blocks) if blocks > 1 else np.zeros(len(mean)),
+        standard_error=of_few(means.std(axis=0, ddof=1) / np.sqrt(blocks), blocks - 1),
         sideways=sideways,
         sway=sway,
-        spread=radius.std(axis=0),
+        spread=spread,
         along=along.mean(axis=0) - raised,
+        settled=np.asarray(-sensing.from_bearings[..., 1] @ mean + sensing.settled_bend),
         start=float(time[0]),
         end=float(time[-1]),
     )
 
 
-def identify_air_gap(rest: SettledRest, model: DropModel, sensing: Sensing) -> AirGap:
+@dataclass(frozen=True, kw_only=True)
+class AirGap:
+    """Air gaps by where the rotor rests, shape (B,) each [m]."""
+
+    value: Array
+    """Air gap: the radius of the rest less the sag."""
+    lower: Array
+    upper: Array
+    """Limits from the smallest and largest block of the tail (the paper's two windows)."""
+    sag: StaticSag
+    """What was taken off the settled radius."""
+    zero_sigma: Array
+    gain_sigma: Array
+    """Standard deviation of the gap by the vertical zero and by the gain of the sensors; the tail cannot
+    separate them from the gap."""
+    rest: Rest
+    """The rest behind it."""
+
+    @property
+    def standard_error(self) -> Array:
+        """Standard error with everything the tail cannot separate; `NINETY` of it hold 90 %."""
+        return np.asarray(np.sqrt(self.zero_sigma**2 + self.gain_sigma**2 + self.rest.standard_error**2))
+
+
+def identify_air_gap(rest: Rest, model: DropModel, sensing: Sensing) -> AirGap:
     """Air gap of each bearing: settled radius less what gives way under the weight.
 
     Parameters
     ----------
-    rest : SettledRest
-        From `find_rest`.
+    rest : Rest
+        From `rest_of`.
     model : DropModel
         Gives load shares, contact, balls and support; call again with a better support until the gap rests.
     sensing : Sensing
@@ -293,15 +306,13 @@ def identify_air_gap(rest: SettledRest, model: DropModel, sensing: Sensing) -> A
     from rotordrop.rotor.parameters import sag_of_model
 
     sag = sag_of_model(model)
-    vertical = np.abs(sensing.to_bearings[:, 1, :])
-    zero = np.sqrt(np.sum((vertical * sensing.offset_sigma) ** 2, axis=1))
     gain = np.sqrt(np.sum((sensing.to_bearings[:, 1, :] * rest.along * sensing.gain_sigma) ** 2, axis=1))
     return AirGap(
         value=rest.radius - sag.total,
         lower=rest.radius_lower - sag.total,
         upper=rest.radius_upper - sag.total,
         sag=sag,
-        zero_sigma=zero,
+        zero_sigma=sensing.height_sigma,
         gain_sigma=gain,
         rest=rest,
     )

@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 
 from rotordrop.cli.app import run
+from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.errors import RecordError
 from rotordrop.evidence.clearance import measure_clearance, wear_between
 from rotordrop.machine import example_machine, example_path, load_machine
 from rotordrop.record.record import Record
 from rotordrop.record.recording import recording_of
 from rotordrop.record.writers import write_hdf5
+from rotordrop.rotor.parameters import build_drop_model, sag_of_model
+from rotordrop.rotor.statics import bearing_load_shares
 
 RATE = 2000.0
 
@@ -124,6 +127,34 @@ def test_wear_is_the_difference_with_its_interval(lp400):
         np.testing.assert_allclose(wear.moved, [0.0, -12e-6], atol=1.5e-6)
 
 
+@pytest.mark.parametrize("push", [0.7, 1.0, 1.6])
+def test_a_wall_that_gives_way_to_the_push_is_not_taken_for_the_gap(lp400, push):
+    loads = push * bearing_load_shares(lp400)
+    # springs in series: contact law K x**n, support; what the balls give way comes from their own numbers
+    gone = [
+        (load / float(b.contact.stiffness)) ** (1.0 / float(b.contact.exponent))
+        + load / float(b.support.stiffness)
+        + numbers_of(b).deflection(float(load))[0]
+        for b, load in zip(lp400.touchdown_bearings, loads, strict=True)
+    ]
+    position = np.asarray(lp400.rotor.node_positions)
+    at = position[[b.node - 1 for b in lp400.touchdown_bearings]]
+    sensed = position[[node - 1 for node in dict.fromkeys(s.node for s in lp400.sensors)]]
+    angle = np.repeat(np.arange(8) * np.pi / 4.0, int(0.5 * RATE))
+    round_ = np.column_stack([np.cos(angle), np.sin(angle)])
+    line = np.polynomial.Polynomial.fit(at, 250e-6 + np.array(gone), 1)
+    rng = np.random.default_rng(1)
+    paths = [radius * round_ + rng.normal(0.0, 0.5e-6, round_.shape) for radius in line(sensed)]
+    record = record_of_paths(paths, lp400)
+    for found, beyond in zip(measure_clearance(record, machine=lp400), gone, strict=True):
+        assert found.radius == pytest.approx(250e-6 + beyond, abs=0.5e-6)
+        low, high = found.interval_90
+        assert low <= 250e-6 <= high
+        assert found.gap == pytest.approx(250e-6, abs=0.7 * beyond + 0.5e-6)
+    for found in measure_clearance(record):
+        assert found.interval_90[0] > 250e-6, "without a machine the hole is measured, push included"
+
+
 def test_half_a_round_is_refused_with_what_is_missing(lp400):
     rng = np.random.default_rng(0)
     path = pushed(rng, 250e-6, 0.0)
@@ -143,9 +174,11 @@ def test_the_command_writes_the_machine_file(lp400, tmp_path, capsys):
     told = capsys.readouterr().out
     assert "NDE: grown by +20.0 µm" in told.replace("+19.9", "+20.0").replace("+20.1", "+20.0")
     measured = load_machine(files[2]).bearing("NDE").air_gap
-    assert measured.value == pytest.approx(300e-6, abs=1e-6)
+    sag = np.asarray(sag_of_model(build_drop_model(lp400)).total)[0]
+    assert measured.value == pytest.approx(300e-6 - sag, abs=1e-6)
     assert measured.source == "lift check after.h5"
     assert measured.interval_90 is not None
+    assert f"the shaft goes {1e6 * sag:.1f} µm beyond it" in told
     told = json.loads((tmp_path / "out.json").read_text())["wear"]
     assert [entry["bearing"] for entry in told] == ["NDE", "DE"]
     assert run(["clearance", files[0], "-o", files[2]]) == 64

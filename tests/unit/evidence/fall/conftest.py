@@ -10,7 +10,7 @@ import pytest
 
 from rotordrop.evidence.evidence import Evidence, known, read_evidence
 from rotordrop.evidence.initial_state import InitialState
-from rotordrop.evidence.rest import SettledRest
+from rotordrop.evidence.rest import Rest
 from rotordrop.evidence.sensing import Sensing, build_sensing
 from rotordrop.known import Known
 from rotordrop.machine import Machine, example_machine
@@ -59,7 +59,7 @@ def evidence(drop: SyntheticDrop, model: DropModel) -> Evidence:
 
 
 @pytest.fixture(scope="session")
-def rest(evidence: Evidence) -> SettledRest:
+def rest(evidence: Evidence) -> Rest:
     return known(evidence.rest)
 
 

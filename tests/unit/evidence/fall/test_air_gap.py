@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import IdentificationError, RecordError
-from rotordrop.evidence.rest import LARGEST_SWAY, SettledRest, find_rest, identify_air_gap, resting_record
+from rotordrop.evidence.rest import LARGEST_SWAY, Rest, identify_air_gap, rest_of, resting_record
 from rotordrop.evidence.sensing import Sensing
 from rotordrop.machine import Machine
 from rotordrop.record.axes import sensor_directions
@@ -21,15 +21,11 @@ def gaps(model: DropModel) -> np.ndarray:
     return np.array([float(bearing.air_gap) for bearing in model.machine.touchdown_bearings])
 
 
-def test_air_gap_is_found_to_a_tenth_of_a_micrometre(
-    rest: SettledRest, model: DropModel, sensing: Sensing
-) -> None:
+def test_air_gap_is_found_to_a_tenth_of_a_micrometre(rest: Rest, model: DropModel, sensing: Sensing) -> None:
     assert identify_air_gap(rest, model, sensing).value == pytest.approx(gaps(model), abs=0.1e-6)
 
 
-def test_gap_moves_by_the_sag_of_another_support(
-    rest: SettledRest, model: DropModel, sensing: Sensing
-) -> None:
+def test_gap_moves_by_the_sag_of_another_support(rest: Rest, model: DropModel, sensing: Sensing) -> None:
     softer = model.with_values({"NDE.support.stiffness": 5e7})
     moved = identify_air_gap(rest, softer, sensing).value - identify_air_gap(rest, model, sensing).value
     load = float(model.load_shares[0])
@@ -42,20 +38,18 @@ def test_vertical_zero_of_the_sensors_reads_like_a_gap(
     assert drop.tail is not None
     up = sensor_directions(drop.tail.sensors)[:, 1]
     shifted = replace(drop.tail, signals=drop.tail.signals - 5e-6 * up)
-    gap = identify_air_gap(find_rest(shifted, sensing), model, sensing)
+    gap = identify_air_gap(rest_of(shifted, sensing), model, sensing)
     assert gap.value == pytest.approx(gaps(model) + 5e-6, abs=0.1e-6)
 
 
-def test_sway_does_not_lift_the_rest_position(
-    drop: SyntheticDrop, sensing: Sensing, rest: SettledRest
-) -> None:
+def test_sway_does_not_lift_the_rest_position(drop: SyntheticDrop, sensing: Sensing, rest: Rest) -> None:
     assert drop.tail is not None
     time = np.arange(3000) * 1e-3
     angle = 0.12 * np.sin(2.0 * np.pi * 29.0 * time)
     radius = rest.radius
     place = np.stack([np.outer(np.sin(angle), radius), np.outer(-np.cos(angle), radius)], axis=-1)
     along = np.einsum("sbc,tbc->ts", sensing.from_bearings, place) + sensing.settled_bend
-    swaying = find_rest(replace(drop.tail, time=time, signals=along), sensing)
+    swaying = rest_of(replace(drop.tail, time=time, signals=along), sensing)
     assert swaying.radius == pytest.approx(radius, abs=1e-9)
     assert swaying.sway == pytest.approx(0.12 * radius, rel=0.01)
     resting = -sensing.from_bearings[..., 1] @ radius + sensing.settled_bend
@@ -67,7 +61,7 @@ def test_sag_is_load_over_stiffness_in_the_support(model: DropModel) -> None:
 
 
 def test_limits_enclose_the_gap_and_zero_error_dominates(
-    rest: SettledRest, model: DropModel, sensing: Sensing
+    rest: Rest, model: DropModel, sensing: Sensing
 ) -> None:
     vague = replace(sensing, offset_sigma=np.full(4, 10e-6))
     gap = identify_air_gap(rest, model, vague)
@@ -99,18 +93,18 @@ def test_short_tail_is_refused(drop: SyntheticDrop, sensing: Sensing) -> None:
     assert drop.tail is not None
     short: Record = drop.tail.window(float(drop.tail.time[0]), float(drop.tail.time[0]) + 0.1)
     with pytest.raises(IdentificationError, match=r"0.1 s of settled rotor; at least 0.2 s"):
-        find_rest(short, sensing)
+        rest_of(short, sensing)
 
 
 def test_levitated_rotor_is_no_rest(drop: SyntheticDrop, sensing: Sensing) -> None:
     assert drop.tail is not None
     floating = replace(drop.tail, signals=-drop.tail.signals)
     with pytest.raises(IdentificationError, match=r"not at rest on its bearings: mean height 2\d\d"):
-        find_rest(floating, sensing)
+        rest_of(floating, sensing)
 
 
 def test_a_rotor_that_swings_in_one_bearing_alone_is_not_at_rest(
-    drop: SyntheticDrop, sensing: Sensing, rest: SettledRest
+    drop: SyntheticDrop, sensing: Sensing, rest: Rest
 ) -> None:
     assert drop.tail is not None
     time = np.arange(4000) * 1e-3
@@ -122,7 +116,7 @@ def test_a_rotor_that_swings_in_one_bearing_alone_is_not_at_rest(
         along = np.einsum("sbc,tbc->ts", sensing.from_bearings, place) + sensing.settled_bend
         return replace(drop.tail, time=time, signals=along)
 
-    assert find_rest(tail(), sensing).radius == pytest.approx(rest.radius)
+    assert rest_of(tail(), sensing).radius == pytest.approx(rest.radius)
     place[:, 1, 0] = 1.5 * LARGEST_SWAY * rest.radius[1] * np.sin(2.0 * np.pi * 8.0 * time)
     with pytest.raises(IdentificationError, match=r"the rotor is not at rest on its bearings"):
-        find_rest(tail(), sensing)
+        rest_of(tail(), sensing)

@@ -9,8 +9,8 @@ import pytest
 
 from rotordrop.errors import IdentificationError
 from rotordrop.evidence.evidence import Evidence, known, read_evidence
-from rotordrop.evidence.initial_state import InitialState, end_of_fall, initial_state_of, settled_along
-from rotordrop.evidence.rest import SettledRest
+from rotordrop.evidence.initial_state import InitialState, end_of_fall, initial_state_of
+from rotordrop.evidence.rest import Rest
 from rotordrop.evidence.sensing import Sensing
 from rotordrop.machine import Machine
 from rotordrop.replay.modal_expansion import expand_initial_state
@@ -116,9 +116,9 @@ def test_square_root_squares_to_the_covariance(initial: InitialState) -> None:
 
 
 def test_modal_expansion_misses_the_sag_that_the_fit_finds(
-    drop: SyntheticDrop, initial: InitialState, rest: SettledRest, model: DropModel, sensing: Sensing
+    drop: SyntheticDrop, initial: InitialState, rest: Rest, model: DropModel, sensing: Sensing
 ) -> None:
-    along = drop.record.along - rest.along + settled_along(rest, sensing)
+    along = drop.record.along - rest.along + rest.settled
     expanded = expand_initial_state(drop.record.time, along, initial.drop_instant, model, sensing)
     true = true_state(drop, 1e-5)[0]
     by_fit = np.abs(initial.displacement - true).max()
