@@ -332,8 +332,10 @@ CASES: tuple[Case, ...] = (
 INTERNALS = "internals"
 VOLATILE = frozenset(
     {"rotordrop_version", "created", "computed", "written", "host", "threads", "wall_time_s"}
+    | {"document_sha256", "sealed"}
 )
-"""Keys of documents and attributes of HDF5 files that say when, where or how fast, not what."""
+"""Keys of documents and attributes of HDF5 files that say when, where or how fast, not what, and digests of
+what is compared itself."""
 
 LONG = 24
 """Numbers in an array from which on it is told by its digest."""

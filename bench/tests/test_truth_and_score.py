@@ -184,7 +184,10 @@ def test_missing_and_unusable_values_are_left_out(folder):
 
 @pytest.mark.parametrize(
     ("content", "message"),
-    [("{", "cannot be read as a truth file"), ('{"name": 1}', "no 'air_gap_m' and no 'peak")],
+    [
+        ("{", r"is not JSON .* Give a file that .rotordrop-bench synthesize"),
+        ('{"name": 1}', "no 'air_gap_m' and no 'peak"),
+    ],
 )
 def test_what_is_no_truth_file_is_refused(tmp_path, content, message):
     file = tmp_path / "truth.json"
@@ -207,7 +210,10 @@ def test_an_interval_that_is_none_is_refused_and_not_a_traceback(folder, interva
 def test_what_is_no_estimate_is_refused(tmp_path, folder):
     file = tmp_path / "estimate.json"
     file.write_text("[1]")
-    with pytest.raises(UsageError, match=r"estimate\.json holds no estimate"):
+    with pytest.raises(
+        UsageError,
+        match=r"estimate\.json holds a list; expected an object\. Give a file that .rotordrop estimate",
+    ):
         score_estimate(file, folder / "truth" / "drop_060.json")
 
 

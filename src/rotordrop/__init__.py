@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rotordrop._version import __version__
 
 if TYPE_CHECKING:
+    from rotordrop.document import read_document as read_document
     from rotordrop.elements.catalog.lookup import find_bearing as find_bearing
     from rotordrop.errors import RotordropError as RotordropError
     from rotordrop.estimation import Replay as Replay
@@ -76,6 +77,7 @@ _PUBLIC = {
     "look": "rotordrop.evidence.look",
     "machine_schema": "rotordrop.machine",
     "parse_quantity": "rotordrop.units",
+    "read_document": "rotordrop.document",
     "read_record": "rotordrop.record",
     "run_study": "rotordrop.study",
     "save_machine": "rotordrop.machine",

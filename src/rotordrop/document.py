@@ -11,6 +11,7 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
 from rotordrop.errors import UsageError
+from rotordrop.files import DIGEST, read_sealed, without_digest
 from rotordrop.json_schema import DIALECT
 
 ABSENT: Any = None
@@ -69,13 +70,33 @@ class Document(BaseModel):
         return {"$schema": DIALECT, **made, "title": title, "description": description}
 
 
+def read_document(path: str | Path) -> dict[str, Any]:
+    """The values of a JSON document that a command wrote with ``--json``.
+
+    Raises
+    ------
+    UsageError
+        If there is no such file.
+    DamagedFileError
+        If it has no digest, or holds other values than were written with it.
+    """
+    try:
+        return read_sealed(path, "give it as a command wrote it with --json")
+    except OSError as fault:
+        raise UsageError(
+            f"{path} cannot be read ({fault.strerror}); name a file that a command wrote with --json"
+        ) from fault
+
+
 def read_json(path: Path, made_by: str) -> dict[str, Any]:
-    """The object that a JSON file holds.
+    """The object that a JSON file holds, without its digest if it has one.
 
     Raises
     ------
     UsageError
         If it cannot be read, is no JSON, or holds something else than an object.
+    DamagedFileError
+        If it holds other values than were written with its digest.
     """
     way_out = f"Give a file that '{made_by}' wrote."
     try:
@@ -86,4 +107,7 @@ def read_json(path: Path, made_by: str) -> dict[str, Any]:
         raise UsageError(f"{path} is not JSON ({fault}). {way_out}") from fault
     if not isinstance(content, dict):
         raise UsageError(f"{path} holds a {type(content).__name__}; expected an object. {way_out}")
-    return content
+    if DIGEST not in content:
+        return content
+    remedy = f"give it as '{made_by}' wrote it, or take its last member {DIGEST!r} out if the change is meant"
+    return without_digest(content, str(path), remedy)

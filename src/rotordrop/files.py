@@ -12,7 +12,7 @@ import re
 import shutil
 import stat
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
@@ -161,17 +161,69 @@ def new_hdf5(path: str | os.PathLike[str], *, track_order: bool = False) -> Iter
     """Give an empty HDF5 file (``h5py.File``) that appears at `path`, complete or not at all.
 
     It is put together in memory: a disk that becomes full while the HDF5 library writes leaves it in a state
-    that ends the interpreter.
+    that ends the interpreter. Behind the file, where the library does not look, stands the digest of all its
+    bytes; ``sealed`` in its attributes says so.
     """
     import h5py
 
     with atomic_path(path) as temporary:
         memory = {"driver": "core", "backing_store": False}
         with h5py.File(temporary.name, "w", track_order=track_order, **memory) as file:
+            file.attrs[HDF5_SEALED] = "the last 32 bytes are the SHA-256 of all but the last 48"
             yield file
             file.flush()
             image = file.id.get_file_image()
-        temporary.write_bytes(image)
+        with temporary.open("wb") as stream:
+            stream.write(image)
+            stream.write(_HDF5_MARK + hashlib.sha256(image).digest())
+
+
+@contextmanager
+def read_hdf5(path: Path, remedy: str, *, always_sealed: bool = False) -> Iterator[Any]:
+    """Open an HDF5 file (``h5py.File``) of `new_hdf5`; one that is not what was written is refused.
+
+    Files of older versions have no digest; `always_sealed` refuses those too.
+    """
+    import h5py
+
+    sealed = hdf5_is_sealed(path, remedy)
+    if always_sealed and not sealed:
+        raise DamagedFileError(f"{path} is damaged: its digest is gone; {remedy}")
+    with h5py.File(path, "r") as file:
+        if HDF5_SEALED in file.attrs and not sealed:
+            # the library cuts off what stands behind a file that it opens for writing
+            raise DamagedFileError(f"{path} was changed after rotordrop wrote it; {remedy}")
+        yield file
+
+
+def hdf5_is_sealed(path: Path, remedy: str) -> bool:
+    """Whether a digest stands behind an HDF5 file; a file that it is not the digest of is refused."""
+    if (holds := _hdf5_seal(path, *_state_of(path))) is False:
+        raise DamagedFileError(f"{path} is damaged: it is not what rotordrop wrote; {remedy}")
+    return bool(holds)
+
+
+HDF5_SEALED = "sealed"
+"""Attribute of an HDF5 file with a digest behind it."""
+_HDF5_MARK = b"rotordrop sha256"
+
+
+@lru_cache(maxsize=4096)
+def _hdf5_seal(path: Path, *state: int) -> bool | None:
+    """Whether the digest behind an HDF5 file is that of the file; None where there is none."""
+    length = len(_HDF5_MARK) + hashlib.sha256().digest_size
+    digest = hashlib.sha256()
+    with path.open("rb") as stream:
+        left = stream.seek(0, os.SEEK_END) - length
+        stream.seek(max(left, 0))
+        if not (seal := stream.read()).startswith(_HDF5_MARK):
+            return None
+        stream.seek(0)
+        while left > 0:
+            part = stream.read(min(left, 2**20))
+            digest.update(part)
+            left -= len(part) or left
+    return seal == _HDF5_MARK + digest.digest()
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:
@@ -187,40 +239,82 @@ def write_json(path: str | os.PathLike[str], content: Any, *, sealed: bool = Fal
     """Write a JSON file in UTF-8, complete or not at all.
 
     Numbers that JSON cannot hold (NaN, infinity) are refused before anything is written. A sealed table ends
-    with the digest of the whole file, for `read_sealed`.
+    with the digest of its values, for `read_sealed`.
     """
     try:
-        whole = {**content, "sha256": _NO_DIGEST.decode()} if sealed else content
+        whole = with_digest(content) if sealed else content
         text = json.dumps(whole, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     except (TypeError, ValueError) as error:
         raise OutputError(f"cannot write {path} as JSON: {error}") from error
-    raw = text.encode("utf-8", errors="replace")
-    if sealed:
-        raw = raw[: _DIGEST.start] + hashlib.sha256(raw).hexdigest().encode() + raw[_DIGEST.stop :]
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(raw)
+    write_text(path, text)
 
 
-_DIGEST = slice(-68, -4)
-"""Where a sealed file has its digest: before the quotation mark, the line end, the brace and the line end."""
-_NO_DIGEST = b"0" * 64
+def with_digest(content: Mapping[str, Any]) -> dict[str, Any]:
+    """A table for JSON with the digest of its values as its last member, in place of one that it has."""
+    values = _values(content)
+    return {**values, DIGEST: digest_of_values(values)}
+
+
+def without_digest(content: Mapping[str, Any], place: str, remedy: str) -> dict[str, Any]:
+    """A table as it was before `with_digest`; one that holds other values is refused with the way out."""
+    values = _values(content)
+    if content.get(DIGEST) != digest_of_values(values):
+        raise DamagedFileError(f"{place} is damaged or was changed: it is not what rotordrop wrote; {remedy}")
+    return values
+
+
+def _values(content: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in content.items() if name != DIGEST}
+
+
+DIGEST = "document_sha256"
+"""Member of a table that holds the digest of the others."""
+
+
+def digest_of_values(content: Mapping[str, Any]) -> str:
+    """SHA-256 of what a JSON table says; layout, order and the spelling of numbers do not count."""
+
+    def shortest(number: str) -> float:
+        """A whole number as one: other programs write 1 for 1.0."""
+        return int(value) if (value := float(number)).is_integer() else value
+
+    text = json.dumps(content, ensure_ascii=False).encode("utf-8", errors="replace")  # as `write_text` does
+    plain = json.dumps(json.loads(text, parse_float=shortest), sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(plain.encode()).hexdigest()
 
 
 def read_sealed(path: str | os.PathLike[str], remedy: str) -> dict[str, Any]:
-    """Read a sealed JSON table; one of which a single bit has changed is refused with the way out."""
-    raw = Path(path).read_bytes()
-    empty = raw[: _DIGEST.start] + _NO_DIGEST + raw[_DIGEST.stop :]
-    if hashlib.sha256(empty).hexdigest().encode() != raw[_DIGEST]:
-        raise DamagedFileError(f"{path} is damaged: it is not what rotordrop wrote; {remedy}")
-    content: dict[str, Any] = json.loads(raw)
-    del content["sha256"]
-    return content
+    """Read a sealed JSON table; one that holds other values than were written is refused with the way out."""
+    try:
+        content = json.loads(Path(path).read_bytes())
+    except (ValueError, RecursionError):
+        content = None
+    return without_digest(content if isinstance(content, dict) else {}, str(path), remedy)
 
 
 def digest_of_file(path: str | os.PathLike[str]) -> str:
     """SHA-256 of a file."""
     with Path(path).open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def digest_at(file: Path) -> str:
+    """Digest of a file, computed again when the file has changed; empty where there is none."""
+    try:
+        return _digest(file, *_state_of(file))
+    except OSError:
+        return ""
+
+
+def _state_of(file: Path) -> tuple[int, ...]:
+    """What is another for a file that has changed."""
+    now = file.stat()
+    return now.st_ino, now.st_size, now.st_mtime_ns, now.st_ctime_ns
+
+
+@lru_cache(maxsize=4096)
+def _digest(file: Path, *state: int) -> str:
+    return digest_of_file(file)
 
 
 def require_place(path: str | os.PathLike[str]) -> None:

@@ -1,10 +1,10 @@
 """Damage machine files and see what the program says.
 
-Usage: python studies/damaged/machines.py COUNT
+Usage: python studies/damaged/machines.py COUNT [FIRST]
 
 Four files, damaged in eight ways: characters, lines, numbers, units, words, brackets. Each is read, summed
-up where it is accepted. One line per 250 files in ``results/machines.jsonl``; a block that is there is not
-made again.
+up where it is accepted. The number is the seed; the first is FIRST. One line per 250 files in
+``results/machines.jsonl``; a block that is there is not made again.
 """
 
 from __future__ import annotations
@@ -103,7 +103,8 @@ def main() -> None:
     lines = [json.loads(line) for line in RESULTS.read_text().splitlines()] if RESULTS.is_file() else []
     there = {line["block"] for line in lines}
     with RESULTS.open("a") as out:
-        for first in range(0, int(sys.argv[1]), BLOCK):
+        begin = int(sys.argv[2]) if len(sys.argv) > 2 else 0
+        for first in range(begin, begin + int(sys.argv[1]), BLOCK):
             if first in there:
                 continue
             counts: Counter[str] = Counter()

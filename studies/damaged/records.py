@@ -1,18 +1,21 @@
 """Damage small recordings of every format and see what the program makes of them.
 
-Usage: python studies/damaged/records.py FORMAT COUNT      random damage up to number COUNT, 250 at a time
+Usage: python studies/damaged/records.py FORMAT COUNT [FIRST]  random damage from number FIRST on
        python studies/damaged/records.py FORMAT cut         cut after every byte, 1000 at a time
-       FORMAT may be all
+       FORMAT may be all; "HDF5 of others" is HDF5 without the digest that this program puts
+       behind its own
        python studies/damaged/records.py summary
 
-Number and format are the seed of a damage. A block that is in ``results/records.jsonl`` is not made again.
-The libraries of binary formats run in this process, which is forked for every block: a file that ends or
-holds up one is then read as a user would, through the child process of the program, and the block goes on
+Number and format are the seed of a damage. A block of 250 that is in ``results/records.jsonl`` is not made
+again. The libraries of binary formats run in this process, which is forked for every block: a file that ends
+or holds up one is then read as a user would, through the child process of the program, and the block goes on
 behind it.
 """
 
 from __future__ import annotations
 
+import gzip
+import io
 import json
 import multiprocessing
 import queue
@@ -20,6 +23,7 @@ import sys
 import tempfile
 import time
 import traceback
+import zipfile
 import zlib
 from collections import Counter
 from collections.abc import Iterator
@@ -44,13 +48,75 @@ CUT_ROWS = 60
 
 HANG_S = 5.0
 RESULTS = Path(__file__).parent / "results" / "records.jsonl"
-KINDS = ("bits", "cut", "deleted", "twice", "zeroed", "header")
+KINDS = ("bits", "cut", "deleted", "twice", "zeroed", "header", "pushed in", "swapped")
+TEXTS = ("CSV comma", "CSV German", "TXT counter", "COMTRADE ASCII", "UFF text")
+PACKED = ("CSV gzip", "NPZ", "Excel")
+"""Formats whose rows are lines, and those with a checksum over what is packed."""
+SEAL = 48
+WRITERS["HDF5 of others"] = ("h5", lambda path: _of_others(path))
 
 
-def damaged(content: bytes, seed: int) -> tuple[str, bytes]:
-    """Damage a file in one of six ways."""
+def _of_others(path: Path) -> None:
+    """The HDF5 of this program as others write it."""
+    content = written("HDF5", path.parent).read_bytes()
+    path.write_bytes(content[:-SEAL] if content[-SEAL:].startswith(b"rotordrop sha256") else content)
+
+
+def _rows(content: bytes, random: np.random.Generator) -> bytes:
+    """A text with one row lost, twice, exchanged, merged or turned, or with one digit or word in it."""
+    lines = content.split(b"\n")
+    way, at, other = int(random.integers(7)), *random.integers(len(lines) // 2, len(lines) - 1, 2).tolist()
+    sign = next(sign for sign in (b"\t", b";", b",", b" ") if sign in lines[at])
+    cells = lines[at].split(sign)
+    if way == 0:
+        del lines[at]
+    elif way == 1:
+        lines.insert(at, lines[at])
+    elif way == 2:
+        lines[at], lines[other] = lines[other], lines[at]
+    elif way == 3:
+        lines[at : at + 2] = [b"".join(lines[at : at + 2])]
+    elif way == 4:
+        lines[at] = sign.join(cells[1:] + cells[:1])
+    elif way == 5:
+        digits = [i for i, letter in enumerate(lines[at]) if 48 <= letter <= 57]
+        row = bytearray(lines[at])
+        row[digits[int(random.integers(len(digits)))]] = int(random.integers(48, 58))
+        lines[at] = bytes(row)
+    else:
+        cells[int(random.integers(len(cells)))] = b"n/a"
+        lines[at] = sign.join(cells)
+    return b"\n".join(lines)
+
+
+def _below_the_checksum(content: bytes, seed: int) -> bytes:
+    """A packed file whose content was damaged before it was packed."""
+    if content[:2] == b"\x1f\x8b":
+        return gzip.compress(damaged(gzip.decompress(content), seed, "")[1])
+    made = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as new:
+        parts = [part for part in old.infolist() if part.file_size]
+        hit = parts[seed % len(parts)].filename
+        for part in parts:
+            inner = old.read(part)
+            new.writestr(part.filename, damaged(inner, seed, "")[1] if part.filename == hit else inner)
+    return made.getvalue()
+
+
+def damaged(content: bytes, seed: int, name: str) -> tuple[str, bytes]:
+    """Damage a file of a format in one of the ways that it has."""
     random = np.random.default_rng(seed)
-    kind = KINDS[int(random.integers(len(KINDS)))]
+    kinds = (*KINDS, *["rows"] * (name in TEXTS), *["below the checksum"] * (name in PACKED))
+    kind = kinds[int(random.integers(len(kinds)))]
+    if kind == "rows":
+        return kind, _rows(content, random)
+    if kind == "below the checksum":
+        return kind, _below_the_checksum(content, seed)
+    return kind, _bytes(content, kind, random)
+
+
+def _bytes(content: bytes, kind: str, random: np.random.Generator) -> bytes:
+    """A file with bytes that are others, lost, there twice, zero or elsewhere."""
     data = bytearray(content)
     at = int(random.integers(len(data)))
     length = int(np.exp(random.uniform(0.0, np.log(max(len(data) // 4, 2)))))
@@ -65,10 +131,14 @@ def damaged(content: bytes, seed: int) -> tuple[str, bytes]:
         data[at:at] = data[at : at + length]
     elif kind == "zeroed":
         data[at : at + length] = bytes(len(data[at : at + length]))
+    elif kind == "pushed in":
+        data[at:at] = random.bytes(length)
+    elif kind == "swapped":
+        data[at : at + 2 * length] = data[at + length : at + 2 * length] + data[at : at + length]
     else:
         for _ in range(int(random.integers(1, 9))):
             data[int(random.integers(min(len(data), 512)))] = int(random.integers(256))
-    return kind, bytes(data)
+    return bytes(data)
 
 
 def _plain(path: Path, kind: str) -> Content:
@@ -196,7 +266,7 @@ def lines() -> list[dict[str, Any]]:
 
 
 def summary() -> None:
-    """Print outcomes by format, and the sizes of silent changes."""
+    """Print outcomes by format and by kind, and the sizes of silent changes."""
     total: Counter[str] = Counter()
     for name in WRITERS:
         mine: Counter[str] = Counter()
@@ -208,11 +278,21 @@ def summary() -> None:
                     )
         total += mine
         print(f"{name:16} {sum(mine.values()):6} {dict(mine)}")
+    by_kind: dict[str, Counter[str]] = {}
+    for line in lines():
+        for key, count in line["counts"].items():
+            kind, said = key.split("|")
+            by_kind.setdefault(kind, Counter())[said] += count
+    for kind, counts in by_kind.items():
+        print(f"{kind:20} {sum(counts.values()):6} {dict(counts)}")
     sizes = [c for line in lines() for _, said, c in line["told"] if said.startswith("silent: values")]
     print(f"all {sum(total.values())} {dict(total)}")
     if sizes:
         um = 1e6 * np.array(sizes)
-        print(f"silent values: {len(um)}, median {np.median(um):.3g} um, {int(np.sum(um > 5.0))} above 5 um")
+        above = (
+            f"{int(np.sum(um > 5.0))} above 5 um, {int(np.sum(um > 50.0))} above 50, largest {um.max():.0f}"
+        )
+        print(f"silent values: {len(um)}, median {np.median(um):.3g} um, {above}")
 
 
 def _shorten(rows: int) -> None:
@@ -222,7 +302,7 @@ def _shorten(rows: int) -> None:
         setattr(every_format, name, getattr(every_format, name)[:rows])
 
 
-def run_format(name: str, wanted: str) -> None:
+def run_format(name: str, wanted: str, first: int) -> None:
     """Judge what is missing of a format."""
     there = {(line["format"], line["block"]) for line in lines()}
     if wanted == "cut":
@@ -234,7 +314,10 @@ def run_format(name: str, wanted: str) -> None:
         starts = range(0, len(content), 1000)
         blocks = {f"cut {rows} rows {a}": range(a, min(a + 1000, len(content))) for a in starts}
     else:
-        blocks = {f"{a}": range(a, a + BLOCK) for a in range(0, int(wanted), BLOCK)}
+        blocks = {
+            f"{a}": range(a, min(a + BLOCK, first + int(wanted)))
+            for a in range(first, first + int(wanted), BLOCK)
+        }
     for label, numbers in blocks.items():
         if (name, label) in there:
             continue
@@ -242,7 +325,7 @@ def run_format(name: str, wanted: str) -> None:
             run(name, [(i, "every byte", content[:i]) for i in numbers], label)
         else:
             base = zlib.crc32(name.encode())
-            run(name, [(i, *damaged(content, (base << 20) + i)) for i in numbers], label)
+            run(name, [(i, *damaged(content, (base << 20) + i, name)) for i in numbers], label)
 
 
 def main() -> None:
@@ -251,7 +334,7 @@ def main() -> None:
         summary()
         return
     for name in WRITERS if sys.argv[1] == "all" else (sys.argv[1],):
-        run_format(name, sys.argv[2])
+        run_format(name, sys.argv[2], int(sys.argv[3]) if len(sys.argv) > 3 else 0)
 
 
 if __name__ == "__main__":

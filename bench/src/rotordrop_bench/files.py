@@ -57,7 +57,7 @@ def write_synthetic(
         write_record(drop.tail, paths[-1])
     hashes = {f"{stem}.{kind}": sha256_of(folder / f"{stem}.{kind}") for kind in formats}
     paths.append(folder / TRUTH_FOLDER / f"{stem}.json")
-    write_json(paths[-1], {**drop.truth, "name": stem, "record_sha256": hashes})
+    write_json(paths[-1], {**drop.truth, "name": stem, "record_sha256": hashes}, sealed=True)
     if histories:
         paths.append(folder / TRUTH_FOLDER / f"{stem}.npz")
         # forces and stresses in single precision, displacements in double, as in the supplied files

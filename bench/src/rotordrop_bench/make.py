@@ -102,7 +102,7 @@ def make_bench(
             "rotor": drop.rotor,
             "record_sha256": {"record.csv": sha256_of(place / "record.csv")},
         }
-        write_json(truth_path(folder, drop.name), truth)
+        write_json(truth_path(folder, drop.name), truth, sealed=True)
     return [drop.name for drop in missing]
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.document import read_json
 from rotordrop.errors import UsageError
 from rotordrop_bench.truth import Truth, read_truth, truth_of
 
@@ -64,7 +64,7 @@ def score_estimate(
     if not isinstance(truth, Truth):
         truth = truth_of(truth) if isinstance(truth, Mapping) else read_truth(truth)
     if not isinstance(estimate, Mapping):
-        estimate = _read(Path(estimate))
+        estimate = read_json(Path(estimate), "rotordrop estimate --json")
     found = _one_drop(estimate, truth, drop)
     _refuse_another_recording(found, truth, drop)
     named = {name: found.get("bearings", {}).get(name, {}) for name in truth.bearing_names}
@@ -107,19 +107,6 @@ def score_estimate(
             "fraction": float(np.mean(judged)) if judged else None,
         },
     }
-
-
-def _read(estimate: Path) -> Estimate:
-    try:
-        loaded = json.loads(estimate.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise UsageError(
-            f"{estimate} cannot be read as an estimate ({error}); "
-            "give the file of 'rotordrop estimate --json'"
-        ) from error
-    if not isinstance(loaded, Mapping):
-        raise UsageError(f"{estimate} holds no estimate; give the file of 'rotordrop estimate --json'")
-    return loaded
 
 
 def _one_drop(estimate: Estimate, truth: Truth, drop: str | None) -> Estimate:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.document import read_json
 from rotordrop.elements.table import LOADS, published
 from rotordrop.errors import UsageError
 
@@ -77,12 +77,7 @@ class Truth:
 def read_truth(path: str | Path) -> Truth:
     """Read a truth file, ours or a supplied one, with the histories beside it (.npz) where they exist."""
     path = Path(path)
-    try:
-        values = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise UsageError(
-            f"{path} cannot be read as a truth file ({error}); give the .json of a recording"
-        ) from error
+    values = read_json(path, "rotordrop-bench synthesize")
     histories = {}
     if (beside := path.with_suffix(".npz")).is_file():
         with np.load(beside) as stored:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from rotordrop.errors import OutputError, UsageError
-from rotordrop.files import require_place, write_json, write_text
+from rotordrop.files import require_place, with_digest, write_json, write_text
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -60,8 +60,9 @@ def deliver(
 ) -> None:
     """Write page, tables and JSON where they were asked for, and print the summary.
 
-    ``content`` is ready for JSON; with ``-`` as its file it is printed in place of the summary, which is a
-    page or a function that prints on the console it is given. Pages and tables need a page.
+    ``content`` is ready for JSON; a table gets a digest of its values. With ``-`` as its file it is printed
+    in place of the summary, which is a page or a function that prints on the console it is given. Pages and
+    tables need a page.
     """
     if not callable(summary):
         from rotordrop.report.csv_files import write_data
@@ -72,11 +73,12 @@ def deliver(
         if data is not None:
             write_data(summary, data)
     if json_file == STANDARD_OUTPUT:
+        told = with_digest(content) if isinstance(content, dict) else content
         whole = (sys.stdout.encoding or "utf-8").lower().replace("-", "") == "utf8"
-        sys.stdout.write(json.dumps(content, indent=2, ensure_ascii=not whole, allow_nan=False) + "\n")
+        sys.stdout.write(json.dumps(told, indent=2, ensure_ascii=not whole, allow_nan=False) + "\n")
         return
     if json_file is not None:
-        write_json(json_file, content)
+        write_json(json_file, content, sealed=isinstance(content, dict))
     out = console()
     if callable(summary):
         summary(out)

@@ -335,7 +335,7 @@ class Estimate:
             If the suffix names no format, or the file cannot be written.
         """
         if Path(path).suffix.lower() == ".json":
-            write_json(path, self.to_dict())
+            write_json(path, self.to_dict(), sealed=True)
             return
         from rotordrop.estimate.histories import write_histories
 

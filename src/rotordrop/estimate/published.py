@@ -464,6 +464,8 @@ class Drop(Document):
     settled: dict[str, Settled] = ABSENT
     first_contact: dict[str, FirstContact] = ABSENT
     agreement: Agreement = ABSENT
+    document_sha256: str = ABSENT
+    """Digest of the other values."""
 
     @property
     def correlations(self) -> list[Correlation]:
@@ -482,6 +484,8 @@ class Drops(Document):
     fingerprint: str
     machine: str
     drops: dict[str, Drop]
+    document_sha256: str = ABSENT
+    """Digest of the other values."""
 
 
 def drops_of(content: Mapping[str, Any], place: str) -> dict[str, Drop]:

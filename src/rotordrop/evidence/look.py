@@ -28,6 +28,7 @@ from rotordrop.evidence.quality.finding import ranked
 from rotordrop.evidence.quality.recorder import check_blocks, check_clock
 from rotordrop.evidence.rest import standstill_of
 from rotordrop.evidence.synchronous import Synchronous, synchronous_motion
+from rotordrop.files import DIGEST
 from rotordrop.json_schema import DIALECT, FLAG, MAYBE, NUMBER, PAIR, TEXT, TEXTS, closed, listed
 from rotordrop.record.arrangement import Arrangement
 from rotordrop.record.profile import Profile, SpeedSource, rules_of
@@ -352,6 +353,7 @@ __all__ = ["Drop", "Impact", "Look", "PlaneLook", "Synchronous", "Whirl", "look"
 def look_schema() -> dict[str, Any]:
     """JSON Schema of a look at a record: SI units, times in record time, positive turns with the spin."""
     content = closed(
+        {DIGEST: TEXT},
         record=TEXT,
         sha256=TEXT,
         channels=listed(name=TEXT, plane=TEXT, angle_rad=NUMBER),

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import SimulationError
-from rotordrop.files import new_hdf5
+from rotordrop.files import new_hdf5, read_hdf5
 from rotordrop.simulate.checkpoint import part_path
 from rotordrop.simulate.coast_down_result import CoastDownResult, WindowStatistics
 from rotordrop.simulate.fingerprint import fingerprint
@@ -45,6 +45,7 @@ _NUMBERS = (
     "rejected_steps",
 )
 _TEXTS = ("machine_name", "reduction", "outcome")
+_AGAIN = "simulate the coast-down again"
 _ARRAYS = ("peak_value", "peak_time", "whirl_time", "contacts", "contact_energy")
 
 
@@ -101,16 +102,15 @@ def _write_head(file: Any, result: CoastDownResult, frame: Frame) -> None:
 
 
 def _join(file: Any, parts: list[Path]) -> None:
-    import h5py
-
+    remedy = f"remove {parts[0].parent} and start the run again" if parts else ""
     lengths: dict[str, int] = {}
     for path in parts:
-        with h5py.File(path, "r") as part:
+        with read_hdf5(path, remedy, always_sealed=True) as part:
             for name in part:
                 lengths[name] = lengths.get(name, 0) + part[name].shape[0]
     filled = dict.fromkeys(lengths, 0)
     for path in parts:
-        with h5py.File(path, "r") as part:
+        with read_hdf5(path, remedy, always_sealed=True) as part:
             for name in part:
                 if name not in file:
                     shape = (lengths[name], *part[name].shape[1:])
@@ -124,11 +124,9 @@ def _join(file: Any, parts: list[Path]) -> None:
 
 def load_coast_down(path: str | Path) -> CoastDownResult:
     """Read the statistics of a coast-down file; a file of another kind or a damaged one is refused."""
-    import h5py
-
     path = Path(path)
     try:
-        with h5py.File(path, "r") as file:
+        with read_hdf5(path, _AGAIN) as file:
             _check_format(file, path)
             return _read_head(file, path)
     except (OSError, KeyError) as error:
@@ -151,11 +149,9 @@ def is_coast_down(path: str | Path) -> bool:
 
 def ended_run(path: Path, digest: str) -> CoastDownResult | None:
     """What a file holds if it is the whole of just this run, as a run killed behind its end left it."""
-    import h5py
-
     if not is_coast_down(path):
         return None
-    with h5py.File(path, "r") as file:
+    with read_hdf5(path, _AGAIN) as file:
         mine = file.attrs.get("run") == digest
     return load_coast_down(path) if mine else None
 
@@ -195,9 +191,7 @@ class PlaneInFile:
     shape: tuple[int, int]
 
     def __getitem__(self, wanted: slice) -> Array:
-        import h5py
-
-        with h5py.File(self.path, "r") as file:
+        with read_hdf5(self.path, _AGAIN) as file:
             return np.asarray(file[self.dataset][wanted, self.index], dtype=np.float64)
 
 
@@ -217,10 +211,8 @@ class CoastDownSamples:
 
 def open_samples(path: str | Path) -> CoastDownSamples:
     """Open the samples of a coast-down file without reading the displacements into memory."""
-    import h5py
-
     path = Path(path)
-    with h5py.File(path, "r") as file:
+    with read_hdf5(path, _AGAIN) as file:
         _check_format(file, path)
         names = tuple(file["bearing"].asstr()[()])
         nodes = [f"node {node}" for node in file["sensor_node"][()]]

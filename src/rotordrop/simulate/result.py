@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.errors import SimulationError, UsageError
-from rotordrop.files import new_hdf5
+from rotordrop.files import new_hdf5, read_hdf5
 from rotordrop.physics.hertz import LineContact
 from rotordrop.simulate.certificate import Certificate, refined_peak
 from rotordrop.units import format_quantity
@@ -268,11 +268,9 @@ def _dataset(file: Any, name: str, values: Any, axes: tuple[str, ...], unit: str
 
 def load_result(path: str | Path) -> DropResult:
     """Read a result written by `DropResult.save`; a file of another kind or a damaged one is refused."""
-    import h5py
-
     path = Path(path)
     try:
-        with h5py.File(path, "r") as file:
+        with read_hdf5(path, "simulate the drop again") as file:
             if file.attrs.get("format") != _FORMAT:
                 raise SimulationError(
                     f"{path} has format {file.attrs.get('format')!r}; expected {_FORMAT!r}. "

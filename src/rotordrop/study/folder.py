@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from rotordrop._version import __version__
 from rotordrop.errors import DamagedFileError, OutputError, UsageError
 from rotordrop.files import (
+    DIGEST,
     atomic_path,
     digest_of_file,
     process_runs,
@@ -158,7 +159,7 @@ def read_plan(path: str | Path) -> dict[str, Any]:
         with suppress(ValueError, RecursionError):
             plan = json.loads(file.read_bytes())
         # what has a digest was not written without one
-        if not isinstance(plan, dict) or plan.get("format") != WITHOUT_DIGESTS or "sha256" in plan:
+        if not isinstance(plan, dict) or plan.get("format") != WITHOUT_DIGESTS or DIGEST in plan:
             raise
         return plan
 

@@ -15,7 +15,7 @@ from starlette.responses import Response
 
 from rotordrop.errors import RotordropError, UsageError
 from rotordrop.web.running import VERBS, Runner, Verb, result_folder
-from rotordrop.web.workspace import LONGEST_OPTION, Job, TooLargeError, Workspace, labelled
+from rotordrop.web.workspace import LONGEST_OPTION, Job, TooLargeError, Workspace, in_time, labelled
 
 LARGEST_ORDER = 16 * 2**10
 """Bytes of an order; chosen, not measured: options are short texts."""
@@ -86,7 +86,7 @@ def number(request: Request, name: str, usual: float) -> float:
 async def order_of(request: Request) -> dict[str, Any]:
     """The body of a request as a table of JSON."""
     body = b""
-    async for part in request.stream():
+    async for part in in_time(request.stream(), "the order"):
         body += part
         if len(body) > LARGEST_ORDER:
             raise TooLargeError(f"more than {LARGEST_ORDER} bytes are no order")

@@ -58,7 +58,7 @@ def write_look(
         columns["speed"], labels["speed"] = seen.record.speed, "speed [rad/s]"
     write_traces(made, "motion", seen.motion.time, columns)
     content = look_page(seen, drawn=False)
-    write_json(made / "document.json", seen.as_json())
+    write_json(made / "document.json", seen.as_json(), sealed=True)
     write_json(
         made / "page.json",
         {
@@ -134,7 +134,7 @@ def write_estimate(
     ]
     write_traces(made, "drop", grid, columns)
     write_page(content, made / "report.html")
-    write_json(made / "document.json", estimate_document(estimate))
+    write_json(made / "document.json", estimate_document(estimate), sealed=True)
     write_json(
         made / "page.json",
         {
@@ -216,7 +216,7 @@ def write_waterfall(
         simulated=SIMULATED_RECORD if record.is_simulated else "",
     )
     write_page(content, made / "report.html")
-    write_json(made / "document.json", found.as_json())
+    write_json(made / "document.json", found.as_json(), sealed=True)
     write_json(made / "page.json", {**content_json(content), **_falls(found, job, made, options)})
 
 

@@ -21,8 +21,8 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 from rotordrop.errors import DamagedFileError
-from rotordrop.files import read_sealed, write_json
-from rotordrop.web.workspace import Job, Workspace, digest_at, digests_in
+from rotordrop.files import digest_at, read_sealed, write_json
+from rotordrop.web.workspace import Job, Workspace, digests_in
 
 Verb: TypeAlias = Literal["channels", "look", "estimate", "waterfall"]
 Key: TypeAlias = tuple[str, Verb]

@@ -27,6 +27,7 @@ def serve(
         import uvicorn
 
         from rotordrop.web.app import make_app
+        from rotordrop.web.connection import configured
     except ModuleNotFoundError as error:
         raise UsageError(
             f"the page needs the package {error.name}; install it with pip install 'rotordrop[serve]'"
@@ -36,12 +37,8 @@ def serve(
     space = Workspace(folder)
     app = make_app(space, port=port, log=log)
     announce(f"http://127.0.0.1:{port}/#token={space.token()}")
-    config = uvicorn.Config(
-        app, log_level="warning", access_log=False, ws="none", server_header=False, date_header=False,
-        timeout_graceful_shutdown=2, proxy_headers=False,
-    )  # fmt: skip
     try:
-        uvicorn.Server(config).run(sockets=[listening])
+        uvicorn.Server(configured(app)).run(sockets=[listening])
     finally:
         if left := running(space):
             tell(

@@ -17,15 +17,16 @@ import time
 from collections.abc import AsyncIterable, AsyncIterator
 from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import lru_cache
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any, Literal, TypeAlias
 
 from rotordrop.errors import DamagedFileError, OutputError, UsageError
 from rotordrop.files import (
+    DIGEST,
     atomic_folder,
     atomic_path,
     clear_after_killed_runs,
+    digest_at,
     digest_of_file,
     read_sealed,
     write_json,
@@ -120,7 +121,7 @@ class Workspace:
         for file in self.jobs_folder.glob("*/*.json"):
             with suppress(ValueError):
                 told = json.loads(file.read_bytes())
-                if isinstance(told, dict) and "sha256" not in told:
+                if isinstance(told, dict) and DIGEST not in told:
                     verb = file.name.removesuffix(".result.json")
                     found = file.with_name(f"{verb}.{told.get('run')}")
                     more = {"files": digests_in(found)} if verb != file.name and found.is_dir() else {}
@@ -246,21 +247,7 @@ def digests_in(folder: Path) -> dict[str, str]:
     return {file.name: digest_of_file(file) for file in sorted(folder.iterdir())}
 
 
-def digest_at(file: Path) -> str:
-    """Digest of a file, computed again when the file has changed; empty where there is none."""
-    try:
-        now = file.stat()
-    except OSError:
-        return ""
-    return _digest(file, now.st_ino, now.st_size, now.st_mtime_ns, now.st_ctime_ns)
-
-
-@lru_cache(maxsize=4096)
-def _digest(file: Path, *state: int) -> str:
-    return digest_of_file(file)
-
-
-async def _in_time(body: AsyncIterable[bytes], label: str) -> AsyncIterator[bytes]:
+async def in_time(body: AsyncIterable[bytes], label: str) -> AsyncIterator[bytes]:
     """The pieces of an upload, as long as they come fast enough: what stalls keeps others from the room."""
     begun, counted, parts = time.monotonic(), 0, aiter(body)
     while True:
@@ -306,7 +293,7 @@ async def receive(
     try:
         claim(declared or 0)
         with atomic_path(job.path / "files" / stored) as place, place.open("wb") as stream:
-            async for part in _in_time(body, label):
+            async for part in in_time(body, label):
                 counted += len(part)
                 claim(counted)
                 digest.update(part)

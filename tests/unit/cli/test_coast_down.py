@@ -17,6 +17,7 @@ from rotordrop.cli.app import run
 from rotordrop.errors import RecordError
 from rotordrop.estimate.recorded_coast_down import recorded_coast_down, with_recorded_drag
 from rotordrop.estimate.simulated_coast_down import simulated_coast_down
+from rotordrop.files import new_hdf5
 from rotordrop.machine import example_machine, example_path, load_machine, save_machine
 from rotordrop.record.record import read_record
 from rotordrop.report.waterfall_page import waterfall_page
@@ -176,9 +177,10 @@ def test_waterfall_reads_a_simulated_coast_down(coast, machine, tmp_path, capsys
 def test_a_simulated_coast_down_knows_when_it_stopped(coast, tmp_path):
     assert simulated_coast_down(coast["h5"]).standstill is None
     path = tmp_path / "stopped.h5"
-    path.write_bytes(coast["h5"].read_bytes())
-    with h5py.File(path, "r+") as file:
-        file.attrs["standstill_time"] = 2.34
+    with h5py.File(coast["h5"]) as old, new_hdf5(path) as file:
+        for name in old:
+            old.copy(name, file)
+        file.attrs.update({**old.attrs, "standstill_time": 2.34})
     assert simulated_coast_down(path).standstill == 2.34
 
 

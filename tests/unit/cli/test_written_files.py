@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import h5py
@@ -23,9 +24,11 @@ from tests.unit.study.test_study import study_with
 
 import rotordrop
 from rotordrop import DropCase, example_machine, load_machine, save_machine, simulate_drop
-from rotordrop.errors import RotordropError
+from rotordrop.cli.app import run
+from rotordrop.document import read_document
+from rotordrop.errors import DamagedFileError, RotordropError
 from rotordrop.estimate.published import read_drop
-from rotordrop.files import write_json
+from rotordrop.files import new_hdf5, write_json
 from rotordrop.ledger import add_drop
 from rotordrop.ledger.book import allow, read_log
 from rotordrop.machine.ross_files import read_ross, write_ross
@@ -33,9 +36,9 @@ from rotordrop.record.profile import Profile, load_profile, save_profile
 from rotordrop.record.readers import read_recording
 from rotordrop.record.recording import Channel, Recording
 from rotordrop.record.writers import write_delimited, write_hdf5
-from rotordrop.simulate.checkpoint import load_checkpoint, save_checkpoint
+from rotordrop.simulate.checkpoint import load_checkpoint, part_path, save_checkpoint
 from rotordrop.simulate.coast_down import CoastDownCase, simulate_coast_down
-from rotordrop.simulate.coast_down_file import load_coast_down
+from rotordrop.simulate.coast_down_file import Frame, load_coast_down, write_coast_down, write_part
 from rotordrop.simulate.result import load_result
 from rotordrop.study.folder import Shard, open_folder, publish, study_of
 from rotordrop.study.quantities import columns_of
@@ -116,6 +119,26 @@ def _coast_down(folder: Path) -> Path:
     return folder / "c.h5"
 
 
+def _part(folder: Path) -> Path:
+    samples = {name: np.arange(12.0) for name in ("speed", "displacement")}
+    write_part(part_path(folder, 0), samples, np.zeros((2, 3)))
+    return part_path(folder, 0)
+
+
+@cache
+def _coasted() -> Any:
+    with TemporaryDirectory() as folder:
+        return load_coast_down(_coast_down(Path(folder)))
+
+
+def _joined(part: Path) -> Any:
+    """What a coast-down that has ended makes of its parts."""
+    frame = Frame(sensor_nodes=(1,), air_gap=np.array([1e-4]))
+    write_coast_down(_coasted(), frame, "d" * 64, part.parent, 1, part.parent / "joined.h5")
+    with h5py.File(part.parent / "joined.h5") as joined:
+        return {name: joined[name][()].tolist() for name in ("speed", "displacement", "contact_log")}
+
+
 def _checkpoint(folder: Path) -> Path:
     save_checkpoint(folder, "d" * 64, {"state": np.arange(50.0), "time": np.array(0.5)})
     return next(folder.iterdir())
@@ -123,8 +146,14 @@ def _checkpoint(folder: Path) -> Path:
 
 def _estimate(folder: Path) -> Path:
     peaks = {"peak_force_N": value(3300.0, 3200.0, 3400.0), "peak_stress_Pa": value(1.5e9)}
-    write_json(folder / "e.json", published(machine="m", bearings={"NDE": bearing(peaks)}).as_json())
+    content = published(machine="m", bearings={"NDE": bearing(peaks)}).as_json()
+    write_json(folder / "e.json", content, sealed=True)
     return folder / "e.json"
+
+
+def _document(folder: Path) -> Path:
+    assert run(["check", str(_machine(folder)), "--json", str(folder / "check.json")]) == 0
+    return folder / "check.json"
 
 
 def _log(folder: Path) -> Path:
@@ -170,7 +199,7 @@ def _job(part: str) -> Callable[[Path], Path]:
         clock = np.arange(2000.0)
         write_traces(made, "motion", clock, {"x0": np.sin(clock)})
         write_json(made / "page.json", {"traces": {"name": "motion"}})
-        write_json(made / "document.json", {"sha256": "x"})
+        write_json(made / "document.json", {"record": "x"}, sealed=True)
         publish_result(job, "look", "0" * 16, made)
         write_state(job, "look", {"state": "done", "run": "0" * 16})
         return job.path / part
@@ -197,20 +226,22 @@ WRITTEN = {
     "rotor of ROSS": Written(("machine.ross_files:write_ross",), _ross, read_ross),
     "profile": Written(("record.profile:save_profile",), _profile, load_profile),
     "record, text": Written(("record.writers:write_delimited",), _csv, _recorded),
-    "record, HDF5": Written(("record.writers:write_hdf5", "record.share:share_record"), _hdf5, _recorded),
-    "drop": Written(("simulate.result:save",), _drop, load_result),
-    "coast-down": Written(
-        ("simulate.coast_down_file:write_coast_down", "simulate.coast_down_file:write_part"),
-        _coast_down,
-        load_coast_down,
+    "record, HDF5": Written(
+        ("record.writers:write_hdf5", "record.share:share_record"), _hdf5, _recorded, sealed=True
     ),
+    "drop": Written(("simulate.result:save",), _drop, load_result, sealed=True),
+    "coast-down": Written(
+        ("simulate.coast_down_file:write_coast_down",), _coast_down, load_coast_down, sealed=True
+    ),
+    "part of a coast-down": Written(("simulate.coast_down_file:write_part",), _part, _joined, sealed=True),
     "checkpoint": Written(
         ("simulate.checkpoint:save_checkpoint",),
         _checkpoint,
         lambda path: load_checkpoint(path.parent, "d" * 64),
         sealed=True,
     ),
-    "estimate": Written(("estimate.estimate:save", "cli._output:deliver"), _estimate, read_drop),
+    "estimate": Written(("estimate.estimate:save",), _estimate, read_drop, sealed=True),
+    "document": Written(("cli._output:deliver",), _document, read_document, sealed=True),
     "log": Written((), _log, read_log, sealed=True),
     "shard": Written((f"{STUDY}_write_sealed",), _study("shards/000001.npy"), _numbers, sealed=True),
     "plan": Written((f"{STUDY}open_folder",), _study("plan.json"), _numbers, sealed=True),
@@ -293,14 +324,44 @@ def test_a_file_of_another_version_is_refused_in_words(kind, tmp_path):
     entry = WRITTEN[kind]
     file = entry.make(tmp_path)
     if file.suffix == ".h5":
-        with h5py.File(file, "a") as content:
-            content.attrs["format"] = re.sub(r"\d+$", "999", content.attrs["format"])
+        written = file.rename(tmp_path / "written.h5")
+        with h5py.File(written) as old, new_hdf5(file) as content:
+            content.attrs.update({**old.attrs, "format": re.sub(r"\d+$", "999", old.attrs["format"])})
     else:
         told = json.loads(file.read_text())
         told["format"] = told["format"] + 1 if isinstance(told["format"], int) else f"{told['format']}9"
-        write_json(file, told, sealed=kind == "plan")
+        write_json(file, told, sealed=True)
     with pytest.raises(RotordropError, match=r"999|format|version"):
         entry.read(file)
+
+
+@pytest.mark.parametrize("kind", ["estimate", "document", "drop", "coast-down"])
+def test_a_file_that_was_changed_by_hand_says_so_and_the_way_out(kind, tmp_path):
+    entry = WRITTEN[kind]
+    file = entry.make(tmp_path)
+    expected = repr(entry.read(file))
+    if file.suffix == ".h5":
+        with h5py.File(file, "a") as content:
+            content.attrs["machine_name"] = "another"
+        with pytest.raises(DamagedFileError, match=r"was changed after rotordrop wrote it; simulate the"):
+            entry.read(file)
+        return
+    told = json.loads(file.read_text())
+    # another program may write the same values in its own way
+    file.write_text(json.dumps(dict(reversed(told.items()))))
+    assert entry.read(file) == entry.read(file) and len(repr(entry.read(file))) == len(expected)
+    file.write_text(json.dumps({**told, "machine": "another"}))
+    with pytest.raises(
+        DamagedFileError, match=r"was changed: .*give it as .*rotordrop|give it as a command wrote"
+    ):
+        entry.read(file)
+    del told["document_sha256"]
+    file.write_text(json.dumps({**told, "machine": "another"}))
+    if kind == "estimate":  # the way out that the sentence names
+        assert "another" in repr(entry.read(file))
+    else:
+        with pytest.raises(DamagedFileError, match="give it as a command wrote it with --json"):
+            entry.read(file)
 
 
 WRITERS = {

@@ -16,7 +16,7 @@ import pytest
 
 from rotordrop import DropCase, example_machine, simulate_drop
 from rotordrop.errors import DamagedFileError, OutputError, UsageError
-from rotordrop.files import write_json
+from rotordrop.files import DIGEST, write_json
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.study.folder import StudyFolder, claimed, open_folder, read_shards, study_of
 from rotordrop.study.plan import Study, load_study, read_study
@@ -179,7 +179,7 @@ def test_a_damaged_shard_is_computed_again_and_kept(serial, tmp_path):
 def test_a_folder_without_digests_is_given_some_by_the_next_run(serial, tmp_path):
     place = shutil.copytree(serial[0], tmp_path / "study")
     plan = json.loads((place / "plan.json").read_text())
-    del plan["sha256"], plan["machine_sha256"]
+    del plan[DIGEST], plan["machine_sha256"]
     (place / "plan.json").write_text(json.dumps(plan | {"format": "rotordrop study 2"}))
     for file in (place / "shards").iterdir():
         file.write_bytes(file.read_bytes()[:-32])

@@ -13,6 +13,7 @@ from typing import Any
 import uvicorn
 
 from rotordrop.web.app import make_app
+from rotordrop.web.connection import configured
 from rotordrop.web.server import listening_at
 from rotordrop.web.workspace import Workspace
 
@@ -40,7 +41,8 @@ class Served:
         self.space, self.port = space, socket.getsockname()[1]
         self.app = make_app(space, port=self.port, log=log)
         self.token = space.token()
-        config = uvicorn.Config(self.app, log_level="critical", ws="none", timeout_graceful_shutdown=1)
+        config = configured(self.app)
+        config.timeout_graceful_shutdown = 1
         self._server = uvicorn.Server(config)
         self._thread = threading.Thread(target=self._server.run, kwargs={"sockets": [socket]}, daemon=True)
         self._thread.start()

@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 from tests.unit.web.serving import Served
 
+from rotordrop.files import DIGEST
 from rotordrop.web import numbers, running
 from rotordrop.web.running import Runner, result_folder
 from rotordrop.web.workspace import Job, Workspace
@@ -124,7 +125,7 @@ def test_a_folder_of_an_earlier_version_is_given_digests_once(served, looked, tm
     shutil.copytree(served.space.jobs_folder / looked, job.path)
     for file in job.path.glob("*.json"):
         told = json.loads(file.read_text())
-        for key in ("sha256", "files") if file.name == "look.result.json" else ("sha256",):
+        for key in (DIGEST, "files") if file.name == "look.result.json" else (DIGEST,):
             told.pop(key)
         file.write_text(json.dumps(told))
     space.prepare()

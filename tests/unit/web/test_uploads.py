@@ -19,7 +19,7 @@ from tests.unit.web.serving import Served
 from rotordrop.errors import UsageError
 from rotordrop.files import atomic_folder, atomic_path
 from rotordrop.record import readers
-from rotordrop.web import workspace
+from rotordrop.web import connection, workspace
 from rotordrop.web.workspace import Workspace, labelled, receive, stored_as
 
 
@@ -268,3 +268,37 @@ def test_two_files_that_would_lie_under_one_name_are_refused(served, order):
     assert [answer.status for answer in answers] == [201, 400]
     assert f"{order[1]}.dat would lie where {order[0]}.dat lies" in answers[1].text
     assert left_over(served, job) == ["record.dat"]
+
+
+@pytest.mark.parametrize(
+    "said",
+    [b"", b"GET / HT", b"GET /api/jobs HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Slow: ", b"GET / HTTP/1.1\r\n" * 3],
+    ids=["nothing", "part of a line", "part of a header", "many lines"],
+)
+@pytest.mark.parametrize("after_another", [False, True])
+def test_a_head_that_never_ends_is_closed(served, monkeypatch, said, after_another):
+    """Connections that said nothing, or half a header, stayed open for ever."""
+    monkeypatch.setattr(connection, "HEAD_S", 0.5)
+    with socket.create_connection(("127.0.0.1", served.port), timeout=10) as slow:
+        if after_another:
+            slow.sendall(f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{served.port}\r\n\r\n".encode())
+            assert b"200 OK" in slow.recv(100)
+        begun = time.monotonic()
+        for letter in said:  # a piece now and then must not give it more time
+            slow.sendall(bytes([letter]))
+        while slow.recv(65536):
+            pass
+        assert time.monotonic() - begun < 9.0
+    assert served.ask("GET", "/api/jobs").status == 200
+
+
+def test_an_order_that_stalls_ends_with_a_sentence(served, monkeypatch):
+    monkeypatch.setattr(workspace, "STALLED_S", 0.3)
+    head = (
+        f"POST /api/jobs HTTP/1.1\r\nHost: 127.0.0.1:{served.port}\r\nX-Rotordrop-Token: {served.token}\r\n"
+    )
+    with socket.create_connection(("127.0.0.1", served.port), timeout=10) as slow:
+        slow.sendall(f"{head}Content-Length: 50\r\n\r\n{{".encode())
+        answer = slow.recv(4096)
+        assert b" 400 " in answer
+        assert b"nothing of the order came for 0.3 s" in answer + slow.recv(4096)

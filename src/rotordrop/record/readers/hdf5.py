@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from rotordrop.errors import RecordError
+from rotordrop.errors import DamagedFileError, RecordError
+from rotordrop.files import HDF5_SEALED, hdf5_is_sealed
 from rotordrop.record.recording import Array, Recording
 from rotordrop.record.sandbox import MOST_SERIES, Content, Item, plain, refuse_bomb, unpack
 
@@ -28,6 +29,10 @@ def read_hdf5(path: Path, profile: Profile) -> Recording:
     The clock of a dataset is in its attributes (``fs_hz`` or ``dt_s``, and ``t0_s``) or in a dataset ``time``
     beside it; the unit is in ``unit`` or ``units``.
     """
+    try:
+        hdf5_is_sealed(path, "copy it again, or make it again")
+    except DamagedFileError as error:
+        raise RecordError(str(error)) from error
     content = unpack(path, "hdf5")
     last = {item.name: item.name.rsplit("/", 1)[-1] for item in content.items}
     times = {
@@ -51,7 +56,7 @@ def read_hdf5(path: Path, profile: Profile) -> Recording:
         channels.append(profile.channel(last[item.name], unit, values, time, label=item.name))
     if not channels:
         raise RecordError(f"{path} holds no one-dimensional numeric dataset; export the channels one by one")
-    entries = {key: str(value) for key, value in content.attributes.items()}
+    entries = {key: str(value) for key, value in content.attributes.items() if key != HDF5_SEALED}
     notes, warnings = (
         tuple(line for line in entries.get(key, "").split("\n") if line) for key in ("notes", "warnings")
     )
