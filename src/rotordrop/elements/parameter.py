@@ -136,6 +136,8 @@ class Parameter:
     """Whether the fit of the first impacts tells minima apart by it; whether the first window shows it."""
     spin_up_only: bool = False
     """Whether it only says when a race catches up with the rotor: it may go far without moving a force."""
+    inferred_with: str = ""
+    """Path of another value of the part that is inferred from the same size, with the same error in it."""
     field: str = ""
     """Field of the JSON document, unit included."""
     truth: tuple[str, ...] = ()

@@ -66,6 +66,7 @@ PARAMETERS: tuple[Parameter, ...] = (
         entries=bearing_entries(L.RACE_INERTIA),
         step=Step.IMPACTS,
         spin_up_only=True,
+        inferred_with="race.mass",
         field="race.inertia_kg_m2",
         truth=("ring_Ip",),
         taken_over="welcome",

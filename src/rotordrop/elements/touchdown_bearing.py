@@ -22,6 +22,13 @@ from rotordrop.known import Known
 from rotordrop.physics import columns as L
 
 _STEEL_DENSITY = 7800.0
+RACE_MASS, RACE_FORM = 1.25, 1.3
+"""Factors within which mass and form, inertia over mass, of a race lie that are inferred from its size [1].
+
+Grooves and shoulders make up a fifth of a ring. One with a carrier 2.3 times as heavy was met, with a form
+within 7 %: what spins along has to be stated. A mass within a factor of 2 did not follow it either, and moved
+peaks of ordinary rings by up to 6 % (DropBench, 5 to 500 kg).
+"""
 _MOUNTING = frozenset(
     ("arrangement", "first_ball_angle", "second_row_offset", "preload_class", "clearance_class")
 )
@@ -98,13 +105,15 @@ class TouchdownBearing(Placed):
         mass, inertia = self._race_from_size(width.value)
         why = self.bearing.race_radius()[1]
         values: dict[str, Known] = {"width": width}
+        spread = RACE_FORM
         if "mass" not in given:
-            bounds = (0.5 * mass, 2.0 * mass)
+            bounds = (mass / RACE_MASS, mass * RACE_MASS)
             values["mass"] = Known(value=mass, status="inferred", range=bounds, source=why, unit="kg")
+            spread = math.exp(math.hypot(math.log(RACE_MASS), math.log(RACE_FORM)))
         else:
             inertia *= self.race.mass.value / mass
         if "inertia" not in given:
-            bounds = (0.5 * inertia, 2.0 * inertia)
+            bounds = (inertia / spread, inertia * spread)
             values["inertia"] = Known(
                 value=inertia, status="inferred", range=bounds, source=why, unit="kg m^2"
             )

@@ -356,6 +356,23 @@ def file_of_fitted(model: DropModel, unknowns: Sequence[Unknown], exponents: Seq
     return through
 
 
+def inferred_together(model: DropModel, unknowns: Sequence[Unknown], block: Array) -> None:
+    """Let values inferred from one size err together in a prior covariance (P, P): a heavy race turns hard.
+
+    The error of the one is part of that of the other.
+    """
+    parts = dict(parts_of(model.machine, "bearing"))
+    places = {(one.owner, one.parameter.path): k for k, one in enumerate(unknowns)}
+    for (owner, _), k in places.items():
+        row = unknowns[k].parameter
+        other = places.get((owner, row.inferred_with))
+        if other is None:
+            continue
+        both = (row.described(parts[owner]), unknowns[other].parameter.described(parts[owner]))
+        if all(one.status == "inferred" for one in both) and block[other, other] < block[k, k]:
+            block[k, other] = block[other, k] = block[other, other]
+
+
 def correlate(model: DropModel, unknowns: Sequence[Unknown], block: Array) -> None:
     """Let calibrated values err together in a prior covariance (P, P), as their machine file says.
 

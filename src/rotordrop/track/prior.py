@@ -11,7 +11,7 @@ from rotordrop.elements.table import parameter
 from rotordrop.machine import Machine
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.statics import levitated_sag
-from rotordrop.rotor.unknowns import Unknown, correlate, sensor_prior, smallest_gap
+from rotordrop.rotor.unknowns import Unknown, correlate, inferred_together, sensor_prior, smallest_gap
 from rotordrop.track.sensor_form import begin_caught_up, share_in_groups
 
 Array = NDArray[np.float64]
@@ -80,6 +80,7 @@ def prior_at_power_off(
     sigma[layout.own] = np.resize(OWN_SIGMA, layout.own.stop - layout.own.start)
     covariance = np.diag(sigma**2)
     share_in_groups(model, unknowns, covariance[s : s + n_p, s : s + n_p])
+    inferred_together(model, unknowns, covariance[s : s + n_p, s : s + n_p])
     correlate(model, unknowns, covariance[s : s + n_p, s : s + n_p])
     if layout.sensor_own:
         begin_caught_up(layout, rows, mean, covariance)

@@ -103,14 +103,17 @@ def test_the_race_is_inferred_from_the_size_of_the_bearing(small_text):
     assert float(bearing.race.mass) == pytest.approx(mass, rel=1e-12)
     assert float(bearing.race.inertia) == pytest.approx(0.5 * mass * (outer**2 + inner**2), rel=1e-12)
     assert bearing.race.mass.status == "inferred"
+    assert bearing.race.mass.range == pytest.approx((mass / 1.25, mass * 1.25))
+    spread = math.exp(math.hypot(math.log(1.25), math.log(1.3)))
+    assert bearing.race.inertia.range[1] == pytest.approx(float(bearing.race.inertia) * spread)
 
 
 def test_the_inferred_inertia_follows_a_given_mass(small_text):
     machine = loads_machine(small_text)
     twice = machine.with_values({"NDE.race.mass": 2 * float(machine.touchdown_bearings[0].race.mass)})
-    assert float(twice.touchdown_bearings[0].race.inertia) == pytest.approx(
-        2 * float(machine.touchdown_bearings[0].race.inertia), rel=1e-12
-    )
+    inertia = twice.touchdown_bearings[0].race.inertia
+    assert float(inertia) == pytest.approx(2 * float(machine.touchdown_bearings[0].race.inertia), rel=1e-12)
+    assert inertia.range[1] == pytest.approx(1.3 * float(inertia))
 
 
 def test_magnets_without_stiffness_give_the_rotor_40_hz(changed):

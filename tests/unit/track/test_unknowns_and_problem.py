@@ -18,7 +18,7 @@ from rotordrop.physics.ball_bearing import bearing_constants, preload_of_offset
 from rotordrop.record.record import read_record
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.reduction import Reduction
-from rotordrop.rotor.unknowns import aero_time_constant, all_unknowns, prior
+from rotordrop.rotor.unknowns import aero_time_constant, all_unknowns, inferred_together, prior
 from rotordrop.track.problem import (
     NOISE_FLOOR,
     TAIL_VERTICAL_SIGMA,
@@ -99,6 +99,28 @@ def test_a_number_beyond_its_bounds_is_stated_as_the_model_took_it(lp400):
     """A race inertia is followed up to four times what was inferred; what lies beyond has no effect."""
     inertia = unknown_of(lp400, "DE.race.inertia")
     assert inertia.value_of(inertia.mean + 3.0) == pytest.approx(4.0 * math.exp(inertia.mean))
+
+
+def race_errors(machine: Machine) -> np.ndarray:
+    """Prior covariance of mass and inertia of the race at NDE, of their logarithms."""
+    model = build_drop_model(machine, COARSE_BASIS)
+    unknowns = all_unknowns(model)
+    places = [[u.path for u in unknowns].index(f"NDE.race.{part}") for part in ("mass", "inertia")]
+    block = np.diag([u.sigma**2 for u in unknowns])
+    inferred_together(model, unknowns, block)
+    return block[np.ix_(places, places)]
+
+
+def test_a_race_that_is_heavier_than_inferred_is_as_much_harder_to_turn(lp400):
+    """Mass and inertia follow from the same size: their ratio is known better than either."""
+    unstated = {"NDE.race.mass": Known(value=0.3, status="inferred", range=(0.24, 0.375))}
+    inertia = Known(value=6e-4, status="inferred", range=(6e-4 / 1.41, 6e-4 * 1.41))
+    both = race_errors(lp400.with_values(unstated | {"NDE.race.inertia": inertia}))
+    form = both[0, 0] + both[1, 1] - 2.0 * both[0, 1]
+    assert NINETY * math.sqrt(both[0, 0]) == pytest.approx(math.log(1.25))
+    assert NINETY * math.sqrt(form) == pytest.approx(math.log(1.3), rel=0.01)
+    stated = race_errors(lp400.with_values(unstated | {"NDE.race.inertia": 6e-4}))
+    assert stated[0, 1] == 0.0
 
 
 def test_what_a_drop_owns_is_not_shared(flight):
