@@ -57,6 +57,9 @@ def estimate(
             "-o",
         ),
     ] = None,
+    everything: Annotated[
+        bool, Option("--all", help="Show also identified values, every note and the parts of intervals.")
+    ] = False,
     data: options.Data = None,
     json: options.Json = None,
 ) -> None:
@@ -70,6 +73,7 @@ def estimate(
     from rotordrop.estimation import Replay, Tracked, estimate_drops
     from rotordrop.machine import load_machine
     from rotordrop.report.estimate_page import estimate_page, estimate_summary
+    from rotordrop.report.estimate_screen import estimate_screen
     from rotordrop.report.origin import origin_here
     from rotordrop.report.page import write_page
     from rotordrop.twin.search import is_calibrated
@@ -103,6 +107,7 @@ def estimate(
     origin = origin_here(sys.argv[1:], used, operator)
     whole = bool(reports) or since is not None
     pages = [estimate_page(e, origin, earlier) if whole else estimate_summary(e, origin) for e in estimates]
+    screens = pages if everything else [estimate_screen(made) for made in estimates]
     for made, place in zip(estimates, outputs, strict=False):
         made.save(place)
     for made, place in zip(estimates, folders, strict=False):
@@ -113,7 +118,7 @@ def estimate(
     written = [f"{word}: {place}" for word, places in words for place in places]
     documents = [estimate_document(made) for made in estimates]
     numbers = combined(documents, [made.name for made in estimates])
-    deliver(numbers, json, lambda out: _summarise(pages, written, out))
+    deliver(numbers, json, lambda out: _summarise(screens, written, out))
     inconsistent = [made for made in estimates if not made.consistent]
     if inconsistent:
         names = ", ".join(made.name for made in inconsistent)

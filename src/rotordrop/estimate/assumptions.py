@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from rotordrop.elements.table import parameter
+from rotordrop.elements.touchdown_bearing import RACE_MASS
 from rotordrop.evidence.evidence import Evidence, Missing, strongest_slowing
 from rotordrop.known import NINETY
 from rotordrop.physics import columns as L
@@ -36,16 +37,18 @@ def evidence_assumptions(evidence: Evidence) -> Iterator[str]:
 
 
 def twin_assumptions(evidence: Evidence, problem: DropProblem) -> tuple[str, ...]:
-    """What the tracked twin takes beside that: noise, settled level, first air gaps, drag of the air."""
+    """What the tracked twin takes beside that: noise, settled level, first air gaps."""
     return (
         *evidence_assumptions(evidence),
         *_noise(evidence, problem),
-        *_gains(problem),
-        *_lag(problem),
         *_level(evidence),
         *_gaps(evidence, problem),
-        *_air(problem),
     )
+
+
+def left_to_assumption(problem: DropProblem) -> dict[str, str]:
+    """What most machine files do not state, in a few words, by the note that says more."""
+    return {note: words for part in (_gains, _lag, _races, _air) for note, words in part(problem)}
 
 
 def _noise(evidence: Evidence, problem: DropProblem) -> Iterator[str]:
@@ -60,7 +63,7 @@ def _noise(evidence: Evidence, problem: DropProblem) -> Iterator[str]:
         yield f"{sensor.name}: no levitated readings tell its noise; {size} (rms) is taken from {origin}"
 
 
-def _gains(problem: DropProblem) -> Iterator[str]:
+def _gains(problem: DropProblem) -> Iterator[tuple[str, str]]:
     """Gains nobody stated: what holds them keeps an error that all sensors share from being found."""
     machine = problem.model.machine
     taken = [sensor for sensor in machine.sensors if sensor.gain.status == "default"]
@@ -70,7 +73,8 @@ def _gains(problem: DropProblem) -> Iterator[str]:
     yield (
         f"the machine file states no gain of {', '.join(sensor.name for sensor in taken)}: taken as "
         f"calibrated, each within ±{within:.1%} (90 %). A larger error that all share would be in forces and "
-        "gaps; a tolerance such as gain = { guess = 1.0, range = [0.8, 1.2] } lets the estimate find it"
+        "gaps; a tolerance such as gain = { guess = 1.0, range = [0.8, 1.2] } lets the estimate find it",
+        f"gains within ±{within:.1%}",
     )
 
 
@@ -78,7 +82,7 @@ SMALL_LOSS = 0.01
 """Loss of a peak by the lag of a sensor that is told [1]."""
 
 
-def _lag(problem: DropProblem) -> Iterator[str]:
+def _lag(problem: DropProblem) -> Iterator[tuple[str, str]]:
     """Time constants nobody stated: a lag rounds an impact off, and stiffness and mass take that up.
 
     A first-order lag lowers the amplitude at an angular frequency w by half the square of w times the lag.
@@ -93,7 +97,23 @@ def _lag(problem: DropProblem) -> Iterator[str]:
         "the machine file states no time constant of the sensors: they are taken as fast. A lag of "
         f"{1e6 * lag:.0f} µs (a bandwidth of {1e-3 * cut_off:.2g} kHz) would hide about "
         f"{SMALL_LOSS:.0%} of a peak of these contacts of {contact:.0f} Hz, and readings need not show it; "
-        "time_constant in the machine file, for all sensors, takes it into account"
+        "time_constant in the machine file, for all sensors, takes it into account",
+        f"sensors faster than {1e-3 * cut_off:.2g} kHz",
+    )
+
+
+def _races(problem: DropProblem) -> Iterator[tuple[str, str]]:
+    """Races whose mass follows from the size of the bearing: what else spins along adds to it."""
+    bearings = problem.model.machine.touchdown_bearings
+    inferred = [one for one in bearings if one.race.mass.status == "inferred"]
+    if not inferred:
+        return
+    masses = ", ".join(f"{one.name} {format_quantity(float(one.race.mass), 'mass')}" for one in inferred)
+    yield (
+        f"the mass of the race is inferred from the size of the bearing: {masses}, within a factor of "
+        f"{RACE_MASS:g}. A carrier or sleeve that spins along is not in it, and moves the peaks of a light "
+        "rotor; race.mass and race.inertia in the machine file take it into account",
+        "races by bearing size",
     )
 
 
@@ -121,12 +141,13 @@ def _gaps(evidence: Evidence, problem: DropProblem) -> Iterator[str]:
         yield f"{name}: without a tail the air gap begins at {begin} ± {within} (90 %), by {origin}{why}"
 
 
-def _air(problem: DropProblem) -> Iterator[str]:
+def _air(problem: DropProblem) -> Iterator[tuple[str, str]]:
     if problem.model.machine.speed.aero_time_constant is not None:
         return
     unknown = next(u for u in problem.unknowns if u.sets("spin", L.AERO_TIME_CONSTANT))
     low, value, high = (math.exp(unknown.mean + k * NINETY * unknown.sigma) for k in (-1.0, 0.0, 1.0))
     yield (
         "the machine file gives no time constant of the drag of the air: it begins at "
-        f"{value:.3g} s (90 %: {low:.2g} to {high:.2g} s)"
+        f"{value:.3g} s (90 %: {low:.2g} to {high:.2g} s)",
+        f"air drag {value:.2g} s",
     )

@@ -270,6 +270,8 @@ class Estimate:
     warnings: tuple[str, ...] = field(default=())
     notes: tuple[str, ...] = field(default=())
     """What makes the numbers less certain, and what is worth knowing and does not."""
+    assumed: Mapping[str, str] = field(default_factory=dict)
+    """What a machine file leaves to assumption, in a few words, by the note that says more."""
     simulated_record: bool = False
     """Whether the record is known to be simulated."""
 

@@ -163,6 +163,8 @@ class ReportContent:
     """The result in sentences, warnings included, most important first."""
     cards: tuple[Card, ...] = ()
     """Headline numbers per bearing."""
+    screen: Table | None = None
+    """What a terminal shows in place of the cards, one line a number."""
     summary: tuple[Table, ...] = ()
     """Tables that belong beside the verdict and into the terminal."""
     sections: tuple[Section, ...] = ()

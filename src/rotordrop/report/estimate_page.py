@@ -85,7 +85,7 @@ def estimate_summary(estimate: Estimate, origin: Origin | None = None) -> Report
         title=f"Touchdown-bearing force and stress {'by replay of' if replayed else 'from'} a recorded drop",
         subtitle=f"{estimate.machine.name}, {estimate.name}, from {shown(estimate.speed, 'speed')}",
         simulated=SIMULATED_RECORD if estimate.simulated_record else "",
-        verdict=_verdict(estimate),
+        verdict=estimate_verdict(estimate),
         cards=tuple(headline_card(b, certain=certain) for b in estimate.bearings),
         summary=(identified_table(estimate.bearings, taken_over=fixed, certain=certain),),
         facts=(*_facts(estimate), *(origin or Origin()).facts(estimate.record.sha256)),
@@ -105,17 +105,17 @@ def spoken(one: FittedParameter) -> str:
     return f"{one.owner}: {one.row.label}" if one.owner else one.row.label
 
 
-def _names(estimate: Estimate) -> Callable[[str], str]:
+def names_in(estimate: Estimate) -> Callable[[str], str]:
     """Gives the name of an unknown by its path, as the tables name it."""
     names = {one.path: spoken(one) for one in estimate.parameters}
     return lambda path: names.get(path, path)
 
 
-def _verdict(estimate: Estimate) -> tuple[Statement, ...]:
+def estimate_verdict(estimate: Estimate) -> tuple[Statement, ...]:
     """What model and record say of each other first, then warnings, notes and limits."""
     found = [f for f in estimate.findings if f.message not in estimate.warnings]
     serious = [s for s in quality_statements(found) if s.level in ("bad", "warning")]
-    name_of = _names(estimate)
+    name_of = names_in(estimate)
     worth_knowing = {check.noted(): check.noted(name_of) for check in estimate.checks if check.note}
     return (
         _judgement(estimate),
@@ -134,7 +134,7 @@ def _judgement(estimate: Estimate) -> Statement:
         level = "notice"
     elif estimate.consistent and any(not check.passed for check in estimate.checks):
         level = "warning"
-    return Statement(estimate.verdict_in(_names(estimate)), level)
+    return Statement(estimate.verdict_in(names_in(estimate)), level)
 
 
 def _part(estimate: Estimate) -> Statement:
@@ -267,7 +267,7 @@ def _parameters(estimate: Estimate) -> Section:
 
 def _consistency(estimate: Estimate) -> Section:
     """Checks of the model against the record, and the innovations behind them."""
-    name_of = _names(estimate)
+    name_of = names_in(estimate)
     columns = (
         Column("check", "name"),
         Column("passed", lambda check: "yes" if check.passed else "no"),

@@ -48,7 +48,9 @@ def _parts(content: ReportContent) -> list[RenderableType]:
     first = [s for s in content.verdict[:1] if s.level != "bad"]
     first += [s for s in content.verdict if s.level == "bad"]
     parts.extend(_statement(statement) for statement in first)
-    if content.cards:
+    if content.screen is not None:
+        parts.append(_table(content.screen))
+    elif content.cards:
         parts.append(_cards(content))
     parts.extend(_statement(statement) for statement in content.verdict if statement not in first)
     parts.extend(_table(table) for table in content.summary)

@@ -54,6 +54,8 @@ class Check:
     """The unknown that message and note are about, where they are about one."""
     widening: float = 1.0
     """Factor on all intervals that what is noted asks for [1]."""
+    remedy: str = ""
+    """What to do where it did not pass."""
 
     def said(self, name_of: Callable[[str], str] = str) -> str:
         """What was compared, with the unknown by its path or by another name."""
@@ -82,9 +84,21 @@ def consistency_checks(problem: DropProblem, smoothed: Smoothed, noise_factor: f
     tolerated = white and len(beyond) == 1
     return (
         *innovations,
-        _departure_check("sensor errors", sensors, tolerated=tolerated, by_path=False),
+        _departure_check(
+            "sensor errors",
+            sensors,
+            tolerated=tolerated,
+            by_path=False,
+            remedy="check that sensor against a known distance, or give its gain a range",
+        ),
         direction_check(problem, smoothed),
-        _departure_check("parameters", parameters, tolerated=tolerated, by_path=True),
+        _departure_check(
+            "parameters",
+            parameters,
+            tolerated=tolerated,
+            by_path=True,
+            remedy="measure that value of the machine, or widen its range in the machine file",
+        ),
         _nuisance_check(problem, smoothed, white),
         _remanence_check(problem, smoothed, white),
         Check(
@@ -92,6 +106,7 @@ def consistency_checks(problem: DropProblem, smoothed: Smoothed, noise_factor: f
             passed=noise_factor < NOISE_FACTOR_LIMIT,
             message=f"process noise {noise_factor:.3g} × its usual size (limit {NOISE_FACTOR_LIMIT:g} ×)",
             note=_of_a_beam(noise_factor) if problem.model.machine.rotor.is_beam else "",
+            remedy="calibrate on two drops with their tails: a joint fit finds what one drop hides",
         ),
         Check(
             name="filter",
@@ -135,6 +150,7 @@ def _innovation_checks(problem: DropProblem, smoothed: Smoothed) -> tuple[Check,
                 f"{names[worst]} {nis[worst]:.2f} × "
                 f"(usual {NIS_RANGE[0]:g} to {NIS_RANGE[1]:g})"
             ),
+            remedy="calibrate on two drops with their tails: a joint fit finds what one drop hides",
         ),
         Check(
             name="innovation whiteness",
@@ -143,6 +159,7 @@ def _innovation_checks(problem: DropProblem, smoothed: Smoothed) -> tuple[Check,
                 f"neighbouring innovations of channel {names[reddest]} correlate by {lag[reddest]:.2f} "
                 f"(limit {CORRELATION_LIMIT:g})"
             ),
+            remedy=f"look for a filter, drift or interference in channel {names[reddest]}",
         ),
     )
 
@@ -174,7 +191,9 @@ def _sensor_departures(problem: DropProblem, smoothed: Smoothed) -> list[Departu
     return list(zip(departure.tolist(), names, strict=True))
 
 
-def _departure_check(name: str, departures: list[Departure], *, tolerated: bool, by_path: bool) -> Check:
+def _departure_check(
+    name: str, departures: list[Departure], *, tolerated: bool, by_path: bool, remedy: str
+) -> Check:
     """What went farthest from its prior.
 
     One alone that goes a little too far is news of the machine where the innovations are white; the intervals
@@ -182,7 +201,8 @@ def _departure_check(name: str, departures: list[Departure], *, tolerated: bool,
     """
     departure, what = max(departures, default=(0.0, "no unknown"))
     said, path = (_departs(departure), what) if by_path else (f"{what} {_departs(departure)}", "")
-    check = Check(name=name, passed=departure < DEPARTURE_LIMIT, message=said, path=path)
+    passed = departure < DEPARTURE_LIMIT
+    check = Check(name=name, passed=passed, message=said, path=path, remedy=remedy)
     if check.passed or not tolerated or departure >= NOTED_DEPARTURE:
         return check
     return replace(
@@ -218,7 +238,14 @@ def _nuisance_check(problem: DropProblem, smoothed: Smoothed, white: bool) -> Ch
     usual = departure < DEPARTURE_LIMIT
     message = _departs(departure)
     note = "" if usual or not white else f"{message}; the readings are followed all the same"
-    return Check(name="unknowns of the drop", passed=usual or white, message=message, note=note, path=path)
+    return Check(
+        name="unknowns of the drop",
+        passed=usual or white,
+        message=message,
+        note=note,
+        path=path,
+        remedy="check that value in the machine file, the planes of unbalance and magnets first",
+    )
 
 
 def _remanence_check(problem: DropProblem, smoothed: Smoothed, white: bool) -> Check:
@@ -257,6 +284,7 @@ def _remanence_check(problem: DropProblem, smoothed: Smoothed, white: bool) -> C
         if noted
         else "",
         widening=math.hypot(1.0, share / LARGEST_LASTING_LIFT) if noted else 1.0,
+        remedy="check the gains of all sensors, or give them a range",
     )
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.errors import IdentificationError
 from rotordrop.estimate.advice import Advice
-from rotordrop.estimate.assumptions import twin_assumptions
+from rotordrop.estimate.assumptions import left_to_assumption, twin_assumptions
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.estimate.bearing_values import bearing_values
 from rotordrop.estimate.estimate import (
@@ -105,6 +105,9 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
         widening=judged.widening,
     )
     values = {parameter.path: parameter.estimate for parameter in judged.parameters}
+    assumed = left_to_assumption(problem)
+    if all(one.phase is None for one in unbalance):
+        assumed |= dict.fromkeys(unbalance_notes(unbalance), "no unbalance phase")
     quick = (QUICK.format("" if judged.check else "without the independent cross-check and "),)
     return Estimate(
         name=evidence.name,
@@ -136,11 +139,13 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
         ),
         notes=(
             *twin_assumptions(evidence, problem),
+            *assumed,
             *(check.noted() for check in drop.checks if check.note),
             *(f"a further number: {one.sentence()}" for one in advice),
-            *unbalance_notes(unbalance),
+            *(note for note in unbalance_notes(unbalance) if note not in assumed),
             *(quick if method.quick else ()),
         ),
+        assumed=assumed,
         simulated_record=facts.simulated,
     )
 
@@ -199,7 +204,12 @@ def _cross_checked(drop: TrackedDrop, method: Tracked) -> tuple[TrackedDrop, Inp
         ]
         if not apart:
             return drop, check
-        failed = Check(name="cross-check", passed=False, message="; ".join(apart))
+        failed = Check(
+            name="cross-check",
+            passed=False,
+            message="; ".join(apart),
+            remedy="plan with the upper end; calibrate on two drops with their tails",
+        )
         return replace(drop, checks=(*drop.checks, failed)), check
     return drop, drop.without_contact_law()
 

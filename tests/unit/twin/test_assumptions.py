@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotordrop.estimate.assumptions import twin_assumptions
+from rotordrop.estimate.assumptions import left_to_assumption, twin_assumptions
 from rotordrop.evidence.evidence import Evidence, Missing, read_evidence
 from rotordrop.machine import Machine, example_machine, load_machine
 from rotordrop.record.examples import example_record_path
@@ -36,7 +36,7 @@ def evidence(machine: Machine) -> Evidence:
 
 def said(machine: Machine, evidence: Evidence) -> str:
     problem = drop_problem(build_drop_model(machine, COARSE_BASIS), evidence, until=UNTIL)
-    return "\n".join(twin_assumptions(evidence, problem))
+    return "\n".join((*twin_assumptions(evidence, problem), *left_to_assumption(problem)))
 
 
 def test_drag_of_the_air_is_said_with_its_interval(machine: Machine, evidence: Evidence) -> None:

@@ -1,0 +1,108 @@
+"""What a terminal shows of an estimate first: verdict, loads of every bearing, limits, what to do next."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from textwrap import shorten
+
+import numpy as np
+
+from rotordrop.elements.ball_bearing import STATIC_STRESS
+from rotordrop.estimate.bearing_drop import BearingDrop
+from rotordrop.estimate.estimate import Estimate
+from rotordrop.report.content import SIMULATED_RECORD, Column, ReportContent, Statement, Table, table
+from rotordrop.report.drop_sections import static_limit_statement
+from rotordrop.report.estimate_page import estimate_verdict
+from rotordrop.report.quantity import Quantity, shown
+
+LONGEST_VERDICT, LONGEST = 270, 185
+"""Characters of the verdict and of another statement: three lines and two of a terminal of 100 columns."""
+MOST_LIMITS = 3
+MORE = " … (--all)"
+MEAN = "mean_force_0p15_0p2_N"
+
+
+def estimate_screen(estimate: Estimate) -> ReportContent:
+    """The first screen of an estimate: 25 lines of a terminal of 100 columns; the page says the rest."""
+    judgement, _part, *others = estimate_verdict(estimate)
+    later = {one.sentence() for one in estimate.later if one.larger}
+    static = [static_limit_statement(b, certain=estimate.consistent) for b in estimate.bearings]
+    elsewhere = {*estimate.assumed, *(one.text for one in static)}
+    limits = [one for one in others if one.level != "good" and one.text not in elsewhere]
+    # what hides a loss first, then what is a warning
+    limits.sort(key=lambda one: (one.text not in later, one.level not in ("bad", "warning")))
+    said = limits[: MOST_LIMITS if estimate.consistent else MOST_LIMITS - 1]
+    assumed = ", ".join(dict.fromkeys((*estimate.assumed.values(), _of_static(estimate))))
+    remedies = dict.fromkeys(check.remedy for check in estimate.checks if not check.passed and check.remedy)
+    closing = (
+        f"{len(limits) - len(said)} more with --all" if len(limits) > len(said) else "",
+        f"assumed: {assumed}",
+        f"to do next: {'; '.join(remedies)}" if remedies else "",
+    )
+    return ReportContent(
+        title=f"{estimate.machine.name}, {estimate.name}, dropped from {shown(estimate.speed, 'speed')}",
+        simulated=SIMULATED_RECORD if estimate.simulated_record else "",
+        verdict=(
+            _short(judgement, LONGEST_VERDICT),
+            *(_short(one, LONGEST) for one in said),
+            *(_short(Statement(text), LONGEST) for text in closing if text),
+        ),
+        screen=_loads(estimate),
+    )
+
+
+def _of_static(estimate: Estimate) -> str:
+    ends = [Quantity.of(b.peak_stress.known, "pressure").ends[1] for b in estimate.bearings]
+    values = ends if not estimate.consistent else [b.peak_stress.value for b in estimate.bearings]
+    shares = ", ".join(f"{100.0 * one / STATIC_STRESS:.0f}" for one in values)
+    return f"peak stress {shares} % of the {shown(STATIC_STRESS, 'pressure')} of C0 (ISO 76)"
+
+
+def _short(one: Statement, longest: int) -> Statement:
+    return Statement(shorten(one.text, longest, placeholder=MORE), one.level)
+
+
+def _loads(estimate: Estimate) -> Table:
+    """Loads of every bearing, one line each."""
+    certain = estimate.consistent
+
+    def number(known: object, kind: str) -> str:
+        one = Quantity.of(known, kind, range_only=not certain)
+        return f"{one.text} ({one.interval_text})" if one.interval_text else one.text
+
+    def mean(b: BearingDrop) -> str:
+        known = b.values.get(MEAN)
+        return b.missing.get(MEAN, "–") if known is None else number(known, "force")
+
+    lines: dict[str, Callable[[BearingDrop], str]] = {
+        "peak bearing force": lambda b: number(b.peak_force.known, "force"),
+        "at, pressed towards": _moment,
+        "peak Hertz stress": lambda b: number(b.peak_stress.known, "pressure"),
+        "impacts": lambda b: b.missing.get("impacts", str(len(b.impacts))),
+        "largest displacement": _displacement,
+        "mean force, 150 to 200 ms": mean,
+    }
+    what = "90 % intervals" if certain else "90 % ranges"
+    columns = [Column(f"first {1e3 * estimate.until:.0f} ms, {what}", str)]
+    for bearing in estimate.bearings:
+        values = {name: of(bearing) for name, of in lines.items()}
+        columns.append(Column(bearing.name, values.__getitem__))
+    return table(lines, columns)
+
+
+def _moment(b: BearingDrop) -> str:
+    """When the force is largest, and where the rotor presses then."""
+    when = shown(b.peak_force.time, "time", 4)
+    if b.force_vector is None:
+        return when
+    x, y = -b.force_vector[int(np.argmin(np.abs(b.force.time - b.peak_force.time)))]
+    return f"{when}, {math.degrees(math.atan2(y, x)):.0f}° (bottom −90°)"
+
+
+def _displacement(b: BearingDrop) -> str:
+    farthest = float(np.nanmax(b.motions[-1].radial.values))
+    if b.air_gap is None:
+        return shown(farthest, "length")
+    gap = 0.5 * (b.air_gap.lower + b.air_gap.upper)
+    return f"{shown(farthest, 'length')}, {farthest / gap:.2f} × the air gap"

@@ -1,0 +1,74 @@
+"""The first screen of an estimate: what an engineer looks for, in 25 lines of 100 columns."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+
+import pytest
+from rich.console import Console
+
+from rotordrop.estimate.estimate import Estimate, Verdict
+from rotordrop.estimate.later_motion import LaterMotion
+from rotordrop.report.estimate_screen import estimate_screen
+from rotordrop.report.terminal import print_summary
+from rotordrop.track.consistency import Check
+
+
+def lines_of(estimate: Estimate) -> list[str]:
+    stream = io.StringIO()
+    print_summary(estimate_screen(estimate), Console(file=stream, width=100, highlight=False, markup=False))
+    return stream.getvalue().splitlines()
+
+
+def line(estimate: Estimate, begin: str) -> str:
+    return next(one for one in lines_of(estimate) if one.strip().startswith(begin))
+
+
+def test_the_loads_of_every_bearing_stand_in_one_line_each(estimate: Estimate) -> None:
+    bearing = estimate.bearing("NDE")
+    low, high = bearing.peak_force.interval_90 or (0.0, 0.0)
+    assert f"{bearing.peak_force.value:.0f} N ({low:.0f} to {high:.0f} N)" in line(
+        estimate, "peak bearing force"
+    )
+    assert f"{1e3 * bearing.peak_force.time:.3f} ms, -" in line(estimate, "at, pressed").replace("−", "-")
+    assert len(bearing.impacts) == int(line(estimate, "impacts").split()[1])
+    assert "× the air gap" in line(estimate, "largest displacement")
+    assert "the estimated part ends before 200 ms" in " ".join(" ".join(lines_of(estimate)).split())
+
+
+def test_what_every_record_leaves_to_assumption_stands_in_one_statement(estimate: Estimate) -> None:
+    text = " ".join(" ".join(lines_of(estimate)).split())
+    assert "assumed: gains within ±1.6%, sensors faster than" in text
+    assert "no unbalance phase" in text and "of C0 (ISO 76)" in text
+    assert "lets the estimate find it" not in text  # the note that says more
+    assert any("lets the estimate find it" in note for note in estimate.notes)
+
+
+def test_a_larger_motion_later_on_comes_before_other_limits(estimate: Estimate) -> None:
+    later = LaterMotion(bearing="NDE", first=3e-4, first_time=0.01, later=4e-4, later_time=1.7, resolved=1e-6)
+    warned = replace(estimate, later=(later,), warnings=("one", "two", "three", later.sentence()), notes=())
+    said = [one for one in lines_of(warned) if one.startswith("warning: ")]
+    assert said[0].startswith("warning: NDE: the rotor went 100.0 µm further out at 1.7")
+    assert len(said) == 3
+    assert "1 more with --all" in " ".join(lines_of(warned))
+
+
+@pytest.mark.parametrize("failed", ["innovation size", "sensor errors"])
+def test_a_flagged_estimate_shows_ranges_and_what_to_do(estimate: Estimate, failed: str) -> None:
+    check = Check(name=failed, passed=False, message=f"{40 * 'far off '}", remedy="calibrate on two drops")
+    flagged = replace(
+        estimate,
+        verdict=Verdict.WIDENED,
+        checks=(check,),
+        warnings=tuple(f"{k} {40 * 'long '}" for k in range(5)),
+        notes=(),
+        simulated_record=True,
+    )
+    shown = lines_of(flagged)
+    assert len(shown) <= 25
+    text = " ".join(" ".join(shown).split())
+    assert "problem: The model is not consistent" in text
+    assert "to do next: calibrate on two drops" in text.lower()
+    low, high = estimate.bearing("DE").peak_force.interval_90 or (0.0, 0.0)
+    assert f"{low:.0f} to {high:.0f} N" in line(flagged, "peak bearing force")
